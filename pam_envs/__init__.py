@@ -1,0 +1,10 @@
+"""Gymnasium environments for the control of pneumatic artificial muscles.
+
+``import pam_envs`` registers the environments; ``gymnasium.make("PAM/MusclePositioning-v0")``
+makes one.
+"""
+
+from pam_envs.envs.registration import register_all
+
+__version__ = "0.1.0"
+register_all()

@@ -1,0 +1,144 @@
+"""Machine code for kernels: numba, imported when the first kernel is built."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from typing import Any
+
+from numba import njit, prange, types
+from numba.core import caching, cgutils
+from numba.core.extending import intrinsic
+from numba.np.arrayobj import make_array, populate_array
+
+from pam_envs import kernels
+
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": False}
+
+
+class _PackageLocator(caching._CacheLocator):
+    """Keeps compiled code by the digest of the whole package.
+
+    Numba's own locator looks only at the file of the function itself, so that an edit of a
+    function that it calls, in another file, would go unnoticed.
+    """
+
+    def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
+        self._folder = kernels.cache_folder() / kernels.source_digest()
+        self._line = py_func.__code__.co_firstlineno  # type: ignore[attr-defined]
+
+    def get_cache_path(self) -> str:
+        """Return the folder."""
+        return str(self._folder)
+
+    def get_source_stamp(self) -> str:
+        """Return what the code is valid for."""
+        return kernels.source_digest()
+
+    def get_disambiguator(self) -> str:
+        """Tell functions of one name apart."""
+        return str(self._line)
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> Any:
+        """Return a locator, or None where nothing can be written."""
+        locator = cls(py_func, py_file)
+        try:
+            locator._folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=locator._folder):
+                return locator
+        except OSError:
+            return None
+
+
+class _CacheImpl(caching.CompileResultCacheImpl):
+    _locator_classes = [_PackageLocator]
+
+
+class _Cache(caching.Cache):
+    _impl_class = _CacheImpl
+
+
+def _constant_view(context: Any, builder: Any, view: Any, data: Any, shape: tuple[int, int]) -> Any:
+    """Return an array value of constant shape over memory that it does not own."""
+    width = context.get_abi_sizeof(context.get_data_type(view.dtype))
+    made = make_array(view)(context, builder)
+    populate_array(
+        made,
+        data=data,
+        shape=[context.get_constant(types.intp, n) for n in shape],
+        strides=[context.get_constant(types.intp, n) for n in (shape[1] * width, width)],
+        itemsize=context.get_constant(types.intp, width),
+        meminfo=None,
+        parent=cgutils.get_null_value(made.parent.type),
+    )
+    return made._getvalue()
+
+
+@intrinsic(prefer_literal=True)
+def _tile_view(typing: Any, tiles: Any, tile: Any, rows: Any, lanes: Any) -> Any:
+    """Return a view of one tile whose shape and strides are constants of the code."""
+    if not isinstance(rows, types.IntegerLiteral) or not isinstance(lanes, types.IntegerLiteral):
+        return None
+    view = types.Array(tiles.dtype, 2, "C")
+    shape = (rows.literal_value, lanes.literal_value)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        source = make_array(signature.args[0])(context, builder, arguments[0])
+        size = context.get_constant(types.intp, shape[0] * shape[1])
+        data = builder.gep(source.data, [builder.mul(arguments[1], size)])
+        return _constant_view(context, builder, view, data, shape)
+
+    return view(tiles, types.intp, rows, lanes), generate
+
+
+@intrinsic(prefer_literal=True)
+def _scratch(typing: Any, rows: Any, lanes: Any) -> Any:
+    """Return rows of scratch on the stack, of constant shape."""
+    if not isinstance(rows, types.IntegerLiteral) or not isinstance(lanes, types.IntegerLiteral):
+        return None
+    view = types.Array(types.float64, 2, "C")
+    shape = (rows.literal_value, lanes.literal_value)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        block = cgutils.alloca_once(
+            builder, context.get_data_type(types.float64), size=shape[0] * shape[1]
+        )
+        return _constant_view(context, builder, view, block, shape)
+
+    return view(rows, lanes), generate
+
+
+_REPLACED: dict[str, Any] = {"tile_view": _tile_view, "scratch": _scratch}
+_BUILT: dict[Any, dict[Any, Any]] = {}
+
+
+def _finish(made: Callable[..., Any], original: Any) -> Callable[..., Any]:
+    """Compile a callee."""
+    return njit(forceinline=original.__pam_kernel__, **_OPTIONS)(made)  # type: ignore[no-any-return]
+
+
+def compiled(
+    function: Callable[..., Any], name: str, parallel: bool, names: dict[str, Any]
+) -> Callable[..., Any]:
+    """Return a dispatcher for a kernel with replaced names (see ``kernels.build``)."""
+    names = {"prange": prange if parallel else range, **_REPLACED, **names}
+    key = tuple(sorted((k, v if isinstance(v, int) else id(v)) for k, v in names.items()))
+    done = dict(_BUILT.setdefault(key, {}))
+    done.pop(function, None)
+
+    def finish(made: Callable[..., Any], original: Any) -> Callable[..., Any]:
+        if original is not function:
+            return _finish(made, original)
+        made.__qualname__ = made.__name__ = name
+        dispatcher = njit(parallel=parallel, **_OPTIONS)(made)
+        try:
+            dispatcher._cache = _Cache(made)
+        except RuntimeError:  # no place to write: compile in memory
+            pass
+        return dispatcher  # type: ignore[no-any-return]
+
+    dispatcher = kernels.rebind(function, names, finish, done)
+    del done[function]
+    _BUILT[key].update(done)
+    return dispatcher

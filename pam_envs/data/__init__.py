@@ -1,0 +1,1 @@
+"""Measured tables and identified plants that the library ships, see ``PROVENANCE.md``."""

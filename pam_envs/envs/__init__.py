@@ -1,0 +1,1 @@
+"""Gymnasium environments: a plant, a reference and a task."""

@@ -1,0 +1,247 @@
+"""The stack of dominant extrema: a Preisach operator's memory, and its recursive inverse.
+
+Of all that an input did, the operator keeps the alternating extrema that no later, larger
+excursion has wiped out, each with the output reached there. In the rows of a lane
+
+- ``stack[0]`` is where the history starts: ``low``, where every relay is down; or, in a virgin
+  history, the largest excursion so far of either sign (0 at the start, in a range ``-h..h``);
+- ``stack[count - 2]`` is the last turn and ``stack[count - 1]`` the present input;
+- ``sums[k]`` is the output at ``stack[k]``, so that one term of the Everett map gives the next.
+
+An output is always computed from a stored turn and never added up along the way: stopping in
+between, or coming back to a turn, changes no bit.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.hysteresis.everett import everett
+from pam_envs.kernels import clip, entry, kernel
+
+Array = NDArray[np.float64]
+
+
+# Branches live in kernels of scalars, and the kernels that hold rows run straight through: the
+# compiler then needs no reference counts on the rows, which makes a step three times as fast.
+
+
+@kernel
+def _held(x: float, low: float, high: float) -> float:
+    """Return ``x`` within its range, and ``low`` for a value that is not a number."""
+    if not x > low:
+        return low
+    return min(x, high)
+
+
+@kernel
+def _rises(x: float, last: float, goes_up: bool) -> bool:
+    """Return which way ``x`` goes; without motion, the way of the present branch."""
+    return goes_up if x == last else x > last
+
+
+@kernel
+def _branch(n: int, rising: bool, goes_up: bool) -> int:
+    """Return the count of turns, less the present input where the same branch goes on."""
+    if n > 1 and rising == goes_up:
+        return n - 1
+    return n
+
+
+@kernel
+def _passes(x: float, bound: float, rising: bool) -> bool:
+    return x >= bound if rising else x <= bound
+
+
+@kernel
+def _base(n: int, value: float, start_value: float, start: float, low: float) -> int:
+    """Return 0 where the history begins anew: at ``low``, or beyond a virgin one's largest."""
+    if n == 1 and (value == start_value or (start != low and abs(value) >= abs(start_value))):
+        return 0
+    return n
+
+
+@kernel
+def _room(n: int, depth: int) -> int:
+    return n - 1 if n == depth else n
+
+
+@kernel
+def _origin(
+    n: int, x: float, turn: float, output: float, start: float, low: float
+) -> tuple[float, float, float]:
+    """Return the turn that an output is counted from, the output there, and the map's factor.
+
+    A virgin curve is half the branch from the opposite input, counted from 0.
+    """
+    if n > 0 or start == low:
+        return turn, output, 1.0
+    return -x, 0.0, 0.5
+
+
+@kernel
+def preisach_step(
+    x: float, stack: Any, sums: Any, count: Any, lane: int, table: Any, low: float,
+    inverse_cell: float,
+) -> float:  # fmt: skip
+    """Advance the memory of one lane to the input ``x`` and return the output.
+
+    Parameters
+    ----------
+    x : float
+        Input. Beyond the table's range it counts as the nearest end; not-a-number counts as low.
+    stack, sums : rows of float, shape (depth, lanes)
+        Extrema and the outputs there; changed in place. ``depth`` is at least 3.
+    count : row of int, shape (lanes,)
+        Number of points in use; changed in place.
+    lane : int
+        Column to work on.
+    table : rows of float, shape (n, n)
+        Antisymmetric Everett map.
+    low : float
+        Input of the table's first row.
+    inverse_cell : float
+        Cells per unit of input, ``(n - 1) / (high - low)``.
+
+    Returns
+    -------
+    float
+        Output.
+
+    Notes
+    -----
+    When the stack is full, a further turn is not stored: the smallest loop, that between the last
+    turn and the present input, is forgotten, and the input moves back and forth on the branch
+    that led to that turn. The output has no jump, and all larger loops are kept exactly.
+    """
+    x = _held(x, low, low + (len(table) - 1) / inverse_cell)
+    n = count[lane]
+    last, start = stack[n - 1][lane], stack[0][lane]
+    goes_up = last > stack[max(n - 2, 0)][lane]
+    rising = _rises(x, last, goes_up)
+    n = _branch(n, rising, goes_up)
+    while n > 1 and _passes(x, stack[n - 2][lane], rising):
+        n -= 2  # a loop is closed and wiped out
+    n = _room(_base(n, x, start, start, low), len(stack))
+    k = max(n - 1, 0)
+    turn, output, part = _origin(n, x, stack[k][lane], sums[k][lane], start, low)
+    change = everett((x - low) * inverse_cell, (turn - low) * inverse_cell, table)
+    y = output + part * change
+    stack[n][lane] = x
+    sums[n][lane] = y
+    count[lane] = n + 1
+    return y
+
+
+@kernel
+def _halved(i: int, k: int, upper: bool) -> tuple[int, int]:
+    middle = (i + k) // 2
+    return (middle, k) if upper else (i, middle)
+
+
+@kernel
+def _part(rest: float, rise: float) -> float:
+    return clip(rest / rise, 0.0, 1.0) if rise > 0.0 else 0.0
+
+
+@kernel
+def _on_branch(change: float, b: float, table: Any) -> float:
+    """Return ``a`` in cells with ``everett(a, b) = change``: linear in ``a`` within a cell."""
+    i, k = 0, len(table) - 1
+    while k - i > 1:
+        middle = (i + k) // 2
+        i, k = _halved(i, k, everett(middle * 1.0, b, table) <= change)
+    first = everett(i * 1.0, b, table)
+    rise = everett(k * 1.0, b, table) - first
+    return i + _part(change - first, rise)
+
+
+@kernel
+def _virgin_input(y: float, table: Any) -> float:
+    """Return ``a`` in cells with ``everett(a, n - 1 - a) / 2 = y``: quadratic within a cell."""
+    top = len(table) - 1
+    i, k = 0, top
+    while k - i > 1:
+        middle = (i + k) // 2
+        i, k = _halved(i, k, table[middle][top - middle] <= 2.0 * y)
+    first, last = table[i][top - i], table[k][top - k]
+    corner = table[i][top - k] + table[k][top - i]
+    # first + s (last - first) + s (1 - s) bend = 2 y
+    bend = corner - first - last
+    slope, rest = last - first + bend, 2.0 * y - first
+    root = math.sqrt(max(0.0, slope * slope - 4.0 * bend * rest))
+    return i + _part(2.0 * rest, slope + root)
+
+
+@kernel
+def _input(n: int, y: float, change: float, b: float, virgin: bool, table: Any) -> float:
+    if n == 0 and virgin:
+        return _virgin_input(y, table)
+    return _on_branch(change, b, table)
+
+
+@kernel
+def _either(first: bool, a: float, b: float) -> float:
+    return a if first else b
+
+
+@kernel
+def preisach_inverse(
+    y: float, stack: Any, sums: Any, count: Any, lane: int, table: Any, low: float,
+    inverse_cell: float,
+) -> float:  # fmt: skip
+    """Return the input that takes the output of one lane to ``y``; the memory is left alone.
+
+    The recursion ``E(u_next, u_turn) = y - y_turn`` from the turn that ``y`` leaves standing:
+    exact, other than a series over an inverted Everett map, which holds only for relay densities
+    of ``alpha - beta`` alone. An output out of reach gives the end of the range. Parameters are
+    those of :func:`preisach_step`.
+    """
+    n = count[lane]
+    last, start = sums[n - 1][lane], stack[0][lane]
+    goes_up = stack[n - 1][lane] > stack[max(n - 2, 0)][lane]
+    rising = _rises(y, last, goes_up)
+    present = stack[n - 1][lane]
+    n = _branch(n, rising, goes_up)
+    while n > 1 and _passes(y, sums[n - 2][lane], rising):
+        n -= 2
+    n = _room(_base(n, y, sums[0][lane], start, low), len(stack))
+    k = max(n - 1, 0)
+    b = (stack[k][lane] - low) * inverse_cell
+    found = _input(n, y, y - sums[k][lane], b, start != low, table)
+    return _either(y == last, present, low + found / inverse_cell)
+
+
+@entry
+def simulate(
+    x: Array, stack: Any, sums: Any, count: Any, table: Any, low: float, inverse_cell: float,
+    y: Array,
+) -> None:  # fmt: skip
+    """Write into ``y`` the outputs of lane 0 for the inputs ``x`` in turn."""
+    for t in range(len(x)):
+        y[t] = preisach_step(x[t], stack, sums, count, 0, table, low, inverse_cell)
+
+
+@entry
+def advance_rows(
+    x: Array, stack: Any, sums: Any, count: Any, table: Any, low: float, inverse_cell: float,
+    y: Array,
+) -> None:  # fmt: skip
+    """Write into ``y`` the output of every lane for one input each."""
+    for lane in range(len(x)):
+        y[lane] = preisach_step(x[lane], stack, sums, count, lane, table, low, inverse_cell)
+
+
+@entry
+def invert_rows(
+    y: Array, stack: Any, sums: Any, count: Any, table: Any, low: float, inverse_cell: float,
+    x: Array,
+) -> None:  # fmt: skip
+    """Write into ``x`` the input of every lane that gives ``y``, and advance the memories."""
+    for lane in range(len(y)):
+        x[lane] = preisach_inverse(y[lane], stack, sums, count, lane, table, low, inverse_cell)
+        preisach_step(x[lane], stack, sums, count, lane, table, low, inverse_cell)

@@ -1,0 +1,309 @@
+"""Maxwell-slip elements and play operators: two duals of one rate-independent memory.
+
+A *play* follows its input at a distance of at most its threshold. A *stop* (an elasto-slip
+element: a spring in series with dry friction) is the rest, ``stop = x - play``. Springs and stops
+in parallel make the Maxwell-slip model, length in and force out; plays in parallel make the
+Prandtl-Ishlinskii operator, force or pressure in and length out. Each is the exact inverse of the
+other, in the middle of a history too: see :meth:`PlayOperator.inverse`.
+
+References
+----------
+F. Al-Bender, V. Lampaert, J. Swevers, "The generalized Maxwell-slip model", IEEE Trans. Automatic
+Control 50 (2005). P. Krejci, K. Kuhnen, "Inverse control of systems with hysteresis and creep",
+IEE Proc. Control Theory Appl. 148 (2001), for the inverse and its state.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.hysteresis.checks import (
+    check_not_negative,
+    check_thresholds,
+    floats,
+    series,
+    single_rows,
+)
+from pam_envs.hysteresis.elements import (
+    move_plays,
+    play,
+    play_step,
+    simulate_plays,
+    simulate_slips,
+    slip_step,
+    stop,
+)
+
+__all__ = ["MaxwellSlip", "PlayOperator", "play", "play_step", "slip_step", "stop"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlayOperator:
+    """A line and plays in parallel: ``y = linear * x + sum(weights * plays)``.
+
+    Parameters
+    ----------
+    thresholds : tuple of float
+        Half dead widths of the plays, rising, at least 0, in the unit of the input.
+    weights : tuple of float
+        Slope that each play adds when it moves, output unit per input unit. Not negative for a
+        passive, invertible operator.
+    linear : float
+        Slope of the memory-free part.
+    """
+
+    thresholds: tuple[float, ...]
+    weights: tuple[float, ...]
+    linear: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "thresholds", floats("thresholds", self.thresholds))
+        object.__setattr__(self, "weights", floats("weights", self.weights))
+        object.__setattr__(self, "linear", floats("linear", (self.linear,))[0])
+        check_thresholds("thresholds", self.thresholds, len(self.weights), "weights")
+
+    @property
+    def total_slope(self) -> float:
+        """The slope where every play moves: that of large amplitudes."""
+        return self.linear + math.fsum(self.weights)
+
+    def initial_state(self, batch_shape: tuple[int, ...] = ()) -> Array:
+        """Return the play positions of the virgin state, zeros of shape ``(*batch_shape, n)``."""
+        return np.zeros((*batch_shape, len(self.thresholds)))
+
+    def step(self, x: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
+        """Return the output and the new state for one sample of every row.
+
+        Parameters
+        ----------
+        x : array_like, shape (...)
+            Inputs.
+        state : array_like, shape (..., n)
+            Play positions before; they are not changed.
+
+        Returns
+        -------
+        y : ndarray, shape (...)
+            Outputs, the same bits as :meth:`simulate` gives.
+        state : ndarray, shape (..., n)
+            Play positions after.
+        """
+        x = np.asarray(x, dtype=float)
+        new = move_plays(x, self.thresholds, state)
+        y = np.asarray(self.linear * x)
+        for i, weight in enumerate(self.weights):
+            y = y + weight * new[..., i]
+        return y, new
+
+    def simulate(self, x: ArrayLike, state: ArrayLike | None = None) -> tuple[Array, Array]:
+        """Return the outputs, shape (T,), for inputs of shape (T,), and the last state, (n,)."""
+        values = series(x)
+        start = self.initial_state() if state is None else state
+        rows = single_rows(start, len(self.thresholds))
+        y = np.empty_like(values)
+        arrays = np.array(self.thresholds), np.array(self.weights)
+        simulate_plays(values, rows, *arrays, self.linear, y)
+        return y, rows[:, 0]
+
+    def dissipated(self, before: ArrayLike, after: ArrayLike) -> Array:
+        """Return the work lost between two states, ``sum(weights * r * abs(change))``.
+
+        The input must have moved one way in between, or not passed its last turn by enough to
+        move a play back. Over a closed cycle the sum is the loop area, the integral of ``x dy``.
+        """
+        moved = np.abs(np.asarray(after, dtype=float) - np.asarray(before, dtype=float))
+        return moved @ (np.array(self.weights) * np.array(self.thresholds))
+
+    def scaled(self, width: float) -> PlayOperator:
+        """Return this operator with its hysteresis made ``width`` times as wide.
+
+        The output is ``s x - width (s x - y)`` with ``s`` the total slope: 0 is free of memory,
+        1 is this operator, and the slope of large amplitudes is always the same.
+        """
+        (width,) = floats("width", (width,))
+        check_not_negative("width", (width,), "to stay passive")
+        linear = width * self.linear + (1.0 - width) * self.total_slope
+        return replace(self, weights=tuple(width * a for a in self.weights), linear=linear)
+
+    def _slopes(self) -> list[float]:
+        """Return the slope of the initial loading curve before every play moves, and after all."""
+        check_not_negative("weights", self.weights, "for the operator to have an inverse")
+        slopes = [self.linear]
+        for threshold, weight in zip(self.thresholds, self.weights, strict=True):
+            if threshold == 0.0:  # a play without width is part of the line
+                slopes[0] += weight
+            slopes.append(slopes[-1] + (weight if threshold > 0.0 else 0.0))
+        if slopes[0] <= 0.0:
+            raise ValueError(
+                f"the initial slope is {slopes[0]}; it must be above 0 for the operator to have"
+                " an inverse: add to linear, which is the output's motion right after a turn"
+            )
+        return slopes
+
+    def inverse(self) -> MaxwellSlip:
+        """Return the Maxwell-slip model that undoes this operator exactly.
+
+        The inverse's initial loading curve is the mirror image of this operator's: its break
+        displacements are the outputs at which this operator's plays begin to move, its slopes are
+        the reciprocals. Feed it from :meth:`inverse_state` in the middle of a history.
+
+        Raises
+        ------
+        ValueError
+            If a weight is negative or the initial slope is not above 0.
+        """
+        slopes = self._slopes()
+        stiffnesses = tuple(
+            (weight if threshold > 0.0 else 0.0) / (before * after)
+            for threshold, weight, before, after in zip(
+                self.thresholds, self.weights, slopes, slopes[1:], strict=False
+            )
+        )
+        return MaxwellSlip(1.0 / slopes[-1], stiffnesses, _loading(self.thresholds, slopes))
+
+    def inverse_state(self, state: ArrayLike) -> Array:
+        """Return the inverse's state, shape (..., n), for a state that this operator reached.
+
+        ``psi_i = A_i w_i + sum over j > i of weights_j w_j`` with ``A_i`` the slope of the
+        loading curve once play ``i`` moves.
+        """
+        return _mirrored(state, self._slopes(), self.weights)
+
+
+@dataclass(frozen=True)
+class MaxwellSlip:
+    """A spring and elasto-slip elements in parallel: ``spring * x + sum(k * stop)``.
+
+    Parameters
+    ----------
+    spring : float
+        Stiffness of the spring that never slips, force unit per length unit, at least 0.
+    stiffnesses : tuple of float
+        Stiffnesses ``k`` of the elements, at least 0.
+    break_displacements : tuple of float
+        Deflections at which the elements slip, rising, at least 0. The break force of an element
+        is its stiffness times this.
+
+    Notes
+    -----
+    The state holds the slip positions (where each element would be free of force), shape (..., n).
+    """
+
+    spring: float
+    stiffnesses: tuple[float, ...]
+    break_displacements: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "spring", floats("spring", (self.spring,))[0])
+        object.__setattr__(self, "stiffnesses", floats("stiffnesses", self.stiffnesses))
+        breaks = floats("break_displacements", self.break_displacements)
+        object.__setattr__(self, "break_displacements", breaks)
+        check_thresholds("break_displacements", breaks, len(self.stiffnesses), "stiffnesses")
+        check_not_negative("stiffnesses", self.stiffnesses, "to dissipate and not create energy")
+        check_not_negative("spring", (self.spring,), "to be a spring")
+
+    @property
+    def total_slope(self) -> float:
+        """The stiffness where every element slips: that of large amplitudes."""
+        return self.spring
+
+    def initial_state(self, batch_shape: tuple[int, ...] = ()) -> Array:
+        """Return the slip positions of the virgin state, zeros of shape ``(*batch_shape, n)``."""
+        return np.zeros((*batch_shape, len(self.stiffnesses)))
+
+    def step(self, x: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
+        """Return the force, shape (...), and the new state, (..., n), for one sample of every row.
+
+        The bits are those of :meth:`simulate`; ``state`` is not changed.
+        """
+        x = np.asarray(x, dtype=float)
+        new = move_plays(x, self.break_displacements, state)
+        force = np.asarray(self.spring * x)
+        for i, stiffness in enumerate(self.stiffnesses):
+            force = force + stiffness * (x - new[..., i])
+        return force, new
+
+    def simulate(self, x: ArrayLike, state: ArrayLike | None = None) -> tuple[Array, Array]:
+        """Return the forces, shape (T,), for inputs of shape (T,), and the last state, (n,)."""
+        values = series(x)
+        start = self.initial_state() if state is None else state
+        rows = single_rows(start, len(self.stiffnesses))
+        force = np.empty_like(values)
+        arrays = np.array(self.break_displacements), np.array(self.stiffnesses)
+        simulate_slips(values, rows, *arrays, self.spring, force)
+        return force, rows[:, 0]
+
+    def dissipated(self, before: ArrayLike, after: ArrayLike) -> Array:
+        """Return the friction work between two states, ``sum(k * x_break * abs(slip))``.
+
+        Exact when the input moved one way in between. Summed over the steps of a cycle it is the
+        loop area, the integral of ``force dx``; never negative.
+        """
+        slipped = np.abs(np.asarray(after, dtype=float) - np.asarray(before, dtype=float))
+        return slipped @ (np.array(self.stiffnesses) * np.array(self.break_displacements))
+
+    def stored_energy(self, x: ArrayLike, state: ArrayLike) -> Array:
+        """Return the elastic energy at input ``x``, shape (...), with slip positions (..., n)."""
+        x = np.asarray(x, dtype=float)
+        stops = x[..., None] - np.asarray(state, dtype=float)
+        return 0.5 * self.spring * x**2 + 0.5 * (stops**2 @ np.array(self.stiffnesses))
+
+    def scaled(self, width: float) -> MaxwellSlip:
+        """Return this model with its hysteresis ``width`` times as wide, 0 for the spring alone."""
+        (width,) = floats("width", (width,))
+        check_not_negative("width", (width,), "to stay passive")
+        return replace(self, stiffnesses=tuple(width * k for k in self.stiffnesses))
+
+    def _slopes(self) -> list[float]:
+        """Return the slope of the initial loading curve before each slips, and after all."""
+        if self.spring <= 0.0:
+            raise ValueError(
+                f"spring is {self.spring}; it must be above 0 for the model to have an inverse:"
+                " a force beyond the sum of the break forces has no displacement otherwise"
+            )
+        slopes = [self.spring]  # summed from the softest up: no difference of large numbers
+        pairs = zip(self.break_displacements, self.stiffnesses, strict=True)
+        for displacement, stiffness in reversed(list(pairs)):
+            slopes.append(slopes[-1] + (stiffness if displacement > 0.0 else 0.0))
+        return slopes[::-1]
+
+    def inverse(self) -> PlayOperator:
+        """Return the play operator that undoes this model exactly (``spring`` must be above 0)."""
+        slopes = self._slopes()
+        weights = tuple(
+            (stiffness if displacement > 0.0 else 0.0) / (before * after)
+            for displacement, stiffness, before, after in zip(
+                self.break_displacements, self.stiffnesses, slopes, slopes[1:], strict=False
+            )
+        )
+        thresholds = _loading(self.break_displacements, slopes)
+        return PlayOperator(thresholds, weights, 1.0 / slopes[0])
+
+    def inverse_state(self, state: ArrayLike) -> Array:
+        """Return the inverse's state, shape (..., n), for a state that this model reached."""
+        return _mirrored(state, self._slopes(), tuple(-k for k in self.stiffnesses))
+
+
+def _loading(thresholds: tuple[float, ...], slopes: list[float]) -> tuple[float, ...]:
+    """Return the initial loading curve, piecewise linear, at its kinks ``thresholds``."""
+    values, x, y = [], 0.0, 0.0
+    for threshold, slope in zip(thresholds, slopes, strict=False):
+        y, x = y + slope * (threshold - x), threshold
+        values.append(y)
+    return tuple(values)
+
+
+def _mirrored(state: ArrayLike, slopes: list[float], changes: tuple[float, ...]) -> Array:
+    w = np.asarray(state, dtype=float)
+    result = np.empty_like(w)
+    rest = np.zeros(w.shape[:-1])
+    for i in reversed(range(len(changes))):
+        result[..., i] = slopes[i + 1] * w[..., i] + rest
+        rest = rest + changes[i] * w[..., i]
+    return result

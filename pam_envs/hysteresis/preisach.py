@@ -1,0 +1,337 @@
+"""The classical Preisach operator, with its exact recursive inverse.
+
+Relays of all switching thresholds in parallel, weighted by a density: the general
+rate-independent memory in which larger excursions wipe out smaller ones and all minor loops
+between the same two inputs are congruent. The operator is carried by its Everett map
+(:mod:`~pam_envs.hysteresis.everett`) and by a stack of dominant extrema
+(:mod:`~pam_envs.hysteresis.extrema`), a handful of operations a step whatever the grid.
+
+Play operators are the special case whose density depends on ``alpha - beta`` alone.
+
+References
+----------
+I. D. Mayergoyz, "Mathematical Models of Hysteresis", Springer 1991, chapter 1.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.hysteresis import everett as maps
+from pam_envs.hysteresis.checks import check_not_negative, floats, series
+from pam_envs.hysteresis.extrema import (
+    advance_rows,
+    invert_rows,
+    preisach_inverse,
+    preisach_step,
+    simulate,
+)
+from pam_envs.hysteresis.maxwell_slip import PlayOperator
+
+__all__ = ["Preisach", "PreisachState", "preisach_inverse", "preisach_step"]
+
+Array = NDArray[np.float64]
+Start = Literal["low", "virgin"]
+
+SMALLEST_WEIGHT = -1e-12
+"""Relay weights down to this part of the largest Everett value count as rounding errors."""
+
+
+class PreisachState(NamedTuple):
+    """Memory of a batch: extrema and outputs, shapes (depth, \\*batch), and points in use."""
+
+    stack: Array
+    sums: Array
+    counts: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Preisach:
+    """Preisach operator on the inputs from ``low`` to ``high``.
+
+    Parameters
+    ----------
+    low, high : float
+        Range of the input; an input beyond it counts as the nearest end.
+    table : array_like, shape (n, n)
+        Everett map at ``n >= 2`` evenly spaced inputs, antisymmetric, of relay weights that are
+        nowhere negative; kept as a tuple of tuples. Interpolated bilinearly in between.
+    depth : int
+        Extrema that are kept, at least 3. A turn too many forgets the smallest loop.
+    start : {"low", "virgin"}
+        State at the beginning: every relay down, at ``low``; or demagnetised, at 0 in a range
+        with ``low = -high`` and a map with ``mu(a, b) = mu(-b, -a)``. For a muscle, the first is
+        one that has always been vented to ``low`` before.
+    start_output : float
+        Output at the beginning. 0 for a virgin start.
+
+    Raises
+    ------
+    ValueError
+        If a value is out of bounds, or a relay weight is negative (the message names the cell).
+    """
+
+    low: float
+    high: float
+    table: tuple[tuple[float, ...], ...]
+    depth: int = 24
+    start: Start = "low"
+    start_output: float = 0.0
+
+    def __post_init__(self) -> None:
+        low, high, output = floats(
+            "(low, high, start_output)", (self.low, self.high, self.start_output)
+        )
+        table = np.array(self.table, dtype=float)
+        rows = tuple(tuple(row) for row in table.tolist()) if table.ndim == 2 else ()
+        for name, value in (("low", low), ("high", high), ("start_output", output)):
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "table", rows)
+        if not low < high:
+            raise ValueError(f"low is {low} and high is {high}; low must be below high: swap them")
+        if self.depth < 3:
+            raise ValueError(f"depth is {self.depth}; a loop needs 3 points: 24 is the default")
+        _check_table(table)
+        self._check_start(table)
+
+    def _check_start(self, table: Array) -> None:
+        if self.start not in ("low", "virgin"):
+            raise ValueError(f"start is {self.start!r}; choose 'low' or 'virgin'")
+        if self.start == "low":
+            return
+        if self.low != -self.high or self.start_output != 0.0:
+            raise ValueError(
+                f"start is 'virgin' with low = {self.low}, high = {self.high} and start_output ="
+                f" {self.start_output}; it needs low = -high and 0: widen the range, or use 'low'"
+            )
+        error = maps.symmetry_error(table)
+        if error > 1e-9:
+            raise ValueError(
+                f"start is 'virgin' and the table is asymmetric by {error:.2g} of its largest"
+                " entry; it needs mu(a, b) = mu(-b, -a) to 1e-9: use start='low', or symmetrise"
+            )
+
+    # --- construction ---------------------------------------------------------------------------
+
+    @classmethod
+    def from_weights(
+        cls, weights: ArrayLike, low: float, high: float, depth: int = 24, start: Start = "low",
+        start_output: float = 0.0,
+    ) -> Preisach:  # fmt: skip
+        """Return the operator with relay weights per cell, shape (n - 1, n - 1).
+
+        ``weights[k][l]``, ``l <= k``, is what the relays that switch up in cell ``k`` and down in
+        cell ``l`` add to the output, in units of the output.
+        """
+        table = maps.table_from_weights(weights)
+        return cls(low, high, table, depth, start, start_output)  # type: ignore[arg-type]
+
+    @classmethod
+    def from_density(
+        cls, density: Callable[[Array, Array], ArrayLike], low: float, high: float,
+        levels: int = 33, depth: int = 24, start: Start = "low",
+    ) -> Preisach:  # fmt: skip
+        """Return the operator of a density ``mu(alpha, beta)``, output per input squared.
+
+        The density is taken at the middle of each cell; a cell on the diagonal, which is half a
+        cell, at the middle of its triangle.
+        """
+        cell = (high - low) / (levels - 1)
+        down, up = np.meshgrid(*2 * (low + cell * (np.arange(levels - 1) + 0.5),))
+        near = np.eye(levels - 1) / 6.0 * cell
+        values = np.broadcast_to(np.asarray(density(up + near, down - near), float), up.shape)
+        area = cell**2 * (1.0 - 0.5 * np.eye(levels - 1))
+        return cls.from_weights(np.tril(values * area), low, high, depth, start)
+
+    @classmethod
+    def from_play(
+        cls, operator: PlayOperator, low: float, high: float, levels: int = 33, depth: int = 24,
+        start: Start = "low",
+    ) -> Preisach:  # fmt: skip
+        """Return the Preisach operator that is ``operator``, exactly at the grid's inputs.
+
+        It starts in the play's own virgin state, or where the play is after the input has come
+        up to ``low`` from far below; the outputs agree, start included.
+        """
+        table = maps.play_table(operator, maps.grid(low, high, levels))
+        output = 0.0
+        if start == "low":
+            output = operator.total_slope * low + math.fsum(
+                a * r for a, r in zip(operator.weights, operator.thresholds, strict=True)
+            )
+        return cls(low, high, table, depth, start, output)  # type: ignore[arg-type]
+
+    def plus_linear(self, slope: float) -> Preisach:
+        """Return this operator with ``slope * x`` added to its output."""
+        return self._mixed(1.0, slope)
+
+    def scaled(self, width: float, slope: float | None = None) -> Preisach:
+        """Return this operator with its hysteresis made ``width`` times as wide.
+
+        The output is ``s x - width (s x - y)`` with ``s`` the ``slope``, :attr:`total_slope`
+        unless given: 0 is the line ``s x``, 1 is this operator.
+        """
+        (width,) = floats("width", (width,))
+        check_not_negative("width", (width,), "to stay passive")
+        s = self.total_slope if slope is None else slope
+        return self._mixed(width, (1.0 - width) * s)
+
+    def _mixed(self, width: float, slope: float) -> Preisach:
+        table = width * self.everett + maps.line_table(slope, self.levels)
+        start = self.low if self.start == "low" else 0.0
+        output = width * self.start_output + slope * start
+        return replace(self, table=table, start_output=output)  # type: ignore[arg-type]
+
+    # --- what the map says ----------------------------------------------------------------------
+
+    @cached_property
+    def everett(self) -> Array:
+        """The Everett map as a read-only array, shape (n, n)."""
+        table = np.array(self.table)
+        table.setflags(write=False)
+        return table
+
+    @cached_property
+    def levels(self) -> Array:
+        """The inputs of the map's rows and columns, shape (n,)."""
+        return maps.grid(self.low, self.high, len(self.table))
+
+    @cached_property
+    def weights(self) -> Array:
+        """The relay weights per cell, shape (n - 1, n - 1), lower triangle; none negative."""
+        return maps.weights_from_table(self.everett)
+
+    @property
+    def inverse_cell(self) -> float:
+        """Cells per unit of input."""
+        return (len(self.table) - 1) / (self.high - self.low)
+
+    @property
+    def total_slope(self) -> float:
+        """The slope at the two tips of the major loop: for plays, that where all of them move."""
+        e = self.everett
+        return float((2.0 * e[-1, 0] - e[-2, 0] - e[-1, 1]) / 2.0 * self.inverse_cell)
+
+    # --- operation ------------------------------------------------------------------------------
+
+    def initial_state(self, batch_shape: tuple[int, ...] = ()) -> PreisachState:
+        """Return the state at the beginning, arrays of shape (depth, \\*batch_shape)."""
+        stack = np.zeros((self.depth, *batch_shape))
+        sums = np.zeros((self.depth, *batch_shape))
+        stack[0] = self.low if self.start == "low" else 0.0
+        sums[0] = self.start_output
+        return PreisachState(stack, sums, np.ones(batch_shape, dtype=np.int64))
+
+    def simulate(
+        self, x: ArrayLike, state: PreisachState | None = None
+    ) -> tuple[Array, PreisachState]:
+        """Return the outputs, shape (T,), for inputs of shape (T,), and the last state."""
+        values = series(x)
+        start = self.initial_state() if state is None else state
+        if np.ndim(start.counts) != 0:
+            raise ValueError(
+                f"state is of a batch of shape {np.shape(start.counts)}; simulate takes one: use step"
+            )
+        rows, y = self._rows(start), np.empty_like(values)
+        simulate(values, *rows, self.everett, self.low, self.inverse_cell, y)
+        return y, _shaped(rows, ())
+
+    def step(self, x: ArrayLike, state: PreisachState) -> tuple[Array, PreisachState]:
+        """Return the output and the new state for one sample of every row.
+
+        Parameters
+        ----------
+        x : array_like, shape batch_shape
+            Inputs.
+        state : PreisachState
+            Memory before; it is not changed.
+
+        Returns
+        -------
+        y : ndarray, shape batch_shape
+            Outputs.
+        state : PreisachState
+            Memory after.
+        """
+        shape = np.shape(state.counts)
+        values = np.array(np.broadcast_to(np.asarray(x, float), shape)).reshape(-1)
+        rows, y = self._rows(state), np.empty_like(values)
+        advance_rows(values, *rows, self.everett, self.low, self.inverse_cell, y)
+        return y.reshape(shape), _shaped(rows, shape)
+
+    def inverse_step(self, y: ArrayLike, state: PreisachState) -> tuple[Array, PreisachState]:
+        """Return the input that takes the output to ``y``, and the memory after that input.
+
+        Parameters
+        ----------
+        y : array_like, shape batch_shape
+            Wanted outputs. One out of reach gives the nearest end of the input's range.
+        state : PreisachState
+            Memory before; it is not changed.
+
+        Raises
+        ------
+        ValueError
+            If the output can stand still while the input moves (a cell of the diagonal has no
+            weight), so that there is no unique input.
+        """
+        self._check_invertible()
+        shape = np.shape(state.counts)
+        values = np.array(np.broadcast_to(np.asarray(y, float), shape)).reshape(-1)
+        rows, x = self._rows(state), np.empty_like(values)
+        invert_rows(values, *rows, self.everett, self.low, self.inverse_cell, x)
+        return x.reshape(shape), _shaped(rows, shape)
+
+    @cached_property
+    def _stiff_cell(self) -> int:
+        return int(np.argmin(np.diag(self.weights)))
+
+    def _check_invertible(self) -> None:
+        k = self._stiff_cell
+        if self.weights[k, k] <= 0.0:
+            raise ValueError(
+                f"the relay weight of the diagonal cell {k} is {self.weights[k, k]}; it must be"
+                " above 0 for an inverse, or the output stands still after a turn: add a line"
+                " with plus_linear(slope)"
+            )
+
+    def _rows(self, state: PreisachState) -> tuple[Array, Array, NDArray[np.int64]]:
+        """Return copies of the arrays, shapes (depth, lanes) and (lanes,)."""
+        depth = len(state.stack)
+        stack = np.array(state.stack, dtype=float).reshape(depth, -1)
+        sums = np.array(state.sums, dtype=float).reshape(depth, -1)
+        return stack, sums, np.array(state.counts, dtype=np.int64).reshape(-1)
+
+
+def _shaped(rows: tuple[Array, Array, NDArray[np.int64]], shape: tuple[int, ...]) -> PreisachState:
+    stack, sums, count = rows
+    full = (len(stack), *shape)
+    return PreisachState(stack.reshape(full), sums.reshape(full), count.reshape(shape))
+
+
+def _check_table(table: Array) -> None:
+    if table.ndim != 2 or table.shape[0] != table.shape[1] or len(table) < 2:
+        raise ValueError(f"table has shape {table.shape}; it must be square, 2 by 2 or larger")
+    if not np.all(np.isfinite(table)):
+        i, j = np.argwhere(~np.isfinite(table))[0]
+        raise ValueError(f"table[{i}][{j}] is {table[i, j]}; it must be finite: fill the gap")
+    if np.any(table != -table.T):
+        i, j = np.argwhere(table != -table.T)[0]
+        raise ValueError(
+            f"table[{i}][{j}] is {table[i, j]} and table[{j}][{i}] is {table[j, i]}; E(b, a) must"
+            " be -E(a, b): give both halves, or build the operator with from_weights"
+        )
+    weights = maps.weights_from_table(table)
+    k, j = np.unravel_index(np.argmin(weights), weights.shape)
+    if weights[k, j] < SMALLEST_WEIGHT * np.max(np.abs(table)):
+        raise ValueError(
+            f"the relay weight of cell ({k}, {j}) is {weights[k, j]:.3g}; it must be at least 0 or"
+            " loops create energy: clip it with from_weights, or identify with fit_preisach"
+        )

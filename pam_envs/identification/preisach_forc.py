@@ -1,0 +1,312 @@
+"""Preisach operators from measurements.
+
+:func:`preisach_from_curves` reads the Everett map off first-order descending curves, one from
+every level of the grid: the textbook identification, which takes what it is given. It needs a
+dedicated test. :func:`fit_preisach` takes any record and solves for relay weights that are not
+negative; what the record leaves open is filled from a *prior density*.
+
+The prior is the density of ``alpha - beta`` alone (the map of a play operator: loops of one width
+all over the range) that fits the record best. It has one unknown a diagonal, which a single large
+loop fixes. The fit is drawn to it by a small penalty, so that cells that no excursion separated
+keep its proportions while those that the record fixes follow the record. How much is fixed is
+handed back: the rank, and for every cell the share that the data decide.
+
+References
+----------
+I. D. Mayergoyz, "Mathematical Models of Hysteresis", Springer 1991, section 1.2: identification by
+first-order curves; congruency and wiping out as necessary and sufficient conditions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import nnls
+
+from pam_envs.hysteresis import everett as maps
+from pam_envs.hysteresis.preisach import Preisach, Start
+from pam_envs.identification.memory_loops import measured
+from pam_envs.identification.relay_regressors import relay_regressors
+
+Array = NDArray[np.float64]
+Curve = tuple[ArrayLike, ArrayLike]
+
+
+@dataclass(frozen=True)
+class CurveFit:
+    """Operator read off first-order curves.
+
+    Parameters
+    ----------
+    model : Preisach
+        The operator.
+    clipped : float
+        Weight of the relays that came out negative and were set to 0, as a part of all weight:
+        0 for curves of a Preisach operator, and a measure of noise or misfit otherwise.
+    """
+
+    model: Preisach
+    clipped: float
+
+
+@dataclass(frozen=True)
+class PreisachFit:
+    """Operator fitted to a record, and how much of it the record fixes.
+
+    Parameters
+    ----------
+    model : Preisach
+        The operator; its output includes the fitted constant (``start_output``) unless the start
+        is virgin.
+    offset : float
+        The fitted constant: the output in the start state.
+    rms : float
+        Root mean square of the residuals, in the unit of the output.
+    rank : int
+        Rank of the regressors (one per cell, and the constant).
+    unknowns : int
+        Number of cells, plus 1.
+    decided : ndarray, shape (n - 1, n - 1)
+        Share of each cell's weight that the record decides, from 0 (all prior) to 1.
+    prior : ndarray, shape (n - 1, n - 1)
+        Relay weights of the prior.
+    """
+
+    model: Preisach
+    offset: float
+    rms: float
+    rank: int
+    unknowns: int
+    decided: Array
+    prior: Array
+
+
+def curve_inputs(low: float, high: float, levels: int, points: int = 1) -> Array:
+    """Return the input of a first-order test: from ``low`` up to each level in turn and back.
+
+    Parameters
+    ----------
+    low, high : float
+        Range of the input.
+    levels : int
+        Levels of the grid; there are ``levels - 1`` curves.
+    points : int
+        Samples per cell of the grid.
+
+    Returns
+    -------
+    ndarray
+        Input samples, beginning and ending at ``low``.
+    """
+    fine = np.linspace(low, high, (levels - 1) * points + 1)
+    legs = [fine[:1]]
+    for k in range(1, levels):
+        up = fine[1 : k * points + 1]
+        legs += [up, up[-2::-1], fine[:1]]
+    return np.concatenate(legs)
+
+
+def descending_curves(x: ArrayLike, y: ArrayLike) -> list[tuple[Array, Array]]:
+    """Return the falling runs of a record, each from its turn to its end, as (x, y) pairs."""
+    inputs, outputs = measured(x, y)
+    falling = np.diff(inputs) < 0.0
+    edges = np.diff(np.concatenate([[0], falling.astype(int), [0]]))
+    first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    return [(inputs[a : b + 1], outputs[a : b + 1]) for a, b in zip(first, last, strict=True)]
+
+
+def preisach_from_curves(
+    curves: Sequence[Curve],
+    low: float,
+    high: float,
+    levels: int,
+    depth: int = 24,
+    start_output: float = 0.0,
+) -> CurveFit:
+    """Return the Preisach operator of first-order descending curves.
+
+    Parameters
+    ----------
+    curves : sequence of (x, y) pairs
+        Each begins at a turn on the ascending major branch and falls to ``low``. There must be
+        one from every level of the grid above ``low``, in any order.
+    low, high : float
+        Range of the input.
+    levels : int
+        Levels of the grid.
+    depth : int
+        Extrema that the operator keeps.
+    start_output : float
+        Output at ``low``.
+
+    Returns
+    -------
+    CurveFit
+        The operator, ``E(alpha, beta) = y(turn at alpha) - y(beta)``, negative weights set to 0.
+
+    Raises
+    ------
+    ValueError
+        If a level has no curve (the message names it), or a curve does not reach ``low``.
+    """
+    points = maps.grid(low, high, levels)
+    rising = np.zeros((levels, levels))
+    found = np.zeros(levels, dtype=bool)
+    for x, y in curves:
+        inputs, outputs = measured(x, y)
+        k = int(np.argmin(np.abs(points - inputs[0])))
+        near = 1e-6 * (high - low)
+        if abs(points[k] - inputs[0]) > near or k == 0:
+            continue
+        if inputs[-1] > low + near:
+            raise ValueError(
+                f"the curve from {inputs[0]} ends at {inputs[-1]}; it must reach {low}: measure it"
+                " to the end of the range"
+            )
+        rising[k, :k] = outputs[0] - np.interp(points[:k], inputs[::-1], outputs[::-1])
+        found[k] = True
+    if not np.all(found[1:]):
+        missing = points[1:][~found[1:]]
+        raise ValueError(
+            f"no curve turns at {missing[0]}, a level of the grid ({missing.size} missing); choose"
+            " levels for which all were measured, or use fit_preisach, which takes any record"
+        )
+    weights = maps.weights_from_table(rising - rising.T)
+    clipped = np.sum(np.abs(weights[weights < 0.0])) / max(np.sum(np.abs(weights)), 1e-300)
+    model = Preisach.from_weights(
+        np.maximum(weights, 0.0), low, high, depth, start_output=start_output
+    )
+    return CurveFit(model, float(clipped))
+
+
+def fit_preisach(
+    x: ArrayLike,
+    y: ArrayLike,
+    low: float,
+    high: float,
+    levels: int = 17,
+    depth: int = 24,
+    start: Start = "low",
+    prior_weight: float = 1e-3,
+) -> PreisachFit:
+    """Return the Preisach operator, plus a constant, that is nearest to a record.
+
+    Parameters
+    ----------
+    x, y : array_like, shape (T,)
+        Input and output, from the start state on.
+    low, high : float
+        Range of the input; inputs beyond it count as its ends.
+    levels : int
+        Levels of the grid: ``levels (levels - 1) / 2`` unknown weights.
+    depth : int
+        Extrema that the operator keeps.
+    start : {"low", "virgin"}
+        State before the first sample. A virgin start makes the weights symmetric, ``mu(a, b) =
+        mu(-b, -a)``, and needs ``low = -high``.
+    prior_weight : float
+        Penalty on the distance from the prior, relative to the largest singular value of the
+        regressors. Above 0: smaller follows the record further into directions it hardly fixes.
+
+    Returns
+    -------
+    PreisachFit
+        Operator, residual, rank, and the share of every cell that the record decides.
+    """
+    inputs, outputs = measured(x, y)
+    if not prior_weight > 0.0:
+        raise ValueError(f"prior_weight is {prior_weight}; it must be above 0: 1e-3 is the default")
+    up, down = np.tril_indices(levels - 1)
+    regressors = relay_regressors(inputs, low, high, levels, depth, start)[:, up, down]
+    join = _mirror_join(up, down, levels) if start == "virgin" else np.eye(len(up))
+    columns = regressors @ join
+    middle, level = columns.mean(axis=0), outputs.mean()
+    if start == "virgin":  # nothing to add to an output that begins at 0
+        middle, level = np.zeros_like(middle), 0.0
+    centred, target = columns - middle, outputs - level
+    sizes, directions = np.linalg.svd(centred, full_matrices=False)[1:]
+    strength = prior_weight * max(sizes[0], 1e-300)
+    prior = _gap_prior(centred, target, join, up - down)
+    found = _drawn(centred, target, prior, strength)
+    weights, prior_cells, decided = (np.zeros((levels - 1, levels - 1)) for _ in range(3))
+    weights[up, down], prior_cells[up, down] = join @ found, join @ prior
+    share = (sizes / np.hypot(sizes, strength))[:, None] * directions
+    decided[up, down] = (join > 0.0) @ np.sum(share**2, axis=0)
+    offset = float(level - middle @ found)
+    model = Preisach.from_weights(weights, low, high, depth, start, offset)
+    rms = float(np.sqrt(np.mean((outputs - offset - columns @ found) ** 2)))
+    rank = int(np.sum(sizes > sizes[0] * max(centred.shape) * np.finfo(float).eps))
+    extra = int(start != "virgin")
+    return PreisachFit(
+        model, offset, rms, rank + extra, columns.shape[1] + extra, decided, prior_cells
+    )
+
+
+def _mirror_join(up: NDArray[np.int64], down: NDArray[np.int64], levels: int) -> Array:
+    """Return the matrix, (cells, pairs), that gives a cell and its mirror image one weight."""
+    first = np.minimum(up * levels + down, (levels - 2 - down) * levels + levels - 2 - up)
+    _, pair = np.unique(first, return_inverse=True)
+    return np.eye(pair.max() + 1)[pair]
+
+
+def _gap_prior(columns: Array, y: Array, join: Array, gaps: NDArray[np.int64]) -> Array:
+    """Return the best weights that depend on the gap of the thresholds alone."""
+    gap_of = (join.T @ gaps) / join.sum(axis=0)
+    diagonals = np.eye(int(gaps.max()) + 1)[np.rint(gap_of).astype(int)]
+    summed = columns @ diagonals
+    size = np.maximum(np.sqrt(np.sum(summed**2, axis=0)), 1e-300)
+    return diagonals @ (nnls(summed / size, y)[0] / size)
+
+
+def _drawn(columns: Array, y: Array, prior: Array, strength: float) -> Array:
+    """Return weights, not negative, near the data and drawn to the prior."""
+    stacked = np.vstack([columns, strength * np.eye(columns.shape[1])])
+    return nnls(stacked, np.concatenate([y, strength * prior]), maxiter=30 * columns.shape[1])[0]
+
+
+def congruency_error(loops: Sequence[Curve]) -> float:
+    """Return how far minor loops between the same two inputs are from being congruent.
+
+    Parameters
+    ----------
+    loops : sequence of (x, y) pairs
+        At least two records of the same closed excursion of the input, met in different
+        histories, each from the same turn on.
+
+    Returns
+    -------
+    float
+        Largest difference between two loops after moving their first points together, divided by
+        the largest height of a loop. 0 (to rounding) for a Preisach operator; creep, or a width
+        that depends on the level of the output, shows here.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two loops, or they are not between the same inputs.
+    """
+    records = [measured(x, y) for x, y in loops]
+    if len(records) < 2:
+        raise ValueError(f"{len(records)} loops; congruency compares at least 2: record more")
+    ends = [(x.min(), x.max(), x[0]) for x, _ in records]
+    span = ends[0][1] - ends[0][0]
+    for k, end in enumerate(ends):
+        if np.max(np.abs(np.subtract(end, ends[0]))) > 1e-6 * span:
+            raise ValueError(
+                f"loop {k} is between {end[0]} and {end[1]} from {end[2]}, loop 0 between"
+                f" {ends[0][0]} and {ends[0][1]} from {ends[0][2]}; compare equal loops"
+            )
+    travels = [np.concatenate([[0.0], np.cumsum(np.abs(np.diff(x)))]) for x, _ in records]
+    shapes = [
+        np.interp(travels[0], travel, y - y[0])
+        for travel, (_, y) in zip(travels, records, strict=True)
+    ]
+    height = max(float(np.ptp(shape)) for shape in shapes)
+    spread = float(np.max(np.ptp(np.array(shapes), axis=0)))
+    return spread / height if height > 0.0 else 0.0
+
+
+symmetry_error = maps.symmetry_error

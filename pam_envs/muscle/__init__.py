@@ -1,0 +1,1 @@
+"""Static force laws of pneumatic muscles: force(pressure, contraction)."""

@@ -1,0 +1,119 @@
+"""Effective-area law: pressure pulls on an area, braid and tube push back.
+
+    F(w, e) = a (1 - c e) w - [ f0 (1 - exp(-e / e0)) + k1 e + k3 e^3 ]
+
+with effective pressure ``w`` [Pa] and strain ``e`` (contraction over rest length, negative when
+stretched). The area term is the virtual-work force of a McKibben muscle about its rest length
+(its area shrinks as it shortens: ``c``); the bracket is the force of tube and braid at no
+pressure, whose saturating part gives the threshold pressure of a short muscle. The same two terms,
+with a Gaussian taper, fit published isometric maps of 10 mm muscles.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.kernels import kernel
+from pam_envs.parameters import parameter
+
+_FIT = "least squares on seed 003, Tables 3-5"
+
+
+@dataclass(frozen=True)
+class EffectiveAreaMuscle:
+    """Geometry and static force law of one muscle."""
+
+    rest_length: float = parameter(
+        0.1, "m", 0.02, 2.0, "published", "seed 003, Table 1: MAS-10-N-100"
+    )
+    diameter: float = parameter(
+        0.01, "m", 0.003, 0.1, "published", "seed 003, Table 1: MAS-10-N-100"
+    )
+    braid_angle: float = parameter(
+        0.499, "rad", 0.2, 0.9, "assumed", "28.6 degrees, DMSP-10-250 (public model code)"
+    )
+    area: float = parameter(8.7e-4, "m2", 1e-5, 2e-2, "identified", _FIT)
+    area_taper: float = parameter(0.0, "1", 0.0, 6.0, "identified", _FIT, neutral=0.0)
+    braid_force: float = parameter(106.0, "N", 0.0, 5e3, "identified", _FIT)
+    braid_strain: float = parameter(0.0167, "1", 0.005, 0.2, "identified", _FIT)
+    stiffness: float = parameter(2250.0, "N", 0.0, 1e5, "identified", _FIT)
+    hardening: float = parameter(8600.0, "N", 0.0, 1e7, "identified", _FIT)
+
+    def tension(self, drive: ArrayLike, strain: ArrayLike) -> NDArray[np.float64]:
+        """Return the force [N] at effective pressure ``drive`` [Pa] and ``strain`` [1]."""
+        w, e = np.asarray(drive, float), np.asarray(strain, float)
+        return self.area * (1.0 - self.area_taper * e) * w - self.passive(e)
+
+    def passive(self, strain: ArrayLike) -> NDArray[np.float64]:
+        """Return the force [N] with which tube and braid resist contraction."""
+        e = np.asarray(strain, float)
+        return np.asarray(
+            self.braid_force * -np.expm1(-e / self.braid_strain)
+            + self.stiffness * e
+            + self.hardening * e**3
+        )
+
+    def drive(self, force: ArrayLike, strain: ArrayLike) -> NDArray[np.float64]:
+        """Return the effective pressure [Pa] that gives ``force`` [N] at ``strain`` [1]."""
+        e = np.asarray(strain, float)
+        return (np.asarray(force, float) + self.passive(e)) / (
+            self.area * (1.0 - self.area_taper * e)
+        )
+
+    def volume(self, strain: ArrayLike) -> NDArray[np.float64]:
+        """Return the inner volume [m3] of an ideal braid of inextensible threads."""
+        ratio = (1.0 - np.asarray(strain, float)) * math.cos(self.braid_angle)
+        tall = math.pi * self.diameter**2 / 4.0 / math.sin(self.braid_angle) ** 2
+        return np.asarray(
+            tall * self.rest_length * (1.0 - np.asarray(strain)) * (1.0 - ratio * ratio)
+        )
+
+
+@kernel
+def tension(
+    drive: float,
+    strain: float,
+    slack: float,
+    area: float,
+    taper: float,
+    braid_force: float,
+    stiffness: float,
+    hardening: float,
+) -> float:
+    """Return the force [N]; ``slack`` is ``exp(-strain / braid_strain)``."""
+    return (
+        area * (1.0 - taper * strain) * drive
+        - braid_force * (1.0 - slack)
+        - (stiffness + hardening * strain * strain) * strain
+    )
+
+
+@kernel
+def tension_slope(
+    drive: float,
+    strain: float,
+    slack: float,
+    area: float,
+    taper: float,
+    braid_slope: float,
+    stiffness: float,
+    hardening: float,
+) -> float:
+    """Return minus the derivative of the force with respect to strain [N], positive.
+
+    ``braid_slope`` is ``braid_force / braid_strain``.
+    """
+    return (
+        area * taper * drive + braid_slope * slack + stiffness + 3.0 * hardening * strain * strain
+    )
+
+
+@kernel
+def volume(strain: float, rest_length: float, tall: float, cosine: float) -> float:
+    """Return the inner volume [m3]; ``tall`` is pi D^2 / (4 sin^2 angle), ``cosine`` its cosine."""
+    ratio = (1.0 - strain) * cosine
+    return tall * rest_length * (1.0 - strain) * (1.0 - ratio * ratio)

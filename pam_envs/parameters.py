@@ -1,0 +1,175 @@
+"""Declared physical parameters and named signals.
+
+A component is a frozen dataclass whose fields are made by :func:`parameter`, so that every number
+carries unit, bounds, provenance and source. :func:`check` refuses a value out of bounds with a
+sentence that names value, bound and remedy.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable, Iterator
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Provenance = Literal["published", "derived", "assumed", "identified"]
+PROVENANCES: tuple[str, ...] = ("published", "derived", "assumed", "identified")
+
+
+@dataclasses.dataclass(frozen=True)
+class Declaration:
+    """What is declared of one parameter.
+
+    Attributes
+    ----------
+    unit : str
+        SI unit, ``"1"`` for a pure number.
+    low, high : float
+        Bounds within which the parameter is physical, in ``unit``.
+    provenance : {"published", "derived", "assumed", "identified"}
+        Where the default comes from.
+    source : str
+        The paper and place, or the reason for an assumption.
+    neutral : float or None
+        The value that switches the effect off, where there is one.
+    spread : tuple of float or None
+        Range over which domain randomisation draws an assumed parameter, in ``unit``.
+    """
+
+    unit: str
+    low: float
+    high: float
+    provenance: Provenance
+    source: str
+    neutral: float | None = None
+    spread: tuple[float, float] | None = None
+
+
+def parameter(
+    default: float,
+    unit: str,
+    low: float,
+    high: float,
+    provenance: Provenance,
+    source: str,
+    *,
+    neutral: float | None = None,
+    spread: tuple[float, float] | None = None,
+) -> Any:
+    """Return a dataclass field for a physical parameter (see :class:`Declaration`)."""
+    declaration = Declaration(unit, low, high, provenance, source, neutral, spread)
+    return dataclasses.field(default=default, metadata={"declaration": declaration})
+
+
+def declarations(component: Any) -> dict[str, Declaration]:
+    """Return the declared parameters of a component class or instance, by field name."""
+    return {
+        field.name: field.metadata["declaration"]
+        for field in dataclasses.fields(component)
+        if "declaration" in field.metadata
+    }
+
+
+def check(component: Any, where: str = "") -> None:
+    """Raise if a parameter of ``component`` is not a finite number within its bounds.
+
+    Raises
+    ------
+    ValueError
+        Naming the parameter, its value, the bounds and what to do.
+    """
+    prefix = f"{where}." if where else ""
+    for name, declared in declarations(component).items():
+        value = getattr(component, name)
+        if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)):
+            raise ValueError(
+                f"{prefix}{name} must be a number in {declared.unit}, got {value!r}; "
+                f"give a value between {declared.low:g} and {declared.high:g}"
+            )
+        if not math.isfinite(value) or not declared.low <= value <= declared.high:
+            raise ValueError(
+                f"{prefix}{name} = {value:g} {declared.unit} is outside its bounds "
+                f"[{declared.low:g}, {declared.high:g}] {declared.unit}; "
+                "check the unit (all parameters are SI) or move the value inside the bounds"
+            )
+
+
+@dataclasses.dataclass(frozen=True)
+class Signal:
+    """One named component of an observation or an action.
+
+    Attributes
+    ----------
+    name : str
+        For example ``"pressure"``.
+    unit : str
+        SI unit.
+    low, high : float
+        Range in ``unit``; the normalised signal runs over [-1, 1] between them.
+    index : int
+        Position in the observation (or action) vector.
+    normalized : bool
+        Whether the vector holds the normalised or the SI value.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    index: int
+    normalized: bool = True
+
+    @property
+    def scale(self) -> tuple[float, float]:
+        """``(a, b)`` such that the vector's entry is ``a * si + b``."""
+        if not self.normalized:
+            return 1.0, 0.0
+        a = 2.0 / (self.high - self.low)
+        return a, -1.0 - a * self.low
+
+    def decode(self, vector: ArrayLike) -> NDArray[np.float64]:
+        """Return the SI value, shape (...), from vectors of shape (..., n)."""
+        a, b = self.scale
+        return (np.asarray(vector, np.float64)[..., self.index] - b) / a
+
+    def encode(self, value: ArrayLike) -> NDArray[np.float64]:
+        """Return the vector's entry for an SI value, held within the range."""
+        a, b = self.scale
+        return a * np.clip(np.asarray(value, np.float64), self.low, self.high) + b
+
+
+class Signals(tuple[Signal, ...]):
+    """Signals in the order of their vector, also by name: ``signals["pressure"]``."""
+
+    __slots__ = ()
+
+    def __new__(cls, signals: Iterable[Signal]) -> Signals:
+        """Check that indices run 0, 1, 2, ... and names are unique."""
+        made = super().__new__(cls, signals)
+        if [s.index for s in made] != list(range(len(made))):
+            raise ValueError("signal indices must run 0, 1, 2, ... in order")
+        if len({s.name for s in made}) != len(made):
+            raise ValueError("signal names must differ")
+        return made
+
+    def __getitem__(self, key: Any) -> Any:
+        """Return a signal by name or position."""
+        if isinstance(key, str):
+            for signal in self:
+                if signal.name == key:
+                    return signal
+            names = ", ".join(s.name for s in self)
+            raise KeyError(f"no signal named {key!r}; there are: {names}")
+        return super().__getitem__(key)
+
+    def names(self) -> Iterator[str]:
+        """Yield the names in order."""
+        return (signal.name for signal in self)
+
+    def decode(self, vector: ArrayLike, name: str) -> NDArray[np.float64]:
+        """Return the SI value of the signal ``name`` from vectors of shape (..., n)."""
+        found: Signal = self[name]
+        return found.decode(vector)

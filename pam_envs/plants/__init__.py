@@ -1,0 +1,1 @@
+"""Plants: regulators, muscles with memory, loads and sensors, composed."""

@@ -1,0 +1,118 @@
+"""The memory of a muscle: from the pressure inside to the effective pressure that pulls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.parameters import parameter
+
+Kind = Literal["maxwell_slip", "preisach", "none"]
+KINDS: tuple[Kind, ...] = ("maxwell_slip", "preisach", "none")
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Pressure-driven friction of braid and tube.
+
+    The pressure, stretched to a scale on which friction is uniform, passes an operator with
+    memory; the operator's hysteretic part is scaled by ``1 + width_per_load * load``; the result
+    is stretched back. ``operator`` is a :class:`PlayOperator` of total slope 1 (the dual of
+    Maxwell-slip elements), a :class:`Preisach` operator, or None.
+    """
+
+    operator: PlayOperator | Preisach | None = None
+    stretch: float = parameter(
+        0.0,
+        "1",
+        -0.8,
+        0.8,
+        "identified",
+        "pressure-dependent friction; least squares on seed 003, Tables 3-5",
+        neutral=0.0,
+    )
+    width_per_load: float = parameter(
+        0.0,
+        "1/kg",
+        -0.2,
+        0.2,
+        "identified",
+        "load-dependent loop width; least squares on seed 003, Tables 3-5",
+        neutral=0.0,
+    )
+
+    @property
+    def kind(self) -> Kind:
+        """Which operator this is."""
+        if self.operator is None:
+            return "none"
+        return "maxwell_slip" if isinstance(self.operator, PlayOperator) else "preisach"
+
+    def stretched(self, pressure: ArrayLike, full: float) -> NDArray[np.float64]:
+        """Return ``pressure`` [Pa] on the scale on which the friction is uniform."""
+        p = np.asarray(pressure, float)
+        return np.asarray(p * (1.0 + self.stretch * (1.0 - p / full)))
+
+    def unstretched(self, value: ArrayLike, full: float) -> NDArray[np.float64]:
+        """Return the pressure [Pa] whose stretched value is ``value``."""
+        z, s = np.asarray(value, float), 1.0 + self.stretch
+        root = np.sqrt(np.maximum(0.0, s * s - 4.0 * self.stretch * z / full))
+        return np.asarray(2.0 * z / (s + root))
+
+    def at_load(self, load: float) -> PlayOperator | Preisach | None:
+        """Return the operator at a load [kg], with its hysteretic part scaled."""
+        if self.operator is None:
+            return None
+        width = max(0.0, min(1.2, 1.0 + self.width_per_load * load))
+        if isinstance(self.operator, PlayOperator):
+            return self.operator.scaled(width)
+        return self.operator.scaled(width, slope=1.0)
+
+    def inverse(self, load: float, full: float) -> MemoryInverse:
+        """Return the exact inverse at a load [kg] for pressures from 0 to ``full`` [Pa]."""
+        return MemoryInverse(self, self.at_load(load), full)
+
+
+@dataclass(frozen=True)
+class MemoryInverse:
+    """The pressure that gives a wanted effective pressure, given the history so far."""
+
+    memory: Memory
+    operator: PlayOperator | Preisach | None
+    full: float
+
+    def initial_state(self, batch_shape: tuple[int, ...] = ()) -> Any:
+        """Return the state after a rest at no pressure."""
+        if self.operator is None:
+            return None
+        return self.operator.initial_state(batch_shape)
+
+    def pressure(self, drive: ArrayLike, state: Any) -> tuple[NDArray[np.float64], Any]:
+        """Return the pressure [Pa] for an effective pressure [Pa], and the state it leaves.
+
+        The pressure is held between 0 and ``full``, and the state is that of the held pressure.
+        """
+        wanted = self.memory.stretched(drive, self.full)
+        if self.operator is None:
+            return np.clip(np.asarray(drive, float), 0.0, self.full), None
+        if isinstance(self.operator, PlayOperator):
+            undo = self.operator.inverse()
+            felt, _ = undo.step(wanted, self.operator.inverse_state(state))
+        else:
+            felt, _ = self.operator.inverse_step(wanted, state)
+        felt = np.clip(felt, 0.0, self.full)
+        _, after = self.operator.step(felt, state)
+        return self.memory.unstretched(felt, self.full), after
+
+    def drive(self, pressure: ArrayLike, state: Any) -> tuple[NDArray[np.float64], Any]:
+        """Return the effective pressure [Pa] at a pressure [Pa], and the state it leaves."""
+        if self.operator is None:
+            return np.asarray(pressure, float), None
+        felt = self.memory.stretched(np.clip(pressure, 0.0, self.full), self.full)
+        value, after = self.operator.step(felt, state)
+        return self.memory.unstretched(value, self.full), after

@@ -1,0 +1,252 @@
+"""A muscle that lifts a load: Festo MAS-10-N-100 of seed 003.
+
+    set-point -> regulator -> pressure -> memory -> effective pressure -> static law -> hanging mass
+
+The measured quantity is the contraction from the rest length under the load that hangs at the
+start, as in the paper's tables.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.mechanics.hanging_mass import GRAVITY, LARGEST_PHASE, HangingMass
+from pam_envs.muscle.effective_area import EffectiveAreaMuscle
+from pam_envs.parameters import check
+from pam_envs.plants import plant_file
+from pam_envs.plants import single_muscle_rows as R
+from pam_envs.plants.memory import Kind, Memory
+from pam_envs.pneumatics.regulator import Regulator
+from pam_envs.sensing.sensor import PositionSensor, PressureSensor
+
+FOLDER = Path(__file__).resolve().parent.parent / "data"
+
+
+class UnstableParameters(ValueError):
+    """Parameters whose motion the sub-steps cannot follow."""
+
+
+@dataclass(frozen=True)
+class SingleMuscle:
+    """The plant; an extended one is ``dataclasses.replace`` of it.
+
+    Attributes
+    ----------
+    regulator, memory, muscle, mass, position, pressure
+        Its components, in the order of the signal.
+    provenance : mapping
+        Parameter name (``"muscle.area"``) to ``(provenance, source)`` where it differs from the
+        declaration.
+    ensemble : tuple of mapping
+        Other parameter sets that fit the data equally well (parameter name to value; Preisach
+        operators under ``"memory.operator"``), for domain randomisation.
+    substeps : int
+        Steps of the integrator in a control period.
+    """
+
+    family: ClassVar[str] = "single_muscle"
+    control_period: ClassVar[float] = 0.01
+
+    regulator: Regulator = field(default_factory=Regulator)
+    memory: Memory = field(default_factory=Memory)
+    muscle: EffectiveAreaMuscle = field(default_factory=EffectiveAreaMuscle)
+    mass: HangingMass = field(default_factory=HangingMass)
+    position: PositionSensor = field(default_factory=PositionSensor)
+    pressure: PressureSensor = field(default_factory=PressureSensor)
+    provenance: Mapping[str, tuple[str, str]] = field(default_factory=dict, compare=False)
+    ensemble: tuple[Mapping[str, Any], ...] = field(default=(), compare=False)
+    substeps: int = 4
+
+    def __post_init__(self) -> None:
+        """Check every parameter, and that the motion can be followed."""
+        for name in plant_file.COMPONENTS:
+            check(getattr(self, name), name)
+        if not isinstance(self.substeps, int) or not 1 <= self.substeps <= 100:
+            raise ValueError(
+                f"substeps = {self.substeps!r} must be a whole number from 1 to 100; 4 is the default"
+            )
+        self._check_memory()
+        self._check_motion()
+
+    def _check_memory(self) -> None:
+        operator = self.memory.operator
+        if isinstance(operator, PlayOperator):
+            total = operator.linear + sum(operator.weights)
+            if abs(total - 1.0) > 1e-9 or operator.linear <= 0.0:
+                raise ValueError(
+                    f"memory: the play operator's total slope is {total:g} with a linear part of "
+                    f"{operator.linear:g}; a muscle's memory needs total slope 1 and a linear part "
+                    "above 0: scale the weights"
+                )
+            if len(operator.weights) > R.ELEMENTS:
+                raise ValueError(
+                    f"memory: {len(operator.weights)} elements, at most {R.ELEMENTS} are simulated; "
+                    "merge neighbouring thresholds"
+                )
+        if isinstance(operator, Preisach):
+            full = self.regulator.max_pressure
+            span = (operator.low, operator.high)
+            if operator.start != "virgin" or not np.allclose(span, (-full, full), rtol=1e-9):
+                raise ValueError(
+                    f"memory: the Everett map spans {span} Pa with start {operator.start!r}; a "
+                    f"muscle needs -{full:g} to {full:g} Pa (the regulator's range and its mirror "
+                    "image) with start 'virgin', so that its first inflation is one"
+                )
+
+    def _check_motion(self) -> None:
+        """Refuse a motion that the sub-steps cannot follow (see ``mechanics.hanging_mass``)."""
+        m, law, h = self.mass, self.muscle, self.control_period / self.substeps
+        strains = np.linspace(-0.02, 0.2, 45)
+        slope = (
+            law.area * law.area_taper * self.regulator.max_pressure
+            + law.braid_force / law.braid_strain * np.exp(-strains / law.braid_strain)
+            + law.stiffness
+            + 3.0 * law.hardening * strains**2
+        )
+        k = float(slope.max()) / law.rest_length / m.moving_mass
+        half = 0.5 * m.damping / m.moving_mass
+        phase = max(k, half * half) * h * h
+        if phase > LARGEST_PHASE:
+            enough = math.ceil(self.substeps * math.sqrt(phase / LARGEST_PHASE))
+            raise UnstableParameters(
+                f"moving_mass = {m.moving_mass:g} kg with damping = {m.damping:g} N s/m and a "
+                f"stiffness of {k * m.moving_mass:.0f} N/m moves too fast for {self.substeps} "
+                f"sub-steps: phase {phase:.1f} against at most {LARGEST_PHASE:g}; use at least "
+                f"{enough} sub-steps or a larger moving_mass"
+            )
+
+    @classmethod
+    def mas10(cls, hysteresis: Kind = "maxwell_slip", **changes: float) -> SingleMuscle:
+        """Return the muscle identified on the measured tables, with that memory.
+
+        Parameters
+        ----------
+        hysteresis : {"maxwell_slip", "preisach", "none"}
+            Which memory; each was identified on the same data.
+        **changes : float
+            Parameters to replace, with ``__`` for the dot (``mass__load=4.55``).
+        """
+        if hysteresis not in ("maxwell_slip", "preisach", "none"):
+            raise ValueError(
+                f"hysteresis = {hysteresis!r}; choose 'maxwell_slip', 'preisach' or 'none'"
+            )
+        plant = cls.from_yaml(FOLDER / f"mas10_{hysteresis}.yaml")
+        return plant.replace({k.replace("__", "."): v for k, v in changes.items()})
+
+    def replace(self, values: Mapping[str, Any]) -> SingleMuscle:
+        """Return the plant with parameters replaced by dotted name (``"mass.load"``)."""
+        changed: dict[str, dict[str, Any]] = {}
+        for name, value in values.items():
+            component, _, entry = name.partition(".")
+            if name not in R.PARAMETERS and name != "memory.operator":
+                raise ValueError(
+                    f"no parameter named {name!r}; there are: {', '.join(R.PARAMETERS)}"
+                )
+            changed.setdefault(component, {})[entry] = value
+        parts: dict[str, Any] = {
+            c: dataclasses.replace(getattr(self, c), **v) for c, v in changed.items()
+        }
+        return dataclasses.replace(self, **parts)
+
+    def value(self, name: str) -> float:
+        """Return a parameter by dotted name, in SI."""
+        component, _, entry = name.partition(".")
+        return float(getattr(getattr(self, component), entry))
+
+    # --- the static law and its inverse -----------------------------------------------------
+
+    def contraction_at(self, drive: ArrayLike, load: ArrayLike) -> NDArray[np.float64]:
+        """Return the contraction [m] at rest under an effective pressure [Pa] and a load [kg].
+
+        Counted from the rest length under that load, as it is measured.
+        """
+        drive, load = np.broadcast_arrays(np.asarray(drive, float), np.asarray(load, float))
+        return np.asarray(self._absolute(drive, load) - self._absolute(np.zeros_like(drive), load))
+
+    def _absolute(self, drive: NDArray[Any], load: NDArray[Any]) -> NDArray[np.float64]:
+        low, high = np.full(drive.shape, -0.3), np.full(drive.shape, 0.6)
+        for _ in range(56):
+            e = 0.5 * (low + high)
+            up = self.muscle.tension(drive, e) > load * GRAVITY
+            low, high = np.where(up, e, low), np.where(up, high, e)
+        return np.asarray(0.5 * (low + high) * self.muscle.rest_length)
+
+    def drive_for(self, contraction: ArrayLike, load: ArrayLike) -> NDArray[np.float64]:
+        """Return the effective pressure [Pa] that holds a contraction [m] under a load [kg].
+
+        The exact inverse of :meth:`contraction_at`; not held within the regulator's range.
+        """
+        contraction, load = np.broadcast_arrays(
+            np.asarray(contraction, float), np.asarray(load, float)
+        )
+        strain = (contraction + self._absolute(np.zeros(load.shape), load)) / (
+            self.muscle.rest_length
+        )
+        return self.muscle.drive(load * GRAVITY, strain)
+
+    # --- rows, files, identity ----------------------------------------------------------------
+
+    def parameter_rows(self) -> NDArray[np.float64]:
+        """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
+        column = np.zeros(R.N_PARAMETERS)
+        column[: len(R.PARAMETERS)] = [self.value(name) for name in R.PARAMETERS]
+        column[R.TALL - R.N_STATE] = (
+            math.pi * self.muscle.diameter**2 / 4.0 / math.sin(self.muscle.braid_angle) ** 2
+        )
+        column[R.COSINE - R.N_STATE] = math.cos(self.muscle.braid_angle)
+        column[R.LINEAR - R.N_STATE] = 1.0
+        operator = self.memory.operator
+        if isinstance(operator, PlayOperator):
+            n = len(operator.weights)
+            column[R.LINEAR - R.N_STATE] = operator.linear
+            for start, values in (
+                (R.THRESHOLD, operator.thresholds),
+                (R.WEIGHT, operator.weights),
+            ):
+                column[start - R.N_STATE : start - R.N_STATE + n] = values
+        return column
+
+    @property
+    def elements(self) -> int:
+        """Number of play operators that are simulated."""
+        operator = self.memory.operator
+        return len(operator.weights) if isinstance(operator, PlayOperator) else 0
+
+    def members(self) -> tuple[SingleMuscle, ...]:
+        """Return this plant and the equally good fits beside it."""
+        return (self, *(self.replace(values) for values in self.ensemble))
+
+    def everett_tables(self) -> NDArray[np.float64]:
+        """Return the Everett maps of all members, shape (members, n, n); (1, 2, 2) if none."""
+        operators = [m.memory.operator for m in self.members()]
+        tables = [np.asarray(o.table, float) for o in operators if isinstance(o, Preisach)]
+        return np.ascontiguousarray(tables) if tables else np.zeros((1, 2, 2))
+
+    def to_yaml(self, path: str | Path) -> None:
+        """Write the plant to a file that :meth:`from_yaml` and ``gym.make(plant=...)`` read."""
+        plant_file.write(self, Path(path))
+
+    @classmethod
+    def from_yaml(cls, path: str | Path) -> SingleMuscle:
+        """Read a plant; what the file leaves out keeps its default.
+
+        Raises
+        ------
+        ValueError
+            If the file cannot be read, or a value is unknown or out of bounds.
+        """
+        return plant_file.read(cls, Path(path))
+
+    def digest(self) -> str:
+        """Return a hash of family, parameters and memory, 16 hexadecimal digits."""
+        return plant_file.digest(self)

@@ -1,0 +1,1 @@
+"""Pressure supply: proportional regulators and valves."""

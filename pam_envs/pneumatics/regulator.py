@@ -1,0 +1,105 @@
+"""Proportional pressure regulator: dead time, slew limit, first-order lag, saturation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pam_envs.kernels import decay, kernel
+from pam_envs.parameters import parameter
+
+DELAY_PERIODS = 12
+"""Longest dead time that the command history holds, in control periods."""
+
+
+@dataclass(frozen=True)
+class Regulator:
+    """A closed-loop pressure regulator as its user sees it.
+
+    The set-point, held between 0 and ``max_pressure``, takes effect after ``dead_time``. The
+    pressure then follows it by a first-order lag whose rate is limited to ``slew_rate``.
+    No value was published for the regulator of the measured muscle (Festo MPPES-3-1/4-6-010): the
+    defaults are assumed, within what two identified regulators of its class show.
+    """
+
+    max_pressure: float = parameter(
+        6e5, "Pa", 1e4, 1.2e6, "published", "seed 003, section 3.2: MPPES-3-1/4-6-010, 0 to 6 bar"
+    )
+    dead_time: float = parameter(
+        0.045,
+        "s",
+        0.0,
+        0.11,
+        "assumed",
+        "44 ms (DMSP-10-250 record, inflating), 45 ms (identified SMC ITV)",
+        neutral=0.0,
+        spread=(0.02, 0.1),
+    )
+    time_constant: float = parameter(
+        0.05,
+        "s",
+        0.002,
+        2.0,
+        "assumed",
+        "50 ms (DMSP-10-250 record, inflating), 83 ms (identified SMC ITV)",
+        spread=(0.035, 0.12),
+    )
+    slew_rate: float = parameter(
+        6.8e5,
+        "Pa/s",
+        1e4,
+        1e9,
+        "assumed",
+        "6.8 bar/s (DMSP-10-250 record, raw step)",
+        neutral=1e9,
+        spread=(4e5, 1.2e6),
+    )
+
+
+@kernel
+def delayed_fraction(end: float, per_width: float, switch: float) -> float:
+    """Return the share of an interval that lies after ``switch``.
+
+    The interval ends at ``end`` and is ``1 / per_width`` wide; shares within 1e-9 of 0 and 1 are
+    rounding errors and count as such.
+    """
+    share = (end - switch) * per_width
+    if share < 1e-9:
+        return 0.0
+    if share > 1.0 - 1e-9:
+        return 1.0
+    return share
+
+
+@kernel
+def regulator_step(
+    pressure: float,
+    target: float,
+    lag: float,
+    per_lag: float,
+    slew: float,
+    per_slew: float,
+    h: float,
+) -> float:
+    """Return the pressure after ``h`` seconds at a constant target: exact.
+
+    While the gap to the target exceeds ``slew * lag`` the pressure ramps; the rest of the interval
+    it decays exponentially.
+
+    Parameters
+    ----------
+    pressure, target : float
+        [Pa].
+    lag, per_lag : float
+        Time constant [s] and its reciprocal.
+    slew, per_slew : float
+        Largest rate [Pa/s] and its reciprocal.
+    h : float
+        Duration [s].
+    """
+    gap = target - pressure
+    size = abs(gap)
+    ramp = max(0.0, min(h, size * per_slew - lag))
+    left = (size - slew * ramp) * decay((h - ramp) * per_lag)
+    if gap < 0.0:
+        return target + left
+    return target - left

@@ -1,0 +1,1 @@
+"""Reference trajectories r(t), seeded, with preview."""

@@ -1,0 +1,1 @@
+"""Tasks: named reward terms, costs and ends. No physics."""

@@ -1,0 +1,302 @@
+"""Memories found again from their records, and how much a record can say."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from pam_envs.hysteresis import MaxwellSlip, PlayOperator, Preisach
+from pam_envs.identification.memory_loops import fit_maxwell_slip, fit_play
+from pam_envs.identification.preisach_forc import (
+    congruency_error,
+    curve_inputs,
+    descending_curves,
+    fit_preisach,
+    preisach_from_curves,
+    symmetry_error,
+)
+from pam_envs.identification.relay_regressors import relay_regressors
+
+Array = NDArray[np.float64]
+LADDER = (0.2, 0.5, 0.9, 1.4)
+
+few = settings(max_examples=40, deadline=None)
+weights_ = st.lists(st.floats(0.05, 2.0), min_size=4, max_size=4)
+
+
+def shrinking_loops(amplitude: float = 2.0, turns: int = 24, points: int = 25) -> Array:
+    """Return an input that swings ever less: it separates all thresholds below its amplitude."""
+    ends = [0.0] + [amplitude * (-1) ** k * (1.0 - k / turns) for k in range(turns)]
+    return np.concatenate([np.linspace(a, b, points) for a, b in pairwise(ends)])
+
+
+# --- plays and stops ------------------------------------------------------------------------------
+
+
+@few
+@given(weights_, st.floats(0.0, 2.0), st.floats(-1.0, 1.0))
+def test_play_weights_come_back(weights, linear, constant):
+    x = shrinking_loops()
+    y, _ = PlayOperator(LADDER, tuple(weights), linear).simulate(x)
+    fit = fit_play(x, y + constant, LADDER)
+    assert fit.determined
+    assert fit.rank == 6
+    np.testing.assert_allclose(fit.model.weights, weights, atol=1e-8)
+    assert fit.model.linear == pytest.approx(linear, abs=1e-8)
+    assert fit.offset == pytest.approx(constant, abs=1e-8)
+    assert fit.rms < 1e-10
+
+
+@few
+@given(weights_, st.floats(0.05, 2.0), st.floats(-1.0, 1.0))
+def test_stiffnesses_come_back(stiffnesses, spring, constant):
+    x = shrinking_loops()
+    force, _ = MaxwellSlip(spring, tuple(stiffnesses), LADDER).simulate(x)
+    fit = fit_maxwell_slip(x, force + constant, LADDER)
+    assert fit.determined
+    np.testing.assert_allclose(fit.model.stiffnesses, stiffnesses, atol=1e-8)
+    assert fit.model.spring == pytest.approx(spring, abs=1e-8)
+    assert fit.offset == pytest.approx(constant, abs=1e-8)
+
+
+def test_state_before_the_record_may_be_given():
+    model = PlayOperator(LADDER, (0.3, 0.1, 0.5, 0.2), 0.4)
+    _, state = model.simulate([1.9, -1.2])
+    x = shrinking_loops()
+    y, _ = model.simulate(x, state)
+    fit = fit_play(x, y, LADDER, initial_state=state)
+    np.testing.assert_allclose(fit.model.weights, model.weights, atol=1e-8)
+    assert fit_play(x, y, LADDER).rms > 1e-3  # the virgin state does not explain it
+
+
+def standard_errors(x: Array, sigma: float) -> Array:
+    """Return the standard deviations of the least-squares weights of line and plays."""
+    columns = [x] + [PlayOperator((r,), (1.0,), 0.0).simulate(x)[0] for r in LADDER]
+    design = np.column_stack([*columns, np.ones_like(x)])
+    return sigma * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
+
+
+def test_noise_costs_what_least_squares_promises():
+    model, x, sigma = PlayOperator(LADDER, (0.3, 0.1, 0.5, 0.2), 0.4), shrinking_loops(), 0.01
+    y, _ = model.simulate(x)
+    truth = np.array([model.linear, *model.weights])
+    allowed = 4.5 * standard_errors(x, sigma)[:-1]
+    for seed in range(20):
+        noise = sigma * np.random.default_rng(seed).standard_normal(len(x))
+        fit = fit_play(x, y + noise, LADDER)
+        found = np.array([fit.model.linear, *fit.model.weights])
+        assert np.all(np.abs(found - truth) <= allowed)
+        assert np.max(np.abs(found - truth)) < 0.02
+        assert fit.rms == pytest.approx(sigma, rel=0.1)
+
+
+def test_weights_are_never_negative():
+    x = shrinking_loops()
+    noise = np.random.default_rng(0).standard_normal(len(x))
+    for fit in (fit_play(x, noise), fit_maxwell_slip(x, noise)):
+        model = fit.model
+        sizes = model.weights if isinstance(model, PlayOperator) else model.stiffnesses
+        assert min(sizes) >= 0.0
+
+
+def test_rank_tells_what_a_small_loop_cannot():
+    model = PlayOperator(LADDER, (0.3, 0.1, 0.5, 0.2), 0.4)
+    x = shrinking_loops(amplitude=0.7)
+    fit = fit_play(x, model.simulate(x)[0], LADDER)
+    assert (fit.rank, fit.unknowns) == (4, 6)  # thresholds of 0.9 and 1.4 never move
+    assert not fit.determined
+    assert fit.model.weights[2:] == (0.0, 0.0)
+    np.testing.assert_allclose(fit.model.weights[:2], model.weights[:2], atol=1e-8)
+
+
+def test_ladder_by_default_covers_the_record():
+    x = shrinking_loops()
+    fit = fit_play(x, PlayOperator(LADDER, (0.3, 0.1, 0.5, 0.2), 0.4).simulate(x)[0], elements=12)
+    assert len(fit.model.thresholds) == 12
+    assert 0.0 < fit.model.thresholds[0]
+    assert fit.model.thresholds[-1] < 2.0
+    assert fit.rms < 0.02
+
+
+# --- first-order curves ---------------------------------------------------------------------------
+
+LEVELS = 9
+
+
+def random_operator(seed: int, levels: int = LEVELS, output: float = 0.0) -> Preisach:
+    rng = np.random.default_rng(seed)
+    weights = np.tril(rng.uniform(0.1, 1.0, (levels - 1, levels - 1)))
+    return Preisach.from_weights(weights, -1.0, 1.0, start_output=output)
+
+
+@few
+@given(st.integers(0, 10**6), st.integers(1, 4), st.floats(-1.0, 1.0))
+def test_map_comes_back_from_first_order_curves(seed, points, output):
+    truth = random_operator(seed, output=output)
+    x = curve_inputs(-1.0, 1.0, LEVELS, points)
+    curves = descending_curves(x, truth.simulate(x)[0])
+    assert len(curves) == LEVELS - 1
+    fit = preisach_from_curves(curves[::-1], -1.0, 1.0, LEVELS, start_output=output)
+    np.testing.assert_allclose(fit.model.everett, truth.everett, atol=1e-11)
+    assert fit.clipped < 1e-10
+
+
+def test_noisy_curves_are_clipped_to_weights_that_are_not_negative():
+    truth = Preisach.from_play(PlayOperator((0.25,), (1.0,), 0.2), -1.0, 1.0, LEVELS)
+    x = curve_inputs(-1.0, 1.0, LEVELS, 2)
+    sigma = 1e-3
+    y = truth.simulate(x)[0] + sigma * np.random.default_rng(0).standard_normal(len(x))
+    fit = preisach_from_curves(descending_curves(x, y), -1.0, 1.0, LEVELS)
+    assert 1e-3 < fit.clipped < 0.05
+    assert np.min(fit.model.weights) >= -1e-12
+    # clipping half of the noise of 28 cells leaves a bias of their size
+    assert np.max(np.abs(fit.model.everett - truth.everett)) < 28 * sigma
+
+
+# --- any record -----------------------------------------------------------------------------------
+
+
+@few
+@given(st.integers(0, 10**6), st.booleans())
+def test_regressors_times_weights_are_the_output(seed, virgin):
+    operator = random_operator(seed)
+    if virgin:
+        even = operator.weights + operator.weights[::-1, ::-1].T
+        operator = Preisach.from_weights(even, -1.0, 1.0, start="virgin")
+    x = np.random.default_rng(seed).uniform(-1.1, 1.1, 30)
+    parts = relay_regressors(x, -1.0, 1.0, LEVELS, start=operator.start)
+    y, _ = operator.simulate(x)
+    np.testing.assert_allclose(np.einsum("tkl,kl->t", parts, operator.weights), y, atol=1e-11)
+
+
+@pytest.mark.parametrize("start", ["low", "virgin"])
+def test_fit_finds_a_model_that_the_record_decides(start):
+    truth = random_operator(1, output=0.3)
+    if start == "virgin":
+        even = truth.weights + truth.weights[::-1, ::-1].T
+        truth = Preisach.from_weights(even, -1.0, 1.0, start="virgin")
+    x = np.random.default_rng(2).uniform(-1.0, 1.0, 1500)
+    y, _ = truth.simulate(x)
+    fit = fit_preisach(x, y, -1.0, 1.0, LEVELS, start=start, prior_weight=1e-6)
+    assert fit.rank == fit.unknowns
+    assert np.min(fit.decided[np.tril_indices(LEVELS - 1)]) > 0.999
+    np.testing.assert_allclose(fit.model.weights, truth.weights, atol=1e-6)
+    assert fit.offset == pytest.approx(truth.start_output, abs=1e-6)
+    other = np.random.default_rng(3).uniform(-1.0, 1.0, 50)
+    assert np.max(np.abs(fit.model.simulate(other)[0] - truth.simulate(other)[0])) < 1e-5
+
+
+def test_noise_on_a_random_record_averages_out():
+    truth, sigma = random_operator(1), 0.2
+    x = np.random.default_rng(2).uniform(-1.0, 1.0, 1500)
+    clean = truth.simulate(x)[0]
+    y = clean + sigma * np.random.default_rng(4).standard_normal(len(x))
+    fit = fit_preisach(x, y, -1.0, 1.0, LEVELS)
+    assert np.min(fit.model.weights) >= 0.0
+    assert fit.rms == pytest.approx(sigma, rel=0.1)
+    fitted = fit.model.simulate(x)[0]
+    # 37 unknowns and 1500 samples: sigma sqrt(37 / 1500) is 0.16 sigma
+    assert np.sqrt(np.mean((fitted - clean) ** 2)) < 0.25 * sigma
+
+
+def test_one_loop_leaves_the_rest_to_the_prior():
+    play = PlayOperator((0.25, 0.5), (0.5, 0.3), 0.4)
+    truth = Preisach.from_play(play, -1.0, 1.0, LEVELS)
+    grid = np.linspace(-1.0, 1.0, 65)
+    x = np.concatenate([grid, grid[-2::-1]])
+    fit = fit_preisach(x, truth.simulate(x)[0], -1.0, 1.0, LEVELS)
+    assert fit.rank < fit.unknowns / 2
+    assert np.min(fit.decided[np.tril_indices(LEVELS - 1)]) < 0.5
+    # the truth depends on the gap alone, which is the prior: minor loops are predicted
+    other = np.random.default_rng(3).uniform(-1.0, 1.0, 200)
+    gap = fit.model.simulate(other)[0] - truth.simulate(other)[0]
+    assert np.max(np.abs(gap)) < 1e-3
+    # and where it depends on the place too, one loop does not say so
+    placed = random_operator(5)
+    guess = fit_preisach(x, placed.simulate(x)[0], -1.0, 1.0, LEVELS)
+    assert guess.rms < 0.05
+    gap = guess.model.simulate(other)[0] - placed.simulate(other)[0]
+    assert np.max(np.abs(gap)) > 0.2
+
+
+# --- checks ---------------------------------------------------------------------------------------
+
+
+def minor_loops(output) -> list[tuple[Array, Array]]:
+    """Record the loop between -0.3 and 0.3 in three histories."""
+    loop = np.concatenate([np.linspace(-0.3, 0.3, 13), np.linspace(0.3, -0.3, 13)[1:]])
+    records = []
+    for before in ([1.0], [1.0, -1.0], [0.8, -0.7, 0.6]):
+        x = np.array([*before, -0.3, 0.3, *loop])
+        records.append((loop, output(x)[-len(loop) :]))
+    return records
+
+
+def test_congruency_error_is_a_number():
+    operator = random_operator(7)
+    assert congruency_error(minor_loops(lambda x: operator.simulate(x)[0])) < 1e-12
+    # a nonlinear output map keeps the memory but not the congruency
+    curved = congruency_error(minor_loops(lambda x: operator.simulate(x)[0] ** 2))
+    assert curved > 0.1
+
+
+def test_congruency_error_allows_for_other_samples():
+    operator = Preisach.from_play(PlayOperator((0.1,), (1.0,), 0.5), -1.0, 1.0, 21)
+    coarse = np.array([-0.3, -0.1, 0.3, 0.1, -0.3])
+    fine = np.interp(np.linspace(0, 4, 241), np.arange(5), coarse)
+    records = []
+    for x in (coarse, fine):
+        y = operator.simulate(np.array([1.0, -0.3, 0.3, *x]))[0]
+        records.append((x, y[-len(x) :]))
+    assert congruency_error(records) < 0.01
+
+
+def test_symmetry_error_sees_noise_and_bias():
+    even = Preisach.from_density(lambda a, b: 1.0 + (a + b) ** 2, -1.0, 1.0, LEVELS)
+    x = curve_inputs(-1.0, 1.0, LEVELS, 2)
+    y = even.simulate(x)[0]
+    fit = preisach_from_curves(descending_curves(x, y), -1.0, 1.0, LEVELS)
+    assert symmetry_error(fit.model.table) < 1e-12
+    bent = preisach_from_curves(descending_curves(x, y + 0.1 * y**2), -1.0, 1.0, LEVELS)
+    assert symmetry_error(bent.model.table) > 0.01
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: fit_play([0.0, 1.0], [0.0]), r"shape \(2,\) and y \(1,\)"),
+        (lambda: fit_play([0.0, np.nan, 1.0], [0.0, 1.0, 2.0]), r"x\[1\] is nan.*finite"),
+        (lambda: fit_play([1.0, 1.0], [0.0, 1.0]), r"does not vary.*thresholds"),
+        (lambda: fit_play([0.0, 1.0], [0.0, 1.0], [0.5, 0.2]), r"thresholds\[1\] is 0.2.*sort"),
+        (lambda: fit_play([0.0, 1.0], [0.0, 1.0], elements=0), r"elements is 0.*at least 1"),
+        (
+            lambda: fit_play([0.0, 1.0], [0.0, 1.0], [0.5], initial_state=[0.0, 1.0]),
+            r"initial_state has shape \(2,\)",
+        ),
+        (
+            lambda: preisach_from_curves([([1.0, -1.0], [1.0, 0.0])], -1.0, 1.0, 3),
+            r"no curve turns at 0.0.*fit_preisach",
+        ),
+        (
+            lambda: preisach_from_curves([([1.0, 0.0], [1.0, 0.0])], -1.0, 1.0, 2),
+            r"ends at 0.0.*reach -1.0",
+        ),
+        (
+            lambda: fit_preisach([0.0, 1.0], [0.0, 1.0], -1.0, 1.0, prior_weight=0.0),
+            r"prior_weight is 0.0.*above 0",
+        ),
+        (lambda: congruency_error([([0.0, 1.0], [0.0, 1.0])]), r"1 loops.*at least 2"),
+        (
+            lambda: congruency_error([([0.0, 1.0], [0.0, 1.0]), ([0.0, 2.0], [0.0, 1.0])]),
+            r"loop 1 is between 0.0 and 2.0",
+        ),
+    ],
+)
+def test_errors_name_value_bound_and_remedy(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
