@@ -109,7 +109,55 @@ def _scratch(typing: Any, rows: Any, lanes: Any) -> Any:
     return view(rows, lanes), generate
 
 
-_REPLACED: dict[str, Any] = {"tile_view": _tile_view, "scratch": _scratch}
+_DTYPES = (types.float64, types.int64, types.float32, types.int8)
+
+
+@intrinsic(prefer_literal=True)
+def _array_at(typing: Any, book: Any, index: Any, dimensions: Any, kind: Any) -> Any:
+    """Return the array whose address and shape stand in ``book`` (see ``kernels.address_book``)."""
+    if not isinstance(dimensions, types.IntegerLiteral) or not isinstance(
+        kind, types.IntegerLiteral
+    ):
+        return None
+    ndim, dtype = dimensions.literal_value, _DTYPES[kind.literal_value]
+    view = types.Array(dtype, ndim, "C")
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        words = make_array(signature.args[0])(context, builder, arguments[0]).data
+        step = context.get_constant(types.intp, 4)
+        first = builder.mul(arguments[1], step)
+
+        def word(k: int) -> Any:
+            place = builder.add(first, context.get_constant(types.intp, k))
+            return builder.load(builder.gep(words, [place]))
+
+        data = builder.inttoptr(word(0), context.get_data_type(dtype).as_pointer())
+        width = context.get_abi_sizeof(context.get_data_type(dtype))
+        itemsize = context.get_constant(types.intp, width)
+        shape = [word(k + 1) for k in range(ndim)]
+        strides = [itemsize]
+        for size in shape[:0:-1]:
+            strides.insert(0, builder.mul(strides[0], size))
+        made = make_array(view)(context, builder)
+        populate_array(
+            made,
+            data=data,
+            shape=shape,
+            strides=strides,
+            itemsize=itemsize,
+            meminfo=None,
+            parent=cgutils.get_null_value(made.parent.type),
+        )
+        return made._getvalue()
+
+    return view(book, types.intp, dimensions, kind), generate
+
+
+_REPLACED: dict[str, Any] = {
+    "tile_view": _tile_view,
+    "scratch": _scratch,
+    "array_at": _array_at,
+}
 _BUILT: dict[Any, dict[Any, Any]] = {}
 
 

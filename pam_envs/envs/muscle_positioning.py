@@ -283,8 +283,9 @@ def make_setup(
             high,
         ]
     )
-    choices = (made.substeps, made.elements, preview, stride, family, sines_needed(family))
     members = made.members() if randomize is not False else (made,)
+    counts = (len(loads), len(spread), len(members))
+    choices = (made.substeps, made.elements, preview, stride, family, sines_needed(family))
     return Setup(
         plant=made,
         signals=signals,
@@ -298,17 +299,31 @@ def make_setup(
         shared=(
             made.everett_tables()[: len(members)],
             samples,
-            config,
-            np.array([*choices, int(randomize is not False)], np.int64),
-            loads,
-            np.array([m.parameter_rows() for m in members]),
-            spread,
+            _settings(config, loads, scales_of(signals), spread, members),
+            np.array([*choices, *counts], np.int64),
         ),
-        scales=scales_of(signals),
         control_period=made.control_period,
         episode_seconds=seconds,
         render_mode=render_mode,
     )
+
+
+def _settings(
+    config: NDArray[np.float64],
+    loads: NDArray[np.float64],
+    scales: NDArray[np.float64],
+    spread: NDArray[np.float64],
+    members: tuple[SingleMuscle, ...],
+) -> NDArray[np.float64]:
+    """Return all numbers that the environments share, laid out as the kernels read them."""
+    columns = np.array([m.parameter_rows() for m in members])
+    table = np.zeros((K.MEMBERS + len(members), max(columns.shape[1], len(loads), len(config))))
+    table[K.CONFIG_ROW, : len(config)] = config
+    table[K.LOADS, : len(loads)] = loads
+    table[K.SCALES : K.SCALES + len(scales), :4] = scales
+    table[K.SPREAD : K.SPREAD + len(spread), :3] = spread
+    table[K.MEMBERS :, : columns.shape[1]] = columns
+    return table
 
 
 def _task(reward: Any) -> Tracking:

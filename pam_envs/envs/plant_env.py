@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
+from math import isfinite
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.envs.info import Info
 from pam_envs.envs.setup import (
     BEGIN,
     STATE_KEYS,
@@ -16,12 +17,12 @@ from pam_envs.envs.setup import (
     Setup,
     check_seed,
     check_state,
-    for_kernels,
 )
-from pam_envs.kernels import COMPILED, seed_words
+from pam_envs.kernels import COMPILED, address_book, seed_words
 from pam_envs.parameters import Signals
 
-Info = dict[str, Any]
+INTERPRETED_CALLS = 50
+"""Steps after which an environment changes from plain Python to machine code."""
 
 
 def space_of(signals: Signals) -> gym.spaces.Box:
@@ -57,24 +58,42 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._seed: int | None = None
         self._steps = -1
         self._renderer: Any = None
-        self._all = tuple(for_kernels(a) for a in setup.state(1, 1))
+        self._n_actions = len(setup.action_signals)
+        self._keys = setup.info_keys
+        self._run: Any = None
+        self._warming = INTERPRETED_CALLS if COMPILED else 0
+        self._use(setup.kernels.interpreted, compiled=False)
+
+    def _use(self, function: Any, compiled: bool) -> None:
+        """Run on ``function`` from here on: plain Python on lists, or machine code on arrays.
+
+        A new environment begins in plain Python, which is ready at once, and changes to machine
+        code, which takes a while to load or to compile, when it has been stepped a few times. The
+        bits are the same.
+        """
+        setup = self.setup
+        arrays = [
+            *(setup.state(1, 1) if self._run is None else map(np.array, self._all)),
+            *setup.shared,
+            np.zeros((1, len(setup.action_signals))),
+            np.zeros((2, 1, len(setup.signals)), np.float32),
+            np.zeros((2, len(setup.info_keys) + 1, 1)),
+            np.zeros((2, 1), np.int8),
+        ]
+        held = arrays if compiled else [a.tolist() for a in arrays]
+        self._all = tuple(held[:3])
         self._counts = self._all[1][0]
-        self._actions = for_kernels(np.zeros((1, len(setup.action_signals)), np.float64))
-        self._observation = for_kernels(np.zeros((1, len(setup.signals)), np.float32))
-        self._reward = for_kernels(np.zeros(1))
-        self._flags = for_kernels(np.zeros((2, 1), np.int8))
-        self._info = for_kernels(np.zeros((len(setup.info_keys), 1)))
-        outputs = (self._observation, self._reward, self._flags, self._info)
-        self._arguments = (
-            *self._all,
-            *(for_kernels(a) for a in setup.shared),
-            for_kernels(setup.scales),
-            self._actions,
-            *outputs,
-            self._observation,
-            self._info,
-            1,
-        )
+        *_, self._actions, self._observations, self._infos, self._flags = held
+        self._run, self._compiled = function, compiled
+        self._arguments: tuple[Any, ...] = (*held, 1)
+        if compiled:
+            self._held, self._arguments = held, (address_book(held),)
+            self._action_cells = memoryview(self._actions.ravel())
+            self._info_cells = memoryview(self._infos[0].ravel())
+            self._flag_cells = memoryview(self._flags.ravel())
+            self._observation, self._numbers = self._observations[0, 0], self._infos[0, 1:, 0]
+        else:
+            self._action_cells = self._actions[0]
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -89,9 +108,9 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         else:
             self._counts[episode][0] += 1
         self._flags[0][0], self._flags[1][0] = 1, 0
-        self.setup.kernels.single(*self._arguments, BEGIN)
+        self._run(*self._arguments, BEGIN)
         self._steps = 0
-        observation, info = self._read()
+        observation, info, _, _, _ = self._read()
         if self.render_mode is not None:
             self._draw(observation, info, start=True)
         return observation, info
@@ -109,56 +128,70 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._steps < 0:
             raise gym.error.ResetNeeded("call reset() before step()")
         self._take(action)
-        self.setup.kernels.single(*self._arguments, STEP)
+        self._run(*self._arguments, STEP)
         self._steps += 1
-        observation, info = self._read()
+        observation, info, reward, terminated, truncated = self._read()
         if self.render_mode is not None:
             self._draw(observation, info)
-        flags = self._flags
-        return (
-            observation,
-            float(self._reward[0]),
-            bool(flags[0][0]),
-            bool(flags[1][0]),
-            info,
-        )
+        return observation, reward, terminated, truncated, info
 
     def _take(self, action: Any) -> None:
         """Check an action and hand it to the kernel."""
-        row = self._actions[0]
-        if not isinstance(action, np.ndarray) or action.shape != (len(row),):
-            action = self._as_action(action, len(row))
-        for i, value in enumerate(action.tolist()):
-            if not math.isfinite(value):
-                signal = self.action_signals[i]
-                raise ValueError(
-                    f"action[{i}] ({signal.name}) is {value}; give a finite number between "
-                    f"{self.action_space.low[i]:g} and {self.action_space.high[i]:g}"
-                )
-            row[i] = value
+        if self._warming:
+            self._warm()
+        cells, i = self._action_cells, 0
+        try:
+            for value in action.tolist():
+                if not isfinite(value):
+                    raise TypeError
+                cells[i] = value
+                i += 1
+        except (AttributeError, TypeError, IndexError):
+            i = -1
+        if i != self._n_actions:
+            for i, value in enumerate(self._as_action(action)):
+                cells[i] = value
 
-    def _as_action(self, action: Any, number: int) -> NDArray[Any]:
+    def _warm(self) -> None:
+        """Count a step in plain Python, and change to machine code after enough of them."""
+        self._warming -= 1
+        if not self._warming:
+            self._use(self.setup.kernels.single, compiled=True)
+
+    def _as_action(self, action: Any) -> list[float]:
+        """Return an action as a list of numbers, or say what is wrong with it."""
+        shape = (self._n_actions,)
         try:
             made = np.asarray(action, np.float64)
         except (TypeError, ValueError, OverflowError) as error:
             raise ValueError(
-                f"the action {str(action)[:60]!r} is not an array of {number} numbers: {error}"
+                f"the action {str(action)[:60]!r} is not an array of {shape[0]} numbers: {error}"
             ) from error
-        if made.shape != (number,):
+        if made.shape != shape:
             raise ValueError(
-                f"the action has shape {made.shape}, expected ({number},): one number for each of "
+                f"the action has shape {made.shape}, expected {shape}: one number for each of "
                 + ", ".join(self.action_signals.names())
             )
-        return made
+        for i, value in enumerate(made.tolist()):
+            if not isfinite(value):
+                low, high = self.action_space.low[i], self.action_space.high[i]
+                raise ValueError(
+                    f"action[{i}] ({self.action_signals[i].name}) is {value}; "
+                    f"give a finite number between {low:g} and {high:g}"
+                )
+        values: list[float] = made.tolist()
+        return values
 
-    def _read(self) -> tuple[NDArray[np.float32], Info]:
-        if COMPILED:
-            observation = self._observation[0].copy()
-            values = self._info.ravel().tolist()
-        else:
-            observation = np.array(self._observation[0], np.float32)
-            values = [row[0] for row in self._info]
-        return observation, dict(zip(self.setup.info_keys, values, strict=True))
+    def _read(self) -> tuple[NDArray[np.float32], Info, float, bool, bool]:
+        """Return observation, info, reward and flags of the last call."""
+        if self._compiled:
+            flags = self._flag_cells
+            info = Info(self._keys, self._numbers.copy())
+            return self._observation.copy(), info, self._info_cells[0], flags[0] == 1, flags[1] == 1
+        values = np.array(self._infos[0], np.float64)[:, 0]
+        observation = np.array(self._observations[0][0], np.float32)
+        ended = [row[0] == 1 for row in self._flags]
+        return observation, Info(self._keys, values[1:]), float(values[0]), ended[0], ended[1]
 
     def _draw(self, observation: NDArray[np.float32], info: Info, start: bool = False) -> None:
         """Keep what a picture needs, and show it at once in the ``human`` mode."""
@@ -226,6 +259,6 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def __setstate__(self, pickled: dict[str, Any]) -> None:
         """Rebuild the environment in the pickled state."""
-        type(self).__init__(self, pickled["setup"])
+        PlantEnv.__init__(self, pickled["setup"])
         self.spec = pickled["spec"]
         self.set_state(pickled["state"])

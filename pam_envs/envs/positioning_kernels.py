@@ -11,8 +11,10 @@ from typing import Any
 
 from pam_envs.kernels import (
     LANES,
+    array_at,
     build,
     episode_key,
+    interpreted,
     kernel,
     normal,
     prange,
@@ -131,8 +133,27 @@ CONFIG = (
     ACTION_LOW,
     ACTION_HIGH,
 ) = range(len(CONFIG))
-CHOICES = ("substeps", "elements", "preview", "stride", "family", "sines", "randomize")
-SUBSTEPS, N_ELEMENTS, PREVIEW, STRIDE, FAMILY, SINES, RANDOMIZE = range(len(CHOICES))
+CHOICES = (
+    "substeps",
+    "elements",
+    "preview",
+    "stride",
+    "family",
+    "sines",
+    "loads",
+    "spread",
+    "members",
+)
+SUBSTEPS, N_ELEMENTS, PREVIEW, STRIDE, FAMILY, SINES, N_LOADS, N_SPREAD, N_MEMBERS = range(
+    len(CHOICES)
+)
+"""Whole numbers of the configuration; ``members`` is 0 where nothing is drawn."""
+
+CONFIG_ROW, LOADS, SCALES = 0, 1, 2
+SPREAD = SCALES + FIXED_SIGNALS + 1 + MOST_PREVIEW
+MEMBERS = SPREAD + len(R.PARAMETERS)
+"""Rows of the settings: configuration, loads to draw from [kg], ``a, b, low, high`` of each signal,
+``row, low, high`` of each parameter that is drawn, and the parameters of each member."""
 
 ATMOSPHERE = 101325.0
 AIR = 1.0 / (287.05 * 293.15)
@@ -250,11 +271,8 @@ def reset_lane(
     ahead: Any,
     table: Any,
     samples: Any,
-    config: Any,
+    settings: Any,
     choices: Any,
-    loads: Any,
-    members: Any,
-    spread: Any,
     work: Any,
     j: int,
 ) -> None:
@@ -262,19 +280,16 @@ def reset_lane(
     key_a = episode_key(counts[SEED_A][j], counts[R.EPISODE][j])
     key_b = episode_key(counts[SEED_B][j], counts[R.EPISODE][j])
     counts[R.KEY_A][j], counts[R.KEY_B][j], counts[R.STEP][j] = key_a, key_b, 0
-    member = 0
-    if choices[RANDOMIZE] > 0:
-        member = int(uniform(key_a, key_b, RANDOM, 0) * len(members))
+    config = settings[CONFIG_ROW]
+    member = int(uniform(key_a, key_b, RANDOM, 0) * choices[N_MEMBERS])
     counts[R.MEMBER][j] = member
     for k in range(R.N_PARAMETERS):
-        rows[R.N_STATE + k][j] = members[member][k]
-    if choices[RANDOMIZE] > 0:
-        for k in range(len(spread)):
-            low, high = spread[k][1], spread[k][2]
-            if low < high:
-                drawn = low + (high - low) * uniform(key_a, key_b, RANDOM, 1 + k)
-                rows[int(spread[k][0])][j] = drawn
-    load = loads[int(uniform(key_a, key_b, START, 0) * len(loads))]
+        rows[R.N_STATE + k][j] = settings[MEMBERS + member][k]
+    for k in range(choices[N_SPREAD]):
+        drawn = settings[SPREAD + k]
+        u = uniform(key_a, key_b, RANDOM, 1 + k)
+        rows[int(drawn[0])][j] = drawn[1] + (drawn[2] - drawn[1]) * u
+    load = settings[LOADS][int(uniform(key_a, key_b, START, 0) * choices[N_LOADS])]
     rows[R.TOLD_LOAD][j] = load
     rows[R.LOAD][j] = load
     rows[R.CHANGE_TIME][j] = config[EPISODE_SECONDS] * (0.3 + 0.4 * uniform(key_a, key_b, START, 1))
@@ -321,14 +336,15 @@ def _start_memory(rows: Any, counts: Any, j: int) -> None:
 
 @routine
 def write_lane(
-    work: Any, observation: Any, info: Any, scales: Any, signals: int, row: int, j: int
+    work: Any, settings: Any, observation: Any, info: Any, signals: int, row: int, j: int
 ) -> None:
     """Copy lane ``j`` of ``work`` to row ``row`` of the outputs."""
     for i in range(signals):
-        value = scales[i][0] * work[SIGNALS + i][j] + scales[i][1]
-        observation[row][i] = max(scales[i][2], min(scales[i][3], value))
-    for k in range(len(info)):
-        info[k][row] = work[N_WORK + k][j]
+        scale = settings[SCALES + i]
+        value = scale[0] * work[SIGNALS + i][j] + scale[1]
+        observation[row][i] = max(scale[2], min(scale[3], value))
+    for k in range(1, len(info)):
+        info[k][row] = work[N_WORK + k - 1][j]
 
 
 @kernel
@@ -350,18 +366,17 @@ def take_actions(rows: Any, counts: Any, config: Any, work: Any, actions: Any, s
 @kernel
 def write_tile(
     work: Any,
-    config: Any,
-    scales: Any,
+    settings: Any,
     signals: int,
     observation: Any,
-    reward: Any,
-    flags: Any,
     info: Any,
+    flags: Any,
     start: int,
     lanes: int,
 ) -> int:
     """Copy a tile to the outputs; return how many of its episodes are over."""
     over = 0
+    config, reward = settings[CONFIG_ROW], info[0]
     for j in range(lanes):
         terminated = 1 if work[M_CONTRACTION][j] < 0.0 else 0
         truncated = 1 if work[TIME][j] >= config[EPISODE_SECONDS] - 0.5 * config[PERIOD] else 0
@@ -370,45 +385,42 @@ def write_tile(
         over = over + terminated + truncated
         reward[start + j] = work[R_TRACKING][j] + work[R_EFFORT][j]
     for i in range(signals):
-        value = work[SIGNALS + i]
-        a, b, low, high = scales[i][0], scales[i][1], scales[i][2], scales[i][3]
+        value, scale = work[SIGNALS + i], settings[SCALES + i]
+        a, b, low, high = scale[0], scale[1], scale[2], scale[3]
         for j in range(lanes):
             observation[start + j][i] = max(low, min(high, a * value[j] + b))
-    for k in range(len(info)):
-        report, value = info[k], work[N_WORK + k]
+    for k in range(1, len(info)):
+        report, value = info[k], work[N_WORK + k - 1]
         for j in range(lanes):
             report[start + j] = value[j]
     return over
 
 
+@kernel
 def step_tiles(
     all_rows: Any,
     all_counts: Any,
     all_ahead: Any,
     table: Any,
     samples: Any,
-    config: Any,
+    settings: Any,
     choices: Any,
-    loads: Any,
-    members: Any,
-    spread: Any,
-    scales: Any,
     actions: Any,
-    observation: Any,
-    reward: Any,
+    observations: Any,
+    infos: Any,
     flags: Any,
-    info: Any,
-    final_observation: Any,
-    final_info: Any,
     number: int,
     mode: int,
 ) -> None:
     """Step or reset a batch, tile by tile.
 
     ``mode`` 0 steps; 1 steps and starts the next episode of what has ended; 2 starts the episodes
-    of the environments whose ``flags[0]`` is set, and does not step.
+    of the environments whose ``flags[0]`` is set, and does not step. ``observations[0]`` and
+    ``infos[0]`` are the present ones, ``[1]`` those at the end of an episode that has been
+    followed by the next. ``infos[...][0]`` is the reward.
     """
     signals = FIXED_SIGNALS + 1 + choices[PREVIEW]
+    config, observation, info = settings[CONFIG_ROW], observations[0], infos[0]
     for tile in prange(len(all_rows)):
         rows = tile_view(all_rows, tile, N_ROWS, LANES)
         counts = tile_view(all_counts, tile, N_COUNTS, LANES)
@@ -432,50 +444,43 @@ def step_tiles(
         else:
             for j in range(lanes):
                 if flags[0][start + j] > 0:
-                    reset_lane(
-                        rows,
-                        counts,
-                        ahead,
-                        table,
-                        samples,
-                        config,
-                        choices,
-                        loads,
-                        members,
-                        spread,
-                        work,
-                        j,
-                    )
+                    reset_lane(rows, counts, ahead, table, samples, settings, choices, work, j)
         for again in range(2):
             evaluate(rows, counts, ahead, config, choices, work)
             if mode == 2 or again == 1:
                 for j in range(lanes):
                     if flags[0][start + j] + flags[1][start + j] > 0:
-                        write_lane(work, observation, info, scales, signals, start + j, j)
+                        write_lane(work, settings, observation, info, signals, start + j, j)
                 break
-            over = write_tile(
-                work, config, scales, signals, observation, reward, flags, info, start, lanes
-            )
+            over = write_tile(work, settings, signals, observation, info, flags, start, lanes)
             if mode == 0 or over == 0:
                 break
             for j in range(lanes):
                 if flags[0][start + j] + flags[1][start + j] > 0:
-                    write_lane(work, final_observation, final_info, scales, signals, start + j, j)
+                    write_lane(work, settings, observations[1], infos[1], signals, start + j, j)
+                    infos[1][0][start + j] = info[0][start + j]
                     counts[R.EPISODE][j] = counts[R.EPISODE][j] + 1
-                    reset_lane(
-                        rows,
-                        counts,
-                        ahead,
-                        table,
-                        samples,
-                        config,
-                        choices,
-                        loads,
-                        members,
-                        spread,
-                        work,
-                        j,
-                    )
+                    reset_lane(rows, counts, ahead, table, samples, settings, choices, work, j)
+
+
+@kernel
+def step_by_address(book: Any, mode: int) -> None:
+    """Step or reset one environment whose arrays stand in an address book."""
+    step_tiles(
+        array_at(book, 0, 3, 0),
+        array_at(book, 1, 3, 1),
+        array_at(book, 2, 3, 0),
+        array_at(book, 3, 3, 0),
+        array_at(book, 4, 1, 0),
+        array_at(book, 5, 2, 0),
+        array_at(book, 6, 1, 1),
+        array_at(book, 7, 2, 0),
+        array_at(book, 8, 3, 2),
+        array_at(book, 9, 3, 0),
+        array_at(book, 10, 2, 3),
+        1,
+        mode,
+    )
 
 
 class Kernels:
@@ -485,20 +490,25 @@ class Kernels:
         self.kind = kind
         self.n_rows = MEMORY + MEMORY_ROWS[kind]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle by the kind: compiled code is not copied."""
+        return kernels_for, (self.kind,)
+
+    def _names(self, lanes: int) -> dict[str, Any]:
+        return {"remember": MEMORIES[self.kind], "N_ROWS": self.n_rows, "LANES": lanes}
+
     def _build(self, name: str, lanes: int, parallel: bool = False) -> Callable[..., Any]:
-        return build(
-            step_tiles,
-            f"{name}_{self.kind}",
-            parallel,
-            remember=MEMORIES[self.kind],
-            N_ROWS=self.n_rows,
-            LANES=lanes,
-        )
+        return build(step_tiles, f"{name}_{self.kind}", parallel, **self._names(lanes))
+
+    @cached_property
+    def interpreted(self) -> Callable[..., Any]:
+        """One environment, in plain Python."""
+        return interpreted(step_tiles, self._names(1))
 
     @cached_property
     def single(self) -> Callable[..., Any]:
-        """One environment."""
-        return self._build("single", 1)
+        """One environment, by an address book of the arrays."""
+        return build(step_by_address, f"single_{self.kind}", **self._names(1))
 
     @cached_property
     def batch(self) -> Callable[..., Any]:
@@ -512,3 +522,8 @@ class Kernels:
 
 
 KERNELS = {kind: Kernels(kind) for kind in MEMORIES}
+
+
+def kernels_for(kind: str) -> Kernels:
+    """Return the kernels for a kind of memory."""
+    return KERNELS[kind]

@@ -44,8 +44,6 @@ class Setup:
         Keys of ``info``, in the order in which the kernels write them.
     shared : tuple of arrays
         What all environments share, in the order of the kernels' arguments.
-    scales : array, shape (n_signals, 4)
-        ``a, b, low, high`` of each signal: the observation is ``clip(a * si + b, low, high)``.
     control_period, episode_seconds : float
         Seconds.
     render_mode : str or None
@@ -64,7 +62,6 @@ class Setup:
     seed_rows: tuple[int, int, int]
     info_keys: tuple[str, ...]
     shared: tuple[Any, ...]
-    scales: NDArray[np.float64]
     control_period: float
     episode_seconds: float
     render_mode: str | None = None
@@ -90,7 +87,7 @@ def tiles_for(number: int) -> int:
 
 
 def scales_of(signals: Signals) -> NDArray[np.float64]:
-    """Return ``a, b, low, high`` of each signal, in the units of the observation vector.
+    """Return ``a, b, low, high`` of each signal: its entry is ``clip(a * si + b, low, high)``.
 
     The bounds are rounded to single precision inwards, so that a clipped value lies in the space.
     """

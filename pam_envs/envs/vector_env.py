@@ -72,7 +72,6 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
         self._last_observation = np.zeros((self.num_envs, len(setup.signals)), np.float32)
         self._all = tuple(for_kernels(a) for a in setup.state(tiles_for(num_envs), LANES))
         self._shared = tuple(for_kernels(a) for a in setup.shared)
-        self._scales = for_kernels(setup.scales)
         self._keys = len(setup.info_keys)
         spread_out = COMPILED and threads != 1 and num_envs >= PARALLEL_FROM
         self._kernel = setup.kernels.parallel if spread_out else setup.kernels.batch
@@ -94,13 +93,12 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
                 )
         self._seed_rows(self._seeds(seed), mask)
         outputs = self._outputs()
-        if self._seeded:
-            outputs[0][:] = self._last_observation
-        outputs[2][0], outputs[2][1] = mask, False
+        observations, infos, flags = outputs
+        observations[0], infos[0], flags[0], flags[1] = self._last_observation, 0.0, mask, False
         self._call(np.zeros((self.num_envs, len(self.action_signals))), outputs, BEGIN)
         self._seeded = True
-        self._last_observation = outputs[0].copy()
-        return outputs[0], self._infos(outputs[3])
+        self._last_observation = observations[0].copy()
+        return observations[0], self._infos(infos[0])
 
     def _seed_rows(self, seeds: list[int | None] | None, mask: NDArray[np.bool_]) -> None:
         a, b, episode = self.setup.seed_rows
@@ -114,25 +112,21 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
                 counts[episode][lane] = 0
 
     def _outputs(self) -> tuple[NDArray[Any], ...]:
-        """Return fresh arrays for observation, reward, flags, info and the final two."""
-        n, signals = self.num_envs, len(self.signals)
-        keys = self._keys if self.with_info else 0
+        """Return fresh arrays for observations, reward with info (each with a final part), flags."""
+        n, keys = self.num_envs, self._keys if self.with_info else 0
         return (
-            np.empty((n, signals), np.float32),
-            np.empty(n),
+            np.empty((2, n, len(self.signals)), np.float32),
+            np.empty((2, keys + 1, n)),
             np.empty((2, n), np.bool_),
-            np.empty((keys, n)),
-            np.empty((n, signals), np.float32),
-            np.empty((keys, n)),
         )
 
     def _call(self, actions: NDArray[Any], outputs: tuple[NDArray[Any], ...], mode: int) -> None:
-        tables = (*self._all, *self._shared, self._scales)
         if COMPILED:
-            self._kernel(*tables, actions, *outputs, self.num_envs, mode)
+            self._kernel(*self._all, *self._shared, actions, *outputs, self.num_envs, mode)
             return
         views = [a.tolist() for a in outputs]
-        self._kernel(*tables, actions.tolist(), *views, self.num_envs, mode)
+        arguments = (actions.tolist(), *views, self.num_envs, mode)
+        self._kernel(*self._all, *self._shared, *arguments)
         for array, view in zip(outputs, views, strict=True):
             array[...] = np.array(view, array.dtype).reshape(array.shape)
 
@@ -174,14 +168,14 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
             raise gym.error.ResetNeeded("call reset() before step()")
         actions = self._checked(actions)
         outputs = self._outputs()
-        observation, reward, flags, info, final, final_info = outputs
+        observations, reports, flags = outputs
         self._call(actions, outputs, STEP_AND_RESTART)
-        self._last_observation = observation
-        infos = self._infos(info) if self.with_info else {}
+        self._last_observation = observations[0]
+        infos = self._infos(reports[0])
         ended = flags[0] | flags[1]
         if ended.any():
-            self._add_final(infos, ended, final, final_info)
-        return observation, reward, flags[0], flags[1], infos
+            self._add_final(infos, ended, observations[1], reports[1])
+        return observations[0], reports[0, 0], flags[0], flags[1], infos
 
     def _checked(self, actions: Any) -> NDArray[np.float64]:
         wanted = (self.num_envs, len(self.action_signals))
@@ -200,7 +194,7 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
         return made
 
     def _infos(self, info: NDArray[np.float64]) -> dict[str, Any]:
-        return dict(zip(self.setup.info_keys, info, strict=False))
+        return dict(zip(self.setup.info_keys, info[1:], strict=True)) if self.with_info else {}
 
     def _add_final(
         self,

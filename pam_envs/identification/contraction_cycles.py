@@ -262,9 +262,7 @@ def ensemble(
             break
         repeats = random.choice(np.unique(table.repeat), 5)
         prior = random.dirichlet(np.full(6, 2.0))
-        fit, _ = fit_maxwell_slip(
-            mean_cycles(table, repeats), hysteresis != "none", prior, start
-        )
+        fit, _ = fit_maxwell_slip(mean_cycles(table, repeats), hysteresis != "none", prior, start)
         if hysteresis == "preisach":
             fit = fit_preisach_map(fit)
         missed = _model(fit.plant, best.cycles) - best.cycles.contractions
@@ -366,6 +364,4 @@ def identifiability(fit: CyclesFit, standard_error: float = 6.7e-5) -> Identifia
     matrix = np.array([c[:, 1:].ravel() for c in columns]).T / standard_error
     _, sizes, directions = np.linalg.svd(matrix, full_matrices=False)
     strong = sizes > 1.0
-    return Identifiability(
-        tuple(names), int(strong.sum()), np.sum(directions[strong] ** 2, axis=0)
-    )
+    return Identifiability(tuple(names), int(strong.sum()), np.sum(directions[strong] ** 2, axis=0))

@@ -61,9 +61,7 @@ def minor_loops(plant: SingleMuscle, low: float = 2e5, high: float = 3e5) -> tup
     return congruency_error(curves[0]), congruency_error(curves[1])
 
 
-def summarise(
-    table: ContractionTable, plant: SingleMuscle, fit: cycles.CyclesFit
-) -> Summary:
+def summarise(table: ContractionTable, plant: SingleMuscle, fit: cycles.CyclesFit) -> Summary:
     """Return the figures of one fit."""
     loads = [float(m) for m in fit.cycles.loads]
     at, measured, model = fit.widths()

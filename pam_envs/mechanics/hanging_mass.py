@@ -40,7 +40,7 @@ class HangingMass:
         1e4,
         "assumed",
         "damping ratio 0.3 to 0.4 at 4.55 kg; published values for larger muscles are higher",
-        spread=(120.0, 600.0),
+        spread=(120.0, 450.0),
     )
 
 

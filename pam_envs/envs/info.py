@@ -1,0 +1,61 @@
+"""The ``info`` of a step: a dict that is filled when it is first looked at.
+
+Filling a dict with twenty numbers takes longer than simulating the plant, and most steps of a
+learning run never look. So a step hands out an :class:`Info`, which holds the numbers and becomes
+an ordinary dict with the first access of any kind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+
+def _filling(name: str) -> Callable[..., Any]:
+    """Return the dict's method of that name, preceded by the filling."""
+    method = getattr(dict, name)
+
+    def touched(self: Info, *arguments: Any, **named: Any) -> Any:
+        if self._numbers is not None:
+            self._fill()
+        for other in arguments:
+            if isinstance(other, Info) and other._numbers is not None:
+                other._fill()
+        return method(self, *arguments, **named)
+
+    touched.__name__ = name
+    touched.__doc__ = method.__doc__
+    return touched
+
+
+class Info(dict[str, Any]):
+    """A dict of ``keys`` and ``numbers`` that is filled on first access.
+
+    Parameters
+    ----------
+    keys : tuple of str
+        The keys, in order.
+    numbers : object
+        With ``tolist()``, giving one float for each key; not to be changed afterwards.
+    """
+
+    __slots__ = ("_names", "_numbers")
+
+    def __init__(self, keys: tuple[str, ...], numbers: Any) -> None:
+        self._names = keys
+        self._numbers: Any = numbers
+
+    def _fill(self) -> None:
+        values, self._numbers = self._numbers.tolist(), None
+        dict.update(self, zip(self._names, values, strict=True))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle and copy as an ordinary dict."""
+        return dict, (dict(self.items()),)
+
+
+for _name in (
+    "__contains__ __delitem__ __eq__ __getitem__ __ior__ __iter__ __len__ __ne__ __or__ __repr__ "
+    "__reversed__ __ror__ __setitem__ clear copy get items keys pop popitem setdefault update values"
+).split():
+    setattr(Info, _name, _filling(_name))

@@ -1,0 +1,135 @@
+"""One environment, rows of any batch, compiled and uncompiled: the same bits."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from pam_envs.kernels import COMPILED
+from tests.envs.cases import IDS, VARIANTS, actions_for, trajectory
+
+ROOT = Path(__file__).resolve().parents[2]
+EVERY = pytest.mark.parametrize("name", IDS)
+SIZES = (1, 2, 7, 64, 256) if COMPILED else (1, 7)
+
+
+def batch(name: str, number: int, **arguments: object) -> gym.vector.VectorEnv:
+    return gym.make_vec(name, number, vectorization_mode="vector_entry_point", **arguments)
+
+
+@EVERY
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("number", SIZES)
+def test_rows_of_a_batch_are_single_environments(name: str, variant: str, number: int) -> None:
+    arguments = {"episode_seconds": 0.3, **VARIANTS[variant]}
+    envs = batch(name, number, **arguments)
+    steps, seed = (70 if COMPILED else 33), 17
+    drive = actions_for(envs.action_space, steps, 2)
+    rows = sorted({0, number // 2, number - 1})
+    singles = {i: gym.make(name, **arguments) for i in rows}
+    observations, infos = envs.reset(seed=seed)
+    for i, env in singles.items():
+        observation, info = env.reset(seed=seed + i)
+        assert np.array_equal(observation, observations[i])
+        assert {k: v[i] for k, v in infos.items()} == info
+    restarts = 0
+    for actions in drive:
+        observations, rewards, terminated, truncated, infos = envs.step(actions)
+        for i, env in singles.items():
+            observation, reward, ended, cut, info = env.step(actions[i])
+            assert (reward, ended, cut) == (rewards[i], terminated[i], truncated[i])
+            if ended or cut:
+                restarts += 1
+                assert np.array_equal(observation, infos["final_obs"][i])
+                final = infos["final_info"]
+                assert {k: final[k][i] for k in info} == info
+                observation, info = env.reset()
+            assert np.array_equal(observation, observations[i])
+            assert {k: infos[k][i] for k in info} == info
+    assert restarts >= len(rows) * (2 if COMPILED else 1)
+
+
+@EVERY
+@pytest.mark.skipif(not COMPILED, reason="compares with the compiled kernels")
+def test_both_cores_give_the_bits_of_one(name: str) -> None:
+    number = 4096
+    one = batch(name, number, threads=1, episode_seconds=0.2)
+    two = batch(name, number, episode_seconds=0.2)
+    assert one._kernel is not two._kernel
+    one.reset(seed=3)
+    two.reset(seed=3)
+    for actions in actions_for(one.action_space, 30, 4):
+        a, b = one.step(actions), two.step(actions)
+        assert all(np.array_equal(x, y) for x, y in zip(a[:4], b[:4], strict=True))
+        assert all(np.array_equal(a[4][k], b[4][k]) for k in a[4] if "final" not in k)
+
+
+@EVERY
+def test_a_saved_batch_loses_no_bit(name: str) -> None:
+    envs = batch(name, 40, episode_seconds=0.2)
+    drive = actions_for(envs.action_space, 60, 5)
+    envs.reset(seed=0)
+    for actions in drive[:25]:
+        envs.step(actions)
+    state = envs.get_state()
+    after = [envs.step(a)[0].tobytes() for a in drive[25:]]
+    envs.set_state(state)
+    assert [envs.step(a)[0].tobytes() for a in drive[25:]] == after
+    fresh = batch(name, 40, episode_seconds=0.2)
+    fresh.set_state(state)
+    assert [fresh.step(a)[0].tobytes() for a in drive[25:]] == after
+
+
+@EVERY
+def test_a_masked_reset_leaves_the_other_rows_alone(name: str) -> None:
+    envs, kept = batch(name, 5), batch(name, 5)
+    envs.reset(seed=9)
+    kept.reset(seed=9)
+    drive = actions_for(envs.action_space, 20, 6)
+    for actions in drive[:10]:
+        envs.step(actions)
+        kept.step(actions)
+    mask = np.array([False, True, False, False, True])
+    before = envs._last_observation.copy()
+    observations, infos = envs.reset(options={"reset_mask": mask})
+    assert np.array_equal(observations[~mask], before[~mask])
+    assert (infos["time"][mask] == 0.0).all()
+    for actions in drive[10:]:
+        a, b = envs.step(actions)[0], kept.step(actions)[0]
+        assert np.array_equal(a[~mask], b[~mask])
+    single = gym.make(name)
+    single.reset(seed=9 + 1)
+    assert np.array_equal(single.reset()[0], observations[1])
+    with pytest.raises(ValueError, match="reset_mask"):
+        envs.reset(options={"reset_mask": [True]})
+
+
+def digest() -> str:
+    """Return a hash over the trajectories of every environment and variant."""
+    lines = []
+    for name in IDS:
+        for variant, arguments in VARIANTS.items():
+            env = gym.make(name, episode_seconds=0.7, **arguments)
+            lines.append(f"{name} {variant} {trajectory(env, 23, 90)}")
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+
+
+@pytest.mark.parametrize("compile_kernels", ["0", "1"])
+def test_other_processes_and_plain_python_give_the_same_bits(compile_kernels: str) -> None:
+    code = "from tests.envs.test_bits import digest; print(digest())"
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "PAM_ENVS_COMPILE": compile_kernels, "PYTHONPATH": str(ROOT)},
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert run.stdout.strip() == digest()
