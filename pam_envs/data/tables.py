@@ -10,20 +10,22 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Parser = Callable[[str], Any]
+"""Makes a value of a cell, or raises ``ValueError`` with a sentence on what is wrong with it."""
+N = TypeVar("N", int, float)
 
 BAR = 1e5
 MM = 1e-3
-COLUMNS = ("load_kg", "direction", "pressure_bar", "repeat", "contraction_mm")
-DIRECTIONS = ("inflation", "deflation")
 LOAD_TOLERANCE = 1e-6
 """Two loads [kg] closer than this are the same load."""
 
@@ -183,6 +185,85 @@ class ContractionTable:
         return rows
 
 
+def number(low: float, high: float, unit: float = 1.0) -> Parser:
+    """Return a parser of numbers within [low, high], both in the file's unit.
+
+    Parameters
+    ----------
+    low, high : float
+        Bounds of what the cell holds.
+    unit : float
+        The file's unit in SI, for example 1e5 for bar.
+    """
+    return lambda cell: unit * _within(_converted(cell, float, "a number"), low, high)
+
+
+def whole_number(low: int, high: int) -> Parser:
+    """Return a parser of whole numbers within [low, high]."""
+    return lambda cell: _within(_converted(cell, int, "a whole number"), low, high)
+
+
+def one_of(*choices: str) -> Parser:
+    """Return a parser that lets only these words through."""
+
+    def parse(cell: str) -> str:
+        if cell not in choices:
+            wanted = " or ".join(map(repr, choices))
+            raise ValueError(f"{cell!r} is not {wanted}; correct the cell")
+        return cell
+
+    return parse
+
+
+COLUMNS: dict[str, Parser] = {
+    "load_kg": number(0.0, 1000.0),
+    "direction": one_of("inflation", "deflation"),
+    "pressure_bar": number(0.0, 20.0, BAR),
+    "repeat": whole_number(1, 100_000),
+    "contraction_mm": number(-1000.0, 1000.0, MM),
+}
+"""The columns of a table of contractions."""
+
+
+def read_columns(source: Path | Traversable, columns: Mapping[str, Parser]) -> dict[str, list[Any]]:
+    """Read a CSV file whose every cell is checked.
+
+    Parameters
+    ----------
+    source : Path or Traversable
+        A file whose first row holds exactly the names of ``columns``, in their order.
+    columns : mapping of str to callable
+        What makes a value of each column's cells, see :func:`number`, :func:`whole_number` and
+        :func:`one_of`; it raises ``ValueError`` for a bad cell.
+
+    Returns
+    -------
+    dict of str to list
+        The values of each column, in the file's order.
+
+    Raises
+    ------
+    ValueError
+        For wrong columns, a row of the wrong length, a bad cell or no rows at all, naming file,
+        row (the header is row 1), column and value.
+    """
+    # utf-8-sig: spreadsheets put a byte order mark before the first column's name.
+    rows = csv.reader(source.read_text(encoding="utf-8-sig").splitlines())
+    header = [cell.strip() for cell in next(rows, [])]
+    if header != list(columns):
+        raise ValueError(
+            f"{source}, row 1: the columns must be {', '.join(columns)}, got {', '.join(header)!r}"
+        )
+    values: dict[str, list[Any]] = {name: [] for name in columns}
+    for row, cells in enumerate(rows, 2):
+        if cells:
+            for name, value in _values(cells, columns, f"{source}, row {row}").items():
+                values[name].append(value)
+    if not values[header[0]]:
+        raise ValueError(f"{source} holds no readings; give at least one row below the header")
+    return values
+
+
 def load_contraction_table(path: str | Path | None = None) -> ContractionTable:
     """Read and check a table of contractions.
 
@@ -204,69 +285,46 @@ def load_contraction_table(path: str | Path | None = None) -> ContractionTable:
         pressures do not rise and then fall, or differ from those of the load's other cycles.
     """
     source = resources.files(__package__) / "mas10_contraction.csv" if path is None else Path(path)
-    # utf-8-sig: spreadsheets put a byte order mark before the first column's name.
-    lines = source.read_text(encoding="utf-8-sig").splitlines()
-    table = _in_cycle_order(_read(csv.reader(lines), str(source)))
+    table = _in_cycle_order(read_columns(source, COLUMNS))
     _check_cycles(table, str(source))
     return table
 
 
-def _read(rows: Iterator[list[str]], name: str) -> list[tuple[float, bool, float, int, float]]:
-    """Return the readings in SI, in the file's order."""
-    header = tuple(cell.strip() for cell in next(rows, []))
-    if header != COLUMNS:
-        raise ValueError(
-            f"{name}, row 1: the columns must be {', '.join(COLUMNS)}, got {', '.join(header)!r}"
-        )
-    readings = [_reading(cells, f"{name}, row {row}") for row, cells in enumerate(rows, 2) if cells]
-    if not readings:
-        raise ValueError(f"{name} holds no readings; give at least one cycle")
-    return readings
+def _values(cells: list[str], columns: Mapping[str, Parser], where: str) -> dict[str, Any]:
+    """Return the values of one row by column."""
+    if len(cells) != len(columns):
+        raise ValueError(f"{where}: {len(columns)} cells are needed, got {len(cells)}: {cells!r}")
+    values = {}
+    for (name, parse), cell in zip(columns.items(), cells, strict=True):
+        try:
+            values[name] = parse(cell.strip())
+        except ValueError as error:
+            raise ValueError(f"{where}, column {name}: {error}") from None
+    return values
 
 
-def _reading(cells: list[str], where: str) -> tuple[float, bool, float, int, float]:
-    """Return one reading (load kg, inflating, pressure Pa, repeat, contraction m)."""
-    if len(cells) != len(COLUMNS):
-        raise ValueError(f"{where}: {len(COLUMNS)} cells are needed, got {len(cells)}: {cells!r}")
-    load, direction, pressure, repeat, contraction = (cell.strip() for cell in cells)
-    return (
-        _number(load, f"{where}, column load_kg", 0.0, 1000.0, float),
-        _is_inflation(direction, f"{where}, column direction"),
-        BAR * _number(pressure, f"{where}, column pressure_bar", 0.0, 20.0, float),
-        int(_number(repeat, f"{where}, column repeat", 1, 100_000, int)),
-        MM * _number(contraction, f"{where}, column contraction_mm", -1000.0, 1000.0, float),
-    )
-
-
-def _number(cell: str, where: str, low: float, high: float, kind: Callable[[str], float]) -> float:
+def _converted(cell: str, kind: Callable[[str], N], wanted: str) -> N:
     try:
-        value = kind(cell)
+        return kind(cell)
     except ValueError:
-        wanted = "a whole number" if kind is int else "a number"
-        raise ValueError(f"{where}: {cell!r} is not {wanted}; correct the cell") from None
-    if not (math.isfinite(value) and low <= value <= high):
-        raise ValueError(
-            f"{where}: {cell!r} is outside [{low:g}, {high:g}]; correct the cell or its unit"
-        )
+        raise ValueError(f"{cell!r} is not {wanted}; correct the cell") from None
+
+
+def _within(value: N, low: float, high: float) -> N:
+    if not low <= value <= high:
+        raise ValueError(f"{value!r} is outside [{low:g}, {high:g}]; correct the cell or its unit")
     return value
 
 
-def _is_inflation(cell: str, where: str) -> bool:
-    if cell not in DIRECTIONS:
-        raise ValueError(f"{where}: {cell!r} is neither 'inflation' nor 'deflation'")
-    return cell == "inflation"
-
-
-def _in_cycle_order(readings: list[tuple[float, bool, float, int, float]]) -> ContractionTable:
+def _in_cycle_order(columns: dict[str, list[Any]]) -> ContractionTable:
     """Return the readings sorted by load and repeat; within a cycle the file's order stays."""
-    ordered = sorted(readings, key=lambda reading: (reading[0], reading[3]))
-    load, inflating, pressure, repeat, contraction = zip(*ordered, strict=True)
+    order = np.lexsort((columns["repeat"], columns["load_kg"]))
     return ContractionTable(
-        load_kg=np.array(load, dtype=np.float64),
-        inflating=np.array(inflating, dtype=np.bool_),
-        pressure_pa=np.array(pressure, dtype=np.float64),
-        repeat=np.array(repeat, dtype=np.int64),
-        contraction_m=np.array(contraction, dtype=np.float64),
+        load_kg=np.array(columns["load_kg"], dtype=np.float64)[order],
+        inflating=np.array(columns["direction"])[order] == "inflation",
+        pressure_pa=np.array(columns["pressure_bar"], dtype=np.float64)[order],
+        repeat=np.array(columns["repeat"], dtype=np.int64)[order],
+        contraction_m=np.array(columns["contraction_mm"], dtype=np.float64)[order],
     )
 
 

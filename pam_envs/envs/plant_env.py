@@ -162,6 +162,8 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Return an action as a list of numbers, or say what is wrong with it."""
         shape = (self._n_actions,)
         try:
+            if np.iscomplexobj(action):
+                raise TypeError("complex numbers")
             made = np.asarray(action, np.float64)
         except (TypeError, ValueError, OverflowError) as error:
             raise ValueError(

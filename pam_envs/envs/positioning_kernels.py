@@ -335,6 +335,17 @@ def _start_memory(rows: Any, counts: Any, j: int) -> None:
 
 
 @routine
+def copy_lane(rows: Any, counts: Any, ahead: Any, source: int, to: int) -> None:
+    """Make one lane of a tile a copy of another."""
+    for k in range(len(rows)):
+        rows[k][to] = rows[k][source]
+    for k in range(len(counts)):
+        counts[k][to] = counts[k][source]
+    for k in range(len(ahead)):
+        ahead[k][to] = ahead[k][source]
+
+
+@routine
 def write_lane(
     work: Any, settings: Any, observation: Any, info: Any, signals: int, row: int, j: int
 ) -> None:
@@ -445,6 +456,8 @@ def step_tiles(
             for j in range(lanes):
                 if flags[0][start + j] > 0:
                     reset_lane(rows, counts, ahead, table, samples, settings, choices, work, j)
+            for j in range(lanes, LANES):  # the rest of the last tile computes along, unseen
+                copy_lane(rows, counts, ahead, lanes - 1, j)
         for again in range(2):
             evaluate(rows, counts, ahead, config, choices, work)
             if mode == 2 or again == 1:

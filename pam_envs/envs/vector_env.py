@@ -180,6 +180,8 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
     def _checked(self, actions: Any) -> NDArray[np.float64]:
         wanted = (self.num_envs, len(self.action_signals))
         try:
+            if np.iscomplexobj(actions):
+                raise TypeError("complex numbers")
             made = np.asarray(actions, np.float64)
         except (TypeError, ValueError, OverflowError) as error:
             raise ValueError(f"the actions are not an array of shape {wanted}: {error}") from error

@@ -1,0 +1,226 @@
+"""Bad input: a clear error, and an environment that goes on as if nothing had been said."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from pam_envs.plants.single_muscle import SingleMuscle, UnstableParameters
+from tests.envs.cases import IDS
+
+EVERY = pytest.mark.parametrize("name", IDS)
+BAD_ACTIONS = [
+    [np.nan],
+    [np.inf],
+    [-np.inf],
+    np.zeros(0, np.float32),
+    np.zeros(2, np.float32),
+    np.zeros((1, 1), np.float32),
+    np.float32(0.1),
+    np.array(["up"]),
+    "up",
+    None,
+    {},
+    [[0.1], [0.2, 0.3]],
+    object(),
+    [10**400],
+    [1j],
+    np.array([1j]),
+]
+
+
+@EVERY
+@pytest.mark.parametrize("warm", [0, 80])
+def test_bad_actions_change_nothing(name: str, warm: int) -> None:
+    env, twin = gym.make(name).unwrapped, gym.make(name).unwrapped
+    env.reset(seed=0)
+    twin.reset(seed=0)
+    good = np.full(env.action_space.shape, 0.3, np.float32)
+    for _ in range(warm):
+        env.step(good)
+        twin.step(good)
+    before = env.get_state()
+    for action in BAD_ACTIONS:
+        with pytest.raises(ValueError, match="action"):
+            env.step(action)
+    after = env.get_state()
+    assert all(np.array_equal(after[k], before[k]) for k in before)
+    assert np.array_equal(env.step(good)[0], twin.step(good)[0])
+
+
+@EVERY
+def test_fuzz_of_ten_thousand_bad_actions(name: str) -> None:
+    random = np.random.default_rng(0)
+    env, twin = gym.make(name).unwrapped, gym.make(name).unwrapped
+    env.reset(seed=1)
+    twin.reset(seed=1)
+    n = env.action_space.shape[0]
+    bad = 0
+    while bad < 10_000:
+        kind = int(random.integers(5))
+        shape = tuple(random.integers(0, 4, random.integers(0, 4)).tolist())
+        action: Any = random.normal(size=shape)
+        if kind == 0:
+            action = np.full(n, random.choice([np.nan, np.inf, -np.inf]))
+        if kind == 1:
+            action = action.tolist()
+        if kind == 2:
+            action = action.astype(random.choice(["U5", "O", "c16", "M8[s]"]))
+        if kind == 3:
+            action = bytes(random.integers(0, 255, 5).tolist())
+        try:
+            good = np.shape(action) == (n,) and not np.iscomplexobj(action)
+            good = good and np.isfinite(np.asarray(action, np.float64)).all()
+        except (TypeError, ValueError):
+            good = False
+        if good:
+            continue
+        bad += 1
+        with pytest.raises(ValueError, match="action"):
+            env.step(action)
+    for value in (0.5, -0.2, 0.9):
+        action = np.full(n, value, np.float32)
+        assert np.array_equal(env.step(action)[0], twin.step(action)[0])
+
+
+@EVERY
+def test_actions_out_of_range_are_clipped_and_reported(name: str) -> None:
+    env, twin = gym.make(name), gym.make(name)
+    env.reset(seed=2)
+    twin.reset(seed=2)
+    far, edge = env.action_space.high * 7, env.action_space.high
+    a, b = env.step(far), twin.step(edge)
+    assert np.array_equal(a[0], b[0])
+    assert (a[4]["saturated"], b[4]["saturated"]) == (1.0, 0.0)
+
+
+@EVERY
+def test_bad_batches_change_nothing(name: str) -> None:
+    envs = gym.make_vec(name, 4, vectorization_mode="vector_entry_point")
+    envs.reset(seed=0)
+    before = envs.get_state()
+    shape = envs.action_space.shape
+    broken = np.zeros(shape)
+    broken[2, 0] = np.nan
+    for actions in (broken, np.zeros((3, shape[1])), np.zeros(4), None, "no", [[1.0], [2.0, 3.0]]):
+        with pytest.raises(ValueError, match="actions"):
+            envs.step(actions)
+    assert all(np.array_equal(v, before[k]) for k, v in envs.get_state().items())
+    for seed in (-1, 1.5, "a", [1, 2], True):
+        with pytest.raises(ValueError, match="seed"):
+            envs.reset(seed=seed)
+    with pytest.raises(ValueError, match="num_envs"):
+        gym.make_vec(name, 0, vectorization_mode="vector_entry_point")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"hysteresis": "bouc_wen"}, "hysteresis = 'bouc_wen' is not known; choose one of"),
+        ({"reference": "stairs"}, "choose one of 'steps'"),
+        ({"reference": [0.0, np.nan]}, "finite sample"),
+        ({"reference": [5.0]}, "samples are in metres"),
+        ({"reference": object()}, "reference"),
+        ({"preview": -1}, "preview = -1 must be from 0 to 20"),
+        ({"preview": 2.5}, "whole number"),
+        ({"preview_stride": 0}, "preview_stride = 0"),
+        ({"episode_seconds": 0}, "from 0.02 to 3600 s"),
+        ({"episode_seconds": float("nan")}, "episode_seconds = nan"),
+        ({"episode_seconds": "long"}, "episode_seconds = 'long'"),
+        ({"load": -1.0}, "load = -1.0 must be a number from 0 to 5 kg"),
+        ({"load": 25.0}, "from 0 to 5 kg"),
+        ({"load": []}, "load = "),
+        ({"load": "heavy"}, "load = 'heavy'"),
+        ({"load_disturbance": -0.1}, "load_disturbance"),
+        ({"start": "middle"}, "start = 'middle'"),
+        ({"normalize": 1}, "normalize = 1"),
+        ({"randomize": 3}, "randomize = 3"),
+        ({"randomize": {"mass.colour": (1, 2)}}, "'mass.colour' is not a parameter"),
+        ({"randomize": {"mass.damping": (300, 100)}}, "swap them"),
+        ({"randomize": {"mass.damping": 100}}, r"needs \(low, high\)"),
+        ({"randomize": {"mass.damping": (1, 1e9)}}, "outside its bounds"),
+        ({"randomize": {"mass.moving_mass": (0.05, 0.2)}}, "use at least"),
+        ({"reward": {"speed": 1.0}}, "keys among tracking_weight"),
+        ({"reward": {"error_scale": -1.0}}, "outside its bounds"),
+        ({"plant": "/nowhere/rig.yaml"}, "cannot be read"),
+        ({"plant": 7}, "must be a SingleMuscle"),
+    ],
+)
+def test_bad_arguments_of_muscle_positioning(arguments: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        gym.make("PAM/MusclePositioning-v0", **arguments)
+
+
+def test_a_plant_with_another_memory_is_refused() -> None:
+    plant = SingleMuscle.mas10("preisach")
+    with pytest.raises(ValueError, match="the plant's memory is 'preisach'"):
+        gym.make("PAM/MusclePositioning-v0", plant=plant, hysteresis="maxwell_slip")
+    env = gym.make("PAM/MusclePositioning-v0", plant=plant, hysteresis="none")
+    assert env.unwrapped.plant.memory.kind == "none"
+
+
+GOOD = {"schema": 1, "family": "single_muscle"}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "is not YAML"),
+        ("just text", "must hold a mapping"),
+        ("schema: 2\nfamily: single_muscle", "schema is 2"),
+        ("schema: 1\nfamily: leg", "family is 'leg'"),
+        ("schema: 1\nfamily: single_muscle\ncolour: red", "unknown key 'colour'"),
+        ("schema: 1\nfamily: single_muscle\nparameters: {mass.weight: 1}", "unknown parameter"),
+        ("schema: 1\nfamily: single_muscle\nparameters: {mass.load: heavy}", "must be a number"),
+        ("schema: 1\nfamily: single_muscle\nparameters: {mass.load: .nan}", "outside its bounds"),
+        ("schema: 1\nfamily: single_muscle\nparameters: {mass.load: 99}", r"mass.load = 99 kg"),
+        (
+            "schema: 1\nfamily: single_muscle\nparameters: {mass.load: {value: 1, unit: g}}",
+            "expected 'kg'",
+        ),
+        (
+            "schema: 1\nfamily: single_muscle\nparameters: {mass.load: {value: 1, why: x}}",
+            "unknown key 'why'",
+        ),
+        (
+            "schema: 1\nfamily: single_muscle\n"
+            "parameters: {mass.load: {value: 1, provenance: rumour}}",
+            "provenance 'rumour'",
+        ),
+        ("schema: 1\nfamily: single_muscle\nparameters: [1]", "must be a mapping"),
+        ("schema: 1\nfamily: single_muscle\nmemory: {kind: rope}", "memory must be a mapping"),
+        ("schema: 1\nfamily: single_muscle\nmemory: {kind: preisach}", "needs exactly the keys"),
+        (
+            "schema: 1\nfamily: single_muscle\n"
+            "memory: {kind: maxwell_slip, linear: 0.2, thresholds: [1e4], weights: [0.5]}",
+            "total slope",
+        ),
+        ("schema: 1\nfamily: single_muscle\nsubsteps: 0", "substeps"),
+        ("schema: 1\nfamily: single_muscle\nensemble: [3]", "must be a mapping"),
+        (
+            "schema: 1\nfamily: single_muscle\nparameters: {mass.moving_mass: 0.05}",
+            "too fast for 4 sub-steps",
+        ),
+    ],
+)
+def test_bad_plant_files(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=said) as error:
+        gym.make("PAM/MusclePositioning-v0", plant=str(path))
+    assert re.search("rig.yaml", str(error.value))
+
+
+def test_what_cannot_be_simulated_names_the_remedy() -> None:
+    with pytest.raises(UnstableParameters, match="use at least . sub-steps") as error:
+        SingleMuscle.mas10(mass__moving_mass=0.06)
+    enough = int(re.findall(r"at least (\d+) sub-steps", str(error.value))[0])
+    plant = SingleMuscle.mas10()
+    made = dataclasses.replace(plant, substeps=enough).replace({"mass.moving_mass": 0.06})
+    assert made.mass.moving_mass == 0.06

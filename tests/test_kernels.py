@@ -1,0 +1,162 @@
+"""Arithmetic without libm, random numbers, and the builder of kernels."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from pam_envs import kernels
+from pam_envs.mechanics.hanging_mass import damped_motion, oscillator
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def test_decay_is_the_exponential() -> None:
+    x = np.linspace(-3.0, 5.0, 801)
+    assert max(abs(kernels.decay(v) / math.exp(-v) - 1.0) for v in x.tolist()) < 2e-13
+    x = np.linspace(5.0, 20.0, 301)
+    assert max(abs(kernels.decay(v) / math.exp(-v) - 1.0) for v in x.tolist()) < 1e-9
+    assert kernels.decay(0.0) == 1.0
+    assert kernels.decay(1e9) == kernels.decay(40.0) > 0.0
+
+
+def test_sine_is_the_sine() -> None:
+    x = np.linspace(-30.0, 30.0, 4001).tolist()
+    assert max(abs(kernels.sine_of_turns(v) - math.sin(2 * math.pi * v)) for v in x) < 1e-13
+    assert kernels.sine_of_turns(0.0) == 0.0
+
+
+def test_logarithm_and_normal_quantile() -> None:
+    u = np.concatenate([np.logspace(-9.9, -0.31, 800), 1.0 - np.logspace(-9.0, -0.31, 800)])
+    assert max(abs(kernels.log_of_fraction(v) - math.log(v)) for v in u.tolist()) < 1e-11
+    got = np.array([kernels.normal_quantile(v) for v in u.tolist()])
+    assert np.abs(got - stats.norm.ppf(u)).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("value", "step", "expected"), [(0.26, 0.1, 0.3), (-0.26, 0.1, -0.3), (1.7, 0.0, 1.7)]
+)
+def test_quantise(value: float, step: float, expected: float) -> None:
+    assert kernels.quantise(value, step) == pytest.approx(expected, abs=1e-15)
+
+
+def test_oscillator_covers_both_kinds_of_motion() -> None:
+    for phase in np.linspace(0.05, 9.0, 60).tolist():
+        c, s = oscillator(phase)
+        root = math.sqrt(phase)
+        assert c == pytest.approx(math.cos(root), abs=2e-7)
+        assert s == pytest.approx(math.sin(root) / root, abs=2e-7)
+        c, s = oscillator(-phase)
+        assert c == pytest.approx(math.cosh(root), rel=2e-7)
+        assert s == pytest.approx(math.sinh(root) / root, rel=2e-7)
+    assert oscillator(0.0) == (1.0, 1.0)
+
+
+@pytest.mark.parametrize("damping", [0.0, 20.0, 1200.0])
+def test_damped_motion_solves_its_equation(damping: float) -> None:
+    from scipy.integrate import solve_ivp
+
+    v0, a, j, k, h = 0.03, 2.0, -400.0, 9e4, 0.005
+    exact = solve_ivp(
+        lambda t, y: [y[1], a + j * t - k * y[0] - damping * y[1]],
+        (0.0, h),
+        [0.0, v0],
+        rtol=1e-11,
+        atol=1e-14,
+    ).y[:, -1]
+    got = damped_motion(v0, a, j, k, damping, kernels.decay(0.5 * damping * h), h)
+    assert got == pytest.approx(tuple(exact), rel=1e-6, abs=1e-10)
+
+
+def test_mix_is_a_bijection_that_spreads_one_bit() -> None:
+    words = np.random.default_rng(0).integers(0, 2**32, 20000).tolist()
+    assert len({kernels.mix(w) for w in set(words)}) == len(set(words))
+    flips = np.zeros(32)
+    for w in words[:500]:
+        for bit in range(32):
+            flips[bit] += (kernels.mix(w) ^ kernels.mix(w ^ (1 << bit))).bit_count()
+    assert np.abs(flips / 500 - 16.0).max() < 0.6
+
+
+def draws(seed: int, episode: int, stream: int, number: int) -> np.ndarray:
+    a, b = kernels.seed_words(seed)
+    a, b = kernels.episode_key(a, episode), kernels.episode_key(b, episode)
+    return np.array([kernels.uniform(a, b, stream, i) for i in range(number)])
+
+
+def test_uniform_numbers_are_uniform_and_independent() -> None:
+    sample = draws(0, 0, 1, 20000)
+    assert stats.kstest(sample, "uniform").pvalue > 1e-3
+    for lag in (1, 2, 3, 7):
+        assert abs(np.corrcoef(sample[lag:], sample[:-lag])[0, 1]) < 0.03
+    for other in (draws(1, 0, 1, 20000), draws(0, 1, 1, 20000), draws(0, 0, 2, 20000)):
+        assert abs(np.corrcoef(sample, other)[0, 1]) < 0.03
+    pairs, _, _ = np.histogram2d(sample[::2], sample[1::2], bins=16, range=[[0, 1], [0, 1]])
+    assert stats.chisquare(pairs.ravel()).pvalue > 1e-3
+
+
+def test_first_draws_of_neighbouring_seeds_and_episodes_are_independent() -> None:
+    seeds = np.array([draws(s, 0, 3, 2) for s in range(4000)])
+    episodes = np.array([draws(7, e, 3, 2) for e in range(4000)])
+    for sample in (seeds, episodes):
+        assert stats.kstest(sample[:, 0], "uniform").pvalue > 1e-3
+        assert abs(np.corrcoef(sample[1:, 0], sample[:-1, 0])[0, 1]) < 0.06
+        assert abs(np.corrcoef(sample.T)[0, 1]) < 0.06
+
+
+def test_normal_numbers_are_normal() -> None:
+    a, b = kernels.seed_words(12)
+    sample = np.array([kernels.normal(a, b, 1, i) for i in range(20000)])
+    assert stats.kstest(sample, "norm").pvalue > 1e-3
+    assert abs(sample.std() - 1.0) < 0.02
+
+
+def test_seeds_of_any_size_differ() -> None:
+    seeds = [0, 1, 2**31, 2**32, 2**32 + 1, 2**64, 2**100, 2**100 + 1]
+    assert len({kernels.seed_words(s) for s in seeds}) == len(seeds)
+    with pytest.raises(ValueError, match="non-negative"):
+        kernels.seed_words(-1)
+
+
+@kernels.kernel
+def _inner(x: float) -> float:
+    return x + OFFSET
+
+
+OFFSET = 1
+
+
+@kernels.kernel
+def _outer(x: float) -> float:
+    return 2.0 * _inner(x)
+
+
+def test_build_replaces_names_through_the_call_graph() -> None:
+    plain = kernels.build(_outer, "plain_for_test")
+    moved = kernels.build(_outer, "moved_for_test", OFFSET=10)
+    assert (plain(1.0), moved(1.0), _outer(1.0)) == (4.0, 22.0, 4.0)
+    assert kernels.interpreted(_outer, {"OFFSET": 5})(1.0) == 12.0
+
+
+def test_compiled_code_is_kept_on_disk_and_dropped_when_a_source_changes(tmp_path: Path) -> None:
+    code = "import tests.test_kernels as t; t.kernels.build(t._outer, 'kept')(1.0)"
+    variables = {
+        **os.environ,
+        "PYTHONPATH": str(ROOT),
+        "PAM_ENVS_CACHE": str(tmp_path),
+        "PAM_ENVS_COMPILE": "1",
+    }
+    run = [sys.executable, "-c", code]
+    subprocess.run(run, env=variables, cwd=ROOT, check=True)
+    folder = tmp_path / kernels.source_digest()
+    assert sorted(p.suffix for p in folder.iterdir()) == [".nbc", ".nbi"]
+    before = {p: p.stat().st_mtime_ns for p in folder.iterdir()}
+    subprocess.run(run, env=variables, cwd=ROOT, check=True)
+    assert {p: p.stat().st_mtime_ns for p in folder.iterdir()} == before
