@@ -113,6 +113,8 @@ class Signal:
         Position in the observation (or action) vector.
     normalized : bool
         Whether the vector holds the normalised or the SI value.
+    ahead : float
+        How far [s] in the future of the observation the value applies, for previews.
     """
 
     name: str
@@ -121,6 +123,7 @@ class Signal:
     high: float
     index: int
     normalized: bool = True
+    ahead: float = 0.0
 
     @property
     def scale(self) -> tuple[float, float]:

@@ -151,7 +151,7 @@ def _spread(plant: SingleMuscle, randomize: Any) -> NDArray[np.float64]:
             )
         for end in (low, high):
             plant.replace({name: end})  # refuses what is out of bounds or cannot be simulated
-        table.append((R.N_STATE + R.PARAMETERS.index(name), low, high))
+        table.append((R.PARAMETERS.index(name), low, high))
     _check_corners(plant, ranges)
     return np.array(table, float).reshape(-1, 3)
 
@@ -174,7 +174,9 @@ def _check_corners(plant: SingleMuscle, ranges: Mapping[str, Any]) -> None:
         member.replace(worst)
 
 
-def _signals(plant: SingleMuscle, task: Tracking, preview: int, normalize: bool) -> Signals:
+def _signals(
+    plant: SingleMuscle, task: Tracking, preview: int, spacing: float, normalize: bool
+) -> Signals:
     position = (task.lowest_contraction, task.highest_contraction)
     pressure = (0.0, plant.regulator.max_pressure)
     parts: list[tuple[str, str, tuple[float, float]]] = [
@@ -186,7 +188,7 @@ def _signals(plant: SingleMuscle, task: Tracking, preview: int, normalize: bool)
     ]
     parts += [(f"reference_{i + 1}", "m", position) for i in range(preview)]
     return Signals(
-        Signal(name, unit, low, high, i, normalize)
+        Signal(name, unit, low, high, i, normalize, max(0, i - 4) * spacing)
         for i, (name, unit, (low, high)) in enumerate(parts)
     )
 
@@ -257,7 +259,7 @@ def make_setup(
     change = check_number("load_disturbance", load_disturbance, 0.0, HIGHEST_LOAD, "kg")
     task = _task(reward)
     spread = _spread(made, randomize)
-    signals = _signals(made, task, preview, normalize)
+    signals = _signals(made, task, preview, stride * made.control_period, normalize)
     full = made.regulator.max_pressure
     actions = Signals([Signal("pressure_set_point", "Pa", 0.0, full, 0, normalize)])
     a, b = actions[0].scale
@@ -292,6 +294,8 @@ def make_setup(
         action_signals=actions,
         kernels=K.KERNELS[made.memory.kind],
         rows=K.KERNELS[made.memory.kind].n_rows,
+        fixed=R.N_PARAMETERS,
+        drawn=randomize is not False,
         counts=K.N_COUNTS,
         ring=1 << (preview * stride).bit_length(),
         seed_rows=(K.SEED_A, K.SEED_B, R.EPISODE),

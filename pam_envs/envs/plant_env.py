@@ -17,6 +17,7 @@ from pam_envs.envs.setup import (
     Setup,
     check_seed,
     check_state,
+    saved,
 )
 from pam_envs.kernels import COMPILED, address_book, seed_words
 from pam_envs.parameters import Signals
@@ -81,8 +82,8 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             np.zeros((2, 1), np.int8),
         ]
         held = arrays if compiled else [a.tolist() for a in arrays]
-        self._all = tuple(held[:3])
-        self._counts = self._all[1][0]
+        self._all = tuple(held[:4])
+        self._counts = self._all[2][0]
         *_, self._actions, self._observations, self._infos, self._flags = held
         self._run, self._compiled = function, compiled
         self._arguments: tuple[Any, ...] = (*held, 1)
@@ -226,11 +227,8 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def get_state(self) -> dict[str, NDArray[Any]]:
         """Return everything that the future depends on, as arrays that own their data."""
         seed = -1 if self._seed is None else self._seed
-        rows, counts, ahead = (np.array(a) for a in self._all)
         return {
-            "rows": rows.astype(np.float64),
-            "counts": counts.astype(np.int64),
-            "ahead": ahead.astype(np.float64),
+            **saved(self._all),
             "steps": np.array(self._steps),
             "seed": np.frombuffer(str(seed).encode(), np.uint8).copy(),
         }

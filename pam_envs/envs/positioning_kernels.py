@@ -25,6 +25,7 @@ from pam_envs.kernels import (
 )
 from pam_envs.muscle.effective_area import volume
 from pam_envs.plants import single_muscle_rows as R
+from pam_envs.plants.single_muscle_rows import N_PARAMETERS
 from pam_envs.plants.single_muscle_kernels import (
     MEMORIES,
     MEMORY_ROWS,
@@ -167,10 +168,10 @@ N_ROWS = 0
 
 
 @kernel
-def air_in_muscle(rows: Any, j: int) -> float:
+def air_in_muscle(rows: Any, fixed: Any, j: int) -> float:
     """Return the mass of air [kg] in the muscle of lane ``j``."""
-    length = rows[R.REST_LENGTH][j]
-    space = volume(rows[R.CONTRACTION][j] / length, length, rows[R.TALL][j], rows[R.COSINE][j])
+    length = fixed[R.REST_LENGTH][j]
+    space = volume(rows[R.CONTRACTION][j] / length, length, fixed[R.TALL][j], fixed[R.COSINE][j])
     return AIR * (rows[R.PRESSURE][j] + ATMOSPHERE) * space
 
 
@@ -200,6 +201,7 @@ def look_ahead(rows: Any, counts: Any, ahead: Any, samples: Any, config: Any, ch
 @kernel
 def evaluate(
     rows: Any,
+    fixed: Any,
     counts: Any,
     ahead: Any,
     config: Any,
@@ -209,7 +211,7 @@ def evaluate(
     """Write what can be observed and reported of a tile into ``work``."""
     step, key_a, key_b = counts[R.STEP], counts[R.KEY_A], counts[R.KEY_B]
     x, rest, velocity = rows[R.CONTRACTION], rows[R.REST], rows[R.VELOCITY]
-    pressure, set_point, older = rows[R.PRESSURE], rows[R.HISTORY], rows[R.HISTORY + 1]
+    pressure, set_point, older = rows[R.PRESSURE], rows[R.SET_POINT], rows[R.OLD_SET_POINT]
     period, stride = config[PERIOD], choices[STRIDE]
     for j in range(LANES):
         work[TIME][j] = step[j] * period
@@ -222,16 +224,16 @@ def evaluate(
         work[S_LOAD][j] = rows[R.LOAD][j]
         work[SENSOR_X][j] = read_sensor(
             contraction,
-            rows[R.POSITION_NOISE][j],
-            rows[R.POSITION_RESOLUTION][j],
-            rows[R.POSITION_BIAS][j],
+            fixed[R.POSITION_NOISE][j],
+            fixed[R.POSITION_RESOLUTION][j],
+            fixed[R.POSITION_BIAS][j],
             normal(key_a[j], key_b[j], NOISE_X, step[j]),
         )
         work[SENSOR_P][j] = read_sensor(
             pressure[j],
-            rows[R.PRESSURE_NOISE][j],
-            rows[R.PRESSURE_RESOLUTION][j],
-            rows[R.PRESSURE_BIAS][j],
+            fixed[R.PRESSURE_NOISE][j],
+            fixed[R.PRESSURE_RESOLUTION][j],
+            fixed[R.PRESSURE_BIAS][j],
             normal(key_a[j], key_b[j], NOISE_P, step[j]),
         )
         work[SIGNALS][j] = work[SENSOR_X][j]
@@ -251,13 +253,13 @@ def evaluate(
             output - now[j], config[ERROR_SCALE], config[TRACKING_WEIGHT]
         )
         work[R_EFFORT][j] = effort_reward(
-            set_point[j] - older[j], rows[R.MAX_PRESSURE][j], config[EFFORT_WEIGHT]
+            set_point[j] - older[j], fixed[R.MAX_PRESSURE][j], config[EFFORT_WEIGHT]
         )
         work[C_CONTRACTION][j] = excess(output, config[SOFT_CONTRACTION])
         work[C_PRESSURE][j] = excess(pressure[j], config[SOFT_PRESSURE])
         work[M_CONTRACTION][j] = min(config[HIGHEST] - output, output - config[LOWEST])
         work[M_PRESSURE][j] = config[SOFT_PRESSURE] - pressure[j]
-        air = air_in_muscle(rows, j)
+        air = air_in_muscle(rows, fixed, j)
         work[E_TRAVEL][j] = abs(pressure[j] - rows[R.OLD_PRESSURE][j])
         work[E_AIR][j] = max(0.0, air - rows[R.OLD_AIR][j])
         rows[R.OLD_PRESSURE][j] = pressure[j]
@@ -267,6 +269,7 @@ def evaluate(
 @routine
 def reset_lane(
     rows: Any,
+    fixed: Any,
     counts: Any,
     ahead: Any,
     table: Any,
@@ -284,11 +287,11 @@ def reset_lane(
     member = int(uniform(key_a, key_b, RANDOM, 0) * choices[N_MEMBERS])
     counts[R.MEMBER][j] = member
     for k in range(R.N_PARAMETERS):
-        rows[R.N_STATE + k][j] = settings[MEMBERS + member][k]
+        fixed[k][j] = settings[MEMBERS + member][k]
     for k in range(choices[N_SPREAD]):
         drawn = settings[SPREAD + k]
         u = uniform(key_a, key_b, RANDOM, 1 + k)
-        rows[int(drawn[0])][j] = drawn[1] + (drawn[2] - drawn[1]) * u
+        fixed[int(drawn[0])][j] = drawn[1] + (drawn[2] - drawn[1]) * u
     load = settings[LOADS][int(uniform(key_a, key_b, START, 0) * choices[N_LOADS])]
     rows[R.TOLD_LOAD][j] = load
     rows[R.LOAD][j] = load
@@ -297,19 +300,20 @@ def reset_lane(
     if uniform(key_a, key_b, START, 2) < 0.5:
         rows[R.CHANGE][j] = max(-load, -config[LOAD_CHANGE])
     _start_memory(rows, counts, j)
-    peak = config[START_SHARE] * rows[R.MAX_PRESSURE][j] * uniform(key_a, key_b, START, 3)
+    peak = config[START_SHARE] * fixed[R.MAX_PRESSURE][j] * uniform(key_a, key_b, START, 3)
     begin = peak * uniform(key_a, key_b, START, 4)
-    rows[R.REST][j] = rest_contraction(rows, j, 0.0, load)
+    rows[R.REST][j] = rest_contraction(fixed, j, 0.0, load)
     for pressure in (0.0, peak, begin):
         rows[R.PRESSURE][j] = pressure
-        remember(rows, counts, table, MEMORY, j, j + 1, choices[N_ELEMENTS], work)
+        remember(rows, fixed, counts, table, MEMORY, j, j + 1, choices[N_ELEMENTS], work)
     for k in range(R.N_HISTORY):
         rows[R.HISTORY + k][j] = begin
     rows[R.SET_POINT][j] = begin
-    rows[R.CONTRACTION][j] = rest_contraction(rows, j, rows[R.DRIVE][j], load)
+    rows[R.OLD_SET_POINT][j] = begin
+    rows[R.CONTRACTION][j] = rest_contraction(fixed, j, rows[R.DRIVE][j], load)
     rows[R.VELOCITY][j] = 0.0
     rows[R.OLD_PRESSURE][j] = begin
-    rows[R.OLD_AIR][j] = air_in_muscle(rows, j)
+    rows[R.OLD_AIR][j] = air_in_muscle(rows, fixed, j)
     work[SATURATED][j] = 0.0
     if choices[FAMILY] != SAMPLES:
         draw_reference(
@@ -335,10 +339,12 @@ def _start_memory(rows: Any, counts: Any, j: int) -> None:
 
 
 @routine
-def copy_lane(rows: Any, counts: Any, ahead: Any, source: int, to: int) -> None:
+def copy_lane(rows: Any, fixed: Any, counts: Any, ahead: Any, source: int, to: int) -> None:
     """Make one lane of a tile a copy of another."""
     for k in range(len(rows)):
         rows[k][to] = rows[k][source]
+    for k in range(len(fixed)):
+        fixed[k][to] = fixed[k][source]
     for k in range(len(counts)):
         counts[k][to] = counts[k][source]
     for k in range(len(ahead)):
@@ -362,16 +368,16 @@ def write_lane(
 def take_actions(rows: Any, counts: Any, config: Any, work: Any, actions: Any, start: int) -> None:
     """Turn actions into set-points, and let the load change at its time."""
     step, load, set_point = counts[R.STEP], rows[R.LOAD], rows[R.SET_POINT]
+    older = rows[R.OLD_SET_POINT]
     told, when, change = rows[R.TOLD_LOAD], rows[R.CHANGE_TIME], rows[R.CHANGE]
     saturated, last = work[SATURATED], len(actions) - 1
     for j in range(LANES):
         wanted = float(actions[min(start + j, last)][0])
         held = max(config[ACTION_LOW], min(config[ACTION_HIGH], wanted))
         saturated[j] = 0.0 if held == wanted else 1.0
+        older[j] = set_point[j]
         set_point[j] = config[ACTION_SCALE] * held + config[ACTION_OFFSET]
         load[j] = told[j] + (change[j] if step[j] * config[PERIOD] >= when[j] else 0.0)
-    for j in range(LANES):
-        step[j] = step[j] + 1
 
 
 @kernel
@@ -410,6 +416,7 @@ def write_tile(
 @kernel
 def step_tiles(
     all_rows: Any,
+    all_fixed: Any,
     all_counts: Any,
     all_ahead: Any,
     table: Any,
@@ -434,6 +441,7 @@ def step_tiles(
     config, observation, info = settings[CONFIG_ROW], observations[0], infos[0]
     for tile in prange(len(all_rows)):
         rows = tile_view(all_rows, tile, N_ROWS, LANES)
+        fixed = tile_view(all_fixed, min(tile, len(all_fixed) - 1), N_PARAMETERS, LANES)
         counts = tile_view(all_counts, tile, N_COUNTS, LANES)
         ahead = all_ahead[tile]
         work = scratch(N_WORK_ROWS, LANES)
@@ -443,6 +451,7 @@ def step_tiles(
             take_actions(rows, counts, config, work, actions, start)
             advance(
                 rows,
+                fixed,
                 counts,
                 table,
                 MEMORY,
@@ -451,15 +460,19 @@ def step_tiles(
                 config[PERIOD],
                 work,
             )
+            for j in range(LANES):
+                counts[R.STEP][j] = counts[R.STEP][j] + 1
             look_ahead(rows, counts, ahead, samples, config, choices)
         else:
             for j in range(lanes):
                 if flags[0][start + j] > 0:
-                    reset_lane(rows, counts, ahead, table, samples, settings, choices, work, j)
+                    reset_lane(
+                        rows, fixed, counts, ahead, table, samples, settings, choices, work, j
+                    )
             for j in range(lanes, LANES):  # the rest of the last tile computes along, unseen
-                copy_lane(rows, counts, ahead, lanes - 1, j)
+                copy_lane(rows, fixed, counts, ahead, lanes - 1, j)
         for again in range(2):
-            evaluate(rows, counts, ahead, config, choices, work)
+            evaluate(rows, fixed, counts, ahead, config, choices, work)
             if mode == 2 or again == 1:
                 for j in range(lanes):
                     if flags[0][start + j] + flags[1][start + j] > 0:
@@ -473,7 +486,9 @@ def step_tiles(
                     write_lane(work, settings, observations[1], infos[1], signals, start + j, j)
                     infos[1][0][start + j] = info[0][start + j]
                     counts[R.EPISODE][j] = counts[R.EPISODE][j] + 1
-                    reset_lane(rows, counts, ahead, table, samples, settings, choices, work, j)
+                    reset_lane(
+                        rows, fixed, counts, ahead, table, samples, settings, choices, work, j
+                    )
 
 
 @kernel
@@ -481,16 +496,17 @@ def step_by_address(book: Any, mode: int) -> None:
     """Step or reset one environment whose arrays stand in an address book."""
     step_tiles(
         array_at(book, 0, 3, 0),
-        array_at(book, 1, 3, 1),
-        array_at(book, 2, 3, 0),
+        array_at(book, 1, 3, 0),
+        array_at(book, 2, 3, 1),
         array_at(book, 3, 3, 0),
-        array_at(book, 4, 1, 0),
-        array_at(book, 5, 2, 0),
-        array_at(book, 6, 1, 1),
-        array_at(book, 7, 2, 0),
-        array_at(book, 8, 3, 2),
-        array_at(book, 9, 3, 0),
-        array_at(book, 10, 2, 3),
+        array_at(book, 4, 3, 0),
+        array_at(book, 5, 1, 0),
+        array_at(book, 6, 2, 0),
+        array_at(book, 7, 1, 1),
+        array_at(book, 8, 2, 0),
+        array_at(book, 9, 3, 2),
+        array_at(book, 10, 3, 0),
+        array_at(book, 11, 2, 3),
         1,
         mode,
     )

@@ -34,8 +34,10 @@ class Setup:
         What the observation and the action hold.
     kernels : object
         With ``single``, ``batch`` and ``parallel``, which take the arrays of a batch and a mode.
-    rows, counts : int
-        Rows of float and integer state of one environment.
+    rows, fixed, counts : int
+        Rows of state, of parameters and of integer state of one environment.
+    drawn : bool
+        Whether environments differ in their parameters; otherwise all tiles share them.
     ring : int
         References that are kept for the preview, a power of two.
     seed_rows : tuple of int
@@ -57,6 +59,8 @@ class Setup:
     action_signals: Signals
     kernels: Any
     rows: int
+    fixed: int
+    drawn: bool
     counts: int
     ring: int
     seed_rows: tuple[int, int, int]
@@ -68,9 +72,10 @@ class Setup:
     arguments: dict[str, Any] = field(default_factory=dict)
 
     def state(self, tiles: int, lanes: int) -> tuple[NDArray[Any], ...]:
-        """Return zeroed float rows, integer rows and previews for tiles of ``lanes`` lanes."""
+        """Return zeroed state, parameters, integers and previews for tiles of ``lanes`` lanes."""
         return (
             np.zeros((tiles, self.rows, lanes)),
+            np.zeros((tiles if self.drawn else 1, self.fixed, lanes)),
             np.zeros((tiles, self.counts, lanes), np.int64),
             np.zeros((tiles, self.ring, lanes)),
         )
@@ -132,7 +137,16 @@ def check_seed(seed: Any) -> int:
     return int(seed)
 
 
-STATE_KEYS = ("rows", "counts", "ahead")
+STATE_KEYS = ("rows", "fixed", "counts", "ahead")
+
+
+def saved(parts: tuple[Any, ...]) -> dict[str, NDArray[Any]]:
+    """Return copies of the parts of a state, as arrays by name."""
+    kinds = {"counts": np.int64}
+    return {
+        name: np.array(part, kinds.get(name, np.float64))
+        for name, part in zip(STATE_KEYS, parts, strict=True)
+    }
 
 
 def check_state(state: Any, wanted: tuple[NDArray[Any], ...]) -> None:

@@ -20,6 +20,7 @@ from pam_envs.envs.setup import (
     check_state,
     check_whole,
     for_kernels,
+    saved,
     tiles_for,
 )
 from pam_envs.kernels import COMPILED, LANES, seed_words
@@ -104,7 +105,7 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
         a, b, episode = self.setup.seed_rows
         for row in np.flatnonzero(mask).tolist():
             tile, lane = divmod(row, LANES)
-            counts, seed = self._all[1][tile], None if seeds is None else seeds[row]
+            counts, seed = self._all[2][tile], None if seeds is None else seeds[row]
             if seed is None:
                 counts[episode][lane] += 1
             else:
@@ -216,11 +217,8 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
 
     def get_state(self) -> dict[str, NDArray[Any]]:
         """Return everything that the future depends on, as arrays that own their data."""
-        rows, counts, ahead = (np.array(a) for a in self._all)
         return {
-            "rows": rows.astype(np.float64),
-            "counts": counts.astype(np.int64),
-            "ahead": ahead.astype(np.float64),
+            **saved(self._all),
             "last": self._last_observation.copy(),
             "seeded": np.array(self._seeded),
         }

@@ -69,7 +69,7 @@ def _place(plant: SingleMuscle, name: str) -> int:
     if name in R.PARAMETERS:
         return R.PARAMETERS.index(name)
     if name in weights(plant):
-        return R.WEIGHT - R.N_STATE + weights(plant).index(name)
+        return R.WEIGHT + weights(plant).index(name)
     known = ", ".join((*R.PARAMETERS, *weights(plant)))
     raise ValueError(f"no parameter named {name!r}; there are: {known}")
 

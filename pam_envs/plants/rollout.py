@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pam_envs.kernels import COMPILED, LANES, build, kernel, prange, scratch, tile_view
 from pam_envs.plants import single_muscle_rows as R
 from pam_envs.plants.single_muscle import SingleMuscle
-from pam_envs.plants.single_muscle_rows import N_COUNTS
+from pam_envs.plants.single_muscle_rows import N_COUNTS, N_PARAMETERS
 from pam_envs.plants.single_muscle_kernels import (
     MEMORIES,
     MEMORY_ROWS,
@@ -29,6 +29,7 @@ remember: Any = None  # placeholders, filled in for each memory
 @kernel
 def run(
     all_rows: Any,
+    all_fixed: Any,
     all_counts: Any,
     table: Any,
     set_points: Any,
@@ -40,20 +41,23 @@ def run(
     """Run tiles of plants from rest at no pressure through ``len(set_points)`` control periods."""
     for tile in prange(len(all_rows)):
         rows = tile_view(all_rows, tile, N_ROWS, LANES)
+        fixed = tile_view(all_fixed, tile, N_PARAMETERS, LANES)
         counts = tile_view(all_counts, tile, N_COUNTS, LANES)
         work = scratch(N_WORK, LANES)
         start = tile * LANES
         lanes = min(LANES, len(outputs[0][0]) - start)
         for j in range(LANES):
-            rows[R.REST][j] = rest_contraction(rows, j, 0.0, rows[R.LOAD][j])
+            rows[R.LOAD][j] = fixed[R.NOMINAL_LOAD][j]
+            rows[R.REST][j] = rest_contraction(fixed, j, 0.0, rows[R.LOAD][j])
             rows[R.CONTRACTION][j] = rows[R.REST][j]
             counts[R.STACK_COUNT][j] = 1
         x, rest = rows[R.CONTRACTION], rows[R.REST]
         for step in range(len(set_points)):
             columns = len(set_points[step])
             for j in range(LANES):
+                counts[R.STEP][j] = step
                 rows[R.SET_POINT][j] = set_points[step][min(start + j, columns - 1)]
-            advance(rows, counts, table, R.END, elements, substeps, period, work)
+            advance(rows, fixed, counts, table, R.END, elements, substeps, period, work)
             for j in range(lanes):
                 outputs[0][step][start + j] = x[j] - rest[j]
                 outputs[1][step][start + j] = rows[R.VELOCITY][j]
@@ -93,11 +97,10 @@ def simulate_rows(
     rows = np.zeros((tiles, R.END + MEMORY_ROWS[kind], LANES))
     column = np.minimum(np.arange(tiles * LANES), n - 1)
     laid = parameters[column].T.reshape(-1, tiles, LANES).transpose(1, 0, 2)
-    rows[:, R.N_STATE : R.END] = laid
-    rows[:, R.LOAD] = rows[:, R.NOMINAL_LOAD]
-    counts = np.zeros((tiles, R.N_COUNTS, LANES), np.int64)
+    fixed = np.ascontiguousarray(laid)
+    counts = np.zeros((tiles, N_COUNTS, LANES), np.int64)
     outputs = np.empty((len(OUTPUTS), len(commands), n))
-    arrays: list[Any] = [rows, counts, plant.everett_tables()[:1], commands, outputs]
+    arrays: list[Any] = [rows, fixed, counts, plant.everett_tables()[:1], commands, outputs]
     if not COMPILED:
         arrays = [a.tolist() for a in arrays]
     _runner(kind)(*arrays, plant.elements, plant.substeps, plant.control_period)

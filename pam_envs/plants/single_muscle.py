@@ -200,20 +200,20 @@ class SingleMuscle:
         """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
         column = np.zeros(R.N_PARAMETERS)
         column[: len(R.PARAMETERS)] = [self.value(name) for name in R.PARAMETERS]
-        column[R.TALL - R.N_STATE] = (
+        column[R.TALL] = (
             math.pi * self.muscle.diameter**2 / 4.0 / math.sin(self.muscle.braid_angle) ** 2
         )
-        column[R.COSINE - R.N_STATE] = math.cos(self.muscle.braid_angle)
-        column[R.LINEAR - R.N_STATE] = 1.0
+        column[R.COSINE] = math.cos(self.muscle.braid_angle)
+        column[R.LINEAR] = 1.0
         operator = self.memory.operator
         if isinstance(operator, PlayOperator):
             n = len(operator.weights)
-            column[R.LINEAR - R.N_STATE] = operator.linear
+            column[R.LINEAR] = operator.linear
             for start, values in (
                 (R.THRESHOLD, operator.thresholds),
                 (R.WEIGHT, operator.weights),
             ):
-                column[start - R.N_STATE : start - R.N_STATE + n] = values
+                column[start : start + n] = values
         return column
 
     @property

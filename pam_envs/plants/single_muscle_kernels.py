@@ -40,6 +40,7 @@ from pam_envs.plants.single_muscle_rows import (
     SET_POINT,
     SLEW_RATE,
     STACK_COUNT,
+    STEP,
     STIFFNESS,
     STRETCH,
     THRESHOLD,
@@ -48,7 +49,7 @@ from pam_envs.plants.single_muscle_rows import (
     WEIGHT,
     WIDTH_PER_LOAD,
 )
-from pam_envs.pneumatics.regulator import delayed_fraction, regulator_step
+from pam_envs.pneumatics.regulator import DELAY_PERIODS, delayed_fraction, regulator_step
 
 
 @kernel
@@ -76,7 +77,15 @@ def loop_width(width_per_load: float, load: float) -> float:
 
 @kernel
 def no_memory(
-    rows: Any, counts: Any, table: Any, memory: int, first: int, last: int, elements: int, work: Any
+    rows: Any,
+    fixed: Any,
+    counts: Any,
+    table: Any,
+    memory: int,
+    first: int,
+    last: int,
+    elements: int,
+    work: Any,
 ) -> None:
     """Effective pressure without memory: the pressure."""
     pressure, drive = rows[PRESSURE], rows[DRIVE]
@@ -86,18 +95,31 @@ def no_memory(
 
 @kernel
 def play_memory(
-    rows: Any, counts: Any, table: Any, memory: int, first: int, last: int, elements: int, work: Any
+    rows: Any,
+    fixed: Any,
+    counts: Any,
+    table: Any,
+    memory: int,
+    first: int,
+    last: int,
+    elements: int,
+    work: Any,
 ) -> None:
     """Effective pressure by play operators, the dual of Maxwell-slip elements."""
-    pressure, drive, stretch, full = rows[PRESSURE], rows[DRIVE], rows[STRETCH], rows[MAX_PRESSURE]
-    linear, load, per_load = rows[LINEAR], rows[LOAD], rows[WIDTH_PER_LOAD]
+    pressure, drive, stretch, full = (
+        rows[PRESSURE],
+        rows[DRIVE],
+        fixed[STRETCH],
+        fixed[MAX_PRESSURE],
+    )
+    linear, load, per_load = fixed[LINEAR], rows[LOAD], fixed[WIDTH_PER_LOAD]
     felt, output, per_full = work[0], work[1], work[2]
     for j in range(first, last):
         per_full[j] = 1.0 / full[j]
         felt[j] = stretched(pressure[j], stretch[j], per_full[j])
         output[j] = linear[j] * felt[j]
     for k in range(elements):
-        threshold, weight, state = rows[THRESHOLD + k], rows[WEIGHT + k], rows[memory + k]
+        threshold, weight, state = fixed[THRESHOLD + k], fixed[WEIGHT + k], rows[memory + k]
         for j in range(first, last):
             w = play(felt[j], threshold[j], state[j])
             state[j] = w
@@ -110,11 +132,24 @@ def play_memory(
 
 @kernel
 def preisach_memory(
-    rows: Any, counts: Any, table: Any, memory: int, first: int, last: int, elements: int, work: Any
+    rows: Any,
+    fixed: Any,
+    counts: Any,
+    table: Any,
+    memory: int,
+    first: int,
+    last: int,
+    elements: int,
+    work: Any,
 ) -> None:
     """Effective pressure by a Preisach operator."""
-    pressure, drive, stretch, full = rows[PRESSURE], rows[DRIVE], rows[STRETCH], rows[MAX_PRESSURE]
-    load, per_load = rows[LOAD], rows[WIDTH_PER_LOAD]
+    pressure, drive, stretch, full = (
+        rows[PRESSURE],
+        rows[DRIVE],
+        fixed[STRETCH],
+        fixed[MAX_PRESSURE],
+    )
+    load, per_load = rows[LOAD], fixed[WIDTH_PER_LOAD]
     stack, sums = rows[memory : memory + DEPTH], rows[memory + DEPTH : memory + 2 * DEPTH]
     count, member = counts[STACK_COUNT], counts[R.MEMBER]
     for j in range(first, last):
@@ -135,6 +170,7 @@ remember: Any = None  # a placeholder: one of the three above
 @kernel
 def advance(
     rows: Any,
+    fixed: Any,
     counts: Any,
     table: Any,
     memory: int,
@@ -143,28 +179,29 @@ def advance(
     period: float,
     work: Any,
 ) -> None:
-    """Advance a tile by one control period towards its set-points."""
+    """Advance a tile by one control period towards its set-points (``counts[STEP]`` is the period)."""
     h = period / substeps
     x, v, pressure, drive = rows[CONTRACTION], rows[VELOCITY], rows[PRESSURE], rows[DRIVE]
-    load, moving, damping, dead = rows[LOAD], rows[MOVING_MASS], rows[DAMPING], rows[DEAD_TIME]
-    lag, slew, length, area = rows[TIME_CONSTANT], rows[SLEW_RATE], rows[REST_LENGTH], rows[AREA]
-    taper, force, k1, k3 = rows[AREA_TAPER], rows[BRAID_FORCE], rows[STIFFNESS], rows[HARDENING]
-    braid_strain, set_point = rows[BRAID_STRAIN], rows[SET_POINT]
+    load, moving, damping, dead = rows[LOAD], fixed[MOVING_MASS], fixed[DAMPING], fixed[DEAD_TIME]
+    lag, slew, length, area = (
+        fixed[TIME_CONSTANT],
+        fixed[SLEW_RATE],
+        fixed[REST_LENGTH],
+        fixed[AREA],
+    )
+    taper, force, k1, k3 = fixed[AREA_TAPER], fixed[BRAID_FORCE], fixed[STIFFNESS], fixed[HARDENING]
+    braid_strain, set_point, step = fixed[BRAID_STRAIN], rows[SET_POINT], counts[STEP]
     older, newer, switch, was, damped = work[3], work[4], work[5], work[6], work[7]
     per_lag, per_slew, per_mass, per_length = work[8], work[9], work[10], work[11]
     per_strain, per_jerk, drag, late, width = work[12], work[13], work[14], work[15], work[16]
-    for k in range(N_HISTORY - 1, 0, -1):
-        to, source = rows[HISTORY + k], rows[HISTORY + k - 1]
-        for j in range(LANES):
-            to[j] = source[j]
-    newest = rows[HISTORY]
     for j in range(LANES):
-        newest[j] = set_point[j]
         age = dead[j] / period
-        whole = min(int(age), N_HISTORY - 2)
+        whole = min(int(age), DELAY_PERIODS)
         switch[j] = (age - whole) * period
-        newer[j] = rows[HISTORY + whole][j]
-        older[j] = rows[HISTORY + whole + 1][j]
+        now = step[j]
+        rows[HISTORY + (now & (N_HISTORY - 1))][j] = set_point[j]
+        newer[j] = rows[HISTORY + ((now + N_HISTORY - whole) & (N_HISTORY - 1))][j]
+        older[j] = rows[HISTORY + ((now + N_HISTORY - whole - 1) & (N_HISTORY - 1))][j]
     for j in range(LANES):
         per_lag[j] = 1.0 / lag[j]
         per_slew[j] = 1.0 / slew[j]
@@ -191,7 +228,7 @@ def advance(
                     pressure[j], target, lag[j], per_lag[j], slew[j], per_slew[j], width[j]
                 )
                 pressure[j] = reached if width[j] > 0.0 else pressure[j]
-            remember(rows, counts, table, memory, 0, LANES, elements, work)
+            remember(rows, fixed, counts, table, memory, 0, LANES, elements, work)
         for j in range(LANES):
             ahead = 0.5 * h * v[j]
             e = (x[j] + ahead) * per_length[j]
@@ -226,21 +263,21 @@ MEMORY_ROWS = {"none": 0, "maxwell_slip": R.ELEMENTS, "preisach": 2 * DEPTH}
 
 
 @routine
-def rest_contraction(rows: Any, lane: int, drive: float, load: float) -> float:
+def rest_contraction(fixed: Any, lane: int, drive: float, load: float) -> float:
     """Return the contraction [m] at rest, by bisection to the last bit that matters."""
-    length = rows[REST_LENGTH][lane]
+    length = fixed[REST_LENGTH][lane]
     low, high = -0.3, 0.6
     for _ in range(56):
         e = 0.5 * (low + high)
         pull = tension(
             drive,
             e,
-            decay(e / rows[BRAID_STRAIN][lane]),
-            rows[AREA][lane],
-            rows[AREA_TAPER][lane],
-            rows[BRAID_FORCE][lane],
-            rows[STIFFNESS][lane],
-            rows[HARDENING][lane],
+            decay(e / fixed[BRAID_STRAIN][lane]),
+            fixed[AREA][lane],
+            fixed[AREA_TAPER][lane],
+            fixed[BRAID_FORCE][lane],
+            fixed[STIFFNESS][lane],
+            fixed[HARDENING][lane],
         )
         if pull > load * GRAVITY:
             low = e

@@ -1,20 +1,23 @@
 """Where each number of the single muscle stands in its rows.
 
-A plant's numbers are rows of a matrix whose columns are environments (lanes): first the state,
-then the parameters, then what memory needs. This page is the only one that counts.
+A plant's numbers are rows of two matrices whose columns are environments (lanes): ``rows`` is the
+state, followed by that of the memory, and ``fixed`` the parameters, which all tiles of a batch
+share unless they are drawn. This page is the only one that counts.
 """
 
 from __future__ import annotations
 
-from pam_envs.pneumatics.regulator import DELAY_PERIODS
-
 # state
-CONTRACTION, VELOCITY, PRESSURE, DRIVE, SET_POINT, LOAD, OLD_PRESSURE, OLD_AIR = range(8)
-HISTORY = 8  # set-points of this and the last control periods, newest first
-N_HISTORY = DELAY_PERIODS + 1
+CONTRACTION, VELOCITY, PRESSURE, DRIVE, SET_POINT, OLD_SET_POINT, LOAD, OLD_PRESSURE, OLD_AIR = (
+    range(9)
+)
 # drawn at reset
-REST, TOLD_LOAD, CHANGE_TIME, CHANGE = range(HISTORY + N_HISTORY, HISTORY + N_HISTORY + 4)
-N_STATE = HISTORY + N_HISTORY + 4
+REST, TOLD_LOAD, CHANGE_TIME, CHANGE = range(9, 13)
+# set-points of the last control periods: that of period k stands in row HISTORY + k % N_HISTORY
+HISTORY = 13
+N_HISTORY = 16  # a power of two
+END = HISTORY + N_HISTORY
+"""First row after the plant's state; the memory's state follows."""
 
 # parameters, in the order of PARAMETERS below
 PARAMETERS = (
@@ -68,16 +71,14 @@ PARAMETERS = (
     PRESSURE_BIAS,
     STRETCH,
     WIDTH_PER_LOAD,
-) = range(N_STATE, N_STATE + len(PARAMETERS))
+) = range(len(PARAMETERS))
 # derived from them once
-TALL, COSINE, LINEAR = range(N_STATE + len(PARAMETERS), N_STATE + len(PARAMETERS) + 3)
+TALL, COSINE, LINEAR = range(len(PARAMETERS), len(PARAMETERS) + 3)
 ELEMENTS = 8
 THRESHOLD = LINEAR + 1
 WEIGHT = THRESHOLD + ELEMENTS
-END = WEIGHT + ELEMENTS
-"""First row after the plant's state and parameters."""
+N_PARAMETERS = WEIGHT + ELEMENTS
 
-N_PARAMETERS = END - N_STATE
 DEPTH = 24
 """Depth of the Preisach stack of extrema."""
 

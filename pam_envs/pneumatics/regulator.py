@@ -8,7 +8,7 @@ from pam_envs.kernels import decay, kernel
 from pam_envs.parameters import parameter
 
 DELAY_PERIODS = 12
-"""Longest dead time that the command history holds, in control periods."""
+"""Longest dead time, in control periods, that a command history has to hold."""
 
 
 @dataclass(frozen=True)

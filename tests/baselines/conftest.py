@@ -1,0 +1,74 @@
+"""Plants, environments and rollouts for the controllers' tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import pam_envs  # noqa: F401  registers the ids
+from baselines.catalogue import make_controller
+from baselines.controller import Controller
+from pam_envs.plants.single_muscle import SingleMuscle
+
+HOLD = 90
+"""Control periods for which each level of the staircase is held."""
+SECONDS = 13 * HOLD / 100
+ID = "PAM/MusclePositioning-v0"
+QUIET = {
+    "position.noise": 0.0,
+    "position.resolution": 0.0,
+    "pressure.noise": 0.0,
+    "pressure.resolution": 0.0,
+}
+PROMPT = {"regulator.dead_time": 0.0, "regulator.time_constant": 0.002, "regulator.slew_rate": 1e9}
+
+
+def quiet(hysteresis: str, **changes: float) -> SingleMuscle:
+    """Return the stock muscle with ideal sensors and a regulator without delay."""
+    plant = SingleMuscle.mas10(hysteresis)
+    return plant.replace(
+        {**QUIET, **PROMPT, **{k.replace("__", "."): v for k, v in changes.items()}}
+    )
+
+
+def make_env(**arguments: Any) -> Any:
+    return gym.make(ID, disable_env_checker=True, **arguments).unwrapped
+
+
+def built(name: str, env: Any, plant: Any = None) -> Controller:
+    model = env.plant if plant is None else plant
+    return make_controller(name, model, env.signals, env.action_signals)
+
+
+def rollout(env: Any, controller: Controller, seed: int = 1) -> dict[str, np.ndarray]:
+    """Return the recorded info of one episode."""
+    observation, _ = env.reset(seed=seed)
+    state, start, over, rows = None, True, False, []
+    while not over:
+        action, state = controller.predict(observation, state, start)
+        observation, _, terminated, truncated, info = env.step(action)
+        start, over = False, terminated or truncated
+        rows.append(info)
+    return {key: np.array([row[key] for row in rows]) for key in rows[0]}
+
+
+@pytest.fixture
+def staircase() -> np.ndarray:
+    """Held levels [m], up, part of the way down, up again and down: inner loops included."""
+    levels = [2, 4, 7, 10, 12, 9, 11, 6, 8, 7, 3, 5, 4]
+    return np.repeat(np.array(levels) * 1e-3, HOLD)
+
+
+@pytest.fixture
+def settled() -> Callable[[dict[str, np.ndarray]], np.ndarray]:
+    """Errors [m] late on each level of the staircase, before a preview shows the next one."""
+
+    def errors(record: dict[str, np.ndarray]) -> np.ndarray:
+        ends = np.arange(HOLD - 25, len(record["output"]), HOLD)
+        return np.asarray(np.abs(record["output"] - record["reference"])[ends])
+
+    return errors

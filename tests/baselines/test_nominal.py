@@ -1,0 +1,76 @@
+"""The nominal muscle by rows agrees with the plant's own operators."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baselines.nominal import Nominal
+from pam_envs.plants.single_muscle import SingleMuscle
+from pam_envs.pneumatics.regulator import regulator_step
+
+
+@pytest.fixture(params=["maxwell_slip", "preisach", "none"])
+def plant(request):
+    return SingleMuscle.mas10(request.param)
+
+
+PATH = np.concatenate([np.linspace(0, 5.5e5, 9), np.linspace(5e5, 1e5, 7), [3e5, 2e5, 4e5, 3.5e5]])
+
+
+def test_memory_is_the_plants_own(plant):
+    muscle, own = Nominal(plant).at(2.55), plant.memory.inverse(2.55, 6e5)
+    state, theirs = muscle.memory.initial(1), own.initial_state((1,))
+    for pressure in PATH:
+        drive, state = muscle.felt(np.array([pressure]), state)
+        expected, theirs = own.drive(np.array([pressure]), theirs)
+        np.testing.assert_allclose(drive, expected, rtol=1e-12, atol=1e-6)
+        wanted = drive + np.array([2e4])
+        np.testing.assert_allclose(
+            muscle.pressure_for(wanted, state), own.pressure(wanted, theirs)[0], rtol=1e-9
+        )
+
+
+def test_inverse_undoes_the_memory_anywhere_in_a_history(plant):
+    muscle = Nominal(plant).at(4.55)
+    state = muscle.memory.initial(1)
+    for pressure in PATH:
+        _, state = muscle.felt(np.array([pressure]), state)
+        for target in (1e5, 2.7e5, 4e5):
+            found = muscle.pressure_for(np.array([target]), state)
+            assert muscle.felt(found, state)[0] == pytest.approx(target, abs=1e-3)
+
+
+def test_static_curve_is_the_plants_own(plant):
+    muscle, drive = Nominal(plant).at(4.55), np.linspace(1e3, 5.9e5, 77)
+    np.testing.assert_allclose(
+        muscle.contraction_at(drive), plant.contraction_at(drive, 4.55), atol=1e-7
+    )
+    np.testing.assert_allclose(
+        muscle.drive_for(muscle.contraction_at(drive)), drive, rtol=0, atol=10.0
+    )
+
+
+def test_first_measurement_explains_the_history(plant):
+    muscle = Nominal(plant).at(2.55)
+    peak, now = np.array([5e5, 3e5, 2e5]), np.array([2e5, 2.5e5, 2e5])
+    _, truth = muscle.felt(peak, muscle.memory.initial(3))
+    drive, truth = muscle.felt(now, truth)
+    state = muscle.explain(muscle.contraction_at(drive), now)
+    for target in (1.2e5, 2.8e5):
+        wanted = np.full(3, target)
+        np.testing.assert_allclose(
+            muscle.pressure_for(wanted, state), muscle.pressure_for(wanted, truth), atol=200.0
+        )
+
+
+def test_regulator_is_the_plants_own(plant):
+    nominal, law = Nominal(plant), plant.regulator
+    pressure = np.array([1e5, 1e5, 4e5, 2e5, 5e5])
+    target = np.array([1.05e5, 5e5, 0.0, 2e5, 4.65e5])
+    lag, slew = law.time_constant, law.slew_rate
+    expected = [
+        regulator_step(p, u, lag, 1.0 / lag, slew, 1.0 / slew, plant.control_period)
+        for p, u in zip(pressure, target, strict=True)
+    ]
+    np.testing.assert_allclose(nominal.next_pressure(pressure, target), expected, rtol=1e-12)

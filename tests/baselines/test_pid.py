@@ -1,0 +1,81 @@
+"""The PID: its rule, its limits, and that it closes the loop."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baselines.pid import Gains, pid_start, pid_step, simc
+from pam_envs.plants.single_muscle import SingleMuscle
+from tests.baselines.conftest import QUIET, built, make_env, rollout
+
+GAINS = Gains(1e7, 2e8, 1e5, 0.005, 0.05)
+
+
+def _run(errors, gains=GAINS, low=0.0, high=6e5):
+    state, outputs = pid_start(np.array([3e5]), np.zeros(1)), []
+    for e in errors:
+        output, state = pid_step(gains, state, np.array([e]), np.zeros(1), low, high, 0.01)
+        outputs.append(output[0])
+    return np.array(outputs), state
+
+
+def test_starts_from_the_output_that_was_there():
+    assert _run([0.0, 0.0])[0] == pytest.approx([3e5, 3e5])
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_limits_do_not_wind_it_up(sign):
+    outputs, state = _run([sign * 5e-3] * 2000)
+    limit = 6e5 if sign > 0 else 0.0
+    assert outputs[-1] == limit
+    assert 0.0 <= state.integral[0] <= 6e5
+    back, _ = _run([sign * 5e-3] * 2000 + [-sign * 2e-3] * 20)
+    assert abs(back[2000] - limit) > 1e4  # leaves the limit at the first sign of the error
+
+
+def test_without_back_calculation_it_would_stay_at_the_limit():
+    patient = Gains(1e7, 2e8, 1e5, 0.005, 1e9)
+    guarded, _ = _run([5e-3] * 200 + [-1e-3] * 3)
+    wound, _ = _run([5e-3] * 200 + [-1e-3] * 3, patient, high=6e5)
+    assert guarded[-1] < wound[-1]
+
+
+def test_derivative_is_filtered_and_of_the_measurement():
+    still = pid_start(np.zeros(1), np.zeros(1))
+    kick, _ = pid_step(GAINS, still, np.array([1e-3]), np.zeros(1), -1e9, 1e9, 0.01)
+    assert kick[0] == pytest.approx(1e4)  # a step of the reference: proportional part alone
+    moved, state = pid_step(GAINS, still, np.zeros(1), np.array([1e-3]), -1e9, 1e9, 0.01)
+    assert moved[0] == pytest.approx(-1e5 * 0.1 * (1 - 0.005 / 0.015))
+    later, _ = pid_step(GAINS, state, np.zeros(1), np.array([1e-3]), -1e9, 1e9, 0.01)
+    assert moved[0] < later[0] < 0.0
+
+
+def test_rule_is_skogestads():
+    plant = SingleMuscle.mas10()
+    gains = simc(plant)
+    theta = plant.regulator.dead_time + 0.015
+    controller_gain = gains.derivative / (gains.proportional - gains.derivative / 0.05)
+    assert gains.integral == pytest.approx(gains.tracking_time**-1 * gains.integral * 0.05)
+    assert 0.0 < controller_gain < 0.03  # tau_2, the lag of the mass
+    slower = simc(plant, closed_loop_time=3.0 * theta)
+    assert slower.integral == pytest.approx(gains.integral / 2.0)
+
+
+def test_rule_gives_the_same_gains_again_and_lower_ones_for_a_longer_dead_time():
+    plant = SingleMuscle.mas10()
+    assert simc(plant) == simc(SingleMuscle.mas10())
+    assert simc(plant.replace({"regulator.dead_time": 0.1})).integral < simc(plant).integral
+
+
+@pytest.mark.parametrize("load", [0.0, 2.55, 4.55])
+@pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach"])
+def test_closes_the_loop_without_oscillation(hysteresis, load):
+    plant = SingleMuscle.mas10(hysteresis).replace(QUIET)
+    reference = np.repeat([3e-3, 8e-3, 12e-3, 6e-3], 250)
+    env = make_env(plant=plant, load=load, reference=reference, episode_seconds=10.0)
+    record = rollout(env, built("pid", env))
+    error = record["output"] - record["reference"]
+    for end in (248, 498, 748, 998):
+        assert np.abs(error[end - 50 : end]).max() < 2e-5
+    assert record["output"][250:500].max() < 8e-3 + 0.2 * 5e-3  # overshoot below 20 %
