@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import tempfile
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 from numba import njit, prange, types
 from numba.core import caching, cgutils
@@ -52,7 +53,7 @@ class _PackageLocator(caching._CacheLocator):
 
 
 class _CacheImpl(caching.CompileResultCacheImpl):
-    _locator_classes = [_PackageLocator]
+    _locator_classes: ClassVar[list[Any]] = [_PackageLocator]
 
 
 class _Cache(caching.Cache):
@@ -180,10 +181,8 @@ def compiled(
             return _finish(made, original)
         made.__qualname__ = made.__name__ = name
         dispatcher = njit(parallel=parallel, **_OPTIONS)(made)
-        try:
+        with contextlib.suppress(RuntimeError):  # without a place to write: compile in memory
             dispatcher._cache = _Cache(made)
-        except RuntimeError:  # no place to write: compile in memory
-            pass
         return dispatcher  # type: ignore[no-any-return]
 
     dispatcher = kernels.rebind(function, names, finish, done)

@@ -83,7 +83,10 @@ def tile_view(tiles: Any, tile: int, rows: int, lanes: int) -> Any:
 
 
 def array_at(book: Any, index: int, dimensions: int, kind: int) -> Any:
-    """Return an array of an :func:`address_book`; ``kind`` 0 to 3: float64, int64, float32, int8."""
+    """Return an array of an :func:`address_book`.
+
+    ``kind`` is 0 for float64, 1 for int64, 2 for float32 and 3 for int8.
+    """
     raise NotImplementedError("only compiled kernels read arrays by their address")
 
 
@@ -145,7 +148,7 @@ def rebind(
         return done[function]
     scope = dict(function.__globals__)  # type: ignore[attr-defined]
     for used in function.__code__.co_names:  # type: ignore[attr-defined]
-        value = names.get(used, scope.get(used))
+        value: Any = names.get(used, scope.get(used))
         if hasattr(value, "__pam_kernel__"):
             value = rebind(value, names, finish, done)
         if used in scope:

@@ -54,8 +54,9 @@ class Info(dict[str, Any]):
         return dict, (dict(self.items()),)
 
 
-for _name in (
-    "__contains__ __delitem__ __eq__ __getitem__ __ior__ __iter__ __len__ __ne__ __or__ __repr__ "
-    "__reversed__ __ror__ __setitem__ clear copy get items keys pop popitem setdefault update values"
-).split():
+_TOUCHING = """
+    __contains__ __delitem__ __eq__ __getitem__ __ior__ __iter__ __len__ __ne__ __or__ __repr__
+    __reversed__ __ror__ __setitem__ clear copy get items keys pop popitem setdefault update values
+"""
+for _name in _TOUCHING.split():
     setattr(Info, _name, _filling(_name))

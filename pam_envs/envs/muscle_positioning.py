@@ -90,7 +90,7 @@ def _loads(load: Any) -> NDArray[np.float64]:
     values = LOADS if load is None else load
     if isinstance(values, (int, float, np.integer, np.floating)):
         values = (values,)
-    if not isinstance(values, (Sequence, np.ndarray)) or isinstance(values, str) or not len(values):
+    if not isinstance(values, (Sequence, np.ndarray)) or isinstance(values, str) or not values:
         raise ValueError(f"load = {load!r} must be a number of kg, several of them, or None")
     return np.array([check_number("load", v, 0.0, HIGHEST_LOAD, "kg") for v in values])
 

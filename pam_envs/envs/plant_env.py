@@ -26,7 +26,7 @@ INTERPRETED_CALLS = 50
 """Steps after which an environment changes from plain Python to machine code."""
 
 
-def space_of(signals: Signals) -> gym.spaces.Box:
+def space_of(signals: Signals) -> gym.spaces.Box[np.float32]:
     """Return the Box of a vector of signals."""
     low = [-1.0 if s.normalized else s.low for s in signals]
     high = [1.0 if s.normalized else s.high for s in signals]
@@ -53,8 +53,8 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.signals = setup.signals
         self.action_signals = setup.action_signals
         self.render_mode = setup.render_mode
-        self.observation_space = space_of(setup.signals)
-        self.action_space = space_of(setup.action_signals)
+        self.observation_space: gym.spaces.Box[np.float32] = space_of(setup.signals)
+        self.action_space: gym.spaces.Box[np.float32] = space_of(setup.action_signals)
         self.control_period = setup.control_period
         self._seed: int | None = None
         self._steps = -1
@@ -62,6 +62,8 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._n_actions = len(setup.action_signals)
         self._keys = setup.info_keys
         self._run: Any = None
+        self._all: Any = None
+        self._action_cells: Any = None
         self._warming = INTERPRETED_CALLS if COMPILED else 0
         self._use(setup.kernels.interpreted, compiled=False)
 

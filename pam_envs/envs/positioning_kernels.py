@@ -25,7 +25,6 @@ from pam_envs.kernels import (
 )
 from pam_envs.muscle.effective_area import volume
 from pam_envs.plants import single_muscle_rows as R
-from pam_envs.plants.single_muscle_rows import N_PARAMETERS
 from pam_envs.plants.single_muscle_kernels import (
     MEMORIES,
     MEMORY_ROWS,
@@ -33,6 +32,7 @@ from pam_envs.plants.single_muscle_kernels import (
     advance,
     rest_contraction,
 )
+from pam_envs.plants.single_muscle_rows import N_PARAMETERS
 from pam_envs.references.trajectory import ROWS as REFERENCE_ROWS
 from pam_envs.references.trajectory import SAMPLES, draw_reference, reference_value
 from pam_envs.sensing.sensor import read_sensor

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from pam_envs.kernels import COMPILED, LANES
 from pam_envs.parameters import Signals
 
-
 STEP, STEP_AND_RESTART, BEGIN = 0, 1, 2
 """Modes of the kernels: step; step and start what has ended anew; start what is flagged."""
 

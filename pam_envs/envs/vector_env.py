@@ -113,7 +113,7 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
                 counts[episode][lane] = 0
 
     def _outputs(self) -> tuple[NDArray[Any], ...]:
-        """Return fresh arrays for observations, reward with info (each with a final part), flags."""
+        """Return fresh arrays: observations, reward with info (both with a final part), flags."""
         n, keys = self.num_envs, self._keys if self.with_info else 0
         return (
             np.empty((2, n, len(self.signals)), np.float32),

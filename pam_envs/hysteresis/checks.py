@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 
 
 def floats(name: str, values: Sequence[float]) -> tuple[float, ...]:
+    """Return the values as floats, or raise naming the first that is not finite."""
     result = tuple(float(value) for value in values)
     for i, value in enumerate(result):
         if not math.isfinite(value):
@@ -21,9 +22,11 @@ def floats(name: str, values: Sequence[float]) -> tuple[float, ...]:
 
 
 def check_thresholds(name: str, values: tuple[float, ...], count: int, partner: str) -> None:
+    """Raise unless the values rise from at least 0 and there are ``count`` of them."""
     if len(values) != count:
         raise ValueError(
-            f"{name} has {len(values)} values and {partner} has {count}; give one of each per element"
+            f"{name} has {len(values)} values and {partner} has {count}; "
+            "give one of each per element"
         )
     for i, value in enumerate(values):
         if value < 0.0:
@@ -36,6 +39,7 @@ def check_thresholds(name: str, values: tuple[float, ...], count: int, partner: 
 
 
 def check_not_negative(name: str, values: Sequence[float], why: str) -> None:
+    """Raise naming the first value below 0, and why it may not be."""
     for i, value in enumerate(values):
         if value < 0.0:
             raise ValueError(
@@ -44,6 +48,7 @@ def check_not_negative(name: str, values: Sequence[float], why: str) -> None:
 
 
 def single_rows(state: Any, count: int) -> Array:
+    """Return a state of ``count`` numbers as rows of one lane."""
     rows = np.array(state, dtype=float)
     if rows.shape != (count,):
         raise ValueError(
@@ -53,6 +58,7 @@ def single_rows(state: Any, count: int) -> Array:
 
 
 def series(x: ArrayLike) -> Array:
+    """Return a finite input of shape (T,), or raise."""
     values = np.ascontiguousarray(x, dtype=float)
     if values.ndim != 1:
         raise ValueError(f"x has {values.ndim} dimensions; simulate takes 1: use step for batches")

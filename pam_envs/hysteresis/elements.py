@@ -36,7 +36,12 @@ def play(x: float, threshold: float, w: float) -> float:
     float
         Where the play stands now; at most ``threshold`` away from ``x``.
     """
-    return max(x - threshold, min(x + threshold, w))
+    low, high = x - threshold, x + threshold
+    if w < low:
+        return low
+    if w > high:
+        return high
+    return w
 
 
 @kernel
@@ -75,6 +80,7 @@ def slip_step(
 def simulate_plays(
     x: Array, state: Array, thresholds: Array, weights: Array, linear: float, y: Array
 ) -> None:
+    """Run plays over a record, (T,), from the rows ``state``; write the outputs to ``y``."""
     for t in range(len(x)):
         y[t] = play_step(x[t], state, 0, thresholds, weights, linear)
 
@@ -83,11 +89,13 @@ def simulate_plays(
 def simulate_slips(
     x: Array, state: Array, breaks: Array, stiffnesses: Array, spring: float, y: Array
 ) -> None:
+    """Run elasto-slip elements over a record, (T,), from the rows ``state``; write to ``y``."""
     for t in range(len(x)):
         y[t] = slip_step(x[t], state, 0, breaks, stiffnesses, spring)
 
 
 def move_plays(x: Array, thresholds: Sequence[float], state: ArrayLike) -> Array:
+    """Return where plays stand after inputs (...), from positions (..., n)."""
     # the comparisons of the kernel, spelt out, so that even the sign of a zero is the same
     w = np.asarray(state, dtype=float)
     r = np.asarray(thresholds)

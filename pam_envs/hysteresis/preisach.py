@@ -45,7 +45,7 @@ SMALLEST_WEIGHT = -1e-12
 
 
 class PreisachState(NamedTuple):
-    """Memory of a batch: extrema and outputs, shapes (depth, \\*batch), and points in use."""
+    """Memory of a batch: extrema and outputs, shapes (depth, ...), and points in use."""
 
     stack: Array
     sums: Array
@@ -222,7 +222,7 @@ class Preisach:
     # --- operation ------------------------------------------------------------------------------
 
     def initial_state(self, batch_shape: tuple[int, ...] = ()) -> PreisachState:
-        """Return the state at the beginning, arrays of shape (depth, \\*batch_shape)."""
+        """Return the state at the beginning, arrays of shape (depth, ...)."""
         stack = np.zeros((self.depth, *batch_shape))
         sums = np.zeros((self.depth, *batch_shape))
         stack[0] = self.low if self.start == "low" else 0.0
@@ -237,7 +237,8 @@ class Preisach:
         start = self.initial_state() if state is None else state
         if np.ndim(start.counts) != 0:
             raise ValueError(
-                f"state is of a batch of shape {np.shape(start.counts)}; simulate takes one: use step"
+                f"state is of a batch of shape {np.shape(start.counts)}; "
+                "simulate takes one: use step"
             )
         rows, y = self._rows(start), np.empty_like(values)
         simulate(values, *rows, self.everett, self.low, self.inverse_cell, y)

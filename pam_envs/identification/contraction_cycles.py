@@ -305,7 +305,7 @@ def leave_one_repeat_out(table: ContractionTable, hysteresis: Kind) -> float:
 
 
 def repeatability_floor(table: ContractionTable) -> float:
-    """Return the RMS difference [m] of a repeat from the mean of the others: no model does better."""
+    """Return the RMS difference [m] of a repeat from the mean of the others: the best there is."""
     repeats, missed = np.unique(table.repeat), []
     for held in repeats:
         others = mean_cycles(table, repeats[repeats != held]).contractions

@@ -188,10 +188,16 @@ def fit_record(
             remembered[key] = both(theta)
         return remembered[key]
 
+    def misses(theta: Array) -> Array:
+        return evaluated(theta)[0]
+
+    def slopes(theta: Array) -> Array:
+        return evaluated(theta)[1]
+
     found = least_squares(
-        lambda theta: evaluated(theta)[0],
+        misses,
         np.array([plant.value(n) for n in names]) / sizes,
-        jac=lambda theta: evaluated(theta)[1],
+        jac=slopes,
         bounds=(
             np.array([b.low for b in bounds]) / sizes,
             np.array([b.high for b in bounds]) / sizes,

@@ -121,9 +121,10 @@ def identify_all(
         if isinstance(plant.memory.operator, Preisach):
             inner, outer = minor_loops(plant)
             congruency = (
-                f"Preisach's congruency error (minor loops between 2 and 3 bar after 3 and after 6 "
-                f"bar): {inner:.1e} in effective pressure, {outer:.1%} in contraction. For a single muscle a Preisach map from pressure straight to "
-                "contraction is an approximation; here the static law stands between."
+                "Preisach's congruency error (minor loops between 2 and 3 bar after 3 and after 6 "
+                f"bar): {inner:.1e} in effective pressure, {outer:.1%} in contraction. For a "
+                "single muscle a Preisach map from pressure straight to contraction is an "
+                "approximation; here the static law stands between."
             )
     lines += ["", congruency, "", "## What the readings fix", ""]
     found = cycles.identifiability(fits["maxwell_slip"])

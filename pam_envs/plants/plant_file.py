@@ -14,6 +14,7 @@ Everything but ``schema`` and ``family`` may be missing. Notes are free text and
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -84,7 +85,7 @@ def _memory(record: Any, where: str) -> PlayOperator | Preisach | None:
             return Preisach(
                 float(record["low"]),
                 float(record["high"]),
-                np.array(record["table"], float),
+                tuple(tuple(float(v) for v in row) for row in record["table"]),
                 start="virgin",
             )
     except (TypeError, ValueError) as error:
@@ -108,7 +109,7 @@ def record(plant: SingleMuscle) -> dict[str, Any]:
             }
     ensemble = []
     for member in plant.ensemble:
-        values = {k: float(v) for k, v in member.items() if k != "memory.operator"}
+        values: dict[str, Any] = {k: float(v) for k, v in member.items() if k != "memory.operator"}
         if "memory.operator" in member:
             values["memory"] = _memory_record(member["memory.operator"])
         ensemble.append(values)
@@ -207,7 +208,9 @@ def _build(cls: type[SingleMuscle], data: Mapping[str, Any], where: str) -> Sing
         place = f"{where}: ensemble[{i}]"
         if not isinstance(member, Mapping):
             raise ValueError(f"{place} must be a mapping from parameter to value")
-        other = {k: _entry(k, v, "", place) for k, v in member.items() if k != "memory"}
+        other: dict[str, Any] = {
+            k: _entry(k, v, "", place) for k, v in member.items() if k != "memory"
+        }
         if "memory" in member:
             other["memory.operator"] = _memory(member["memory"], place)
         ensemble.append(other)
@@ -244,10 +247,8 @@ def _entry(name: str, entry: Any, unit: str, where: str) -> float:
                 f"choose one of {', '.join(PROVENANCES)}"
             )
     if isinstance(value, str):  # YAML reads 1e5 without a sign as text
-        try:
+        with contextlib.suppress(ValueError):
             value = float(value)
-        except ValueError:
-            pass
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ValueError(f"{where}: {name} must be a number in {unit or 'SI'}, got {value!r}")
     return float(value)

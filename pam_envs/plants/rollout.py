@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from pam_envs.kernels import COMPILED, LANES, build, kernel, prange, scratch, tile_view
 from pam_envs.plants import single_muscle_rows as R
 from pam_envs.plants.single_muscle import SingleMuscle
-from pam_envs.plants.single_muscle_rows import N_COUNTS, N_PARAMETERS
 from pam_envs.plants.single_muscle_kernels import (
     MEMORIES,
     MEMORY_ROWS,
@@ -20,6 +19,7 @@ from pam_envs.plants.single_muscle_kernels import (
     advance,
     rest_contraction,
 )
+from pam_envs.plants.single_muscle_rows import N_COUNTS, N_PARAMETERS
 
 OUTPUTS = ("contraction", "velocity", "pressure", "drive")
 N_ROWS = 0

@@ -73,7 +73,8 @@ class SingleMuscle:
             check(getattr(self, name), name)
         if not isinstance(self.substeps, int) or not 1 <= self.substeps <= 100:
             raise ValueError(
-                f"substeps = {self.substeps!r} must be a whole number from 1 to 100; 4 is the default"
+                f"substeps = {self.substeps!r} must be a whole number from 1 to 100; "
+                "4 is the default"
             )
         self._check_memory()
         self._check_motion()
@@ -90,8 +91,8 @@ class SingleMuscle:
                 )
             if len(operator.weights) > R.ELEMENTS:
                 raise ValueError(
-                    f"memory: {len(operator.weights)} elements, at most {R.ELEMENTS} are simulated; "
-                    "merge neighbouring thresholds"
+                    f"memory: {len(operator.weights)} elements, at most {R.ELEMENTS} are "
+                    "simulated; merge neighbouring thresholds"
                 )
         if isinstance(operator, Preisach):
             full = self.regulator.max_pressure

@@ -179,7 +179,7 @@ def advance(
     period: float,
     work: Any,
 ) -> None:
-    """Advance a tile by one control period towards its set-points (``counts[STEP]`` is the period)."""
+    """Advance a tile by control period ``counts[STEP]``, towards its set-points."""
     h = period / substeps
     x, v, pressure, drive = rows[CONTRACTION], rows[VELOCITY], rows[PRESSURE], rows[DRIVE]
     load, moving, damping, dead = rows[LOAD], fixed[MOVING_MASS], fixed[DAMPING], fixed[DEAD_TIME]

@@ -23,7 +23,7 @@ KNOTS = 24
 SINES = 4
 RATE, RAMP, KNOT, SINE = 0, 1, 2, 2 + KNOTS
 ROWS = 2 + KNOTS + 3 * SINES
-"""Rows that one reference takes: knots a second, ramp share, knots, then (a, f, phi) of each sine."""
+"""Rows of one reference: knots a second, ramp share, knots, then (a, f, phi) of each sine."""
 
 STREAM = 32
 """Random stream of reference draws (one draw number a constant)."""

@@ -218,7 +218,7 @@ def test_bad_plant_files(tmp_path: Path, text: str, said: str) -> None:
 
 
 def test_what_cannot_be_simulated_names_the_remedy() -> None:
-    with pytest.raises(UnstableParameters, match="use at least . sub-steps") as error:
+    with pytest.raises(UnstableParameters, match=r"use at least \d sub-steps") as error:
         SingleMuscle.mas10(mass__moving_mass=0.06)
     enough = int(re.findall(r"at least (\d+) sub-steps", str(error.value))[0])
     plant = SingleMuscle.mas10()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import pickle
 import warnings
 
@@ -86,7 +87,7 @@ def test_steps_share_no_memory(name: str) -> None:
         observation, _, _, _, info = env.step(action)
         kept.append(observation)
         infos.append(info)
-    assert not any(np.shares_memory(a, b) for a, b in zip(kept, kept[1:], strict=False))
+    assert not any(np.shares_memory(a, b) for a, b in itertools.pairwise(kept))
     times = [info["time"] for info in infos]  # looked at long after the step
     assert times == sorted(times)
     assert len(set(times)) == len(times)

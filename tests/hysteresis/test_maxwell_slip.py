@@ -206,7 +206,8 @@ def lattice_path(turns: list[int]) -> Array:
     x = [0.0]
     for turn in turns:
         here = round(4 * x[-1])
-        x += [k / 4 for k in range(here, turn, 1 if turn > here else -1)][1:] + [turn / 4]
+        x += [k / 4 for k in range(here, turn, 1 if turn > here else -1)][1:]
+        x.append(turn / 4)
     return np.array(x)
 
 

@@ -258,7 +258,7 @@ def test_full_loop_dissipates():
     assert area == pytest.approx(np.sum(up - down) * (HIGH - LOW) / CELLS, rel=1e-12)
 
 
-# --- a full stack, the ends of the range ------------------------------------------------------------
+# --- a full stack, the ends of the range ----------------------------------------------------
 
 SHRINKING = [0.9 * (-0.8) ** k for k in range(8)]
 

@@ -118,7 +118,7 @@ def test_ladder_by_default_covers_the_record():
     x = shrinking_loops()
     fit = fit_play(x, PlayOperator(LADDER, (0.3, 0.1, 0.5, 0.2), 0.4).simulate(x)[0], elements=12)
     assert len(fit.model.thresholds) == 12
-    assert 0.0 < fit.model.thresholds[0]
+    assert fit.model.thresholds[0] > 0.0
     assert fit.model.thresholds[-1] < 2.0
     assert fit.rms < 0.02
 

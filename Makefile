@@ -1,0 +1,69 @@
+# Everything from a fresh clone, with nothing but Python 3.11 or later: make test, make benchmark.
+
+PYTHON ?= python3
+JOBS ?= 2
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+EXTRAS := plot,baselines,agents,bench,dev
+INSTALL := $(BIN)/python -m pip --disable-pip-version-check --no-input install -qq
+PLAIN := $(wildcard tests/hysteresis tests/test_kernels.py tests/envs/test_bits.py)
+
+# One thread each for linear algebra: more are slower on small problems, and change what is learned.
+export OMP_NUM_THREADS ?= 1
+export MPLBACKEND ?= Agg
+export SDL_VIDEODRIVER ?= dummy
+
+.NOTPARALLEL:
+.DEFAULT_GOAL := help
+.PHONY: help venv benchmark test lint format types layers check images clean
+
+help: ## Show this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-10s %s\n", $$1, $$2}' Makefile
+
+# .begun marks an environment that is being made. Whoever finds it starts anew, because half an
+# install looks like a whole one. The last step turns the mark into the stamp.
+$(READY): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit("pam-envs needs Python 3.11 or later, and this is %d.%d: make PYTHON=python3.12" % sys.version_info[:2] if sys.version_info < (3, 11) else 0)'
+	@if test -e $(VENV)/.begun; then rm -rf $(VENV); fi
+	@mkdir -p $(VENV) && rm -f $(READY) && touch $(VENV)/.begun
+	@echo "Making $(VENV); the first time takes some minutes"
+	@$(PYTHON) -m venv $(VENV)
+	@$(INSTALL) "$$(grep '^torch==' constraints.txt)"
+	@$(INSTALL) --editable ".[$(EXTRAS)]" --constraint constraints.txt
+	@mv $(VENV)/.begun $(READY)
+
+venv: $(READY) ## Make .venv with everything
+
+benchmark: $(READY) ## Score every controller and write the leaderboard
+	$(BIN)/python -m benchmarks run
+	$(BIN)/python -m benchmarks board
+
+test: $(READY) ## Run the tests: a part without the compiler, then all
+ifneq ($(PLAIN),)
+	PAM_ENVS_COMPILE=0 $(BIN)/python -m pytest --quiet --numprocesses $(JOBS) $(PLAIN)
+endif
+	$(BIN)/python -m pytest --numprocesses $(JOBS)
+
+lint: $(READY) ## Check style and format
+	$(BIN)/ruff check --quiet .
+	$(BIN)/ruff format --quiet --check .
+
+format: $(READY) ## Mend style and format
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+types: $(READY) ## Check types
+	$(BIN)/mypy pam_envs
+
+layers: $(READY) ## Check which way imports run
+	$(BIN)/lint-imports --no-logo
+
+check: lint types layers test ## All of the above checks
+
+images: $(READY) ## Draw the pictures of the documentation
+	$(BIN)/python -m benchmarks show MusclePositioning-v0 --controller inverse_pid --episode-seconds 40 --plot docs/images/muscle_positioning.png
+
+clean: ## Remove .venv, caches and builds; results stay
+	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,1 @@
+"""Learning: the batched environment for stable-baselines3, training, and policies as data."""

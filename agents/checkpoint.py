@@ -1,0 +1,99 @@
+"""Checkpoint files: written whole or not at all, read without running anything they hold.
+
+A file is a mark, the SHA-256 of what follows, and tensors, numbers and text in torch's format,
+which is read with ``weights_only=True``: nothing but those types is ever built. It is written
+beside its place, flushed to the disk and then renamed over the old one, so that a process that is
+killed at any moment leaves the old or the new checkpoint, never half of one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+MARK = b"PAMCKPT1"
+NAME = "checkpoint.pt"
+TEMPORARY = ".tmp"
+
+
+class CheckpointError(ValueError):
+    """A checkpoint that cannot be used; the message says why and what to do."""
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """Write ``data`` so that ``path`` holds the old or the new bytes whenever one looks."""
+    temporary = path.with_name(f"{path.name}.{os.getpid()}{TEMPORARY}")
+    with temporary.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+    temporary.replace(path)
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
+
+
+def sweep(folder: Path) -> None:
+    """Remove what killed writers left behind."""
+    for stale in folder.glob(f"*{TEMPORARY}"):
+        stale.unlink(missing_ok=True)
+
+
+def save(path: Path, content: dict[str, Any]) -> None:
+    """Write a checkpoint of tensors, arrays, numbers, text, lists and dictionaries."""
+    buffer = io.BytesIO()
+    torch.save(_tensors(content), buffer)
+    payload = buffer.getvalue()
+    write_atomically(path, MARK + hashlib.sha256(payload).digest() + payload)
+
+
+def load(path: Path) -> dict[str, Any]:
+    """Read a checkpoint of :func:`save`; arrays come back as tensors.
+
+    Raises
+    ------
+    CheckpointError
+        If there is none, it is damaged, or it is another kind of file.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise CheckpointError(f"no checkpoint can be read at {path}: {error.strerror}") from error
+    if not data.startswith(MARK):
+        raise CheckpointError(
+            f"{path.name} is not a checkpoint of this project, and files of other programs are not "
+            "opened because they may run code; start a training of your own and resume that"
+        )
+    payload = data[len(MARK) + 32 :]
+    if hashlib.sha256(payload).digest() != data[len(MARK) : len(MARK) + 32]:
+        raise CheckpointError(f"{path.name} is damaged (its checksum differs); start the run anew")
+    try:
+        content: dict[str, Any] = torch.load(
+            io.BytesIO(payload), map_location="cpu", weights_only=True
+        )
+    except Exception as error:
+        raise CheckpointError(
+            f"{path.name} holds other things than numbers and text and was not opened"
+        ) from error
+    return content
+
+
+def _tensors(value: Any) -> Any:
+    """Return the content with arrays as tensors, which need no code to read."""
+    if isinstance(value, (np.ndarray, np.generic)):
+        return torch.from_numpy(np.array(value))
+    if isinstance(value, dict):
+        return {key: _tensors(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_tensors(entry) for entry in value]
+    if value is None or isinstance(value, (bool, int, float, str, torch.Tensor)):
+        return value
+    raise TypeError(f"a checkpoint holds no {type(value).__name__}")

@@ -1,0 +1,153 @@
+"""Checked settings: a mapping becomes a frozen dataclass, or a sentence says what is wrong."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+import types
+from collections.abc import Mapping
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+
+class SettingsError(ValueError):
+    """A setting that cannot be used; the message says what to change."""
+
+
+def number(default: Any, low: float, high: float) -> Any:
+    """Return a dataclass field for a number (or several) from ``low`` to ``high``."""
+    return dataclasses.field(default=default, metadata={"bounds": (low, high)})
+
+
+def choice(default: Any, *choices: str) -> Any:
+    """Return a dataclass field for one of several words."""
+    return dataclasses.field(default=default, metadata={"choices": choices})
+
+
+def nearest(word: str, known: list[str]) -> str:
+    """Return "; did you mean 'x'?", or what there is to choose from."""
+    close = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
+    if close:
+        return f"; did you mean {close[0]!r}?"
+    return f"; there are: {', '.join(sorted(known))}"
+
+
+def build(cls: type, given: Any, where: str = "") -> Any:
+    """Return ``cls`` made from a mapping, every entry checked.
+
+    Parameters
+    ----------
+    cls : type
+        A frozen dataclass; nested ones are built from nested mappings.
+    given : mapping
+        Values by field name; what is left out keeps its default.
+    where : str
+        Dotted place of the mapping, for messages.
+
+    Raises
+    ------
+    SettingsError
+        Naming the entry, its value and the remedy; an unknown key with the nearest known one.
+    """
+    if not isinstance(given, Mapping):
+        raise SettingsError(f"{where or 'the settings'} must be a mapping, got {given!r}")
+    fields = {field.name: field for field in dataclasses.fields(cls)}
+    hints = get_type_hints(cls)
+    values = {}
+    for key, value in given.items():
+        place = f"{where}.{key}" if where else str(key)
+        if key not in fields:
+            raise SettingsError(f"unknown setting {place!r}{nearest(str(key), list(fields))}")
+        values[key] = _value(hints[key], value, place)
+        _check_field(fields[key], values[key], place)
+    missing = [
+        name
+        for name, field in fields.items()
+        if name not in values
+        and field.default is dataclasses.MISSING
+        and field.default_factory is dataclasses.MISSING
+    ]
+    if missing:
+        raise SettingsError(f"{where or 'the settings'} must say {', '.join(missing)}")
+    return cls(**values)
+
+
+def _value(kind: Any, value: Any, place: str) -> Any:
+    """Return ``value`` as the annotated type, or raise."""
+    origin = get_origin(kind)
+    if origin in (Union, types.UnionType):
+        return _one_of(get_args(kind), value, place)
+    if dataclasses.is_dataclass(kind):
+        return build(kind, value, place)  # type: ignore[arg-type]
+    if origin is tuple:
+        return _several(get_args(kind), value, place)
+    if origin is Literal:
+        if value not in get_args(kind):
+            raise SettingsError(
+                f"{place} = {value!r} is not known{nearest(str(value), [*get_args(kind)])}"
+            )
+        return value
+    if origin in (dict, Mapping):
+        if not isinstance(value, Mapping) or not all(isinstance(k, str) for k in value):
+            raise SettingsError(f"{place} = {value!r} must be a mapping from names to values")
+        return dict(value)
+    return _plain(kind, value, place)
+
+
+def _one_of(kinds: tuple[Any, ...], value: Any, place: str) -> Any:
+    if value is None and type(None) in kinds:
+        return None
+    error: SettingsError | None = None
+    for kind in kinds:
+        if kind is not type(None):
+            try:
+                return _value(kind, value, place)
+            except SettingsError as refused:
+                error = error or refused
+    raise error or SettingsError(f"{place} = {value!r} is of no known kind")
+
+
+def _several(kinds: tuple[Any, ...], value: Any, place: str) -> tuple[Any, ...]:
+    if not isinstance(value, (list, tuple)):
+        raise SettingsError(f"{place} = {value!r} must be a list")
+    if kinds[-1] is not Ellipsis and len(value) != len(kinds):
+        raise SettingsError(f"{place} = {value!r} must have {len(kinds)} entries")
+    return tuple(_value(kinds[0], entry, f"{place}[{i}]") for i, entry in enumerate(value))
+
+
+def _plain(kind: Any, value: Any, place: str) -> Any:
+    if kind is bool and isinstance(value, bool):
+        return value
+    if kind is int and isinstance(value, int) and not isinstance(value, bool):
+        return value
+    if kind is float and isinstance(value, str):
+        value = _number_in(value)
+    numeric = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if kind is float and numeric and math.isfinite(value):
+        return float(value)
+    if kind is str and isinstance(value, str):
+        return value
+    wanted = {bool: "true or false", int: "a whole number", float: "a finite number", str: "text"}
+    raise SettingsError(f"{place} = {value!r} must be {wanted.get(kind, kind)}")
+
+
+def _number_in(text: str) -> float | str:
+    """Return the number that a text holds: YAML 1.1 reads 1e-3 as text and 1.0e-3 as a number."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _check_field(field: dataclasses.Field[Any], value: Any, place: str) -> None:
+    if "choices" in field.metadata and value not in field.metadata["choices"]:
+        known = list(field.metadata["choices"])
+        raise SettingsError(f"{place} = {value!r} is not known{nearest(str(value), known)}")
+    if "bounds" not in field.metadata or value is None or isinstance(value, str):
+        return
+    low, high = field.metadata["bounds"]
+    for one in value if isinstance(value, tuple) else (value,):
+        if not low <= one <= high:
+            raise SettingsError(
+                f"{place} = {one!r} must be from {low:g} to {high:g}; change it to lie within"
+            )

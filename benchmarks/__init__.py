@@ -1,0 +1,9 @@
+"""Scores of every controller over fixed scenarios, with the means to run each of them again.
+
+python -m benchmarks run       score all controllers, one JSON a row
+python -m benchmarks board     write LEADERBOARD.md, its plot and TIMES.md from the rows
+python -m benchmarks verify    run a row again from its own record and compare
+python -m benchmarks papers    published figures beside ours
+python -m benchmarks speed     measure rates against other environments
+python -m benchmarks show      run one episode and draw it
+"""

@@ -1,0 +1,296 @@
+"""Command line of the benchmarks."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Literal
+
+import tyro
+
+from benchmarks import controllers, rows, scenarios
+
+Positional = tyro.conf.Positional
+
+
+@contextmanager
+def _progress(title: str) -> Iterator[Callable[[int], Callable[[], None]]]:
+    """Show a bar with the time left, and hand out what starts and advances it."""
+    from rich import progress as bars
+
+    columns = (
+        bars.TextColumn("{task.description}"),
+        bars.BarColumn(),
+        bars.MofNCompleteColumn(),
+        bars.TimeElapsedColumn(),
+        bars.TextColumn("left"),
+        bars.TimeRemainingColumn(),
+    )
+    with bars.Progress(*columns) as shown:
+
+        def start(total: int) -> Callable[[], None]:
+            task = shown.add_task(title, total=total)
+            return lambda: shown.advance(task)
+
+        yield start
+
+
+def _choose(names: tuple[str, ...], known: dict[str, Any], what: str) -> list[Any]:
+    for name in names:
+        if name not in known:
+            raise ValueError(f"no {what} named {name!r}; there are: {', '.join(sorted(known))}")
+    return [known[name] for name in names or known]
+
+
+def _tracks(env: str, track: tuple[str, ...]) -> list[scenarios.ScenarioSet]:
+    chosen = _choose(track, scenarios.available(), "track")
+    found = [made for made in chosen if not env or env in (made.env, made.env.split("/")[-1])]
+    if not found:
+        ids = sorted({made.env for made in scenarios.available().values()})
+        raise ValueError(f"no scenarios for {env!r}; there are some for: {', '.join(ids)}")
+    return found
+
+
+def run(
+    env: str = "",
+    controller: tuple[str, ...] = (),
+    track: tuple[str, ...] = (),
+    jobs: int = os.cpu_count() or 1,
+    force: bool = False,
+    out: Path = rows.RESULTS,
+    cells: Path | None = None,
+    backend: Literal["loky", "dask"] = "loky",
+    address: str = "",
+    dry_run: bool = False,
+) -> int:
+    """Score controllers over the scenario files, one JSON a row; an interrupted run goes on.
+
+    Args:
+        env: Id of an environment; all by default.
+        controller: Names of controllers; all by default.
+        track: Names of scenario files; all by default.
+        jobs: Processes.
+        force: Compute again what is there already.
+        out: Folder of the rows.
+        cells: Folder of the cells, the checkpoint.
+        backend: Processes of this machine, or a running Dask cluster.
+        address: Of the Dask scheduler.
+        dry_run: List the cells and whether they are there, and stop.
+    """
+    from benchmarks import runner
+    from benchmarks.cells import cells_of
+    from benchmarks.store import Store
+
+    folder = runner.CELLS if cells is None else cells
+    chosen = _choose(controller, controllers.available(), "controller")
+    pairs = runner.pairs_of(chosen, _tracks(env, track))
+    if not pairs:
+        raise ValueError("no controller runs in these environments")
+    if dry_run:
+        for cell in (cell for pair in pairs for cell in cells_of(*pair)):
+            there = "there" if Store(folder).path(cell.key).exists() else "to run"
+            print(f"{there}  {cell.entrant.name}  {cell.track.name}/{cell.scenario.name}")
+        return 0
+    options = runner.Options(jobs, force, out, folder, backend, address)
+    with _progress("cells") as start:
+        report = runner.run(pairs, options, start)
+    return _tell(report)
+
+
+def _tell(report: Any) -> int:
+    print(f"{report.computed} cells computed, {report.found} were there already")
+    for name in report.quarantined:
+        print(f"corrupt, set aside and computed again: {name}")
+    if report.swept:
+        print(f"{report.swept} half-written files removed")
+    for path in report.rows:
+        row = rows.load(path)
+        head, failures = row["aggregate"]["rms_error"], row["failures"]
+        print(
+            f"{path.stem}: RMS {1e3 * head['mean']:.3f} mm "
+            f"[{1e3 * head['low']:.3f}, {1e3 * head['high']:.3f}]"
+            + (f", {failures} of {len(row['episodes'])} episodes failed" if failures else "")
+        )
+    for line in report.missing:
+        print(f"MISSING {line}", file=sys.stderr)
+    return 1 if report.missing else 0
+
+
+def board(results: Path = rows.RESULTS, out: Path | None = None) -> int:
+    """Write LEADERBOARD.md, a plot a track and TIMES.md from the rows.
+
+    Args:
+        results: Folder of the rows.
+        out: The board's file.
+    """
+    from benchmarks import leaderboard
+
+    for path in leaderboard.write(results, leaderboard.BOARD if out is None else out):
+        print(path)
+    return 0
+
+
+def verify(
+    row: Positional[tuple[str, ...]] = (), jobs: int = os.cpu_count() or 1, all: bool = False
+) -> int:
+    """Run rows again from their own record; exit code 1 if one has drifted.
+
+    Args:
+        row: Files or names of rows.
+        jobs: Processes.
+        all: Every row of benchmarks/results.
+    """
+    from benchmarks import verify as checking
+
+    paths = [_row_path(name) for name in row]
+    paths += sorted(rows.RESULTS.glob("*--*.json")) if all else []
+    if not paths:
+        raise ValueError("name a row, or give --all")
+    verdicts = [checking.verify(path, jobs) for path in paths]
+    for verdict in verdicts:
+        print(f"{verdict.row}: {'holds' if verdict.holds else 'DRIFTED'}")
+        for line in verdict.drifted[:40]:
+            print(f"  {line}")
+        if len(verdict.drifted) > 40:
+            print(f"  and {len(verdict.drifted) - 40} fields more")
+        for line in verdict.notes:
+            print(f"  note: {line}")
+    return 0 if all_hold(verdicts) else 1
+
+
+def all_hold(verdicts: list[Any]) -> bool:
+    """Return whether no row has drifted."""
+    return all(verdict.holds for verdict in verdicts)
+
+
+def _row_path(name: str) -> Path:
+    path = Path(name)
+    return path if path.exists() else rows.RESULTS / f"{path.stem}.json"
+
+
+def papers(json: Path | None = None) -> int:
+    """Print published figures beside ours; exit code 1 if one is out of tolerance.
+
+    Args:
+        json: Also write them to this file.
+    """
+    from benchmarks import papers as published
+    from benchmarks.store import write_record
+
+    figures = published.all_figures()
+    print(published.table(figures))
+    if json:
+        write_record(json, {"figures": [figure.record() for figure in figures]})
+    return 0 if all_pass(figures) else 1
+
+
+def all_pass(figures: list[Any]) -> bool:
+    """Return whether no figure is out of tolerance (one that cannot be computed is no failure)."""
+    return all(figure.passed is not False for figure in figures)
+
+
+def speed(
+    only: tuple[str, ...] = (), rounds: int = 7, json: Path | None = None, strict: bool = False
+) -> int:
+    """Measure rates against other environments, interleaved, and compare with the targets.
+
+    Args:
+        only: Groups to measure: single, batch, plain, start, learning. All by default.
+        rounds: Interleaved rounds; the median counts.
+        json: Also write the figures to this file.
+        strict: Exit code 1 if a floor is missed.
+    """
+    from benchmarks import speed as measuring
+    from benchmarks.store import write_record
+
+    with _progress("groups") as start:
+        results = measuring.measure(only, rounds, start)
+    print(measuring.table(results))
+    if json:
+        write_record(json, measuring.record(results))
+    missed = [result for result in results if result.passed is False]
+    return 1 if strict and missed else 0
+
+
+def show(
+    env: Positional[str],
+    controller: str,
+    hysteresis: str = "maxwell_slip",
+    reference: str = "staircase",
+    load: float = 2.55,
+    episode_seconds: float = 20.0,
+    load_disturbance: float = 0.0,
+    randomize: bool = False,
+    seed: int = 101,
+    plot: Path | None = None,
+    video: Path | None = None,
+) -> int:
+    """Run one episode and draw it: reference, output, pressure, loop.
+
+    Args:
+        env: Id of the environment.
+        controller: Name of a controller.
+        hysteresis: Which memory the plant has.
+        reference: Family of the reference.
+        load: Load [kg].
+        episode_seconds: Duration [s].
+        load_disturbance: By how much [kg] the load changes, unannounced.
+        randomize: Draw the plant's assumed parameters.
+        seed: Of the reset.
+        plot: Picture to write.
+        video: Film to write.
+    """
+    from benchmarks import show as showing
+
+    kwargs = {
+        "hysteresis": hysteresis,
+        "reference": reference,
+        "load": load,
+        "episode_seconds": episode_seconds,
+        "load_disturbance": load_disturbance,
+        "randomize": randomize,
+    }
+    env_id = env if "/" in env else f"PAM/{env}"
+    episode, set_points = showing.play(env_id, controller, kwargs, seed, video)
+    if episode.failed:
+        print(f"ended early: {episode.failure}")
+    else:
+        for name, value in showing.summary(episode, min(2.0, 0.5 * episode_seconds)).items():
+            print(f"{name:20s} {value:.6g}")
+    title = f"{controller} in {env_id}, {hysteresis}, {reference}, {load:g} kg, seed {seed}"
+    if plot:
+        showing.draw(episode, set_points, title, plot)
+        print(plot)
+    if video:
+        print(video)
+    return 1 if episode.failed else 0
+
+
+COMMANDS: dict[str, Callable[..., int]] = {
+    "run": run,
+    "board": board,
+    "verify": verify,
+    "papers": papers,
+    "speed": speed,
+    "show": show,
+}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run a command and return the exit code; a wrong argument is one sentence, no traceback."""
+    try:
+        return int(
+            tyro.extras.subcommand_cli_from_dict(
+                COMMANDS, prog="python -m benchmarks", args=arguments
+            )
+        )
+    except ValueError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,112 @@
+"""One text for equal contents, and the digest of that text."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+def plain(value: Any) -> Any:
+    """Return ``value`` in JSON's own types: NaN and infinities become ``None``.
+
+    Raises
+    ------
+    TypeError
+        If there is something that JSON has no form for.
+    """
+    if value is None or isinstance(value, (bool, str)):
+        return value
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    if isinstance(value, (float, np.floating)):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, np.bool_):
+        return bool(value)
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(entry) for entry in value]
+    raise TypeError(f"cannot write {type(value).__name__} as JSON: {value!r}")
+
+
+def canonical_text(value: Any) -> str:
+    """Return the one JSON text of a value: keys sorted, floats to the last bit."""
+    return json.dumps(plain(value), sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def digest(value: Any) -> str:
+    """Return the SHA-256 of the canonical text, 64 hexadecimal digits."""
+    return hashlib.sha256(canonical_text(value).encode()).hexdigest()
+
+
+def arrays_digest(arrays: Iterable[Any]) -> str:
+    """Return the SHA-256 of arrays (shape, type and bits), 16 hexadecimal digits."""
+    state = hashlib.sha256()
+    for array in arrays:
+        exact = np.ascontiguousarray(array)
+        state.update(f"{exact.dtype.str}{exact.shape}".encode())
+        state.update(exact.tobytes())
+    return state.hexdigest()[:16]
+
+
+SOURCES = {".py", ".yaml", ".yml", ".csv", ".json", ".npz", ".onnx", ".safetensors"}
+
+
+def sources_digest(paths: Iterable[Path]) -> str:
+    """Return the SHA-256 of files and of folders' code and data by relative name, 16 digits."""
+    state = hashlib.sha256()
+    for root in paths:
+        files = sorted(root.rglob("*")) if root.is_dir() else [root]
+        for file in files:
+            if file.is_file() and file.suffix in SOURCES:
+                state.update(file.relative_to(root.parent).as_posix().encode())
+                state.update(file.read_bytes())
+    return state.hexdigest()[:16]
+
+
+def object_digest(thing: Any) -> str:
+    """Return a digest of what an object holds: its class, its numbers and arrays, recursively.
+
+    An object with a method ``digest()`` names itself.
+    """
+    return digest(_contents(thing, ()))[:16]
+
+
+def _contents(thing: Any, above: tuple[int, ...]) -> Any:
+    if isinstance(thing, type):
+        return f"{thing.__module__}.{thing.__qualname__}"
+    if callable(getattr(thing, "digest", None)):
+        return {"digest": thing.digest()}
+    if isinstance(thing, (int, float, str, bool, np.integer, np.floating)) or thing is None:
+        return plain(thing)
+    if isinstance(thing, np.ndarray):
+        return {"array": arrays_digest([thing])}
+    if id(thing) in above:
+        return "above"
+    above = (*above, id(thing))
+    if isinstance(thing, Mapping):
+        return {str(key): _contents(entry, above) for key, entry in thing.items()}
+    if isinstance(thing, (list, tuple, set, frozenset)):
+        entries = [_contents(entry, above) for entry in thing]
+        ordered = isinstance(thing, (list, tuple))
+        return entries if ordered else sorted(entries, key=canonical_text)
+    if dataclasses.is_dataclass(thing):
+        held = {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing)}
+    elif hasattr(thing, "__qualname__"):
+        return f"{thing.__module__}.{thing.__qualname__}"
+    else:
+        held = dict(vars(thing)) if hasattr(thing, "__dict__") else {}
+    named = type(thing)
+    return {
+        "class": f"{named.__module__}.{named.__qualname__}",
+        "holds": {name: _contents(entry, above) for name, entry in held.items()},
+    }

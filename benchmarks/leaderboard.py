@@ -1,0 +1,240 @@
+"""The board: a pure function of the rows, the same to the last byte whenever it is written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks import plots, rows, statistics
+from benchmarks.metrics import HEADLINE
+from benchmarks.rows import Row
+from benchmarks.statistics import Interval
+from benchmarks.store import write_text
+
+BOARD = Path(__file__).parent / "LEADERBOARD.md"
+
+COLUMNS: tuple[tuple[str, str, float], ...] = (
+    ("p95_error", "p95 [mm]", 1e3),
+    ("max_error", "max [mm]", 1e3),
+    ("steady_state_error", "steady [mm]", 1e3),
+    ("sensed_rms_error", "sensed RMS [mm]", 1e3),
+    ("pressure_travel", "pressure travel [bar/s]", 1e-5),
+    ("air_use", "air [mg/s]", 1e6),
+    ("constraint_cost", "constraint cost", 1.0),
+)
+"""Metric, heading and factor from SI of the columns after the headline."""
+
+PREFACE = """\
+# Leaderboard
+
+Written by `python -m benchmarks board` from `benchmarks/results/*.json`; do not edit. Every row
+holds what runs it again: `python -m benchmarks verify ROW`.
+
+- **RMS** is the headline: true output minus the external reference, without noise, after the
+  settling window; the mean over episodes with its 95 % interval (stratified bootstrap over
+  scenarios and seeds). Everything but the sensed error is noise-free.
+- A run that a limit ended counts at the worst-case value and shows under *failures*; none is left
+  out.
+- Rows whose intervals overlap that of the first of their group share its rank (`=`).
+- *knows* is what the controller was built from; *preview* is how far ahead it reads the reference,
+  measured on what it does.
+- Steady-state errors are of references that rest. Constraint cost 1 is one millimetre (or one bar)
+  over a soft limit all the time.
+- Times per step are in [results/TIMES.md](results/TIMES.md), since no two runs give the same.
+"""
+
+
+def interval(row: Mapping[str, Any], metric: str = HEADLINE) -> Interval:
+    """Return a metric's mean with its interval."""
+    entry = row["aggregate"][metric]
+    return Interval(entry["mean"], entry["low"], entry["high"])
+
+
+def tracks(all_rows: Sequence[Row]) -> dict[str, list[Row]]:
+    """Return the rows of each track, best first; the tracks nominal first, then by name."""
+    grouped: dict[str, list[Row]] = {}
+    for row in all_rows:
+        grouped.setdefault(row["scenarios"]["name"], []).append(row)
+    names = sorted(grouped, key=lambda name: ("nominal" not in name, name))
+    order = lambda row: (interval(row).value, row["controller"]["name"])  # noqa: E731
+    return {name: sorted(grouped[name], key=order) for name in names}
+
+
+def ranks(ordered: Sequence[Row]) -> list[str]:
+    """Return the rank of each row, best first; rows that overlap the group's first share it."""
+    groups: list[list[int]] = []
+    for i, row in enumerate(ordered):
+        if groups and interval(row).overlaps(interval(ordered[groups[-1][0]])):
+            groups[-1].append(i)
+        else:
+            groups.append([i])
+    return [f"{group[0] + 1}{'=' if len(group) > 1 else ''}" for group in groups for _ in group]
+
+
+def number(value: float | None) -> str:
+    """Return a number with three significant digits, or a dash."""
+    if value is None or not np.isfinite(value):
+        return "-"
+    if value == 0.0:
+        return "0"
+    digits = int(np.floor(np.log10(abs(value))))
+    return f"{value:.{max(0, 2 - digits)}f}" if digits >= -3 else f"{value:.2g}"
+
+
+def _line(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
+
+
+def _table(heading: Sequence[str], lines: Sequence[Sequence[str]]) -> list[str]:
+    rule = [":--" if name == "controller" else "--:" for name in heading]
+    return [_line(heading), _line(rule), *(_line(line) for line in lines)]
+
+
+def _score_line(rank: str, row: Row) -> list[str]:
+    controller, head = row["controller"], interval(row)
+    preview = controller["preview_seconds"]
+    bounds = f"[{number(1e3 * head.low)}, {number(1e3 * head.high)}]"
+    measured = [
+        number(None if row["aggregate"][m]["mean"] is None else f * row["aggregate"][m]["mean"])
+        for m, _, f in COLUMNS
+    ]
+    return [
+        rank,
+        f"`{controller['name']}`",
+        controller["knowledge"],
+        f"{preview:g} s" if preview else "none",
+        f"**{number(1e3 * head.value)}** {bounds}",
+        *measured,
+        f"{row['failures']} of {len(row['episodes'])}",
+    ]
+
+
+def _matching(first: Row, second: Row) -> bool:
+    keys = [[(e["scenario"], e["seed"]) for e in row["episodes"]] for row in (first, second)]
+    return keys[0] == keys[1]
+
+
+def _pair_line(row: Row, above: Row | None) -> list[str]:
+    inner = row["aggregate"][HEADLINE]
+    middle = f"{number(1e3 * inner['iqm'])}"
+    bounds = f"[{number(1e3 * inner['iqm_low'])}, {number(1e3 * inner['iqm_high'])}]"
+    line = [f"`{row['controller']['name']}`", f"{middle} {bounds}"]
+    if above is None or not _matching(row, above):
+        return [*line, "-", "-"]
+    ours, theirs = (rows.scores_of(r["episodes"], HEADLINE) for r in (row, above))
+    gap = statistics.paired_difference(
+        ours, theirs, [episode["scenario"] for episode in row["episodes"]]
+    )
+    words = f"{1e3 * gap.value:+.3f} [{1e3 * gap.low:+.3f}, {1e3 * gap.high:+.3f}]"
+    return [*line, words, f"{100.0 * statistics.share_better(ours, theirs):.0f} %"]
+
+
+def _by_line(row: Row, columns: Sequence[tuple[str, str]]) -> list[str]:
+    values = [number(1e3 * row["by"][axis][point]) for axis, point in columns]
+    return [f"`{row['controller']['name']}`", *values]
+
+
+def _track_page(name: str, ordered: Sequence[Row], figure: str | None) -> list[str]:
+    first = ordered[0]
+    content = first["scenarios"]["content"]
+    digests = {row["scenarios"]["digest"] for row in ordered}
+    heading = ["rank", "controller", "knows", "preview", "RMS [mm] [95 %]"]
+    heading += [title for _, title, _ in COLUMNS] + ["failures"]
+    pairs = zip(ordered, [None, *ordered[:-1]], strict=True)
+    columns = [(axis, str(point)) for axis in first["by"] for point in first["by"][axis]]
+    lines = [
+        f"## {content['title']}",
+        "",
+        f"`{first['env']['id']}`, scenarios `{name}` version {content['version']} "
+        f"(`{first['scenarios']['digest'][:12]}`), {len(first['plants'])} scenarios x "
+        f"{len(first['seeds'])} seeds, settling window {content['settle_seconds']:g} s, "
+        f"worst case {1e3 * content['worst_case'][HEADLINE]:g} mm.",
+        "",
+    ]
+    if len(digests) > 1:
+        lines += ["**These rows are not of one scenario file: run the track again.**", ""]
+    scored = zip(ranks(ordered), ordered, strict=True)
+    lines += [*_table(heading, [_score_line(rank, row) for rank, row in scored]), ""]
+    if figure:
+        lines += [f"![error and effort of {name}]({figure})", ""]
+    heading = ["controller", "IQM of RMS [mm] [95 %]", "RMS minus the row above [mm] [95 %]"]
+    heading += ["better than the row above in"]
+    lines += ["Paired with the row above, episode by episode:", ""]
+    lines += [*_table(heading, [_pair_line(*pair) for pair in pairs]), ""]
+    if columns:
+        lines += ["RMS [mm] by setting:", ""]
+        heading = ["controller", *(f"{axis} {point}" for axis, point in columns)]
+        lines += [*_table(heading, [_by_line(row, columns) for row in ordered]), ""]
+    return lines
+
+
+def _legend(all_rows: Sequence[Row]) -> list[str]:
+    entries = {row["controller"]["name"]: row["controller"] for row in all_rows}
+    lines = ["## Controllers", ""]
+    for name in sorted(entries):
+        about = entries[name]
+        cited = f" *{about['citation']}*" if about["citation"] else ""
+        lines.append(f"- `{name}`: {about['summary']}{cited}")
+    return lines
+
+
+def board_text(all_rows: Sequence[Row], figures: Mapping[str, str] | None = None) -> str:
+    """Return LEADERBOARD.md.
+
+    Parameters
+    ----------
+    all_rows : sequence of rows
+        In any order.
+    figures : mapping from track to path, optional
+        Pictures to show, relative to the board.
+    """
+    lines = [*PREFACE.splitlines(), ""]
+    for name, ordered in tracks(all_rows).items():
+        lines += _track_page(name, ordered, (figures or {}).get(name))
+    return "\n".join(lines + _legend(all_rows)).rstrip() + "\n"
+
+
+def times_text(all_rows: Sequence[Row]) -> str:
+    """Return TIMES.md: what is never compared."""
+    lines = [
+        "# Compute time per step",
+        "",
+        "Of `predict` alone, Python included, as measured when the row was run: median over the",
+        "scenarios of the median and of the 99th percentile. Machines and their load differ.",
+        "",
+    ]
+    for name, ordered in tracks(all_rows).items():
+        table = [
+            [
+                f"`{row['controller']['name']}`",
+                number(row["volatile"]["predict_us"]["median"]),
+                number(row["volatile"]["predict_us"]["p99"]),
+                row["volatile"]["machine"],
+                row["volatile"]["date"],
+            ]
+            for row in ordered
+        ]
+        heading = ["controller", "median [us]", "p99 [us]", "machine", "date"]
+        lines += [f"## {name}", "", *_table(heading, table), ""]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def write(folder: Path = rows.RESULTS, board: Path = BOARD) -> list[Path]:
+    """Write the board, its figures and the times, and return the paths."""
+    all_rows = rows.load_all(folder)
+    if not all_rows:
+        raise ValueError(f"no rows in {folder}; run `python -m benchmarks run` first")
+    written, figures = [], {}
+    for name, ordered in tracks(all_rows).items():
+        path = folder / f"{name}.svg"
+        write_text(path, plots.error_against_effort(ordered))
+        inside = path.resolve().is_relative_to(board.parent.resolve())
+        relative = path.resolve().relative_to(board.parent.resolve()) if inside else path
+        figures[name] = relative.as_posix()
+        written.append(path)
+    write_text(board, board_text(all_rows, figures))
+    write_text(folder / "TIMES.md", times_text(all_rows))
+    return [board, folder / "TIMES.md", *written]

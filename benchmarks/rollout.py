@@ -1,0 +1,156 @@
+"""One episode, recorded as physical signals from ``info``."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.controllers import Controller
+
+Array = NDArray[np.float64]
+Watch = Callable[[Any], None]
+
+
+@dataclass(frozen=True)
+class Episode:
+    """What was recorded of one episode of n steps.
+
+    Attributes
+    ----------
+    signals : mapping of (n,) array
+        Every entry of ``info``, SI.
+    observations : (n, n_obs) array
+        What the controller was given at each step.
+    actions : (n, n_act) array
+        What it answered.
+    seconds : (n,) array
+        Time that each answer took [s].
+    period : float
+        Control period [s].
+    failure : str
+        Why the episode ended before its time; empty if it did not.
+    """
+
+    signals: Mapping[str, Array]
+    observations: NDArray[Any]
+    actions: NDArray[Any]
+    seconds: Array
+    period: float
+    failure: str
+
+    @property
+    def failed(self) -> bool:
+        """Whether a limit, a refused action or an error ended the episode."""
+        return bool(self.failure)
+
+
+def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None) -> Episode:
+    """Run one episode and record it; nothing is wrapped, filtered or scaled on the way.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        With the package's named signals and ``info``.
+    controller : Controller
+    seed : int
+        Of the environment's reset.
+    watch : callable, optional
+        Called with the environment after the reset and after each step (for a video).
+    """
+    observation, first = env.reset(seed=seed)
+    keys = tuple(first)
+    infos: list[tuple[float, ...]] = []
+    observations, actions, seconds = [], [], []
+    state, start, failure, clock = None, True, "", time.perf_counter
+    over = False
+    if watch:
+        watch(env)
+    while not over:
+        try:
+            begin = clock()
+            action, state = controller.predict(observation, state, start, True)
+            spent = clock() - begin
+            after, _, terminated, truncated, info = env.step(action)
+        except Exception as error:
+            failure = f"{type(error).__name__}: {error}"
+            break
+        start = False
+        observations.append(observation)
+        actions.append(action)
+        seconds.append(spent)
+        infos.append(tuple([info[key] for key in keys]))
+        observation, over = after, terminated or truncated
+        if terminated:
+            failure = f"a limit ended the episode at {info['time']:g} s"
+        if watch:
+            watch(env)
+    table = np.array(infos, np.float64).reshape(-1, len(keys))
+    return Episode(
+        signals={key: np.ascontiguousarray(table[:, i]) for i, key in enumerate(keys)},
+        observations=np.array(observations),
+        actions=np.array(actions),
+        seconds=np.array(seconds),
+        period=float(env.unwrapped.control_period),
+        failure=failure,
+    )
+
+
+class Replay:
+    """A controller that gives recorded actions, whatever it observes."""
+
+    def __init__(self, actions: NDArray[Any]) -> None:
+        self.actions = actions
+
+    def predict(
+        self,
+        observation: Any,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[Any, Any]:
+        """Return the next recorded action; ``state`` counts the steps."""
+        step = 0 if state is None or episode_start else int(state)
+        return self.actions[step], step + 1
+
+
+def preview_used(episode: Episode, controller: Controller, signals: Any) -> int:
+    """Return how many preview samples a controller reads, measured on what it does.
+
+    The episode's observations are shown to it again with the last samples replaced by the
+    present reference. The first replacement that changes an action marks the last sample in use.
+
+    Parameters
+    ----------
+    episode : Episode
+        An episode of this controller.
+    controller : Controller
+    signals : Signals
+        Of the observation; the preview is ``reference_1``, ``reference_2``, ...
+    """
+    index = {signal.name: signal.index for signal in signals}
+    ahead = sorted(
+        (int(name.split("_")[1]), i) for name, i in index.items() if name.startswith("reference_")
+    )
+    if not ahead or not len(episode.observations):
+        return 0
+    plain = _answers(controller, episode.observations)
+    for number, first in reversed(list(enumerate(ahead, start=1))):
+        masked = episode.observations.copy()
+        for _, column in ahead[number - 1 :]:
+            masked[:, column] = masked[:, index["reference"]]
+        if not np.array_equal(_answers(controller, masked), plain, equal_nan=True):
+            return first[0]
+    return 0
+
+
+def _answers(controller: Controller, observations: NDArray[Any]) -> NDArray[Any]:
+    answers, state = [], None
+    for i, observation in enumerate(observations):
+        action, state = controller.predict(observation, state, i == 0, True)
+        answers.append(action)
+    return np.array(answers)

@@ -1,0 +1,155 @@
+"""Fixed scenario files: which episodes are run, and how they are scored.
+
+A file names an environment, a grid of keyword arguments, the seeds, the settling window and the
+worst-case values. What is digested is the content and not the layout, so that a comment changes
+nothing and a number changes everything.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from benchmarks.canonical import digest, plain
+from benchmarks.metrics import METRICS
+
+FOLDER = Path(__file__).parent / "scenarios"
+_KEYS = {
+    "schema",
+    "name",
+    "version",
+    "title",
+    "env",
+    "seeds",
+    "settle_seconds",
+    "hold_seconds",
+    "sensed",
+    "rests",
+    "cost_scales",
+    "worst_case",
+    "kwargs",
+    "grid",
+    "per_reference",
+    "model",
+}
+_OPTIONAL: dict[str, Any] = {"kwargs": {}, "grid": {}, "per_reference": {}, "model": {}}
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One setting of an environment, run once per seed.
+
+    Attributes
+    ----------
+    name : str
+        Unique in its file.
+    kwargs : mapping
+        Keyword arguments of ``gymnasium.make``.
+    model : mapping
+        Keyword arguments that differ for the environment whose plant is the controller's nominal
+        model; empty where the model is of the plant's own kind.
+    rests : bool
+        Whether the reference rests, so that a steady-state error is scored.
+    """
+
+    name: str
+    kwargs: Mapping[str, Any]
+    model: Mapping[str, Any]
+    rests: bool
+
+
+@dataclass(frozen=True)
+class ScenarioSet:
+    """The content of a scenario file.
+
+    Attributes
+    ----------
+    content : mapping
+        The file as plain data: what is digested and kept with every row.
+    """
+
+    content: Mapping[str, Any]
+
+    def __post_init__(self) -> None:
+        """Check the keys and the values that the scores rest on."""
+        given, name = set(self.content), self.content.get("name", "the scenario file")
+        if given - _KEYS or _KEYS - given - set(_OPTIONAL):
+            raise ValueError(
+                f"{name}: unknown keys {sorted(given - _KEYS)}, "
+                f"missing keys {sorted(_KEYS - given - set(_OPTIONAL))}"
+            )
+        if set(self.content["worst_case"]) != set(METRICS):
+            raise ValueError(f"{name}: worst_case needs a value for each of {', '.join(METRICS)}")
+        seeds = self.content["seeds"]
+        if not seeds or len(set(seeds)) != len(seeds):
+            raise ValueError(f"{name}: seeds must be different whole numbers, got {seeds}")
+
+    @property
+    def name(self) -> str:
+        """Name of the track, as in the row's file name."""
+        return str(self.content["name"])
+
+    @property
+    def env(self) -> str:
+        """Id of the environment."""
+        return str(self.content["env"])
+
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """Seeds of each scenario's episodes."""
+        return tuple(int(seed) for seed in self.content["seeds"])
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the content."""
+        return digest(self.content)
+
+    def scenarios(self) -> tuple[Scenario, ...]:
+        """Return the grid, written out in the order of the file."""
+        grid = self.content.get("grid") or {}
+        return tuple(
+            self._scenario(dict(zip(grid, values, strict=True)))
+            for values in itertools.product(*grid.values())
+        )
+
+    def _scenario(self, point: Mapping[str, Any]) -> Scenario:
+        kwargs = {**(self.content.get("kwargs") or {}), **point}
+        reference = kwargs.get("reference")
+        kwargs |= (self.content.get("per_reference") or {}).get(reference, {})
+        return Scenario(
+            name="_".join(_word(value) for value in point.values()) or "only",
+            kwargs=kwargs,
+            model=dict(self.content.get("model") or {}),
+            rests=reference in self.content["rests"],
+        )
+
+
+def _word(value: Any) -> str:
+    return f"{value:g}kg" if isinstance(value, (int, float)) else str(value)
+
+
+def load(path: Path) -> ScenarioSet:
+    """Return the scenarios of a file.
+
+    Raises
+    ------
+    ValueError
+        If the file is not a mapping, or a key is unknown or missing.
+    """
+    content = yaml.safe_load(path.read_text())
+    if not isinstance(content, dict) or content.get("schema") != 1:
+        raise ValueError(f"{path}: not a scenario file of schema 1")
+    made = ScenarioSet(plain(content))
+    if made.name != path.stem:
+        raise ValueError(f"{path}: holds {made.name!r}; name file and content alike")
+    return made
+
+
+def available(folder: Path = FOLDER) -> dict[str, ScenarioSet]:
+    """Return all scenario files by name."""
+    return {path.stem: load(path) for path in sorted(folder.glob("*.yaml"))}

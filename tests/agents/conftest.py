@@ -1,0 +1,41 @@
+"""Models trained for a moment, for the tests of learning; without torch there are no such tests."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+NEEDED = ("torch", "stable_baselines3", "onnx", "onnxruntime")
+collect_ignore_glob = [] if all(map(find_spec, NEEDED)) else ["test_*.py"]
+
+
+@pytest.fixture(scope="session")
+def ppo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Path]:
+    """Return the preset's network after a moment of training, and its folder."""
+    from short_runs import tiny, trained
+
+    folder = tmp_path_factory.mktemp("ppo")
+    return trained(folder, tiny()), folder
+
+
+@pytest.fixture(scope="session")
+def normalized_ppo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Path]:
+    """Return a plain network with a normalised observation, and its folder."""
+    from short_runs import tiny, trained
+
+    folder = tmp_path_factory.mktemp("normalized")
+    network = {"hidden": [16, 16], "activation": "elu"}
+    config = tiny(network=network, normalize={"observation": True, "reward": True})
+    return trained(folder, config), folder
+
+
+@pytest.fixture(scope="session")
+def sac(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Path]:
+    """Return SAC after a moment of training, and its folder."""
+    from short_runs import tiny, trained
+
+    folder = tmp_path_factory.mktemp("sac")
+    return trained(folder, tiny("sac")), folder

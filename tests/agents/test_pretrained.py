@@ -1,0 +1,98 @@
+"""The policy that comes with the project is the recorded one, and tracks well on unseen seeds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from short_runs import ID
+
+from agents import catalogue, configs
+from agents.policy import OnnxPolicy
+
+NAMES = sorted(catalogue.PRETRAINED)
+
+
+def rms(controller: object, reference: str, hysteresis: str, load: float) -> float:
+    """Return the RMS error [m] after two seconds, over 16 seeds that training never saw."""
+    env = gym.make_vec(
+        ID,
+        16,
+        vectorization_mode="vector_entry_point",
+        reference=reference,
+        hysteresis=hysteresis,
+        load=load,
+    )
+    observation, infos = env.reset(seed=101)
+    errors = []
+    for _ in range(999):
+        action, _ = controller.predict(observation)  # type: ignore[attr-defined]
+        observation, _, terminated, _, infos = env.step(action)
+        assert not terminated.any()
+        errors.append(infos["output"] - infos["reference"])
+    return float(np.sqrt(np.mean(np.square(errors[200:]))))
+
+
+class FeedForward:
+    """Sets the pressure that the static law without memory asks for."""
+
+    def __init__(self, load: float) -> None:
+        env = gym.make(ID, load=load).unwrapped
+        self.signals, self.action = env.signals, env.action_signals[0]
+        self.grid = np.linspace(-0.01, 0.02, 301)
+        self.pressures = np.clip(env.plant.drive_for(self.grid, load), 0.0, 6e5)
+
+    def predict(self, observation: np.ndarray) -> tuple[np.ndarray, None]:
+        reference = self.signals.decode(observation, "reference")
+        pressure = np.interp(reference, self.grid, self.pressures)
+        return self.action.encode(pressure)[:, None], None
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_file_is_small_and_its_training_is_recorded(name: str) -> None:
+    path = Path(catalogue.PRETRAINED[name])
+    assert path.stat().st_size < 100_000
+    card = json.loads(path.with_suffix(".json").read_text())
+    assert OnnxPolicy.load(path).card == card
+    assert f"--steps {card['config']['steps']} --seed {card['seed']}" in card["command"]
+    assert configs.from_mapping(card["config"]).as_dict() == card["config"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_recorded_preset_is_the_one_that_ships(name: str) -> None:
+    card = OnnxPolicy.load(catalogue.PRETRAINED[name]).card
+    assert configs.preset(card["env"], card["algo"]).as_dict() == card["config"]
+    assert "--config" not in card["command"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_was_trained_on_the_plant_that_ships(name: str) -> None:
+    policy = OnnxPolicy.load(catalogue.PRETRAINED[name])
+    env = gym.make(policy.card["env"], **policy.card["env_kwargs"]).unwrapped
+    policy.check(env.signals, env.action_signals)
+    assert env.plant.digest() == policy.card["plant"], "the plant has changed: train it anew"
+
+
+@pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach"])
+@pytest.mark.parametrize(("reference", "most"), [("sines", 0.15e-3), ("staircase", 0.5e-3)])
+def test_it_tracks_where_a_law_without_memory_cannot(
+    hysteresis: str, reference: str, most: float
+) -> None:
+    policy = catalogue.load_pretrained("ppo")
+    for load in (0.0, 2.55, 4.55):
+        error = rms(policy, reference, hysteresis, load)
+        assert error < most
+        assert error < 0.4 * rms(FeedForward(load), reference, hysteresis, load)
+
+
+def test_benchmarks_find_it_among_the_controllers() -> None:
+    env = gym.make(ID).unwrapped
+    for name, entry in catalogue.CONTROLLERS.items():
+        made = catalogue.make_controller(name, env.plant, env.signals, env.action_signals, seed=0)
+        assert entry.envs == (made.card["env"],)
+        assert made.digest() == catalogue.load_pretrained(name).digest()
+    with pytest.raises(ValueError, match="no policy named 'pppo'; did you mean 'ppo'"):
+        catalogue.load_pretrained("pppo")

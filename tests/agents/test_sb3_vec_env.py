@@ -1,0 +1,209 @@
+"""The adapter shows stable-baselines3 exactly the batched environment."""
+
+from __future__ import annotations
+
+import copy
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from short_runs import ID
+from stable_baselines3.common.env_checker import check_env
+from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
+
+from agents.sb3_vec_env import NO_INFO, BatchVecEnv, make_batch_vec_env
+
+N, SEED = 5, 40
+SHORT = {"episode_seconds": 0.12, "reference": "mixed", "load": None}
+
+
+def actions(steps: int) -> np.ndarray:
+    return np.random.default_rng(0).uniform(-1, 1, (steps, N, 1)).astype(np.float32)
+
+
+def test_single_environment_passes_the_checker_without_a_warning() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(gym.make(ID).unwrapped)
+        check_env(gym.make(ID, normalize=True, reference="mixed", load=None).unwrapped)
+
+
+def test_rows_are_those_of_the_batched_environment_and_of_single_ones() -> None:
+    env = make_batch_vec_env(ID, N, **SHORT)
+    batch = gym.make_vec(ID, N, vectorization_mode="vector_entry_point", **SHORT)
+    singles = [gym.make(ID, **SHORT) for _ in range(N)]
+    env.seed(SEED)
+    first = env.reset()
+    assert np.array_equal(first, batch.reset(seed=SEED)[0])
+    assert np.array_equal(first, [e.reset(seed=SEED + i)[0] for i, e in enumerate(singles)])
+    resets = 0
+    for action in actions(60):
+        observation, reward, done, infos = env.step(action)
+        theirs = batch.step(action)
+        assert np.array_equal(observation, theirs[0])
+        assert np.array_equal(reward, theirs[1].astype(np.float32))
+        assert np.array_equal(done, theirs[2] | theirs[3])
+        for i, single in enumerate(singles):
+            last, value, terminated, truncated, _ = single.step(action[i])
+            assert reward[i] == np.float32(value)
+            assert done[i] == (terminated or truncated)
+            if done[i]:
+                resets += 1
+                assert np.array_equal(infos[i]["terminal_observation"], last)
+                assert infos[i]["TimeLimit.truncated"] == (truncated and not terminated)
+                last, _ = single.reset()
+            assert np.array_equal(observation[i], last)
+    assert resets >= 4 * N
+
+
+def test_termination_is_not_called_a_truncation() -> None:
+    limits = {"highest_contraction": 0.004}
+    env = make_batch_vec_env(ID, N, reward=limits, load=0.0, start="rest")
+    env.seed(SEED)
+    env.reset()
+    seen = []
+    for _ in range(300):
+        _, _, done, infos = env.step(np.ones((N, 1), np.float32))
+        seen += [infos[i]["TimeLimit.truncated"] for i in np.flatnonzero(done)]
+    assert seen
+    assert not any(seen)
+
+
+def test_only_ended_rows_have_an_info_of_their_own() -> None:
+    env = make_batch_vec_env(ID, N, **SHORT)
+    env.reset()
+    for action in actions(30):
+        _, _, done, infos = env.step(action)
+        for i in range(N):
+            assert (infos[i] is NO_INFO) == (not done[i])
+            assert set(infos[i]) == (
+                {"terminal_observation", "TimeLimit.truncated"} if done[i] else set()
+            )
+
+
+def test_the_shared_info_cannot_be_written_to() -> None:
+    for write in (
+        lambda: NO_INFO.update(a=1),
+        lambda: NO_INFO.setdefault("a", 1),
+        lambda: NO_INFO.__setitem__("a", 1),
+    ):
+        with pytest.raises(TypeError, match="copy it"):
+            write()
+    own = NO_INFO.copy()
+    own["a"] = 1
+    assert dict(NO_INFO) == {}
+    assert copy.deepcopy(NO_INFO) == {}
+
+
+def test_infos_are_reported_by_row_when_asked_for() -> None:
+    env = make_batch_vec_env(ID, N, info=True, **SHORT)
+    env.seed(SEED)
+    env.reset()
+    assert env.reset_infos[2]["time"] == 0.0
+    single = gym.make(ID, **SHORT)
+    single.reset(seed=SEED + 2)
+    for action in actions(12):
+        _, _, done, infos = env.step(action)
+        last, _, _, _, wanted = single.step(action[2])
+        extra = {"terminal_observation", "TimeLimit.truncated"} if done[2] else set()
+        assert {k: v for k, v in infos[2].items() if k not in extra} == wanted
+    assert done[2]
+    assert np.array_equal(infos[2]["terminal_observation"], last)
+
+
+def test_a_returned_observation_is_not_overwritten_later() -> None:
+    env = make_batch_vec_env(ID, N, **SHORT)
+    env.reset()
+    kept = [env.step(action) for action in actions(15)]
+    held = [(o.copy(), r.copy()) for o, r, _, _ in kept]
+    for action in actions(15):
+        env.step(action)
+    for (o, r, _, _), (old_o, old_r) in zip(kept, held, strict=True):
+        assert np.array_equal(o, old_o)
+        assert np.array_equal(r, old_r)
+
+
+def test_seeds_repeat_and_resets_without_a_seed_go_on() -> None:
+    env = make_batch_vec_env(ID, N, **SHORT)
+    env.seed(7)
+    first, second = env.reset(), env.reset()
+    assert not np.array_equal(first, second)
+    env.seed(7)
+    assert np.array_equal(env.reset(), first)
+    assert np.array_equal(env.reset(), second)
+
+
+def test_monitor_reports_the_return_of_whole_episodes() -> None:
+    env = VecMonitor(make_batch_vec_env(ID, N, **SHORT))
+    env.reset()
+    total, reported = np.zeros(N), []
+    for action in actions(24):
+        _, reward, done, infos = env.step(action)
+        total += reward
+        for i in np.flatnonzero(done):
+            assert infos[i]["episode"]["r"] == pytest.approx(total[i], rel=1e-5)
+            assert infos[i]["episode"]["l"] == 12
+            reported.append(i)
+            total[i] = 0.0
+    assert len(reported) == 2 * N
+
+
+def test_normalisation_reaches_the_terminal_observation() -> None:
+    env = VecNormalize(make_batch_vec_env(ID, N, **SHORT))
+    plain = make_batch_vec_env(ID, N, **SHORT)
+    for made in (env, plain):
+        made.seed(SEED)
+        made.reset()
+    for action in actions(12):
+        _, _, done, infos = env.step(action)
+        _, _, _, raw = plain.step(action)
+    assert done.all()
+    for i in range(N):
+        wanted = env.normalize_obs(raw[i]["terminal_observation"])
+        assert np.array_equal(infos[i]["terminal_observation"], wanted)
+
+
+def test_attributes_and_methods_are_those_of_the_batch() -> None:
+    env = make_batch_vec_env(ID, N, **SHORT)
+    assert env.get_attr("plant", indices=[0, 3]) == [env.env.plant] * 2
+    assert len(env.get_attr("signals")) == N
+    assert env.has_attr("plant")
+    assert not env.has_attr("nonsense")
+    assert env.env_is_wrapped(gym.Wrapper) == [False] * N
+    env.set_attr("note", "here")
+    assert env.get_attr("note", 1) == ["here"]
+    with pytest.raises(ValueError, match="one batch"):
+        env.set_attr("note", "there", indices=[1])
+    with pytest.raises(ValueError, match="one batch"):
+        env.env_method("get_state", indices=0)
+    with pytest.raises(IndexError, match="row 9"):
+        env.get_attr("plant", indices=[9])
+
+
+def test_state_goes_back_to_the_last_bit() -> None:
+    env = make_batch_vec_env(ID, N, **SHORT)
+    env.seed(SEED)
+    env.reset()
+    moves = actions(40)
+    for action in moves[:20]:
+        env.step(action)
+    state = env.env_method("get_state")[0]
+    first = [env.step(action)[0] for action in moves[20:]]
+    env.set_state(state)
+    again = [env.step(action)[0] for action in moves[20:]]
+    assert np.array_equal(first, again)
+
+
+def test_another_kind_of_reset_is_refused() -> None:
+    other = SyncVectorEnv([lambda: gym.make(ID)], autoreset_mode=AutoresetMode.NEXT_STEP)
+    with pytest.raises(ValueError, match="SAME_STEP"):
+        BatchVecEnv(other)
+
+
+def test_rows_cannot_be_reset_with_differing_options() -> None:
+    env = make_batch_vec_env(ID, 2, **SHORT)
+    env.set_options([{"a": 1}, {}])
+    with pytest.raises(ValueError, match="same options"):
+        env.reset()

@@ -1,0 +1,236 @@
+"""A run goes on where it was: the same bits whether or not it was killed."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+import yaml
+from rich.console import Console
+from short_runs import ID, tiny, trained
+from stable_baselines3.common.evaluation import evaluate_policy
+
+from agents import checkpoint, configs, train
+from agents.__main__ import main
+from agents.checkpoint import MARK, CheckpointError
+from agents.policy import OnnxPolicy
+from agents.sb3_vec_env import make_batch_vec_env
+
+QUIET = Console(quiet=True)
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class Killed(Exception):
+    """Stands for the moment at which a process is killed."""
+
+
+def killed_after(run: train.Run, steps: int) -> None:
+    """Train, and stop without any clearing up once ``steps`` are passed."""
+    model = train.start(run)
+    ordinary = model.collect_rollouts
+
+    def collect(*arguments: Any, **keywords: Any) -> Any:
+        if model.num_timesteps >= steps:
+            raise Killed
+        return ordinary(*arguments, **keywords)
+
+    model.collect_rollouts = collect  # type: ignore[method-assign]
+    with pytest.raises(Killed):
+        train.train(run, model, QUIET)
+    np.random.seed(999)  # noqa: NPY002  (a new process starts with other random numbers)
+    torch.manual_seed(999)
+
+
+@pytest.mark.parametrize("algo", ["ppo", "sac"])
+def test_resumed_is_uninterrupted_to_the_last_bit(
+    algo: str, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    whole, folder = request.getfixturevalue(algo)
+    run = train.Run(tiny(algo), 3, tmp_path)
+    killed_after(run, 700)
+    again = train.saved_run(tmp_path)
+    assert again == run
+    model = train.resume(again)
+    assert 256 <= model.num_timesteps < 700
+    train.train(again, model, QUIET)
+    mine, theirs = model.policy.state_dict(), whole.policy.state_dict()
+    assert all(torch.equal(mine[name], theirs[name]) for name in theirs)
+    assert (tmp_path / "policy.onnx").read_bytes() == (folder / "policy.onnx").read_bytes()
+
+
+def test_a_normalised_run_resumes_to_the_last_bit(
+    tmp_path: Path, normalized_ppo: tuple[Any, Path]
+) -> None:
+    whole, folder = normalized_ppo
+    run = train.Run(tiny(**_parts(whole, folder)), 3, tmp_path)
+    killed_after(run, 512)
+    model = train.resume(train.saved_run(tmp_path))
+    train.train(run, model, QUIET)
+    moments, theirs = (m.get_vec_normalize_env().obs_rms for m in (model, whole))
+    assert np.array_equal(moments.mean, theirs.mean)
+    assert np.array_equal(moments.var, theirs.var)
+    assert (tmp_path / "policy.onnx").read_bytes() == (folder / "policy.onnx").read_bytes()
+
+
+def _parts(model: Any, folder: Path) -> dict[str, Any]:
+    plain = train.saved_run(folder).config.as_dict()
+    return {"network": plain["network"], "normalize": plain["normalize"]}
+
+
+def test_another_seed_gives_another_policy(tmp_path: Path, ppo: tuple[Any, Path]) -> None:
+    other = trained(tmp_path, tiny(), seed=4)
+    assert not torch.equal(
+        other.policy.action_net.weight,
+        ppo[0].policy.action_net.weight,
+    )
+
+
+def test_a_killed_process_resumes_from_the_command_line(tmp_path: Path) -> None:
+    config = tmp_path / "tiny.yaml"
+    config.write_text(yaml.safe_dump({**tiny().as_dict(), "steps": 12_000}))
+    base = ["train", ID, "--seed", "5", "--config", str(config), "--out"]
+    assert main([*base, str(tmp_path / "whole")]) == 0
+    folder = tmp_path / "killed"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "agents", *base, str(folder)],
+        cwd=ROOT,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    until = time.monotonic() + 60
+    while not (folder / checkpoint.NAME).exists() and time.monotonic() < until:
+        time.sleep(0.01)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    (folder / "checkpoint.pt.1.tmp").write_bytes(b"half")
+    saved = checkpoint.load(folder / checkpoint.NAME)["snapshot"]["counters"]["num_timesteps"]
+    assert 0 < saved < 12_000
+    assert not (folder / "policy.onnx").exists()
+    assert main(["train", ID, "--resume", "--out", str(folder)]) == 0
+    assert not list(folder.glob("*.tmp"))
+    whole = (tmp_path / "whole" / "policy.onnx").read_bytes()
+    assert (folder / "policy.onnx").read_bytes() == whole
+
+
+def test_an_interrupted_write_leaves_the_old_checkpoint(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / checkpoint.NAME
+    checkpoint.save(file, {"a": np.arange(3)})
+    before = file.read_bytes()
+
+    def power_cut(*_: Any) -> None:
+        raise Killed
+
+    monkeypatch.setattr(os, "fsync", power_cut)
+    with pytest.raises(Killed):
+        checkpoint.save(file, {"a": np.arange(4)})
+    assert file.read_bytes() == before
+    assert checkpoint.load(file)["a"].tolist() == [0, 1, 2]
+
+
+def test_a_torn_or_foreign_checkpoint_is_never_picked_up(tmp_path: Path) -> None:
+    file = tmp_path / checkpoint.NAME
+    checkpoint.save(file, {"a": np.arange(300)})
+    good = file.read_bytes()
+    for bad, message in (
+        (good[:-1], "damaged"),
+        (good[:60], "damaged"),
+        (good[:-5] + b"\0" + good[-4:], "damaged"),
+        (b"", "not a checkpoint"),
+        (b"PK\x03\x04" + good, "may run code"),
+    ):
+        file.write_bytes(bad)
+        with pytest.raises(CheckpointError, match=message):
+            checkpoint.load(file)
+
+
+@pytest.mark.filterwarnings("ignore:Detected pickle protocol")
+def test_a_checkpoint_cannot_run_code(tmp_path: Path) -> None:
+    marker = tmp_path / "ran"
+
+    class Doctored:
+        def __reduce__(self) -> Any:
+            return os.system, (f"touch {marker}",)
+
+    torch.save({"settings": Doctored()}, tmp_path / "inner.pt")
+    for payload in ((tmp_path / "inner.pt").read_bytes(), pickle.dumps(Doctored())):
+        file = tmp_path / checkpoint.NAME
+        file.write_bytes(MARK + hashlib.sha256(payload).digest() + payload)
+        with pytest.raises(CheckpointError, match="was not opened"):
+            checkpoint.load(file)
+        assert main(["train", ID, "--resume", "--out", str(tmp_path)]) == 2
+    assert not marker.exists()
+
+
+def test_a_run_is_neither_overwritten_nor_resumed_with_other_settings(
+    ppo: tuple[Any, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = str(ppo[1])
+    before = (ppo[1] / checkpoint.NAME).read_bytes()
+    assert main(["train", ID, "--out", folder]) == 2
+    assert "already holds a training" in capsys.readouterr().err
+    assert main(["train", ID, "--out", folder, "--resume", "--set", "ppo.gamma=0.5"]) == 2
+    assert "keeps the settings" in capsys.readouterr().err
+    assert main(["train", ID, "--out", str(tmp_path / "none"), "--resume"]) == 2
+    assert "no checkpoint" in capsys.readouterr().err
+    assert (ppo[1] / checkpoint.NAME).read_bytes() == before
+
+
+def test_a_changed_plant_is_not_trained_on_unnoticed(ppo: tuple[Any, Path], tmp_path: Path) -> None:
+    content = checkpoint.load(ppo[1] / checkpoint.NAME)
+    digest = ppo[0].get_env().get_attr("plant")[0].digest()
+    content["settings"] = content["settings"].replace(digest, "0123456789abcdef")
+    checkpoint.save(tmp_path / checkpoint.NAME, content)
+    with pytest.raises(CheckpointError, match="train anew"):
+        train.resume(train.saved_run(tmp_path))
+
+
+def test_the_log_and_the_card_are_written(ppo: tuple[Any, Path]) -> None:
+    folder = ppo[1]
+    assert list((folder / "tensorboard").glob("events*"))
+    card = OnnxPolicy.load(folder / "policy.onnx").card
+    assert card["steps"] == 1024
+    assert card["seed"] == 3
+    assert card["command"].startswith(f"python -m agents train {ID} --algo ppo --steps 1024")
+    assert card["plant"] == ppo[0].get_env().get_attr("plant")[0].digest()
+    assert configs.read(folder / "policy.json") == tiny()
+    text = (folder / "policy.json").read_text()
+    assert str(folder) not in text
+    assert str(ROOT) not in text
+
+
+def test_training_episodes_are_far_from_those_that_are_scored() -> None:
+    config = tiny()
+    env = train.make_env(config, 0)
+    train.make_model(config, 0, env)
+    assert env.unwrapped._seeds == list(range(train.FIRST_SEED, train.FIRST_SEED + 8))
+
+
+def test_learning_improves_the_return(tmp_path: Path) -> None:
+    config = configs.changed(
+        configs.preset(ID, "ppo"),
+        ["steps=200_000", "num_envs=64", "env_kwargs.load=2.55", "env_kwargs.episode_seconds=4.0"],
+    )
+    run = train.Run(config, 1, tmp_path)
+    model = train.start(run)
+    env = make_batch_vec_env(ID, 32, reference="mixed", episode_seconds=4.0)
+
+    def score(policy: Any) -> float:
+        env.seed(1)
+        return float(evaluate_policy(policy, env, n_eval_episodes=32, warn=False)[0])
+
+    untrained = score(model)
+    train.train(run, model, QUIET)
+    assert score(OnnxPolicy.load(tmp_path / "policy.onnx")) > 0.5 * untrained
+    assert untrained < 0.0

@@ -1,0 +1,101 @@
+"""Controllers for the harness's own tests, built like those of the catalogue."""
+
+from __future__ import annotations
+
+import os
+import signal
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Always the same normalised action."""
+
+    action: float
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return np.array([self.action], np.float32), None
+
+
+@dataclass(frozen=True)
+class Inverse:
+    """Static inverse of the reference, ``ahead`` preview samples early, plus an integrator."""
+
+    plant: Any
+    signals: Any
+    action_signals: Any
+    ahead: int = 0
+    gain: float = 0.0
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        total = 0.0 if state is None or episode_start else state
+        name = f"reference_{self.ahead}" if self.ahead else "reference"
+        wanted = float(self.signals.decode(observation, name))
+        load = float(self.signals.decode(observation, "load"))
+        seen = float(self.signals.decode(observation, "contraction"))
+        total += self.gain * (float(self.signals.decode(observation, "reference")) - seen)
+        pressure = 4e7 * (wanted + total) + 1e4 * load
+        return self.action_signals[0].encode([pressure]).astype(np.float32), total
+
+
+@dataclass(frozen=True)
+class Refused:
+    """Gives a number that no environment takes, from the first step on."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return np.array([np.nan], np.float32), None
+
+
+@dataclass(frozen=True)
+class Killer:
+    """Kills its process once: the file ``BENCH_FAKES_MARK`` says that it has."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        mark = Path(os.environ["BENCH_FAKES_MARK"])
+        if not mark.exists():
+            mark.write_text("killed")
+            os.kill(os.getpid(), signal.SIGKILL)
+        return np.array([0.0], np.float32), None
+
+
+@dataclass(frozen=True)
+class Entry:
+    """As an entry of the catalogue."""
+
+    summary: str
+    knowledge: str = "nothing"
+    citation: str = ""
+    envs: tuple[str, ...] = ()
+    kind: str = "classical"
+
+
+CONTROLLERS = {
+    "low": Entry("holds 1.5 bar"),
+    "middle": Entry("holds 3 bar"),
+    "inverse": Entry("static inverse", "nominal model"),
+    "ahead": Entry("static inverse, two preview samples early", "nominal model"),
+    "integral": Entry("static inverse with an integrator", "nominal model"),
+    "learned": Entry("as integral, verified as learned ones are", kind="learned"),
+    "refused": Entry("not a number"),
+    "killer": Entry("kills its worker once"),
+}
+
+
+def make_controller(name, plant=None, signals=None, action_signals=None, seed=0):
+    """Return a controller by name."""
+    parts = (plant, signals, action_signals)
+    made = {
+        "low": lambda: Hold(-0.5),
+        "middle": lambda: Hold(0.0),
+        "inverse": lambda: Inverse(*parts),
+        "ahead": lambda: Inverse(*parts, ahead=2),
+        "integral": lambda: Inverse(*parts, gain=0.02),
+        "learned": lambda: Inverse(*parts, gain=0.02),
+        "refused": Refused,
+        "killer": Killer,
+    }
+    return made[name]()
