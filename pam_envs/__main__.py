@@ -1,0 +1,216 @@
+"""The command line: ``pam-envs list``, ``render`` and ``identify`` (or ``python -m pam_envs``)."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import gymnasium as gym
+import numpy as np
+import tyro
+from numpy.typing import NDArray
+
+from pam_envs.envs.registration import register_all
+from pam_envs.envs.rendering_film import write_film
+
+
+@dataclass
+class List:
+    """List the registered environments."""
+
+
+@dataclass
+class Render:
+    """Film an environment under the exact inverse of its plant."""
+
+    env: tyro.conf.Positional[str]
+    """Its id, with or without PAM/ and -v0."""
+    video: Path = Path("out.mp4")
+    """Where to write; .gif works too."""
+    seconds: float = 10.0
+    """Length of the episode [s]."""
+    hysteresis: Literal["maxwell_slip", "preisach", "none"] = "maxwell_slip"
+    """The muscle's memory."""
+    reference: str = "staircase"
+    """Family of references."""
+    load: float = 2.55
+    """Load [kg]."""
+    seed: int = 0
+    """Seed of the episode."""
+    fps: int = 25
+    """Pictures a second."""
+
+
+@dataclass
+class Identify:
+    """Identify the shipped muscle anew from the shipped readings (some minutes)."""
+
+    out: Path = Path("identified")
+    """Folder for the plant files and the report."""
+    members: int = 8
+    """Equally good fits to look for beside the best one."""
+
+
+class Mistake(Exception):
+    """Something the user can mend; its text says how."""
+
+
+def env_ids() -> list[str]:
+    """Return the ids of the registered environments."""
+    return sorted(name for name in gym.registry if name.startswith("PAM/"))
+
+
+def env_id(given: str) -> str:
+    """Return the id that was meant, or say which are near."""
+    known = env_ids()
+    short = {name.removeprefix("PAM/").rsplit("-v", 1)[0].lower(): name for name in known}
+    key = given.removeprefix("PAM/").rsplit("-v", 1)[0].lower()
+    if given in known:
+        return given
+    if key in short and "-v" not in given:
+        return short[key]
+    if f"PAM/{given}" in known:
+        return f"PAM/{given}"
+    near = difflib.get_close_matches(key, short, n=1, cutoff=0.4)
+    hint = f"; did you mean {short[near[0]]}?" if near else "."
+    raise Mistake(f"no environment named {given!r}{hint} There are: {', '.join(known)}")
+
+
+def list_environments() -> None:
+    """Print a table of the environments."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title="Environments")
+    for column in ("id", "action", "observation", "control period", "memories"):
+        table.add_column(column, overflow="fold")
+    for name in env_ids():
+        env: Any = gym.make(name).unwrapped
+        actions = ", ".join(f"{s.name} ({s.unit})" for s in env.action_signals)
+        signals = ", ".join(f"{s.name} ({s.unit})" for s in env.signals)
+        memories = "maxwell_slip, preisach, none"
+        table.add_row(name, actions, signals, f"{1e3 * env.control_period:g} ms", memories)
+    Console().print(table)
+
+
+class InverseFeedForward:
+    """The set-point that the plant's own inverse asks for: static law, then memory."""
+
+    def __init__(self, env: Any) -> None:
+        self.plant, self.signals = env.plant, env.signals
+        self.action = env.action_signals[0]
+        self.inverse: Any = None
+        self.state: Any = None
+
+    def __call__(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the action for an observation."""
+        load = float(self.signals.decode(observation, "load"))
+        if self.inverse is None:
+            full = self.plant.regulator.max_pressure
+            self.inverse = self.plant.memory.inverse(load, full)
+            self.state = self.inverse.initial_state((1,))
+        wanted = self.signals.decode(observation, "reference")
+        drive = np.atleast_1d(self.plant.drive_for(wanted, load))
+        pressure, self.state = self.inverse.pressure(drive, self.state)
+        return np.asarray(self.action.encode(pressure), np.float32)
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Give a temporary name beside ``path`` and move it there when all went well."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def render(options: Render) -> None:
+    """Write a film."""
+    name = env_id(options.env)
+    if options.video.suffix not in (".mp4", ".gif"):
+        raise Mistake(f"--video {options.video} must end in .mp4 or .gif")
+    if not 1 <= options.fps <= 100:
+        raise Mistake(f"--fps {options.fps} must be from 1 to 100")
+    env = gym.make(
+        name,
+        render_mode="rgb_array",
+        hysteresis=options.hysteresis,
+        reference=options.reference,
+        load=options.load,
+        episode_seconds=options.seconds,
+        start="rest",
+    )
+    with whole_file(options.video) as path:
+        write_film(path, _pictures(env, options), options.fps)
+    env.close()
+    print(f"wrote {options.video}")
+
+
+def _pictures(env: Any, options: Render) -> Iterator[NDArray[np.uint8]]:
+    """Run an episode under the inverse and yield its pictures."""
+    from rich.progress import track
+
+    inner = env.unwrapped
+    observation, _ = env.reset(seed=options.seed)
+    policy = InverseFeedForward(inner)
+    every = max(1, round(1.0 / (options.fps * inner.control_period)))
+    steps = round(options.seconds / inner.control_period)
+    for step in track(range(steps), description=f"filming {options.video.name}"):
+        observation, _, terminated, truncated, _ = env.step(policy(observation))
+        if step % every == 0:
+            yield env.render()
+        if terminated or truncated:
+            return
+
+
+def identify(options: Identify) -> None:
+    """Identify the shipped plants anew and write files and report."""
+    from pam_envs.identification.mas10 import identify_all
+
+    options.out.mkdir(parents=True, exist_ok=True)
+    report = identify_all(options.out, options.members, lambda line: print(line, flush=True))
+    with whole_file(options.out / "identification.md") as path:
+        path.write_text(report, encoding="utf-8")
+    print(report)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line; return the exit code."""
+    register_all()
+    chosen: Any = tyro.cli(
+        tyro.extras.subcommand_type_from_defaults(
+            {"list": List(), "render": Render(env=tyro.MISSING), "identify": Identify()},
+            descriptions={
+                "list": List.__doc__ or "",
+                "render": Render.__doc__ or "",
+                "identify": Identify.__doc__ or "",
+            },
+        ),
+        args=arguments,
+        prog="pam-envs",
+        description="Environments for the control of pneumatic artificial muscles.",
+    )
+    try:
+        if isinstance(chosen, List):
+            list_environments()
+        elif isinstance(chosen, Render):
+            render(chosen)
+        else:
+            identify(chosen)
+    except (Mistake, ValueError, OSError, ImportError) as error:
+        print(f"pam-envs: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,66 @@
+"""The command line, as a user calls it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pam_envs.__main__ import Mistake, env_id, main
+
+
+def test_list(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    assert main(["list"]) == 0
+    out = capsys.readouterr().out
+    assert "PAM/MusclePositioning-v0" in out
+    assert "pressure_set_point (Pa)" in out
+
+
+@pytest.mark.parametrize(
+    "given", ["PAM/MusclePositioning-v0", "MusclePositioning-v0", "MusclePositioning"]
+)
+def test_ids_may_be_short(given: str) -> None:
+    assert env_id(given) == "PAM/MusclePositioning-v0"
+
+
+def test_a_mistyped_id_names_the_nearest() -> None:
+    with pytest.raises(Mistake, match=r"did you mean PAM/MusclePositioning-v0\?"):
+        env_id("MusclePositionin")
+    with pytest.raises(Mistake, match="There are: PAM/"):
+        env_id("PAM/MusclePositioning-v7")
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".gif"])
+def test_a_film(tmp_path: Path, suffix: str) -> None:
+    pytest.importorskip("pygame")
+    imageio = pytest.importorskip("imageio.v2")
+    film = tmp_path / f"film{suffix}"
+    options = ["--video", str(film), "--seconds", "0.6", "--fps", "10", "--load", "4.55"]
+    assert main(["render", "MusclePositioning", *options]) == 0
+    assert list(tmp_path.iterdir()) == [film]
+    with imageio.get_reader(film) as reader:
+        pictures = [picture for picture in reader]
+    assert len(pictures) >= 5
+    assert pictures[0].shape[:2] == (600, 800)
+    assert (pictures[0] != pictures[-1]).any()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["Muscles"], "no environment named"),
+        (["MusclePositioning", "--video", "film.txt"], "must end in .mp4 or .gif"),
+        (["MusclePositioning", "--load", "99"], "from 0 to 5 kg"),
+        (["MusclePositioning", "--fps", "0"], "from 1 to 100"),
+        (["MusclePositioning", "--reference", "stairs"], "choose one of"),
+    ],
+)
+def test_mistakes_are_one_sentence(
+    options: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["render", *options]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert "Traceback" not in error
+    assert len(error.splitlines()) == 1
