@@ -63,6 +63,7 @@ check: lint types layers test ## All of the above checks
 
 images: $(READY) ## Draw the pictures of the documentation
 	$(BIN)/python -m benchmarks show MusclePositioning-v0 --controller inverse_pid --episode-seconds 40 --plot docs/images/muscle_positioning.png
+	$(BIN)/python docs/make_images.py
 
 clean: ## Remove .venv, caches and builds; results stay
 	rm -rf $(VENV) build dist .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis

@@ -1,0 +1,43 @@
+"""Draw the rendered frame of the documentation (``make images``)."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import gymnasium as gym
+import pygame
+
+import pam_envs  # noqa: F401 (registers the environments)
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from baselines.catalogue import make_controller  # noqa: E402
+
+
+def frame(path: Path, seconds: float = 21.0, seed: int = 7) -> None:
+    """Run the inverse with PID on a staircase and write the picture after ``seconds``."""
+    env = gym.make(
+        "PAM/MusclePositioning-v0",
+        render_mode="rgb_array",
+        reference="staircase",
+        load=2.55,
+        episode_seconds=60.0,
+    )
+    inner = env.unwrapped
+    controller = make_controller("inverse_pid", inner.plant, inner.signals, inner.action_signals)
+    observation, _ = env.reset(seed=seed)
+    state, start = None, True
+    for _ in range(round(seconds / inner.control_period)):
+        action, state = controller.predict(observation, state, start)
+        observation, *_ = env.step(action)
+        start = False
+    picture = pygame.surfarray.make_surface(env.render().swapaxes(0, 1))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pygame.image.save(picture, str(path))
+    env.close()
+
+
+if __name__ == "__main__":
+    frame(ROOT / "docs" / "images" / "muscle_positioning_frame.png")
