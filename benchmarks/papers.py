@@ -19,7 +19,7 @@ WIDTHS: dict[float, tuple[float, float]] = {0.0: (3.29, 3.5), 2.55: (2.82, 4.5),
 """Load [kg]: largest loop width [mm] and the pressure of it [bar] (seed 003, section 4)."""
 
 SIMULATED = 0.3
-"""Tolerance [mm] of an identified plant's loop width at the pressure of the widest measured loop."""
+"""Tolerance [mm] of an identified plant's loop width where the measured loop is widest."""
 
 
 @dataclass(frozen=True)
