@@ -331,7 +331,8 @@ def _check_table(table: Array) -> None:
         )
     weights = maps.weights_from_table(table)
     k, j = np.unravel_index(np.argmin(weights), weights.shape)
-    if weights[k, j] < SMALLEST_WEIGHT * np.max(np.abs(table)):
+    rounding = SMALLEST_WEIGHT * np.max(np.abs(table)) - np.finfo(float).tiny
+    if weights[k, j] < rounding:
         raise ValueError(
             f"the relay weight of cell ({k}, {j}) is {weights[k, j]:.3g}; it must be at least 0 or"
             " loops create energy: clip it with from_weights, or identify with fit_preisach"
