@@ -35,18 +35,22 @@ class Info(dict[str, Any]):
     ----------
     keys : tuple of str
         The keys, in order.
-    numbers : object
-        With ``tolist()``, giving one float for each key; not to be changed afterwards.
+    first : float
+        Value of the first key. It is in the dict from the start: C code that asks a dict for its
+        size before it asks for its items would otherwise take it for empty.
+    numbers : bytes
+        One double for each key.
     """
 
     __slots__ = ("_names", "_numbers")
 
-    def __init__(self, keys: tuple[str, ...], numbers: Any) -> None:
+    def __init__(self, keys: tuple[str, ...], first: float, numbers: bytes) -> None:
+        dict.__setitem__(self, keys[0], first)
         self._names = keys
         self._numbers: Any = numbers
 
     def _fill(self) -> None:
-        values, self._numbers = self._numbers.tolist(), None
+        values, self._numbers = memoryview(self._numbers).cast("d").tolist(), None
         dict.update(self, zip(self._names, values, strict=True))
 
     def __reduce__(self) -> tuple[Any, ...]:

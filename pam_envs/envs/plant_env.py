@@ -92,9 +92,10 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if compiled:
             self._held, self._arguments = held, (address_book(held),)
             self._action_cells = memoryview(self._actions.ravel())
-            self._info_cells = memoryview(self._infos[0].ravel())
+            self._reward_cell = memoryview(self._infos[0, 0])
+            self._info_cells = memoryview(self._infos[0, 1:].ravel())
             self._flag_cells = memoryview(self._flags.ravel())
-            self._observation, self._numbers = self._observations[0, 0], self._infos[0, 1:, 0]
+            self._observation = self._observations[0, 0]
         else:
             self._action_cells = self._actions[0]
 
@@ -190,13 +191,15 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _read(self) -> tuple[NDArray[np.float32], Info, float, bool, bool]:
         """Return observation, info, reward and flags of the last call."""
         if self._compiled:
-            flags = self._flag_cells
-            info = Info(self._keys, self._numbers.copy())
-            return self._observation.copy(), info, self._info_cells[0], flags[0] == 1, flags[1] == 1
-        values = np.array(self._infos[0], np.float64)[:, 0]
+            flags, cells = self._flag_cells, self._info_cells
+            info = Info(self._keys, cells[0], cells.tobytes())
+            reward = self._reward_cell[0]
+            return self._observation.copy(), info, reward, flags[0] == 1, flags[1] == 1
+        reward, *values = (float(row[0]) for row in self._infos[0])
         observation = np.array(self._observations[0][0], np.float32)
         ended = [row[0] == 1 for row in self._flags]
-        return observation, Info(self._keys, values[1:]), float(values[0]), ended[0], ended[1]
+        info = Info(self._keys, values[0], np.array(values).tobytes())
+        return observation, info, reward, ended[0], ended[1]
 
     def _draw(self, observation: NDArray[np.float32], info: Info, start: bool = False) -> None:
         """Keep what a picture needs, and show it at once in the ``human`` mode."""
