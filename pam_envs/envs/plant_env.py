@@ -193,8 +193,8 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._compiled:
             flags, cells = self._flag_cells, self._info_cells
             info = Info(self._keys, cells[0], cells.tobytes())
-            reward = self._reward_cell[0]
-            return self._observation.copy(), info, reward, flags[0] == 1, flags[1] == 1
+            given: float = self._reward_cell[0]
+            return self._observation.copy(), info, given, flags[0] == 1, flags[1] == 1
         reward, *values = (float(row[0]) for row in self._infos[0])
         observation = np.array(self._observations[0][0], np.float32)
         ended = [row[0] == 1 for row in self._flags]
