@@ -110,8 +110,12 @@ class ScenarioSet:
         return digest(self.content)
 
     def scenarios(self) -> tuple[Scenario, ...]:
-        """Return the grid, written out in the order of the file."""
-        grid = self.content.get("grid") or {}
+        """Return the grid, written out by the names of its axes.
+
+        Not in the order of the file: a record keeps its content with sorted keys, and has to give
+        the same scenarios in the same order.
+        """
+        grid = dict(sorted((self.content.get("grid") or {}).items()))
         return tuple(
             self._scenario(dict(zip(grid, values, strict=True)))
             for values in itertools.product(*grid.values())

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 
 from pam_envs.envs.registration import register_all
 from pam_envs.envs.rendering_film import write_film
+from pam_envs.parameters import Signals
+from pam_envs.plants.memory import KINDS, Kind
 
 
 @dataclass
@@ -32,10 +34,10 @@ class Render:
     env: tyro.conf.Positional[str]
     """Its id, with or without PAM/ and -v0."""
     video: Path = Path("out.mp4")
-    """Where to write; .gif works too."""
+    """Where to write."""
     seconds: float = 10.0
     """Length of the episode [s]."""
-    hysteresis: Literal["maxwell_slip", "preisach", "none"] = "maxwell_slip"
+    hysteresis: Kind = "maxwell_slip"
     """The muscle's memory."""
     reference: str = "staircase"
     """Family of references."""
@@ -45,6 +47,8 @@ class Render:
     """Seed of the episode."""
     fps: int = 25
     """Pictures a second."""
+    gif: bool = False
+    """Write a .gif instead of a .mp4 (so does --video NAME.gif)."""
 
 
 @dataclass
@@ -88,15 +92,23 @@ def list_environments() -> None:
     from rich.table import Table
 
     table = Table(title="Environments")
-    for column in ("id", "action", "observation", "control period", "memories"):
+    table.add_column("id", no_wrap=True)
+    for column in ("action", "observation", "control period", "memories"):
         table.add_column(column, overflow="fold")
     for name in env_ids():
         env: Any = gym.make(name).unwrapped
-        actions = ", ".join(f"{s.name} ({s.unit})" for s in env.action_signals)
-        signals = ", ".join(f"{s.name} ({s.unit})" for s in env.signals)
-        memories = "maxwell_slip, preisach, none"
-        table.add_row(name, actions, signals, f"{1e3 * env.control_period:g} ms", memories)
+        actions, signals = _names(env.action_signals), _names(env.signals)
+        period = f"{1e3 * env.control_period:g} ms"
+        table.add_row(name, actions, signals, period, ", ".join(KINDS))
+        env.close()
     Console().print(table)
+
+
+def _names(signals: Signals) -> str:
+    """Return names and units; of references to come (``reference_1`` and on), how many."""
+    coming = sum(s.name.startswith("reference_") for s in signals)
+    names = [f"{s.name} ({s.unit})" for s in signals if not s.name.startswith("reference_")]
+    return ", ".join([*names, f"{coming} references to come"] if coming else names)
 
 
 class InverseFeedForward:
@@ -136,8 +148,9 @@ def whole_file(path: Path) -> Iterator[Path]:
 def render(options: Render) -> None:
     """Write a film."""
     name = env_id(options.env)
-    if options.video.suffix not in (".mp4", ".gif"):
-        raise Mistake(f"--video {options.video} must end in .mp4 or .gif")
+    video = options.video.with_suffix(".gif") if options.gif else options.video
+    if video.suffix not in (".mp4", ".gif"):
+        raise Mistake(f"--video {video} must end in .mp4 or .gif")
     if not 1 <= options.fps <= 100:
         raise Mistake(f"--fps {options.fps} must be from 1 to 100")
     env = gym.make(
@@ -149,10 +162,10 @@ def render(options: Render) -> None:
         episode_seconds=options.seconds,
         start="rest",
     )
-    with whole_file(options.video) as path:
+    with whole_file(video) as path:
         write_film(path, _pictures(env, options), options.fps)
     env.close()
-    print(f"wrote {options.video}")
+    print(f"wrote {video}")
 
 
 def _pictures(env: Any, options: Render) -> Iterator[NDArray[np.uint8]]:
@@ -161,12 +174,13 @@ def _pictures(env: Any, options: Render) -> Iterator[NDArray[np.uint8]]:
 
     inner = env.unwrapped
     observation, _ = env.reset(seed=options.seed)
-    policy = InverseFeedForward(inner)
-    every = max(1, round(1.0 / (options.fps * inner.control_period)))
+    yield env.render()
+    policy, shown = InverseFeedForward(inner), 1
     steps = round(options.seconds / inner.control_period)
-    for step in track(range(steps), description=f"filming {options.video.name}"):
+    for step in track(range(1, steps + 1), description="filming"):
         observation, _, terminated, truncated, _ = env.step(policy(observation))
-        if step % every == 0:
+        if step * inner.control_period * options.fps > shown - 1e-6:
+            shown += 1
             yield env.render()
         if terminated or truncated:
             return

@@ -41,9 +41,19 @@ def test_a_film(tmp_path: Path, suffix: str) -> None:
     assert list(tmp_path.iterdir()) == [film]
     with imageio.get_reader(film) as reader:
         pictures = [picture for picture in reader]
-    assert len(pictures) >= 5
+    assert len(pictures) == 7  # the start, and one every 0.1 s
     assert pictures[0].shape[:2] == (600, 800)
     assert (pictures[0] != pictures[-1]).any()
+
+
+def test_a_film_lasts_as_long_as_the_episode(tmp_path: Path) -> None:
+    pytest.importorskip("pygame")
+    imageio = pytest.importorskip("imageio.v2")
+    film = tmp_path / "film.gif"
+    options = ["--video", str(film.with_suffix(".mp4")), "--gif", "--seconds", "1.0"]
+    assert main(["render", "MusclePositioning", *options, "--fps", "30"]) == 0
+    with imageio.get_reader(film) as reader:
+        assert len(list(reader)) == 31  # 30 a second, although that is no whole number of periods
 
 
 @pytest.mark.parametrize(

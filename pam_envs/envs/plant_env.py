@@ -45,7 +45,7 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     numbers are a function of seed, episode, stream and draw; ``np_random`` is never drawn from.
     """
 
-    metadata = {"render_modes": ["rgb_array", "human"], "render_fps": 50}
+    metadata = {"render_modes": ["rgb_array", "human"], "render_fps": 100}
 
     def __init__(self, setup: Setup) -> None:
         self.setup = setup
@@ -218,6 +218,9 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             return None
         if self._steps < 0:
             raise gym.error.ResetNeeded("call reset() before render()")
+        if self._renderer is None:  # a copy, or closed in between: the past is not known
+            observation, info, *_ = self._read()
+            self._draw(observation, info, start=True)
         if self.render_mode == "human":
             return None
         picture: NDArray[np.uint8] = self._renderer.picture()
@@ -234,6 +237,7 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         seed = -1 if self._seed is None else self._seed
         return {
             **saved(self._all),
+            "infos": np.array(self._infos, np.float64),
             "steps": np.array(self._steps),
             "seed": np.frombuffer(str(seed).encode(), np.uint8).copy(),
         }
@@ -250,6 +254,9 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         for to, name in zip(self._all, STATE_KEYS, strict=True):
             for i, value in enumerate(np.asarray(state[name])[0].tolist()):
                 to[0][i][0] = value[0]
+        if "infos" in state:  # the last report, for a picture of the present
+            for k, row in enumerate(np.asarray(state["infos"])[0].tolist()):
+                self._infos[0][k][0] = row[0]
         self._steps = int(state["steps"])
         seed = int(np.asarray(state["seed"], np.uint8).tobytes().decode())
         self._seed = None if seed < 0 else seed

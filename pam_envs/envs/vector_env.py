@@ -51,7 +51,7 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
 
     metadata = {
         "render_modes": ["rgb_array"],
-        "render_fps": 50,
+        "render_fps": 100,
         "autoreset_mode": AutoresetMode.SAME_STEP,
     }
 

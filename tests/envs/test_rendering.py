@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+import os
+import subprocess
+import sys
 import warnings
 
 import gymnasium as gym
@@ -59,6 +63,60 @@ def test_the_window(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @EVERY
+def test_the_close_button_closes_for_good(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    import pygame
+
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    env = gym.make(name, render_mode="human")
+    env.reset(seed=0)
+    assert pygame.display.get_surface().get_size() == (800, 600)
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    for _ in range(4):  # the episode goes on, unseen
+        _, _, terminated, _, _ = env.step(env.action_space.high)
+        assert not terminated
+        assert not pygame.display.get_init()
+    env.close()
+
+
+HEADLESS = """
+import os, sys
+import gymnasium as gym
+import pam_envs
+assert "pygame" not in sys.modules
+before = dict(os.environ)
+env = gym.make(sys.argv[1], render_mode="rgb_array")
+env.reset(seed=0)
+assert env.render().shape == (600, 800, 3)
+import pygame
+assert not pygame.display.get_init()
+assert dict(os.environ) == before
+"""
+
+
+@EVERY
+def test_pictures_need_no_display_and_leave_the_environment_variables_alone(name: str) -> None:
+    variables = {k: v for k, v in os.environ.items() if not k.startswith("SDL_")}
+    variables["DISPLAY"] = ":none"  # a display that cannot be opened
+    subprocess.run([sys.executable, "-c", HEADLESS, name], env=variables, check=True)
+
+
+@EVERY
+@pytest.mark.parametrize("load", [0.0, 0.3, 5.0])
+def test_every_load_can_be_drawn(name: str, load: float) -> None:
+    pictures = []
+    for action in (-1.0, 1.0):
+        env = gym.make(name, render_mode="rgb_array", load=load)
+        env.reset(seed=1)
+        for _ in range(100):
+            _, _, terminated, _, info = env.step(np.array([2 * action], np.float32))
+            assert not terminated
+        assert info["saturated"] == 1.0
+        pictures.append(env.render())
+        env.close()
+    assert (pictures[0][60:, :320] != pictures[1][60:, :320]).any(axis=2).sum() > 5000
+
+
+@EVERY
 def test_the_checker_with_rendering(name: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -74,3 +132,16 @@ def test_rendering_without_a_mode_warns_and_before_the_reset_says_so(name: str) 
     env = gym.make(name, render_mode="rgb_array").unwrapped
     with pytest.raises(gym.error.ResetNeeded):
         env.render()
+
+
+@EVERY
+def test_a_copy_and_a_closed_environment_draw_the_present(name: str) -> None:
+    env = gym.make(name, render_mode="rgb_array").unwrapped
+    env.reset(seed=0)
+    for action in actions_for(env.action_space, 80):
+        env.step(action)
+    twin = copy.deepcopy(env)
+    picture = twin.render()
+    assert np.array_equal(picture[:, :280], env.render()[:, :280])  # the muscle as it is now
+    env.close()
+    assert np.array_equal(env.render(), picture)

@@ -1,0 +1,247 @@
+"""The harness: scores, checkpoints that survive, rows that can be trusted."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from benchmarks import leaderboard, metrics, rows, statistics, verify
+from benchmarks.controllers import find
+from benchmarks.runner import Options, Report, run
+from benchmarks.scenarios import ScenarioSet
+from benchmarks.store import Store, comparable, read_record, seal, write_record
+
+ROOT = Path(__file__).resolve().parents[2]
+NAMES = ("low", "middle", "integral")
+
+
+def options(folder: Path, **changes: Any) -> Options:
+    return Options(**{"jobs": 1, "out": folder / "out", "cells": folder / "cells", **changes})
+
+
+def score(track: ScenarioSet, folder: Path, *names: str, **changes: Any) -> Report:
+    return run([(find(n), track) for n in names or NAMES], options(folder, **changes))
+
+
+def lasting(path: Path) -> dict[str, Any]:
+    return comparable(read_record(path))
+
+
+def test_rows_hold_what_runs_them_again_and_do_not_depend_on_the_run(
+    track: ScenarioSet, folder: Path
+) -> None:
+    first = score(track, folder)
+    assert not first.missing
+    assert first.computed == len(NAMES) * 2
+    row = lasting(first.rows[0])
+    assert row["scenarios"]["digest"] == track.digest
+    assert row["seeds"] == [1, 2, 3]
+    assert len(row["episodes"]) == 6
+    before = {p.name: lasting(p) for p in first.rows}
+    again = score(track, folder)
+    assert (again.computed, again.found) == (0, first.computed)
+    parallel = score(track, folder / "other", jobs=2)
+    assert {p.name: lasting(p) for p in parallel.rows} == before
+
+
+def test_a_refused_action_counts_at_the_worst_case_and_is_not_dropped(
+    track: ScenarioSet, folder: Path
+) -> None:
+    (path,) = score(track, folder, "refused").rows
+    row = lasting(path)
+    assert row["failures"] == len(row["episodes"]) == 6
+    worst = track.content["worst_case"]["rms_error"]
+    assert row["aggregate"]["rms_error"]["mean"] == pytest.approx(worst)
+    text = leaderboard.board_text([row])
+    assert "6 of 6" in text
+
+
+def test_a_corrupt_cell_is_set_aside_and_computed_again(track: ScenarioSet, folder: Path) -> None:
+    (path,) = score(track, folder, "low").rows
+    before = lasting(path)
+    cells = sorted((folder / "cells").glob("*.json"))
+    cells[0].write_text(cells[0].read_text()[:200])
+    content = json.loads(cells[1].read_text())
+    content["episodes"] = []
+    cells[1].write_text(json.dumps(content))
+    report = score(track, folder, "low")
+    assert report.computed == 2
+    assert len(report.quarantined) == 2
+    assert lasting(report.rows[0]) == before
+
+
+def test_a_killed_worker_costs_its_cell_and_nothing_else(
+    track: ScenarioSet, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BENCH_FAKES_MARK", str(folder / "mark"))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(Path(__file__).parent)]))
+    report = score(track, folder, "killer", jobs=2)
+    assert (folder / "mark").exists()
+    assert not report.missing
+    assert len(report.rows) == 1
+
+
+_WRITER = """
+import sys
+from pathlib import Path
+from benchmarks.store import write_record
+path = Path(sys.argv[1])
+for k in range(10**9):
+    write_record(path, {"k": k, "filling": list(range(3000))})
+"""
+
+
+def test_no_kill_leaves_half_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "record.json"
+    random = np.random.default_rng(0)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    for _ in range(8):
+        writer = subprocess.Popen([sys.executable, "-c", _WRITER, str(path)], env=environment)
+        while not path.exists():
+            time.sleep(0.01)
+        time.sleep(random.uniform(0.0, 0.05))
+        writer.send_signal(signal.SIGKILL)
+        writer.wait()
+        assert len(read_record(path)["filling"]) == 3000
+    Store(tmp_path).sweep()
+    assert list(tmp_path.iterdir()) == [path]
+
+
+_RUNNER = """
+import sys
+from pathlib import Path
+import yaml
+from benchmarks import controllers, scenarios
+from benchmarks.controllers import find
+from benchmarks.runner import Options, run
+controllers.SOURCES = (("bench_fakes", "bench_fakes", "classical"),)
+folder = Path(sys.argv[1])
+track = scenarios.load(folder / "short.yaml")
+options = Options(jobs=1, out=folder / "out", cells=folder / "cells")
+run([(find(n), track) for n in ("low", "middle", "integral")], options)
+"""
+
+
+def test_an_interrupted_run_goes_on_and_gives_the_rows_of_one_that_was_not(
+    track: ScenarioSet, folder: Path
+) -> None:
+    whole = {p.name: lasting(p) for p in score(track, folder / "whole").rows}
+    paths = os.pathsep.join([str(ROOT), str(Path(__file__).parent)])
+    environment = {**os.environ, "PYTHONPATH": paths}
+    for _ in range(3):
+        command = [sys.executable, "-c", _RUNNER, str(folder)]
+        runner = subprocess.Popen(command, env=environment)
+        cells = folder / "cells"
+        have = len(list(cells.glob("*.json"))) if cells.exists() else 0
+        begin = time.monotonic()
+        while runner.poll() is None and time.monotonic() - begin < 60:
+            if cells.exists() and len(list(cells.glob("*.json"))) > have:
+                break
+            time.sleep(0.005)
+        runner.kill()
+        runner.wait()
+    assert len(list(cells.glob("*.json"))) > 0
+    report = score(track, folder)
+    assert {p.name: lasting(p) for p in report.rows} == whole
+
+
+def test_verify_holds_for_an_honest_row(track: ScenarioSet, folder: Path) -> None:
+    for path in score(track, folder, "integral", "learned").rows:
+        verdict = verify.verify(path, folder=folder)
+        assert verdict.holds, verdict.drifted
+
+
+def forge(row: dict[str, Any], kind: str) -> None:
+    if kind == "an altered score":
+        row["aggregate"]["rms_error"]["mean"] *= 0.9
+    if kind == "an altered episode":
+        row["episodes"][0]["scores"]["rms_error"] *= 0.9
+    if kind == "a dropped episode":
+        row["episodes"].pop()
+    if kind == "an altered scenario":
+        row["scenarios"]["content"]["settle_seconds"] = 1.0
+    if kind == "another plant":
+        row["plants"] = {k: "0" * 16 for k in row["plants"]}
+    if kind == "another controller":
+        row["controller"]["name"] = "middle"
+    if kind == "another version":
+        row["env"] = json.loads(json.dumps(row["env"]).replace("v0", "v1").replace('": 0', '": 1'))
+
+
+FORGERIES = (
+    "an altered score",
+    "an altered episode",
+    "a dropped episode",
+    "an altered scenario",
+    "another plant",
+    "another controller",
+    "another version",
+)
+
+
+@pytest.mark.parametrize("kind", FORGERIES)
+def test_verify_finds_a_forgery(kind: str, track: ScenarioSet, folder: Path) -> None:
+    (path,) = score(track, folder, "integral").rows
+    row = read_record(path)
+    genuine = json.dumps(row, sort_keys=True)
+    forge(row, kind)
+    assert json.dumps(row, sort_keys=True) != genuine
+    write_record(path, row)  # sealed anew: the checksum alone would not tell
+    assert not verify.verify(path, folder=folder).holds
+
+
+def test_a_row_edited_by_hand_fails_its_checksum(track: ScenarioSet, folder: Path) -> None:
+    (path,) = score(track, folder, "low").rows
+    row = json.loads(path.read_text())
+    row["row"] = "better"
+    path.write_text(json.dumps(row))
+    with pytest.raises(ValueError, match="checksum"):
+        rows.load(path)
+    assert not verify.verify(path, folder=folder).holds
+
+
+def test_the_board_is_a_function_of_the_rows(track: ScenarioSet, folder: Path) -> None:
+    score(track, folder)
+    text = leaderboard.board_text(rows.load_all(folder / "out"))
+    loaded = rows.load_all(folder / "out")
+    for row in loaded:
+        row["volatile"] = {"host": "elsewhere", "seconds": 1e9}
+    assert leaderboard.board_text(loaded[::-1]) == text
+    assert [text.index(f"`{n}`") for n in ("integral", "middle")] == sorted(
+        text.index(f"`{n}`") for n in ("integral", "middle")
+    )
+
+
+def test_statistics_against_known_answers() -> None:
+    random = np.random.default_rng(0)
+    sample = random.normal(3.0, 1.0, 400)
+    strata = np.zeros(400, int)
+    found = statistics.bootstrap(sample, strata)
+    exact = stats.t.interval(0.95, 399, sample.mean(), stats.sem(sample))
+    assert found.value == pytest.approx(sample.mean())
+    assert (found.low, found.high) == pytest.approx(exact, abs=0.02)
+    assert statistics.bootstrap(sample, strata) == found
+    means = [statistics.interquartile_mean(np.atleast_2d(sample))[0], stats.trim_mean(sample, 0.25)]
+    assert means[0] == pytest.approx(means[1])
+    # strata of their own level: the interval is that of the scatter within them
+    levels = np.repeat([0.0, 100.0], 200)
+    split = statistics.bootstrap(sample + levels, np.repeat([0, 1], 200))
+    assert split.high - split.low < 0.3
+
+
+def test_metrics_against_known_answers() -> None:
+    t = 0.01 * np.arange(1000)
+    error = 2e-3 * np.sin(2 * np.pi * t)
+    assert metrics.rms(error) == pytest.approx(2e-3 / np.sqrt(2), rel=1e-3)
+    assert metrics.percentile_95(error) == pytest.approx(2e-3 * np.sin(0.475 * np.pi), rel=1e-2)
+    assert seal({"a": 1.0})["checksum"] != seal({"a": 1.0000001})["checksum"]
