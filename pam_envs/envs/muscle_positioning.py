@@ -56,6 +56,9 @@ LOADS = (0.0, 2.55, 4.55)
 REFERENCE_RANGE = (0.001, 0.013)
 """Contractions [m] between which references are drawn: within reach of every measured load."""
 HIGHEST_LOAD = 5.0
+_NOT_DRAWN = ("mass.load", "regulator.max_pressure", "muscle.diameter", "muscle.braid_angle")
+DRAWN = tuple(name for name in R.PARAMETERS if name not in _NOT_DRAWN)
+"""Parameters that ``randomize`` may draw: the others scale the action or enter derived numbers."""
 
 
 @lru_cache(maxsize=8)
@@ -90,7 +93,11 @@ def _loads(load: Any) -> NDArray[np.float64]:
     values = LOADS if load is None else load
     if isinstance(values, (int, float, np.integer, np.floating)):
         values = (values,)
-    if not isinstance(values, (Sequence, np.ndarray)) or isinstance(values, str) or not values:
+    if (
+        not isinstance(values, (Sequence, np.ndarray))
+        or isinstance(values, str)
+        or len(values) == 0
+    ):
         raise ValueError(f"load = {load!r} must be a number of kg, several of them, or None")
     return np.array([check_number("load", v, 0.0, HIGHEST_LOAD, "kg") for v in values])
 
@@ -137,10 +144,10 @@ def _spread(plant: SingleMuscle, randomize: Any) -> NDArray[np.float64]:
         )
     table = []
     for name, span in ranges.items():
-        if name not in R.PARAMETERS or name == "mass.load":
+        if name not in DRAWN:
             raise ValueError(
                 f"randomize: {name!r} is not a parameter that can be drawn; there are: "
-                + ", ".join(p for p in R.PARAMETERS if p != "mass.load")
+                + ", ".join(DRAWN)
             )
         if not isinstance(span, (Sequence, np.ndarray)) or len(span) != 2 or isinstance(span, str):
             raise ValueError(f"randomize: {name} needs (low, high), got {span!r}")

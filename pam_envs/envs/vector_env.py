@@ -92,6 +92,8 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
                     f"reset_mask has shape {mask.shape} and type {mask.dtype}, expected "
                     f"({self.num_envs},) of bool"
                 )
+        if not self._seeded and not mask.all():
+            raise ValueError("the first reset must reset every row; leave reset_mask out")
         self._seed_rows(self._seeds(seed), mask)
         outputs = self._outputs()
         observations, infos, flags = outputs
@@ -171,7 +173,7 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
         outputs = self._outputs()
         observations, reports, flags = outputs
         self._call(actions, outputs, STEP_AND_RESTART)
-        self._last_observation = observations[0]
+        self._last_observation = observations[0].copy()
         infos = self._infos(reports[0])
         ended = flags[0] | flags[1]
         if ended.any():

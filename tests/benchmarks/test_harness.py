@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from joblib.externals.loky import get_reusable_executor
 from scipy import stats
 
 from benchmarks import leaderboard, metrics, rows, statistics, verify
@@ -85,7 +86,9 @@ def test_a_killed_worker_costs_its_cell_and_nothing_else(
 ) -> None:
     monkeypatch.setenv("BENCH_FAKES_MARK", str(folder / "mark"))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(Path(__file__).parent)]))
+    get_reusable_executor().shutdown(wait=True)  # workers of other tests have another environment
     report = score(track, folder, "killer", jobs=2)
+    get_reusable_executor().shutdown(wait=True)
     assert (folder / "mark").exists()
     assert not report.missing
     assert len(report.rows) == 1

@@ -143,6 +143,10 @@ def test_bad_batches_change_nothing(name: str) -> None:
         ({"randomize": 3}, "randomize = 3"),
         ({"randomize": {"mass.colour": (1, 2)}}, "'mass.colour' is not a parameter"),
         ({"randomize": {"mass.damping": (300, 100)}}, "swap them"),
+        (
+            {"randomize": {"regulator.max_pressure": (3e5, 3e5)}},
+            "not a parameter that can be drawn",
+        ),
         ({"randomize": {"mass.damping": 100}}, r"needs \(low, high\)"),
         ({"randomize": {"mass.damping": (1, 1e9)}}, "outside its bounds"),
         ({"randomize": {"mass.moving_mass": (0.05, 0.2)}}, "use at least"),
