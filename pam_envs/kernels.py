@@ -33,6 +33,9 @@ COMPILED: bool = os.environ.get("PAM_ENVS_COMPILE", "1").lower() not in {"0", "f
 LANES = 32
 """Environments that one tile of a batch advances together."""
 
+WITHOUT_KERNELS = ("data", "diagnosis", "__main__.py")
+"""Parts of the package that compiled code does not depend on."""
+
 _MASK = 0xFFFFFFFF
 prange = range
 
@@ -167,10 +170,15 @@ def rebind(
 
 @lru_cache(maxsize=1)
 def source_digest() -> str:
-    """Return a digest of the package's sources: what compiled code on disk is valid for."""
+    """Return a digest of the package's sources: what compiled code on disk is valid for.
+
+    The folders that hold no kernels are left out.
+    """
     root = Path(__file__).parent
     digest = hashlib.sha256()
     for path in sorted(root.rglob("*.py")):
+        if path.relative_to(root).parts[0] in WITHOUT_KERNELS:
+            continue
         digest.update(str(path.relative_to(root)).encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]

@@ -292,6 +292,7 @@ def make_setup(
             high,
         ]
     )
+    kernels = K.kernels_for(made.memory.kind, made.extended)
     members = made.members() if randomize is not False else (made,)
     counts = (len(loads), len(spread), len(members))
     choices = (made.substeps, made.elements, preview, stride, family, sines_needed(family))
@@ -299,8 +300,8 @@ def make_setup(
         plant=made,
         signals=signals,
         action_signals=actions,
-        kernels=K.KERNELS[made.memory.kind],
-        rows=K.KERNELS[made.memory.kind].n_rows,
+        kernels=kernels,
+        rows=kernels.n_rows,
         fixed=R.N_PARAMETERS,
         drawn=randomize is not False,
         counts=K.N_COUNTS,

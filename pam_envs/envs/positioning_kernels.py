@@ -25,12 +25,17 @@ from pam_envs.kernels import (
 )
 from pam_envs.muscle.effective_area import volume
 from pam_envs.plants import single_muscle_rows as R
+from pam_envs.plants.single_muscle_effects import replacements
 from pam_envs.plants.single_muscle_kernels import (
     MEMORIES,
     MEMORY_ROWS,
     N_WORK,
     advance,
+    begin_effects,
     rest_contraction,
+    seen_position,
+    seen_pressure,
+    true_position,
 )
 from pam_envs.plants.single_muscle_rows import N_PARAMETERS
 from pam_envs.references.trajectory import ROWS as REFERENCE_ROWS
@@ -210,12 +215,12 @@ def evaluate(
 ) -> None:
     """Write what can be observed and reported of a tile into ``work``."""
     step, key_a, key_b = counts[R.STEP], counts[R.KEY_A], counts[R.KEY_B]
-    x, rest, velocity = rows[R.CONTRACTION], rows[R.REST], rows[R.VELOCITY]
-    pressure, set_point, older = rows[R.PRESSURE], rows[R.SET_POINT], rows[R.OLD_SET_POINT]
+    velocity, pressure = rows[R.VELOCITY], rows[R.PRESSURE]
+    set_point, older = rows[R.SET_POINT], rows[R.OLD_SET_POINT]
     period, stride = config[PERIOD], choices[STRIDE]
     for j in range(LANES):
         work[TIME][j] = step[j] * period
-        contraction = x[j] - rest[j]
+        contraction = true_position(rows, j)
         work[OUTPUT][j] = contraction
         work[S_CONTRACTION][j] = contraction
         work[S_VELOCITY][j] = velocity[j]
@@ -223,14 +228,14 @@ def evaluate(
         work[S_DRIVE][j] = rows[R.DRIVE][j]
         work[S_LOAD][j] = rows[R.LOAD][j]
         work[SENSOR_X][j] = read_sensor(
-            contraction,
+            seen_position(rows, j),
             fixed[R.POSITION_NOISE][j],
             fixed[R.POSITION_RESOLUTION][j],
             fixed[R.POSITION_BIAS][j],
             normal(key_a[j], key_b[j], NOISE_X, step[j]),
         )
         work[SENSOR_P][j] = read_sensor(
-            pressure[j],
+            seen_pressure(rows, j),
             fixed[R.PRESSURE_NOISE][j],
             fixed[R.PRESSURE_RESOLUTION][j],
             fixed[R.PRESSURE_BIAS][j],
@@ -314,6 +319,7 @@ def reset_lane(
     rows[R.VELOCITY][j] = 0.0
     rows[R.OLD_PRESSURE][j] = begin
     rows[R.OLD_AIR][j] = air_in_muscle(rows, fixed, j)
+    begin_effects(rows, fixed, j)
     work[SATURATED][j] = 0.0
     if choices[FAMILY] != SAMPLES:
         draw_reference(
@@ -513,21 +519,28 @@ def step_by_address(book: Any, mode: int) -> None:
 
 
 class Kernels:
-    """The functions for one kind of memory, built when first asked for."""
+    """The functions for one kind of memory, plain or with effects, built when first asked for."""
 
-    def __init__(self, kind: str) -> None:
-        self.kind = kind
-        self.n_rows = MEMORY + MEMORY_ROWS[kind]
+    def __init__(self, kind: str, extended: bool = False) -> None:
+        self.kind, self.extended = kind, extended
+        self.n_rows = MEMORY + MEMORY_ROWS[kind] + (R.N_EFFECTS if extended else 0)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle by the kind: compiled code is not copied."""
-        return kernels_for, (self.kind,)
+        return kernels_for, (self.kind, self.extended)
 
     def _names(self, lanes: int) -> dict[str, Any]:
-        return {"remember": MEMORIES[self.kind], "N_ROWS": self.n_rows, "LANES": lanes}
+        names = {"remember": MEMORIES[self.kind], "N_ROWS": self.n_rows, "LANES": lanes}
+        if self.extended:
+            names |= replacements(self.kind, MEMORY + MEMORY_ROWS[self.kind])
+        return names
+
+    @property
+    def _suffix(self) -> str:
+        return self.kind + ("_extended" if self.extended else "")
 
     def _build(self, name: str, lanes: int, parallel: bool = False) -> Callable[..., Any]:
-        return build(step_tiles, f"{name}_{self.kind}", parallel, **self._names(lanes))
+        return build(step_tiles, f"{name}_{self._suffix}", parallel, **self._names(lanes))
 
     @cached_property
     def interpreted(self) -> Callable[..., Any]:
@@ -537,7 +550,7 @@ class Kernels:
     @cached_property
     def single(self) -> Callable[..., Any]:
         """One environment, by an address book of the arrays."""
-        return build(step_by_address, f"single_{self.kind}", **self._names(1))
+        return build(step_by_address, f"single_{self._suffix}", **self._names(1))
 
     @cached_property
     def batch(self) -> Callable[..., Any]:
@@ -550,9 +563,11 @@ class Kernels:
         return self._build("parallel", LANES, parallel=True)
 
 
-KERNELS = {kind: Kernels(kind) for kind in MEMORIES}
+KERNELS = {
+    (kind, extended): Kernels(kind, extended) for kind in MEMORIES for extended in (False, True)
+}
 
 
-def kernels_for(kind: str) -> Kernels:
-    """Return the kernels for a kind of memory."""
-    return KERNELS[kind]
+def kernels_for(kind: str, extended: bool = False) -> Kernels:
+    """Return the kernels for a kind of memory, plain or with effects."""
+    return KERNELS[kind, extended]

@@ -42,6 +42,27 @@ class HangingMass:
         "damping ratio 0.3 to 0.4 at 4.55 kg; published values for larger muscles are higher",
         spread=(120.0, 450.0),
     )
+    # effects, neutral unless a recording shows them
+    carried: float = parameter(
+        1.0, "1", 0.0, 1.0, "assumed", "share of the load that is accelerated", neutral=1.0
+    )
+    load_error: float = parameter(
+        0.0, "kg", -5.0, 5.0, "assumed", "what hangs beside a load that is told", neutral=0.0
+    )
+    slack: float = parameter(
+        0.0, "m", 0.0, 0.02, "assumed", "contraction before the wire is tight", neutral=0.0
+    )
+    stick: float = parameter(
+        0.0, "N", 0.0, 200.0, "assumed", "force at which the guide breaks away", neutral=0.0
+    )
+    stick_kinetic: float = parameter(
+        0.5, "1", -1.0, 1.0, "assumed", "where it sticks again, over where it broke away"
+    )
+    ring_share: float = parameter(
+        0.0, "1", 0.0, 1.0, "assumed", "share of the motion behind a soft mount", neutral=0.0
+    )
+    ring_frequency: float = parameter(7.0, "Hz", 0.5, 20.0, "assumed", "of the mount")
+    ring_damping: float = parameter(0.1, "1", 0.005, 2.0, "assumed", "damping ratio of the mount")
 
 
 @kernel
@@ -63,6 +84,27 @@ def oscillator(phase: float) -> tuple[float, float]:
     s = s * z + 1.0 / 120.0
     s = s * z - 1.0 / 6.0
     s = s * z + 1.0
+    return 2.0 * c * c - 1.0, s * c
+
+
+@kernel
+def oscillator_wide(phase: float) -> tuple[float, float]:
+    """Return the same as :func:`oscillator` for phases up to 256, for long steps."""
+    z = 0.015625 * phase
+    c = z * (1.0 / 479001600.0) - 1.0 / 3628800.0
+    c = c * z + 1.0 / 40320.0
+    c = c * z - 1.0 / 720.0
+    c = c * z + 1.0 / 24.0
+    c = c * z - 0.5
+    c = c * z + 1.0
+    s = z * (1.0 / 6227020800.0) - 1.0 / 39916800.0
+    s = s * z + 1.0 / 362880.0
+    s = s * z - 1.0 / 5040.0
+    s = s * z + 1.0 / 120.0
+    s = s * z - 1.0 / 6.0
+    s = s * z + 1.0
+    s, c = s * c, 2.0 * c * c - 1.0
+    s, c = s * c, 2.0 * c * c - 1.0
     return 2.0 * c * c - 1.0, s * c
 
 

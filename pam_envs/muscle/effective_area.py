@@ -41,12 +41,67 @@ class EffectiveAreaMuscle:
     braid_force: float = parameter(106.0, "N", 0.0, 5e3, "identified", _FIT)
     braid_strain: float = parameter(0.0167, "1", 0.005, 0.2, "identified", _FIT)
     stiffness: float = parameter(2250.0, "N", 0.0, 1e5, "identified", _FIT)
-    hardening: float = parameter(8600.0, "N", 0.0, 1e7, "identified", _FIT)
+    hardening: float = parameter(8600.0, "N", -1e7, 1e7, "identified", _FIT)
+    # a static map that has to be finer; neutral in the plain law
+    area_curve: float = parameter(
+        0.0, "1", -60.0, 60.0, "assumed", "the area shrinks with strain squared too", neutral=0.0
+    )
+    softening: float = parameter(
+        0.0, "N", -1e6, 1e6, "assumed", "passive force over strain squared", neutral=0.0
+    )
+    stiffening: float = parameter(
+        0.0, "N", -1e8, 1e8, "assumed", "passive force over strain to the fourth", neutral=0.0
+    )
+    # effects, neutral unless a recording shows them
+    temperature: float = parameter(
+        293.15, "K", 230.0, 400.0, "assumed", "of the muscle; the law is that of 293.15 K"
+    )
+    temperature_gain: float = parameter(
+        0.0, "1/K", -0.05, 0.05, "assumed", "effective pressure gained per kelvin", neutral=0.0
+    )
+    load_curve: float = parameter(
+        0.0, "Pa/N2", -200.0, 200.0, "assumed", "pressure shift over load squared", neutral=0.0
+    )
+    load_stiffening: float = parameter(
+        0.0, "1/N", -0.015, 0.05, "assumed", "stiffness gained per newton of load", neutral=0.0
+    )
+    load_stiffening_2: float = parameter(
+        0.0, "1/N2", -2e-4, 1e-3, "assumed", "the same by load squared", neutral=0.0
+    )
+    creep_1: float = parameter(
+        0.0, "1", -0.5, 2.0, "assumed", "length that follows at memory.creep_time_1", neutral=0.0
+    )
+    creep_2: float = parameter(
+        0.0, "1", -0.5, 2.0, "assumed", "length that follows at memory.creep_time_2", neutral=0.0
+    )
+    creep_3: float = parameter(
+        0.0, "1", -0.5, 2.0, "assumed", "length that follows at memory.creep_time_3", neutral=0.0
+    )
+    creep_4: float = parameter(
+        0.0, "1", -0.5, 2.0, "assumed", "length that follows at memory.creep_time_4", neutral=0.0
+    )
+    strand_friction: float = parameter(
+        0.0, "N", 0.0, 200.0, "assumed", "friction between strands, driven by length", neutral=0.0
+    )
+    strand_break: float = parameter(
+        0.02, "1", 0.001, 0.3, "assumed", "strain at which the last strand slips"
+    )
+    viscosity: float = parameter(
+        0.0, "N s/m", 0.0, 1e5, "assumed", "damping at small speed beside the mass's", neutral=0.0
+    )
+    viscosity_speed: float = parameter(
+        0.02, "m/s", 1e-4, 10.0, "assumed", "speed at which that damping has fallen by 1 / sqrt(2)"
+    )
 
     def tension(self, drive: ArrayLike, strain: ArrayLike) -> NDArray[np.float64]:
         """Return the force [N] at effective pressure ``drive`` [Pa] and ``strain`` [1]."""
         w, e = np.asarray(drive, float), np.asarray(strain, float)
-        return self.area * (1.0 - self.area_taper * e) * w - self.passive(e)
+        return self.area_at(e) * w - self.passive(e)
+
+    def area_at(self, strain: ArrayLike) -> NDArray[np.float64]:
+        """Return the effective area [m2] at a strain."""
+        e = np.asarray(strain, float)
+        return np.asarray(self.area * (1.0 - self.area_taper * e - self.area_curve * e**2))
 
     def passive(self, strain: ArrayLike) -> NDArray[np.float64]:
         """Return the force [N] with which tube and braid resist contraction."""
@@ -54,15 +109,15 @@ class EffectiveAreaMuscle:
         return np.asarray(
             self.braid_force * -np.expm1(-e / self.braid_strain)
             + self.stiffness * e
+            + self.softening * e**2
             + self.hardening * e**3
+            + self.stiffening * e**4
         )
 
     def drive(self, force: ArrayLike, strain: ArrayLike) -> NDArray[np.float64]:
         """Return the effective pressure [Pa] that gives ``force`` [N] at ``strain`` [1]."""
         e = np.asarray(strain, float)
-        return (np.asarray(force, float) + self.passive(e)) / (
-            self.area * (1.0 - self.area_taper * e)
-        )
+        return (np.asarray(force, float) + self.passive(e)) / self.area_at(e)
 
     def volume(self, strain: ArrayLike) -> NDArray[np.float64]:
         """Return the inner volume [m3] of an ideal braid of inextensible threads."""
@@ -117,3 +172,20 @@ def volume(strain: float, rest_length: float, tall: float, cosine: float) -> flo
     """Return the inner volume [m3]; ``tall`` is pi D^2 / (4 sin^2 angle), ``cosine`` its cosine."""
     ratio = (1.0 - strain) * cosine
     return tall * rest_length * (1.0 - strain) * (1.0 - ratio * ratio)
+
+
+@kernel
+def fine_tension(
+    drive: float, strain: float, area: float, curve: float, k2: float, k4: float
+) -> float:
+    """Return what the finer terms of the static map add to the force [N]."""
+    e2 = strain * strain
+    return -(area * curve * drive + k2 + k4 * e2) * e2
+
+
+@kernel
+def fine_slope(
+    drive: float, strain: float, area: float, curve: float, k2: float, k4: float
+) -> float:
+    """Return minus the derivative of :func:`fine_tension` with respect to strain [N]."""
+    return 2.0 * (area * curve * drive + k2 + 2.0 * k4 * strain * strain) * strain

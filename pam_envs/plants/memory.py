@@ -45,6 +45,38 @@ class Memory:
         "load-dependent loop width; least squares on seed 003, Tables 3-5",
         neutral=0.0,
     )
+    # effects, neutral unless a recording shows them
+    shape: float = parameter(
+        0.0, "1", -3.0, 1.0, "assumed", "friction missing in inner loops", neutral=0.0
+    )
+    creep_1: float = parameter(
+        0.0, "1", -0.5, 2.0, "assumed", "first Kelvin-Voigt compliance", neutral=0.0
+    )
+    creep_2: float = parameter(
+        0.0, "1", -0.5, 2.0, "assumed", "second Kelvin-Voigt compliance", neutral=0.0
+    )
+    creep_3: float = parameter(
+        0.0, "1", -0.5, 2.0, "assumed", "third Kelvin-Voigt compliance", neutral=0.0
+    )
+    creep_4: float = parameter(
+        0.0, "1", -0.5, 2.0, "assumed", "fourth Kelvin-Voigt compliance", neutral=0.0
+    )
+    creep_time_1: float = parameter(0.4, "s", 0.02, 1e4, "assumed", "its time constant")
+    creep_time_2: float = parameter(2.5, "s", 0.02, 1e4, "assumed", "its time constant")
+    creep_time_3: float = parameter(15.0, "s", 0.02, 1e4, "assumed", "its time constant")
+    creep_time_4: float = parameter(90.0, "s", 0.02, 1e4, "assumed", "its time constant")
+    first_width: float = parameter(
+        0.0, "1", -1.0, 10.0, "assumed", "extra loop width of the first travel", neutral=0.0
+    )
+    first_loss: float = parameter(
+        0.0, "1", -0.9, 0.9, "assumed", "effective pressure missing at first", neutral=0.0
+    )
+    first_travel: float = parameter(
+        2e6, "Pa", 1e4, 1e9, "assumed", "pressure travel in which the first state fades"
+    )
+    threshold: float = parameter(
+        0.0, "Pa", 0.0, 3e5, "assumed", "pressure before the tube meets the braid", neutral=0.0
+    )
 
     @property
     def kind(self) -> Kind:

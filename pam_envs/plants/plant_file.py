@@ -27,7 +27,7 @@ import yaml
 
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
-from pam_envs.parameters import PROVENANCES, declarations
+from pam_envs.parameters import PROVENANCES, Declaration, declarations
 
 if TYPE_CHECKING:
     from pam_envs.plants.single_muscle import SingleMuscle
@@ -35,6 +35,48 @@ if TYPE_CHECKING:
 COMPONENTS = ("regulator", "memory", "muscle", "mass", "position", "pressure")
 KEYS = ("schema", "family", "substeps", "parameters", "memory", "ensemble", "notes")
 ENTRY_KEYS = ("value", "unit", "provenance", "source")
+_CREEP_TIMES = tuple(f"memory.creep_time_{k}" for k in (1, 2, 3, 4))
+EFFECTS: tuple[tuple[str, ...], ...] = (
+    ("regulator.gain",),
+    ("regulator.dead_band", "regulator.dead_close"),
+    ("regulator.exhaust_ratio",),
+    ("regulator.exhaust_rate",),
+    ("regulator.leak",),
+    (
+        "regulator.supply_pressure",
+        "regulator.supply_droop",
+        "regulator.supply_time",
+        "regulator.supply_recovery",
+    ),
+    ("regulator.ring_share", "regulator.ring_frequency", "regulator.ring_damping"),
+    ("memory.shape",),
+    (*(f"{c}.creep_{k}" for c in ("memory", "muscle") for k in (1, 2, 3, 4)), *_CREEP_TIMES),
+    ("memory.first_width", "memory.first_loss", "memory.first_travel"),
+    ("memory.threshold",),
+    ("muscle.area_curve",),
+    ("muscle.softening",),
+    ("muscle.stiffening",),
+    ("muscle.temperature", "muscle.temperature_gain"),
+    ("muscle.load_curve",),
+    ("muscle.load_stiffening",),
+    ("muscle.load_stiffening_2",),
+    ("muscle.strand_friction", "muscle.strand_break"),
+    ("muscle.viscosity", "muscle.viscosity_speed"),
+    ("mass.carried",),
+    ("mass.load_error",),
+    ("mass.slack",),
+    ("mass.stick", "mass.stick_kinetic"),
+    ("mass.ring_share", "mass.ring_frequency", "mass.ring_damping"),
+    ("position.drift", "position.drift_time"),
+    ("position.ramp", "position.ramp_at", "position.ramp_over"),
+    ("position.delay",),
+    ("position.bow",),
+    ("position.slip", "position.slip_at"),
+    ("pressure.drift",),
+    ("pressure.bow",),
+)
+"""Parameters that switch an effect on, each with those that shape it. A file leaves out what is
+off, so that a plant's digest stays when a new effect is added."""
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
@@ -96,10 +138,13 @@ def _memory(record: Any, where: str) -> PlayOperator | Preisach | None:
 def record(plant: SingleMuscle) -> dict[str, Any]:
     """Return a plant as plain data, in the layout of the file."""
     parameters = {}
+    absent = _absent(plant)
     for component in COMPONENTS:
         part = getattr(plant, component)
         for name, declared in declarations(part).items():
             key = f"{component}.{name}"
+            if key in absent:
+                continue
             kind, source = plant.provenance.get(key, (declared.provenance, declared.source))
             parameters[key] = {
                 "value": float(getattr(part, name)),
@@ -121,6 +166,21 @@ def record(plant: SingleMuscle) -> dict[str, Any]:
         "memory": _memory_record(plant.memory.operator),
         "ensemble": ensemble,
     }
+
+
+def _absent(plant: SingleMuscle) -> set[str]:
+    """Return the parameters of effects that are off, which a file need not name."""
+    absent = set()
+    for names in EFFECTS:
+        amounts = [n for n in names if _declared(plant, n).neutral is not None]
+        if all(plant.value(n) == _declared(plant, n).neutral for n in amounts):
+            absent |= set(names)
+    return absent
+
+
+def _declared(plant: SingleMuscle, name: str) -> Declaration:
+    component, _, field = name.partition(".")
+    return declarations(getattr(plant, component))[field]
 
 
 def digest(plant: SingleMuscle) -> str:

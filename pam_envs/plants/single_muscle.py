@@ -22,12 +22,27 @@ from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.mechanics.hanging_mass import GRAVITY, LARGEST_PHASE, HangingMass
 from pam_envs.muscle.effective_area import EffectiveAreaMuscle
-from pam_envs.parameters import check
+from pam_envs.parameters import check, declarations
 from pam_envs.plants import plant_file
 from pam_envs.plants import single_muscle_rows as R
 from pam_envs.plants.memory import Kind, Memory
 from pam_envs.pneumatics.regulator import Regulator
 from pam_envs.sensing.sensor import PositionSensor, PressureSensor
+
+NEUTRAL: dict[str, float] = {
+    f"{component}.{name}": declared.neutral
+    for component, part in (
+        ("regulator", Regulator),
+        ("memory", Memory),
+        ("muscle", EffectiveAreaMuscle),
+        ("mass", HangingMass),
+        ("position", PositionSensor),
+        ("pressure", PressureSensor),
+    )
+    for name, declared in declarations(part).items()
+    if declared.neutral is not None and f"{component}.{name}" in R.EFFECTS
+}
+"""The values at which each effect is off."""
 
 FOLDER = Path(__file__).resolve().parent.parent / "data"
 
@@ -149,10 +164,8 @@ class SingleMuscle:
         changed: dict[str, dict[str, Any]] = {}
         for name, value in values.items():
             component, _, entry = name.partition(".")
-            if name not in R.PARAMETERS and name != "memory.operator":
-                raise ValueError(
-                    f"no parameter named {name!r}; there are: {', '.join(R.PARAMETERS)}"
-                )
+            if name not in R.NAMES and name != "memory.operator":
+                raise ValueError(f"no parameter named {name!r}; there are: {', '.join(R.NAMES)}")
             changed.setdefault(component, {})[entry] = value
         parts: dict[str, Any] = {
             c: dataclasses.replace(getattr(self, c), **v) for c, v in changed.items()
@@ -176,11 +189,20 @@ class SingleMuscle:
 
     def _absolute(self, drive: NDArray[Any], load: NDArray[Any]) -> NDArray[np.float64]:
         low, high = np.full(drive.shape, -0.3), np.full(drive.shape, 0.6)
+        weight, stiffer, shift = self._carried(load)
         for _ in range(56):
             e = 0.5 * (low + high)
-            up = self.muscle.tension(drive, e) > load * GRAVITY
+            pull = self.muscle.tension(drive - shift, e) - (stiffer - 1.0) * self.muscle.passive(e)
+            up = pull > weight
             low, high = np.where(up, e, low), np.where(up, high, e)
         return np.asarray(0.5 * (low + high) * self.muscle.rest_length)
+
+    def _carried(self, load: NDArray[Any]) -> tuple[Any, Any, Any]:
+        """Return the weight [N], the factor on the stiffness and the pressure shift [Pa]."""
+        weight = (load + self.mass.load_error * (load > 0.0)) * GRAVITY
+        law = self.muscle
+        stiffer = 1.0 + (law.load_stiffening + law.load_stiffening_2 * weight) * weight
+        return weight, stiffer, self.muscle.load_curve * weight * weight
 
     def drive_for(self, contraction: ArrayLike, load: ArrayLike) -> NDArray[np.float64]:
         """Return the effective pressure [Pa] that holds a contraction [m] under a load [kg].
@@ -193,14 +215,17 @@ class SingleMuscle:
         strain = (contraction + self._absolute(np.zeros(load.shape), load)) / (
             self.muscle.rest_length
         )
-        return self.muscle.drive(load * GRAVITY, strain)
+        weight, stiffer, shift = self._carried(load)
+        pull = weight + (stiffer - 1.0) * self.muscle.passive(strain)
+        return self.muscle.drive(pull, strain) + shift
 
     # --- rows, files, identity ----------------------------------------------------------------
 
     def parameter_rows(self) -> NDArray[np.float64]:
         """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
         column = np.zeros(R.N_PARAMETERS)
-        column[: len(R.PARAMETERS)] = [self.value(name) for name in R.PARAMETERS]
+        for name in R.NAMES:
+            column[R.place(name)] = self.value(name)
         column[R.TALL] = (
             math.pi * self.muscle.diameter**2 / 4.0 / math.sin(self.muscle.braid_angle) ** 2
         )
@@ -216,6 +241,11 @@ class SingleMuscle:
             ):
                 column[start : start + n] = values
         return column
+
+    @property
+    def extended(self) -> bool:
+        """Whether an effect is on that a plain plant has not."""
+        return any(self.value(name) != neutral for name, neutral in NEUTRAL.items())
 
     @property
     def elements(self) -> int:

@@ -251,6 +251,29 @@ def advance(
             x[j] = x[j] + dx
 
 
+@kernel
+def true_position(rows: Any, j: int) -> float:
+    """Return where the load of lane ``j`` is [m], from its rest position."""
+    return rows[CONTRACTION][j] - rows[R.REST][j]  # type: ignore[no-any-return]
+
+
+@kernel
+def seen_position(rows: Any, j: int) -> float:
+    """Return what the position sensor measures [m], before its bias, noise and steps."""
+    return rows[CONTRACTION][j] - rows[R.REST][j]  # type: ignore[no-any-return]
+
+
+@kernel
+def seen_pressure(rows: Any, j: int) -> float:
+    """Return what the pressure sensor measures [Pa], before its bias, noise and steps."""
+    return rows[PRESSURE][j]  # type: ignore[no-any-return]
+
+
+@kernel
+def begin_effects(rows: Any, fixed: Any, j: int) -> None:
+    """Begin what a plain plant has not."""
+
+
 N_WORK = 17
 """Rows of scratch that :func:`advance` needs."""
 

@@ -53,6 +53,48 @@ class Regulator:
         neutral=1e9,
         spread=(4e5, 1.2e6),
     )
+    # effects, neutral unless a recording shows them
+    gain: float = parameter(
+        1.0, "1", 0.5, 1.5, "assumed", "pressure reached over set-point", neutral=1.0
+    )
+    dead_band: float = parameter(
+        0.0, "Pa", 0.0, 3e5, "assumed", "error that the valve does not answer", neutral=0.0
+    )
+    dead_close: float = parameter(
+        1.0, "1", 0.0, 1.0, "assumed", "error at which the valve closes again, over dead_band"
+    )
+    exhaust_ratio: float = parameter(
+        1.0, "1", 0.1, 20.0, "assumed", "lag when exhausting over lag when filling", neutral=1.0
+    )
+    exhaust_rate: float = parameter(
+        100.0,
+        "1/s",
+        0.05,
+        100.0,
+        "assumed",
+        "fastest exhaust over absolute pressure (choked flow)",
+        neutral=100.0,
+    )
+    leak: float = parameter(
+        0.0, "1/s", 0.0, 10.0, "assumed", "pressure lost over pressure", neutral=0.0
+    )
+    supply_pressure: float = parameter(
+        2e7, "Pa", 5e4, 2e7, "assumed", "of the reservoir at rest", neutral=2e7
+    )
+    supply_droop: float = parameter(
+        0.0, "1", 0.0, 5.0, "assumed", "supply pressure lost over pressure filled", neutral=0.0
+    )
+    supply_time: float = parameter(
+        0.01, "s", 0.001, 5.0, "assumed", "time constant of filling from the supply"
+    )
+    supply_recovery: float = parameter(
+        10.0, "s", 0.1, 1e3, "assumed", "time constant of the reservoir's recovery"
+    )
+    ring_share: float = parameter(
+        0.0, "1", 0.0, 1.0, "assumed", "share of the pressure behind a line that rings", neutral=0.0
+    )
+    ring_frequency: float = parameter(7.0, "Hz", 0.5, 20.0, "assumed", "of the line")
+    ring_damping: float = parameter(0.1, "1", 0.005, 2.0, "assumed", "damping ratio of the line")
 
 
 @kernel
