@@ -1,0 +1,259 @@
+"""Columns of a file of measurements: its header, its cells and what is wrong with them."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.data.rig_file import near
+
+Array = NDArray[np.float64]
+SHOWN = 5
+"""How many rows a message names."""
+
+CONVERSIONS = {
+    "s": {"ms": "divide by 1000", "us": "divide by 1e6", "min": "multiply by 60"},
+    "bar": {
+        "kpa": "divide by 100",
+        "mpa": "multiply by 10",
+        "pa": "divide by 1e5",
+        "mbar": "divide by 1000",
+        "psi": "divide by 14.504",
+    },
+    "mm": {
+        "m": "multiply by 1000",
+        "cm": "multiply by 10",
+        "um": "divide by 1000",
+        "in": "multiply by 25.4",
+        "percent": "multiply by a hundredth of the rest length",
+    },
+    "N": {"kg": "multiply by 9.80665", "g": "multiply by 0.00980665", "kn": "multiply by 1000"},
+    "C": {"k": "subtract 273.15", "f": "subtract 32 and divide by 1.8"},
+    "kg": {"n": "divide by 9.80665", "g": "divide by 1000"},
+}
+"""What makes the wanted unit of another one, by wanted unit and other unit in lower case."""
+
+
+class RecordingError(ValueError):
+    """A file of measurements that cannot be used.
+
+    Attributes
+    ----------
+    problems : tuple of str
+        Each complaint, a sentence with rows and remedy.
+    """
+
+    def __init__(self, where: str, problems: Iterable[str]) -> None:
+        self.where = where
+        self.problems = tuple(problems)
+        many = len(self.problems) > 1
+        text = "".join(f"\n- {p}" for p in self.problems) if many else " " + self.problems[0]
+        super().__init__(f"{where}:{text}")
+
+    def __reduce__(self) -> tuple[type[RecordingError], tuple[str, tuple[str, ...]]]:
+        """Let the error travel between processes."""
+        return type(self), (self.where, self.problems)
+
+
+def refuse(where: str, *problems: str) -> NoReturn:
+    """Raise a :class:`RecordingError`."""
+    raise RecordingError(where, problems)
+
+
+def rows_text(rows: Iterable[int]) -> str:
+    """Return "row 4", or "rows 4, 5 and 9", or the first of many with their number.
+
+    Parameters
+    ----------
+    rows : iterable of int
+        Rows of a file; the header is row 1.
+    """
+    numbers = [int(row) for row in rows]
+    if len(numbers) == 1:
+        return f"row {numbers[0]}"
+    if len(numbers) <= SHOWN:
+        return f"rows {', '.join(map(str, numbers[:-1]))} and {numbers[-1]}"
+    return f"rows {', '.join(map(str, numbers[:SHOWN]))} and {len(numbers) - SHOWN} more"
+
+
+def span_text(first: int, last: int) -> str:
+    """Return "rows 4 to 9"."""
+    return f"row {first}" if first == last else f"rows {first} to {last}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Sheet:
+    """The cells of a file.
+
+    Attributes
+    ----------
+    where : str
+        The file, for messages.
+    cells : mapping of str to list of str
+        By column, without the spaces around.
+    rows : ndarray of int
+        Row in the file of each line of cells; the header is row 1, and blank rows are left out.
+    """
+
+    where: str
+    cells: Mapping[str, list[str]]
+    rows: NDArray[np.int64]
+
+    def text(self, column: str) -> list[str]:
+        """Return a column of words; none may be missing."""
+        cells = self.cells[column]
+        empty = [int(r) for r, cell in zip(self.rows, cells, strict=True) if not cell]
+        if empty:
+            refuse(self.where, f"column {column} is empty in {rows_text(empty)}; fill the cells")
+        return cells
+
+    def numbers(self, column: str) -> tuple[Array, NDArray[np.bool_], list[str]]:
+        """Return a column of numbers.
+
+        Returns
+        -------
+        values : ndarray, shape (n,)
+            In the file's unit, NaN where the cell is empty or wrong.
+        empty : ndarray of bool, shape (n,)
+            Where a cell is empty.
+        problems : list of str
+            What is wrong with the others.
+        """
+        cells = self.cells[column]
+        empty = np.array([not cell for cell in cells], dtype=bool)
+        try:
+            values = np.array([cell or "nan" for cell in cells], dtype=np.float64)
+            words: list[int] = []
+        except ValueError:
+            values = np.array([_number(cell) for cell in cells])
+            words = [i for i, cell in enumerate(cells) if cell and not _is_number(cell)]
+        wrong = ~np.isfinite(values) & ~empty
+        wrong[words] = True
+        values[wrong] = np.nan
+        return values, empty, self._complaints(column, wrong)
+
+    def _complaints(self, column: str, wrong: NDArray[np.bool_]) -> list[str]:
+        at = np.flatnonzero(wrong)
+        if not len(at):
+            return []
+        first = self.cells[column][at[0]]
+        hint = "write decimals with a point" if "," in first else "correct the cells"
+        return [
+            f"column {column} holds no number in {rows_text(self.rows[at])} "
+            f"(the first is {first!r}); {hint}"
+        ]
+
+
+def read_header(path: str | Path) -> tuple[str, ...]:
+    """Return the names of a file's columns.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be read or holds nothing.
+    """
+    where = str(path)
+    lines = _lines(Path(path), where)
+    return tuple(cell.strip() for cell in next(csv.reader(lines[:1]), []))
+
+
+def read_sheet(path: str | Path, known: Sequence[str], required: Sequence[str], what: str) -> Sheet:
+    """Read a CSV file with some of the columns that are known, in any order.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    known, required : sequence of str
+        Names of columns, each ending in its unit if it has one.
+    what : str
+        What the file holds, for messages: "a recording".
+
+    Raises
+    ------
+    RecordingError
+        For columns that are unknown, doubled or missing, and rows of the wrong length.
+    """
+    where = str(path)
+    lines = _lines(Path(path), where)
+    header = read_header(path)
+    if len(header) == 1 and ";" in header[0]:
+        refuse(where, "the cells are separated by ';'; save with ',' and with decimal points")
+    problems = [
+        f"row 1: unknown column {name!r}{column_hint(name, known)}"
+        for name in header
+        if name not in known
+    ]
+    problems += [f"row 1: the column {n} stands twice" for n in known if header.count(n) > 1]
+    if not problems:  # a missing column is most often a misspelt one
+        problems = [f"row 1: {what} needs the column {n}" for n in required if n not in header]
+    if problems:
+        refuse(where, *problems)
+    return _sheet(lines, header, where)
+
+
+def _sheet(lines: list[str], header: tuple[str, ...], where: str) -> Sheet:
+    reader = csv.reader(lines)
+    next(reader)
+    filled = [(reader.line_num, cells) for cells in reader if any(c.strip() for c in cells)]
+    ragged = [(row, len(cells)) for row, cells in filled if len(cells) != len(header)]
+    if ragged:
+        at = rows_text(row for row, _ in ragged)
+        refuse(where, f"{len(header)} cells a row are needed, got {ragged[0][1]} in {at}")
+    rows, table = [row for row, _ in filled], [cells for _, cells in filled]
+    if not table:
+        refuse(where, "there are no rows below the header; give at least one")
+    columns = zip(*table, strict=True)
+    cells_of = {
+        n: [cell.strip() for cell in column] for n, column in zip(header, columns, strict=True)
+    }
+    return Sheet(where, cells_of, np.array(rows, dtype=np.int64))
+
+
+def column_hint(name: str, known: Iterable[str]) -> str:
+    """Return how a column that is not known should be called, and in which unit it should be."""
+    columns = list(known)
+    if not name:
+        return f"; name it or take it out, known: {', '.join(columns)}"
+    stem, _, unit = name.rpartition("_")
+    for column in columns:
+        base, _, wanted = column.rpartition("_")
+        if wanted not in CONVERSIONS:
+            continue
+        if name.lower() == base.lower():
+            return f"; give {column}, with the unit in the name"
+        if stem.lower() == base.lower() and unit != wanted:
+            recipe = CONVERSIONS[wanted].get(unit.lower())
+            return f"; give {column} instead" + (f": {recipe}" if recipe else "")
+    return near(name, columns)
+
+
+def _lines(path: Path, where: str) -> list[str]:
+    # utf-8-sig: spreadsheets put a byte order mark before the first column's name.
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except OSError as error:
+        refuse(where, f"cannot be read: {error.strerror or error}")
+    except UnicodeDecodeError as error:
+        refuse(where, f"is not text in UTF-8 ({error.reason}); save it as CSV in UTF-8")
+    if not lines:
+        refuse(where, "is empty; row 1 must name the columns")
+    return lines
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _number(cell: str) -> float:
+    return float(cell) if _is_number(cell) else float("nan")

@@ -1,0 +1,306 @@
+"""What the owner of a rig tells about it: ``RIG.yaml``.
+
+    plant: single_muscle
+    muscle: {rest_length_mm: 200, diameter_mm: 10}
+    regulator: {max_pressure_bar: 6}
+    load: hanging_mass            # or constant_force
+    sensors: {contraction_noise_mm: 0.03, pressure_noise_bar: 0.008}
+    history: {cycles_since_rest: 0, rezeroed: false}
+    repeats: [[holds_a, holds_b]] # segments that repeat one another
+    valve_closed: [shut]          # segments during which the valve is shut
+    tolerance: {mass.load: 0.02}  # what is known, and how well
+
+Every key but ``plant`` may be missing.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import yaml
+
+Load = Literal["hanging_mass", "constant_force"]
+LOADS: tuple[str, ...] = get_args(Load)
+
+BAR = 1e5
+MM = 1e-3
+
+
+@dataclasses.dataclass(frozen=True)
+class Bounds:
+    """A number of the file: where it stands, its unit in SI, and what is possible."""
+
+    key: str
+    unit: str
+    scale: float
+    low: float
+    high: float
+
+
+NUMBERS = {
+    "rest_length": Bounds("muscle.rest_length_mm", "mm", MM, 10.0, 5000.0),
+    "diameter": Bounds("muscle.diameter_mm", "mm", MM, 1.0, 100.0),
+    "max_pressure": Bounds("regulator.max_pressure_bar", "bar", BAR, 0.5, 15.0),
+    "contraction_noise": Bounds("sensors.contraction_noise_mm", "mm", MM, 1e-5, 10.0),
+    "pressure_noise": Bounds("sensors.pressure_noise_bar", "bar", BAR, 1e-6, 1.0),
+}
+"""Fields of :class:`Rig` that are numbers with a unit."""
+HISTORY = ("cycles_since_rest", "rezeroed")
+SECTIONS: dict[str, tuple[str, ...]] = {
+    "muscle": ("rest_length_mm", "diameter_mm"),
+    "regulator": ("max_pressure_bar",),
+    "sensors": ("contraction_noise_mm", "pressure_noise_bar"),
+    "history": HISTORY,
+}
+KEYS = (
+    "plant",
+    "muscle",
+    "regulator",
+    "load",
+    "sensors",
+    "history",
+    "repeats",
+    "valve_closed",
+    "tolerance",
+)
+_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+def near(word: str, known: Iterable[str]) -> str:
+    """Return "; did you mean 'x'?", or what there is to choose from."""
+    choices = list(known)
+    close = difflib.get_close_matches(word, choices, n=1, cutoff=0.6)
+    if close:
+        return f"; did you mean {close[0]!r}?"
+    return f"; known: {', '.join(choices)}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Rig:
+    """What is known of the rig that a recording was taken on.
+
+    Attributes
+    ----------
+    plant : str
+        Family of the plant to replay the recording through.
+    rest_length, diameter : float or None
+        Of the muscle [m].
+    max_pressure : float or None
+        Largest gauge pressure that the regulator gives [Pa].
+    load : {"hanging_mass", "constant_force"}
+        Whether the load is accelerated with the muscle's end or pulls with its force alone.
+    contraction_noise, pressure_noise : float or None
+        RMS of the sensors' noise [m], [Pa].
+    cycles_since_rest : int
+        Cycles that the muscle had made before the first row, since it last rested.
+    rezeroed : bool
+        Whether the position sensor was zeroed anew at the start of each segment.
+    repeats : tuple of tuple of str
+        Groups of segments in which the same was done.
+    valve_closed : tuple of str
+        Segments during which the valve is shut, so that the command has no effect.
+    tolerance : mapping of str to float
+        Plant parameters that are known, with the relative error within which they are.
+    """
+
+    plant: str = "single_muscle"
+    rest_length: float | None = None
+    diameter: float | None = None
+    max_pressure: float | None = None
+    load: Load = "hanging_mass"
+    contraction_noise: float | None = None
+    pressure_noise: float | None = None
+    cycles_since_rest: int = 0
+    rezeroed: bool = False
+    repeats: tuple[tuple[str, ...], ...] = ()
+    valve_closed: tuple[str, ...] = ()
+    tolerance: Mapping[str, float] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check every value; a message speaks in the file's units."""
+        for field, bounds in NUMBERS.items():
+            value = getattr(self, field)
+            if value is not None:
+                _check_number(value / bounds.scale, bounds)
+        if self.load not in LOADS:
+            raise ValueError(
+                f"load is {self.load!r}; choose hanging_mass or constant_force (what hangs, in "
+                "newton, belongs into the recording's column load_N)"
+            )
+        if not 0 <= self.cycles_since_rest <= 1_000_000:
+            raise ValueError(
+                f"history.cycles_since_rest = {self.cycles_since_rest} is outside [0, 1000000]; "
+                "count the cycles since the muscle last rested"
+            )
+        _check_groups(self.repeats)
+        _check_tolerance(self.tolerance)
+
+    @classmethod
+    def from_yaml(cls, path: str | Path) -> Rig:
+        """Read a rig file.
+
+        Raises
+        ------
+        ValueError
+            Naming the file, the key, its value and what to do.
+        """
+        where = f"rig file {path}"
+        data = _read(Path(path), where)
+        try:
+            return cls(**_fields(data))
+        except ValueError as error:
+            raise ValueError(f"{where}: {error}") from None
+
+
+def _read(path: Path, where: str) -> Mapping[str, Any]:
+    try:
+        data = yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_LOADER)
+    except OSError as error:
+        raise ValueError(f"{where} cannot be read: {error.strerror or error}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ValueError(f"{where} is not YAML: {error}") from error
+    if not isinstance(data, Mapping):
+        raise ValueError(f"{where}: must hold a mapping with the keys {', '.join(KEYS)}")
+    return data
+
+
+def _fields(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the arguments of :class:`Rig`, in SI."""
+    _refuse_unknown(data, KEYS, "")
+    sections = {name: _section(data.get(name), name, keys) for name, keys in SECTIONS.items()}
+    given: dict[str, Any] = {"plant": _word(data.get("plant"))}
+    for field, bounds in NUMBERS.items():
+        section, _, key = bounds.key.partition(".")
+        if sections[section].get(key) is not None:
+            value = _number(sections[section][key], bounds.key, bounds.unit)
+            _check_number(value, bounds)
+            given[field] = value * bounds.scale
+    if data.get("load") is not None:
+        given["load"] = data["load"]
+    given |= _history(sections["history"])
+    given["repeats"] = _repeats(data.get("repeats"))
+    given["valve_closed"] = _labels(data.get("valve_closed"), "valve_closed")
+    given["tolerance"] = _tolerance(data.get("tolerance"))
+    return given
+
+
+def _refuse_unknown(data: Mapping[Any, Any], known: Iterable[str], prefix: str) -> None:
+    known = tuple(known)
+    for key in data:
+        if key not in known:
+            home = [f"{s}.{k}" for s, keys in SECTIONS.items() for k in keys if k == key]
+            hint = f"; did you mean {home[0]!r}?" if home else near(str(key), known)
+            raise ValueError(f"unknown key {prefix + str(key)!r}{hint}")
+
+
+def _section(value: Any, name: str, keys: tuple[str, ...]) -> Mapping[str, Any]:
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{name} must be a mapping with the keys {', '.join(keys)}, got {value!r}")
+    _refuse_unknown(value, keys, f"{name}.")
+    return value
+
+
+def _word(value: Any) -> str:
+    if not isinstance(value, str) or not value.strip():
+        raise ValueError(
+            f"plant is {value!r}; name the plant's family, for example plant: single_muscle"
+        )
+    return value.strip()
+
+
+def _number(value: Any, key: str, unit: str) -> float:
+    if isinstance(value, str):  # YAML reads 1e5 without a sign as text
+        with contextlib.suppress(ValueError):
+            value = float(value)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError(f"{key} must be a number in {unit}, got {value!r}")
+    return float(value)
+
+
+def _check_number(value: float, bounds: Bounds) -> None:
+    slack = 1e-9 * bounds.high  # from SI and back
+    if not math.isfinite(value) or not bounds.low - slack <= value <= bounds.high + slack:
+        raise ValueError(
+            f"{bounds.key} = {value:g} {bounds.unit} is outside [{bounds.low:g}, "
+            f"{bounds.high:g}] {bounds.unit}; correct the value or its unit, or leave it out"
+        )
+
+
+def _history(section: Mapping[str, Any]) -> dict[str, Any]:
+    given = {key: value for key, value in section.items() if value is not None}
+    cycles = given.get("cycles_since_rest", 0)
+    if isinstance(cycles, bool) or not isinstance(cycles, int):
+        raise ValueError(f"history.cycles_since_rest must be a whole number, got {cycles!r}")
+    rezeroed = given.get("rezeroed", False)
+    if not isinstance(rezeroed, bool):
+        raise ValueError(f"history.rezeroed must be true or false, got {rezeroed!r}")
+    return given
+
+
+def _labels(value: Any, key: str) -> tuple[str, ...]:
+    """Return segment labels; YAML makes numbers of those that look like numbers."""
+    if value is None:
+        return ()
+    good = (str, int, float)
+    if not isinstance(value, list) or not all(
+        isinstance(v, good) and not isinstance(v, bool) for v in value
+    ):
+        raise ValueError(f"{key} must be a list of segments, for example [holds_a], got {value!r}")
+    return tuple(str(label).strip() for label in value)
+
+
+def _repeats(value: Any) -> tuple[tuple[str, ...], ...]:
+    if value is None:
+        return ()
+    if not isinstance(value, list):
+        raise ValueError(
+            "repeats must be a list of groups of segments, for example "
+            f"[[holds_a, holds_b]], got {value!r}"
+        )
+    return tuple(_labels(group, "each group of repeats") for group in value)
+
+
+def _check_groups(repeats: tuple[tuple[str, ...], ...]) -> None:
+    named = [label for group in repeats for label in group]
+    for group in repeats:
+        if len(group) < 2:
+            raise ValueError(
+                f"repeats holds the group {list(group)!r}; name at least two segments that repeat "
+                "one another, or leave the group out"
+            )
+    for label in named:
+        if named.count(label) > 1:
+            raise ValueError(f"repeats names the segment {label!r} twice; name it once")
+
+
+def _tolerance(value: Any) -> dict[str, float]:
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise ValueError(
+            "tolerance must be a mapping from parameter to relative error, for example "
+            f"{{mass.load: 0.02}}, got {value!r}"
+        )
+    return {str(k): _number(v, f"tolerance of {k}", "parts of one") for k, v in value.items()}
+
+
+def _check_tolerance(tolerance: Mapping[str, float]) -> None:
+    for name, value in tolerance.items():
+        if name.count(".") != 1:
+            raise ValueError(
+                f"tolerance names {name!r}; name a parameter of the plant with its component, "
+                "for example mass.load"
+            )
+        if not 0.0 < value <= 1.0:
+            raise ValueError(
+                f"tolerance of {name} = {value:g} is outside (0, 1]; it is relative: give 0.02 "
+                "for two per cent"
+            )
