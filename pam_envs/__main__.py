@@ -1,4 +1,4 @@
-"""The command line: ``pam-envs list``, ``render`` and ``identify`` (or ``python -m pam_envs``)."""
+"""The command line: ``pam-envs list``, ``render``, ``identify``, ``diagnose``."""
 
 from __future__ import annotations
 
@@ -59,6 +59,24 @@ class Identify:
     """Folder for the plant files and the report."""
     members: int = 8
     """Equally good fits to look for beside the best one."""
+
+
+@dataclass
+class Diagnose:
+    """Say what the plant gets wrong on a recording, why, and write the better plant."""
+
+    recording: tyro.conf.Positional[Path]
+    """CSV file: a recording in time, or a table of settled readings (docs/recording.md)."""
+    rig: Path | None = None
+    """YAML file that says what is known of the rig."""
+    out: Path = Path("diagnosis")
+    """Folder for report.json, report.html and plant.yaml."""
+    plant: Path | None = None
+    """Plant file to begin with; default: the shipped muscle, scaled to the rig's."""
+    seed: int = 0
+    """Of all draws."""
+    quiet: bool = False
+    """Show no progress."""
 
 
 class Mistake(Exception):
@@ -197,16 +215,59 @@ def identify(options: Identify) -> None:
     print(report)
 
 
+def diagnose(options: Diagnose) -> None:
+    """Diagnose a recording and write the report."""
+    from pam_envs.data.recording import Recording, read_input
+    from pam_envs.data.rig_file import Rig
+
+    rig = Rig() if options.rig is None else Rig.from_yaml(options.rig)
+    data = read_input(options.recording, rig)
+    if not isinstance(data, Recording):
+        _diagnose_readings(data, options)
+        return
+    from pam_envs.diagnosis.diagnosis import diagnose as run
+    from pam_envs.plants.single_muscle import SingleMuscle
+
+    if rig.plant != SingleMuscle.family:
+        raise Mistake(f"plant: {rig.plant!r} cannot be diagnosed; there is: {SingleMuscle.family}")
+    plant = None if options.plant is None else SingleMuscle.from_yaml(options.plant)
+    found = run(data, plant, rig=rig, seed=options.seed, progress=not options.quiet)
+    print(f"{found.verdict}: {found.text}")
+    for warning in found.report["warnings"]:
+        print(f"warning: {warning}")
+    found.write(options.out)
+    print(f"wrote {options.out}")
+
+
+def _diagnose_readings(table: Any, options: Diagnose) -> None:
+    """Diagnose a table of settled readings."""
+    from types import SimpleNamespace
+
+    from pam_envs.diagnosis.readings import diagnose_readings
+    from pam_envs.diagnosis.report import write
+
+    report = diagnose_readings(table, seed=options.seed)
+    print(f"{report['verdict']}: {report['text']}")
+    write(SimpleNamespace(report=report, traces=None, plant=None), options.out)
+    print(f"wrote {options.out}")
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return the exit code."""
     register_all()
     chosen: Any = tyro.cli(
         tyro.extras.subcommand_type_from_defaults(
-            {"list": List(), "render": Render(env=tyro.MISSING), "identify": Identify()},
+            {
+                "list": List(),
+                "render": Render(env=tyro.MISSING),
+                "identify": Identify(),
+                "diagnose": Diagnose(recording=tyro.MISSING),
+            },
             descriptions={
                 "list": List.__doc__ or "",
                 "render": Render.__doc__ or "",
                 "identify": Identify.__doc__ or "",
+                "diagnose": Diagnose.__doc__ or "",
             },
         ),
         args=arguments,
@@ -218,6 +279,8 @@ def main(arguments: list[str] | None = None) -> int:
             list_environments()
         elif isinstance(chosen, Render):
             render(chosen)
+        elif isinstance(chosen, Diagnose):
+            diagnose(chosen)
         else:
             identify(chosen)
     except (Mistake, ValueError, OSError, ImportError) as error:

@@ -1,0 +1,152 @@
+"""Checks of settled readings: do repeats drift, are they copies, do they scatter alike."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from pam_envs.data.readings import one_path
+from pam_envs.data.tables import ContractionTable
+
+Array = NDArray[np.float64]
+
+MM = 1e-3
+SIGNIFICANT = 0.05
+TREND = 2.5
+"""Size of a t value from which a trend over the repeats is told."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Trend:
+    """Drift of the contraction over the repeats at one load.
+
+    Attributes
+    ----------
+    slope : float
+        [m] a repeat.
+    t : float
+        Slope over its standard error, from the scatter of the readings about it.
+    t_means : float
+        The same from the means of the repeats alone, which holds even where the readings of a
+        repeat err together; NaN for fewer than three repeats.
+    """
+
+    slope: float
+    t: float
+    t_means: float
+
+
+def repeat_trend(table: ContractionTable, load: float) -> Trend:
+    """Return the drift over the repeats at ``load`` [kg]; every repeat went the same path."""
+    left = _deviations(table, load)
+    cells, repeats = left.shape
+    if repeats < 2:
+        raise ValueError(f"one repeat at {load:g} kg shows no trend; measure at least two")
+    x = np.arange(repeats) - 0.5 * (repeats - 1)
+    slope = float(np.sum(left @ x) / (cells * (x @ x)))
+    rest = left - slope * x
+    error = np.sqrt(np.sum(rest**2) / max(1, left.size - cells - 1) / (cells * (x @ x)))
+    means = left.mean(axis=0)
+    freedom = repeats - 2
+    spread = np.sqrt(np.sum((means - slope * x) ** 2) / max(1, freedom) / (x @ x))
+    t_means = slope / spread if freedom > 0 and spread > 0.0 else np.nan
+    return Trend(slope, float(slope / error) if error > 0.0 else 0.0, float(t_means))
+
+
+def scatter(table: ContractionTable, load: float) -> float:
+    """Return the standard deviation [m] of the repeats about their means at ``load`` [kg]."""
+    left = _deviations(table, load)
+    cells, repeats = left.shape
+    return float(np.sqrt(np.sum(left**2) / max(1, cells * (repeats - 1))))
+
+
+def scatter_homogeneity(table: ContractionTable) -> float:
+    """Return the p value that repeats scatter alike at all loads (Levene, about medians)."""
+    groups = [_deviations(table, load).ravel() for load in table.loads]
+    groups = [group for group in groups if group.size and np.any(group)]
+    return float(stats.levene(*groups).pvalue) if len(groups) > 1 else 1.0
+
+
+def audit_table(table: ContractionTable) -> list[str]:
+    """Return what to bear in mind about a table.
+
+    Parameters
+    ----------
+    table : ContractionTable
+
+    Returns
+    -------
+    list of str
+        Sentences.
+    """
+    warnings = _loads(table)
+    if not one_path(table):
+        return [
+            *warnings,
+            "the repeats went different ways: their scatter and their drift were not checked",
+        ]
+    for load in table.loads:
+        warnings += _copied(table, load)
+    several = [load for load in table.loads if len(table.repeats(load)) > 1]
+    if not several:
+        return [*warnings, "every reading was taken once: the noise floor is not known"]
+    for load in several:
+        warnings += _drifts(table, load)
+    if len(several) == len(table.loads) > 1:
+        warnings += _unequal(table)
+    return warnings
+
+
+def _deviations(table: ContractionTable, load: float) -> Array:
+    """Return readings less their mean over the repeats, without those zero by definition."""
+    _, contraction = table.cycles(load)
+    cells = contraction[np.any(contraction != 0.0, axis=1)]
+    return np.asarray(cells - cells.mean(axis=1, keepdims=True))
+
+
+def _loads(table: ContractionTable) -> list[str]:
+    n = len(table.loads)
+    if n == 1:
+        return ["there is one load: causes that act with the load cannot be decided"]
+    if n == 2:
+        return ["there are two loads: whether an effect is in proportion to the load is not known"]
+    if n == 3:
+        return [
+            "there are three loads: a quadratic law of the load cannot be told from a dead zone; "
+            "measure at least five"
+        ]
+    return []
+
+
+def _copied(table: ContractionTable, load: float) -> list[str]:
+    _, contraction = table.cycles(load)
+    numbers = table.repeats(load)
+    return [
+        f"repeats {numbers[j]} and {numbers[i]} at {load:g} kg are alike digit by digit: one is a "
+        "copy; take it out, or the noise is judged too small"
+        for i in range(len(numbers))
+        for j in range(i)
+        if np.array_equal(contraction[:, i], contraction[:, j])
+    ]
+
+
+def _drifts(table: ContractionTable, load: float) -> list[str]:
+    trend = repeat_trend(table, load)
+    if abs(trend.t) < TREND:
+        return []
+    means = "" if np.isnan(trend.t_means) else f", {trend.t_means:.1f} from the repeats' means"
+    return [
+        f"the readings at {load:g} kg drift by {trend.slope / MM:+.3f} mm a repeat "
+        f"(t = {trend.t:.1f}{means}): the muscle was not yet cycled in, or the zero moved"
+    ]
+
+
+def _unequal(table: ContractionTable) -> list[str]:
+    p = scatter_homogeneity(table)
+    if p >= SIGNIFICANT:
+        return []
+    told = ", ".join(f"{scatter(table, load) / MM:.3f} mm at {load:g} kg" for load in table.loads)
+    return [f"the repeats do not scatter alike at all loads (Levene p = {p:.2g}): {told}"]

@@ -1,0 +1,95 @@
+"""What a cause is: parameters that a plain plant has switched off, and how to tell it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Term:
+    """A parameter of a form.
+
+    Attributes
+    ----------
+    name : str
+        Dotted name of the plant's parameter.
+    starts : tuple of float
+        Where fits begin, in SI; forms with several terms begin at the i-th of each.
+    low, high : float, optional
+        Bounds narrower than those of the parameter's declaration.
+    scale : float, optional
+        Size of a meaningful change.
+    log : bool
+        Fitted on a logarithmic scale.
+    amount : bool
+        Whether the effect vanishes with it (the others shape it).
+    """
+
+    name: str
+    starts: tuple[float, ...]
+    low: float | None = None
+    high: float | None = None
+    scale: float | None = None
+    log: bool = False
+    amount: bool = True
+
+
+@dataclass(frozen=True)
+class Form:
+    """One mathematical form of a cause.
+
+    Attributes
+    ----------
+    name : str
+        In a word or two.
+    terms : tuple of Term
+        Its parameters.
+    seeds : callable, optional
+        Makes starts from the base's fit (see :mod:`pam_envs.diagnosis.seeds`) instead of
+        ``Term.starts``.
+    """
+
+    name: str
+    terms: tuple[Term, ...]
+    seeds: Callable[..., Sequence[Sequence[float]]] | None = None
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Something that a plant may lack.
+
+    Attributes
+    ----------
+    name : str
+        As in the report.
+    title : str
+        As in a sentence, "creep of the muscle".
+    forms : tuple of Form
+        Rival mathematical forms; the best one counts.
+    signature : str
+        How it shows in a residual.
+    neighbours : tuple of str
+        Causes that it is easily taken for.
+    experiment : str
+        What separates it from them.
+    source : str
+        Where the physics is described.
+    needs : tuple of str
+        Columns of a recording without which it cannot be decided.
+    once : bool
+        It happens once, so that segments left out by kind do not show it.
+    sensor : str
+        What would measure it directly.
+    """
+
+    name: str
+    title: str
+    forms: tuple[Form, ...]
+    signature: str = ""
+    neighbours: tuple[str, ...] = ()
+    experiment: str = ""
+    source: str = ""
+    needs: tuple[str, ...] = ()
+    once: bool = False
+    sensor: str = ""

@@ -1,0 +1,38 @@
+"""Dead time: the regulator answers late.
+
+The command passes a bus, a converter and a pilot stage before the valve moves, and sound needs time
+along the tube. Everything happens as it would, only later, in pressure and contraction alike. A lag
+rounds the corner of a step instead, so that the two can be told where the record is fast enough.
+"""
+
+from __future__ import annotations
+
+from pam_envs.diagnosis.cause import Cause, Form, Term
+
+CAUSE = Cause(
+    name="dead_time",
+    title="the dead time of the regulator",
+    forms=(Form("delay", (Term("regulator.dead_time", (0.01, 0.04), scale=0.01),)),),
+    signature=(
+        "the error follows the rate of the command, in pressure and contraction, and is one sharp "
+        "peak at the start of a step"
+    ),
+    neighbours=(
+        "sensor_delay",
+        "slew_limit",
+        "valve_dead_band",
+        "exhaust_asymmetry",
+        "resonance",
+    ),
+    experiment=(
+        "Steps of three sizes, up and down: dead time is the same for all of them, the time that a "
+        "limited rate takes grows with the size, a slow exhaust is late on the way down only. A "
+        "delayed position reading leaves the pressure alone."
+    ),
+    source=(
+        "A public record of a DMSP-10-250 on a pressure regulator: 44 ms inflating, 96 ms "
+        "deflating; an open wrist-robot project's identified ITV regulator: 45 ms, 5 to 105 ms "
+        "over pressures."
+    ),
+    sensor="a fast pressure sensor at the valve's outlet",
+)

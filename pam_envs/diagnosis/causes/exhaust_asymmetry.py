@@ -1,0 +1,38 @@
+"""Exhausting unlike filling: the way down has a pace of its own.
+
+Filling is driven by the supply, exhausting by the muscle's own pressure, through another edge of
+the valve and a silencer. The lag may be another, or the flow be choked, so that the absolute
+pressure falls by at most a fixed share a second.
+"""
+
+from __future__ import annotations
+
+from pam_envs.diagnosis.cause import Cause, Form, Term
+
+CAUSE = Cause(
+    name="exhaust_asymmetry",
+    title="an exhaust unlike filling",
+    forms=(
+        Form("lag", (Term("regulator.exhaust_ratio", (1.2,), log=True),)),
+        Form(
+            "choked",
+            (Term("regulator.exhaust_rate", (1.5, 5.0), low=0.2, high=99.0, log=True),),
+        ),
+    ),
+    signature=(
+        "steps down are late or early in the pressure, steps up fit; with one lag for both, errors "
+        "of opposite signs"
+    ),
+    neighbours=("dead_time", "slew_limit", "supply_droop", "creep"),
+    experiment=(
+        "Steps of several sizes up and down between the same levels, against the measured "
+        "pressure: dead time and a limited rate act both ways, a drooping supply on the way up, "
+        "creep not in the pressure at all."
+    ),
+    source=(
+        "A public record of a DMSP-10-250 on a pressure regulator: lags of 50 ms up and 84 ms "
+        "down, 24 % of the way left after a second; an open wrist-robot project's identified ITV "
+        "regulator, with the flow law of ISO 6358."
+    ),
+    sensor="a fast pressure sensor at the muscle",
+)

@@ -1,0 +1,42 @@
+"""Compliance that changes with load: the static curve moves or turns with what hangs on the muscle.
+
+The law of the base gives a load its share of the pull, in proportion. A real muscle is necked at
+its ends and its fittings give way, so that the load costs more pressure than that (a shift with its
+square) or meets another stiffness (passive force times a polynomial in the load).
+"""
+
+from __future__ import annotations
+
+from pam_envs.diagnosis.cause import Cause, Form, Term
+
+CAUSE = Cause(
+    name="load_dependent_compliance",
+    title="compliance that changes with load",
+    forms=(
+        Form("shift", (Term("muscle.load_curve", (2.0,), scale=2.0),)),
+        Form(
+            "stiffening",
+            (
+                Term("muscle.load_stiffening", (5e-4,), scale=5e-4),
+                Term("muscle.load_stiffening_2", (1e-6,), scale=1e-5),
+            ),
+        ),
+    ),
+    signature=(
+        "a smooth function of pressure that differs between loads, without direction or time; with "
+        "the base refitted, of opposite signs at the middle load and at the outer ones"
+    ),
+    neighbours=("payload_error", "load_dependent_hysteresis", "wire_slack", "temperature"),
+    experiment=(
+        "The same slow triangle under five loads, one of them none: a wrong load shifts all loads "
+        "by one amount, slack ends at a contraction, compliance bends with the load. Three loads "
+        "cannot tell a square law from a dead zone."
+    ),
+    source=(
+        "Readings of a MAS-10-N-100 (Applied Sciences 2021, 11(21), 9855, Tables 3 to 5): the load "
+        "enters as a shift of the pressure, 0.079 bar a kilogram, growing faster than in "
+        "proportion."
+    ),
+    needs=("contraction", "loads"),
+    sensor="a load cell between muscle and load",
+)

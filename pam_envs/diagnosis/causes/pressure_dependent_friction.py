@@ -1,0 +1,32 @@
+"""Friction that changes with pressure: the loop is wider at one end of the range than at the other.
+
+The pressure presses the threads of the braid on one another, so that their friction grows with it,
+less what the load takes off. In the plant the memory acts on a stretched scale of the pressure, on
+which friction is uniform: the loop's width changes along the range.
+"""
+
+from __future__ import annotations
+
+from pam_envs.diagnosis.cause import Cause, Form, Term
+
+CAUSE = Cause(
+    name="pressure_dependent_friction",
+    title="friction that changes with pressure",
+    forms=(Form("stretch", (Term("memory.stretch", (0.1, -0.1), scale=0.05),)),),
+    signature=(
+        "the error has the sign of the direction at low pressures and the opposite one at high "
+        "pressures"
+    ),
+    neighbours=("hysteresis_drive", "hysteresis_shape", "load_dependent_hysteresis", "sensor_bias"),
+    experiment=(
+        "Small loops of the same size at three mean pressures, under two loads: with pressure the "
+        "width changes at either load, with load at every pressure, a wrong shape changes neither."
+    ),
+    source=(
+        "Tondu and Lopez 2000, IEEE Control Systems Magazine 20(2): friction between threads goes "
+        "with the force between them; an open wrist-robot project: 0.5 N and 15 N/MPa; least "
+        "squares on readings of a MAS-10-N-100 (Applied Sciences 2021, 11(21), 9855)."
+    ),
+    needs=("contraction",),
+    sensor="a load cell between muscle and load",
+)

@@ -1,0 +1,42 @@
+"""Bias: a reading is off by a constant.
+
+The zero of an amplifier, or a muscle that had not come to rest when the sensor was zeroed, shifts
+every reading by the same amount, at all pressures and loads. The bias acts on the reading alone, so
+that nothing else in the rig feels it.
+"""
+
+from __future__ import annotations
+
+from pam_envs.diagnosis.cause import Cause, Form, Term
+
+CAUSE = Cause(
+    name="sensor_bias",
+    title="a bias of the sensors",
+    forms=(
+        Form(
+            "both",
+            (
+                Term("position.bias", (1e-4,), scale=1e-4),
+                Term("pressure.bias", (1e3,), scale=1e3),
+            ),
+        ),
+    ),
+    signature="the same error at all times, at rest without pressure too",
+    neighbours=(
+        "sensor_drift",
+        "sensor_nonlinearity",
+        "slip_step",
+        "creep",
+        "threshold_pressure",
+        "pressure_dependent_friction",
+    ),
+    experiment=(
+        "Rest without pressure at the start and at the end: a bias is there both times and equal, "
+        "a drift and a slip only later, a threshold and a bowed sensor only under pressure."
+    ),
+    source=(
+        "A public record of a DMSP-10-250 on a pressure regulator: the pressure reads 0.3 bar off "
+        "at rest."
+    ),
+    sensor="zeroing the sensors at rest without pressure",
+)

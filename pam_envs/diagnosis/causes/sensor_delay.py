@@ -1,0 +1,31 @@
+"""Delay of the reading: the position is shown late.
+
+Filters of an amplifier, averaging over samples and a bus make the reading late, not the motion. The
+pressure reading shows when things really happened.
+"""
+
+from __future__ import annotations
+
+from pam_envs.diagnosis.cause import Cause, Form, Term
+
+CAUSE = Cause(
+    name="sensor_delay",
+    title="the delay of the position sensor",
+    forms=(Form("delay", (Term("position.delay", (0.02,), scale=0.01),)),),
+    signature=(
+        "the error of the contraction follows its velocity, by the same time at every speed; the "
+        "pressure fits"
+    ),
+    neighbours=("dead_time", "viscous_loss"),
+    experiment=(
+        "One swing at 0.2, 0.5, 1 and 2 Hz: a delay shifts all of them by the same time without "
+        "taking from the swing, a loss takes from it and shifts the slow ones more; dead time is "
+        "in the pressure as well."
+    ),
+    source=(
+        "An open wrist-robot project: readings 15 to 25 ms behind a simulation driven by the "
+        "measured pressure."
+    ),
+    needs=("contraction", "pressure"),
+    sensor="an accelerometer on the load, or a camera",
+)

@@ -1,0 +1,35 @@
+"""Slew limit: the pressure cannot rise or fall faster than the valve lets air through.
+
+A full-open valve passes a limited flow, so that large steps run along a straight ramp before they
+round off. Small steps do not meet the limit and follow the lag alone.
+"""
+
+from __future__ import annotations
+
+from pam_envs.diagnosis.cause import Cause, Form, Term
+
+CAUSE = Cause(
+    name="slew_limit",
+    title="the limited rate of the regulator",
+    forms=(
+        Form(
+            "limit",
+            (Term("regulator.slew_rate", (3e5, 1e6, 3e6), low=5e4, high=1e8, log=True),),
+        ),
+    ),
+    signature=(
+        "large steps are late and small ones are not: the time to 63 % grows with the size of the "
+        "step; the error is a triangle after each large step"
+    ),
+    neighbours=("dead_time", "supply_droop", "exhaust_asymmetry"),
+    experiment=(
+        "Steps of three sizes, up and down: a limited rate delays by the size of the step and is "
+        "the same every time, a drooping supply is slower near the top and after a busy spell, a "
+        "slow exhaust acts on the way down only."
+    ),
+    source=(
+        "A public record of a DMSP-10-250 on a pressure regulator: 6.8 bar/s in a raw step, not an "
+        "exponential; ISO 6358 for the flow through a valve."
+    ),
+    sensor="a fast pressure sensor at the muscle",
+)

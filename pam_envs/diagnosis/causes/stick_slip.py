@@ -1,0 +1,44 @@
+"""Stick-slip: the guide sticks, breaks away and sticks again.
+
+Dry friction of a guide is larger at rest than in motion, so that slow motion goes in jumps. The
+load stays where it is until the force on it exceeds the breakaway force, then jumps to where the
+friction of motion holds it. Weak sticking looks like a loss that depends on direction.
+"""
+
+from __future__ import annotations
+
+from pam_envs.diagnosis.cause import Cause, Form, Term
+from pam_envs.diagnosis.seeds import grid
+
+_BREAKS = (0.5, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0, 14.0)
+_HOLDS = (0.0, 0.3, 0.5, 0.75)
+
+CAUSE = Cause(
+    name="stick_slip",
+    title="stick-slip in the guide",
+    forms=(
+        Form(
+            "jumping play",
+            (
+                Term("mass.stick", (4.0,), scale=4.0),
+                Term("mass.stick_kinetic", (0.4,), high=0.95, scale=1.0, amount=False),
+            ),
+            seeds=grid(_BREAKS, _HOLDS),
+        ),
+    ),
+    signature=(
+        "in slow motion the contraction stands still and jumps; the error is a saw-tooth with the "
+        "sign of the direction, whatever the speed"
+    ),
+    neighbours=("viscous_loss", "hysteresis_drive", "hysteresis_shape", "valve_dead_band"),
+    experiment=(
+        "A very slow triangle, 10 s or more for each way: stick-slip draws stairs where everything "
+        "else draws a line; the pressure stays smooth, which a valve's dead band does not."
+    ),
+    source=(
+        "Armstrong-Hélouvry, Dupont and Canudas de Wit 1994, Automatica 30(7); sizes are assumed, "
+        "within what guides of small rigs show."
+    ),
+    needs=("contraction",),
+    sensor="a position sensor of higher resolution, or a load cell between muscle and load",
+)

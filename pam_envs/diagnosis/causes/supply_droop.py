@@ -1,0 +1,48 @@
+"""Droop of the supply: the reservoir empties faster than it is filled.
+
+A small reservoir or a long feed loses pressure as air is taken and recovers slowly. High commands
+are then missed or reached late, the more the busier the rig has been; below the supply's pressure
+nothing is felt. In the plant filling runs through a throat from a supply that falls with what is
+filled and comes back exponentially.
+"""
+
+from __future__ import annotations
+
+from pam_envs.diagnosis.cause import Cause, Form, Term
+
+CAUSE = Cause(
+    name="supply_droop",
+    title="the droop of the supply",
+    forms=(
+        Form(
+            "reservoir",
+            (
+                Term(
+                    "regulator.supply_pressure",
+                    (6.2e5, 7e5, 6.2e5, 5.6e5),
+                    low=3e5,
+                    high=2e6,
+                    log=True,
+                ),
+                Term("regulator.supply_droop", (0.1, 0.1, 0.3, 0.05), scale=0.05, amount=False),
+                Term("regulator.supply_time", (0.1, 0.1, 0.03, 0.03), log=True, amount=False),
+                Term("regulator.supply_recovery", (8.0,), log=True, amount=False),
+            ),
+        ),
+    ),
+    signature=(
+        "peaks of the pressure are clipped or late near the top, worse after a busy spell; "
+        "deflating fits"
+    ),
+    neighbours=("slew_limit", "exhaust_asymmetry"),
+    experiment=(
+        "Fill to the top again and again, then once after a rest: a droop grows with the number of "
+        "fillings and is gone after the rest, a limited rate is the same every time and at every "
+        "level."
+    ),
+    source=(
+        "A public record of a DMSP-10-250 on a pressure regulator: peaks of 5.65 falling to 5.11 "
+        "bar over four cycles at the same command."
+    ),
+    sensor="a pressure sensor before the valve",
+)

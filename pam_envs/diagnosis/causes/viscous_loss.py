@@ -1,0 +1,39 @@
+"""Viscous loss: a drag that grows with speed, less than in proportion.
+
+Rubber under shear and grease between strands resist the more the faster they are sheared, along a
+power of the speed below one. In the plant a further damping falls off with speed from its value at
+rest, so that it holds back slow motion and leaves fast motion to the damping of the base.
+"""
+
+from __future__ import annotations
+
+from pam_envs.diagnosis.cause import Cause, Form, Term
+
+CAUSE = Cause(
+    name="viscous_loss",
+    title="viscous loss in the muscle",
+    forms=(
+        Form(
+            "thinning",
+            (
+                Term("muscle.viscosity", (300.0,), scale=300.0),
+                Term("muscle.viscosity_speed", (0.003,), log=True, amount=False),
+            ),
+        ),
+    ),
+    signature=(
+        "the error of the contraction has the sign of the velocity, grows with speed and is gone "
+        "in a hold"
+    ),
+    neighbours=("stick_slip", "hysteresis_drive", "sensor_delay", "creep", "resonance"),
+    experiment=(
+        "One swing at 0.2, 0.5, 1 and 2 Hz, and ramps at two rates: what viscous loss adds to the "
+        "loop shrinks with the rate, what friction adds does not; in a hold only friction is left."
+    ),
+    source=(
+        "Reynolds et al. 2003, Annals of Biomedical Engineering 31: damping of a large muscle, "
+        "smaller in relaxation; sizes for 10 mm muscles are assumed."
+    ),
+    needs=("contraction",),
+    sensor="a load cell between muscle and load",
+)

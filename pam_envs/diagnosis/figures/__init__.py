@@ -1,0 +1,51 @@
+"""The figures of a diagnosis, as pieces of SVG for its page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pam_envs.diagnosis.figures.canvas import Picture, drawing
+from pam_envs.diagnosis.figures.loops import loops, scatter
+from pam_envs.diagnosis.figures.matrix import isolability
+from pam_envs.diagnosis.figures.over_time import effects, replay, residual, zoom
+from pam_envs.diagnosis.figures.ranked import kinds, rivals, structure
+from pam_envs.diagnosis.figures.readings import Curves, cell_effects, cycles, left_over
+from pam_envs.diagnosis.figures.traces import View
+
+__all__ = ["Picture", "draw"]
+
+OF_TRACES = (replay, zoom, residual, scatter, loops, effects)
+OF_READINGS = (cycles, left_over, cell_effects)
+OF_REPORT = (structure, rivals, kinds, isolability)
+
+
+def draw(report: Mapping[str, Any], traces: Any) -> dict[str, Picture]:
+    """Draw whatever a diagnosis has.
+
+    Parameters
+    ----------
+    report : mapping
+        As in ``report.json``.
+    traces : Traces or None
+        Without them only the figures of the report itself, and of settled readings in it.
+
+    Returns
+    -------
+    dict
+        Name to picture; one that has nothing to show is missing.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        Without matplotlib.
+    """
+    view = None if traces is None else View.of(traces)
+    with drawing():
+        made = [f(report) for f in OF_REPORT]
+        if view is not None and view.channels and len(view.clock) > 1:
+            made += [f(report, view) for f in OF_TRACES]
+        elif (report.get("readings") or {}).get("curves"):
+            curves = Curves.of(report["readings"]["curves"])
+            made += [f(report, curves) for f in OF_READINGS]
+    return {picture.name: picture for picture in made if picture is not None}

@@ -1,0 +1,247 @@
+"""A figure in pixels, and its way onto a page: the only file here that imports matplotlib.
+
+One unit of a figure is one CSS pixel on a page that is 900 wide. The SVG has neither fonts nor
+colours of its own; it takes both from the page, and is as dark or as light as the page is.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+WIDTH = 900.0
+LEFT, RIGHT = 62.0, 18.0
+"""Room beside axes for ticks and labels."""
+LEGEND = 36.0
+"""Height of the legend above everything."""
+
+INK, MUTED, RULE, PAPER = "#1a1c20", "#646b75", "#dfe2e7", "#fefefe"
+MEASURED, BASE, EXTENDED, FLOOR = "#9aa1ab", "#d55e00", "#0072b2", "#009e73"
+HELD, RISING, FALLING, GREY = "#eef1f6", "#b8860b", "#6a4c93", "#b9bec6"
+VARIABLES = {
+    INK: "ink",
+    MUTED: "muted",
+    RULE: "rule",
+    PAPER: "paper",
+    MEASURED: "measured",
+    BASE: "base",
+    EXTENDED: "extended",
+    FLOOR: "floor",
+    HELD: "held",
+    RISING: "rising",
+    FALLING: "falling",
+    GREY: "grey",
+}
+"""Colours that colour-blind readers tell apart (after Okabe and Ito), as the page names them."""
+
+STYLE = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "pam-envs",
+    "text.parse_math": False,
+    "path.simplify": False,
+    "font.family": "DejaVu Sans",
+    "font.size": 12.0,
+    "axes.labelsize": 12.0,
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": MUTED,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.facecolor": "none",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.unicode_minus": True,
+    "grid.color": RULE,
+    "grid.linewidth": 0.8,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelsize": 11.0,
+    "ytick.labelsize": 11.0,
+    "xtick.major.size": 3.0,
+    "ytick.major.size": 0.0,
+    "xtick.major.width": 0.8,
+    "text.color": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 12.0,
+}
+DASHES = (0, (5, 3))
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure of the page.
+
+    Attributes
+    ----------
+    name : str
+        Unique on the page.
+    svg : str
+        An ``<svg>`` element without references to anything outside.
+    alt : str
+        What it shows, for who does not see it.
+    caption : str
+        How to read it.
+    """
+
+    name: str
+    svg: str
+    alt: str
+    caption: str
+
+
+@contextmanager
+def drawing() -> Iterator[None]:
+    """Set matplotlib up for the time of drawing.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        Without matplotlib.
+    """
+    import matplotlib
+
+    with matplotlib.rc_context(STYLE), warnings.catch_warnings():
+        # the page's own fonts show what the font that text is measured with lacks
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        yield
+
+
+class Canvas:
+    """A figure laid out in pixels from its upper left corner."""
+
+    def __init__(self, height: float) -> None:
+        import matplotlib.figure
+
+        self.height = height
+        self.figure = matplotlib.figure.Figure(figsize=(WIDTH / 72.0, height / 72.0), dpi=72)
+        self.figure.patch.set_visible(False)
+
+    def axes(self, left: float, top: float, width: float, height: float, share: Any = None) -> Any:
+        """Add axes."""
+        low = self.height - top - height
+        box = (left / WIDTH, low / self.height, width / WIDTH, height / self.height)
+        ax = self.figure.add_axes(box, sharex=share)
+        ax.locator_params(nbins=5)
+        return ax
+
+    def text(self, x: float, y: float, text: str, **style: Any) -> None:
+        """Write with the baseline at y."""
+        style = {"fontsize": 12.0, "color": INK, **style}
+        figure: Any = self.figure
+        figure.text(x / WIDTH, 1.0 - y / self.height, text, **style)
+
+    def title(self, x: float, y: float, text: str) -> None:
+        """Write the title of a panel."""
+        self.text(x, y, text, fontweight="bold")
+
+    def legend(self, entries: Sequence[tuple[str, str, dict[str, Any]]], x: float = LEFT) -> None:
+        """Put a line of (kind, label, style) at the top; kind is "line", "dot" or "area"."""
+        import matplotlib.lines
+        import matplotlib.patches
+
+        handles: list[Any] = []
+        for kind, label, style in entries:
+            if kind == "area":
+                handles.append(matplotlib.patches.Patch(linewidth=0, label=label, **style))
+                continue
+            shape = {"linestyle": "none", "marker": "o"} if kind == "dot" else {}
+            handles.append(matplotlib.lines.Line2D([], [], label=label, **(shape | style)))
+        if not handles:
+            return
+        self.figure.legend(
+            handles=handles,
+            loc="upper left",
+            bbox_to_anchor=(x / WIDTH, 1.0 - 2.0 / self.height),
+            ncols=len(handles),
+            handlelength=1.5,
+            handletextpad=0.6,
+            columnspacing=1.6,
+            borderpad=0.0,
+            borderaxespad=0.0,
+        )
+
+    def picture(self, name: str, alt: str, caption: str) -> Picture:
+        """Return the finished figure."""
+        from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+        self.figure.align_ylabels()
+        buffer = io.StringIO()
+        FigureCanvasSVG(self.figure).print_svg(buffer, metadata={"Date": None})
+        return Picture(name, for_page(buffer.getvalue(), name, alt, self.height), alt, caption)
+
+
+def dots(ax: Any, x: Array, y: Array, colour: str) -> None:
+    """Draw a cloud as one path of strokes without length: a fifth of the size of markers.
+
+    The limits of the axes do not follow it.
+    """
+    import matplotlib.patches
+    import matplotlib.path
+
+    if not len(x):
+        return
+    points = np.repeat(np.column_stack([x, y]), 2, axis=0)
+    codes = np.tile([matplotlib.path.Path.MOVETO, matplotlib.path.Path.LINETO], len(x))
+    path = matplotlib.path.Path(points, codes)
+    style = {"edgecolor": colour, "linewidth": 2.6, "capstyle": "round", "alpha": 0.45}
+    ax.add_artist(matplotlib.patches.PathPatch(path, fill=False, **style))
+
+
+def square(ax: Any, column: int, row: int, colour: str, alpha: float) -> None:
+    """Fill a cell of a matrix."""
+    import matplotlib.patches
+
+    corner = (column + 0.03, row + 0.03)
+    ax.add_artist(
+        matplotlib.patches.Rectangle(corner, 0.94, 0.94, linewidth=0, facecolor=colour, alpha=alpha)
+    )
+
+
+def for_page(svg: str, name: str, alt: str, height: float) -> str:
+    """Return matplotlib's SVG as an element of a page: its own ids, the page's colours and type."""
+    body = svg[svg.index("<svg") :]
+    body = body[body.index(">") + 1 :]
+    for tag in ("metadata", "style"):
+        body = re.sub(rf"<{tag}.*?</{tag}>", "", body, count=1, flags=re.DOTALL)
+    body = re.sub(r"<[^>]+>", lambda found: _tag(found[0], name), body)
+    body = re.sub(r">\s+<", "><", body)
+    head = f'<svg viewBox="0 0 {WIDTH:g} {height:g}" role="img" aria-label="{escape(alt)}">'
+    return head + body.strip()
+
+
+def _tag(tag: str, name: str) -> str:
+    if tag.startswith("<g "):
+        tag = re.sub(r' id="[^"]*"', "", tag)
+    tag = tag.replace(' id="', f' id="{name}-').replace("url(#", f"url(#{name}-")
+    tag = tag.replace(' xlink:href="#', f' href="#{name}-')
+    tag = re.sub(r' style="[^"]*"', lambda found: _style(found[0]), tag)
+    return re.sub(r' d="[^"]*"', lambda found: _path(found[0]), tag)
+
+
+def _style(text: str) -> str:
+    text = re.sub(r"font: (?:(\w+) )?([\d.]+)px [^;\"]*", _font, text)
+    return re.sub(r"#[0-9a-f]{6}", lambda found: _colour(found[0]), text)
+
+
+def _font(found: re.Match[str]) -> str:
+    weight = f"font-weight: {found[1]}; " if found[1] else ""
+    return f"{weight}font-size: {found[2]}px"
+
+
+def _colour(value: str) -> str:
+    return f"var(--{VARIABLES[value]})" if value in VARIABLES else value
+
+
+def _path(text: str) -> str:
+    return re.sub(r"\s+", " ", re.sub(r"(\.\d\d)\d+", r"\1", text))

@@ -1,0 +1,274 @@
+"""Figures over time: the replay, what it leaves, what each cause does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pam_envs.diagnosis.figures import traces as tv
+from pam_envs.diagnosis.figures.canvas import (
+    BASE,
+    EXTENDED,
+    FLOOR,
+    HELD,
+    INK,
+    LEFT,
+    LEGEND,
+    MEASURED,
+    MUTED,
+    RIGHT,
+    RULE,
+    WIDTH,
+    Array,
+    Canvas,
+    Picture,
+)
+from pam_envs.diagnosis.figures.quantities import MINUS, TIMES, Report, floor, short
+from pam_envs.diagnosis.figures.traces import CHANNELS, View, limits
+
+ROW = 14.0
+"""Height of a row of names of segments; gap between axes that share their time."""
+BOTTOM = 40.0
+INSIDE = WIDTH - LEFT - RIGHT
+
+
+def line(ax: Any, x: Array, y: Array, **style: Any) -> None:
+    """Draw a line, thinned to what can be seen."""
+    ax.plot(*tv.envelope(x, y), **({"linewidth": 1.1, "solid_joinstyle": "round"} | style))
+
+
+def models(ax: Any, view: View, channel: str, rows: slice, wide: float = 3.0) -> None:
+    """Draw an output as measured and as replayed."""
+    x = view.clock[rows]
+    line(ax, x, view.measured[channel][rows], color=MEASURED, linewidth=wide)
+    line(ax, x, view.base[channel][rows], color=BASE)
+    if channel in view.extended:
+        line(ax, x, view.extended[channel][rows], color=EXTENDED)
+
+
+def model_legend(view: View) -> list[tuple[str, str, dict[str, Any]]]:
+    """Return the legend of measured and replayed lines."""
+    entries = [
+        ("line", "measured", {"color": MEASURED, "linewidth": 3.0}),
+        (
+            "line",
+            f"simulation{' before' if view.extended else ''}",
+            {"color": BASE, "linewidth": 1.8},
+        ),
+    ]
+    if view.extended:
+        entries.append(("line", "simulation after", {"color": EXTENDED, "linewidth": 1.8}))
+    return entries
+
+
+def held_out_legend(view: View) -> list[tuple[str, str, dict[str, Any]]]:
+    """Return the legend of the shading."""
+    return (
+        [("area", "held out", {"facecolor": HELD})] if any(s.held_out for s in view.spans) else []
+    )
+
+
+def places(view: View) -> list[tuple[float, int, str, bool]]:
+    """Return time, row, name and whether it was held out of each segment whose name has room.
+
+    There are two rows, and those held out choose first.
+    """
+    per_second = INSIDE / max(view.end - float(view.clock[0]), 1e-12)
+    taken: list[list[tuple[float, float]]] = [[], []]
+    found = []
+    for span in sorted(view.spans, key=lambda s: (not s.held_out, s.start)):
+        label = short(span.name, 18)
+        left = (float(view.clock[span.start]) - float(view.clock[0])) * per_second
+        right = left + 6.2 * len(label) + 8.0
+        free = [r for r in (0, 1) if all(right <= a or b <= left for a, b in taken[r])]
+        if free and right < INSIDE + RIGHT:
+            taken[free[0]].append((left, right))
+            found.append((float(view.clock[span.start]), free[0], label, span.held_out))
+    return found
+
+
+class Strips:
+    """Axes over the whole recording, one below the other."""
+
+    def __init__(self, view: View, heights: Sequence[float], gap: float = ROW) -> None:
+        self.view, self.gap = view, gap
+        self.names = places(view)
+        rows = 1 + max((row for _, row, _, _ in self.names), default=0)
+        self.top = LEGEND + ROW * rows + (gap - ROW)
+        self.canvas = Canvas(self.top + sum(heights) + gap * (len(heights) - 1) + BOTTOM)
+        self.heights = list(heights)
+        self.axes: list[Any] = []
+
+    def next(self, label: str) -> Any:
+        """Return the next axes, with the segments shaded and named on the first."""
+        first = self.axes[0] if self.axes else None
+        height = self.heights[len(self.axes)]
+        ax = self.canvas.axes(LEFT, self.top, INSIDE, height, first)
+        self._shade(ax)
+        if first is None:
+            for time, row, name, held_out in self.names:
+                ax.annotate(
+                    name,
+                    (time, 1.0),
+                    xycoords=("data", "axes fraction"),
+                    xytext=(3.0, 4.0 + (ROW - 1.0) * row),
+                    textcoords="offset points",
+                    fontsize=10.5,
+                    color=INK if held_out else MUTED,
+                )
+        self.axes.append(ax)
+        self.top += height + self.gap
+        ax.set_ylabel(label)
+        last = len(self.axes) == len(self.heights)
+        ax.tick_params(labelbottom=last)
+        if last:
+            ax.set_xlabel(self.view.time_label)
+        return ax
+
+    def _shade(self, ax: Any) -> None:
+        view = self.view
+        for span in view.spans:
+            start = view.clock[span.start]
+            stop = view.end if span.stop == len(view.clock) else view.clock[span.stop]
+            if span.held_out:
+                ax.axvspan(start, stop, color=HELD, linewidth=0, zorder=0)
+            if span.start:
+                ax.axvline(start, color=RULE, linewidth=0.8, zorder=0.5)
+        ax.grid(axis="x", visible=False)
+        ax.set_xlim(view.clock[0], view.end)
+
+
+def replay(report: Report, view: View) -> Picture | None:
+    """Draw measured and replayed outputs over the whole recording."""
+    below = []
+    if view.load is not None and np.nanmax(view.load) > np.nanmin(view.load):
+        below.append(("load\n[N]", view.load))
+    if view.temperature is not None:
+        below.append(("temp.\n[°C]", view.temperature))
+    strips = Strips(view, [170.0] * len(view.channels) + [52.0] * len(below))
+    for channel in view.channels:
+        models(strips.next(tv.unit_label(channel)), view, channel, slice(None))
+    for label, values in below:
+        ax = strips.next(label)
+        line(ax, view.clock, values, color=INK)
+        ax.set_ylim(limits([values], 0.15))
+        ax.locator_params(axis="y", nbins=2)
+    strips.canvas.legend([*model_legend(view), *held_out_legend(view)])
+    return strips.canvas.picture(
+        "replay",
+        f"{' and '.join(view.channels)} over {len(view.spans)} segments, measured and simulated "
+        f"before{' and after' if view.extended else ''} the fix",
+        "A good simulation lies on the wide grey line of the measurement; shaded segments were "
+        "held out of every fit.",
+    )
+
+
+def zoom(report: Report, view: View) -> Picture | None:
+    """Draw the worst stretch of each held-out segment."""
+    spans = tv.one_of_each(view.spans, 3)
+    if not spans:
+        return None
+    gap, height, top = 48.0, 165.0, LEGEND + 14.0
+    width = (INSIDE - gap * (len(spans) - 1)) / len(spans)
+    canvas = Canvas(top + len(view.channels) * (height + ROW) - ROW + BOTTOM)
+    error = view.residual(view.channels[0])
+    for i, span in enumerate(spans):
+        rows = tv.worst_window(view.clock, error, span, 20.0)
+        left = LEFT + i * (width + gap)
+        canvas.title(left, top - 6.0, short(span.name, int(width / 8.0)))
+        for j, channel in enumerate(view.channels):
+            ax = canvas.axes(left, top + j * (height + ROW), width, height)
+            models(ax, view, channel, rows, 4.0)
+            ax.margins(x=0.0, y=0.08)
+            ax.tick_params(labelbottom=channel == view.channels[-1])
+            if i == 0:
+                ax.set_ylabel(tv.unit_label(channel))
+            if channel == view.channels[-1]:
+                ax.set_xlabel(view.time_label)
+    canvas.legend(model_legend(view))
+    return canvas.picture(
+        "zoom",
+        f"close-up of the held-out segments {', '.join(s.name for s in spans)}",
+        "Up to 20 s of each kind of held-out segment, where the simulation was worst before the "
+        "fix.",
+    )
+
+
+def residual(report: Report, view: View) -> Picture | None:
+    """Draw what is left of each output over time, with the band of the noise."""
+    strips = Strips(view, [150.0] * len(view.channels))
+    banded = False
+    for channel in view.channels:
+        ax = strips.next(tv.unit_label(channel))
+        shown = [view.residual(channel)]
+        line(ax, view.clock, shown[0], color=BASE, linewidth=0.9)
+        if channel in view.extended:
+            shown.append(view.residual(channel, extended=True))
+            line(ax, view.clock, shown[1], color=EXTENDED, linewidth=0.9)
+        noise = floor(report, channel)
+        if noise:
+            banded = True
+            shown.append(np.array([-2.5 * noise, 2.5 * noise]))
+            for edge in (-2.0 * noise, 2.0 * noise):
+                ax.axhline(edge, color=FLOOR, linewidth=1.4, zorder=4)
+        ax.set_ylim(limits(shown))
+    side = "before" if view.extended else "simulated"
+    entries = [("line", f"measured {MINUS} {side}", {"color": BASE, "linewidth": 1.8})]
+    if view.extended:
+        entries.append(("line", f"measured {MINUS} after", {"color": EXTENDED, "linewidth": 1.8}))
+    if banded:
+        entries.append(("line", f"±2 {TIMES} noise floor", {"color": FLOOR, "linewidth": 1.8}))
+    strips.canvas.legend([*entries, *held_out_legend(view)])
+    return strips.canvas.picture(
+        "residual",
+        f"residual of {' and '.join(view.channels)} over time against the band of the noise",
+        "A residual of nothing but noise fills the space between the green lines evenly; whatever "
+        "leaves it or swings slowly is something that the simulation does not do.",
+    )
+
+
+def effects(report: Report, view: View) -> Picture | None:
+    """Draw what each named cause adds to the outputs."""
+    rows = [
+        (short(cause.get("title") or cause["name"], 60), channel, traces[channel])
+        for cause in report.get("causes") or []
+        for traces in [view.effects.get(cause["name"]) or {}]
+        for channel in _seen(report, traces)
+    ]
+    if not rows:
+        return None
+    strips = Strips(view, [120.0] * len(rows), gap=ROW + 16.0)
+    for title, channel, trace in rows:
+        strips.canvas.title(LEFT, _title_height(strips), f"{title}: {channel}")
+        ax = strips.next(tv.unit_label(channel))
+        ax.axhline(0.0, color=MUTED, linewidth=0.8)
+        line(ax, view.clock, trace, color=EXTENDED, linewidth=1.3)
+    strips.canvas.legend(
+        [("line", "effect", {"color": EXTENDED, "linewidth": 1.8}), *held_out_legend(view)]
+    )
+    return strips.canvas.picture(
+        "effects",
+        "contribution over time of " + ", ".join(c["name"] for c in report["causes"]),
+        "The extended simulation less the same simulation with this one cause switched off: what "
+        "the cause does to the output, and when.",
+    )
+
+
+def _title_height(strips: Strips) -> float:
+    if strips.axes:
+        return strips.top - 7.0
+    return strips.top - 8.0 - ROW * (1 + max((row for _, row, _, _ in strips.names), default=0))
+
+
+def _seen(report: Report, effect: dict[str, Array]) -> list[str]:
+    """Return the channels on which an effect is at least a tenth of the noise, or the largest."""
+
+    def size(channel: str) -> float:
+        noise = floor(report, channel)
+        rms = float(np.sqrt(np.nanmean(effect[channel] ** 2)))
+        return rms / noise if noise else float(rms > 0)
+
+    channels = [c for c in CHANNELS if c in effect]
+    return [c for c in channels if size(c) >= 0.1] or sorted(channels, key=size)[-1:]

@@ -1,0 +1,111 @@
+"""A first guess of the static map and the friction, by linear regression of the force balance.
+
+Where nothing moves fast the load equals the force of the law, which is linear in its coefficients
+once the plays are computed from the pressure. The guess only starts the fit by simulation: its
+errors are those of regressors that carry noise.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+from scipy.optimize import lsq_linear
+
+from pam_envs.hysteresis.elements import move_plays, simulate_plays
+from pam_envs.mechanics.hanging_mass import GRAVITY
+
+Array = NDArray[np.float64]
+
+SLOW = 0.008
+"""Speed [m/s] below which a sample counts as a balance of forces."""
+MOST = 4000
+"""Samples used."""
+
+
+def play_gaps(pressure: Array, thresholds: tuple[float, ...]) -> Array:
+    """Return pressure minus each play of it, shape (n_plays, T), from a virgin start."""
+    gaps = np.empty((len(thresholds), len(pressure)))
+    for k, threshold in enumerate(thresholds):
+        output = np.empty(len(pressure))
+        state = move_plays(np.zeros(1), (threshold,), np.zeros((1, 1))).T.copy()
+        simulate_plays(pressure, state, np.array([threshold]), np.array([1.0]), 0.0, output)
+        gaps[k] = pressure - output
+    return gaps
+
+
+def balance(
+    contraction: Array,
+    pressure: Array,
+    load: Array,
+    period: float,
+    rest_length: float,
+    braid_strain: float,
+    thresholds: tuple[float, ...],
+    usable: NDArray[np.bool_],
+) -> dict[str, float] | None:
+    """Return coefficients of the static law and play weights, or None if too little is at rest.
+
+    Parameters
+    ----------
+    contraction : ndarray, shape (T,)
+        From the unloaded rest length [m].
+    pressure : ndarray, shape (T,)
+        [Pa].
+    load : ndarray, shape (T,)
+        [kg].
+    usable : ndarray of bool, shape (T,)
+        Samples with readings.
+    """
+    window = max(3, round(0.1 / period))
+    smooth = uniform_filter1d(np.nan_to_num(contraction), window)
+    pace = np.abs(np.gradient(smooth, period))
+    rows = np.flatnonzero(usable & (uniform_filter1d(pace, window) < SLOW))
+    if len(rows) < 200:
+        return None
+    rows = rows[:: max(1, len(rows) // MOST)]
+    e, p = smooth[rows] / rest_length, pressure[rows]
+    gaps = play_gaps(pressure, thresholds)[:, rows]
+    force = load[rows] * GRAVITY
+    bend = -np.expm1(-e / braid_strain)
+    passive = [-bend, -e, -(e**2), -(e**3), -(e**4)]
+    taper = np.zeros(len(rows))
+    found: dict[str, float] = {}
+    for _ in range(3):
+        columns = np.array([p, -e * p, -(e**2) * p, *passive, *(-gaps * (1.0 - taper))]).T
+        scale = np.linalg.norm(columns, axis=0) + 1e-12
+        low = np.full(columns.shape[1], -np.inf)
+        low[[0, 3]] = 0.0
+        low[8:] = 0.0
+        solved = lsq_linear(columns / scale, force, (low, np.full(len(low), np.inf)))
+        c = solved.x / scale
+        area = max(c[0], 1e-6)
+        taper = np.clip((c[1] * e + c[2] * e**2) / area, -1.0, 0.95)
+        found = {
+            "muscle.area": area,
+            "muscle.area_taper": c[1] / area,
+            "muscle.area_curve": c[2] / area,
+            "muscle.braid_force": max(c[3], 1e-3),
+            "muscle.stiffness": c[4],
+            "muscle.softening": c[5],
+            "muscle.hardening": c[6],
+            "muscle.stiffening": c[7],
+        }
+        found |= {f"memory.weight[{k}]": w / area for k, w in enumerate(c[8:])}
+    return found
+
+
+def guessed(frees: tuple[Any, ...], found: dict[str, float]) -> tuple[Any, ...]:
+    """Return frees that start at the guess, within their bounds."""
+    made = []
+    for free in frees:
+        if free.name not in found:
+            made.append(free)
+            continue
+        low = max(free.low, 1e-9) if free.log else free.low
+        start = float(np.clip(found[free.name], low, free.high))
+        made.append(dataclasses.replace(free, start=start))
+    return tuple(made)

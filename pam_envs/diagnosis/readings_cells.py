@@ -1,0 +1,155 @@
+"""The cells of a table of readings, and the memory of the pressures that led to each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.data.tables import LOAD_TOLERANCE, MM, ContractionTable
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+THRESHOLDS = (1 / 24, 1 / 16, 1 / 12, 1 / 8, 3 / 16)
+"""Half dead widths of the plays, over the highest pressure."""
+BLOCK = 4
+"""Neighbouring cells of one way that count as one draw of the model's error."""
+
+
+@dataclass(frozen=True)
+class Cells:
+    """The cells of a table: one load, step of a path and all its repeats each.
+
+    Attributes
+    ----------
+    load, pressure, mean : ndarray, shape (C,)
+        Fractions of the largest load, pressure and contraction.
+    falling : ndarray of bool, shape (C,)
+        Whether the pressure had been lowered to the cell.
+    used : ndarray of bool, shape (C,)
+        False where a reading is zero by definition.
+    group : ndarray of int, shape (C,)
+        Index into ``loads``.
+    path : ndarray of int, shape (C,)
+        Cells of one number were gone through one after the other, from rest.
+    block : ndarray of int, shape (C,)
+        Stretch of neighbouring cells whose errors are taken as one draw; -1 where not used.
+    readings : ndarray, shape (R, C)
+        Repeats; NaN where there are fewer.
+    loads : tuple of float
+        [kg].
+    scale : tuple of float
+        Largest load [kg], pressure [Pa] and contraction [m].
+    """
+
+    load: Array
+    pressure: Array
+    mean: Array
+    falling: Mask
+    used: Mask
+    group: NDArray[np.int64]
+    path: NDArray[np.int64]
+    block: NDArray[np.int64]
+    readings: Array
+    loads: tuple[float, ...]
+    scale: tuple[float, float, float]
+
+    @cached_property
+    def order(self) -> NDArray[np.int64]:
+        """Cells by step and path, shape (steps, paths); a path that has ended repeats its last."""
+        rows = [np.flatnonzero(self.path == k) for k in range(int(self.path[-1]) + 1)]
+        longest = max(len(row) for row in rows)
+        return np.array([np.pad(row, (0, longest - len(row)), "edge") for row in rows]).T
+
+    @cached_property
+    def lags(self) -> Array:
+        """How far the plays lag behind the pressure, shape (plays, 1, C)."""
+        return stops(self.pressure[None], self.order)
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """Readings in each cell, shape (C,)."""
+        return np.asarray(np.isfinite(self.readings).sum(axis=0))
+
+    @property
+    def millimetres(self) -> float:
+        """What a contraction of 1 is [mm]."""
+        return self.scale[2] / MM
+
+
+def _paths(table: ContractionTable) -> dict[tuple[float, bytes], list[NDArray[np.int64]]]:
+    """Return the rows of every cycle, those of one load and the same pressures together."""
+    found: dict[tuple[float, bytes], list[NDArray[np.int64]]] = {}
+    for load in table.loads:
+        for repeat in table.repeats(load):
+            rows = np.flatnonzero(
+                (np.abs(table.load_kg - load) < LOAD_TOLERANCE) & (table.repeat == repeat)
+            )
+            key = (load, table.pressure_pa[rows].tobytes())
+            found.setdefault(key, []).append(rows)
+    return found
+
+
+def _blocks(path: NDArray[np.int64], falling: Mask, used: Mask) -> NDArray[np.int64]:
+    """Return the number of each stretch of at most ``BLOCK`` used cells of one way, or -1."""
+    block, last, size = np.full(len(path), -1), -1, 0
+    before: tuple[int, bool] | None = None
+    for i in np.flatnonzero(used):
+        way = (int(path[i]), bool(falling[i]))
+        fresh = way != before or size == BLOCK
+        last, size, before = last + fresh, 1 if fresh else size + 1, way
+        block[i] = last
+    return block
+
+
+def cells_of(table: ContractionTable) -> Cells:
+    """Return the cells of a table, load by load and path by path, in the order of the readings."""
+    cycles = _paths(table)
+    most = max(len(rows) for rows in cycles.values())
+    largest = max(float(np.abs(table.contraction_m).max()), 1e-12)
+    scale = (max(table.loads) or 1.0, float(table.pressure_pa.max()) or 1.0, largest)
+    parts: list[tuple[NDArray[Any], ...]] = []
+    for number, ((load, _), rows) in enumerate(cycles.items()):
+        values = np.full((most, len(rows[0])), np.nan)
+        values[: len(rows)] = table.contraction_m[np.array(rows)] / largest
+        used = np.ones(values.shape[1], bool)
+        used[0] = bool(np.nanmax(np.abs(values[:, 0])) > 0.0)
+        ones = np.ones(values.shape[1])
+        parts.append(
+            (
+                ones * load / scale[0],
+                table.pressure_pa[rows[0]] / scale[1],
+                np.nanmean(values, axis=0),
+                ~table.inflating[rows[0]],
+                used,
+                (ones * table.loads.index(load)).astype(np.int64),
+                (ones * number).astype(np.int64),
+                values,
+            )
+        )
+    names = ("load", "pressure", "mean", "falling", "used", "group", "path", "readings")
+    columns: dict[str, Any] = {
+        name: np.concatenate(column, axis=-1)
+        for name, column in zip(names, zip(*parts, strict=True), strict=True)
+    }
+    block = _blocks(columns["path"], columns["falling"], columns["used"])
+    return Cells(**columns, block=block, loads=table.loads, scale=scale)
+
+
+def stops(pressure: Array, order: NDArray[np.int64]) -> Array:
+    """Return how far the plays lag behind the pressure, shape (plays, L, C), from rest.
+
+    ``order`` is :attr:`Cells.order`; the pressure has the shape (L, C).
+    """
+    lag = np.array(THRESHOLDS)[:, None, None]
+    behind = np.zeros((len(THRESHOLDS), *pressure.shape))
+    play = np.zeros((len(THRESHOLDS), len(pressure), order.shape[1]))
+    for at in order:
+        value = pressure[:, at]
+        play = np.clip(play, value - lag, value + lag)
+        behind[:, :, at] = value - play
+    return behind

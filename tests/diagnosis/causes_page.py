@@ -1,0 +1,170 @@
+"""What ``docs/diagnosis_causes.md`` has to say, made of the declarations.
+
+The page holds three parts between marks; the rest of it is written by hand. After a change of the
+catalogue ``python -m tests.diagnosis.causes_page`` brings the parts up to date.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from pam_envs.diagnosis.cause import Cause, Form, Term
+from pam_envs.diagnosis.causes import catalogue
+from pam_envs.diagnosis.single_muscle import BASE, declared
+from pam_envs.plants import single_muscle_rows as R
+from pam_envs.plants.single_muscle import SingleMuscle
+
+PAGE = Path(__file__).parents[2] / "docs/diagnosis_causes.md"
+EXAMPLE = Path(__file__).with_name("users_cause.py")
+PLANT = SingleMuscle.mas10("maxwell_slip")
+COMPONENTS = ("regulator", "memory", "muscle", "mass", "position", "pressure")
+WEIGHT = "memory.weight"
+
+GIVEN = {
+    "regulator.max_pressure": "RIG.yaml, `regulator: {max_pressure_bar}`",
+    "muscle.rest_length": "RIG.yaml, `muscle: {rest_length_mm}`",
+    "muscle.diameter": "RIG.yaml, `muscle: {diameter_mm}`; only the air used depends on it",
+    "muscle.braid_angle": "the plant; only the air used depends on it",
+    "muscle.braid_strain": "the plant; `braid_force` and `stiffness` go with it and are refitted",
+    "muscle.temperature": "the recording, `temperature_C`; 20 °C if there is none",
+    "memory.creep_time_1": "the plant; four fixed times cover 0.1 to 300 s",
+    "memory.creep_time_2": "the plant",
+    "memory.creep_time_3": "the plant",
+    "memory.creep_time_4": "the plant",
+    "mass.load": "the recording, `load_N`; its error is `payload_error`",
+    "mass.carried": "RIG.yaml, `load`: 1 for `hanging_mass`, 0 for `constant_force`",
+    "position.noise": "RIG.yaml, `sensors: {contraction_noise_mm}`; measured if it is not given",
+    "position.resolution": "the recording; replays are free of steps",
+    "pressure.noise": "RIG.yaml, `sensors: {pressure_noise_bar}`; measured if it is not given",
+    "pressure.resolution": "the recording; replays are free of steps",
+}
+"""Declared parameters, and where they are given."""
+NEEDS = {
+    "contraction": "`contraction_mm`",
+    "pressure": "`pressure_bar`",
+    "loads": "`load_N` with two loads or more",
+    "temperature": "`temperature_C` that varies",
+}
+
+
+def named_by() -> dict[str, list[str]]:
+    """Return the causes whose forms move a parameter, by its name."""
+    found: dict[str, list[str]] = {}
+    for cause in catalogue():
+        for name in dict.fromkeys(t.name for form in cause.forms for t in form.terms):
+            found.setdefault(name, []).append(cause.name)
+    return found
+
+
+def classes_of(name: str) -> list[tuple[str, str]]:
+    """Return the classes of a parameter, one if all is well, with a word on each."""
+    causes = named_by().get(name, [])
+    return [
+        *([("base", "refitted")] if name in (*BASE, WEIGHT) else []),
+        *([("cause", ", ".join(f"[{c}](#{c})" for c in causes))] if causes else []),
+        *([("declared", GIVEN[name])] if name in GIVEN else []),
+    ]
+
+
+def parameters() -> list[str]:
+    """Return every parameter of the plant, in the order of the signal."""
+    names = [*R.NAMES, WEIGHT]
+    return sorted(names, key=lambda n: COMPONENTS.index(n.partition(".")[0]))
+
+
+def number(value: float | None) -> str:
+    return "" if value is None else f"{value:g}"
+
+
+def limits(name: str) -> tuple[str, float, float, float | None]:
+    """Return unit, bounds and neutral value."""
+    if name == WEIGHT:
+        return "1", 0.0, 1.0, None
+    d = declared(PLANT, name)
+    return d.unit, d.low, d.high, d.neutral
+
+
+def table() -> str:
+    """Return the table of all parameters and their classes."""
+    rows = ["| parameter | unit | bounds | neutral | class | |", "|---|---|---|---|---|---|"]
+    for name in parameters():
+        unit, low, high, neutral = limits(name)
+        kind, words = classes_of(name)[0]
+        shown = f"{name}[k]" if name == WEIGHT else name
+        rows.append(
+            f"| `{shown}` | {unit} | {low:g} to {high:g} | {number(neutral)} | {kind} | {words} |"
+        )
+    return "\n".join(rows)
+
+
+def row_of(form: Form, term: Term) -> str:
+    """Return what is fitted, within which bounds."""
+    unit, low, high, neutral = limits(term.name)
+    low = low if term.low is None else term.low
+    high = high if term.high is None else term.high
+    role = "the effect goes with it" if term.amount else "shapes it"
+    cells = (form.name, f"`{term.name}`", unit, f"{low:g} to {high:g}")
+    return f"| {' | '.join(cells)} | {number(neutral) if term.amount else ''} | {role} |"
+
+
+def section(cause: Cause) -> str:
+    """Return the section of a cause."""
+    module = sys.modules[f"pam_envs.diagnosis.causes.{cause.name}"]
+    lead, _, physics = (module.__doc__ or "").strip().partition("\n\n")
+    rows = [row_of(form, term) for form in cause.forms for term in form.terms]
+    points = {
+        "Residual": cause.signature + ".",
+        "Easily taken for": ", ".join(f"[{n}](#{n})" for n in cause.neighbours) + ".",
+        "What tells": cause.experiment,
+        "Measured directly by": cause.sensor + ".",
+        "Needs": ", ".join(NEEDS[n] for n in cause.needs) + "." if cause.needs else "",
+        "Source": cause.source,
+    }
+    return "\n".join(
+        [
+            f"### {cause.name}",
+            "",
+            f"**{lead}** {' '.join(physics.split())}",
+            "",
+            "| form | parameter | unit | bounds | neutral | |",
+            "|---|---|---|---|---|---|",
+            *rows,
+            "",
+            *(f"- *{name}*: {text}" for name, text in points.items() if text),
+        ]
+    )
+
+
+def sections() -> str:
+    """Return the sections of all causes."""
+    return "\n\n".join(section(cause) for cause in catalogue())
+
+
+def example() -> str:
+    """Return the file of a user's cause, as a block of code."""
+    return f"```python\n{EXAMPLE.read_text(encoding='utf-8')}```"
+
+
+PARTS: dict[str, Callable[[], str]] = {"table": table, "sections": sections, "example": example}
+
+
+def _between(name: str) -> re.Pattern[str]:
+    return re.compile(rf"(?<=<!-- {name} -->\n).*?(?=\n<!-- /{name} -->)", re.DOTALL)
+
+
+def part(name: str) -> str:
+    """Return a part of the page as it stands."""
+    found = _between(name).search(PAGE.read_text(encoding="utf-8"))
+    assert found is not None, f"{PAGE.name} has lost its marks of {name!r}"
+    return found.group()
+
+
+if __name__ == "__main__":
+    text = PAGE.read_text(encoding="utf-8")
+    for mark, make in PARTS.items():
+        made = make()
+        text = _between(mark).sub(lambda _, made=made: made, text)
+    PAGE.write_text(text, encoding="utf-8")

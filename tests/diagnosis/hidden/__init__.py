@@ -1,0 +1,41 @@
+"""Rigs that hide an effect in their recordings, independent of the library under test.
+
+Nothing here knows the library's plants: another muscle law, another friction, another integrator,
+and every effect in another mathematical form.
+"""
+
+from .base import CONTRACTION_NOISE_MM, PRESSURE_NOISE_BAR, Base, decoys, draw_base
+from .campaign import (
+    Campaign,
+    campaign_idle,
+    campaign_long,
+    campaign_short,
+    campaign_standard,
+)
+from .catalogue import EFFECTS, FINAL_UNKNOWN, TUNING_UNKNOWN, draw_effect
+from .effect import Effect
+from .rig import make_recording, rig_yaml, simulate, write_csv
+from .stepper import Stepper
+
+__all__ = [
+    "CONTRACTION_NOISE_MM",
+    "EFFECTS",
+    "FINAL_UNKNOWN",
+    "PRESSURE_NOISE_BAR",
+    "TUNING_UNKNOWN",
+    "Base",
+    "Campaign",
+    "Effect",
+    "Stepper",
+    "campaign_idle",
+    "campaign_long",
+    "campaign_short",
+    "campaign_standard",
+    "decoys",
+    "draw_base",
+    "draw_effect",
+    "make_recording",
+    "rig_yaml",
+    "simulate",
+    "write_csv",
+]

@@ -1,0 +1,577 @@
+"""The audit of recordings and tables, and the noise floor, on data made by numpy alone."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from pam_envs.data.readings import load_readings
+from pam_envs.data.recording import Recording, Rig
+from pam_envs.data.tables import ContractionTable, load_contraction_table
+from pam_envs.diagnosis.audit import audit, undecidable
+from pam_envs.diagnosis.audit_tables import repeat_trend, scatter, scatter_homogeneity
+from pam_envs.diagnosis.noise import hold_ends, noise_floor, resolution, white_noise
+
+PERIOD = 0.02
+NOISE = {"contraction": 3e-5, "pressure": 800.0}
+RIG = Rig(
+    rest_length=0.2,
+    max_pressure=6e5,
+    contraction_noise=3e-5,
+    pressure_noise=800.0,
+    repeats=(("holds_a", "holds_b"),),
+    valve_closed=("shut",),
+)
+
+
+def lagged(command: np.ndarray, time_constant: float) -> np.ndarray:
+    keep = np.exp(-PERIOD / time_constant)
+    return lfilter([0.0, 1.0 - keep], [1.0, -keep], command, zi=[command[0]])[0]
+
+
+def first_order(rng: np.random.Generator, n: int, rms: float, time: float) -> np.ndarray:
+    """Return noise with an exponential autocorrelation, shape (n,)."""
+    keep = np.exp(-PERIOD / time)
+    drive = rms * np.sqrt(1.0 - keep**2) * rng.standard_normal(n)
+    drive[0] /= np.sqrt(1.0 - keep**2)
+    return lfilter([1.0], [1.0, -keep], drive)
+
+
+def arrays(seed: int = 0, white: float = 1.0, slow: float = 0.0, correlation: float = 1.0) -> dict:
+    """Return a sound campaign: rest, holds twice, a sine, a shut valve, three loads.
+
+    ``white`` and ``slow`` are the parts of the noise, in units of NOISE.
+    """
+    rng = np.random.default_rng(seed)
+    holds = np.repeat([1.0, 3.0, 5.0, 2.0, 4.0, 1.5, 5.5, 3.5], 200)
+    sine = 2.8 - 2.2 * np.cos(2 * np.pi * 0.5 * PERIOD * np.arange(600))
+    pieces = [
+        ("rest", np.zeros(200), 0.0),
+        ("condition_a", holds, 0.0),
+        ("holds_a", holds, 0.0),
+        ("condition_b", holds[::-1], 25.0),
+        ("back", holds, 0.0),
+        ("holds_b", holds, 0.0),
+        ("sine", sine, 45.0),
+        ("shut", np.full(250, 3.0), 45.0),
+    ]
+    command = 1e5 * np.concatenate([piece[1] for piece in pieces])
+    n = len(command)
+    pressure = lagged(command, 0.08)
+    contraction = 3e-8 * lagged(pressure, 0.05)
+    noise = {
+        name: white * rms * rng.standard_normal(n) + first_order(rng, n, slow * rms, correlation)
+        for name, rms in NOISE.items()
+    }
+    return {
+        "time": PERIOD * np.arange(n),
+        "command": command,
+        "pressure": pressure + noise["pressure"],
+        "contraction": contraction + noise["contraction"],
+        "load": np.concatenate([np.full(len(p), load) for _, p, load in pieces]),
+        "segment": [label for label, p, _ in pieces for _ in p],
+        "temperature": 20.0 + 2.0 * np.linspace(0.0, 1.0, n),
+        "valve_closed": ("shut",),
+    }
+
+
+def made(**changes) -> Recording:
+    columns = {**arrays(), **changes}
+    return Recording.from_arrays(columns.pop("time"), columns.pop("command"), **columns)
+
+
+def told(recording: Recording, rig: Rig = RIG) -> str:
+    """Return the audit's warnings; there must be no problems."""
+    found = audit(recording, rig)
+    assert found.problems == ()
+    return "\n".join(found.warnings)
+
+
+def problem(recording: Recording, rig: Rig = RIG) -> str:
+    found = audit(recording, rig)
+    assert found.problems
+    return "\n".join(found.problems)
+
+
+def rows(recording: Recording, label: str) -> np.ndarray:
+    return recording.rows_of(label)
+
+
+def test_a_sound_recording_passes_without_a_word():
+    for seed in range(5):
+        columns = arrays(seed, white=0.8, slow=0.6)
+        recording = Recording.from_arrays(columns.pop("time"), columns.pop("command"), **columns)
+        found = audit(recording, RIG)
+        assert found.problems == ()
+        assert found.warnings == ()
+        assert undecidable(recording, RIG) == {}
+
+
+def test_rounded_readings_pass_too():
+    columns = arrays()
+    columns["contraction"] = 5e-5 * np.round(columns["contraction"] / 5e-5)
+    columns["pressure"] = 450.0 * np.round(columns["pressure"] / 450.0)
+    recording = Recording.from_arrays(columns.pop("time"), columns.pop("command"), **columns)
+    assert told(recording) == ""
+
+
+# one channel
+
+
+def test_a_stuck_channel_is_a_problem():
+    pressure = arrays()["pressure"].copy()
+    pressure[1000:1500] = 2.5e5
+    text = problem(made(pressure=pressure))
+    assert "pressure_bar stands at 2.5 bar in rows 1002 to 1501 while the command moves by" in text
+    text = problem(made(contraction=np.full_like(pressure, 1e-3)))
+    assert "contraction_mm holds one value in all rows" in text
+
+
+def test_a_muscle_that_may_stand_still_is_only_a_warning():
+    columns = arrays()
+    low = made().rows_of("condition_a")
+    columns["contraction"][low[:200]] = columns["contraction"].min() - 1e-4
+    columns["command"][low[:200]] = np.linspace(0.0, 2.4e5, 200)
+    text = told(made(**columns))
+    first = low[0] + 2
+    assert f"in rows {first} to {first + 199} while the command moves by 1.8 bar" in text
+    assert "friction, a threshold or the end of its range holds it" in text
+    columns["command"][low[:200]] = np.linspace(0.0, 5.5e5, 200)
+    assert "the sensor was stuck" in problem(made(**columns))
+
+
+def test_what_stands_still_under_a_shut_valve_is_not_stuck():
+    shut = made().rows_of("shut")
+    columns = arrays()
+    columns["command"][shut] = np.linspace(1e5, 4e5, len(shut))
+    columns["contraction"][shut] = 9e-3
+    assert "stands at" not in told(made(**columns))
+
+
+def test_a_clipped_channel_is_told_with_its_rows():
+    contraction = np.minimum(arrays()["contraction"], 14e-3)
+    text = told(made(contraction=contraction))
+    assert f"contraction_mm reads exactly 14 mm in {np.sum(contraction == 14e-3)} rows" in text
+    assert "upper end of its range" in text
+    pressure = np.maximum(arrays()["pressure"], 1.2e5)
+    text = told(made(pressure=pressure))
+    start = made().rows_of("condition_a")[0]
+    assert f"pressure_bar reads exactly 1.2 bar in {np.sum(pressure == 1.2e5)} rows" in text
+    assert f"rows 2 to {start + 200 + 2}" in text
+    assert "lower end of its range" in text
+
+
+def test_coarse_readings_are_told():
+    contraction = 2e-4 * np.round(arrays()["contraction"] / 2e-4)
+    text = told(made(contraction=contraction))
+    assert (
+        "contraction_mm is recorded in steps of 0.2 mm, coarser than its noise of 0.03 mm" in text
+    )
+    assert "digit by digit" not in text  # coarse readings repeat themselves rightly
+
+
+def test_resolution_is_the_step_between_readings():
+    rng = np.random.default_rng(0)
+    values = rng.normal(size=2000)
+    assert resolution(values) == 0.0
+    assert resolution(0.05 * np.round(values / 0.05)) == pytest.approx(0.05)
+    assert resolution(np.ones(5)) == 0.0
+    assert resolution(np.array([0.0, 2.0, 0.0])) == 2.0
+
+
+def test_single_spikes_are_named():
+    contraction = arrays()["contraction"].copy()
+    contraction[[700, 2100]] += [2e-3, -2e-3]
+    text = told(made(contraction=contraction))
+    assert "contraction_mm jumps for a single sample" in text
+    assert "in rows 702 and 2102; correct these readings" in text
+
+
+def test_a_copied_cycle_is_named_with_both_places():
+    columns = arrays()
+    recording = made()
+    one, two = rows(recording, "holds_a"), rows(recording, "holds_b")
+    for name in ("contraction", "pressure"):
+        columns[name][two] = columns[name][one]
+    text = told(made(**columns))
+    assert (
+        f"the readings of rows {one[0] + 2} to {one[-1] + 2} stand once more in "
+        f"rows {two[0] + 2} to {two[-1] + 2}, digit by digit"
+    ) in text
+    columns = arrays()
+    for name in ("contraction", "pressure"):
+        columns[name][3000:3049] = columns[name][1000:1049]
+    assert "digit by digit" not in told(made(**columns))  # 49 rows are too few
+    for name in ("contraction", "pressure"):
+        columns[name][3000:3063] = columns[name][1000:1063]
+    assert "rows 1002 to 1064 stand once more in rows 3002 to 3064" in told(made(**columns))
+
+
+def test_checks_of_a_fast_recording_see_every_reading():
+    n = 4000
+    rng = np.random.default_rng(1)
+    command = 1e5 * (2.0 + np.sin(np.arange(n) / 200.0))
+    pressure = command + 800.0 * rng.standard_normal(n)
+    pressure[1501] += 1e5
+    fast = Recording.from_arrays(np.arange(n) / 500.0, command, pressure=pressure)
+    assert fast.raw is not None
+    assert "in row 1503;" in told(fast, Rig())
+
+
+def test_the_declared_noise_is_that_of_a_single_reading():
+    rng = np.random.default_rng(1)
+    command = np.repeat(1e5 * rng.uniform(0.0, 5.0, 20), 2000)
+    pressure = command + 800.0 * rng.standard_normal(40_000)
+    fast = Recording.from_arrays(np.arange(40_000) / 500.0, command, pressure=pressure)
+    floor = noise_floor(fast, Rig(pressure_noise=800.0))
+    assert floor["pressure"].value == pytest.approx(800.0 / np.sqrt(5.0), rel=0.06)
+    assert floor["pressure"].reading == pytest.approx(800.0, rel=0.06)
+    assert floor.warnings == ()
+    assert "declared" in noise_floor(fast, Rig(pressure_noise=400.0)).warnings[0]
+    assert noise_floor(made(), RIG)["pressure"].reading == pytest.approx(800.0, rel=0.06)
+
+
+# units
+
+
+@pytest.mark.parametrize(
+    ("factor", "advice"),
+    [
+        (100.0, "it looks like kPa: divide by 100"),
+        (14.5, "it looks like psi: divide by 14.504"),
+        (0.1, "it looks like MPa: multiply by 10"),
+        (1e-3, "no muscle is run like this"),
+    ],
+)
+def test_pressures_in_other_units_are_named(factor, advice):
+    text = problem(made(pressure=factor * arrays()["pressure"]))
+    assert "pressure_bar " in text
+    assert advice in text
+
+
+@pytest.mark.parametrize(
+    ("factor", "advice"), [(100.0, "kPa: divide by 100"), (14.5, "psi: divide by 14.504")]
+)
+def test_commands_in_other_units_are_named(factor, advice):
+    columns = arrays()
+    both = {name: factor * columns[name] for name in ("command", "pressure")}
+    text = problem(made(**both))
+    assert f"pressure_command_bar goes up to {factor * 5.5:.4g}; it looks like {advice}" in text
+
+
+def test_a_command_near_zero_is_wrong_only_if_the_pressure_rises():
+    columns = arrays()
+    text = problem(made(command=0.1 * columns["command"]))
+    assert "pressure_command_bar never exceeds 0.55 while the pressure goes to 5.5" in text
+    assert "it looks like MPa: multiply by 10" in text
+    text = told(made(command=0.0 * columns["command"], pressure=columns["pressure"] * 1e-3))
+    assert "pressure_command_bar never exceeds 0 bar: nothing is excited" in text
+
+
+def test_pressures_all_in_mpa_are_suspected():
+    columns = arrays()
+    both = {name: 0.1 * columns[name] for name in ("command", "pressure")}
+    assert "if the pressures are in MPa, multiply by 10" in told(made(**both))
+
+
+def test_absolute_pressure_is_suspected():
+    text = told(made(pressure=arrays()["pressure"] + 1.013e5))
+    assert "gauge pressure is wanted: if it is absolute, subtract 1.013" in text
+
+
+def test_contractions_that_cannot_be_right():
+    contraction = arrays()["contraction"]
+    text = problem(made(contraction=10.0 * contraction))
+    assert "more than 40% of the rest length of 200 mm; check its unit" in text
+    text = problem(made(contraction=0.2 - contraction))
+    assert "looks like the muscle's length" in text
+    text = told(made(contraction=1e-3 * contraction), Rig())
+    assert "if it is in metres, multiply by 1000" in text
+    assert "contraction_mm falls as the pressure rises" in told(made(contraction=-contraction))
+
+
+def test_loads_in_kilograms_are_found_by_the_force():
+    load = arrays()["load"]
+    text = problem(made(load=load / 9.80665, force=load + 0.1))
+    assert "load_N looks like kilograms: multiply by 9.80665" in text
+    assert "if load_N is in kilograms" in told(made(load=load / 9.80665))
+    assert "load_N goes down to -45 N" in problem(made(load=-load))
+
+
+def test_a_command_above_the_regulators_range_is_told():
+    rig = dataclasses.replace(RIG, max_pressure=5e5)
+    assert "the command goes to 5.5 bar, above the regulator's 5 bar" in told(made(), rig)
+
+
+# what is missing
+
+
+def test_what_the_campaign_lacks_is_told():
+    columns = arrays()
+    bare = made(
+        load=25.0,
+        temperature=None,
+        pressure=None,
+        command=columns["command"] + 5e4,
+        segment=None,
+        valve_closed=(),
+    )
+    text = told(bare, Rig())
+    assert "the load was 25 N throughout" in text
+    assert "causes that act with the load cannot be decided" in text
+    assert "no segments repeat one another" in text
+    assert "there is no column temperature_C" in text
+    assert "there is no column pressure_bar" in text
+    assert "never rests near 0 bar" in text
+    assert "there is no column contraction_mm" in told(made(contraction=None))
+
+
+def test_notes_of_the_reading_are_among_the_warnings():
+    recording = dataclasses.replace(made(), notes=("row 7 was mended",))
+    assert audit(recording, RIG).warnings[0] == "row 7 was mended"
+
+
+def test_a_rig_that_names_other_segments_is_a_problem():
+    assert "'holds_c'" in problem(made(), Rig(repeats=(("holds_a", "holds_c"),)))
+
+
+def test_repeats_must_have_one_command():
+    rig = dataclasses.replace(RIG, repeats=(("holds_a", "condition_b"),))
+    assert "'holds_a' and 'condition_b' should repeat one another" in told(made(), rig)
+
+
+def test_what_absent_columns_make_undecidable():
+    reasons = undecidable(made(temperature=None, load=25.0, pressure=None, valve_closed=()), RIG)
+    assert reasons["temperature"] == "the temperature was not recorded"
+    assert reasons["payload_error"] == "the load was 25 N throughout"
+    assert "load_dependent_hysteresis" in reasons
+    assert "load_dependent_compliance" in reasons
+    assert "cannot be told from dead_time" in reasons["sensor_delay"]
+    assert "the valve was never shut" in reasons["leak"]
+    assert set(reasons) == {
+        "temperature",
+        "payload_error",
+        "load_dependent_hysteresis",
+        "load_dependent_compliance",
+        "sensor_delay",
+        "leak",
+    }
+
+
+def test_what_a_campaign_cannot_show():
+    even = made(temperature=np.full(len(made().time), 20.0))
+    assert "varied by only 0 K" in undecidable(even)["temperature"]
+    tired = dataclasses.replace(RIG, cycles_since_rest=6)
+    assert "6 cycles since it rested" in undecidable(made(), tired)["first_cycle_softening"]
+    assert "first_cycle_softening" not in undecidable(
+        made(), dataclasses.replace(RIG, cycles_since_rest=5)
+    )
+    rising = np.sort(arrays()["command"])
+    assert "never falls" in undecidable(made(command=rising))["exhaust_asymmetry"]
+    reasons = undecidable(made(contraction=None))
+    for name in ("creep", "slip_step", "sensor_delay", "stick_slip", "wire_slack"):
+        assert reasons[name] == "the contraction was not recorded"
+    assert "valve_dead_band" not in reasons
+    assert "dead_time" not in reasons
+
+
+def test_two_seconds_of_a_shut_valve_do_not_show_a_leak():
+    columns = arrays()
+    shut = made().rows_of("shut")
+    columns["segment"][shut[100] :] = ["after"] * (len(shut) - 100)
+    assert "leak" in undecidable(made(**columns))
+    columns["segment"][shut[100] : shut[100] + 50] = ["shut"] * 50
+    assert "leak" not in undecidable(made(**columns))
+
+
+# the noise floor
+
+
+@pytest.mark.parametrize(
+    ("white", "slow", "correlation"), [(1.0, 0.0, 1.0), (0.8, 0.6, 0.3), (0.7, 0.7, 1.0)]
+)
+def test_the_floor_is_the_noise_white_and_coloured(white, slow, correlation):
+    true = np.hypot(white, slow)
+    found = {"repeats": [], "holds": [], "innovations": []}
+    for seed in range(4):
+        columns = arrays(seed, white, slow, correlation)
+        recording = Recording.from_arrays(columns.pop("time"), columns.pop("command"), **columns)
+        floor = noise_floor(recording, RIG)
+        for channel, rms in NOISE.items():
+            assert floor[channel].source == "repeats"
+            for name, value in floor[channel].estimates.items():
+                found[name].append(value / rms)
+    assert np.mean(found["repeats"]) == pytest.approx(true, rel=0.06)
+    assert np.mean(found["holds"]) == pytest.approx(true, rel=0.12)
+    assert np.mean(found["innovations"]) == pytest.approx(white, rel=0.06)
+
+
+def test_the_correlation_time_is_that_of_the_noise():
+    columns = arrays(1, white=0.0, slow=1.0, correlation=0.5)
+    recording = Recording.from_arrays(columns.pop("time"), columns.pop("command"), **columns)
+    assert noise_floor(recording, RIG)["contraction"].correlation_time == pytest.approx(
+        0.5, rel=0.3
+    )
+    time = noise_floor(made(), RIG)["contraction"].correlation_time
+    assert time is not None
+    assert time < PERIOD
+
+
+def test_without_repeats_the_holds_serve_and_without_holds_the_differences():
+    assert noise_floor(made(), Rig())["pressure"].source == "holds"
+    n = 3000
+    rng = np.random.default_rng(0)
+    command = 1e5 * (2.5 + 2.0 * np.sin(0.01 * np.arange(n)))
+    moving = Recording.from_arrays(
+        PERIOD * np.arange(n), command, pressure=command + 800.0 * rng.standard_normal(n)
+    )
+    floor = noise_floor(moving)
+    assert floor.contraction is None
+    assert floor["pressure"].source == "innovations"
+    assert floor["pressure"].value == pytest.approx(800.0, rel=0.06)
+    assert floor["pressure"].correlation_time is None
+    with pytest.raises(KeyError, match="contraction was not recorded"):
+        floor["contraction"]
+
+
+def test_repeats_that_differ_give_way_to_the_holds():
+    contraction = arrays()["contraction"].copy()
+    second = made().rows_of("holds_b")
+    contraction[second] += 3e-4 * np.sin(np.arange(len(second)) / 200.0)
+    floor = noise_floor(made(contraction=contraction), RIG)
+    assert floor["contraction"].source == "holds"
+    assert floor["contraction"].value == pytest.approx(3e-5, rel=0.1)
+    assert floor["contraction"].estimates["repeats"] > 1e-4
+    assert "the muscle or the rig changed between the repeats" in floor.warnings[0]
+    assert floor["pressure"].source == "repeats"
+
+
+def test_an_offset_between_repeats_is_not_noise():
+    contraction = arrays()["contraction"].copy()
+    contraction[made().rows_of("holds_b")] += 1e-3
+    floor = noise_floor(made(contraction=contraction), RIG)["contraction"]
+    assert floor.source == "repeats"
+    assert floor.value == pytest.approx(3e-5, rel=0.06)
+
+
+def test_outliers_and_copies_do_not_move_the_floor():
+    contraction = arrays()["contraction"].copy()
+    second = made().rows_of("holds_b")
+    contraction[second[::97]] += 5e-3
+    floor = noise_floor(made(contraction=contraction), RIG)["contraction"]
+    assert floor.estimates["repeats"] == pytest.approx(3e-5, rel=0.06)
+    contraction[second] = contraction[made().rows_of("holds_a")]
+    floor = noise_floor(made(contraction=contraction), RIG)["contraction"]
+    assert "repeats" not in floor.estimates
+    assert floor.value == pytest.approx(3e-5, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("factor", "warned"), [(0.5, True), (0.8, False), (1.25, False), (2.0, True)]
+)
+def test_a_wrong_declaration_is_told(factor, warned):
+    rig = dataclasses.replace(RIG, contraction_noise=factor * 3e-5)
+    floor = noise_floor(made(), rig)
+    assert floor["contraction"].declared == factor * 3e-5
+    assert floor["contraction"].value == pytest.approx(3e-5, rel=0.06)
+    text = f"contraction: the declared noise is {factor * 0.03:.3g} mm, the repeats say 0.0"
+    assert any(warning.startswith(text) for warning in floor.warnings) is warned
+    assert (text in told(made(), rig)) is warned
+
+
+def test_noise_below_the_resolution():
+    """A reading that never moves within a hold has the error of its rounding."""
+    columns = arrays(white=0.0)
+    contraction = 1e-4 * np.round(columns["contraction"] / 1e-4)
+    pressure = np.zeros_like(contraction)
+    floor = noise_floor(made(contraction=contraction, pressure=pressure))
+    assert floor["contraction"].value == pytest.approx(1e-4 / np.sqrt(12.0))
+    assert floor["pressure"].source == "declared"
+    assert floor["pressure"].value == 0.0
+    assert "no noise can be seen in the recording; declare the sensor's" in floor.warnings[-1]
+    floor = noise_floor(made(pressure=pressure), RIG)
+    assert floor["pressure"].value == 800.0
+
+
+def test_holds_end_settled_and_within_one_experiment():
+    recording = made()
+    for end in hold_ends(recording):
+        assert np.ptp(recording.command[end]) == 0.0
+        assert np.ptp(recording.load[end]) == 0.0
+        before = recording.command[end[0] - 75 : end[0]]
+        assert np.ptp(before) == 0.0
+        assert len(end) * PERIOD >= 1.0
+    assert len(hold_ends(recording)) > 20
+
+
+def test_white_noise_ignores_what_moves():
+    recording = made()
+    assert recording.contraction is not None
+    assert white_noise(recording, recording.contraction) == pytest.approx(3e-5, rel=0.05)
+
+
+# tables
+
+
+def test_the_published_table_is_audited():
+    """The figures of the tables' own analysis: only the unloaded muscle drifts."""
+    table = load_contraction_table()
+    trend = repeat_trend(table, 0.0)
+    assert trend.slope == pytest.approx(0.033e-3, abs=0.0005e-3)
+    assert trend.t == pytest.approx(3.0, abs=0.1)
+    assert trend.t_means == pytest.approx(2.7, abs=0.1)
+    assert abs(repeat_trend(table, 2.55).t) < 1.0
+    assert scatter(table, 0.0) == pytest.approx(0.177e-3, abs=0.0005e-3)
+    assert scatter_homogeneity(table) == pytest.approx(0.006, abs=0.0005)
+    text = "\n".join(audit(table).warnings)
+    assert audit(table).problems == ()
+    assert "the readings at 0 kg drift by +0.033 mm a repeat (t = 3.0, 2.7 from" in text
+    assert "at 2.55 kg drift" not in text
+    assert "Levene p = 0.0062): 0.177 mm at 0 kg, 0.133 mm at 2.55 kg, 0.136 mm" in text
+    assert "a quadratic law of the load cannot be told from a dead zone" in text
+
+
+def test_an_even_table_of_five_loads_passes():
+    assert audit(_table(np.random.default_rng(3), loads=5)).warnings == ()
+
+
+def test_identical_repeats_are_named():
+    table = _table(np.random.default_rng(3), loads=5)
+    contraction = table.contraction_m.copy()
+    at = table.load_kg == 2.0
+    contraction[at & (table.repeat == 3)] = contraction[at & (table.repeat == 1)]
+    text = "\n".join(audit(dataclasses.replace(table, contraction_m=contraction)).warnings)
+    assert "repeats 1 and 3 at 2 kg are alike digit by digit" in text
+
+
+def test_few_loads_and_single_repeats_are_told(tmp_path):
+    table = _table(np.random.default_rng(0), loads=1, repeats=1)
+    text = "\n".join(audit(table).warnings)
+    assert "there is one load" in text
+    assert "the noise floor is not known" in text
+    with pytest.raises(ValueError, match="one repeat at 0 kg shows no trend"):
+        repeat_trend(table, 0.0)
+    assert "two loads" in audit(_table(np.random.default_rng(0), loads=2)).warnings[0]
+    path = tmp_path / "table.csv"
+    path.write_text(
+        "load_kg,pressure_bar,direction,repeat,contraction_mm\n0,0,up,1,0\n0,2,up,1,3\n0,1,up,2,2\n"
+    )
+    assert "went different ways" in audit(load_readings(path)).warnings[-1]
+
+
+def _table(rng: np.random.Generator, loads: int, repeats: int = 4) -> ContractionTable:
+    path = np.r_[np.arange(0.0, 6.0), np.arange(6.0, -1.0, -1.0)]
+    n = len(path)
+    shape = (loads, repeats, n)
+    base = np.broadcast_to(2.0 * path, shape) + 0.1 * rng.standard_normal(shape)
+    base[:, :, 0] = 0.0
+    return ContractionTable(
+        load_kg=np.repeat(np.arange(float(loads)), repeats * n),
+        inflating=np.tile(np.arange(n) <= np.argmax(path), loads * repeats),
+        pressure_pa=np.tile(1e5 * path, loads * repeats),
+        repeat=np.tile(np.repeat(np.arange(1, repeats + 1), n), loads),
+        contraction_m=1e-3 * base.ravel(),
+    )

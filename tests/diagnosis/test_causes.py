@@ -1,0 +1,293 @@
+"""The catalogue of causes: complete, documented, and each one acts on the plant."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+
+import numpy as np
+import pytest
+
+from pam_envs.data.rig_file import Rig
+from pam_envs.diagnosis import causes as package
+from pam_envs.diagnosis.audit import NEED_CONTRACTION, NEED_LOADS
+from pam_envs.diagnosis.causes import by_name, catalogue
+from pam_envs.diagnosis.search import frees_of
+from pam_envs.diagnosis.single_muscle import BASE, MuscleFamily, declared, start_plant
+from pam_envs.plants import single_muscle_rows as R
+from pam_envs.plants.replay import Inputs, replay
+from pam_envs.plants.single_muscle import SingleMuscle
+from tests.diagnosis import causes_page as page
+from tests.diagnosis import users_cause
+
+NAMES = [
+    "creep",
+    "leak",
+    "valve_dead_band",
+    "dead_time",
+    "slew_limit",
+    "sensor_bias",
+    "sensor_drift",
+    "sensor_delay",
+    "viscous_loss",
+    "temperature",
+    "first_cycle_softening",
+    "load_dependent_hysteresis",
+    "load_dependent_compliance",
+    "hysteresis_shape",
+    "hysteresis_drive",
+    "supply_droop",
+    "stick_slip",
+    "threshold_pressure",
+    "exhaust_asymmetry",
+    "pressure_dependent_friction",
+    "sensor_nonlinearity",
+    "resonance",
+    "slip_step",
+    "wire_slack",
+    "payload_error",
+]
+"""They are part of the report's layout."""
+CATALOGUE = catalogue()
+PLANT = start_plant(Rig(rest_length=0.2))
+PERIOD = 0.02
+EARLY = {"position.slip_at": 8.0, "position.ramp_at": 8.0}
+"""Moments [s] within the short campaign, for those that are looked for in a recording."""
+FORMS = [
+    pytest.param(cause, form, id=f"{cause.name}-{form.name}")
+    for cause in CATALOGUE
+    for form in cause.forms
+]
+TERMS = [
+    pytest.param(form, term, id=f"{cause.name}-{form.name}-{term.name}")
+    for cause in CATALOGUE
+    for form in cause.forms
+    for term in form.terms
+]
+
+
+def campaign(loads: tuple[float, float] = (1.5, 4.0)) -> Inputs:
+    """Return 22 s of steps, small swings and a shut valve, twice, while the muscle warms."""
+    bars = [(0, 0.6), (3, 1.4), (0.5, 1), (6, 1.4), (3, 1.4), (3.04, 0.6), (4.5, 0.8), (-1, 1.8)]
+    bars += [(0.2, 1), (0, 1)]
+    one = np.concatenate([np.full(round(s / PERIOD), 1e5 * p if p >= 0 else -1.0) for p, s in bars])
+    command = np.tile(one, 2)
+    n = len(command)
+    fresh = np.zeros(n, bool)
+    fresh[0] = True
+    return Inputs(
+        PERIOD,
+        command,
+        np.repeat(loads, len(one)),
+        293.15 + np.linspace(0.0, 15.0, n),
+        fresh,
+        np.zeros(n),
+        np.zeros(n, bool),
+    )
+
+
+INPUTS, EMPTY = campaign(), campaign((0.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return replay(PLANT, INPUTS)
+
+
+def started(form, **amounts):
+    """Return the values at which the last of a form's fits begins."""
+    values = {t.name: EARLY.get(t.name, t.starts[-1]) for t in form.terms}
+    return {**values, **amounts}
+
+
+def neutral(form):
+    """Return what switches a form off; what only shapes it stays on."""
+    return {t.name: declared(PLANT, t.name).neutral for t in form.terms if t.amount}
+
+
+def differences(first, second):
+    return {name: float(np.abs(first[name] - second[name]).max()) for name in first}
+
+
+def test_the_catalogue_has_every_cause_once():
+    assert [cause.name for cause in CATALOGUE] == NAMES
+
+
+def test_every_file_is_one_cause_and_named_as_it():
+    files = [module.name for module in pkgutil.iter_modules(package.__path__)]
+    assert sorted(files) == sorted(NAMES)
+    for name in files:
+        assert importlib.import_module(f"{package.__name__}.{name}").CAUSE is by_name(name)
+
+
+def test_an_unknown_cause_is_refused_by_name():
+    with pytest.raises(ValueError, match="no cause named 'gremlins'; there are: creep, leak"):
+        by_name("gremlins")
+
+
+@pytest.mark.parametrize("cause", CATALOGUE, ids=NAMES)
+def test_a_cause_is_documented(cause):
+    for text in (cause.signature, cause.experiment, cause.source, cause.sensor):
+        assert text.strip()
+    assert 5 < len(cause.title) <= 40
+    _, _, physics = importlib.import_module(f"{package.__name__}.{cause.name}").__doc__.partition(
+        "\n\n"
+    )
+    assert 2 <= physics.count(". ") + physics.count(".\n") <= 5
+
+
+@pytest.mark.parametrize("cause", CATALOGUE, ids=NAMES)
+def test_neighbours_are_causes_and_mutual(cause):
+    assert cause.neighbours
+    assert len(set(cause.neighbours)) == len(cause.neighbours)
+    for name in cause.neighbours:
+        assert name != cause.name
+        assert cause.name in by_name(name).neighbours, f"{name} does not know {cause.name}"
+
+
+def test_what_a_cause_needs_is_what_the_audit_asks_for():
+    def needing(column):
+        return {cause.name for cause in CATALOGUE if column in cause.needs}
+
+    assert {n for cause in CATALOGUE for n in cause.needs} <= set(page.NEEDS)
+    assert needing("contraction") == set(NEED_CONTRACTION)
+    assert needing("loads") >= set(NEED_LOADS)
+    assert needing("temperature") == {"temperature"}
+
+
+@pytest.mark.parametrize(("form", "term"), TERMS)
+def test_fits_begin_within_bounds(form, term):
+    d = declared(PLANT, term.name)
+    low = d.low if term.low is None else term.low
+    high = d.high if term.high is None else term.high
+    assert d.low <= low < high <= d.high
+    assert term.starts
+    assert all(low <= start <= high for start in term.starts)
+    assert not term.log or low > 0.0
+    assert term.log or (term.scale is not None and term.scale > 0.0)
+    assert {len(t.starts) for t in form.terms} <= {1, max(len(t.starts) for t in form.terms)}
+
+
+@pytest.mark.parametrize(("cause", "form"), FORMS)
+def test_a_form_has_an_amount_that_can_be_switched_off(cause, form):
+    off = neutral(form)
+    assert off
+    for term in form.terms:
+        assert not term.amount or off[term.name] is not None
+        assert not term.amount or off[term.name] not in term.starts
+        assert term.name not in BASE
+
+
+@pytest.mark.parametrize("name", page.parameters())
+def test_every_parameter_is_in_one_class(name):
+    assert [kind for kind, _ in page.classes_of(name)] in (["base"], ["cause"], ["declared"])
+
+
+def test_no_class_holds_what_is_not_a_parameter():
+    assert {*page.named_by(), *page.GIVEN, *BASE} <= set(R.NAMES)
+
+
+@pytest.mark.parametrize("name", page.PARTS)
+def test_the_page_says_what_is_declared(name):
+    assert page.part(name) == page.PARTS[name](), "run python -m tests.diagnosis.causes_page"
+
+
+def test_links_of_the_page_have_targets():
+    text = page.PAGE.read_text(encoding="utf-8")
+    for name in NAMES:
+        assert text.count(f"\n### {name}\n") == 1
+
+
+@pytest.mark.parametrize(("cause", "form"), FORMS)
+def test_a_cause_changes_what_is_measured(cause, form, plain):
+    changed = differences(plain, replay(PLANT.replace(started(form)), INPUTS))
+    assert changed["contraction"] > 5e-6 or changed["pressure"] > 100.0
+
+
+@pytest.mark.parametrize(("form", "term"), TERMS)
+def test_every_parameter_of_a_form_matters(form, term):
+    values = started(form)
+    span = abs(values[term.name]) or term.scale
+    moved = values[term.name] + (0.3 * span if term.high is None else -0.3 * span)
+    first = replay(PLANT.replace(values), INPUTS)
+    second = replay(PLANT.replace({**values, term.name: moved}), INPUTS)
+    assert max(differences(first, second).values()) > 0.0
+
+
+@pytest.mark.parametrize(("cause", "form"), FORMS)
+def test_a_cause_that_is_off_changes_nothing(cause, form, plain):
+    off = replay(PLANT.replace(started(form, **neutral(form))), INPUTS)
+    for name, values in plain.items():
+        assert np.array_equal(off[name], values)
+
+
+@pytest.mark.parametrize("name", NEED_CONTRACTION)
+def test_causes_that_need_the_contraction_leave_the_pressure_alone(name, plain):
+    for form in by_name(name).forms:
+        changed = replay(PLANT.replace(started(form)), INPUTS)
+        assert np.array_equal(changed["pressure"], plain["pressure"])
+
+
+@pytest.mark.parametrize("name", NEED_LOADS)
+def test_causes_of_the_load_do_nothing_without_one(name):
+    empty = replay(PLANT, EMPTY)
+    for form in by_name(name).forms:
+        changed = replay(PLANT.replace(started(form)), EMPTY)
+        assert np.array_equal(changed["contraction"], empty["contraction"])
+
+
+def test_a_leak_takes_the_pressure_down_while_the_valve_is_shut(plain):
+    shut = INPUTS.command < 0.0
+    leaking = replay(PLANT.replace(started(by_name("leak").forms[0])), INPUTS)
+    still, falling = plain["pressure"][1:][shut[:-1]], leaking["pressure"][1:][shut[:-1]]
+    half = len(still) // 2
+    assert np.ptp(still[:half]) < 1.0
+    assert (np.diff(falling[:half]) < 0.0).all()
+
+
+def test_exhaust_asymmetry_acts_on_the_way_down_only():
+    inputs = campaign()
+    rising = np.maximum.accumulate(np.maximum(inputs.command, 0.0))
+    up = Inputs(
+        PERIOD, rising, inputs.load, inputs.kelvin, inputs.fresh, 0.0 * rising, inputs.rezeroed
+    )
+    first = replay(PLANT, up)["pressure"]
+    for form in by_name("exhaust_asymmetry").forms:
+        assert np.array_equal(replay(PLANT.replace(started(form)), up)["pressure"], first)
+
+
+@pytest.mark.parametrize(("cause", "form"), FORMS)
+def test_a_plant_with_a_cause_is_a_file(cause, form, tmp_path):
+    plant = PLANT.replace(started(form))
+    plant.to_yaml(tmp_path / "plant.yaml")
+    assert SingleMuscle.from_yaml(tmp_path / "plant.yaml") == plant
+
+
+# --- a user's own -------------------------------------------------------------------------------
+
+
+def test_a_users_cause_uses_what_ours_do_not():
+    form = users_cause.CAUSE.forms[0]
+    assert users_cause.CAUSE.name not in NAMES
+    assert not {t.name for t in form.terms} & {*page.named_by(), *BASE}
+
+
+def test_a_users_cause_acts_on_the_plant(plain):
+    form = users_cause.CAUSE.forms[0]
+    changed = replay(PLANT.replace(started(form)), INPUTS)
+    assert differences(plain, changed)["contraction"] > 5e-6
+    assert np.array_equal(changed["pressure"], plain["pressure"])
+    off = replay(PLANT.replace(neutral(form)), INPUTS)
+    assert np.array_equal(off["contraction"], plain["contraction"])
+
+
+def test_a_users_cause_is_fitted_as_ours_are():
+    family = MuscleFamily(PLANT, INPUTS)
+    form = users_cause.CAUSE.forms[0]
+    (free,) = frees_of(family, form, (0.4,))
+    assert (free.low, free.high) == (0.0, 1.0)
+    column = family.column.copy()
+    column[free.place] = free.outer(np.array([free.inner(0.4)]))[0]
+    seen = family.simulate(column[None])
+    wanted = replay(PLANT.replace({"mass.carried": 0.4}), INPUTS)
+    np.testing.assert_array_equal(seen[0, :, 0], wanted["contraction"])

@@ -1,0 +1,304 @@
+"""The rigs that hide effects: independent, clean when nothing is hidden, and physical."""
+
+from __future__ import annotations
+
+import ast
+import csv
+import dataclasses
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.diagnosis import hidden
+from tests.diagnosis.hidden import Campaign, Effect, Stepper
+
+FOLDER = Path(hidden.__file__).parent
+ALLOWED = {"numpy", "scipy", "numba", *sys.stdlib_module_names}
+ALL = (*hidden.EFFECTS, *hidden.TUNING_UNKNOWN, *hidden.FINAL_UNKNOWN)
+CHANNELS = {
+    "contraction_mm": hidden.CONTRACTION_NOISE_MM,
+    "pressure_bar": hidden.PRESSURE_NOISE_BAR,
+}
+
+
+def _base(seed: int = 3) -> hidden.Base:
+    return hidden.draw_base(np.random.default_rng(seed))
+
+
+def _effect(name: str, seed: int = 1) -> Effect:
+    return hidden.draw_effect(name, np.random.default_rng(seed))
+
+
+def _size(one: dict, other: dict) -> float:
+    """Return the RMS of the difference over that of the noise, on the louder channel."""
+    return max(
+        float(np.sqrt(np.mean((one[name] - other[name]) ** 2))) / noise
+        for name, noise in CHANNELS.items()
+    )
+
+
+def _single(command: np.ndarray, load: float = 0.0, period: float = 0.02) -> Campaign:
+    count = command.size
+    return Campaign(
+        command,
+        np.full(count, "test_a"),
+        np.full(count, load),
+        np.full(count, 20.0),
+        np.zeros(count, bool),
+        period,
+    )
+
+
+@pytest.fixture(scope="module")
+def short() -> Campaign:
+    return hidden.campaign_short()
+
+
+@pytest.fixture(scope="module")
+def standard() -> Campaign:
+    return hidden.campaign_standard()
+
+
+@pytest.fixture(scope="module")
+def clean_short(short) -> dict:
+    return hidden.simulate(_base(), [], short)
+
+
+@pytest.fixture(scope="module")
+def clean(standard) -> dict:
+    return hidden.simulate(_base(), [], standard)
+
+
+def _imports(tree: ast.AST) -> set[str]:
+    names = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.partition(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            names.add((node.module or "").partition(".")[0])
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 1, "only files of the same folder"
+    return names
+
+
+def test_the_rigs_import_nothing_but_numbers():
+    files = sorted(FOLDER.rglob("*.py"))
+    assert len(files) > 10
+    for file in files:
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        assert _imports(tree) <= ALLOWED, file.name
+        words = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+        assert not words & {"__import__", "importlib", "import_module", "exec", "eval"}, file.name
+
+
+def test_there_are_25_effects_and_two_disjoint_sets_outside_the_catalogue():
+    assert len(hidden.EFFECTS) == len(set(hidden.EFFECTS)) == 25
+    assert len(hidden.TUNING_UNKNOWN) >= 4
+    assert len(hidden.FINAL_UNKNOWN) >= 4
+    assert len(set(ALL)) == len(ALL)
+    with pytest.raises(ValueError, match="no effect is called 'magic'"):
+        _effect("magic")
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_an_amplitude_of_zero_is_exactly_clean_and_a_small_one_nearly(name, short, clean_short):
+    base, effect = _base(), _effect(name)
+    zero = hidden.simulate(base, [(effect, 0.0)], short)
+    assert all(np.array_equal(clean_short[key], zero[key]) for key in clean_short)
+    assert _size(hidden.simulate(base, [(effect, 1e-4)], short), clean_short) < 0.1
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_every_effect_shows_and_stays_physical(name, short, clean_short):
+    base, effect = _base(), _effect(name)
+    shown = hidden.simulate(base, [(effect, 5.0)], short)
+    assert _size(shown, clean_short) > 1.0
+    strong = hidden.simulate(base, [(effect, 15.0)], short)
+    assert np.all(np.isfinite(strong["contraction_mm"]))
+    assert _size(strong, clean_short) > _size(shown, clean_short)
+    assert np.ptp(strong["contraction_mm"]) < 0.3 * base.length_mm
+    assert -0.7 < strong["pressure_bar"].min() <= strong["pressure_bar"].max() < 9.0
+
+
+def test_a_negative_amplitude_is_refused(short):
+    with pytest.raises(ValueError, match=r"amplitude -1\.0 of creep is negative"):
+        hidden.simulate(_base(), [(_effect("creep"), -1.0)], short)
+
+
+def test_the_same_seeds_give_the_same_recording(short):
+    def recording(noise_seed: int) -> dict:
+        effects = [(_effect("creep"), 2.0), (_effect("leak"), 1.0)]
+        return hidden.make_recording(_base(), effects, short, noise_seed)
+
+    one, same, other = recording(5), recording(5), recording(6)
+    assert all(np.array_equal(one[key], same[key]) for key in one)
+    assert not np.array_equal(one["contraction_mm"], other["contraction_mm"])
+    assert _base(4) == _base(4) != _base(5)
+    assert _effect("creep", 2) == _effect("creep", 2) != _effect("creep", 3)
+
+
+@pytest.mark.parametrize("factor", [1.0, 3.0])
+def test_noise_has_its_size_and_a_slow_part(factor, standard, clean):
+    base = dataclasses.replace(_base(), coloured=0.5, grain_mm=0.0, grain_bar=0.0)
+    noise = {name: [] for name in CHANNELS}
+    for seed in range(4):
+        columns = hidden.make_recording(base, [], standard, seed, factor)
+        for name in CHANNELS:
+            noise[name].append(columns[name] - clean[name])
+    for name, rms in CHANNELS.items():
+        rows = np.array(noise[name])
+        assert np.sqrt(np.mean(rows**2)) == pytest.approx(factor * rms, rel=0.06)
+        lagged = np.mean(rows[:, 50:] * rows[:, :-50]) / np.mean(rows**2)
+        assert lagged == pytest.approx(0.5 * np.exp(-1.0), abs=0.08)
+
+
+def test_the_campaign_has_every_kind_twice_under_four_loads_or_more(standard):
+    kinds: dict[str, set] = {}
+    for label in dict.fromkeys(standard.segment.tolist()):
+        kinds.setdefault(label.rpartition("_")[0], set()).add(label)
+    assert all(len(instances) >= 2 for instances in kinds.values())
+    assert {"staircase", "triangle", "steps", "random", "holds", "shut", "chirp"} <= set(kinds)
+    assert set(standard.load_N) == {0.0, 15.0, 30.0, 45.0, 60.0}
+    assert 280.0 < standard.time[-1] < 320.0
+    assert np.ptp(standard.temperature_C) > 2.0
+
+
+def test_loads_change_in_rests_near_0_bar(standard, clean):
+    changes = np.flatnonzero(np.diff(standard.load_N)) + 1
+    assert changes.size > 6
+    for row in changes:
+        assert standard.segment[row].startswith("rest")
+        assert np.all(standard.command_bar[row : row + 50] == 0.0)
+        assert clean["pressure_bar"][row + 49] < 0.01
+
+
+def test_repeated_segments_have_the_same_commands_and_loads(standard):
+    for pair in standard.repeats():
+        one, other = (standard.segment == label for label in pair)
+        assert np.array_equal(standard.command_bar[one], standard.command_bar[other])
+        assert np.array_equal(standard.load_N[one], standard.load_N[other])
+
+
+def test_a_shut_valve_holds_the_pressure_until_something_leaks(standard, clean):
+    leaking = hidden.simulate(_base(), [(_effect("leak"), 5.0)], standard)
+    assert standard.closed_segments() == ["shut_a", "shut_b"]
+    for label, level in (("shut_a", 2.0), ("shut_b", 4.5)):
+        rows = standard.segment == label
+        assert rows.sum() == 500
+        assert np.ptp(clean["pressure_bar"][rows]) == 0.0
+        assert clean["pressure_bar"][rows][0] == pytest.approx(level, rel=0.05)
+        assert leaking["pressure_bar"][rows][-1] < leaking["pressure_bar"][rows][0] - 0.1
+
+
+def test_long_short_and_idle_campaigns(short):
+    assert 570.0 < hidden.campaign_long().time[-1] < 630.0
+    assert 110.0 < short.time[-1] < 130.0
+    idle = hidden.campaign_idle()
+    assert np.ptp(idle.command_bar) == 0.0
+    assert np.ptp(hidden.simulate(_base(), [], idle)["contraction_mm"]) < 0.01
+
+
+def test_the_regulator_of_a_clean_rig_is_one_lag():
+    base = _base()
+    step = hidden.simulate(base, [], _single(np.full(200, 3.0), period=0.01))
+    expected = base.gain * 3.0 * (1.0 - np.exp(-step["time"] / base.lag))
+    assert np.allclose(step["pressure_bar"], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_slow_loop_is_as_wide_as_drawn_and_the_stroke_is_a_muscles(seed):
+    base = _base(seed)
+    half = np.linspace(0.0, 6.0, 2000)
+    run = hidden.simulate(base, [], _single(np.concatenate([half, half[::-1], half, half[::-1]])))
+    up, down = slice(4000, 6000), slice(6000, 8000)
+    middle = 0.5 * run["contraction_mm"].max()
+    rising = np.interp(middle, run["contraction_mm"][up], run["pressure_bar"][up])
+    falling = np.interp(middle, run["contraction_mm"][down][::-1], run["pressure_bar"][down][::-1])
+    assert rising - falling == pytest.approx(base.loop, abs=0.05)
+    assert 0.12 < run["contraction_mm"].max() / base.length_mm < 0.2
+
+
+def test_loads_stretch_a_muscle_at_rest_only_when_they_change():
+    base = _base()
+    steady = hidden.simulate(base, [], _single(np.zeros(100), load=30.0))
+    assert np.max(np.abs(steady["contraction_mm"])) < 1e-6
+    changed = _single(np.zeros(200))
+    changed.load_N[50:] = 30.0
+    assert hidden.simulate(base, [], changed)["contraction_mm"][-1] < -0.2
+
+
+def test_decoys_lie_outside_the_usual_range():
+    rng = np.random.default_rng(0)
+    for base in [hidden.decoys(rng) for _ in range(20)]:
+        assert not 0.035 <= base.lag <= 0.12
+        assert not 0.97 <= base.gain <= 1.03
+        assert not 0.15 <= base.mass <= 0.5
+        assert not 0.4 <= base.loop <= 0.85
+
+
+@pytest.mark.parametrize("name", ["dead_time", "creep", "stick_slip", "sensor_delay", "wire_slack"])
+def test_a_stepped_rig_does_what_a_campaign_does(name):
+    rng = np.random.default_rng(0)
+    command = np.repeat(rng.uniform(0.0, 5.0, 12), 40)
+    base, effects = _base(), [(_effect(name), 3.0)]
+    rows = hidden.simulate(base, effects, _single(command, load=30.0, period=0.01))
+    stepper = Stepper(base, effects, 30.0, 0, period=0.01, noise_factor=0.0)
+    grain = max(base.grain_mm, 1e-9)
+    for row, value in enumerate(command[:-1], start=1):
+        place, pressure = stepper.step(value)
+        assert stepper.position_mm == rows["position_mm"][row]
+        assert place == pytest.approx(rows["contraction_mm"][row], abs=grain)
+        assert pressure == pytest.approx(rows["pressure_bar"][row], abs=max(base.grain_bar, 1e-9))
+
+
+def test_a_reset_starts_the_rig_and_its_noise_anew():
+    stepper = Stepper(_base(), [(_effect("creep"), 3.0)], 15.0, noise_seed=4)
+    first = [stepper.step(3.0) for _ in range(50)]
+    stepper.reset(4)
+    assert [stepper.step(3.0) for _ in range(50)] == first
+    stepper.reset(5)
+    assert [stepper.step(3.0) for _ in range(50)] != first
+
+
+def test_a_period_must_be_whole_milliseconds():
+    with pytest.raises(ValueError, match=r"period 0\.0125 s is not a whole number"):
+        Stepper(_base(), [], 0.0, 0, period=0.0125)
+
+
+def test_a_tray_that_always_hangs_moves_the_rest_position(standard, clean):
+    base, effect = _base(), _effect("payload_error")
+    always = dataclasses.replace(effect, shape={"always": 1.0})
+    with_loads = hidden.simulate(base, [(effect, 3.0)], standard)
+    throughout = hidden.simulate(base, [(always, 3.0)], standard)
+    unloaded = standard.time < 30.0
+    assert np.array_equal(with_loads["contraction_mm"][unloaded], clean["contraction_mm"][unloaded])
+    assert _size(throughout, clean) > 1.0
+    assert throughout["contraction_mm"][0] == 0.0
+
+
+def test_the_file_holds_what_the_recording_holds(short, tmp_path):
+    columns = hidden.make_recording(_base(), [], short, 0)
+    path = tmp_path / "rig.csv"
+    hidden.write_csv(columns, path)
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == [
+        *("time_s", "segment", "pressure_command_bar", "pressure_bar"),
+        *("contraction_mm", "load_N", "temperature_C"),
+    ]
+    assert len(rows) == short.command_bar.size
+    assert [row["segment"] for row in rows] == columns["segment"].tolist()
+    read = np.array([float(row["contraction_mm"]) for row in rows])
+    assert np.allclose(read, columns["contraction_mm"], atol=6e-6)
+
+
+def test_the_owner_writes_what_he_knows(standard):
+    base = _base()
+    sheet = hidden.rig_yaml(base, standard, noise_factor=3.0)
+    assert sheet["plant"] == "single_muscle"
+    assert sheet["muscle"] == {"rest_length_mm": base.length_mm, "diameter_mm": 10.0}
+    assert ["holds_a", "holds_b"] in sheet["repeats"]
+    assert sheet["valve_closed"] == ["shut_a", "shut_b"]
+    assert sheet["sensors"]["contraction_noise_mm"] == pytest.approx(0.135)

@@ -1,0 +1,283 @@
+"""Diagnosis of settled readings: the measured tables, and made-up ones whose truth is known."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from pam_envs.data.tables import load_contraction_table
+from pam_envs.diagnosis.readings import audit_polynomials, diagnose_readings
+from pam_envs.diagnosis.readings_cells import THRESHOLDS, cells_of, stops
+from pam_envs.diagnosis.readings_compare import Study
+from pam_envs.diagnosis.readings_fit import Fit, check_nested
+from pam_envs.diagnosis.readings_models import SHIFT, TERMS, predict, units
+from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from tests.diagnosis.synthetic_readings import PRESSURES, table
+
+TABLE = load_contraction_table()
+COMPLIANCE, WIDTH, FRICTION = (
+    "load_dependent_compliance",
+    "load_dependent_hysteresis",
+    "pressure_dependent_friction",
+)
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return diagnose_readings(TABLE)
+
+
+def _rung(report, *forms):
+    return next(r for r in report["readings"]["ladder"] if tuple(r["model"]) == forms)
+
+
+def _tried(rung, form):
+    return next(t for t in rung["tried"] if t["form"] == form)
+
+
+def _cause(report, name):
+    return next(c for c in report["causes"] if c["name"] == name)
+
+
+def test_measured_causes_are_named_in_the_order_of_evidence(measured):
+    assert measured["verdict"] == "named"
+    assert [c["name"] for c in measured["causes"]] == [COMPLIANCE, WIDTH, FRICTION]
+    assert measured["causes"][0]["form"] == "pressure shift"
+
+
+def test_the_floor_is_that_of_the_repeats(measured):
+    floor = measured["noise_floor"]["contraction"]
+    assert floor["value"] == pytest.approx(0.168, abs=0.001)
+    assert floor["from"] == "repeats"
+
+
+def test_the_load_blind_model_is_three_floors_off(measured):
+    base = _rung(measured)
+    assert base["cells_mm"] == pytest.approx(0.475, abs=0.005)
+    assert base["load_left_out_mm"] == pytest.approx(0.634, abs=0.01)
+    assert measured["error_before"]["contraction"]["times_floor"] == pytest.approx(2.95, abs=0.1)
+    structure = measured["residual_structure"]["before"]["contraction"]
+    assert structure["r2"]["load"] == pytest.approx(0.67, abs=0.02)
+
+
+def test_effects_linear_in_load_cut_the_error_on_a_load_left_out_by_30_percent(measured):
+    before, after = (
+        measured[key]["contraction"]["kinds"]["loads, one left out (mean)"]
+        for key in ("error_before", "error_after")
+    )
+    assert after <= 0.7 * before
+    assert after == pytest.approx(0.38, abs=0.015)
+    cut = measured["readings"]["loads_left_out"]["cut_percent"]
+    assert cut["value"] == pytest.approx(39.7, abs=2.0)
+    assert cut["interval"][0] > 10.0
+    both = _rung(measured, "pressure shift", "width linear in load")
+    assert both["load_left_out_mm"] <= 0.7 * before
+
+
+def test_the_zeroed_form_of_the_shift_is_told_as_an_equal(measured):
+    forms = {r["form"]: r for r in measured["rivals"]}
+    assert not forms["pressure shift, zeroed at each load"]["excluded"]
+    assert forms["smaller stroke"]["excluded"]
+    assert any("0.115 bar/kg" in told for told in measured["warnings"])
+
+
+def test_shift_and_width_come_with_intervals(measured):
+    shift = _cause(measured, COMPLIANCE)["parameters"][0]
+    assert shift["unit"] == "bar/kg"
+    assert shift["value"] == pytest.approx(0.077, abs=0.002)
+    assert shift["interval"] == pytest.approx([0.065, 0.088], abs=0.004)
+    width = _cause(measured, WIDTH)["parameters"][0]
+    assert width["value"] == pytest.approx(-0.056, abs=0.003)
+    assert width["interval"] == pytest.approx([-0.077, -0.037], abs=0.008)
+
+
+def test_the_width_is_masked_until_the_shift_is_in(measured):
+    alone = _tried(_rung(measured), "width linear in load")
+    beside = _tried(_rung(measured, "pressure shift"), "width linear in load")
+    assert alone["p"] > 0.3
+    assert not alone["accepted"]
+    assert beside["p"] < 0.005
+    assert beside["accepted"]
+    pair = next(p for p in measured["readings"]["pairs"] if p["names"] == [COMPLIANCE, WIDTH])
+    assert pair["masked"] == [WIDTH]
+    assert "hidden until load_dependent_compliance is in" in measured["text"]
+
+
+def test_residual_creep_and_a_threshold_are_not_needed(measured):
+    last = measured["readings"]["ladder"][-1]
+    assert last["chosen"] is None
+    assert {t["name"] for t in last["tried"]} == {"creep", "threshold_pressure"}
+
+
+def test_an_exponent_is_post_hoc_and_cannot_be_told_from_a_dead_zone(measured):
+    power, dead = measured["readings"]["load_laws"]
+    assert power["value"] == pytest.approx(1.92, abs=0.03)
+    assert power["load_left_out_mm"] == pytest.approx(0.22, abs=0.01)
+    assert power["status"] == dead["status"] == "post hoc, not held out"
+    assert power["cells_mm"] == pytest.approx(dead["cells_mm"], abs=1e-4)
+    told = " ".join(measured["warnings"])
+    assert "measure at least five" in told
+    assert "the readings do not tell them apart" in told
+    assert measured["experiment"]["between"] == ["power", "dead zone"]
+    assert "1.5 kg and 3.6 kg" in measured["experiment"]["description"]
+
+
+def test_the_floor_is_not_reached_and_the_report_says_by_how_much(measured):
+    assert measured["readings"]["lack_of_fit"]["after"]["F"] > 8.0
+    assert measured["error_after"]["contraction"]["times_floor"] == pytest.approx(1.57, abs=0.05)
+    assert "The floor is not reached" in measured["text"]
+
+
+def test_the_audit_finds_drift_unequal_scatter_and_the_missed_set_point(measured):
+    told = " ".join(measured["warnings"])
+    assert "drift by +0.033 mm a repeat" in told
+    assert "do not scatter alike" in told
+    (point,) = measured["readings"]["set_points"]
+    assert (point["pressure"], point["falling"]) == (5.5, False)
+    assert point["loads"] == [0.0, 2.55]
+    assert max(point["missed"]) < -0.5
+    assert abs(point["others"][0]) < 0.2
+
+
+def test_the_same_table_and_seed_give_the_same_report():
+    small = table(pressures=PRESSURES[::2], loads=(0.0, 3.0), repeats=2)
+    made = [diagnose_readings(small, seed=4) for _ in range(2)]
+    for one in made:
+        del one["runtime_s"]
+    assert json.dumps(made[0]) == json.dumps(made[1])
+
+
+def test_a_table_that_the_load_does_not_touch_is_adequate():
+    found = diagnose_readings(table(seed=1))
+    assert found["verdict"] == "adequate"
+    assert found["causes"] == []
+    assert found["error_before"]["contraction"]["times_floor"] < 1.1
+
+
+def test_a_table_whose_loops_narrow_with_the_load_is_named_so():
+    found = diagnose_readings(table(seed=2, width=lambda m: np.exp(-0.08 * m)))
+    assert found["verdict"] == "named"
+    assert [c["name"] for c in found["causes"]] == [WIDTH]
+    assert "The floor is reached" in found["text"]
+
+
+def test_a_law_of_five_loads_is_judged_without_each():
+    loads = (0.0, 1.2, 2.4, 3.6, 4.8)
+    found = diagnose_readings(table(loads, seed=3, shift=lambda m: 0.4 * (m / 4.8) ** 2))
+    assert [c["name"] for c in found["causes"]] == [COMPLIANCE]
+    power = found["readings"]["load_laws"][0]
+    assert power["status"] == "held out"
+    assert power["value"] == pytest.approx(2.0, abs=0.25)
+    linear = found["error_after"]["contraction"]["kinds"]["loads, one left out (mean)"]
+    assert power["load_left_out_mm"] < 0.7 * linear
+
+
+def test_with_one_load_causes_of_the_load_are_not_testable():
+    found = diagnose_readings(table((2.0,), seed=4, bend=-0.5))
+    untestable = {entry["name"]: entry["reason"] for entry in found["not_testable"]}
+    assert untestable[COMPLIANCE] == untestable[WIDTH] == "there is one load"
+    assert [c["name"] for c in found["causes"]] == [FRICTION]
+    assert found["experiment"] is None
+
+
+def test_with_one_repeat_the_floor_is_unknown_and_the_shift_still_named():
+    found = diagnose_readings(table(repeats=1, seed=5, shift=lambda m: 0.36 * (m / 4.55) ** 1.3))
+    assert found["noise_floor"]["contraction"]["value"] is None
+    assert found["causes"][0]["name"] == COMPLIANCE
+    assert "pressures, one left out" in found["error_after"]["contraction"]["kinds"]
+    assert any("noise floor is not known" in told for told in found["warnings"])
+
+
+def test_copies_of_a_repeat_are_told_and_give_no_floor():
+    one = table((0.0, 3.0), repeats=1, pressures=PRESSURES[::2])
+    columns = {f.name: np.tile(getattr(one, f.name), 2) for f in dataclasses.fields(one)}
+    columns["repeat"] = np.repeat([1, 2], len(one.repeat))
+    found = diagnose_readings(dataclasses.replace(one, **columns))
+    assert found["noise_floor"]["contraction"]["value"] is None
+    assert any("one is a copy" in told for told in found["warnings"])
+
+
+def test_a_zero_common_to_all_loads_is_named_as_stretch_at_rest():
+    one = table((0.0, 2.0, 4.0), repeats=2, pressures=PRESSURES[::2])
+    sunk = one.contraction_m - 1e-3 * one.load_kg + 1e-4
+    found = diagnose_readings(dataclasses.replace(one, contraction_m=sunk))
+    assert [c["form"] for c in found["causes"]] == ["stretch at rest"]
+    assert found["causes"][0]["parameters"][0]["value"] == pytest.approx(1.0, abs=0.05)
+
+
+def test_without_deflation_friction_is_not_testable():
+    found = diagnose_readings(table(repeats=2, pressures=np.arange(0.0, 6.25, 0.25)))
+    untestable = {entry["name"]: entry["reason"] for entry in found["not_testable"]}
+    assert untestable[WIDTH] == untestable[FRICTION] == "the pressure was never lowered"
+    assert found["verdict"] == "adequate"
+
+
+def test_too_few_cells_are_insufficient():
+    found = diagnose_readings(table((0.0,), pressures=PRESSURES[::3], repeats=2))
+    assert found["verdict"] == "insufficient"
+    assert "Measure more pressures" in found["text"]
+
+
+def test_readings_that_are_all_zero_are_refused():
+    with pytest.raises(ValueError, match="readings at several pressures"):
+        diagnose_readings(dataclasses.replace(TABLE, contraction_m=0.0 * TABLE.contraction_m))
+
+
+PUBLISHED = {
+    "(1)": (0.0, True, (-0.053, 0.718, 0.079, 0.096)),
+    "(2)": (0.0, False, (-0.118, 1.005, 0.684, 0.296)),
+    "(3)": (2.55, True, (-0.053, 0.718, 0.079, 0.096)),
+    "(4)": (2.55, False, (-0.120, 1.092, 0.180, 0.439)),
+    "(5)": (4.55, True, (-0.055, 0.786, -0.421, 0.071)),
+    "(6)": (4.55, False, (-0.106, 1.016, 0.005, 0.270)),
+}
+
+
+def test_the_published_polynomial_3_is_found_to_be_a_copy_of_1():
+    found = audit_polynomials(TABLE, PUBLISHED)
+    by_name = {e["name"]: e for e in found["equations"]}
+    assert by_name["(3)"]["copy_of"] == "(1)"
+    assert by_name["(3)"]["rms"] == pytest.approx(0.372, abs=5e-4)
+    assert by_name["(3)"]["best"]["load"] == 0.0
+    assert by_name["(3)"]["best"]["rms"] == pytest.approx(0.218, abs=5e-4)
+    assert [e["copy_of"] for name, e in by_name.items() if name != "(3)"] == [None] * 5
+    first, second = found["discrepancies"]
+    assert first.startswith("equation (3) is a copy of (1)")
+    assert second.startswith("equation (5) misses")
+
+
+def test_polynomials_that_fit_their_readings_raise_no_discrepancy():
+    right = {k: PUBLISHED[k] for k in ("(1)", "(2)", "(4)", "(6)")}
+    assert audit_polynomials(TABLE, right)["discrepancies"] == []
+
+
+def test_lags_are_those_of_play_operators_on_any_path():
+    path = np.array([0.0, 0.4, 0.9, 0.3, 0.6, 0.1, 1.0, 0.0])
+    lags = stops(path[None], np.arange(len(path))[:, None])
+    for lag, half in zip(lags, THRESHOLDS, strict=True):
+        play, _ = PlayOperator((half,), (1.0,), 0.0).simulate(path)
+        np.testing.assert_allclose(lag[0], path - play, atol=1e-15)
+
+
+def test_every_term_is_neutral_at_its_neutral_value():
+    study = Study(cells_of(table(pressures=PRESSURES[::2], repeats=2)))
+    fitted = study.base.fit
+    values = {n.name: fitted.theta[:1, [i]] for i, n in enumerate(fitted.numbers)}
+    plain = predict(study.cells, values)
+    for term in TERMS:
+        added = {n.name: np.array([[n.neutral]]) for n in term.numbers}
+        np.testing.assert_allclose(predict(study.cells, values | added), plain, atol=1e-9)
+
+
+def test_a_fit_worse_than_its_part_is_refused():
+    parent = Fit((), np.zeros((1, 9)), np.array([1.0]))
+    child = Fit((SHIFT,), np.zeros((1, 10)), np.array([1.1]))
+    with pytest.raises(RuntimeError, match="fits worse"):
+        check_nested([parent], child)
+
+
+def test_units_lead_back_to_bar_and_kg():
+    assert units(SHIFT.numbers[0], (4.55, 6e5, 0.0151)) == pytest.approx(6.0 / 4.55)

@@ -1,0 +1,185 @@
+"""The files of a diagnosis: schema, bytes, what is left when something fails."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from pam_envs.diagnosis import page as page_module
+from pam_envs.diagnosis.report import dumps, plain, report_json, write
+from tests.diagnosis import report_fakes as fakes
+from tests.diagnosis.page_reader import SECTIONS, Page
+
+SCHEMA = json.loads(
+    (Path(__file__).parents[1] / "schemas/diagnosis.schema.json").read_text(encoding="utf-8")
+)
+VERDICTS = ("named", "ambiguous", "adequate", "unexplained", "insufficient")
+FILES = {"report.json", "report.html", "plant.yaml"}
+
+
+def folder_of(tmp_path: Path, verdict: str = "named") -> Path:
+    write(fakes.diagnosis(verdict), tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def plain_page(monkeypatch):
+    """Spare the drawing where a test is about files."""
+    monkeypatch.setattr(page_module, "draw", lambda *_: {})
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_every_verdict_makes_a_valid_report_and_a_page(tmp_path, verdict):
+    folder = folder_of(tmp_path, verdict)
+    found = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    jsonschema.validate(found, SCHEMA)
+    assert found["verdict"] == verdict
+    read = Page((folder / "report.html").read_text(encoding="utf-8"))
+    assert found["text"] in read.text
+    assert list(read.figures) == list(SECTIONS)
+    fixed = verdict in ("named", "ambiguous")
+    assert {p.name for p in folder.iterdir()} == (FILES if fixed else FILES - {"plant.yaml"})
+    assert bool(read.figures["effects"]) == fixed
+    assert bool(read.figures["rivals"]) == (verdict != "insufficient")
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("verdict",), "perhaps"),
+        (("schema",), 2),
+        (("causes", 0, "size"), "large"),
+        (("noise_floor", "contraction", "unit"), "m"),
+        (("noise_floor", "contraction", "from"), "hope"),
+        (("rivals", 0, "gain", "interval"), [1.0]),
+        (("causes",), []),
+        (("residual_structure", "before", "contraction", "r2", "colour"), 0.1),
+        (("surprise",), 1),
+    ],
+)
+def test_the_schema_refuses_what_is_wrong(path, value):
+    found = json.loads(report_json(fakes.report()))
+    place = found
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(found, SCHEMA)
+
+
+def test_every_key_is_in_the_schema_and_every_one_is_documented():
+    document = (Path(__file__).parents[2] / "docs/diagnosis_report.md").read_text(encoding="utf-8")
+    parts = [SCHEMA, *SCHEMA["$defs"].values(), *SCHEMA["properties"].values()]
+    keys = {key for part in parts for key in part.get("properties", {})}
+    assert len(keys) > 60
+    assert {key for key in keys if f"`{key}`" not in document} == set()
+
+
+def test_the_same_diagnosis_gives_the_same_bytes(tmp_path):
+    first, second = folder_of(tmp_path / "a"), folder_of(tmp_path / "b")
+    for name in FILES:
+        assert (first / name).read_bytes() == (second / name).read_bytes()
+
+
+def test_keys_come_in_a_fixed_order():
+    report = fakes.report()
+    turned = dict(reversed(report.items()))
+    turned["causes"] = [dict(reversed(c.items())) for c in report["causes"]]
+    assert report_json(turned) == report_json(report)
+    found = json.loads(report_json(report))
+    assert list(found)[:3] == ["schema", "verdict", "text"]
+    assert list(found)[-1] == "runtime_s"
+    assert list(found["noise_floor"]["contraction"]) == ["value", "unit", "from"]
+
+
+def test_numbers_have_six_digits_and_what_is_not_finite_is_null():
+    found = plain({"a": 1.23456789e-7, "b": np.float32(0.1), "c": np.array([np.nan, np.inf, -0.0])})
+    assert found == {"a": 1.23457e-7, "b": 0.1, "c": [None, None, 0.0]}
+    assert str(found["c"][2]) == "0.0"
+    assert plain({"n": np.int64(3), "f": np.bool_(True), "t": (1, 2)}) == {
+        "n": 3,
+        "f": True,
+        "t": [1, 2],
+    }
+
+
+def test_nan_in_a_report_becomes_null_and_a_dash(tmp_path):
+    made = fakes.diagnosis("named")
+    made.report["error_before"]["contraction"]["times_floor"] = np.nan
+    made.report["rivals"][3]["gain"]["interval"] = [np.nan, np.nan]
+    made.report["isolability"]["cosine"][2, :] = np.nan
+    made.report["causes"] = [fakes.CREEP | {"size": np.inf}]
+    made.traces.measured["contraction"][100:140] = np.nan
+    write(made, tmp_path)
+    text = (tmp_path / "report.json").read_text(encoding="utf-8")
+    found = json.loads(text, parse_constant=pytest.fail)
+    jsonschema.validate(found, SCHEMA)
+    assert found["causes"][0]["size"] is None
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert set(Page(html).figures["rivals"]) == {"rivals"}
+    assert not re.search(r"\bnan\b", html, re.IGNORECASE)
+
+
+def test_a_value_that_json_lacks_is_refused_by_name():
+    with pytest.raises(TypeError, match=r"text holds .* of type complex"):
+        report_json({**fakes.report(), "text": 1j})
+
+
+def test_what_fits_on_a_line_stands_on_one():
+    value = {"a": [1, 2], "b": ["x" * 60, "y" * 60]}
+    text = dumps(value)
+    assert json.loads(text) == value
+    assert ' "a": [1, 2],' in text.splitlines()
+    assert len(text.splitlines()) == 7
+
+
+def test_nothing_temporary_is_left(plain_page, tmp_path):
+    folder = folder_of(tmp_path)
+    assert {p.name for p in folder.iterdir()} == FILES
+    assert (folder / "plant.yaml").read_text(encoding="utf-8") == "schema: 1\n"
+
+
+def test_when_drawing_fails_the_old_files_stay(plain_page, tmp_path, monkeypatch):
+    folder = folder_of(tmp_path)
+    before = {p.name: p.read_bytes() for p in folder.iterdir()}
+
+    def fail(*_):
+        raise RuntimeError("no ink")
+
+    monkeypatch.setattr(page_module, "draw", fail)
+    with pytest.raises(RuntimeError, match="no ink"):
+        write(fakes.diagnosis("ambiguous"), folder)
+    assert {p.name: p.read_bytes() for p in folder.iterdir()} == before
+
+
+def test_when_writing_fails_the_old_file_stays(plain_page, tmp_path, monkeypatch):
+    folder = folder_of(tmp_path)
+    before = (folder / "report.html").read_bytes()
+    monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(OSError("disk is full")))
+    with pytest.raises(OSError, match="disk is full"):
+        write(fakes.diagnosis("ambiguous"), folder)
+    assert {p.name for p in folder.iterdir()} == FILES
+    assert (folder / "report.html").read_bytes() == before
+
+
+def test_a_folder_never_holds_parts_of_two_diagnoses(plain_page, tmp_path):
+    folder = folder_of(tmp_path, "named")
+    write(fakes.diagnosis("adequate"), folder)
+    assert {p.name for p in folder.iterdir()} == FILES - {"plant.yaml"}
+
+
+def test_without_matplotlib_the_numbers_are_written_and_the_remedy_is_said(tmp_path, monkeypatch):
+    (tmp_path / "report.html").write_text("of an earlier diagnosis", encoding="utf-8")
+    for name in [n for n in sys.modules if n.partition(".")[0] == "matplotlib"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(ImportError, match=re.escape("pip install 'pam-envs[plot]'")):
+        write(fakes.diagnosis("named"), tmp_path)
+    assert {p.name for p in tmp_path.iterdir()} == FILES - {"report.html"}
+    assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["verdict"] == "named"
