@@ -20,6 +20,8 @@ FAST = 0.04
 """Below this lag [s] the replay takes finer steps."""
 FINE_STEP = 0.0101
 GUESS_ROUNDS, ROUNDS = 6, 12
+FAR = 8.0
+"""Cost a reading above which a fit may have ended in the wrong place."""
 
 
 def calibrate(
@@ -28,8 +30,8 @@ def calibrate(
     """Return the family, the problem and the fitted base.
 
     The regulator is fitted first, on the pressure alone; then the static map and the friction by a
-    regression of the force balance; then everything by simulation. The same again from the plant
-    as it was given, where that may be nearer.
+    regression of the force balance; then everything by simulation. Where that ends far from the
+    readings the fit begins anew at the plant as it was given, and the better of the two stays.
 
     Parameters
     ----------
@@ -67,9 +69,13 @@ def calibrate(
             operator.thresholds,
             np.isfinite(measured[0]),
         )
-        tried = [guessed(frees, found | (law or {})), *([] if law else [frees])]
-    fits = [fit_base(problem, blocks, column, t, ROUNDS) for t in tried]
-    best = min(fits, key=lambda c: c.fit.cost)
+        tried = [guessed(frees, found | law), frees] if law else [guessed(frees, found)]
+    best = fit_base(problem, blocks, column, tried[0], ROUNDS)
+    for start in tried[1:]:
+        if best.fit.cost < FAR * problem.seen:
+            break
+        other = fit_base(problem, blocks, column, start, ROUNDS)
+        best = min(best, other, key=lambda c: c.fit.cost)
     return family, problem, best
 
 

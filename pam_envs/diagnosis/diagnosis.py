@@ -258,7 +258,9 @@ class Study:
         ticks = np.asarray(np.arange(len(recording.time)) * recording.period, np.float64)
         blocks = Blocks.make(ticks, measured)
         family, problem, base = calibrate(family, measured, noise, blocks, ticks)
-        outputs = family.simulate(column_of(base.fit, base.fit.z)[None])[:, :, 0]
+        column = column_of(base.fit, base.fit.z)[None]
+        problem.tie(column)
+        outputs = family.simulate(column)[:, :, 0]
         regressors = Regressors.make(
             ticks, recording.command, outputs, recording.load, recording.temperature
         )

@@ -30,10 +30,12 @@ EVERY = 3
 """Every third block is held out."""
 SCHEDULE = ((2, 12, 0.4), (2, 7, 0.6), (4, 5, 0.8))
 """Rounds with the base's Jacobian held; how many fits then go on, or what part of the best gain."""
-POLISH = 2
-"""Rounds with all of the Jacobian."""
+POLISH = 6
+"""Rounds, at most, with all of the Jacobian."""
 POLISHED = 3
 """How many of the best rivals are polished."""
+POLISHED_ENOUGH = 1e-3
+"""Part of the cost that a round has to gain for another one."""
 
 
 @dataclass(frozen=True)
@@ -182,7 +184,7 @@ def search(
     for rounds, kept, share_kept in SCHEDULE:
         improve(problem, fits, rounds, 1e-4, FEW_DAMPINGS)
         _drop(fits, base.fit.cost, kept, share_kept)
-        if np.log(base.fit.cost / min(f.cost for f in fits)) < least:
+        if least > 0.0 and np.log(base.fit.cost / min(f.cost for f in fits)) < least:
             return []
     best: dict[str, Fit] = {}
     for fit in fits:
@@ -202,7 +204,7 @@ def polish(problem: Problem, fits: Sequence[Fit], rounds: int = POLISH) -> None:
     """Take rounds with a fresh Jacobian of all parameters."""
     for fit in fits:
         fit.done, fit.damping, fit.shared = False, 1.0, None
-    improve(problem, fits, rounds, 1e-4)
+    improve(problem, fits, rounds, POLISHED_ENOUGH)
 
 
 def whole(problem: Problem, fit: Fit) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +15,9 @@ from pam_envs.diagnosis.search import Blocks, Candidate, search
 from pam_envs.diagnosis.structure import Regressors, flexible_r2, spectral_peak
 
 Array = NDArray[np.float64]
+
+KEPT = 12
+"""How many rivals of a level are judged."""
 
 
 @dataclass(frozen=True)
@@ -70,16 +73,58 @@ class Rule:
     draws: int = 400
 
 
+@dataclass(frozen=True)
+class Level:
+    """The best model with so many causes, its rivals, and what it leaves.
+
+    Attributes
+    ----------
+    model : Candidate
+        The best.
+    rivals : list of Candidate
+        With as many causes, the best first.
+    left : dict
+        See :func:`left_over`.
+    """
+
+    model: Candidate
+    rivals: list[Candidate]
+    left: dict[str, Any]
+
+
 @dataclass
 class Decision:
-    """What was decided, and on what."""
+    """What was decided, and on what.
+
+    Attributes
+    ----------
+    verdict : {"adequate", "named", "ambiguous", "unexplained", "insufficient"}
+        In a word.
+    model : Candidate
+        The base with the causes named.
+    rivals, open_rivals : list of Candidate
+        What else was fitted, the best first; those of them that are not excluded.
+    structure : dict
+        What is left before and after.
+    evidence : dict
+        All that the rule looked at, in plain types: see :func:`judge`.
+    """
 
     verdict: str
     model: Candidate
     rivals: list[Candidate] = field(default_factory=list)
     open_rivals: list[Candidate] = field(default_factory=list)
     structure: dict[str, Any] = field(default_factory=dict)
-    levels: list[dict[str, Any]] = field(default_factory=list)
+    evidence: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """A verdict on plain evidence: how many causes, and which rivals are not excluded."""
+
+    verdict: str
+    level: int
+    open_rivals: tuple[int, ...] = ()
 
 
 def left_over(
@@ -120,17 +165,39 @@ def decide(
     seed: int = 0,
 ) -> Decision:
     """Search causes, add further ones while they pay, and word the verdict."""
-    found = search(problem, family, blocks, base, causes)
-    before = left_over(problem, blocks, base, regressors)
-    best = found[0] if found else base
-    gain = blocks.gain(base.errors, best.errors)
-    if gain < rule.least_gain:
-        odd = structured(before, rule)
-        verdict = "unexplained" if odd else "adequate"
-        return Decision(verdict, base, found, [], {"before": before, "after": before})
-    model, rivals, first_gain = best, found, gain
-    after = left_over(problem, blocks, best, regressors)
-    while len(model.causes) < rule.most:
+    levels = [Level(base, [], left_over(problem, blocks, base, regressors))]
+    for model, rivals in _ladder(problem, family, blocks, base, causes, rule):
+        levels.append(Level(model, rivals, left_over(problem, blocks, model, regressors)))
+    evidence = evidence_of(blocks, levels, rule, seed)
+    judged = judge(evidence, rule)
+    chosen = levels[judged.level]
+    rivals = chosen.rivals if judged.level else levels[min(1, len(levels) - 1)].rivals
+    return Decision(
+        judged.verdict,
+        chosen.model,
+        rivals,
+        [rivals[k] for k in judged.open_rivals],
+        {"before": levels[0].left, "after": chosen.left},
+        evidence,
+    )
+
+
+def _ladder(
+    problem: Problem,
+    family: Any,
+    blocks: Blocks,
+    base: Candidate,
+    causes: Sequence[Cause],
+    rule: Rule,
+) -> Iterator[tuple[Candidate, list[Candidate]]]:
+    """Return the best model with one cause, two, ... and its rivals, while a cause may pay."""
+    rivals = search(problem, family, blocks, base, causes)
+    if not rivals:
+        return
+    yield rivals[0], rivals
+    model = rivals[0]
+    first_gain = blocks.gain(base.errors, model.errors)
+    while first_gain >= rule.least_gain and len(model.causes) < rule.most:
         wanted = max(rule.second_gain, rule.second_share * first_gain)
         larger = search(problem, family, blocks, model, causes, 2, rule.hint * wanted)
         more = blocks.gain(model.errors, larger[0].errors) if larger else 0.0
@@ -140,16 +207,85 @@ def decide(
             for first in rivals[1 : rule.beam]:
                 larger += search(problem, family, blocks, first, causes, 2)[:4]
             larger.sort(key=lambda c: -blocks.gain(base.errors, c.errors))
-        model, rivals = larger[0], distinct(larger)
-        gain = blocks.gain(base.errors, model.errors)
-        after = left_over(problem, blocks, model, regressors)
-    structure = {"before": before, "after": after}
-    left = max(after["rest"], float(np.log(max(after["excess"], 1.0))))
-    if structured(after, rule) and left > rule.rest * gain:
-        return Decision("unexplained", model, rivals, [], structure)
-    still = not_excluded(blocks, base, model, rivals, rule, seed)
-    verdict = "ambiguous" if still else "named"
-    return Decision(verdict, model, rivals, still, structure)
+        rivals = distinct(larger)
+        model = rivals[0]
+        yield model, rivals
+
+
+def evidence_of(
+    blocks: Blocks, levels: Sequence[Level], rule: Rule, seed: int = 0
+) -> dict[str, Any]:
+    """Return what a rule decides on, in plain types.
+
+    Under ``levels``, one entry for each number of causes from none: ``gain`` over the base,
+    ``added`` over the level before, what is ``left``, and the ``rivals``, the best first, each
+    with ``names``, ``forms``, ``gain`` and ``better``: the part of the samples of blocks in which
+    it is ahead of the best.
+    """
+    base = levels[0].model
+    draws = blocks.draws(rule.draws, seed)
+    made = []
+    for k, level in enumerate(levels):
+        before = levels[max(k - 1, 0)].model
+        made.append(
+            {
+                "gain": blocks.gain(base.errors, level.model.errors),
+                "added": blocks.gain(before.errors, level.model.errors),
+                "left": level.left,
+                "rivals": [
+                    {
+                        "names": list(rival.names),
+                        "forms": [form.name for _, form in rival.causes],
+                        "gain": blocks.gain(base.errors, rival.errors),
+                        "better": _better(blocks, rival, level.model, draws),
+                    }
+                    for rival in level.rivals[:KEPT]
+                ],
+            }
+        )
+    return {"levels": made}
+
+
+def _better(blocks: Blocks, rival: Candidate, best: Candidate, draws: NDArray[np.int64]) -> float:
+    return float(np.mean(blocks.gains(rival.errors, best.errors, draws) <= 0.0))
+
+
+def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
+    """Word the verdict on evidence.
+
+    Parameters
+    ----------
+    evidence : mapping
+        From :func:`evidence_of`.
+    rule : Rule
+        The numbers of the decision.
+    """
+    levels = evidence["levels"]
+    if len(levels) < 2 or levels[1]["gain"] < rule.least_gain:
+        return Judgement("unexplained" if structured(levels[0]["left"], rule) else "adequate", 0)
+    level = 1
+    wanted = max(rule.second_gain, rule.second_share * levels[1]["gain"])
+    while level + 1 < len(levels) and level < rule.most and levels[level + 1]["added"] >= wanted:
+        level += 1
+    found = levels[level]
+    left = max(found["left"]["rest"], float(np.log(max(found["left"]["excess"], 1.0))))
+    if structured(found["left"], rule) and left > rule.rest * found["gain"]:
+        return Judgement("unexplained", level)
+    still = not_excluded(found["rivals"], rule)
+    return Judgement("ambiguous" if still else "named", level, still)
+
+
+def not_excluded(rivals: Sequence[Mapping[str, Any]], rule: Rule) -> tuple[int, ...]:
+    """Return which rivals are close to the first and not surely worse."""
+    best = rivals[0]
+    return tuple(
+        k
+        for k, rival in enumerate(rivals)
+        if set(rival["names"]) != set(best["names"])
+        and len(rival["names"]) == len(best["names"])
+        and rival["gain"] >= rule.close * best["gain"]
+        and rival["better"] > rule.doubt
+    )
 
 
 def structured(left: dict[str, Any], rule: Rule) -> bool:
@@ -168,31 +304,6 @@ def distinct(candidates: Iterable[Candidate]) -> list[Candidate]:
             seen.add(key)
             kept.append(c)
     return kept
-
-
-def not_excluded(
-    blocks: Blocks,
-    base: Candidate,
-    best: Candidate,
-    rivals: Sequence[Candidate],
-    rule: Rule,
-    seed: int,
-) -> list[Candidate]:
-    """Return the rivals that are close and not surely worse."""
-    gain = blocks.gain(base.errors, best.errors)
-    draws = blocks.draws(rule.draws, seed)
-    still = []
-    for rival in rivals:
-        if frozenset(rival.names) == frozenset(best.names):
-            continue
-        if len(rival.names) != len(best.names):
-            continue
-        if blocks.gain(base.errors, rival.errors) < rule.close * gain:
-            continue
-        ahead = blocks.gains(rival.errors, best.errors, draws)
-        if float(np.mean(ahead <= 0.0)) > rule.doubt:
-            still.append(rival)
-    return still
 
 
 def traces_of(problem: Problem, family: Any, base: Candidate, model: Candidate) -> dict[str, Array]:

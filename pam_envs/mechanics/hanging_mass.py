@@ -50,13 +50,22 @@ class HangingMass:
         0.0, "kg", -5.0, 5.0, "assumed", "what hangs beside a load that is told", neutral=0.0
     )
     slack: float = parameter(
-        0.0, "m", 0.0, 0.02, "assumed", "contraction before the wire is tight", neutral=0.0
+        0.0,
+        "m",
+        0.0,
+        0.02,
+        "assumed",
+        "contraction over which the support lets the load go",
+        neutral=0.0,
     )
     stick: float = parameter(
         0.0, "N", 0.0, 200.0, "assumed", "force at which the guide breaks away", neutral=0.0
     )
     stick_kinetic: float = parameter(
-        0.5, "1", -1.0, 1.0, "assumed", "where it sticks again, over where it broke away"
+        0.5, "1", 0.0, 1.0, "assumed", "force while it slides, over that at which it breaks away"
+    )
+    stick_speed: float = parameter(
+        5e-3, "m/s", 1e-4, 1.0, "assumed", "speed at which friction falls to the kinetic one"
     )
     ring_share: float = parameter(
         0.0, "1", 0.0, 1.0, "assumed", "share of the motion behind a soft mount", neutral=0.0

@@ -80,8 +80,17 @@ class EffectiveAreaMuscle:
     creep_4: float = parameter(
         0.0, "1", -0.5, 2.0, "assumed", "length that follows at memory.creep_time_4", neutral=0.0
     )
-    strand_friction: float = parameter(
-        0.0, "N", 0.0, 200.0, "assumed", "friction between strands, driven by length", neutral=0.0
+    strand_1: float = parameter(
+        0.0, "N", 0.0, 500.0, "assumed", "friction of the first strands to break away", neutral=0.0
+    )
+    strand_2: float = parameter(
+        0.0, "N", 0.0, 500.0, "assumed", "friction of the second strands to break away", neutral=0.0
+    )
+    strand_3: float = parameter(
+        0.0, "N", 0.0, 500.0, "assumed", "friction of the third strands to break away", neutral=0.0
+    )
+    strand_4: float = parameter(
+        0.0, "N", 0.0, 500.0, "assumed", "friction of the last strands to break away", neutral=0.0
     )
     strand_break: float = parameter(
         0.02, "1", 0.001, 0.3, "assumed", "strain at which the last strand slips"

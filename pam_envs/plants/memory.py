@@ -47,7 +47,13 @@ class Memory:
     )
     # effects, neutral unless a recording shows them
     shape: float = parameter(
-        0.0, "1", -3.0, 1.0, "assumed", "friction missing in inner loops", neutral=0.0
+        1.0, "1", 0.01, 100.0, "assumed", "slope of small loops over that of plays", neutral=1.0
+    )
+    pressure_slope: float = parameter(
+        0.0, "1", -2.0, 20.0, "assumed", "friction gained up to full pressure, linear", neutral=0.0
+    )
+    pressure_bend: float = parameter(
+        0.0, "1", -20.0, 20.0, "assumed", "friction gained with pressure squared", neutral=0.0
     )
     creep_1: float = parameter(
         0.0, "1", -0.5, 2.0, "assumed", "first Kelvin-Voigt compliance", neutral=0.0

@@ -36,10 +36,12 @@ SLIDE = 0.2
 FASTEST_DECAY, FASTEST_TURN = 1.0 / 24.0, 1.0 / 200.0
 """Over the sub-step: mass over damping, and mass over stiffness and the sub-step again."""
 TURN = 6.283185307179586
-SHARES = (0.25, 0.2, 0.15, 0.4)
-BREAKS = (0.075, 0.2, 0.5, 1.0)
-"""Strand friction: shares of the force and break strains over that of the last strand (assumed:
-0.3, 0.8, 2 and 4 % of the length, by analogy with plays fitted to a public DMSP-10-250 record)."""
+NOWHERE = -1e9
+"""Where a load hangs that has no support [m]."""
+BREAKS = (0.1, 0.3, 0.6, 1.0)
+"""Strains at which strands break away, over that of the last one."""
+STICK_STEPS = 4
+"""Parts of a sub-step where a guide sticks and slips."""
 
 
 @kernel
@@ -61,19 +63,31 @@ def filled(rows: Any, fixed: Any, j: int, target: float, width: float) -> float:
     band = wide * fixed[R.DEAD_CLOSE][j]
     off, opened = abs(goal - pressure), rows[FIRST + R.OPEN][j]
     opened = 1.0 if off > wide else (opened if off > band * 1.0000001 else 0.0)
-    rows[FIRST + R.OPEN][j] = opened
     goal = goal if opened > 0.0 else pressure
     stop_low, stop_high = min(pressure, goal + band), max(pressure, goal - band)
-    lag = fixed[R.TIME_CONSTANT][j] * (fixed[R.EXHAUST_RATIO][j] if goal < pressure else 1.0)
+    slower = (fixed[R.EXHAUST_RATIO][j] - 1.0) * (
+        1.0 - fixed[R.EXHAUST_TAPER][j] * pressure / fixed[R.MAX_PRESSURE][j]
+    )
+    lag = fixed[R.TIME_CONSTANT][j] * (1.0 + slower if goal < pressure else 1.0)
     slew = fixed[R.SLEW_RATE][j]
     reached = regulator_step(pressure, goal, lag, 1.0 / lag, slew, 1.0 / slew, width)
     rate = fixed[R.EXHAUST_RATE][j]
     choked = (pressure + ATMOSPHERE) * decay(rate * width) - ATMOSPHERE
     reached = reached if rate >= 100.0 else max(reached, min(pressure, choked))
-    supply, filling = fixed[R.SUPPLY_PRESSURE][j] - drop, decay(width / fixed[R.SUPPLY_TIME][j])
-    reached = min(reached, max(pressure, supply - (supply - pressure) * filling))
+    # what the supply lets through: choked, and as the root of the difference near its pressure
+    supply = fixed[R.SUPPLY_PRESSURE][j] - drop
+    most = (supply + ATMOSPHERE) / fixed[R.SUPPLY_TIME][j]
+    head = math.sqrt(max(0.0, supply - pressure))
+    head = max(0.0, head - width * most / math.sqrt(2.0 * max(1.0, supply + ATMOSPHERE)))
+    throat = max(0.0, min(width * most, supply - head * head - pressure))
+    filling = max(1e-9, reached - pressure)
+    share = throat / math.sqrt(filling * filling + throat * throat)
+    share = 1.0 if fixed[R.SUPPLY_PRESSURE][j] >= 2e7 else share
+    reached = reached if reached <= pressure else pressure + filling * share
     # the valve closes when the error has fallen to the band
-    reached = min(reached, stop_high) if goal > pressure else max(reached, stop_low)
+    stopped = min(reached, stop_high) if goal > pressure else max(reached, stop_low)
+    rows[FIRST + R.OPEN][j] = opened if stopped == reached else 0.0
+    reached = stopped
     reached = pressure if target < 0.0 else reached
     rows[FIRST + R.DROP][j] = (
         drop + fixed[R.SUPPLY_DROOP][j] * max(0.0, reached - pressure)
@@ -130,7 +144,10 @@ def feel(
         friction[j] = felt - drive[j]
         new = decay(min(40.0, rows[FIRST + R.TRAVEL][j] / fixed[R.FIRST_TRAVEL][j]))
         share = min(1.0, abs(friction[j]) / max(most[j], 1.0))
-        friction[j] = friction[j] * (1.0 - fixed[R.SHAPE][j] * (1.0 - share))
+        shape, u = fixed[R.SHAPE][j], true[j] / fixed[R.MAX_PRESSURE][j]
+        friction[j] = friction[j] * shape / (1.0 + (shape - 1.0) * share)
+        grown = (fixed[R.PRESSURE_SLOPE][j] + fixed[R.PRESSURE_BEND][j] * u) * u
+        friction[j] = friction[j] * max(0.02, 1.0 + grown)
         w = felt - (1.0 + fixed[R.FIRST_WIDTH][j] * new) * friction[j]
         drive[j] = w
     if creeps > 0:
@@ -172,21 +189,17 @@ def settled(
 
 
 @kernel
-def supported(x: float, drive: float, hangs: float, fixed: Any, j: int) -> float:
-    """Return where the muscle's end is if a support holds the load up to ``slack``.
+def hung(x: float, hangs: float, slack: float) -> float:
+    """Return the share of a load that hangs on the muscle, 0 to 1.
 
-    Until the wire is tight the muscle shortens as one without load does; near its rest length
-    that is a straight line.
+    The load rests on something that gives way: from where it would hang without pressure the
+    muscle takes it over in ``slack``.
     """
-    stiff = fixed[R.BRAID_FORCE][j] / fixed[R.BRAID_STRAIN][j] + fixed[R.STIFFNESS][j]
-    alone = drive * fixed[R.AREA][j] * fixed[R.REST_LENGTH][j] / stiff
-    slack = fixed[R.SLACK][j]
-    held = max(x, min(alone, hangs + slack))
-    return held if slack > 0.0 else x
+    return 1.0 if slack <= 0.0 else max(0.0, min(1.0, (x - hangs) / slack))
 
 
 @routine
-def balance(fixed: Any, lane: int, drive: float, load: float) -> float:
+def balance(fixed: Any, lane: int, drive: float, load: float, hangs: float) -> float:
     """Return the position [m] at rest of one lane, by bisection."""
     length = fixed[R.REST_LENGTH][lane]
     mass = load + (fixed[R.LOAD_ERROR][lane] if load > 0.0 else 0.0)
@@ -215,7 +228,7 @@ def balance(fixed: Any, lane: int, drive: float, load: float) -> float:
             fixed[R.SOFTENING][lane] * stiffer,
             fixed[R.STIFFENING][lane] * stiffer,
         )
-        if pull > weight:
+        if pull > weight * hung(e * length, hangs, fixed[R.SLACK][lane]):
             low = e
         else:
             high = e
@@ -225,10 +238,8 @@ def balance(fixed: Any, lane: int, drive: float, load: float) -> float:
 @routine
 def rest_extended(fixed: Any, lane: int, drive: float, load: float) -> float:
     """Return the position [m] at rest under an effective pressure and a load told."""
-    x = balance(fixed, lane, drive, load)
-    if fixed[R.SLACK][lane] <= 0.0:
-        return x
-    return supported(x, drive, balance(fixed, lane, 0.0, load), fixed, lane)
+    hangs = balance(fixed, lane, 0.0, load, NOWHERE)
+    return balance(fixed, lane, drive, load, hangs)
 
 
 @kernel
@@ -238,8 +249,9 @@ def begin_effects(rows: Any, fixed: Any, j: int) -> None:
         rows[FIRST + k][j] = 0.0
     x, pressure = rows[R.CONTRACTION][j], rows[R.PRESSURE][j]
     rows[FIRST + R.REGULATED][j], rows[FIRST + R.LINE][j] = pressure, pressure
-    for k in (R.STUCK, R.SHOWN, R.MOUNT):
+    for k in (R.SHOWN, R.MOUNT):
         rows[FIRST + k][j] = x
+    rows[FIRST + R.STUCK][j] = 1.0
     for k in (R.STRAND_1, R.STRAND_2, R.STRAND_3, R.STRAND_4):
         rows[FIRST + k][j] = x / fixed[R.REST_LENGTH][j]
     rows[FIRST + R.KELVIN][j] = fixed[R.TEMPERATURE][j]
@@ -253,7 +265,7 @@ def begin_effects(rows: Any, fixed: Any, j: int) -> None:
     rows[R.REST][j] = rows[R.REST][j] * (1.0 + crept)
     rows[FIRST + R.OPEN][j] = 0.0
     rows[FIRST + R.HUNG][j] = rows[R.LOAD][j]
-    rows[FIRST + R.HANGS][j] = balance(fixed, j, 0.0, rows[R.LOAD][j])
+    rows[FIRST + R.HANGS][j] = balance(fixed, j, 0.0, rows[R.LOAD][j], NOWHERE)
     for k in range(R.N_HISTORY):
         rows[FIRST + R.SEEN + k][j] = x * (1.0 + crept) - rows[R.REST][j]
     rows[FIRST + R.POSITION][j] = x * (1.0 + crept) - rows[R.REST][j]
@@ -307,6 +319,40 @@ def seen_pressure(rows: Any, j: int) -> float:
 
 
 @kernel
+def rubbing(
+    rows: Any, fixed: Any, j: int, push: float, speed: float, per_mass: float
+) -> tuple[float, float]:
+    """Return which way the guide rubs, 0 where it holds, and the deceleration [m/s2].
+
+    It holds until the push [m/s2] exceeds the breakaway force; in motion its friction falls with
+    speed towards the kinetic one (Stribeck).
+    """
+    most = fixed[R.STICK][j] * per_mass
+    held = rows[FIRST + R.STUCK][j] > 0.0
+    side = 1.0 if (push if held else speed) > 0.0 else -1.0
+    kinetic, pace = fixed[R.STICK_KINETIC][j], fixed[R.STICK_SPEED][j]
+    rubs = side * most * (kinetic + (1.0 - kinetic) * decay(min(40.0, abs(speed) / pace)))
+    if most == 0.0:
+        side = 2.0  # no guide
+    elif held and abs(push) <= most:
+        side = 0.0
+    return side, rubs
+
+
+@kernel
+def caught(
+    rows: Any, j: int, side: float, speed: float, moved: float, after: float, h: float
+) -> tuple[float, float]:
+    """Return displacement and speed where the guide catches what has stopped."""
+    turned = abs(side) == 1.0 and after * side < 0.0
+    rows[FIRST + R.STUCK][j] = 1.0 if side == 0.0 or turned else 0.0
+    if turned:  # it stops where its speed passes zero
+        share = speed / (speed - after) if speed * side > 0.0 else 0.0
+        moved = 0.5 * speed * share * h
+    return (0.0, 0.0) if side == 0.0 else (moved, 0.0 if turned else after)
+
+
+@kernel
 def move(
     rows: Any,
     fixed: Any,
@@ -325,11 +371,11 @@ def move(
         friction[j] = 0.0
         sticking[j] = 0.0
     for i in range(4 if strands > 0 else 0):
-        slip, share, part = rows[FIRST + R.STRAND_1 + i], SHARES[i], BREAKS[i]
+        slip, part = rows[FIRST + R.STRAND_1 + i], BREAKS[i]
         for j in range(LANES):
             e = (x[j] + 0.5 * h * v[j]) / fixed[R.REST_LENGTH][j]
             span = part * fixed[R.STRAND_BREAK][j]
-            stiff = fixed[R.STRAND_FRICTION][j] * share / span
+            stiff = fixed[R.STRAND_FORCE_1 + i][j] / span
             gap = max(-span, min(span, e - slip[j]))
             friction[j] = friction[j] + stiff * gap
             sticking[j] = sticking[j] + (stiff if abs(e - slip[j]) < span else 0.0)
@@ -368,6 +414,10 @@ def move(
             + fine_slope(0.5 * (was[j] + drive[j]) - shift, e, area, curve, k2, k4)
             + sticking[j]
         )
+        slack = fixed[R.SLACK][j]
+        hangs = hung(x[j] + ahead, rows[FIRST + R.HANGS][j], slack)
+        eased = weight * fixed[R.REST_LENGTH][j] / max(slack, 1e-6)
+        slope = slope + (eased if 0.0 < hangs < 1.0 else 0.0)
         pace = fixed[R.VISCOSITY_SPEED][j]
         loss = fixed[R.DAMPING][j] + fixed[R.VISCOSITY][j] / math.sqrt(1.0 + abs(v[j]) / pace)
         stiff = slope * per_length
@@ -375,30 +425,25 @@ def move(
         # motion that is over within the sub-step is followed as slowly as the series reaches
         per_mass = 1.0 / max(moved, loss * h * FASTEST_DECAY, stiff * h * h * FASTEST_TURN)
         k = stiff * per_mass
-        sticking[j] = stiff
-        a = (pull - weight) * per_mass + k * ahead
+        a = (pull - weight * hangs) * per_mass + k * ahead
         jerk = area * (1.0 - (taper + curve * e) * e) * (drive[j] - was[j]) * per_mass / h
         drag = per_mass * loss
-        dx, v[j] = damped_motion(v[j], a, jerk, k, drag, decay(0.5 * drag * h), h)
+        if sticks > 0:
+            side, rubs = rubbing(rows, fixed, j, a - k * ahead + jerk * h, v[j], per_mass)
+            a = a - rubs
+        speed = v[j]
+        dx, v[j] = damped_motion(speed, a, jerk, k, drag, decay(0.5 * drag * h), h)
+        if sticks > 0:
+            dx, v[j] = caught(rows, j, side, speed, dx, v[j], h)
         x[j] = x[j] + dx
     for i in range(4 if strands > 0 else 0):
         slip, part = rows[FIRST + R.STRAND_1 + i], BREAKS[i]
         for j in range(LANES):
             slip[j] = play(x[j] / fixed[R.REST_LENGTH][j], part * fixed[R.STRAND_BREAK][j], slip[j])
     shown = rows[FIRST + R.SHOWN]
-    hangs = rows[FIRST + R.HANGS]
     for j in range(LANES):
         friction[j] = shown[j]
-        shown[j] = supported(x[j], drive[j], hangs[j], fixed, j)
-    if sticks > 0:
-        stuck = rows[FIRST + R.STUCK]
-        for j in range(LANES):
-            width = fixed[R.STICK][j] / sticking[j]
-            gap = shown[j] - stuck[j]
-            side = 1.0 if gap > 0.0 else -1.0
-            slid = shown[j] - side * width * fixed[R.STICK_KINETIC][j]
-            stuck[j] = slid if abs(gap) > width else stuck[j]
-            shown[j] = stuck[j] if width > 0.0 else shown[j]
+        shown[j] = x[j]
     if stretches > 0:
         for k in range(4):
             state = rows[FIRST + R.STRETCH_1 + k]
@@ -439,12 +484,15 @@ def advance_extended(
     for k in range(4):
         creeps = creeps + count_on(fixed[R.DRIVE_CREEP_1 + k], 0.0)
         stretches = stretches + count_on(fixed[R.LENGTH_CREEP_1 + k], 0.0)
-    lines, mounts = count_on(fixed[R.LINE_SHARE], 0.0), count_on(fixed[R.MOUNT_SHARE], 0.0)
-    strands, sticks = count_on(fixed[R.STRAND_FRICTION], 0.0), count_on(fixed[R.STICK], 0.0)
+    lines = count_on(fixed[R.LINE_SHARE], 0.0) + count_on(fixed[R.LINE_FLOW], 0.0)
+    mounts = count_on(fixed[R.MOUNT_SHARE], 0.0)
+    strands, sticks = 0, count_on(fixed[R.STICK], 0.0)
+    for k in range(4):
+        strands = strands + count_on(fixed[R.STRAND_FORCE_1 + k], 0.0)
     for j in range(LANES):
         if load[j] != rows[FIRST + R.HUNG][j]:
             rows[FIRST + R.HUNG][j] = load[j]
-            rows[FIRST + R.HANGS][j] = balance(fixed, j, 0.0, load[j])
+            rows[FIRST + R.HANGS][j] = balance(fixed, j, 0.0, load[j], NOWHERE)
         age = dead[j] / period
         whole = min(int(age), DELAY_PERIODS)
         switch[j] = (age - whole) * period
@@ -475,11 +523,20 @@ def advance_extended(
                     turns, ratio = fixed[R.LINE_FREQUENCY][j], fixed[R.LINE_DAMPING][j]
                     swung = rung(rows, j, R.LINE, own[0][j], pressure[j], turns, ratio, width[j])
                     part = fixed[R.LINE_SHARE][j]
-                    pressure[j] = max(0.0, (1.0 - part) * pressure[j] + part * swung)
+                    flow = fixed[R.LINE_FLOW][j] * rows[FIRST + R.LINE_RATE][j] / (TURN * turns)
+                    pressure[j] = max(0.0, (1.0 - part) * pressure[j] + part * swung + flow)
             for j in range(LANES):
                 rows[FIRST + R.TRAVEL][j] += abs(pressure[j] - own[1][j])
             feel(rows, fixed, counts, table, memory, 0, LANES, elements, work, width, own, creeps)
-        move(rows, fixed, was, h, own, strands, sticks, mounts, stretches)
+        parts = STICK_STEPS if sticks > 0 else 1
+        for j in range(LANES):
+            own[2][j] = drive[j]
+        for q in range(parts):
+            for j in range(LANES):
+                drive[j] = was[j] + (own[2][j] - was[j]) / (parts - q)
+            move(rows, fixed, was, h / parts, own, strands, sticks, mounts, stretches)
+            for j in range(LANES):
+                was[j] = drive[j]
     for j in range(LANES):
         sense(rows, fixed, j, step[j] + 1, (step[j] + 1) * period, period)
 

@@ -66,6 +66,9 @@ class Regulator:
     exhaust_ratio: float = parameter(
         1.0, "1", 0.1, 20.0, "assumed", "lag when exhausting over lag when filling", neutral=1.0
     )
+    exhaust_taper: float = parameter(
+        0.0, "1", 0.0, 1.0, "assumed", "how much of exhaust_ratio is gone at full pressure"
+    )
     exhaust_rate: float = parameter(
         100.0,
         "1/s",
@@ -85,13 +88,16 @@ class Regulator:
         0.0, "1", 0.0, 5.0, "assumed", "supply pressure lost over pressure filled", neutral=0.0
     )
     supply_time: float = parameter(
-        0.01, "s", 0.001, 5.0, "assumed", "time constant of filling from the supply"
+        0.01, "s", 0.001, 5.0, "assumed", "filling to the supply takes at full flow"
     )
     supply_recovery: float = parameter(
         10.0, "s", 0.1, 1e3, "assumed", "time constant of the reservoir's recovery"
     )
     ring_share: float = parameter(
         0.0, "1", 0.0, 1.0, "assumed", "share of the pressure behind a line that rings", neutral=0.0
+    )
+    ring_flow: float = parameter(
+        0.0, "1", -2.0, 2.0, "assumed", "ringing that goes with the flow", neutral=0.0
     )
     ring_frequency: float = parameter(7.0, "Hz", 0.5, 20.0, "assumed", "of the line")
     ring_damping: float = parameter(0.1, "1", 0.005, 2.0, "assumed", "damping ratio of the line")

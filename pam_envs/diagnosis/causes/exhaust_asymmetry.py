@@ -13,7 +13,13 @@ CAUSE = Cause(
     name="exhaust_asymmetry",
     title="an exhaust unlike filling",
     forms=(
-        Form("lag", (Term("regulator.exhaust_ratio", (1.2,), log=True),)),
+        Form(
+            "lag",
+            (
+                Term("regulator.exhaust_ratio", (1.2,), log=True),
+                Term("regulator.exhaust_taper", (0.3,), scale=0.5, amount=False),
+            ),
+        ),
         Form(
             "choked",
             (Term("regulator.exhaust_rate", (1.5, 5.0), low=0.2, high=99.0, log=True),),

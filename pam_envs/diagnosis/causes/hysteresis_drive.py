@@ -16,7 +16,7 @@ CAUSE = Cause(
         Form(
             "strands",
             (
-                Term("muscle.strand_friction", (2.0,), scale=1.0),
+                *(Term(f"muscle.strand_{k}", (0.5, 2.0), scale=1.0) for k in (1, 2, 3, 4)),
                 Term("muscle.strand_break", (0.02,), log=True, amount=False),
             ),
         ),

@@ -13,7 +13,7 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 CAUSE = Cause(
     name="hysteresis_shape",
     title="the shape of minor loops",
-    forms=(Form("inner loops", (Term("memory.shape", (0.1, -0.1), scale=0.05),)),),
+    forms=(Form("inner loops", (Term("memory.shape", (2.0, 0.5), log=True),)),),
     signature=(
         "the error begins at reversals and has gone when the loop is fully slipped: large loops "
         "fit, small reversals are off"

@@ -12,7 +12,16 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 CAUSE = Cause(
     name="pressure_dependent_friction",
     title="friction that changes with pressure",
-    forms=(Form("stretch", (Term("memory.stretch", (0.1, -0.1), scale=0.05),)),),
+    forms=(
+        Form("stretch", (Term("memory.stretch", (0.1, -0.1), scale=0.05),)),
+        Form(
+            "factor",
+            (
+                Term("memory.pressure_slope", (0.5, -0.3), scale=0.3),
+                Term("memory.pressure_bend", (-0.1, 0.1), scale=0.3),
+            ),
+        ),
+    ),
     signature=(
         "the error has the sign of the direction at low pressures and the opposite one at high "
         "pressures"

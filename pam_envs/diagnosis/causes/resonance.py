@@ -8,20 +8,29 @@ through a lightly damped second-order system of a few hertz.
 from __future__ import annotations
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
+from pam_envs.diagnosis.seeds import grid
+
+_SHARES, _DAMPINGS, _FLOWS = (0.1,), (0.03, 0.1), (0.1,)
+_FLOW = Term("regulator.ring_flow", (0.1,), scale=0.05)
+_HERTZ = (3.0, 3.5, 4.0, 4.6, 5.2, 5.8, 6.5, 7.2, 8.0, 8.8, 9.6, 10.5, 11.5, 12.6, 14.0)
 
 
-def _ring(component: str) -> tuple[Term, ...]:
+def _ring(component: str, *more: Term) -> tuple[Term, ...]:
     return (
-        Term(f"{component}.ring_share", (0.1, 0.3), high=0.8, scale=0.05),
-        Term(f"{component}.ring_frequency", (4.0, 8.0), log=True, amount=False),
+        Term(f"{component}.ring_share", (0.1,), high=0.8, scale=0.05),
+        Term(f"{component}.ring_frequency", (7.0,), log=True, amount=False),
         Term(f"{component}.ring_damping", (0.1,), high=0.2, log=True, amount=False),
+        *more,
     )
 
 
 CAUSE = Cause(
     name="resonance",
     title="a resonance of line or mount",
-    forms=(Form("line", _ring("regulator")), Form("mount", _ring("mass"))),
+    forms=(
+        Form("line", _ring("regulator", _FLOW), grid(_SHARES, _HERTZ, _DAMPINGS, _FLOWS)),
+        Form("mount", _ring("mass"), grid(_SHARES, _HERTZ, _DAMPINGS)),
+    ),
     signature=(
         "a decaying oscillation of one frequency after every step, whatever its size; a peak in "
         "the spectrum that is not there in holds"

@@ -11,19 +11,21 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.seeds import grid
 
 _BREAKS = (0.5, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0, 14.0)
-_HOLDS = (0.0, 0.3, 0.5, 0.75)
+_HOLDS = (0.3, 0.5, 0.75)
+_SPEEDS = (1e-3, 5e-3)
 
 CAUSE = Cause(
     name="stick_slip",
     title="stick-slip in the guide",
     forms=(
         Form(
-            "jumping play",
+            "Stribeck",
             (
                 Term("mass.stick", (4.0,), scale=4.0),
                 Term("mass.stick_kinetic", (0.4,), high=0.95, scale=1.0, amount=False),
+                Term("mass.stick_speed", (5e-3,), high=0.3, log=True, amount=False),
             ),
-            seeds=grid(_BREAKS, _HOLDS),
+            seeds=grid(_BREAKS, _HOLDS, _SPEEDS),
         ),
     ),
     signature=(

@@ -9,6 +9,10 @@ filled and comes back exponentially.
 from __future__ import annotations
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
+from pam_envs.diagnosis.seeds import grid
+
+_SUPPLIES, _DROOPS = (5.6e5, 6.1e5, 6.4e5, 6.8e5, 7.2e5), (0.05, 0.2, 0.5)
+_TIMES, _RECOVERIES = (0.03, 0.08, 0.2), (2.0, 6.0)
 
 CAUSE = Cause(
     name="supply_droop",
@@ -17,17 +21,12 @@ CAUSE = Cause(
         Form(
             "reservoir",
             (
-                Term(
-                    "regulator.supply_pressure",
-                    (6.2e5, 7e5, 6.2e5, 5.6e5),
-                    low=3e5,
-                    high=2e6,
-                    log=True,
-                ),
-                Term("regulator.supply_droop", (0.1, 0.1, 0.3, 0.05), scale=0.05, amount=False),
-                Term("regulator.supply_time", (0.1, 0.1, 0.03, 0.03), log=True, amount=False),
-                Term("regulator.supply_recovery", (8.0,), log=True, amount=False),
+                Term("regulator.supply_pressure", (6.5e5,), low=3e5, high=2e6, log=True),
+                Term("regulator.supply_droop", (0.2,), scale=0.05, amount=False),
+                Term("regulator.supply_time", (0.05,), log=True, amount=False),
+                Term("regulator.supply_recovery", (4.0,), log=True, amount=False),
             ),
+            seeds=grid(_SUPPLIES, _DROOPS, _TIMES, _RECOVERIES),
         ),
     ),
     signature=(
