@@ -81,6 +81,8 @@ class Cause:
         It happens once, so that segments left out by kind do not show it.
     sensor : str
         What would measure it directly.
+    contains : tuple of str
+        Causes that it can imitate in a limit: where both fit alike the simpler one is named.
     """
 
     name: str
@@ -93,3 +95,4 @@ class Cause:
     needs: tuple[str, ...] = ()
     once: bool = False
     sensor: str = ""
+    contains: tuple[str, ...] = ()

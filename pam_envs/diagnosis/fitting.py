@@ -117,6 +117,8 @@ class Fit:
         Derivative of the residuals by the last k coordinates.
     shared : Shared or None
         The derivative by those before them.
+    begins : dict
+        Where fits of further causes begin, by form.
     """
 
     frees: tuple[Free, ...]
@@ -129,6 +131,7 @@ class Fit:
     damping: float = 1.0
     done: bool = False
     label: Any = None
+    begins: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @property
     def held(self) -> int:
@@ -191,8 +194,8 @@ class Problem:
         if bad.any():
             outputs[bad] = WORST
             outputs[np.isnan(self.measured)] = 0.0
-        flat = outputs.reshape(-1, len(columns))
-        return np.ascontiguousarray(flat[self.order].T)
+        flat = outputs.transpose(2, 0, 1).reshape(len(columns), -1)
+        return np.ascontiguousarray(flat[:, self.order])
 
     def rows(self, residual: Array) -> Array:
         """Return a residual vector by channel and sample, shape (channels, T)."""

@@ -115,11 +115,16 @@ def _shown(
 
 
 def _full(base: Fit, fit: Fit) -> Array:
-    """Return the column with the cause at the far end of its bounds, or thirty times its start."""
+    """Return the column with the cause far beyond where its fit starts, within its bounds."""
     column = column_of(fit, fit.z)
-    for free in fit.frees[len(base.frees) :]:
+    _, form = fit.label
+    for term, free in zip(form.terms, fit.frees[len(base.frees) :], strict=True):
+        here = base.column[free.place]
         if not free.log:
             column[free.place] = np.clip(30.0 * free.start, free.low, free.high)
+        elif term.amount and here > 0.0:
+            far = here * (free.start / here) ** 6
+            column[free.place] = np.clip(far, free.low, free.high)
     return column
 
 

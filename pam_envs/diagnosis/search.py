@@ -28,7 +28,7 @@ BLOCK_SECONDS = 4.0
 """Length of the interleaved blocks on which causes are compared."""
 EVERY = 3
 """Every third block is held out."""
-SCHEDULE = ((2, 12, 0.4), (2, 7, 0.6), (4, 5, 0.8))
+SCHEDULE = ((2, 8, 0.4), (2, 5, 0.6), (4, 4, 0.8))
 """Rounds with the base's Jacobian held; how many fits then go on, or what part of the best gain."""
 POLISH = 6
 """Rounds, at most, with all of the Jacobian."""
@@ -131,7 +131,10 @@ def frees_of(family: Any, form: Form, values: Sequence[float]) -> tuple[Free, ..
 def starts(problem: Problem, family: Any, base: Fit, form: Form) -> list[tuple[float, ...]]:
     """Return where the fits of a form begin."""
     if form.seeds is not None:
-        return [tuple(s) for s in form.seeds(problem, family, base, form)]
+        key = id(form)
+        if key not in base.begins:
+            base.begins[key] = [tuple(s) for s in form.seeds(problem, family, base, form)]
+        return list(base.begins[key])
     n = max(len(t.starts) for t in form.terms)
     return [tuple(t.starts[min(i, len(t.starts) - 1)] for t in form.terms) for i in range(n)]
 
@@ -235,7 +238,7 @@ def fit_base(
 
 def refit(problem: Problem, blocks: Blocks, candidate: Candidate, rounds: int = 6) -> Candidate:
     """Return a candidate fitted anew to a problem with other training samples."""
-    fit = replace(candidate.fit, done=False, damping=1.0, shared=None)
+    fit = replace(candidate.fit, done=False, damping=1.0, shared=None, begins={})
     evaluate(problem, [fit])
     improve(problem, [fit], rounds, 1e-5)
     return Candidate(candidate.causes, fit, blocks.errors(problem.rows(fit.residual)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.fitting import Problem, column_of
-from pam_envs.diagnosis.search import Blocks, Candidate, search
+from pam_envs.diagnosis.search import Blocks, Candidate, refit, search
 from pam_envs.diagnosis.structure import Regressors, flexible_r2, spectral_peak
 
 Array = NDArray[np.float64]
 
+CROSS_ROUNDS, CROSSED = 4, 4
+"""Rounds of a fit to other blocks, and how many rivals are compared so."""
 KEPT = 12
 """How many rivals of a level are judged."""
 
@@ -50,8 +52,10 @@ class Rule:
         First causes from which a second is looked for.
     most : int
         Most causes named.
-    simpler : float
-        What a form with more parameters must gain over one it contains.
+    simpler, simpler_share : float
+        What a cause that contains another one must gain over it, and what part of the gain.
+    folds : int
+        Ways to hold blocks out on which close rivals are compared.
     draws : int
         Bootstrap samples.
     """
@@ -69,7 +73,9 @@ class Rule:
     hint: float = 0.4
     beam: int = 3
     most: int = 3
-    simpler: float = 0.03
+    simpler: float = 0.05
+    simpler_share: float = 0.03
+    folds: int = 3
     draws: int = 400
 
 
@@ -170,6 +176,9 @@ def decide(
         levels.append(Level(model, rivals, left_over(problem, blocks, model, regressors)))
     evidence = evidence_of(blocks, levels, rule, seed)
     judged = judge(evidence, rule)
+    if judged.verdict == "ambiguous":
+        cross(problem, blocks, levels, regressors, judged, evidence, rule, seed)
+        judged = judge(evidence, rule)
     chosen = levels[judged.level]
     rivals = chosen.rivals if judged.level else levels[min(1, len(levels) - 1)].rivals
     return Decision(
@@ -180,6 +189,45 @@ def decide(
         {"before": levels[0].left, "after": chosen.left},
         evidence,
     )
+
+
+def cross(
+    problem: Problem,
+    blocks: Blocks,
+    levels: list[Level],
+    regressors: Regressors,
+    judged: Judgement,
+    evidence: dict[str, Any],
+    rule: Rule,
+    seed: int,
+) -> None:
+    """Compare what is not excluded on all blocks, and order level and evidence anew."""
+    level, found = levels[judged.level], evidence["levels"][judged.level]
+    places = [0, *judged.open_rivals][:CROSSED]
+    base, *again = crossed(
+        problem, blocks, levels[0].model, [level.rivals[k] for k in places], rule
+    )
+    every = replace(blocks, held_out=np.ones_like(blocks.held_out))
+    gains = [every.gain(base.errors, c.errors) for c in again]
+    ranked = sorted(range(len(again)), key=lambda i: -gains[i])
+    order = preferred(every, base, [again[i] for i in ranked], rule)
+    draws = every.draws(rule.draws, seed)
+    rows = []
+    for candidate in order:
+        i = next(i for i, c in enumerate(again) if c is candidate)
+        row = dict(found["rivals"][places[i]])
+        row["gain"], row["better"] = gains[i], _better(every, candidate, order[0], draws)
+        row["imitates"] = reduces(candidate, order[0])
+        rows.append((row, level.rivals[places[i]]))
+    others = [k for k in range(len(level.rivals)) if k not in places]
+    rivals = [r for _, r in rows] + [level.rivals[k] for k in others]
+    found["rivals"] = [r for r, _ in rows] + [
+        found["rivals"][k] for k in others if k < len(found["rivals"])
+    ]
+    found["crossed"] = len(rows)
+    if rivals[0] is not level.model:
+        found["left"] = left_over(problem, blocks, rivals[0], regressors)
+    levels[judged.level] = Level(rivals[0], rivals, found["left"])
 
 
 def _ladder(
@@ -194,6 +242,7 @@ def _ladder(
     rivals = search(problem, family, blocks, base, causes)
     if not rivals:
         return
+    rivals = preferred(blocks, base, rivals, rule)
     yield rivals[0], rivals
     model = rivals[0]
     first_gain = blocks.gain(base.errors, model.errors)
@@ -207,9 +256,52 @@ def _ladder(
             for first in rivals[1 : rule.beam]:
                 larger += search(problem, family, blocks, first, causes, 2)[:4]
             larger.sort(key=lambda c: -blocks.gain(base.errors, c.errors))
-        rivals = distinct(larger)
+        rivals = preferred(blocks, base, distinct(larger), rule)
         model = rivals[0]
         yield model, rivals
+
+
+def preferred(
+    blocks: Blocks, base: Candidate, rivals: Sequence[Candidate], rule: Rule
+) -> list[Candidate]:
+    """Return rivals, best first, a cause that another one contains before it where both are close.
+
+    A drift that is over before the record begins is a bias, and a very fast resonance a delay:
+    what can imitate another cause has to gain more than that one.
+    """
+    order = list(rivals)
+    best = blocks.gain(base.errors, order[0].errors)
+    margin = max(rule.simpler, rule.simpler_share * best)
+    for rival in order[1:]:
+        behind = best - blocks.gain(base.errors, rival.errors)
+        if behind < margin and reduces(order[0], rival):
+            return [rival, *(r for r in order if r is not rival)]
+    return order
+
+
+def reduces(model: Candidate, other: Candidate) -> bool:
+    """Return whether the model, with one cause in a limit, is the other."""
+    mine, its = set(model.names), set(other.names)
+    if len(model.names) != len(other.names) or len(mine - its) != 1:
+        return False
+    (gone,), (come,) = mine - its, its - mine
+    return any(cause.name == gone and come in cause.contains for cause, _ in model.causes)
+
+
+def crossed(
+    problem: Problem, blocks: Blocks, base: Candidate, rivals: Sequence[Candidate], rule: Rule
+) -> list[Candidate]:
+    """Return base and rivals with errors on all blocks, each from a fit that has not seen it."""
+    whole = [base, *rivals]
+    errors = [candidate.errors.copy() for candidate in whole]
+    fold = (np.arange(len(blocks.held_out)) - np.flatnonzero(blocks.held_out)[0]) % rule.folds
+    for k in range(1, rule.folds):
+        out = fold == k
+        part = replace(blocks, held_out=out)
+        again = replace(problem, train=part.train)
+        for candidate, kept in zip(whole, errors, strict=True):
+            kept[:, out] = refit(again, part, candidate, CROSS_ROUNDS).errors[:, out]
+    return [replace(c, errors=e) for c, e in zip(whole, errors, strict=True)]
 
 
 def evidence_of(
@@ -219,8 +311,8 @@ def evidence_of(
 
     Under ``levels``, one entry for each number of causes from none: ``gain`` over the base,
     ``added`` over the level before, what is ``left``, and the ``rivals``, the best first, each
-    with ``names``, ``forms``, ``gain`` and ``better``: the part of the samples of blocks in which
-    it is ahead of the best.
+    with ``names``, ``forms``, ``gain``, ``better``: the part of the samples of blocks in which it
+    is ahead of the best, and ``imitates``: whether it has the best as a limit.
     """
     base = levels[0].model
     draws = blocks.draws(rule.draws, seed)
@@ -238,6 +330,7 @@ def evidence_of(
                         "forms": [form.name for _, form in rival.causes],
                         "gain": blocks.gain(base.errors, rival.errors),
                         "better": _better(blocks, rival, level.model, draws),
+                        "imitates": reduces(rival, level.model),
                     }
                     for rival in level.rivals[:KEPT]
                 ],
@@ -283,6 +376,7 @@ def not_excluded(rivals: Sequence[Mapping[str, Any]], rule: Rule) -> tuple[int, 
         for k, rival in enumerate(rivals)
         if set(rival["names"]) != set(best["names"])
         and len(rival["names"]) == len(best["names"])
+        and not rival["imitates"]
         and rival["gain"] >= rule.close * best["gain"]
         and rival["better"] > rule.doubt
     )

@@ -38,6 +38,7 @@ ENTRY_KEYS = ("value", "unit", "provenance", "source")
 _CREEP_TIMES = tuple(f"memory.creep_time_{k}" for k in (1, 2, 3, 4))
 EFFECTS: tuple[tuple[str, ...], ...] = (
     ("regulator.gain",),
+    ("regulator.slew_bend",),
     ("regulator.dead_band", "regulator.dead_close"),
     ("regulator.exhaust_ratio", "regulator.exhaust_taper"),
     ("regulator.exhaust_rate",),

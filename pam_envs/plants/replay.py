@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pam_envs.kernels import COMPILED, LANES, build, kernel, prange, routine, scratch, tile_view
 from pam_envs.mechanics.hanging_mass import oscillator_wide
 from pam_envs.plants import single_muscle_rows as R
-from pam_envs.plants.single_muscle import SingleMuscle
+from pam_envs.plants.single_muscle import NEUTRAL, SingleMuscle
 from pam_envs.plants.single_muscle_effects import (
     advance_extended,
     begin_effects,
@@ -148,6 +148,43 @@ def run_replay(
             advance_extended(rows, fixed, counts, table, R.END, elements, substeps, period, work)
 
 
+TILE = 16
+"""Plants that a tile advances together: fewer than in a batch, since few are replayed at a time."""
+COSTLY = (
+    (
+        "regulator.slew_bend",
+        "regulator.dead_band",
+        "regulator.exhaust_ratio",
+        "regulator.exhaust_rate",
+        "regulator.leak",
+        "regulator.supply_pressure",
+    ),
+    (
+        "memory.shape",
+        "memory.pressure_slope",
+        "memory.pressure_bend",
+        "memory.first_width",
+        "memory.first_loss",
+        "muscle.temperature_gain",
+    ),
+    ("regulator.ring_share", "regulator.ring_flow"),
+    ("mass.ring_share",),
+    tuple(f"muscle.creep_{k}" for k in (1, 2, 3, 4)),
+    tuple(f"memory.creep_{k}" for k in (1, 2, 3, 4)),
+    tuple(f"muscle.strand_{k}" for k in (1, 2, 3, 4)),
+    ("mass.stick",),
+)
+"""Parameters of the effects that a tile works out only where one of them is on."""
+
+
+@lru_cache(maxsize=1)
+def _places() -> list[tuple[list[int], Array]]:
+    return [
+        ([R.place(n) for n in names], np.array([NEUTRAL.get(n, 0.0) for n in names]))
+        for names in COSTLY
+    ]
+
+
 @lru_cache(maxsize=8)
 def _runner(kind: str, parallel: bool) -> Callable[..., Any]:
     first = R.END + MEMORY_ROWS[kind]
@@ -156,6 +193,7 @@ def _runner(kind: str, parallel: bool) -> Callable[..., Any]:
         f"replay_{kind}",
         parallel,
         oscillator=oscillator_wide,
+        LANES=TILE,
         N_ROWS=first + R.N_EFFECTS,
         **replacements(kind, first),
     )
@@ -178,17 +216,37 @@ def replay_rows(plant: SingleMuscle, columns: Array, inputs: Inputs) -> Array:
     array, shape (2, T, n)
         Contraction [m] and pressure [Pa] as the sensors would show them, free of noise.
     """
+    table = inputs.table
+    outputs = np.empty((len(columns), len(CHANNELS), len(inputs.command)))
+    for chosen in alike(columns):
+        outputs[chosen] = _replay_tiles(plant, columns[chosen], inputs, table).transpose(2, 0, 1)
+    return outputs.transpose(1, 2, 0)  # plants apart in memory: residuals are read one by one
+
+
+def alike(columns: Array) -> list[NDArray[np.int64]]:
+    """Return groups of columns to replay together, and in which order.
+
+    A tile does for all its lanes what one of them needs: those with the same effects go side by
+    side, and guides that stick, which take finer steps, by themselves.
+    """
+    active = np.array([(columns[:, at] != off).any(axis=1) for at, off in _places()])
+    order = np.lexsort(active[:-1])
+    sticky = active[-1][order]
+    return [group for group in (order[~sticky], order[sticky]) if len(group)]
+
+
+def _replay_tiles(plant: SingleMuscle, columns: Array, inputs: Inputs, table: Array) -> Array:
     kind, n = plant.memory.kind, len(columns)
-    tiles = -(-n // LANES)
-    rows = np.zeros((tiles, R.END + MEMORY_ROWS[kind] + R.N_EFFECTS, LANES))
-    column = np.minimum(np.arange(tiles * LANES), n - 1)
+    tiles = -(-n // TILE)
+    rows = np.zeros((tiles, R.END + MEMORY_ROWS[kind] + R.N_EFFECTS, TILE))
+    column = np.minimum(np.arange(tiles * TILE), n - 1)
     fixed = np.ascontiguousarray(
-        columns[column].T.reshape(-1, tiles, LANES).transpose(1, 0, 2), dtype=np.float64
+        columns[column].T.reshape(-1, tiles, TILE).transpose(1, 0, 2), dtype=np.float64
     )
-    counts = np.zeros((tiles, N_COUNTS, LANES), np.int64)
+    counts = np.zeros((tiles, N_COUNTS, TILE), np.int64)
     outputs = np.empty((len(CHANNELS), len(inputs.command), n))
     substeps = max(1, int(np.ceil(inputs.period / inputs.longest_step)))
-    arrays: list[Any] = [rows, fixed, counts, plant.everett_tables()[:1], inputs.table, outputs]
+    arrays: list[Any] = [rows, fixed, counts, plant.everett_tables()[:1], table, outputs]
     if not COMPILED:
         arrays = [a.tolist() for a in arrays]
     _runner(kind, False)(*arrays, plant.elements, substeps, inputs.period)

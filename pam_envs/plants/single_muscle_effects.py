@@ -40,7 +40,7 @@ NOWHERE = -1e9
 """Where a load hangs that has no support [m]."""
 BREAKS = (0.1, 0.3, 0.6, 1.0)
 """Strains at which strands break away, over that of the last one."""
-STICK_STEPS = 4
+STICK_STEPS = 2
 """Parts of a sub-step where a guide sticks and slips."""
 
 
@@ -71,6 +71,10 @@ def filled(rows: Any, fixed: Any, j: int, target: float, width: float) -> float:
     lag = fixed[R.TIME_CONSTANT][j] * (1.0 + slower if goal < pressure else 1.0)
     slew = fixed[R.SLEW_RATE][j]
     reached = regulator_step(pressure, goal, lag, 1.0 / lag, slew, 1.0 / slew, width)
+    free = (goal - pressure) * (1.0 - decay(width / lag))
+    most = slew * max(width, 1e-9)
+    rounded = pressure + free * most / math.sqrt(free * free + most * most)
+    reached = reached + fixed[R.SLEW_BEND][j] * (rounded - reached)
     rate = fixed[R.EXHAUST_RATE][j]
     choked = (pressure + ATMOSPHERE) * decay(rate * width) - ATMOSPHERE
     reached = reached if rate >= 100.0 else max(reached, min(pressure, choked))
@@ -82,8 +86,8 @@ def filled(rows: Any, fixed: Any, j: int, target: float, width: float) -> float:
     throat = max(0.0, min(width * most, supply - head * head - pressure))
     filling = max(1e-9, reached - pressure)
     share = throat / math.sqrt(filling * filling + throat * throat)
-    share = 1.0 if fixed[R.SUPPLY_PRESSURE][j] >= 2e7 else share
-    reached = reached if reached <= pressure else pressure + filling * share
+    ample = reached <= pressure or fixed[R.SUPPLY_PRESSURE][j] >= 2e7
+    reached = reached if ample else pressure + filling * share
     # the valve closes when the error has fallen to the band
     stopped = min(reached, stop_high) if goal > pressure else max(reached, stop_low)
     rows[FIRST + R.OPEN][j] = opened if stopped == reached else 0.0
@@ -93,6 +97,15 @@ def filled(rows: Any, fixed: Any, j: int, target: float, width: float) -> float:
         drop + fixed[R.SUPPLY_DROOP][j] * max(0.0, reached - pressure)
     ) * decay(width / fixed[R.SUPPLY_RECOVERY][j])
     return reached * decay(fixed[R.LEAK][j] * width)  # type: ignore[no-any-return]
+
+
+@kernel
+def filled_plainly(rows: Any, fixed: Any, j: int, target: float, width: float) -> float:
+    """Return what :func:`filled` returns where none of its effects is on."""
+    pressure, lag = rows[FIRST + R.REGULATED][j], fixed[R.TIME_CONSTANT][j]
+    slew, goal = fixed[R.SLEW_RATE][j], fixed[R.GAIN][j] * target
+    reached = regulator_step(pressure, goal, lag, 1.0 / lag, slew, 1.0 / slew, width)
+    return pressure if target < 0.0 else reached  # type: ignore[no-any-return]
 
 
 @kernel
@@ -125,15 +138,11 @@ def feel(
     width: Any,
     own: Any,
     creeps: int,
+    worn: int,
 ) -> None:
     """Make the effective pressure of the pressure, ``width`` seconds after the last time."""
     pressure, drive = rows[R.PRESSURE], rows[R.DRIVE]
     true, friction, most = own[0], rows[FIRST + R.FRICTION], own[2]
-    for j in range(first, last):
-        most[j] = 0.0
-    for k in range(elements):
-        for j in range(first, last):
-            most[j] = most[j] + fixed[R.WEIGHT + k][j] * fixed[R.THRESHOLD + k][j]
     for j in range(first, last):
         true[j] = pressure[j]
         pressure[j] = max(0.0, pressure[j] - fixed[R.DEAD_PRESSURE][j])
@@ -142,9 +151,17 @@ def feel(
         felt = pressure[j]
         pressure[j] = true[j]
         friction[j] = felt - drive[j]
+        drive[j] = felt - friction[j]
+        true[j] = felt
+        most[j] = 0.0
+    for k in range(elements if worn > 0 else 0):
+        for j in range(first, last):
+            most[j] = most[j] + fixed[R.WEIGHT + k][j] * fixed[R.THRESHOLD + k][j]
+    for j in range(first, last if worn > 0 else first):
+        felt = true[j]
         new = decay(min(40.0, rows[FIRST + R.TRAVEL][j] / fixed[R.FIRST_TRAVEL][j]))
         share = min(1.0, abs(friction[j]) / max(most[j], 1.0))
-        shape, u = fixed[R.SHAPE][j], true[j] / fixed[R.MAX_PRESSURE][j]
+        shape, u = fixed[R.SHAPE][j], pressure[j] / fixed[R.MAX_PRESSURE][j]
         friction[j] = friction[j] * shape / (1.0 + (shape - 1.0) * share)
         grown = (fixed[R.PRESSURE_SLOPE][j] + fixed[R.PRESSURE_BEND][j] * u) * u
         friction[j] = friction[j] * max(0.02, 1.0 + grown)
@@ -161,7 +178,7 @@ def feel(
                 added = added + fixed[R.DRIVE_CREEP_1 + k][j] * state[j]
             w = w + added
             drive[j] = w
-    for j in range(first, last):
+    for j in range(first, last if worn > 0 else first):
         new = decay(min(40.0, rows[FIRST + R.TRAVEL][j] / fixed[R.FIRST_TRAVEL][j]))
         warm = rows[FIRST + R.KELVIN][j] - REFERENCE_TEMPERATURE
         gained = 1.0 + fixed[R.TEMPERATURE_GAIN][j] * warm
@@ -185,7 +202,7 @@ def settled(
     for j in range(first, last):
         own[1][j] = 1e9
         rows[FIRST + R.KELVIN][j] = fixed[R.TEMPERATURE][j]
-    feel(rows, fixed, counts, table, memory, first, last, elements, work, own[1], own, 1)
+    feel(rows, fixed, counts, table, memory, first, last, elements, work, own[1], own, 1, 1)
 
 
 @kernel
@@ -319,37 +336,31 @@ def seen_pressure(rows: Any, j: int) -> float:
 
 
 @kernel
-def rubbing(
-    rows: Any, fixed: Any, j: int, push: float, speed: float, per_mass: float
-) -> tuple[float, float]:
-    """Return which way the guide rubs, 0 where it holds, and the deceleration [m/s2].
+def glide(rows: Any, fixed: Any, own: Any, h: float) -> None:
+    """Move loads on guides that stick and slip.
 
-    It holds until the push [m/s2] exceeds the breakaway force; in motion its friction falls with
-    speed towards the kinetic one (Stribeck).
+    A guide holds until the push exceeds the breakaway force; in motion its friction falls with
+    speed towards the kinetic one (Stribeck). It catches what stops where its speed passes zero.
     """
-    most = fixed[R.STICK][j] * per_mass
-    held = rows[FIRST + R.STUCK][j] > 0.0
-    side = 1.0 if (push if held else speed) > 0.0 else -1.0
-    kinetic, pace = fixed[R.STICK_KINETIC][j], fixed[R.STICK_SPEED][j]
-    rubs = side * most * (kinetic + (1.0 - kinetic) * decay(min(40.0, abs(speed) / pace)))
-    if most == 0.0:
-        side = 2.0  # no guide
-    elif held and abs(push) <= most:
-        side = 0.0
-    return side, rubs
-
-
-@kernel
-def caught(
-    rows: Any, j: int, side: float, speed: float, moved: float, after: float, h: float
-) -> tuple[float, float]:
-    """Return displacement and speed where the guide catches what has stopped."""
-    turned = abs(side) == 1.0 and after * side < 0.0
-    rows[FIRST + R.STUCK][j] = 1.0 if side == 0.0 or turned else 0.0
-    if turned:  # it stops where its speed passes zero
-        share = speed / (speed - after) if speed * side > 0.0 else 0.0
-        moved = 0.5 * speed * share * h
-    return (0.0, 0.0) if side == 0.0 else (moved, 0.0 if turned else after)
+    x, v, stuck = rows[R.CONTRACTION], rows[R.VELOCITY], rows[FIRST + R.STUCK]
+    springs, pushes, jerks, drags, lightness = own[3], own[4], own[5], own[6], own[7]
+    for j in range(LANES):
+        k, drag, speed = springs[j], drags[j], v[j]
+        most = fixed[R.STICK][j] * lightness[j]
+        push = pushes[j] + jerks[j] * h
+        held = stuck[j] > 0.0 and most > 0.0
+        side = 1.0 if (push if held or speed == 0.0 else speed) > 0.0 else -1.0
+        kinetic, pace = fixed[R.STICK_KINETIC][j], fixed[R.STICK_SPEED][j]
+        rubs = most * (kinetic + (1.0 - kinetic) * decay(min(40.0, abs(speed) / pace)))
+        a = pushes[j] + 0.5 * k * h * speed - side * rubs
+        dx, after = damped_motion(speed, a, jerks[j], k, drag, decay(0.5 * drag * h), h)
+        turned = most > 0.0 and after * side < 0.0
+        share = speed / (speed - after) if turned and speed * side > 0.0 else 0.0
+        dx = 0.5 * speed * share * h if turned else dx
+        rests = held and abs(push) <= most
+        x[j] = x[j] + (0.0 if rests else dx)
+        v[j] = 0.0 if rests or turned else after
+        stuck[j] = 1.0 if rests or turned else 0.0
 
 
 @kernel
@@ -367,6 +378,7 @@ def move(
     """Move the load of a tile for ``h`` seconds, the effective pressure going from ``was``."""
     x, v, drive, load = rows[R.CONTRACTION], rows[R.VELOCITY], rows[R.DRIVE], rows[R.LOAD]
     friction, sticking = own[0], own[1]
+    springs, pushes, jerks, drags, lightness = own[3], own[4], own[5], own[6], own[7]
     for j in range(LANES):
         friction[j] = 0.0
         sticking[j] = 0.0
@@ -424,18 +436,19 @@ def move(
         moved = max(0.0, mass) * fixed[R.CARRIED][j] + fixed[R.MOVING_MASS][j]
         # motion that is over within the sub-step is followed as slowly as the series reaches
         per_mass = 1.0 / max(moved, loss * h * FASTEST_DECAY, stiff * h * h * FASTEST_TURN)
-        k = stiff * per_mass
-        a = (pull - weight * hangs) * per_mass + k * ahead
-        jerk = area * (1.0 - (taper + curve * e) * e) * (drive[j] - was[j]) * per_mass / h
-        drag = per_mass * loss
-        if sticks > 0:
-            side, rubs = rubbing(rows, fixed, j, a - k * ahead + jerk * h, v[j], per_mass)
-            a = a - rubs
-        speed = v[j]
-        dx, v[j] = damped_motion(speed, a, jerk, k, drag, decay(0.5 * drag * h), h)
-        if sticks > 0:
-            dx, v[j] = caught(rows, j, side, speed, dx, v[j], h)
-        x[j] = x[j] + dx
+        springs[j] = stiff * per_mass
+        pushes[j] = (pull - weight * hangs) * per_mass
+        jerks[j] = area * (1.0 - (taper + curve * e) * e) * (drive[j] - was[j]) * per_mass / h
+        drags[j] = per_mass * loss
+        lightness[j] = per_mass
+    if sticks > 0:
+        glide(rows, fixed, own, h)
+    else:
+        for j in range(LANES):
+            k, drag = springs[j], drags[j]
+            a = pushes[j] + 0.5 * k * h * v[j]
+            dx, v[j] = damped_motion(v[j], a, jerks[j], k, drag, decay(0.5 * drag * h), h)
+            x[j] = x[j] + dx
     for i in range(4 if strands > 0 else 0):
         slip, part = rows[FIRST + R.STRAND_1 + i], BREAKS[i]
         for j in range(LANES):
@@ -479,13 +492,29 @@ def advance_extended(
     set_point, step, dead = rows[R.SET_POINT], counts[R.STEP], fixed[R.DEAD_TIME]
     older, newer, switch, was, width = work[3], work[4], work[5], work[6], work[7]
     late = work[8]
-    own = scratch(3, LANES)
+    own = scratch(8, LANES)
     creeps, stretches = 0, 0
     for k in range(4):
         creeps = creeps + count_on(fixed[R.DRIVE_CREEP_1 + k], 0.0)
         stretches = stretches + count_on(fixed[R.LENGTH_CREEP_1 + k], 0.0)
     lines = count_on(fixed[R.LINE_SHARE], 0.0) + count_on(fixed[R.LINE_FLOW], 0.0)
     mounts = count_on(fixed[R.MOUNT_SHARE], 0.0)
+    air = (
+        count_on(fixed[R.DEAD_BAND], 0.0)
+        + count_on(fixed[R.EXHAUST_RATIO], 1.0)
+        + count_on(fixed[R.EXHAUST_RATE], 100.0)
+        + count_on(fixed[R.LEAK], 0.0)
+        + count_on(fixed[R.SUPPLY_PRESSURE], 2e7)
+        + count_on(fixed[R.SLEW_BEND], 0.0)
+    )
+    worn = (
+        count_on(fixed[R.SHAPE], 1.0)
+        + count_on(fixed[R.PRESSURE_SLOPE], 0.0)
+        + count_on(fixed[R.PRESSURE_BEND], 0.0)
+        + count_on(fixed[R.FIRST_WIDTH], 0.0)
+        + count_on(fixed[R.FIRST_LOSS], 0.0)
+        + count_on(fixed[R.TEMPERATURE_GAIN], 0.0)
+    )
     strands, sticks = 0, count_on(fixed[R.STICK], 0.0)
     for k in range(4):
         strands = strands + count_on(fixed[R.STRAND_FORCE_1 + k], 0.0)
@@ -513,7 +542,11 @@ def advance_extended(
                 continue
             for j in range(LANES):
                 before = rows[FIRST + R.REGULATED][j]
-                after = filled(rows, fixed, j, newer[j] if stage == 1 else older[j], width[j])
+                aim = newer[j] if stage == 1 else older[j]
+                if air > 0:
+                    after = filled(rows, fixed, j, aim, width[j])
+                else:
+                    after = filled_plainly(rows, fixed, j, aim, width[j])
                 after = after if width[j] > 0.0 else before
                 rows[FIRST + R.REGULATED][j] = after
                 own[0][j], own[1][j] = before, pressure[j]
@@ -527,7 +560,21 @@ def advance_extended(
                     pressure[j] = max(0.0, (1.0 - part) * pressure[j] + part * swung + flow)
             for j in range(LANES):
                 rows[FIRST + R.TRAVEL][j] += abs(pressure[j] - own[1][j])
-            feel(rows, fixed, counts, table, memory, 0, LANES, elements, work, width, own, creeps)
+            feel(
+                rows,
+                fixed,
+                counts,
+                table,
+                memory,
+                0,
+                LANES,
+                elements,
+                work,
+                width,
+                own,
+                creeps,
+                worn,
+            )
         parts = STICK_STEPS if sticks > 0 else 1
         for j in range(LANES):
             own[2][j] = drive[j]

@@ -81,6 +81,7 @@ WEIGHT = THRESHOLD + ELEMENTS
 # parameters of effects that are off in a plain plant, in the order of EFFECTS below
 EFFECTS = (
     "regulator.gain",
+    "regulator.slew_bend",
     "regulator.dead_band",
     "regulator.dead_close",
     "regulator.exhaust_ratio",
@@ -152,6 +153,7 @@ EFFECTS = (
 )
 (
     GAIN,
+    SLEW_BEND,
     DEAD_BAND,
     DEAD_CLOSE,
     EXHAUST_RATIO,

@@ -13,11 +13,11 @@ CAUSE = Cause(
     name="load_dependent_compliance",
     title="compliance that changes with load",
     forms=(
-        Form("shift", (Term("muscle.load_curve", (2.0,), scale=2.0),)),
+        Form("shift", (Term("muscle.load_curve", (2.0, -2.0), scale=2.0),)),
         Form(
             "stiffening",
             (
-                Term("muscle.load_stiffening", (5e-4,), scale=5e-4),
+                Term("muscle.load_stiffening", (5e-4, -5e-4), scale=5e-4),
                 Term("muscle.load_stiffening_2", (1e-6,), scale=1e-5),
             ),
         ),

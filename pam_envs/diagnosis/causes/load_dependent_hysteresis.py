@@ -11,7 +11,7 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 CAUSE = Cause(
     name="load_dependent_hysteresis",
     title="hysteresis that changes with load",
-    forms=(Form("linear", (Term("memory.width_per_load", (-0.01,), scale=0.01),)),),
+    forms=(Form("linear", (Term("memory.width_per_load", (-0.01, 0.02), scale=0.01),)),),
     signature=(
         "the error has the sign of the direction, one way round at small loads and the other way "
         "round at large ones"

@@ -12,7 +12,7 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 CAUSE = Cause(
     name="payload_error",
     title="an error of the payload",
-    forms=(Form("tray", (Term("mass.load_error", (0.1,), scale=0.05),)),),
+    forms=(Form("tray", (Term("mass.load_error", (0.1, -0.1), scale=0.05),)),),
     signature=(
         "every loaded segment is off by the effect of one further weight, which is the same at all "
         "loads; segments without a load fit"

@@ -35,6 +35,7 @@ CAUSE = Cause(
         "a decaying oscillation of one frequency after every step, whatever its size; a peak in "
         "the spectrum that is not there in holds"
     ),
+    contains=("sensor_delay", "dead_time"),
     neighbours=("dead_time", "viscous_loss"),
     experiment=(
         "Sharp steps sampled at 50 Hz or more, under two loads: ringing keeps its frequency, the "

@@ -36,6 +36,7 @@ CAUSE = Cause(
         "a slow function of the time since the start, the same at rest and under pressure, on one "
         "output only"
     ),
+    contains=("sensor_bias", "slip_step"),
     neighbours=(
         "sensor_bias",
         "sensor_nonlinearity",

@@ -13,8 +13,8 @@ CAUSE = Cause(
     name="sensor_nonlinearity",
     title="the nonlinearity of a sensor",
     forms=(
-        Form("position", (Term("position.bow", (0.01,), scale=0.01),)),
-        Form("pressure", (Term("pressure.bow", (0.01,), scale=0.01),)),
+        Form("position", (Term("position.bow", (0.01, -0.01), scale=0.01),)),
+        Form("pressure", (Term("pressure.bow", (0.01, -0.01), scale=0.01),)),
     ),
     signature=(
         "a smooth function of the reading alone, whatever load, direction, rate or time; for the "

@@ -12,7 +12,7 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 CAUSE = Cause(
     name="temperature",
     title="the effect of temperature",
-    forms=(Form("gain", (Term("muscle.temperature_gain", (0.002,), scale=0.001),)),),
+    forms=(Form("gain", (Term("muscle.temperature_gain", (0.002, -0.002), scale=0.001),)),),
     signature=(
         "the error of the contraction goes with temperature times pressure and is nothing at rest"
     ),

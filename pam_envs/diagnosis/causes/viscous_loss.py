@@ -16,8 +16,8 @@ CAUSE = Cause(
         Form(
             "thinning",
             (
-                Term("muscle.viscosity", (300.0,), scale=300.0),
-                Term("muscle.viscosity_speed", (0.003,), log=True, amount=False),
+                Term("muscle.viscosity", (300.0, 600.0, 1500.0), scale=300.0),
+                Term("muscle.viscosity_speed", (0.003, 1e-3, 3e-4), log=True, amount=False),
             ),
         ),
     ),
