@@ -74,7 +74,8 @@ def filled(rows: Any, fixed: Any, j: int, target: float, width: float) -> float:
     free = (goal - pressure) * (1.0 - decay(width / lag))
     most = slew * max(width, 1e-9)
     rounded = pressure + free * most / math.sqrt(free * free + most * most)
-    reached = reached + fixed[R.SLEW_BEND][j] * (rounded - reached)
+    bend = fixed[R.SLEW_BEND][j] if slew < 1e9 else 0.0
+    reached = reached + bend * (rounded - reached)
     rate = fixed[R.EXHAUST_RATE][j]
     choked = (pressure + ATMOSPHERE) * decay(rate * width) - ATMOSPHERE
     reached = reached if rate >= 100.0 else max(reached, min(pressure, choked))

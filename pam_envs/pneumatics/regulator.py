@@ -58,7 +58,7 @@ class Regulator:
         1.0, "1", 0.5, 1.5, "assumed", "pressure reached over set-point", neutral=1.0
     )
     slew_bend: float = parameter(
-        0.0, "1", 0.0, 1.0, "assumed", "from a sharp slew limit (0) to a rounded one (1)"
+        0.0, "1", 0.0, 1.0, "assumed", "from a sharp slew limit to a rounded one", neutral=0.0
     )
     dead_band: float = parameter(
         0.0, "Pa", 0.0, 3e5, "assumed", "error that the valve does not answer", neutral=0.0
