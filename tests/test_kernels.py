@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 from scipy import stats
 
 from pam_envs import kernels
+from pam_envs.kernels import WITHOUT_KERNELS
 from pam_envs.mechanics.hanging_mass import damped_motion, oscillator
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -160,3 +162,15 @@ def test_compiled_code_is_kept_on_disk_and_dropped_when_a_source_changes(tmp_pat
     before = {p: p.stat().st_mtime_ns for p in folder.iterdir()}
     subprocess.run(run, env=variables, cwd=ROOT, check=True)
     assert {p: p.stat().st_mtime_ns for p in folder.iterdir()} == before
+
+
+def test_what_the_cache_leaves_out_holds_no_kernels() -> None:
+    root = ROOT / "pam_envs"
+    files = [
+        path
+        for part in WITHOUT_KERNELS
+        for path in ([root / part] if part.endswith(".py") else (root / part).rglob("*.py"))
+    ]
+    assert len(files) > 40
+    marked = re.compile(r"^\s*@(kernel|routine)\b|\bbuild\(|\bentry\(", re.MULTILINE)
+    assert [path for path in files if marked.search(path.read_text())] == []

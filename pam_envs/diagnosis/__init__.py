@@ -1,1 +1,22 @@
 """What a simulation gets wrong of a rig, why, and the better model."""
+
+from __future__ import annotations
+
+from typing import Any
+
+__all__ = ["Diagnosis", "diagnose", "diagnose_readings"]
+
+_HOMES = {
+    "Diagnosis": "pam_envs.diagnosis.diagnosis",
+    "diagnose": "pam_envs.diagnosis.diagnosis",
+    "diagnose_readings": "pam_envs.diagnosis.readings",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Return what lies one module deeper, loaded when it is first asked for."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    import importlib
+
+    return getattr(importlib.import_module(_HOMES[name]), name)

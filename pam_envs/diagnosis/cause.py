@@ -54,6 +54,12 @@ class Form:
     terms: tuple[Term, ...]
     seeds: Callable[..., Sequence[Sequence[float]]] | None = None
 
+    @property
+    def looks(self) -> int:
+        """Among how many beginnings the best was chosen."""
+        own = max(len(t.starts) for t in self.terms)
+        return int(getattr(self.seeds, "looks", own)) if self.seeds is not None else own
+
 
 @dataclass(frozen=True)
 class Cause:

@@ -23,7 +23,7 @@ from pam_envs.diagnosis.experiment import propose
 from pam_envs.diagnosis.fitting import Fit, Problem, column_of
 from pam_envs.diagnosis.held_out import HeldOut, choose
 from pam_envs.diagnosis.isolability import Isolability, isolability
-from pam_envs.diagnosis.noise import Floor, noise_floor
+from pam_envs.diagnosis.noise import ChannelFloor, Floor, noise_floor
 from pam_envs.diagnosis.search import Blocks, Candidate, refit
 from pam_envs.diagnosis.single_muscle import MuscleFamily, inputs_of, start_plant
 from pam_envs.diagnosis.structure import Regressors
@@ -34,6 +34,8 @@ from pam_envs.plants.single_muscle import SingleMuscle
 
 Array = NDArray[np.float64]
 
+UNDECLARED, BELIEVED = 1.15, 1.5
+"""Noise over what repeats or holds show: where none is declared, and the most that is believed."""
 LEAST_SIZE = 1.0
 """A cause that cannot reach this size over the noise within its bounds is not testable."""
 LEAST_TESTABLE = 5
@@ -220,6 +222,17 @@ def diagnose(
     )
 
 
+def _noise(floor: ChannelFloor) -> float:
+    """Return the noise that residuals are weighed by.
+
+    Repeats and holds are short: they miss its slow part. What is declared counts as long as the
+    data do not contradict it.
+    """
+    if floor.declared is None:
+        return UNDECLARED * floor.value
+    return float(np.clip(floor.declared, floor.value, BELIEVED * floor.value))
+
+
 @dataclass
 class Study:
     """A diagnosis on its way: each stage adds its part."""
@@ -254,7 +267,7 @@ class Study:
             noise[k] = fallback
             if values is not None:
                 measured[k] = np.where(recording.filled, np.nan, values)
-                noise[k] = max(floor[channel].value, 1e-3 * fallback)
+                noise[k] = max(_noise(floor[channel]), 1e-3 * fallback)
         ticks = np.asarray(np.arange(len(recording.time)) * recording.period, np.float64)
         blocks = Blocks.make(ticks, measured)
         family, problem, base = calibrate(family, measured, noise, blocks, ticks)
@@ -265,6 +278,12 @@ class Study:
             ticks, recording.command, outputs, recording.load, recording.temperature
         )
         return cls(recording, sheet, plant, floor, family, problem, blocks, base, regressors)
+
+    def floor_of(self, channel: str) -> tuple[float, str]:
+        """Return the error [m], [Pa] of a perfect model, and what says so."""
+        floor = self.floor[channel]
+        believed = floor.declared is not None and floor.declared > floor.value
+        return (_noise(floor), "declared") if believed else (floor.value, floor.source)
 
     @property
     def model(self) -> Candidate:

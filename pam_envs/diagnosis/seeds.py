@@ -59,10 +59,16 @@ def step_starts(problem: Problem, family: Any, base: Fit, form: Any) -> Starts:
     return starts
 
 
+step_starts.looks = 100  # type: ignore[attr-defined]
+
+
 def ramp_starts(problem: Problem, family: Any, base: Fit, form: Any) -> Starts:
     """Return sizes [m], middles [s] and durations [s] of slow drifts, about the best steps."""
     found = step_starts(problem, family, base, form)[:1]
     return [(size, middle, slow) for size, middle in found for slow in SLOW]
+
+
+ramp_starts.looks = 200  # type: ignore[attr-defined]
 
 
 def grid(*values: Sequence[float], best: int = 3) -> Callable[..., Starts]:
@@ -90,4 +96,5 @@ def grid(*values: Sequence[float], best: int = 3) -> Callable[..., Starts]:
         left = np.einsum("nm,nm->n", found, found) - taken
         return [points[k] for k in np.argsort(left, kind="stable")[:best]]
 
+    starts.looks = int(np.prod([len(v) for v in values]))  # type: ignore[attr-defined]
     return starts

@@ -15,7 +15,7 @@ from pam_envs.mechanics.hanging_mass import GRAVITY
 from pam_envs.parameters import declarations
 from pam_envs.plants import single_muscle_rows as R
 from pam_envs.plants.replay import CHANNELS, Inputs, replay_rows
-from pam_envs.plants.single_muscle import NEUTRAL, SingleMuscle
+from pam_envs.plants.single_muscle import NEUTRAL, SingleMuscle, UnstableParameters
 
 Array = NDArray[np.float64]
 
@@ -158,9 +158,16 @@ class MuscleFamily:
             values["memory.operator"] = PlayOperator(
                 operator.thresholds, weights, 1.0 - sum(weights)
             )
-        return self.plant.replace(values)
+        for substeps in (self.plant.substeps, *FINER):
+            try:
+                return dataclasses.replace(self.plant, substeps=substeps).replace(values)
+            except UnstableParameters as error:
+                unstable = error
+        raise unstable
 
 
+FINER = (6, 8, 12, 20, 40)
+"""Sub-steps for a fitted plant whose motion is too fast for those of the plant it came from."""
 DECLARED = ("mass.carried",)
 OLD_NEUTRAL = {
     "regulator.dead_time": 0.0,

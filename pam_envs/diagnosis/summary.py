@@ -85,8 +85,8 @@ def _seen(study: Any) -> list[tuple[int, str]]:
 def _floors(study: Any) -> dict[str, Any]:
     made = {}
     for _, c in _seen(study):
-        floor = study.floor[c]
-        made[c] = {"value": floor.value / SCALE[c], "unit": PRESSURE_UNIT[c], "from": floor.source}
+        value, source = study.floor_of(c)
+        made[c] = {"value": value / SCALE[c], "unit": PRESSURE_UNIT[c], "from": source}
     return made
 
 
@@ -113,7 +113,7 @@ def _errors(study: Any, candidate: Candidate, seed: int) -> dict[str, Any]:
             "value": value * scale,
             "unit": PRESSURE_UNIT[c],
             "interval": [float(v) * scale for v in np.quantile(spread, [0.025, 0.975])],
-            "times_floor": value * study.problem.noise[k] / study.floor[c].value,
+            "times_floor": value * study.problem.noise[k] / study.floor_of(c)[0],
             "kinds": {
                 str(kind): float(np.sqrt(np.mean(rows[k][use & (labels == kind)] ** 2))) * scale
                 for kind in dict.fromkeys(labels[use].tolist())

@@ -32,14 +32,16 @@ class Rule:
         Part of every report.
     least_gain : float
         Log mean-square gain on held-out blocks below which nothing is called missing.
+    look : float
+        What a gain loses for each factor of e in the number of beginnings its best was chosen from.
     flexible : float
         Share of a residual that a flexible model may explain before it counts as structure.
     peak : float
         Height of a spectral peak, over its neighbourhood, that counts as structure.
     excess : float
         Held-out mean square over that of the noise floor that counts as structure.
-    rest : float
-        Unexplained when the structure left exceeds this part of the gain.
+    explained : float
+        Unexplained when structure is left and less of the excess than this part has gone.
     close : float
         A rival within this part of the best gain is not excluded...
     doubt : float
@@ -62,10 +64,11 @@ class Rule:
 
     version: str = "1"
     least_gain: float = 0.05
+    look: float = 0.01
     flexible: float = 0.15
     peak: float = 30.0
     excess: float = 1.6
-    rest: float = 0.5
+    explained: float = 0.6
     close: float = 0.8
     doubt: float = 0.05
     second_gain: float = 0.1
@@ -208,7 +211,7 @@ def cross(
         problem, blocks, levels[0].model, [level.rivals[k] for k in places], rule
     )
     every = replace(blocks, held_out=np.ones_like(blocks.held_out))
-    gains = [every.gain(base.errors, c.errors) for c in again]
+    gains = [worth(every, base, c, rule) for c in again]
     ranked = sorted(range(len(again)), key=lambda i: -gains[i])
     order = preferred(every, base, [again[i] for i in ranked], rule)
     draws = every.draws(rule.draws, seed)
@@ -245,36 +248,46 @@ def _ladder(
     rivals = preferred(blocks, base, rivals, rule)
     yield rivals[0], rivals
     model = rivals[0]
-    first_gain = blocks.gain(base.errors, model.errors)
+    first_gain = worth(blocks, base, model, rule)
     while first_gain >= rule.least_gain and len(model.causes) < rule.most:
         wanted = max(rule.second_gain, rule.second_share * first_gain)
         larger = search(problem, family, blocks, model, causes, 2, rule.hint * wanted)
-        more = blocks.gain(model.errors, larger[0].errors) if larger else 0.0
+        more = max((worth(blocks, model, c, rule) for c in larger), default=0.0)
         if more < wanted:
             break
         if len(model.causes) == 1:
             for first in rivals[1 : rule.beam]:
                 larger += search(problem, family, blocks, first, causes, 2)[:4]
-            larger.sort(key=lambda c: -blocks.gain(base.errors, c.errors))
+        larger.sort(key=lambda c: -worth(blocks, base, c, rule))
         rivals = preferred(blocks, base, distinct(larger), rule)
         model = rivals[0]
         yield model, rivals
 
 
+def worth(blocks: Blocks, base: Candidate, candidate: Candidate, rule: Rule) -> float:
+    """Return a candidate's gain over a smaller one, less the penalty for having looked often."""
+    known = set(base.names)
+    looks = sum(np.log(form.looks) for cause, form in candidate.causes if cause.name not in known)
+    return blocks.gain(base.errors, candidate.errors) - rule.look * float(looks)
+
+
 def preferred(
-    blocks: Blocks, base: Candidate, rivals: Sequence[Candidate], rule: Rule
+    blocks: Blocks, base: Candidate, rivals: Sequence[Candidate], rule: Rule, seed: int = 0
 ) -> list[Candidate]:
     """Return rivals, best first, a cause that another one contains before it where both are close.
 
     A drift that is over before the record begins is a bias, and a very fast resonance a delay:
-    what can imitate another cause has to gain more than that one.
+    what can imitate another cause has to gain more than that one, and surely.
     """
-    order = list(rivals)
-    best = blocks.gain(base.errors, order[0].errors)
+    order = sorted(rivals, key=lambda c: -worth(blocks, base, c, rule))
+    best = worth(blocks, base, order[0], rule)
     margin = max(rule.simpler, rule.simpler_share * best)
+    draws = blocks.draws(rule.draws, seed)
     for rival in order[1:]:
-        behind = best - blocks.gain(base.errors, rival.errors)
-        if behind < margin and reduces(order[0], rival):
+        if not reduces(order[0], rival):
+            continue
+        behind = best - worth(blocks, base, rival, rule)
+        if behind < margin or _better(blocks, rival, order[0], draws) > rule.doubt:
             return [rival, *(r for r in order if r is not rival)]
     return order
 
@@ -321,14 +334,14 @@ def evidence_of(
         before = levels[max(k - 1, 0)].model
         made.append(
             {
-                "gain": blocks.gain(base.errors, level.model.errors),
-                "added": blocks.gain(before.errors, level.model.errors),
+                "gain": worth(blocks, base, level.model, rule),
+                "added": worth(blocks, before, level.model, rule),
                 "left": level.left,
                 "rivals": [
                     {
                         "names": list(rival.names),
                         "forms": [form.name for _, form in rival.causes],
-                        "gain": blocks.gain(base.errors, rival.errors),
+                        "gain": worth(blocks, base, rival, rule),
                         "better": _better(blocks, rival, level.model, draws),
                         "imitates": reduces(rival, level.model),
                     }
@@ -361,11 +374,16 @@ def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
     while level + 1 < len(levels) and level < rule.most and levels[level + 1]["added"] >= wanted:
         level += 1
     found = levels[level]
-    left = max(found["left"]["rest"], float(np.log(max(found["left"]["excess"], 1.0))))
-    if structured(found["left"], rule) and left > rule.rest * found["gain"]:
+    if structured(found["left"], rule) and gone(levels[0], found) < rule.explained:
         return Judgement("unexplained", level)
     still = not_excluded(found["rivals"], rule)
     return Judgement("ambiguous" if still else "named", level, still)
+
+
+def gone(before: Mapping[str, Any], after: Mapping[str, Any]) -> float:
+    """Return the part of the mean square over the noise that is gone (infinite: of none)."""
+    over = float(before["left"]["excess"]) - 1.0
+    return 1.0 - (float(after["left"]["excess"]) - 1.0) / over if over > 0.0 else np.inf
 
 
 def not_excluded(rivals: Sequence[Mapping[str, Any]], rule: Rule) -> tuple[int, ...]:

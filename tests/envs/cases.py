@@ -8,14 +8,61 @@ import gymnasium as gym
 import numpy as np
 
 import pam_envs  # noqa: F401 (registers)
+from pam_envs.plants.single_muscle import SingleMuscle
 
 IDS = sorted(name for name in gym.registry if name.startswith("PAM/"))
+
+EVERY_EFFECT = {
+    "regulator.gain": 0.97,
+    "regulator.slew_bend": 0.5,
+    "regulator.dead_band": 2e3,
+    "regulator.dead_close": 0.4,
+    "regulator.exhaust_ratio": 1.3,
+    "regulator.exhaust_taper": 0.5,
+    "regulator.exhaust_rate": 8.0,
+    "regulator.leak": 0.02,
+    "regulator.supply_pressure": 6.3e5,
+    "regulator.supply_droop": 0.2,
+    "regulator.supply_time": 0.08,
+    "regulator.ring_share": 0.1,
+    "regulator.ring_flow": 0.05,
+    "memory.shape": 1.3,
+    "memory.pressure_slope": 0.2,
+    "memory.pressure_bend": -0.1,
+    "memory.creep_1": 0.02,
+    "memory.first_width": 0.2,
+    "memory.first_loss": 0.01,
+    "memory.threshold": 5e3,
+    "muscle.area_curve": 0.5,
+    "muscle.temperature": 300.0,
+    "muscle.temperature_gain": 0.002,
+    "muscle.load_curve": 2.0,
+    "muscle.load_stiffening": 1e-3,
+    "muscle.creep_2": 0.02,
+    "muscle.strand_2": 3.0,
+    "muscle.strand_4": 2.0,
+    "muscle.viscosity": 200.0,
+    "mass.load_error": 0.1,
+    "mass.slack": 1e-3,
+    "mass.stick": 3.0,
+    "mass.ring_share": 0.05,
+    "position.drift": 1e-6,
+    "position.ramp": 1e-4,
+    "position.delay": 0.013,
+    "position.bow": 0.01,
+    "position.slip": 1e-4,
+    "position.slip_at": 0.3,
+    "pressure.drift": 10.0,
+    "pressure.bow": 0.01,
+}
+"""What a recording may show, all at once."""
 
 VARIANTS: dict[str, dict[str, Any]] = {
     "default": {},
     "preisach": {"hysteresis": "preisach"},
     "none": {"hysteresis": "none", "normalize": False},
     "random": {"randomize": True, "load": None, "reference": "mixed", "load_disturbance": 1.0},
+    "effects": {"plant": SingleMuscle.mas10().replace(EVERY_EFFECT)},
     "preisach_random": {"hysteresis": "preisach", "randomize": True, "reference": "staircase"},
 }
 
