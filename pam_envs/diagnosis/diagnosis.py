@@ -24,11 +24,12 @@ from pam_envs.diagnosis.fitting import Fit, Problem, column_of
 from pam_envs.diagnosis.held_out import HeldOut, choose
 from pam_envs.diagnosis.isolability import Isolability, isolability
 from pam_envs.diagnosis.noise import ChannelFloor, Floor, noise_floor
+from pam_envs.diagnosis.rule import Rule
 from pam_envs.diagnosis.search import Blocks, Candidate, refit
 from pam_envs.diagnosis.single_muscle import MuscleFamily, inputs_of, start_plant
 from pam_envs.diagnosis.structure import Regressors
 from pam_envs.diagnosis.summary import report_of
-from pam_envs.diagnosis.verdict import Decision, Rule, decide, traces_of
+from pam_envs.diagnosis.verdict import Decision, decide, traces_of
 from pam_envs.mechanics.hanging_mass import GRAVITY
 from pam_envs.plants.single_muscle import SingleMuscle
 

@@ -30,6 +30,8 @@ EVERY = 3
 """Every third block is held out."""
 SCHEDULE = ((2, 8, 0.4), (2, 5, 0.6), (4, 4, 0.8))
 """Rounds with the base's Jacobian held; how many fits then go on, or what part of the best gain."""
+FIRST_SIGHT = 0.3
+"""A search that wants a gain ends if its first round promises less than this part of it."""
 POLISH = 6
 """Rounds, at most, with all of the Jacobian."""
 POLISHED = 3
@@ -184,6 +186,10 @@ def search(
     if not fits:
         return []
     evaluate(problem, fits)
+    if least > 0.0:
+        improve(problem, fits, 1, 1e-4, FEW_DAMPINGS)
+        if np.log(base.fit.cost / min(f.cost for f in fits)) < FIRST_SIGHT * least:
+            return []
     for rounds, kept, share_kept in SCHEDULE:
         improve(problem, fits, rounds, 1e-4, FEW_DAMPINGS)
         _drop(fits, base.fit.cost, kept, share_kept)

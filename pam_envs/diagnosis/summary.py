@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from pam_envs.diagnosis.fitting import Fit, Problem, differentiate, normal_equations
 from pam_envs.diagnosis.held_out import kind_of
 from pam_envs.diagnosis.isolability import channel_size, complement, projected
+from pam_envs.diagnosis.rule import Rule
 from pam_envs.diagnosis.search import Blocks, Candidate
 from pam_envs.diagnosis.single_muscle import declared
 from pam_envs.diagnosis.structure import binned_r2, flexible_r2, ljung_box, spectral_peak
-from pam_envs.diagnosis.verdict import Rule, traces_of
+from pam_envs.diagnosis.verdict import traces_of
 
 Array = NDArray[np.float64]
 

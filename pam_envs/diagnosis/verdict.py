@@ -1,8 +1,8 @@
-"""How a diagnosis decides. Thresholds were frozen before the benchmark's final seeds were drawn."""
+"""How a diagnosis decides: models with more and more causes, the evidence, the verdict."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.fitting import Problem, column_of
+from pam_envs.diagnosis.rule import Judgement, Rule, judge
 from pam_envs.diagnosis.search import Blocks, Candidate, refit, search
 from pam_envs.diagnosis.structure import Regressors, flexible_r2, spectral_peak
 
@@ -18,68 +19,10 @@ Array = NDArray[np.float64]
 
 CROSS_ROUNDS, CROSSED = 4, 4
 """Rounds of a fit to other blocks, and how many rivals are compared so."""
+PERFECT = 0.93
+"""Mean square over the noise of a perfect model, if the noise is a little less than assumed."""
 KEPT = 12
 """How many rivals of a level are judged."""
-
-
-@dataclass(frozen=True)
-class Rule:
-    """The numbers of the decision.
-
-    Attributes
-    ----------
-    version : str
-        Part of every report.
-    least_gain : float
-        Log mean-square gain on held-out blocks below which nothing is called missing.
-    look : float
-        What a gain loses for each factor of e in the number of beginnings its best was chosen from.
-    flexible : float
-        Share of a residual that a flexible model may explain before it counts as structure.
-    peak : float
-        Height of a spectral peak, over its neighbourhood, that counts as structure.
-    excess : float
-        Held-out mean square over that of the noise floor that counts as structure.
-    explained : float
-        Unexplained when structure is left and less of the excess than this part has gone.
-    close : float
-        A rival within this part of the best gain is not excluded...
-    doubt : float
-        ... if the difference is not surer than this (one-sided, blocks drawn again).
-    second_gain, second_share : float
-        A further cause has to gain this much, and this part of the first's gain.
-    hint : float
-        A search for a further cause goes on if its first rounds promise this part of it.
-    beam : int
-        First causes from which a second is looked for.
-    most : int
-        Most causes named.
-    simpler, simpler_share : float
-        What a cause that contains another one must gain over it, and what part of the gain.
-    folds : int
-        Ways to hold blocks out on which close rivals are compared.
-    draws : int
-        Bootstrap samples.
-    """
-
-    version: str = "1"
-    least_gain: float = 0.05
-    look: float = 0.01
-    flexible: float = 0.15
-    peak: float = 30.0
-    excess: float = 1.6
-    explained: float = 0.6
-    close: float = 0.8
-    doubt: float = 0.05
-    second_gain: float = 0.1
-    second_share: float = 0.1
-    hint: float = 0.4
-    beam: int = 3
-    most: int = 3
-    simpler: float = 0.05
-    simpler_share: float = 0.03
-    folds: int = 3
-    draws: int = 400
 
 
 @dataclass(frozen=True)
@@ -125,15 +68,6 @@ class Decision:
     open_rivals: list[Candidate] = field(default_factory=list)
     structure: dict[str, Any] = field(default_factory=dict)
     evidence: dict[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Judgement:
-    """A verdict on plain evidence: how many causes, and which rivals are not excluded."""
-
-    verdict: str
-    level: int
-    open_rivals: tuple[int, ...] = ()
 
 
 def left_over(
@@ -251,6 +185,8 @@ def _ladder(
     first_gain = worth(blocks, base, model, rule)
     while first_gain >= rule.least_gain and len(model.causes) < rule.most:
         wanted = max(rule.second_gain, rule.second_share * first_gain)
+        if attainable(blocks, model) < wanted:
+            break
         larger = search(problem, family, blocks, model, causes, 2, rule.hint * wanted)
         more = max((worth(blocks, model, c, rule) for c in larger), default=0.0)
         if more < wanted:
@@ -262,6 +198,13 @@ def _ladder(
         rivals = preferred(blocks, base, distinct(larger), rule)
         model = rivals[0]
         yield model, rivals
+
+
+def attainable(blocks: Blocks, model: Candidate) -> float:
+    """Return the gain of a model that leaves nothing but noise, on all blocks."""
+    some = blocks.counts.sum(axis=1) > 0
+    whole = blocks.means(model.errors, np.ones_like(blocks.held_out))[some]
+    return float(np.sum(np.log(np.maximum(whole / PERFECT, 1.0))))
 
 
 def worth(blocks: Blocks, base: Candidate, candidate: Candidate, rule: Rule) -> float:
@@ -354,57 +297,6 @@ def evidence_of(
 
 def _better(blocks: Blocks, rival: Candidate, best: Candidate, draws: NDArray[np.int64]) -> float:
     return float(np.mean(blocks.gains(rival.errors, best.errors, draws) <= 0.0))
-
-
-def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
-    """Word the verdict on evidence.
-
-    Parameters
-    ----------
-    evidence : mapping
-        From :func:`evidence_of`.
-    rule : Rule
-        The numbers of the decision.
-    """
-    levels = evidence["levels"]
-    if len(levels) < 2 or levels[1]["gain"] < rule.least_gain:
-        return Judgement("unexplained" if structured(levels[0]["left"], rule) else "adequate", 0)
-    level = 1
-    wanted = max(rule.second_gain, rule.second_share * levels[1]["gain"])
-    while level + 1 < len(levels) and level < rule.most and levels[level + 1]["added"] >= wanted:
-        level += 1
-    found = levels[level]
-    if structured(found["left"], rule) and gone(levels[0], found) < rule.explained:
-        return Judgement("unexplained", level)
-    still = not_excluded(found["rivals"], rule)
-    return Judgement("ambiguous" if still else "named", level, still)
-
-
-def gone(before: Mapping[str, Any], after: Mapping[str, Any]) -> float:
-    """Return the part of the mean square over the noise that is gone (infinite: of none)."""
-    over = float(before["left"]["excess"]) - 1.0
-    return 1.0 - (float(after["left"]["excess"]) - 1.0) / over if over > 0.0 else np.inf
-
-
-def not_excluded(rivals: Sequence[Mapping[str, Any]], rule: Rule) -> tuple[int, ...]:
-    """Return which rivals are close to the first and not surely worse."""
-    best = rivals[0]
-    return tuple(
-        k
-        for k, rival in enumerate(rivals)
-        if set(rival["names"]) != set(best["names"])
-        and len(rival["names"]) == len(best["names"])
-        and not rival["imitates"]
-        and rival["gain"] >= rule.close * best["gain"]
-        and rival["better"] > rule.doubt
-    )
-
-
-def structured(left: dict[str, Any], rule: Rule) -> bool:
-    """Return whether there is more in a residual than noise."""
-    return bool(
-        max(left["r2"]) > rule.flexible or left["peak"] > rule.peak or left["excess"] > rule.excess
-    )
 
 
 def distinct(candidates: Iterable[Candidate]) -> list[Candidate]:

@@ -172,7 +172,7 @@ COSTLY = (
     tuple(f"muscle.creep_{k}" for k in (1, 2, 3, 4)),
     tuple(f"memory.creep_{k}" for k in (1, 2, 3, 4)),
     tuple(f"muscle.strand_{k}" for k in (1, 2, 3, 4)),
-    ("mass.stick",),
+    ("mass.stick", "muscle.viscosity"),
 )
 """Parameters of the effects that a tile works out only where one of them is on."""
 
@@ -227,12 +227,12 @@ def alike(columns: Array) -> list[NDArray[np.int64]]:
     """Return groups of columns to replay together, and in which order.
 
     A tile does for all its lanes what one of them needs: those with the same effects go side by
-    side, and guides that stick, which take finer steps, by themselves.
+    side, and what takes finer steps goes by itself.
     """
     active = np.array([(columns[:, at] != off).any(axis=1) for at, off in _places()])
     order = np.lexsort(active[:-1])
-    sticky = active[-1][order]
-    return [group for group in (order[~sticky], order[sticky]) if len(group)]
+    fine = active[-1][order]
+    return [group for group in (order[~fine], order[fine]) if len(group)]
 
 
 def _replay_tiles(plant: SingleMuscle, columns: Array, inputs: Inputs, table: Array) -> Array:

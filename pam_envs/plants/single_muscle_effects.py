@@ -40,8 +40,8 @@ NOWHERE = -1e9
 """Where a load hangs that has no support [m]."""
 BREAKS = (0.1, 0.3, 0.6, 1.0)
 """Strains at which strands break away, over that of the last one."""
-STICK_STEPS = 2
-"""Parts of a sub-step where a guide sticks and slips."""
+FINE_PARTS = 4
+"""Parts of a sub-step where a guide sticks, or a loss depends on speed."""
 
 
 @kernel
@@ -517,6 +517,7 @@ def advance_extended(
         + count_on(fixed[R.TEMPERATURE_GAIN], 0.0)
     )
     strands, sticks = 0, count_on(fixed[R.STICK], 0.0)
+    fine = sticks + count_on(fixed[R.VISCOSITY], 0.0)
     for k in range(4):
         strands = strands + count_on(fixed[R.STRAND_FORCE_1 + k], 0.0)
     for j in range(LANES):
@@ -576,7 +577,7 @@ def advance_extended(
                 creeps,
                 worn,
             )
-        parts = STICK_STEPS if sticks > 0 else 1
+        parts = FINE_PARTS if fine > 0 else 1
         for j in range(LANES):
             own[2][j] = drive[j]
         for q in range(parts):

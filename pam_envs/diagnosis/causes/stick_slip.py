@@ -10,9 +10,9 @@ from __future__ import annotations
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.seeds import grid
 
-_BREAKS = (0.5, 1.0, 1.5, 2.5, 4.0, 6.0, 9.0, 14.0)
-_HOLDS = (0.3, 0.5, 0.75)
-_SPEEDS = (1e-3, 5e-3)
+_BREAKS = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 15.0)
+_HOLDS = (0.35, 0.5, 0.65, 0.8)
+_SPEEDS = (2e-4,)
 
 CAUSE = Cause(
     name="stick_slip",
@@ -25,7 +25,7 @@ CAUSE = Cause(
                 Term("mass.stick_kinetic", (0.4,), high=0.95, scale=1.0, amount=False),
                 Term("mass.stick_speed", (5e-3,), high=0.3, log=True, amount=False),
             ),
-            seeds=grid(_BREAKS, _HOLDS, _SPEEDS),
+            seeds=grid(_BREAKS, _HOLDS, _SPEEDS, best=5),
         ),
     ),
     signature=(
