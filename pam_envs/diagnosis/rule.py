@@ -62,7 +62,7 @@ class Rule:
     close: float = 0.8
     doubt: float = 0.05
     second_gain: float = 0.1
-    second_share: float = 0.1
+    second_share: float = 0.12
     hint: float = 0.4
     beam: int = 3
     most: int = 3
