@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Callable
 from typing import Any, ClassVar
 
-from numba import njit, prange, types
+from numba import get_num_threads, njit, prange, types
 from numba.core import caching, cgutils
 from numba.core.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
@@ -159,6 +159,7 @@ _REPLACED: dict[str, Any] = {
     "scratch": _scratch,
     "array_at": _array_at,
 }
+__all__ = ["compiled", "get_num_threads"]
 _BUILT: dict[Any, dict[Any, Any]] = {}
 
 

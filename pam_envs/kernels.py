@@ -106,6 +106,17 @@ def address_book(arrays: Sequence[NDArray[Any]]) -> NDArray[np.int64]:
     return book.ravel()
 
 
+def threads() -> int:
+    """Return how many threads a kernel may use: ``OMP_NUM_THREADS`` bounds them, as elsewhere."""
+    if not COMPILED:
+        return 1
+    from pam_envs.compiler import get_num_threads
+
+    wanted = os.environ.get("OMP_NUM_THREADS", "")
+    most = int(get_num_threads())
+    return max(1, min(most, int(wanted))) if wanted.isdigit() else most
+
+
 def build(
     function: Callable[..., Any], name: str, parallel: bool = False, **names: Any
 ) -> Callable[..., Any]:

@@ -15,7 +15,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.kernels import COMPILED, LANES, build, kernel, prange, routine, scratch, tile_view
+from pam_envs.kernels import (
+    COMPILED,
+    LANES,
+    build,
+    kernel,
+    prange,
+    routine,
+    scratch,
+    threads,
+    tile_view,
+)
 from pam_envs.mechanics.hanging_mass import oscillator_wide
 from pam_envs.plants import single_muscle_rows as R
 from pam_envs.plants.single_muscle import NEUTRAL, SingleMuscle
@@ -249,7 +259,7 @@ def _replay_tiles(plant: SingleMuscle, columns: Array, inputs: Inputs, table: Ar
     arrays: list[Any] = [rows, fixed, counts, plant.everett_tables()[:1], table, outputs]
     if not COMPILED:
         arrays = [a.tolist() for a in arrays]
-    _runner(kind, False)(*arrays, plant.elements, substeps, inputs.period)
+    _runner(kind, tiles > 1 and threads() > 1)(*arrays, plant.elements, substeps, inputs.period)
     return outputs if COMPILED else np.array(arrays[-1])
 
 
