@@ -269,6 +269,66 @@ def show(
     return 1 if episode.failed else 0
 
 
+def diagnosis(
+    chosen: Literal["small", "tune", "final"] = "small",
+    offset: int = 0,
+    fraction: float = 1.0,
+    kind: tuple[str, ...] = (),
+    name: tuple[str, ...] = (),
+    limit: int | None = None,
+    loops: int = 0,
+    next: bool = False,
+    jobs: int = os.cpu_count() or 1,
+    force: bool = False,
+    retell: bool = False,
+    cells: Path | None = None,
+    out: Path | None = None,
+) -> int:
+    """Diagnose rigs that hide an effect and score what is found; an interrupted run goes on.
+
+    Args:
+        chosen: Set of cases.
+        offset: Another number draws other cases.
+        fraction: Part of the cases of every kind and cause, for a quick look.
+        kind: Only cases of these kinds.
+        name: Only cases that hide one of these effects.
+        limit: Most cases.
+        loops: Cases of every cause that are run in closed loop on the hidden rig.
+        next: Carry out the experiments that are proposed.
+        jobs: Processes.
+        force: Compute again what is there already.
+        retell: Run nothing; judge what earlier runs recorded by the present rule.
+        cells: Folder of the records, the checkpoint.
+        out: Folder of the page, of its numbers and of its figure. By default benchmarks/results for
+            the whole of the final set, otherwise beside the records.
+    """
+    from benchmarks import diagnosis as running
+    from benchmarks import diagnosis_report as telling
+
+    folder = running.FOLDER if cells is None else cells
+    options = running.Options(
+        chosen, offset, fraction, kind, name, limit, loops, next, jobs, force, folder
+    )
+    if retell:
+        records = running.retold(options)
+        print(f"{len(records)} records judged anew")
+        for path in telling.write(records, out or folder / "pages" / "retold", "--retell"):
+            print(path)
+        return 0
+    with _progress("cases") as start:
+        report = running.run(options, start)
+    print(f"{report.computed} computed, {report.found} were there already")
+    for line in report.quarantined:
+        print(f"corrupt, set aside and computed again: {line}")
+    for line in report.failed:
+        print(f"FAILED, counted as wrong: {line}", file=sys.stderr)
+    official = chosen == "final" and options.whole
+    place = out or (rows.RESULTS if official else folder / "pages" / chosen)
+    for path in telling.write(report.records, place, options.arguments):
+        print(path)
+    return 0
+
+
 COMMANDS: dict[str, Callable[..., int]] = {
     "run": run,
     "board": board,
@@ -276,6 +336,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "papers": papers,
     "speed": speed,
     "show": show,
+    "diagnosis": diagnosis,
 }
 
 

@@ -51,8 +51,9 @@ class Case:
 
     Attributes
     ----------
-    kind : {"single", "weak", "loud", "clean", "decoy", "pair", "unknown"}
-        ``loud`` is a single one under three times the noise, with the same absolute size.
+    kind : {"single", "weak", "loud", "clean", "decoy", "pair", "unknown", "idle"}
+        ``loud`` is a single one under three times the noise, with the same absolute size; in an
+        ``idle`` one nothing is hidden and nothing moves, so that nothing can be decided.
     seed : int
         Of all draws.
     names : tuple of str
@@ -331,11 +332,12 @@ class Counts:
     decoy: int
     pair: int
     unknown: int
+    idle: int
     loud: bool = True
 
 
-SMALL = Counts(single=1, weak=0, clean=3, decoy=2, pair=2, unknown=2, loud=False)
-FULL = Counts(single=40, weak=20, clean=200, decoy=100, pair=100, unknown=60)
+SMALL = Counts(single=1, weak=0, clean=3, decoy=2, pair=2, unknown=2, idle=1, loud=False)
+FULL = Counts(single=40, weak=20, clean=200, decoy=100, pair=100, unknown=60, idle=20)
 
 
 def first_seed(chosen: str, offset: int = 0) -> int:
@@ -390,3 +392,4 @@ def _wanted(counts: Counts, unknown: Sequence[str], rng: np.random.Generator) ->
         yield Case("pair", 0, pairs[k], (float(one), float(two)))
     for i, size in enumerate(sizes_in(*LARGE, counts.unknown, rng)):
         yield Case("unknown", 0, (unknown[i % len(unknown)],), (float(size),))
+    yield from [Case("idle", 0, campaign="idle")] * counts.idle

@@ -1,0 +1,330 @@
+"""The benchmark of the diagnosis: which cases it runs, runs that go on, what a study finds."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Collection
+from pathlib import Path
+from threading import Event
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnosis_fakes import counted, loop, record
+from joblib.externals.loky import get_reusable_executor
+
+from benchmarks import diagnosis, diagnosis_study, runner
+from benchmarks.diagnosis import Options, Task, retold, run, select
+from benchmarks.diagnosis_cases import NOISE, Case, cases
+from benchmarks.diagnosis_next import DrivenRig, OracleRig
+from benchmarks.diagnosis_report import figures
+from benchmarks.diagnosis_study import study, trace_errors
+from benchmarks.store import Store
+from pam_envs.diagnosis.gain import COMPENSABLE
+from tests.diagnosis import hidden
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# --- which cases ---------------------------------------------------------------------------------
+
+
+def test_a_fraction_is_of_every_kind_and_in_a_larger_one() -> None:
+    tenth, fifth = (select(Options("tune", fraction=f)) for f in (0.1, 0.2))
+    assert set(tenth) < set(fifth)
+    for name in hidden.EFFECTS:
+        assert sum(c.kind == "single" and c.names == (name,) for c in tenth) == 4
+    half = tenth[: len(tenth) // 2]
+    assert {case.kind for case in half} == {case.kind for case in cases("tune")}
+    assert sum(case.kind == "single" for case in half) == pytest.approx(50, abs=3)
+    assert select(Options("tune", fraction=0.1)) == tenth
+    assert select(Options("tune", fraction=0.1, limit=7)) == tenth[:7]
+
+
+def test_kinds_and_names_are_chosen_and_wrong_ones_refused() -> None:
+    chosen = select(Options("tune", kinds=("single", "pair"), names=("creep",)))
+    assert {case.kind for case in chosen} == {"single", "pair"}
+    assert all("creep" in case.names for case in chosen)
+    with pytest.raises(ValueError, match="no kind is called 'double'"):
+        select(Options(kinds=("double",)))
+    with pytest.raises(ValueError, match="no effect is called 'magic'"):
+        select(Options(names=("magic",)))
+    with pytest.raises(ValueError, match=r"fraction 0 is outside"):
+        select(Options(fraction=0))
+
+
+def test_the_command_is_told_as_it_was_given() -> None:
+    options = Options("tune", 3, 0.1, ("single",), ("creep", "leak"), 5, 2, True)
+    assert options.arguments == (
+        "--chosen tune --offset 3 --fraction 0.1 --kind single --name creep leak --limit 5 "
+        "--loops 2 --next"
+    )
+    assert Options("final").whole and not options.whole
+
+
+# --- runs ----------------------------------------------------------------------------------------
+
+
+def answer(case: Case, stages: Collection[str]) -> dict[str, Any]:
+    """Answer as a study does; the first weak ones fail."""
+    made = record(
+        case.kind,
+        dict(zip(case.names, case.sizes, strict=True)),
+        "ambiguous" if case.kind == "pair" else "named",
+        case.names,
+        experiment={"name": "long_hold", "separation": 2.0, "enough": case.seed % 2 == 0},
+    )
+    made["case"] = case.record()
+    if "next" in stages:
+        made["next"] = {"plan": "long_hold", "verdict": "named", "names": list(case.names)}
+    if "loop" in stages:
+        made["loop"] = loop(1.0, 0.5, 0.4)
+    if case.kind == "decoy":
+        made = {"case": case.record(), "failure": "ValueError: no", "volatile": {}}
+    return made
+
+
+class Counting:
+    """Answers, and remembers what was asked."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[Case, str]] = []
+
+    def __call__(self, case: Case, stages: Collection[str]) -> dict[str, Any]:
+        (stage,) = stages
+        self.asked.append((case, stage))
+        return answer(case, stages)
+
+
+def test_a_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    class Stopped(Exception):
+        pass
+
+    def stopping(case: Case, stages: Collection[str]) -> dict[str, Any]:
+        if len(list(tmp_path.glob("*.json"))) == 10:
+            raise Stopped
+        return answer(case, stages)
+
+    options = Options(folder=tmp_path)
+    with pytest.raises(Stopped):
+        run(options, act=stopping)
+    counting, ticks = Counting(), []
+    report = run(options, lambda total: lambda: ticks.append(total), act=counting)
+    assert (report.found, report.computed) == (10, 25)
+    assert len(counting.asked) == len(ticks) == 25
+    assert [r["case"]["seed"] for r in report.records] == [c.seed for c in cases("small")]
+    again = Counting()
+    assert run(options, act=again).records == report.records
+    assert again.asked == []
+    assert run(Options(folder=tmp_path, force=True), act=again).computed == 35
+
+
+def test_a_failed_case_is_kept_told_and_counted_as_wrong(tmp_path: Path) -> None:
+    report = run(Options(kinds=("decoy",), folder=tmp_path), act=answer)
+    assert len(report.failed) == 2 and report.failed[0].endswith(": ValueError: no")
+    assert counted(figures(report.records)["false_alarms"]) == (2, 2)
+
+
+def test_a_corrupt_record_is_made_again(tmp_path: Path) -> None:
+    options = Options(kinds=("pair",), folder=tmp_path)
+    before = run(options, act=answer).records
+    sorted(tmp_path.glob("*.json"))[0].write_text("{}")
+    report = run(options, act=answer)
+    assert (report.computed, len(report.quarantined)) == (1, 1)
+    assert report.records == before
+
+
+def test_changed_sources_are_computed_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = Options(kinds=("pair",), folder=tmp_path)
+    run(options, act=answer)
+    monkeypatch.setattr(diagnosis, "sources", lambda stage: f"other {stage}")
+    assert run(options, act=answer).computed == 2
+
+
+def test_a_stage_depends_on_what_decides_it() -> None:
+    engine = ROOT / "pam_envs" / "diagnosis"
+    files = {stage: set() for stage in diagnosis.STAGES}
+    for stage, deciding in files.items():
+        deciding |= {p.name for p in engine.glob("*.py") if diagnosis._decides(p, stage)}
+    assert {"verdict.py", "search.py", "fitting.py", "experiment.py"} <= files["verdict"]
+    assert not {"gain.py", "page.py", "readings.py", "report.py"} & files["verdict"]
+    assert "plant_inverse.py" in files["loop"]
+    assert len({diagnosis.sources(stage) for stage in diagnosis.STAGES}) == 3
+
+
+def test_loops_and_experiments_are_run_where_they_count(tmp_path: Path) -> None:
+    counting = Counting()
+    options = Options("tune", fraction=0.1, folder=tmp_path, loops=2, next=True)
+    report = run(options, act=counting)
+    looped = [case for case, stage in counting.asked if stage == "loop"]
+    assert {case.names[0] for case in looped} == set(COMPENSABLE)
+    assert len(looped) == 2 * len(COMPENSABLE)
+    ahead = [case for case, stage in counting.asked if stage == "next"]
+    pairs = [case for case in select(options) if case.kind == "pair"]
+    assert ahead and set(ahead) == {case for case in pairs if case.seed % 2 == 0}
+    made = figures(report.records)
+    assert made["loop"]["n"] == len(looped)
+    assert counted(made["next"]["resolved"]) == (len(ahead), len(ahead))
+
+
+def test_a_loop_that_fails_leaves_the_verdict(tmp_path: Path) -> None:
+    def failing(case: Case, stages: Collection[str]) -> dict[str, Any]:
+        return {**answer(case, stages), "failure": "no loop" if "loop" in stages else None}
+
+    options = Options(kinds=("single",), names=("creep",), folder=tmp_path, loops=1)
+    (made,) = run(options, act=failing).records
+    assert made["failure"] is None and made["loop"] == {"failure": "no loop"}
+
+
+def deadly(case: Case, stages: Collection[str]) -> dict[str, Any]:
+    """Kill the worker on one case."""
+    if case.names == ("leak",):
+        os._exit(3)
+    return answer(case, stages)
+
+
+in_worker = diagnosis._in_worker
+
+
+def unchanging(stage: str) -> str:
+    """Stand for the digest of the sources."""
+    return f"the sources of {stage}"
+
+
+def in_worker_of_unchanging_sources(*given: Any) -> Task:
+    """Work as a worker does, whatever is written to the engine's files meanwhile."""
+    diagnosis.sources = unchanging
+    return in_worker(*given)
+
+
+def test_a_case_that_kills_its_worker_is_a_failed_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(diagnosis, "sources", unchanging)
+    monkeypatch.setattr(diagnosis, "_in_worker", in_worker_of_unchanging_sources)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(Path(__file__).parent)]))
+    get_reusable_executor().shutdown(wait=True)
+    options = Options(kinds=("single",), names=("creep", "leak"), folder=tmp_path, jobs=2)
+    report = run(options, act=deadly)
+    get_reusable_executor().shutdown(wait=True)
+    assert [bool(record["failure"]) for record in report.records] == [False, True]
+    assert "its worker died 3 times" in report.failed[0]
+
+
+def test_a_worker_whose_sources_are_others_makes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    watched = Event()
+    watched.set()
+    monkeypatch.setattr(runner, "_watching", watched)
+    monkeypatch.setattr(diagnosis, "sources", unchanging)
+    task, store = Task(Case("single", 1, ("creep",), (2.0,)), "verdict"), Store(tmp_path)
+    with pytest.raises(ValueError, match="the sources were changed while the run went on"):
+        in_worker(task, task.key, store, answer, "others", os.getpid())
+    assert store.load(task.key) is None
+    assert in_worker(task, task.key, store, answer, unchanging("verdict"), os.getpid()) == task
+    assert store.load(task.key)["names"] == ["creep"]
+
+
+def test_records_are_judged_anew(tmp_path: Path) -> None:
+    def rival(names: list[str], gain: float) -> dict[str, Any]:
+        return {"names": names, "forms": ["linear"], "gain": gain, "better": 0.0}
+
+    left = {"r2": [0.0, 0.0], "rest": 0.0, "peaks": [], "peak": 0.0, "excess": 1.0}
+    evidence = {
+        "levels": [
+            {"gain": 0.0, "added": 0.0, "left": left, "rivals": []},
+            {"gain": 2.0, "added": 2.0, "left": left, "rivals": [rival(["leak"], 2.0)]},
+        ]
+    }
+
+    def judged(case: Case, stages: Collection[str]) -> dict[str, Any]:
+        known = answer(case, stages)
+        return known | {"evidence": evidence, "verdict": "adequate", "names": []}
+
+    options = Options(kinds=("single",), names=("creep", "leak"), folder=tmp_path)
+    run(options, act=judged)
+    made = retold(options)
+    assert [one["verdict"] for one in made] == ["named", "named"]
+    assert [one["names"] for one in made] == [["leak"], ["leak"]]
+    assert retold(Options(kinds=("clean",), folder=tmp_path)) == []
+
+
+# --- a study -------------------------------------------------------------------------------------
+
+
+def test_a_case_that_cannot_be_made_is_a_failed_record(monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(case: Case) -> None:
+        raise ValueError("on none can the effect be so large")
+
+    monkeypatch.setattr(diagnosis_study, "make", never)
+    case = Case("single", 3, ("creep",), (2.0,))
+    made = study(case, ("verdict", "next", "loop"))
+    assert made["failure"] == "ValueError: on none can the effect be so large"
+    assert made["case"] == json.loads(json.dumps(case.record()))
+    with pytest.raises(ValueError, match="no stage is called 'loops'"):
+        study(case, ("loops",))
+
+
+def test_traces_are_compared_where_the_truth_is_largest() -> None:
+    rng = np.random.default_rng(0)
+    true = np.stack(
+        [0.1 * NOISE[0] * rng.standard_normal(400), NOISE[1] * rng.standard_normal(400)]
+    )
+    constant = np.ones((2, 1)) * NOISE[:, None]
+
+    def left(trace: np.ndarray) -> np.ndarray:
+        rows = trace / NOISE[:, None]
+        return rows - rows.mean(axis=1, keepdims=True)
+
+    found = 0.8 * true + 5.0 * constant  # the base can take up a constant
+    effects = {"creep": {"contraction": found[0], "pressure": found[1]}}
+    made = SimpleNamespace(
+        ground=SimpleNamespace(left=left),
+        truths=(
+            SimpleNamespace(name="creep", trace=true),
+            SimpleNamespace(name="leak", trace=true),
+        ),
+    )
+    errors = trace_errors(
+        made, SimpleNamespace(causes=("creep",), traces=SimpleNamespace(effects=effects))
+    )
+    assert set(errors) == {"creep"}
+    assert errors["creep"]["output"] == "pressure"
+    assert errors["creep"]["error"] == pytest.approx(0.2)
+    assert errors["creep"]["found"] == pytest.approx(0.8 * errors["creep"]["true"])
+    assert errors["creep"]["found_raw"] > 4.0
+
+
+def made_rig(name: str) -> Any:
+    effect = hidden.draw_effect(name, np.random.default_rng(1))
+    base = hidden.draw_base(np.random.default_rng(3))
+    truth = SimpleNamespace(effect=effect, amplitude=3.0)
+    return SimpleNamespace(ground=SimpleNamespace(base=base), truths=(truth,), noise=NOISE)
+
+
+@pytest.mark.parametrize("name", ["creep", "dead_time", "sensor_delay"])
+def test_the_oracle_is_the_rig_that_is_driven_without_its_noise(name: str) -> None:
+    made = made_rig(name)
+    rig, oracle = DrivenRig(made, 30.0, 24.0), OracleRig(made, 30.0, 24.0)
+    commands = np.repeat(np.random.default_rng(0).uniform(0.0, 5e5, 6), 30)
+    ahead = oracle.try_ahead(np.stack([commands, 0.5 * commands], axis=1), len(commands))
+    assert oracle.position == 0.0
+    together = oracle.batch(2)
+    rows = []
+    for command in commands:
+        reading, pressure = rig.step(command)
+        rows.append([reading - oracle.step(command)[0], pressure, rig.position])
+        together.step([command, 0.5 * command])
+        assert oracle.position == rig.position
+    apart, pressures, positions = np.array(rows).T
+    assert np.array_equal(ahead[:, 0], positions)
+    assert together.position == pytest.approx([positions[-1], ahead[-1, 1]])
+    assert np.ptp(positions) > 1e-3 and pressures.max() > 1e5
+    assert np.std(apart) == pytest.approx(NOISE[0], rel=0.5)
+    rig.reset(1)
+    oracle.reset(None)
+    assert rig.position == oracle.position == 0.0

@@ -1,0 +1,163 @@
+"""A mass-spring-damper with hidden dry friction: flagged and named by ours; the page and its rows.
+
+MuJoCo is not needed here.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from benchmarks import head_to_head, head_to_head_page, mass_spring_damper_rig
+from benchmarks.head_to_head import Case, diagnose
+from benchmarks.mass_spring_damper import BASE, CAUSES, NEUTRAL, MassSpringDamper
+from benchmarks.mass_spring_damper_rig import NOISE, PERIOD, Oscillator, another, campaign
+
+SEED = 7
+
+
+@pytest.fixture(scope="module")
+def force() -> np.ndarray:
+    return campaign(SEED).force
+
+
+def test_the_rig_moves_as_its_equation_says():
+    rig = Oscillator.drawn(SEED)
+    force = another(SEED).force[:600]
+    state, found = np.zeros(2), []
+    for value in force:
+        found.append(state[0])
+        state = solve_ivp(
+            lambda _, y, f=value: [
+                y[1],
+                (f - rig.damping * y[1] - rig.stiffness * y[0]) / rig.mass,
+            ],
+            (0.0, PERIOD),
+            state,
+            rtol=1e-9,
+            atol=1e-12,
+        ).y[:, -1]
+    np.testing.assert_allclose(rig.positions(force), found, atol=1e-8)
+
+
+def test_friction_holds_the_mass_until_the_force_breaks_it_away():
+    rig = Oscillator(friction=1.0, breakaway=1.2)
+    ramp = np.linspace(0.0, 3.0, 301)
+    moved = np.flatnonzero(rig.positions(ramp) != 0.0)
+    assert ramp[moved[0] - 1] == pytest.approx(1.2, abs=0.011)  # the force of the step before
+
+
+def test_friction_halts_a_swing_within_the_band_that_it_can_hold():
+    rig = Oscillator(friction=1.0, breakaway=1.0)
+    force = np.concatenate([np.full(300, 8.0), np.zeros(500)])
+    x = rig.positions(force)
+    assert np.ptp(x[-100:]) == 0.0
+    assert 0.0 < abs(x[-1]) <= 1.0 / rig.stiffness
+
+
+@pytest.mark.parametrize(
+    ("friction", "most"), [(0.0, 1e-4), (1.0, 4e-4)], ids=["plain", "friction"]
+)
+def test_rig_and_candidate_agree_on_the_same_plant(force, friction, most):
+    rig = Oscillator(friction=friction)
+    family = MassSpringDamper(force, PERIOD, {"friction.force": friction})
+    shown = family.simulate(family.column[None])[0, :, 0]
+    off = np.sqrt(np.mean((shown - rig.positions(force)) ** 2))
+    assert 0.0 < off < most  # two integrators: near, not the same
+
+
+def test_the_rig_shares_no_code_with_what_is_fitted_to_it():
+    tree = ast.parse(Path(mass_spring_damper_rig.__file__).read_text(encoding="utf-8"))
+    names = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
+    names |= {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
+    assert names == {"__future__", "math", "dataclasses", "numpy", "numpy.typing"}
+
+
+def test_the_library_does_not_know_of_this_plant():
+    library = Path(head_to_head.__file__).parents[1] / "pam_envs"
+    for path in library.rglob("*.py"):
+        assert "mass_spring_damper" not in path.read_text(encoding="utf-8").lower()
+
+
+@pytest.mark.parametrize("cause", CAUSES, ids=lambda c: c.name)
+def test_a_cause_is_neutral_until_it_is_fitted(force, cause):
+    family = MassSpringDamper(force[:3000], PERIOD, {})
+    plain = family.simulate(family.column[None])
+    for form in cause.forms:
+        for term in form.terms:
+            assert term.name in NEUTRAL
+            assert term.name not in BASE
+        column = family.column
+        for term in form.terms:
+            if not term.amount:
+                column[family.free(term.name).place] = term.starts[0]
+        np.testing.assert_array_equal(family.simulate(column[None]), plain)
+        for term in form.terms:
+            column[family.free(term.name).place] = term.starts[0]
+        assert np.abs(family.simulate(column[None]) - plain).max() > 0.1 * NOISE
+
+
+@pytest.mark.parametrize("friction", head_to_head.FRICTIONS)
+def test_hidden_friction_is_named_and_a_plain_rig_is_cleared(force, friction):
+    rig = Oscillator.drawn(SEED, friction=friction)
+    found = diagnose(force, rig.readings(force, SEED))
+    decision = found.decision
+    if friction == 0.0:
+        assert decision.verdict == "adequate"
+        assert decision.model.names == ()
+        assert found.error(found.base) < 1.1
+        return
+    assert decision.verdict == "named"
+    assert decision.model.names == ("dry_friction",)
+    assert decision.model.fit.values()["friction.force"] == pytest.approx(friction, rel=0.1)
+    assert found.error(found.base) > 3.0
+    assert found.error(decision.model) < 0.5 * found.error(found.base)
+    damping = found.base.fit.values()["damping"] / rig.damping
+    assert damping > 1.5  # what a refit alone makes of friction
+
+
+def test_another_effect_is_not_called_friction(force):
+    case = Case(SEED, "dead_time", head_to_head.OTHERS["dead_time"])
+    found = diagnose(force, case.rig.readings(force, SEED))
+    assert found.decision.verdict == "named"
+    assert found.decision.model.names == ("dead_time",)
+    delay = found.decision.model.fit.values()["actuator.dead_time"]
+    assert delay == pytest.approx(0.03, abs=0.002)
+
+
+def written() -> dict:
+    return json.loads(head_to_head.RESULTS.read_text(encoding="utf-8"))
+
+
+def test_every_line_of_a_table_has_all_its_columns():
+    with pytest.raises(ValueError, match="not as long as the head"):
+        head_to_head_page.table(["a", "b"], [["1"]])
+
+
+def test_the_page_is_that_of_the_results():
+    assert head_to_head.PAGE.read_text(encoding="utf-8") == head_to_head_page.page(written())
+
+
+def test_the_results_flag_every_friction_and_clear_every_plain_rig():
+    levels = head_to_head_page.by_friction(written()["rows"])
+    assert tuple(levels) == head_to_head.FRICTIONS
+    for friction, rows in levels.items():
+        assert len(rows) >= 20
+        assert all(head_to_head_page.flagged(row) == (friction > 0.0) for row in rows)
+        if friction > 0.0:
+            assert all(row["ours"]["causes"][0] == "dry_friction" for row in rows)
+
+
+def test_a_page_without_mujoco_says_so():
+    result = written()
+    for row in result["rows"]:
+        for key in ("sysid", "sysid_told"):
+            row.pop(key, None)
+    text = head_to_head_page.page(result)
+    assert "its side was not run" in text
+    assert "sysid: issues" not in text
