@@ -197,7 +197,7 @@ def kept(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def main(
-    rigs: int = 20, others: int = 10, told: int = 8, write: bool = False, keep: bool = False
+    rigs: int = 20, others: int = 10, told: int = 5, write: bool = False, keep: bool = False
 ) -> dict[str, Any]:
     """Run both tools on the same recordings and print the tables.
 

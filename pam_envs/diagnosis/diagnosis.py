@@ -26,7 +26,7 @@ from pam_envs.diagnosis.isolability import Isolability, isolability
 from pam_envs.diagnosis.noise import ChannelFloor, Floor, noise_floor
 from pam_envs.diagnosis.rule import Rule
 from pam_envs.diagnosis.search import Blocks, Candidate, refit
-from pam_envs.diagnosis.single_muscle import MuscleFamily, inputs_of, start_plant
+from pam_envs.diagnosis.single_muscle import KELVIN, MuscleFamily, inputs_of, start_plant
 from pam_envs.diagnosis.structure import Regressors
 from pam_envs.diagnosis.summary import report_of
 from pam_envs.diagnosis.verdict import Decision, decide, traces_of
@@ -328,7 +328,11 @@ class Study:
 
     def decide(self, rule: Rule, seed: int) -> None:
         """Compare rival causes."""
-        if len(self.causes) < LEAST_TESTABLE:
+        moving = np.bincount(self.blocks.of, np.abs(np.diff(self.recording.command, prepend=0.0)))
+        if (
+            len(self.causes) < min(LEAST_TESTABLE, len(self.causes) + len(self.not_testable))
+            or int(np.sum(self.blocks.held_out & (moving > 0.0))) < rule.least_blocks
+        ):
             self.decision = Decision("insufficient", self.base)
             return
         self.decision = decide(
@@ -373,9 +377,10 @@ class Study:
         residuals = None
         if simulated is None and held is not None and np.isfinite(self.problem.measured[0]).any():
             rows = held.rows & np.isfinite(self.problem.measured[0])
-            left = (self.problem.measured - self.outputs(self.model))[0][rows]
+            left = -held.problem.rows(held.model.fit.residual)[0][rows] * self.problem.noise[0]
             residuals = loops.Residuals(np.ascontiguousarray(left), self.recording.period)
-        heaviest = float(np.median(self.recording.load)) / GRAVITY
+        loads = self.recording.load[self.recording.load > 0.0]
+        load = float(np.median(loads)) / GRAVITY if len(loads) else 0.0
         self.loop = loops.closed_loop(
             self.plant_of(self.base),
             self.plant_of(self.model),
@@ -383,9 +388,17 @@ class Study:
             rig=simulated,
             oracle=oracle,
             residuals=residuals,
-            load=heaviest,
+            load=load,
+            kelvin=self._far_from_room(),
             seed=seed,
         )
+
+    def _far_from_room(self) -> float | None:
+        """Return the temperature [K] of the recording that is furthest from 20 deg C."""
+        celsius = self.recording.temperature
+        if celsius is None:
+            return None
+        return float(celsius[np.argmax(np.abs(celsius - 20.0))]) + KELVIN
 
     def traces(self) -> Traces:
         """Return what a report draws."""

@@ -41,7 +41,7 @@ class HeldOut:
 
 def kind_of(label: str) -> str:
     """Return the kind of experiment that a label names: ``random_b`` is of the kind random."""
-    return re.sub(r"[\s_.-]*([A-Za-z]|\d+)$", "", label) or label
+    return re.sub(r"[\s_.-]+(?:[A-Za-z]|\d+)$|(?<=[A-Za-z])\d+$", "", label) or label
 
 
 def choose(recording: Recording, blocks: Blocks) -> NDArray[np.bool_]:

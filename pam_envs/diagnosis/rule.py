@@ -1,6 +1,6 @@
 """The rule of a diagnosis: numbers, and how they word a verdict on plain evidence.
 
-Thresholds were chosen on drawn cases and frozen before those of the benchmark were drawn.
+Its thresholds were chosen on drawn cases that no benchmark reports.
 """
 
 from __future__ import annotations
@@ -34,6 +34,8 @@ class Rule:
         Unexplained when structure is left and less of the excess than this part has gone.
     close : float
         A rival within this part of the best gain is not excluded...
+    least_blocks : int
+        With fewer held-out blocks in which something moves nothing is decided.
     doubt : float
         ... if the difference is not surer than this (one-sided, blocks drawn again).
     second_gain, second_share : float
@@ -60,6 +62,7 @@ class Rule:
     excess: float = 1.6
     explained: float = 0.6
     close: float = 0.8
+    least_blocks: int = 6
     doubt: float = 0.05
     second_gain: float = 0.1
     second_share: float = 0.12
@@ -92,11 +95,11 @@ def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
         The numbers of the decision.
     """
     levels = evidence["levels"]
-    if len(levels) < 2 or levels[1]["gain"] < rule.least_gain:
+    if len(levels) < 2 or not pays(levels[1], rule.least_gain, rule):
         return Judgement("unexplained" if structured(levels[0]["left"], rule) else "adequate", 0)
     level = 1
     wanted = max(rule.second_gain, rule.second_share * levels[1]["gain"])
-    while level + 1 < len(levels) and level < rule.most and levels[level + 1]["added"] >= wanted:
+    while level + 1 < len(levels) and level < rule.most and pays(levels[level + 1], wanted, rule):
         level += 1
     found = levels[level]
     if structured(found["left"], rule) and gone(levels[0], found) < rule.explained:
@@ -110,6 +113,11 @@ def structured(left: dict[str, Any], rule: Rule) -> bool:
     return bool(
         max(left["r2"]) > rule.flexible or left["peak"] > rule.peak or left["excess"] > rule.excess
     )
+
+
+def pays(level: Mapping[str, Any], wanted: float, rule: Rule) -> bool:
+    """Return whether a further cause gains as much as is wanted, and surely gains."""
+    return bool(level["added"] >= wanted and level["unsure"] <= rule.doubt)
 
 
 def gone(before: Mapping[str, Any], after: Mapping[str, Any]) -> float:

@@ -23,8 +23,9 @@ FILTERS = (0.05, 0.2, 1.0, 5.0, 20.0, 60.0)
 """Time constants [s] of the flexible model's filters."""
 LOWEST_PEAK = 0.15
 """Peaks of the spectrum are looked for above this frequency [Hz]."""
-WINDOW, NEAR = 80.0, 12
-"""Length [s] of the windows of a spectrum, and bins on either side of a peak's neighbourhood."""
+WINDOW, NEAR, LEAST_WINDOWS = 80.0, 12, 4
+"""Longest window [s] of a spectrum, bins on either side of a peak's neighbourhood, and how many
+windows a record has at least: a spectrum that is not averaged has peaks of noise."""
 MOVED = 6.0
 """Height of a peak in the spectrum of the motion above which the experiment put it there."""
 CYCLE = 5e4
@@ -218,10 +219,12 @@ def spectral_peak(
 def _heights(signal: Array, period: float) -> tuple[Array, Array]:
     """Return frequencies and the power there over the median of the neighbourhood."""
     r = np.nan_to_num(signal - np.nanmean(signal))
-    length = min(len(r), int(WINDOW / period))
+    length = max(4 * NEAR, min(int(WINDOW / period), len(r) // LEAST_WINDOWS))
     frequency, power = welch(r, 1.0 / period, nperseg=length, noverlap=length // 2)
-    near = median_filter(power, 2 * NEAR + 1, mode="nearest")
-    return frequency, power / np.maximum(near, 1e-300)
+    near = median_filter(power, 2 * NEAR + 1, mode="reflect")
+    heights = power / np.maximum(near, 1e-300)
+    heights[-NEAR:] = 0.0  # what is next to half the sampling rate has no neighbourhood
+    return frequency, heights
 
 
 def ljung_box(residual: Array, lags: int = LAGS) -> float:

@@ -266,9 +266,9 @@ def evidence_of(
     """Return what a rule decides on, in plain types.
 
     Under ``levels``, one entry for each number of causes from none: ``gain`` over the base,
-    ``added`` over the level before, what is ``left``, and the ``rivals``, the best first, each
-    with ``names``, ``forms``, ``gain``, ``better``: the part of the samples of blocks in which it
-    is ahead of the best, and ``imitates``: whether it has the best as a limit.
+    ``added`` over the level before, how ``unsure`` that is, what is ``left``, and the ``rivals``,
+    the best first, each with ``names``, ``forms``, ``gain``, ``better``: the part of the samples of
+    blocks in which it is ahead of the best, and ``imitates``: whether it has the best as a limit.
     """
     base = levels[0].model
     draws = blocks.draws(rule.draws, seed)
@@ -279,6 +279,7 @@ def evidence_of(
             {
                 "gain": worth(blocks, base, level.model, rule),
                 "added": worth(blocks, before, level.model, rule),
+                "unsure": _unsure(blocks, before, level.model, draws, rule),
                 "left": level.left,
                 "rivals": [
                     {
@@ -293,6 +294,14 @@ def evidence_of(
             }
         )
     return {"levels": made}
+
+
+def _unsure(
+    blocks: Blocks, before: Candidate, after: Candidate, draws: NDArray[np.int64], rule: Rule
+) -> float:
+    """Return the part of the samples of blocks in which a further cause gains nothing."""
+    penalty = blocks.gain(before.errors, after.errors) - worth(blocks, before, after, rule)
+    return float(np.mean(blocks.gains(before.errors, after.errors, draws) <= penalty))
 
 
 def _better(blocks: Blocks, rival: Candidate, best: Candidate, draws: NDArray[np.int64]) -> float:

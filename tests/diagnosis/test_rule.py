@@ -1,0 +1,98 @@
+"""The rule on plain evidence, kinds of experiment, and peaks of a spectrum."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pam_envs.diagnosis.held_out import kind_of
+from pam_envs.diagnosis.rule import Rule, judge
+from pam_envs.diagnosis.structure import spectral_peak
+
+RULE = Rule()
+
+
+def left(excess: float = 1.0, r2: float = 0.0, peak: float = 4.0) -> dict[str, Any]:
+    return {"excess": excess, "r2": [r2, 0.0], "peak": peak, "rest": 0.0}
+
+
+def rival(*names: str, gain: float, better: float = 0.0, imitates: bool = False) -> dict[str, Any]:
+    return {"names": list(names), "gain": gain, "better": better, "imitates": imitates}
+
+
+def level(gain: float, *rivals: dict[str, Any], added: float | None = None, **more: Any) -> Any:
+    made = {"gain": gain, "added": gain if added is None else added, "unsure": 0.0}
+    return {**made, "left": left(), "rivals": list(rivals), **more}
+
+
+def evidence(*levels: Any, before: dict[str, Any] | None = None) -> dict[str, Any]:
+    none = {"gain": 0.0, "added": 0.0, "unsure": 1.0, "rivals": [], "left": before or left()}
+    return {"levels": [none, *levels]}
+
+
+LEAK = rival("leak", gain=1.0, better=1.0)
+LIKE = rival("ring", gain=1.0, better=0.5, imitates=True)
+BOTH = rival("leak", "creep", gain=1.3, better=1.0)
+
+
+@pytest.mark.parametrize(
+    ("found", "verdict", "names"),
+    [
+        (evidence(), "adequate", 0),
+        (evidence(level(0.04, LEAK)), "adequate", 0),
+        (evidence(level(0.4, LEAK, unsure=0.2)), "adequate", 0),
+        (evidence(before=left(excess=1.7)), "unexplained", 0),
+        (evidence(before=left(r2=0.2)), "unexplained", 0),
+        (evidence(before=left(peak=40.0)), "unexplained", 0),
+        (evidence(level(1.0, LEAK)), "named", 1),
+        (evidence(level(1.0, LEAK, rival("creep", gain=0.9, better=0.2))), "ambiguous", 1),
+        (evidence(level(1.0, LEAK, rival("creep", gain=0.9, better=0.01))), "named", 1),
+        (evidence(level(1.0, LEAK, rival("creep", gain=0.5, better=0.2))), "named", 1),
+        (evidence(level(1.0, LEAK, LIKE)), "named", 1),
+        (evidence(level(1.0, LEAK), level(1.3, BOTH, added=0.3)), "named", 2),
+        (evidence(level(1.0, LEAK), level(1.3, BOTH, added=0.3, unsure=0.1)), "named", 1),
+        (evidence(level(1.0, LEAK), level(1.1, BOTH, added=0.1)), "named", 1),
+    ],
+)
+def test_evidence_words_the_verdict(found: dict[str, Any], verdict: str, names: int) -> None:
+    judged = judge(found, RULE)
+    assert (judged.verdict, judged.level) == (verdict, names)
+
+
+@pytest.mark.parametrize(("after", "verdict"), [(2.0, "named"), (6.0, "unexplained")])
+def test_what_is_left_decides_whether_a_cause_explains(after: float, verdict: str) -> None:
+    found = evidence(level(1.0, LEAK, left=left(excess=after)), before=left(excess=10.0))
+    assert judge(found, RULE).verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("label", "kind"),
+    [
+        ("staircase", "staircase"),
+        ("sine_slow", "sine_slow"),
+        ("rest", "rest"),
+        ("staircase_a", "staircase"),
+        ("random-b", "random"),
+        ("steps 3", "steps"),
+        ("run12", "run"),
+        ("a", "a"),
+        ("7", "7"),
+    ],
+)
+def test_a_label_names_a_kind(label: str, kind: str) -> None:
+    assert kind_of(label) == kind
+
+
+@pytest.mark.parametrize("seconds", [30, 60, 120, 300])
+def test_white_noise_has_no_peak_and_a_hum_has(seconds: int) -> None:
+    period = 0.02
+    time = np.arange(round(seconds / period)) * period
+    for seed in range(20):
+        noise = np.random.default_rng(seed).standard_normal(len(time))
+        assert spectral_peak(noise, period)[1] < RULE.peak
+    hum = noise + 0.7 * np.sin(2.0 * np.pi * 6.3 * time)
+    frequency, height = spectral_peak(hum, period)
+    assert frequency == pytest.approx(6.3, abs=0.2)
+    assert height > RULE.peak
