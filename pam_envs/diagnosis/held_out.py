@@ -23,7 +23,7 @@ class HeldOut:
     Attributes
     ----------
     rows : ndarray of bool, shape (T,)
-        What no fit has seen.
+        What neither of the two fits has seen.
     problem : Problem
         With the others as training samples.
     base, model : Candidate

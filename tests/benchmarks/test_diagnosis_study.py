@@ -236,8 +236,14 @@ def test_records_are_judged_anew(tmp_path: Path) -> None:
     left = {"r2": [0.0, 0.0], "rest": 0.0, "peaks": [], "peak": 0.0, "excess": 1.0}
     evidence = {
         "levels": [
-            {"gain": 0.0, "added": 0.0, "left": left, "rivals": []},
-            {"gain": 2.0, "added": 2.0, "left": left, "rivals": [rival(["leak"], 2.0)]},
+            {"gain": 0.0, "added": 0.0, "unsure": 0.0, "left": left, "rivals": []},
+            {
+                "gain": 2.0,
+                "added": 2.0,
+                "unsure": 0.0,
+                "left": left,
+                "rivals": [rival(["leak"], 2.0)],
+            },
         ]
     }
 
