@@ -28,7 +28,8 @@ from pam_envs.diagnosis.rule import Rule, judge
 HERE = Path(__file__).parent
 FOLDER = HERE / ".cells" / "diagnosis"
 ATTEMPTS = 3
-"""Rounds over what is still missing, so that a killed worker costs one case."""
+"""Rounds over what is still missing; in the last every case is alone, so that a dead worker
+costs no other case."""
 SHUFFLE = 20_260_101
 
 LOOP_FILES = ("gain.py", "gain_references.py", "plant_inverse.py")
@@ -327,10 +328,12 @@ def _stage(
 def _computed(missing: Sequence[Task], store: Store, jobs: int, act: Study) -> Iterator[None]:
     """Make records round by round; a case whose worker dies every time becomes a failed one."""
     left = list(missing)
-    for _ in range(ATTEMPTS):
-        for task in _attempt(left, store, jobs, act):
-            left = [other for other in left if other != task]
-            yield
+    for attempt in range(ATTEMPTS):
+        alone = attempt == ATTEMPTS - 1
+        for batch in [[task] for task in left] if alone else [left]:
+            for task in _attempt(batch, store, jobs, act):
+                left = [other for other in left if other != task]
+                yield
         if not left:
             return
     for task in left:
