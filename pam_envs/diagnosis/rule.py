@@ -135,6 +135,7 @@ def not_excluded(rivals: Sequence[Mapping[str, Any]], rule: Rule) -> tuple[int, 
         if set(rival["names"]) != set(best["names"])
         and len(rival["names"]) == len(best["names"])
         and not rival["imitates"]
+        and not rival.get("out", False)
         and rival["gain"] >= rule.close * best["gain"]
         and rival["better"] > rule.doubt
     )

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.fitting import Problem, column_of
@@ -17,8 +18,8 @@ from pam_envs.diagnosis.structure import Regressors, flexible_r2, spectral_peak
 
 Array = NDArray[np.float64]
 
-CROSS_ROUNDS, CROSSED = 4, 4
-"""Rounds of a fit to other blocks, and how many rivals are compared so."""
+CROSS_ROUNDS = 4
+"""Rounds of a fit to other blocks."""
 PERFECT = 0.93
 """Mean square over the noise of a perfect model, if the noise is a little less than assumed."""
 KEPT = 12
@@ -138,30 +139,31 @@ def cross(
     rule: Rule,
     seed: int,
 ) -> None:
-    """Compare what is not excluded on all blocks, and order level and evidence anew."""
+    """Compare what is not excluded on all blocks, and order level and evidence anew.
+
+    What was excluded stays so: its gain is of other blocks than the new ones.
+    """
     level, found = levels[judged.level], evidence["levels"][judged.level]
-    places = [0, *judged.open_rivals][:CROSSED]
-    base, *again = crossed(
-        problem, blocks, levels[0].model, [level.rivals[k] for k in places], rule
+    places = [0, *judged.open_rivals]
+    smaller = levels[judged.level - 1].model
+    base, before, *again = crossed(
+        problem, blocks, [levels[0].model, smaller, *(level.rivals[k] for k in places)], rule
     )
     every = replace(blocks, held_out=np.ones_like(blocks.held_out))
-    gains = [worth(every, base, c, rule) for c in again]
-    ranked = sorted(range(len(again)), key=lambda i: -gains[i])
-    order = preferred(every, base, [again[i] for i in ranked], rule)
+    ranked = sorted(again, key=lambda c: -worth(every, base, c, rule))
+    order = preferred(every, base, ranked, rule)
     draws = every.draws(rule.draws, seed)
-    rows = []
-    for candidate in order:
-        i = next(i for i, c in enumerate(again) if c is candidate)
-        row = dict(found["rivals"][places[i]])
-        row["gain"], row["better"] = gains[i], _better(every, candidate, order[0], draws)
-        row["imitates"] = reduces(candidate, order[0])
-        rows.append((row, level.rivals[places[i]]))
+    rows = [_row(every, base, c, order[0], draws, rule) for c in order]
+    places = [places[next(i for i, c in enumerate(again) if c is o)] for o in order]
     others = [k for k in range(len(level.rivals)) if k not in places]
-    rivals = [r for _, r in rows] + [level.rivals[k] for k in others]
-    found["rivals"] = [r for r, _ in rows] + [
-        found["rivals"][k] for k in others if k < len(found["rivals"])
+    found["rivals"] = rows + [
+        found["rivals"][k] | {"out": True} for k in others if k < len(found["rivals"])
     ]
     found["crossed"] = len(rows)
+    found["gain"] = rows[0]["gain"]
+    found["added"] = worth(every, before, order[0], rule)
+    found["unsure"] = _unsure(every, before, order[0], draws, len(level.rivals), rule)
+    rivals = [level.rivals[k] for k in (*places, *others)]
     if rivals[0] is not level.model:
         found["left"] = left_over(problem, blocks, rivals[0], regressors)
     levels[judged.level] = Level(rivals[0], rivals, found["left"])
@@ -245,19 +247,18 @@ def reduces(model: Candidate, other: Candidate) -> bool:
 
 
 def crossed(
-    problem: Problem, blocks: Blocks, base: Candidate, rivals: Sequence[Candidate], rule: Rule
+    problem: Problem, blocks: Blocks, candidates: Sequence[Candidate], rule: Rule
 ) -> list[Candidate]:
-    """Return base and rivals with errors on all blocks, each from a fit that has not seen it."""
-    whole = [base, *rivals]
-    errors = [candidate.errors.copy() for candidate in whole]
+    """Return candidates with errors on all blocks, each from a fit to other blocks."""
+    errors = [candidate.errors.copy() for candidate in candidates]
     fold = (np.arange(len(blocks.held_out)) - np.flatnonzero(blocks.held_out)[0]) % rule.folds
     for k in range(1, rule.folds):
         out = fold == k
         part = replace(blocks, held_out=out)
         again = replace(problem, train=part.train)
-        for candidate, kept in zip(whole, errors, strict=True):
+        for candidate, kept in zip(candidates, errors, strict=True):
             kept[:, out] = refit(again, part, candidate, CROSS_ROUNDS).errors[:, out]
-    return [replace(c, errors=e) for c, e in zip(whole, errors, strict=True)]
+    return [replace(c, errors=e) for c, e in zip(candidates, errors, strict=True)]
 
 
 def evidence_of(
@@ -268,7 +269,8 @@ def evidence_of(
     Under ``levels``, one entry for each number of causes from none: ``gain`` over the base,
     ``added`` over the level before, how ``unsure`` that is, what is ``left``, and the ``rivals``,
     the best first, each with ``names``, ``forms``, ``gain``, ``better``: the part of the samples of
-    blocks in which it is ahead of the best, and ``imitates``: whether it has the best as a limit.
+    blocks in which it is ahead of the best, ``imitates``: whether it has the best as a limit, and
+    ``out``: whether it was excluded before the others were compared on all blocks.
     """
     base = levels[0].model
     draws = blocks.draws(rule.draws, seed)
@@ -279,16 +281,10 @@ def evidence_of(
             {
                 "gain": worth(blocks, base, level.model, rule),
                 "added": worth(blocks, before, level.model, rule),
-                "unsure": _unsure(blocks, before, level.model, draws, rule),
+                "unsure": _unsure(blocks, before, level.model, draws, len(level.rivals), rule),
                 "left": level.left,
                 "rivals": [
-                    {
-                        "names": list(rival.names),
-                        "forms": [form.name for _, form in rival.causes],
-                        "gain": worth(blocks, base, rival, rule),
-                        "better": _better(blocks, rival, level.model, draws),
-                        "imitates": reduces(rival, level.model),
-                    }
+                    _row(blocks, base, rival, level.model, draws, rule)
                     for rival in level.rivals[:KEPT]
                 ],
             }
@@ -296,12 +292,41 @@ def evidence_of(
     return {"levels": made}
 
 
+def _row(
+    blocks: Blocks,
+    base: Candidate,
+    rival: Candidate,
+    best: Candidate,
+    draws: NDArray[np.int64],
+    rule: Rule,
+) -> dict[str, Any]:
+    """Return what the rule looks at of a rival."""
+    return {
+        "names": list(rival.names),
+        "forms": [form.name for _, form in rival.causes],
+        "gain": worth(blocks, base, rival, rule),
+        "better": _better(blocks, rival, best, draws),
+        "imitates": reduces(rival, best),
+        "out": False,
+    }
+
+
 def _unsure(
-    blocks: Blocks, before: Candidate, after: Candidate, draws: NDArray[np.int64], rule: Rule
+    blocks: Blocks,
+    before: Candidate,
+    after: Candidate,
+    draws: NDArray[np.int64],
+    looked: int,
+    rule: Rule,
 ) -> float:
-    """Return the part of the samples of blocks in which a further cause gains nothing."""
-    penalty = blocks.gain(before.errors, after.errors) - worth(blocks, before, after, rule)
-    return float(np.mean(blocks.gains(before.errors, after.errors, draws) <= penalty))
+    """Return how likely the best of as many causes gains nothing, if none of them is there.
+
+    One-sided, from the spread of the gain over samples of blocks, times the number of causes among
+    which the best was chosen (Bonferroni).
+    """
+    gain = worth(blocks, before, after, rule)
+    spread = float(np.std(blocks.gains(before.errors, after.errors, draws)))
+    return float(min(1.0, max(looked, 1) * ndtr(-gain / max(spread, 1e-12))))
 
 
 def _better(blocks: Blocks, rival: Candidate, best: Candidate, draws: NDArray[np.int64]) -> float:

@@ -18,8 +18,9 @@ def left(excess: float = 1.0, r2: float = 0.0, peak: float = 4.0) -> dict[str, A
     return {"excess": excess, "r2": [r2, 0.0], "peak": peak, "rest": 0.0}
 
 
-def rival(*names: str, gain: float, better: float = 0.0, imitates: bool = False) -> dict[str, Any]:
-    return {"names": list(names), "gain": gain, "better": better, "imitates": imitates}
+def rival(*names: str, gain: float, better: float = 0.0, **marks: bool) -> dict[str, Any]:
+    marks = {"imitates": False, "out": False} | marks
+    return {"names": list(names), "gain": gain, "better": better, **marks}
 
 
 def level(gain: float, *rivals: dict[str, Any], added: float | None = None, **more: Any) -> Any:
@@ -51,6 +52,7 @@ BOTH = rival("leak", "creep", gain=1.3, better=1.0)
         (evidence(level(1.0, LEAK, rival("creep", gain=0.9, better=0.01))), "named", 1),
         (evidence(level(1.0, LEAK, rival("creep", gain=0.5, better=0.2))), "named", 1),
         (evidence(level(1.0, LEAK, LIKE)), "named", 1),
+        (evidence(level(1.0, LEAK, rival("creep", gain=0.9, better=0.2, out=True))), "named", 1),
         (evidence(level(1.0, LEAK), level(1.3, BOTH, added=0.3)), "named", 2),
         (evidence(level(1.0, LEAK), level(1.3, BOTH, added=0.3, unsure=0.1)), "named", 1),
         (evidence(level(1.0, LEAK), level(1.1, BOTH, added=0.1)), "named", 1),
