@@ -267,17 +267,6 @@ def test_a_period_must_be_whole_milliseconds():
         Stepper(_base(), [], 0.0, 0, period=0.0125)
 
 
-def test_a_tray_that_always_hangs_moves_the_rest_position(standard, clean):
-    base, effect = _base(), _effect("payload_error")
-    always = dataclasses.replace(effect, shape={"always": 1.0})
-    with_loads = hidden.simulate(base, [(effect, 3.0)], standard)
-    throughout = hidden.simulate(base, [(always, 3.0)], standard)
-    unloaded = standard.time < 30.0
-    assert np.array_equal(with_loads["contraction_mm"][unloaded], clean["contraction_mm"][unloaded])
-    assert _size(throughout, clean) > 1.0
-    assert throughout["contraction_mm"][0] == 0.0
-
-
 def test_the_file_holds_what_the_recording_holds(short, tmp_path):
     columns = hidden.make_recording(_base(), [], short, 0)
     path = tmp_path / "rig.csv"

@@ -1,7 +1,7 @@
 """Rigs that hide an effect in their recordings, independent of the library under test.
 
 Nothing here knows the library's plants: another muscle law, another friction, another integrator,
-and every effect in another mathematical form.
+and every effect in another mathematical form. The forms stand side by side in `catalogue`.
 """
 
 from .base import CONTRACTION_NOISE_MM, PRESSURE_NOISE_BAR, Base, decoys, draw_base

@@ -34,8 +34,19 @@ def _pressure_dependent_friction(record: np.ndarray, strength: float, shape: Sha
 
 
 def _stick_slip(record: np.ndarray, strength: float, shape: Shape) -> None:
-    """The guide sticks until it breaks away, and drags less while it slides."""
-    put(record, breakaway=strength, kinetic=strength * shape["kinetic"])
+    """Bristles of a guide bend, slip and ease with speed: LuGre; strength is the breakaway [N].
+
+    They bend by so many mm before they slip; at the Stribeck speed [mm/s] half of the excess over
+    the kinetic friction is gone.
+    """
+    put(
+        record,
+        breakaway=strength,
+        kinetic=strength * shape["kinetic"],
+        stribeck=shape["speed"],
+        bristle=shape["bend"],
+        oil=shape["oil"],
+    )
 
 
 FRICTION = {
@@ -48,7 +59,16 @@ FRICTION = {
         _hysteresis_drive,
         0.1,
     ),
-    "stick_slip": Kind(lambda rng: {"kinetic": uniform(rng, 0.4, 0.8)}, _stick_slip, 1.0),
+    "stick_slip": Kind(
+        lambda rng: {
+            "kinetic": uniform(rng, 0.4, 0.8),
+            "speed": uniform(rng, 0.5, 4.0),
+            "bend": uniform(rng, 0.005, 0.02),
+            "oil": uniform(rng, 5e-4, 2e-3),
+        },
+        _stick_slip,
+        2.0,
+    ),
     "pressure_dependent_friction": Kind(
         lambda rng: {"sign": sign(rng), "bend": uniform(rng, 2.0, 6.0)},
         _pressure_dependent_friction,

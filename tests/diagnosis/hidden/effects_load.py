@@ -24,12 +24,18 @@ def _wire_slack(record: np.ndarray, strength: float, shape: Shape) -> None:
 
 
 def _payload_error(record: np.ndarray, strength: float, shape: Shape) -> None:
-    """A tray hangs with every load and is not told [N]; where nothing hangs, there is no tray.
+    """What hangs is not what is told: a tray [N], and scales that are wrong by a factor.
 
-    A tray that hangs `always` is a shift of the rest position and of the moving mass, which a
-    refit of any clean muscle swallows. It is never drawn, and kept for tests of that.
+    The tray stands on a soft rest that a load presses down; without a load it only rubs on its
+    guide. What the scales add is given at 30 N, over the tray.
     """
-    put(record, tray=strength, tray_always=shape["always"])
+    put(
+        record,
+        tray=strength,
+        tray_rest=shape["rest"],
+        tray_scale=shape["scale"],
+        tray_rub=shape["rub"],
+    )
 
 
 LOAD = {
@@ -43,5 +49,13 @@ LOAD = {
         0.08,
     ),
     "wire_slack": Kind(lambda rng: {"blur": uniform(rng, 0.15, 0.4)}, _wire_slack, 0.005),
-    "payload_error": Kind(lambda _: {"always": 0.0}, _payload_error, 1.0),
+    "payload_error": Kind(
+        lambda rng: {
+            "rest": uniform(rng, 4.0, 9.0),
+            "scale": uniform(rng, -0.25, 0.5),
+            "rub": uniform(rng, 0.02, 0.08),
+        },
+        _payload_error,
+        1.5,
+    ),
 }

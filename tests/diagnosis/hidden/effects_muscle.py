@@ -19,8 +19,9 @@ def _creep(record: np.ndarray, strength: float, shape: Shape) -> None:
 
 
 def _viscous_loss(record: np.ndarray, strength: float, shape: Shape) -> None:
-    """A drag that grows with a power of the speed below one; strength at 1 mm/s [N]."""
-    put(record, loss=strength, loss_power=shape["power"])
+    """Eyring's flow over barriers: the drag is an arsinh of the speed; strength at 1 mm/s [N]."""
+    pace = shape["pace"]
+    put(record, loss=strength / (pace * np.arcsinh(1.0 / pace)), loss_pace=pace)
 
 
 def _temperature(record: np.ndarray, strength: float, shape: Shape) -> None:
@@ -64,7 +65,11 @@ MUSCLE = {
         _creep,
         0.008,
     ),
-    "viscous_loss": Kind(lambda rng: {"power": uniform(rng, 0.4, 0.7)}, _viscous_loss, 0.3),
+    "viscous_loss": Kind(
+        lambda rng: {"pace": float(np.exp(uniform(rng, np.log(0.3), np.log(3.0))))},
+        _viscous_loss,
+        0.3,
+    ),
     "temperature": Kind(lambda rng: {"sign": sign(rng)}, _temperature, 0.003),
     "first_cycle_softening": Kind(
         lambda rng: {

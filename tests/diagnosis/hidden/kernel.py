@@ -42,7 +42,6 @@ def start(p, s, told):
     s.strain = s.hang
     s.rest = s.hang
     s.supply = p.supply
-    s.stuck = 1
     s.held = 0.0
 
 

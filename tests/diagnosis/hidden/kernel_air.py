@@ -8,6 +8,9 @@ from __future__ import annotations
 import math
 
 from .kernel_tools import ATMOSPHERE, STEP, jit
+from .records import TUBE
+
+LAMINAR = 0.995  # ratio of pressures above which the flow through a restriction is laminar
 
 
 @jit
@@ -22,9 +25,22 @@ def orifice(upstream, downstream):
 
 
 @jit
-def capped(rate, limit, power):
-    """Return `rate`, bent smoothly so that it never passes `limit`."""
-    return rate / (1.0 + (abs(rate) / limit) ** power) ** (1.0 / power)
+def passed(critical, upstream, downstream):
+    """Return the flow through a restriction of ISO 6358 over its choked flow at 1 bar.
+
+    Absolute pressures; `critical` is the ratio of pressures below which the flow is choked. Above
+    it follows a quarter of an ellipse, and very near to 1, where that would be infinitely steep,
+    a straight line.
+    """
+    ratio = downstream / upstream
+    if ratio <= critical:
+        return upstream
+    if ratio >= 1.0:
+        return 0.0
+    bound = min(ratio, LAMINAR)
+    share = (bound - critical) / (1.0 - critical)
+    flow = upstream * math.sqrt(1.0 - share * share)
+    return flow if ratio < LAMINAR else flow * (1.0 - ratio) / (1.0 - LAMINAR)
 
 
 @jit
@@ -65,48 +81,109 @@ def set_point(p, s, command, t):
 
 
 @jit
-def comparator(p, s, error):
-    """Open the valve on a large error and close it on a small one."""
-    if p.open_at <= 0.0:
-        return True
-    if abs(error) > p.open_at:
-        s.open = 1
-    elif abs(error) < p.close_at:
-        s.open = 0
-    return s.open == 1
+def driven(p, error):
+    """Return the error that the valve's coil can still drive, of limited force.
+
+    Either its iron saturates, or a current limit leaves a small rest of the slope; a return
+    spring makes both leaner on one side.
+    """
+    limit = (1.0 + math.copysign(p.slew_lean, error)) / p.slew
+    if p.slew_kind > 0.5:
+        return limit * math.tanh(error / limit)
+    over = abs(error) - limit
+    if over <= 0.0:
+        return error
+    return math.copysign(limit + p.slew_rest * over, error)
+
+
+@jit
+def uncovered(p, error):
+    """Return what the spool opens: its lands overlap the ports, rounded, and leak a little."""
+    edge = p.overlap * p.overlap_edge
+    past = abs(error) - p.overlap
+    opened = 0.5 * (past + math.sqrt(past * past + edge * edge))
+    shut = 0.5 * (math.sqrt(p.overlap * p.overlap + edge * edge) - p.overlap)
+    wide = (1.0 - p.overlap_leak) * (opened - shut) + p.overlap_leak * abs(error)
+    return math.copysign(wide, error)
+
+
+@jit
+def volume(p, strain):
+    """Return the muscle's volume over that at rest and its slope: a braided cylinder's."""
+    stretch = 1.0 - strain
+    square = p.braid * stretch * stretch
+    return stretch * (3.0 - square) / (3.0 - p.braid), 3.0 * (square - 1.0) / (3.0 - p.braid)
+
+
+@jit
+def supplied(p, s, rate, shut):
+    """Draw what the muscle takes from the reservoir; return the rate that is left [bar/s].
+
+    Balances of air in muscle and reservoir. The valve opens as far as it must, and not further
+    than fully; the reservoir is fed through an orifice. Flows in volumes of the muscle at rest.
+    """
+    absolute = s.pressure + ATMOSPHERE
+    stock, feed = s.supply + ATMOSPHERE, p.supply + ATMOSPHERE
+    wide, slope = volume(p, s.strain)
+    swallowed = absolute * slope * s.speed
+    wanted = wide * rate + swallowed
+    taken = 0.0
+    if wanted > 0.0 and not shut:
+        taken = min(wanted, passed(p.critical, stock, absolute) / p.throat)
+        rate = min(rate, (taken - swallowed) / wide)
+    filled = passed(p.critical, feed, stock) / p.recovery
+    s.supply += STEP * (filled - p.draw * taken)
+    return rate
 
 
 @jit
 def valve_rate(p, s, error):
     """Return how fast the regulator moves the pressure [bar/s]."""
-    if not comparator(p, s, error):
-        return 0.0
+    if p.overlap > 0.0:
+        error = uncovered(p, error)
     if p.slew > 0.0:
-        error = capped(error, 1.0 / p.slew, p.slew_power)
+        error = driven(p, error)
     rate = error * p.approach / STEP
-    absolute = s.pressure + ATMOSPHERE
     if p.exhaust > 0.0 and rate < 0.0:
-        rate /= 1.0 + p.exhaust * 4.0 / absolute
-    if p.throat > 0.0 and rate > 0.0:
-        flow = orifice(s.supply + ATMOSPHERE, absolute) / (p.supply + ATMOSPHERE)
-        rate = 0.0 if flow <= 0.0 else capped(rate, flow / p.throat, 2.0)
+        rate /= 1.0 + p.exhaust * 4.0 / (s.pressure + ATMOSPHERE)
     return rate
 
 
 @jit
+def behind(values, tick, steps):
+    """Return what was written into a ring so many steps ago, between two of them in proportion."""
+    whole = int(steps)
+    newer = values[(tick - whole) % TUBE]
+    older = values[(tick - whole - 1) % TUBE]
+    return newer + (steps - whole) * (older - newer)
+
+
+@jit
+def resound(p, s):
+    """Send a wave down a closed tube and add a share of what swings at its end.
+
+    The valve's end holds its pressure, the far one throws the wave back, a little weaker and
+    rounded by the wall; both ways take the same time.
+    """
+    tick = s.tick
+    s.sent[tick % TUBE] = s.pressure - behind(s.returned, tick, p.line_trip)
+    arrived = behind(s.sent, tick, p.line_trip)
+    s.line_end += p.line_wall * (arrived - s.line_end)
+    s.returned[tick % TUBE] = p.line_return * s.line_end
+    swung = arrived + p.line_return * s.line_end
+    s.line = p.line * (swung - s.pressure)
+
+
+@jit
 def fill(p, s, command, shut, t):
-    """Move the pressure, the supply and the ringing of the line on by one step."""
+    """Move the pressure, the supply and the waves in the line on by one step."""
     error = set_point(p, s, command, t) - s.pressure
     rate = 0.0 if shut else valve_rate(p, s, error)
     if p.throat > 0.0:
-        drawn = p.draw * max(rate, 0.0)
-        s.supply += STEP * ((p.supply - s.supply) / p.recovery - drawn)
+        rate = supplied(p, s, rate, shut)
     if p.leak > 0.0:
         rate -= p.leak * orifice(s.pressure + ATMOSPHERE, ATMOSPHERE)
     s.pressure = max(s.pressure + STEP * rate, 0.0) if p.leak > 0.0 else s.pressure + STEP * rate
     s.rate = rate
     if p.line > 0.0:
-        omega = p.line_omega
-        pull = p.line * omega * rate - 2.0 * p.line_zeta * omega * s.line_rate
-        s.line_rate += STEP * (pull - omega * omega * s.line)
-        s.line += STEP * s.line_rate
+        resound(p, s)

@@ -8,6 +8,8 @@ from .kernel_muscle import force
 from .kernel_tools import NUDGE, PRESSURE_SPAN, STEP, jit, uniform
 from .records import MEMORIES
 
+PARTS = 2  # of a step where a guide rubs
+
 
 @jit
 def outside(p, s, t):
@@ -29,13 +31,45 @@ def outside(p, s, t):
 
 
 @jit
-def stuck(p, s, push):
-    """Hold the guide until the push breaks it away."""
-    if s.stuck == 1 and abs(push) <= p.breakaway:
-        s.speed = 0.0
-        return True
-    s.stuck = 0
-    return False
+def dragged(p, s, speed):
+    """Return the drag of strands and holder over the speed [N per 1/s of strain]."""
+    pace = 1e3 * p.length * speed
+    drag = 0.0
+    if p.loss > 0.0:
+        turn = pace / p.loss_pace
+        drag += p.loss * (math.asinh(turn) / turn if abs(turn) > 1e-3 else 1.0)
+    if p.tray > 0.0:
+        drag += p.tray * p.tray_rub / (abs(pace) + 1.0)
+    return 1e3 * p.length * drag
+
+
+@jit
+def rub(p, s, push, lean, mass, damping):
+    """Move a load on a guide whose bristles bend, slip and ease with speed (LuGre).
+
+    The linear parts go as in `move`; the bristles are linear in the new speed.
+    """
+    h = STEP / PARTS
+    spring = p.breakaway / p.bristle * 1e3 * p.length  # over the strain
+    back = spring * p.oil / h
+    ease = (1e3 * p.length / p.stribeck) ** 2
+    bent, speed = s.bristle, s.speed
+    slow = 0.5 * h * lean + damping
+    inertia = mass / h + 0.25 * h * lean + 0.5 * damping
+    for _ in range(PARTS):
+        eased = 1.0 + ease * speed * speed
+        grip = p.kinetic * eased + (p.breakaway - p.kinetic)  # the friction in slip, times eased
+        keep = grip / (grip + h * spring * abs(speed) * eased)
+        held = (spring + back) * keep
+        free = push - (held - back) * bent
+        after = speed + (free - (slow + h * held) * speed) / (inertia + h * held)
+        moved = 0.5 * h * (speed + after)
+        bent = keep * (bent + h * after)
+        speed = after
+        s.strain += moved
+        s.travel += abs(moved)
+        push -= lean * moved
+    s.bristle, s.speed = bent, speed
 
 
 @jit
@@ -44,24 +78,17 @@ def move(p, s, work, soft, extra):
     push = force(p, s, work, soft, s.strain) + extra
     stiff = (push - extra - force(p, s, work, soft, s.strain + NUDGE)) / NUDGE
     speed = s.speed
-    if p.breakaway > 0.0:
-        if stuck(p, s, push):
-            return 0.0
-        push -= p.kinetic * math.copysign(1.0, speed if speed != 0.0 else push)
     mass = p.length * (p.mass + s.weight)
     damping = p.length * p.damping
-    loss = 0.0
-    if p.loss > 0.0:
-        flow = 1e3 * p.length * speed
-        loss = p.loss * 1e3 * p.length * (flow * flow + 0.25) ** (0.5 * (p.loss_power - 1.0))
+    loss = dragged(p, s, speed) if p.loss > 0.0 or p.tray > 0.0 else 0.0
     lean = max(stiff, 0.0)
+    if p.breakaway > 0.0:
+        rub(p, s, push, lean, mass, damping + loss)
+        return (s.speed - speed) / STEP
     gain = (push - (0.5 * STEP * lean + damping + loss) * speed) / (
         mass / STEP + 0.25 * STEP * lean + 0.5 * damping + loss
     )
     s.speed = speed + gain
-    if p.breakaway > 0.0 and speed * s.speed < 0.0:
-        s.speed = 0.0
-        s.stuck = 1
     s.strain += 0.5 * STEP * (speed + s.speed)
     s.travel += 0.5 * STEP * abs(speed + s.speed)
     return (s.speed - speed) / STEP
@@ -79,6 +106,19 @@ def remember(p, s, work):
 
 
 @jit
+def shake(p, s, acceleration):
+    """Shake a bracket, and the foot that tilts on it with the sensor's target, by one step."""
+    low, high = p.target_omega, p.target_foot
+    foot = high * high * s.foot + 2.0 * p.target_zeta * high * s.foot_rate
+    turn = -low * low * s.target - 2.0 * p.target_zeta * low * s.target_rate
+    turn += p.target_share * foot - acceleration
+    s.foot_rate -= STEP * (foot + turn + acceleration)
+    s.target_rate += STEP * turn
+    s.target += STEP * s.target_rate
+    s.foot += STEP * s.foot_rate
+
+
+@jit
 def oscillate(p, s, acceleration):
     """Move the swinging load and the springy sensor target on by one step."""
     if p.swing > 0.0:
@@ -88,10 +128,7 @@ def oscillate(p, s, acceleration):
         s.angle_rate = min(max(s.angle_rate, -0.5 * omega), 0.5 * omega)
         s.angle += STEP * s.angle_rate
     if p.target > 0.0:
-        omega = p.target_omega
-        turn = -omega * omega * s.target - 2.0 * p.target_zeta * omega * s.target_rate
-        s.target_rate += STEP * (turn - p.length * acceleration)
-        s.target += STEP * s.target_rate
+        shake(p, s, p.length * acceleration)
 
 
 @jit

@@ -148,8 +148,14 @@ def hanging_strain(p, load):
 
 @jit
 def hang(p, s, told):
-    """Hang the load that is told to be `told` [N]; a tray comes with a load, or always."""
-    load = told + p.tray if told > 0.0 or p.tray_always > 0.5 else told
+    """Hang the load that is told to be `told` [N], and what else comes with it.
+
+    Scales show all loads wrong by a factor. A tray stands on a soft rest, and the heavier the
+    load, the more of the tray hangs too.
+    """
+    load = told
+    if p.tray > 0.0:
+        load += p.tray * (1.0 - math.exp(-told / p.tray_rest) + p.tray_scale * told / 30.0)
     if load != s.load or s.tick == 0:
         s.load = load
         s.weight = load / GRAVITY

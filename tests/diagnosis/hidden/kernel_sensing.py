@@ -80,7 +80,7 @@ def read(p, s):
     place = heard(p, s) if p.late > 0.0 else position_mm(p, s)
     pressure = s.pressure + s.line
     if p.target > 0.0:
-        place += 1e3 * p.target * s.target
+        place += 1e3 * p.target * (s.target + p.target_lever * s.foot)
     if p.bow_mm != 0.0:
         place += p.bow_mm * bow(p, place / (160.0 * p.length))
     if p.bow_bar != 0.0:

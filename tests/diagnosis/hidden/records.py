@@ -15,6 +15,7 @@ SLIDERS = 24
 MEMORIES = 12
 LAGS = 6
 HISTORY = 1024  # of the sensor's moving average, in steps
+TUBE = 256  # of the waves in a line, in steps: more than the way to its end and back
 WAVES = 12
 
 _BASE = """
@@ -22,30 +23,33 @@ _BASE = """
     friction
 """
 _AIR = """
-    leak open_at close_at chain chain_lags slew slew_power supply draw recovery throat exhaust
-    line line_omega line_zeta neighbour neighbour_period neighbour_duty neighbour_decay
-    dither dither_hz
+    leak overlap overlap_edge overlap_leak chain chain_lags slew slew_kind slew_rest slew_lean
+    supply draw recovery throat critical exhaust line line_trip line_return line_wall
+    neighbour neighbour_period neighbour_duty neighbour_decay dither dither_hz
 """
 _FRICTION = """
-    load_grip load_grip_sign pressure_grip pressure_grip_bend map map_kind strand breakaway kinetic
+    load_grip load_grip_sign pressure_grip pressure_grip_bend map map_kind strand
+    breakaway kinetic stribeck bristle oil
 """
 _MUSCLE = """
-    creep creep_strain loss loss_power heat virgin virgin_scale virgin_kind virgin_grip
+    creep creep_strain loss loss_pace heat virgin virgin_scale virgin_kind virgin_grip
     load_soft load_soft_power load_soft_sign threshold threshold_blur wander
     buckle buckle_up buckle_down
 """
 _LOAD = """
-    tray tray_always slack slack_blur slip slip_time slip_blur slip_kind stop stop_at
-    shake shake_hz shake_beat swing swing_omega swing_drive bump bump_cell bump_length bump_seed
+    tray tray_rest tray_scale tray_rub slack slack_blur slip slip_time slip_blur slip_kind
+    stop stop_at shake shake_hz shake_beat swing swing_omega swing_drive
+    bump bump_cell bump_length bump_seed
 """
 _SENSING = """
     bias_mm bias_bar drift_mm drift_bar drift_time drift_kind late late_kind late_lags
-    bow_mm bow_bar bow_kind bow_curve target target_omega target_zeta
+    bow_mm bow_bar bow_kind bow_curve target target_omega target_foot target_share target_lever
+    target_zeta
     dropout dropout_cell dropout_seed
 """
 _STATE = """
-    pressure rate supply line line_rate drive level strand_grip strain speed rest hang load weight
-    travel buckled angle angle_rate target target_rate held integral
+    pressure rate supply line line_end drive level strand_grip strain speed rest hang load weight
+    travel bristle buckled angle angle_rate target target_rate foot foot_rate held integral
 """
 
 Field = tuple[str, type] | tuple[str, type, tuple[int]]
@@ -80,12 +84,13 @@ PARAMETERS = np.dtype(
 )
 STATE = np.dtype(
     _MARK
-    + [(name, np.int64) for name in ("tick", "open", "stuck")]
+    + [(name, np.int64) for name in ("tick",)]
     + _numbers(_STATE)
     + _vectors("stops strands", SLIDERS)
     + _vectors("memory", MEMORIES)
     + _vectors("queue late", LAGS)
     + _vectors("history", HISTORY)
+    + _vectors("sent returned", TUBE)
 )
 
 

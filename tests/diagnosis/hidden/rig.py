@@ -115,6 +115,7 @@ def rig_yaml(base: Base, campaign: Campaign, noise_factor: float = 1.0) -> dict:
         "history": {"cycles_since_rest": 0, "rezeroed": False},
         "repeats": campaign.repeats(),
         "valve_closed": campaign.closed_segments(),
+        "tolerance": {"mass.load": 0.02},
     }
 
 
