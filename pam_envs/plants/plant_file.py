@@ -40,6 +40,7 @@ EFFECTS: tuple[tuple[str, ...], ...] = (
     ("regulator.gain",),
     ("regulator.slew_bend",),
     ("regulator.dead_band", "regulator.dead_close"),
+    ("regulator.overlap", "regulator.overlap_leak"),
     ("regulator.exhaust_ratio", "regulator.exhaust_taper"),
     ("regulator.exhaust_rate",),
     ("regulator.leak",),

@@ -164,6 +164,7 @@ COSTLY = (
     (
         "regulator.slew_bend",
         "regulator.dead_band",
+        "regulator.overlap",
         "regulator.exhaust_ratio",
         "regulator.exhaust_rate",
         "regulator.leak",

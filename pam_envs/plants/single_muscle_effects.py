@@ -54,6 +54,14 @@ def count_on(values: Any, neutral: float) -> int:
 
 
 @kernel
+def norm_8(a: float, b: float) -> float:
+    """Return the eighth root of the sum of eighth powers: a slightly rounded maximum."""
+    a2, b2 = a * a, b * b
+    a4, b4 = a2 * a2, b2 * b2
+    return math.sqrt(math.sqrt(math.sqrt(a4 * a4 + b4 * b4)))
+
+
+@kernel
 def filled(rows: Any, fixed: Any, j: int, target: float, width: float) -> float:
     """Return the regulated pressure [Pa] of lane ``j`` after ``width`` seconds."""
     pressure = rows[FIRST + R.REGULATED][j]
@@ -69,9 +77,14 @@ def filled(rows: Any, fixed: Any, j: int, target: float, width: float) -> float:
         1.0 - fixed[R.EXHAUST_TAPER][j] * pressure / fixed[R.MAX_PRESSURE][j]
     )
     lag = fixed[R.TIME_CONSTANT][j] * (1.0 + slower if goal < pressure else 1.0)
+    # a spool opens beyond its overlap, by what the error exceeds it; within it leaks
+    over, within = fixed[R.OVERLAP][j], fixed[R.OVERLAP_LEAK][j]
+    shift = over * (1.0 - within) if abs(goal - pressure) > over else 0.0
+    lag = lag / within if abs(goal - pressure) < over else lag
+    aim = goal + shift if goal < pressure else goal - shift
     slew = fixed[R.SLEW_RATE][j]
-    reached = regulator_step(pressure, goal, lag, 1.0 / lag, slew, 1.0 / slew, width)
-    free = (goal - pressure) * (1.0 - decay(width / lag))
+    reached = regulator_step(pressure, aim, lag, 1.0 / lag, slew, 1.0 / slew, width)
+    free = (aim - pressure) * (1.0 - decay(width / lag))
     most = slew * max(width, 1e-9)
     rounded = pressure + free * most / math.sqrt(free * free + most * most)
     bend = fixed[R.SLEW_BEND][j] if slew < 1e9 else 0.0
@@ -86,7 +99,7 @@ def filled(rows: Any, fixed: Any, j: int, target: float, width: float) -> float:
     head = max(0.0, head - width * most / math.sqrt(2.0 * max(1.0, supply + ATMOSPHERE)))
     throat = max(0.0, min(width * most, supply - head * head - pressure))
     filling = max(1e-9, reached - pressure)
-    share = throat / math.sqrt(filling * filling + throat * throat)
+    share = throat / norm_8(filling, throat)  # the narrower of valve and throat, hardly rounded
     ample = reached <= pressure or fixed[R.SUPPLY_PRESSURE][j] >= 2e7
     reached = reached if ample else pressure + filling * share
     # the valve closes when the error has fallen to the band
@@ -502,6 +515,7 @@ def advance_extended(
     mounts = count_on(fixed[R.MOUNT_SHARE], 0.0)
     air = (
         count_on(fixed[R.DEAD_BAND], 0.0)
+        + count_on(fixed[R.OVERLAP], 0.0)
         + count_on(fixed[R.EXHAUST_RATIO], 1.0)
         + count_on(fixed[R.EXHAUST_RATE], 100.0)
         + count_on(fixed[R.LEAK], 0.0)

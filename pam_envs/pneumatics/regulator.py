@@ -66,6 +66,12 @@ class Regulator:
     dead_close: float = parameter(
         1.0, "1", 0.0, 1.0, "assumed", "error at which the valve closes again, over dead_band"
     )
+    overlap: float = parameter(
+        0.0, "Pa", 0.0, 3e5, "assumed", "error up to which the spool only leaks", neutral=0.0
+    )
+    overlap_leak: float = parameter(
+        0.01, "1", 1e-4, 1.0, "assumed", "gain within the overlap over that beyond it"
+    )
     exhaust_ratio: float = parameter(
         1.0, "1", 0.1, 20.0, "assumed", "lag when exhausting over lag when filling", neutral=1.0
     )

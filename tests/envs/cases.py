@@ -17,6 +17,8 @@ EVERY_EFFECT = {
     "regulator.slew_bend": 0.5,
     "regulator.dead_band": 2e3,
     "regulator.dead_close": 0.4,
+    "regulator.overlap": 1e3,
+    "regulator.overlap_leak": 0.02,
     "regulator.exhaust_ratio": 1.3,
     "regulator.exhaust_taper": 0.5,
     "regulator.exhaust_rate": 8.0,

@@ -12,7 +12,7 @@ from pam_envs.diagnosis.seeds import grid
 
 _BREAKS = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 15.0)
 _HOLDS = (0.35, 0.5, 0.65, 0.8)
-_SPEEDS = (2e-4,)
+_SPEEDS = (2e-4, 1e-3, 3e-3)
 
 CAUSE = Cause(
     name="stick_slip",

@@ -2,8 +2,9 @@
 
 Overlap of a spool, or the gap between the switching points of a comparator, leaves the pressure
 where it is until the error is large enough. Small commands vanish, and after each step the pressure
-stops short on the side it came from. The valve may go on, once open, until the error is smaller
-still: then the second number is the error at which it closes, over that at which it opens.
+stops short on the side it came from. A spool lets through what the error exceeds the overlap by,
+and leaks within it. A switching valve may go on, once open, until the error is smaller still: then
+the second number is the error at which it closes, over that at which it opens.
 """
 
 from __future__ import annotations
@@ -19,6 +20,13 @@ CAUSE = Cause(
     title="a dead band of the valve",
     forms=(
         Form("dead zone", (Term("regulator.dead_band", (3e3, 1e4), scale=2e3),)),
+        Form(
+            "overlap",
+            (
+                Term("regulator.overlap", (3e3, 1e4, 2e4, 4e4), scale=2e3),
+                Term("regulator.overlap_leak", (0.01,), log=True, amount=False),
+            ),
+        ),
         Form(
             "comparator",
             (
@@ -44,4 +52,5 @@ CAUSE = Cause(
         "0.5 % of full scale."
     ),
     sensor="a fast pressure sensor at the valve's outlet",
+    compensable=True,
 )
