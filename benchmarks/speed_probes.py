@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.speed import Chunk, Measurement, Missing, interleaved, median, ratio
+from benchmarks.speed_diagnosis import diagnosing
 
 ENV = "PAM/MusclePositioning-v0"
 ROOT = Path(__file__).resolve().parent.parent
@@ -364,5 +365,6 @@ GROUPS: dict[str, tuple[Callable[[int], list[Measurement]], ...]] = {
     "plain": (uncompiled, jacobian),
     "start": (start_up,),
     "learning": (learning,),
+    "diagnosis": (diagnosing,),
 }
 """Probes of each group; a probe takes the number of rounds."""
