@@ -9,7 +9,7 @@ owner's sheet reaches the diagnosis.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from itertools import combinations
 from typing import Any
 
@@ -38,6 +38,8 @@ LARGE, WEAK = (1.0, 5.0), (0.1, 1.0)
 """Ranges of sizes."""
 LOUDER = 3.0
 """Noise of the louder cases, over the usual."""
+BRIEF = (30.0, 60.0, 120.0)
+"""Durations [s] of brief recordings."""
 MOST_AMPLITUDE = 20.0
 NEAR = 0.03
 """How near, in the logarithm, a size has to come to what is wanted."""
@@ -51,9 +53,10 @@ class Case:
 
     Attributes
     ----------
-    kind : {"single", "weak", "loud", "clean", "decoy", "pair", "unknown", "idle"}
+    kind : {"single", "weak", "loud", "clean", "decoy", "pair", "unknown", "idle", "brief"}
         ``loud`` is a single one under three times the noise, with the same absolute size; in an
-        ``idle`` one nothing is hidden and nothing moves, so that nothing can be decided.
+        ``idle`` one nothing is hidden and nothing moves, so that nothing can be decided; a
+        ``brief`` one is a clean rig of which there is little.
     seed : int
         Of all draws.
     names : tuple of str
@@ -64,6 +67,8 @@ class Case:
         One of :data:`CAMPAIGNS`.
     noise : float
         Over the usual noise.
+    seconds : float
+        Of the campaign that were recorded; 0: all.
     """
 
     kind: str
@@ -72,6 +77,7 @@ class Case:
     sizes: tuple[float, ...] = ()
     campaign: str = "standard"
     noise: float = 1.0
+    seconds: float = 0.0
 
     def record(self) -> dict[str, Any]:
         """Return the case in plain types."""
@@ -202,6 +208,7 @@ def sheet_of(base: hidden.Base, campaign: hidden.Campaign, noise: float = 1.0) -
         rezeroed=told["history"]["rezeroed"],
         repeats=tuple(tuple(group) for group in told["repeats"]),
         valve_closed=tuple(told["valve_closed"]),
+        tolerance=told["tolerance"],
     )
 
 
@@ -270,7 +277,7 @@ def _draw(
     """Draw a rig and its effects; None where a size is out of reach."""
     rng = np.random.default_rng([case.seed, attempt])
     base = hidden.draw_base(rng, decoy=case.kind == "decoy")
-    ground = ground_of(base, CAMPAIGNS[case.campaign](case.seed))
+    ground = ground_of(base, _campaign(case))
     found = []
     for name, size in zip(case.names, case.sizes, strict=True):
         effect = hidden.draw_effect(name, rng)
@@ -279,6 +286,16 @@ def _draw(
             return None
         found.append((effect, *solved))
     return ground, found
+
+
+def _campaign(case: Case) -> hidden.Campaign:
+    """Return a case's campaign, ended where its recording ends."""
+    whole = CAMPAIGNS[case.campaign](case.seed)
+    if not case.seconds:
+        return whole
+    n = round(case.seconds / whole.period)
+    arrays = {f.name: getattr(whole, f.name)[:n] for f in fields(whole) if f.name != "period"}
+    return replace(whole, **arrays)
 
 
 def make(case: Case) -> Made:
@@ -333,11 +350,12 @@ class Counts:
     pair: int
     unknown: int
     idle: int
+    brief: int
     loud: bool = True
 
 
-SMALL = Counts(single=1, weak=0, clean=3, decoy=2, pair=2, unknown=2, idle=1, loud=False)
-FULL = Counts(single=40, weak=20, clean=200, decoy=100, pair=100, unknown=60, idle=20)
+SMALL = Counts(single=1, weak=0, clean=3, decoy=2, pair=2, unknown=2, idle=1, brief=1, loud=False)
+FULL = Counts(single=40, weak=20, clean=200, decoy=100, pair=100, unknown=60, idle=20, brief=60)
 
 
 def first_seed(chosen: str, offset: int = 0) -> int:
@@ -393,3 +411,5 @@ def _wanted(counts: Counts, unknown: Sequence[str], rng: np.random.Generator) ->
     for i, size in enumerate(sizes_in(*LARGE, counts.unknown, rng)):
         yield Case("unknown", 0, (unknown[i % len(unknown)],), (float(size),))
     yield from [Case("idle", 0, campaign="idle")] * counts.idle
+    for i in range(counts.brief):
+        yield Case("brief", 0, campaign="short", seconds=BRIEF[i % len(BRIEF)])

@@ -111,7 +111,7 @@ class Told:
 
     def right_answer(self, verdict: str, names: Iterable[str]) -> bool:
         """Return whether another verdict on the same rig is the right one."""
-        if self.kind in ("clean", "decoy"):
+        if self.kind in ("clean", "decoy", "brief"):
             return verdict == "adequate"
         if self.kind == "idle":
             return verdict == "insufficient"
@@ -178,6 +178,7 @@ def without_truth(by_kind: Mapping[str, list[Told]]) -> Numbers:
     """Return the counts of rigs in which nothing of the catalogue is hidden."""
     clean, decoy = by_kind.get("clean", []), by_kind.get("decoy", [])
     unknown, idle = by_kind.get("unknown", []), by_kind.get("idle", [])
+    brief = by_kind.get("brief", [])
     named = sorted({one.truth[0] for one in unknown})
     return {
         "false_alarms": share(one.alarm for one in clean + decoy),
@@ -185,6 +186,8 @@ def without_truth(by_kind: Mapping[str, list[Told]]) -> Numbers:
         "false_alarms_decoy": share(one.alarm for one in decoy),
         "false_names": share(one.claims or one.verdict == "failed" for one in clean + decoy),
         "alarms": dict(Counter(one.first for one in clean + decoy if one.alarm).most_common()),
+        "false_alarms_brief": share(one.alarm for one in brief),
+        "brief": dict(Counter(one.first for one in brief).most_common()),
         "unknown": share(one.verdict == "unexplained" for one in unknown),
         "idle": share(one.verdict == "insufficient" for one in idle),
         "unknown_by_kind": {

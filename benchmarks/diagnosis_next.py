@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from benchmarks.diagnosis_cases import NOISE, Case, Made, recording_of, sheet_of
 from pam_envs.data.recording import Recording
 from pam_envs.data.rig_file import BAR, MM, Rig
-from pam_envs.diagnosis.experiment import Plan, plans
 from pam_envs.diagnosis.gain_references import DURATION
+from pam_envs.diagnosis.plans import Means, Plan, plans
 from pam_envs.plants.stepping import PERIOD
 from tests.diagnosis import hidden
 from tests.diagnosis.hidden.catalogue import constants
@@ -24,7 +24,7 @@ from tests.diagnosis.hidden.rig import steps_in
 Array = NDArray[np.float64]
 
 FULL = 6.0
-"""Pressure [bar] that a plan's commands are parts of."""
+"""Largest pressure [bar] of the rigs."""
 FRESH = ("cycles_after_rest",)
 """Plans that begin with a muscle that has rested: the rig starts anew."""
 
@@ -40,7 +40,8 @@ def again(case: Case, made: Made, plan_name: str) -> tuple[Recording, Rig]:
     plan_name : str
         As the report names the experiment.
     """
-    plan = {p.name: p for p in plans()}[plan_name]
+    means = Means.of(made.recording, made.sheet)
+    plan = {p.name: p for p in plans(means)}[plan_name]
     before, extra = made.ground.campaign, _campaign(plan, made.ground.campaign)
     effects = [(truth.effect, truth.amplitude) for truth in made.truths]
     whole = _joined(before, extra)
@@ -62,7 +63,7 @@ def _campaign(plan: Plan, before: hidden.Campaign) -> hidden.Campaign:
     piece = np.concatenate([[0], np.cumsum(shut[1:] != shut[:-1])])
     held = np.where(shut, 0.0, plan.command)
     return hidden.Campaign(
-        np.round(FULL * held, 4),
+        np.round(held / BAR, 4),
         np.array([f"next_{chr(ord('a') + k)}" for k in piece]),
         plan.load.astype(float),
         np.round(before.temperature_C[-1] + plan.kelvin, 2),

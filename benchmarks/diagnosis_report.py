@@ -311,6 +311,9 @@ def _others(made: Numbers) -> str:
         f"a cause claimed on either: {_bound(made['false_names'])}",
         f"what the alarms said: {alarms}",
         f"recordings in which nothing moves: `insufficient` {_told(made['idle'])}",
+        f"false alarm, clean rigs recorded for 30, 60 or 120 s: "
+        f"{_bound(made['false_alarms_brief'])}; answers: "
+        + (", ".join(f"`{name}` {n}" for name, n in made["brief"].items()) or "none"),
         f"pairs: both named without doubt {_told(made['pair_exact'])}, only one of them "
         f"{_told(made['pair_one'])}, a wrong name {_told(made['pair_wrong'])}, right name first "
         f"{_told(made['pair_first'])}; trace error {_percent(made['trace_pairs'], 'median')}",

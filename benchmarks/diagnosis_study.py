@@ -100,7 +100,7 @@ def truths_of(case: Case, made: Made) -> list[dict[str, Any]]:
 
 def outcome(found: Diagnosis) -> dict[str, Any]:
     """Return what a diagnosis says, in short."""
-    report, decision = found.report, found.models["study"].decision
+    report, decision = found.report, found.study.decision
     plan = report["experiment"]
     return {
         "verdict": found.verdict,

@@ -18,6 +18,8 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import difflib
+import hashlib
+import json
 import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -107,6 +109,8 @@ class Rig:
         Segments during which the valve is shut, so that the command has no effect.
     tolerance : mapping of str to float
         Plant parameters that are known, with the relative error within which they are.
+    source : str
+        Where this was read.
     """
 
     plant: str = "single_muscle"
@@ -121,6 +125,14 @@ class Rig:
     repeats: tuple[tuple[str, ...], ...] = ()
     valve_closed: tuple[str, ...] = ()
     tolerance: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    source: str = dataclasses.field(default="arguments", compare=False)
+
+    @property
+    def digest(self) -> str:
+        """Sixteen hexadecimal digits that change with any value."""
+        values = {k: v for k, v in vars(self).items() if k != "source"}
+        values["tolerance"] = dict(self.tolerance)
+        return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
     def __post_init__(self) -> None:
         """Check every value; a message speaks in the file's units."""
@@ -153,7 +165,7 @@ class Rig:
         where = f"rig file {path}"
         data = _read(Path(path), where)
         try:
-            return cls(**_fields(data))
+            return cls(**_fields(data), source=str(path))
         except ValueError as error:
             raise ValueError(f"{where}: {error}") from None
 

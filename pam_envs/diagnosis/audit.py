@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pam_envs.data.recording import Recording, check_rig, repeat_rows
 from pam_envs.data.rig_file import Rig
@@ -12,7 +14,10 @@ from pam_envs.data.tables import ContractionTable
 from pam_envs.diagnosis import audit_channels as channels
 from pam_envs.diagnosis.audit_tables import audit_table
 from pam_envs.diagnosis.audit_units import wrong_units
+from pam_envs.diagnosis.cause import Cause
+from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.noise import Floor, holds, noise_floor
+from pam_envs.diagnosis.tolerance import LOAD, unknown_names, unused
 
 BAR = 1e5
 LOAD_STEP = 0.5
@@ -23,26 +28,6 @@ WARMING = 1.0
 """Kelvin by which the temperature must vary for its effect to be told."""
 SHUT_SECONDS = 2.0
 MANY_CYCLES = 5
-
-NEED_CONTRACTION = (
-    "creep",
-    "sensor_delay",
-    "viscous_loss",
-    "temperature",
-    "first_cycle_softening",
-    "load_dependent_hysteresis",
-    "load_dependent_compliance",
-    "hysteresis_shape",
-    "hysteresis_drive",
-    "stick_slip",
-    "threshold_pressure",
-    "pressure_dependent_friction",
-    "slip_step",
-    "wire_slack",
-    "payload_error",
-)
-"""Causes that act on the contraction alone."""
-NEED_LOADS = ("load_dependent_hysteresis", "load_dependent_compliance", "payload_error")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,7 +62,7 @@ def audit(recording: Recording | ContractionTable, rig: Rig | None = None) -> Au
     if isinstance(recording, ContractionTable):
         return Audit((), tuple(audit_table(recording)))
     rig = rig or Rig()
-    problems = check_rig(recording, rig)
+    problems = [*check_rig(recording, rig), *unknown_names(rig.tolerance)]
     if problems:
         return Audit(tuple(problems), recording.notes)
     floor = noise_floor(recording, rig)
@@ -94,49 +79,84 @@ def audit(recording: Recording | ContractionTable, rig: Rig | None = None) -> Au
         warnings += channels.coarse(seen, name, rms)
     warnings += channels.copies(seen, noise)
     warnings += [*floor.warnings, *_repeats(recording, rig), *_lacks(recording, rig)]
+    warnings += _not_used(recording, rig)
     return Audit(tuple(problems), tuple(dict.fromkeys((*recording.notes, *warnings))))
 
 
-def undecidable(recording: Recording, rig: Rig | None = None) -> dict[str, str]:
-    """Return the causes that a recording cannot show, and why.
+def undecidable(
+    recording: Recording, rig: Rig | None = None, causes: Sequence[Cause] | None = None
+) -> dict[str, str]:
+    """Return the causes that need what a recording does not hold, and what that is.
 
     Parameters
     ----------
     recording : Recording
     rig : Rig, optional
+    causes : sequence of Cause, optional
+        Default: :func:`pam_envs.diagnosis.causes.catalogue`.
 
     Returns
     -------
     dict of str to str
         Reason by name of the cause. A cause that is not listed may still not be excited.
     """
-    rig = rig or Rig()
-    reasons: dict[str, str] = {}
-    if recording.contraction is None:
-        reasons |= dict.fromkeys(NEED_CONTRACTION, "the contraction was not recorded")
-    if recording.pressure is None:
-        reasons.setdefault("sensor_delay", "cannot be told from dead_time: no pressure_bar")
-    levels = load_levels(recording)
-    if len(levels) < 2:
-        reason = f"the load was {levels[0]:.3g} N throughout"
-        reasons |= {name: reason for name in NEED_LOADS if name not in reasons}
-    if recording.temperature is None:
-        reasons.setdefault("temperature", "the temperature was not recorded")
-    elif np.ptp(recording.temperature) < WARMING:
-        span = np.ptp(recording.temperature)
-        reasons.setdefault("temperature", f"the temperature varied by only {span:.2g} K")
-    if _longest_shut(recording) <= SHUT_SECONDS:
-        reasons["leak"] = (
-            f"the valve was never shut for more than {SHUT_SECONDS:g} s (valve_closed in RIG.yaml)"
-        )
-    if rig.cycles_since_rest > MANY_CYCLES:
-        reasons.setdefault(
-            "first_cycle_softening",
-            f"the muscle had already made {rig.cycles_since_rest} cycles since it rested",
-        )
-    if not _falls(recording):
-        reasons["exhaust_asymmetry"] = "the command never falls by more than 0.5 bar"
+    missing = {word: lack(recording, rig or Rig()) for word, lack in LACKS.items()}
+    reasons = {}
+    for cause in catalogue() if causes is None else causes:
+        lacks = [missing[word] for word in cause.needs if missing[word]]
+        if lacks:
+            reasons[cause.name] = lacks[0]
     return dict(sorted(reasons.items()))
+
+
+def _lack_of_column(values: NDArray[np.float64] | None, name: str) -> str:
+    return f"the {name} was not recorded" if values is None else ""
+
+
+def _lack_of_loads(recording: Recording, rig: Rig) -> str:
+    levels = load_levels(recording)
+    return f"the load was {levels[0]:.3g} N throughout" if len(levels) < 2 else ""
+
+
+def _lack_of_warmth(recording: Recording, rig: Rig) -> str:
+    if recording.temperature is None:
+        return "the temperature was not recorded"
+    span = float(np.ptp(recording.temperature))
+    return f"the temperature varied by only {span:.2g} K" if span < WARMING else ""
+
+
+def _lack_of_shutting(recording: Recording, rig: Rig) -> str:
+    if _longest_shut(recording) > SHUT_SECONDS:
+        return ""
+    return f"the valve was never shut for more than {SHUT_SECONDS:g} s (valve_closed in RIG.yaml)"
+
+
+def _lack_of_rest(recording: Recording, rig: Rig) -> str:
+    if rig.cycles_since_rest <= MANY_CYCLES:
+        return ""
+    return f"the muscle had already made {rig.cycles_since_rest} cycles since it rested"
+
+
+def _lack_of_weighing(recording: Recording, rig: Rig) -> str:
+    if LOAD in rig.tolerance:
+        return ""
+    return (
+        "no tolerance of the loads is declared; add tolerance: {mass.load: 0.02} to RIG.yaml if "
+        "they were weighed to 2 %"
+    )
+
+
+LACKS: dict[str, Callable[[Recording, Rig], str]] = {
+    "contraction": lambda r, _: _lack_of_column(r.contraction, "contraction"),
+    "pressure": lambda r, _: _lack_of_column(r.pressure, "pressure"),
+    "loads": _lack_of_loads,
+    "weighed": _lack_of_weighing,
+    "temperature": _lack_of_warmth,
+    "valve_closed": _lack_of_shutting,
+    "rest": _lack_of_rest,
+    "exhaust": lambda r, _: "" if _falls(r) else "the command never falls by more than 0.5 bar",
+}
+"""What a recording lacks, by what a cause may need (:data:`pam_envs.diagnosis.cause.NEEDS`)."""
 
 
 def load_levels(recording: Recording) -> list[float]:
@@ -212,6 +232,24 @@ def _lacks(recording: Recording, rig: Rig) -> list[str]:
         warnings.append(
             f"the command never rests near 0 bar for {REST_SECONDS:g} s: the sensors' zeros cannot "
             "be checked; start each run with a rest"
+        )
+    return warnings
+
+
+def _not_used(recording: Recording, rig: Rig) -> list[str]:
+    """Return what was told, but does not enter the replay."""
+    warnings = [
+        f"tolerance of {name} is not used: no refit moves it" for name in unused(rig.tolerance)
+    ]
+    if recording.supply is not None:
+        warnings.append(
+            "supply_pressure_bar is not used: the replay takes the supply as constant but for the "
+            "droop that it fits"
+        )
+    if rig.cycles_since_rest > 0:
+        warnings.append(
+            f"history.cycles_since_rest = {rig.cycles_since_rest} does not enter the replay, which "
+            "begins with a muscle that has rested"
         )
     return warnings
 

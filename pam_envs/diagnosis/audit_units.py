@@ -24,6 +24,12 @@ USUAL = 6.0
 """Gauge pressure [bar] that muscles are run at."""
 LARGEST_SHARE = 0.4
 """Contraction over rest length that no muscle reaches."""
+SMALLEST_STROKE, SMALLEST_SHARE = 0.5e-3, 0.002
+"""Stroke [m], and part of the rest length, below which no muscle stays over a wide range..."""
+WIDE, WIDE_SHARE = 3.0 * BAR, 0.6
+"""... of pressures [Pa]: this wide, or this part of the regulator's."""
+FOLLOWS = 0.5
+"""Correlation with the command from which a contraction follows it."""
 STANDARD_GRAVITY = 9.80665
 
 
@@ -91,15 +97,37 @@ def _low(value: float, wanted: float) -> tuple[str, str] | None:
 def _contraction(recording: Recording, rig: Rig) -> list[str]:
     if recording.contraction is None:
         return []
+    metres = _metres(recording, rig)
+    if metres:
+        return metres
     largest = float(np.max(np.abs(recording.contraction)))
     if rig.rest_length is None or largest <= LARGEST_SHARE * rig.rest_length:
         return []
-    falls = _follows(recording) < -0.5
+    falls = _follows(recording) < -FOLLOWS
     told = "it looks like the muscle's length: give rest length minus length"
     return [
         f"contraction_mm goes up to {largest / MM:.4g} mm, more than {LARGEST_SHARE:.0%} of the "
         f"rest length of {rig.rest_length / MM:.4g} mm; "
         + (told if falls else "check its unit and the rest length")
+    ]
+
+
+def _metres(recording: Recording, rig: Rig) -> list[str]:
+    """Return what is wrong with a stroke that is too small for the pressures."""
+    assert recording.contraction is not None
+    wide = WIDE if rig.max_pressure is None else WIDE_SHARE * rig.max_pressure
+    if np.ptp(recording.command) < wide or _follows(recording) < FOLLOWS:
+        return []
+    stroke = float(np.ptp(recording.contraction))
+    least = SMALLEST_STROKE
+    if rig.rest_length is not None:
+        least = max(least, SMALLEST_SHARE * rig.rest_length)
+    if stroke >= least:
+        return []
+    span = float(np.ptp(recording.command)) / BAR
+    return [
+        f"contraction_mm spans only {stroke / MM:.3g} mm over {span:.3g} bar; it looks like "
+        "metres: multiply by 1000"
     ]
 
 
@@ -167,7 +195,7 @@ def _suspicions(recording: Recording, rig: Rig) -> list[str]:
             warnings.append(
                 f"contraction_mm spans only {span:.3g} mm; if it is in metres, multiply by 1000"
             )
-        if _follows(recording) < -0.5:
+        if _follows(recording) < -FOLLOWS:
             warnings.append(
                 "contraction_mm falls as the pressure rises; contraction is rest length minus "
                 "length: check its sign"

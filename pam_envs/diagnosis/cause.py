@@ -2,8 +2,21 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+
+NEEDS = {
+    "contraction": "`contraction_mm`",
+    "pressure": "`pressure_bar`",
+    "loads": "`load_N` with two loads or more",
+    "weighed": "loads declared to a tolerance (`tolerance: {mass.load}` in RIG.yaml)",
+    "temperature": "`temperature_C` that varies",
+    "valve_closed": "a segment with the valve shut (`valve_closed` in RIG.yaml)",
+    "rest": "a muscle that had rested (`cycles_since_rest` in RIG.yaml)",
+    "exhaust": "a command that falls by more than 0.5 bar",
+}
+"""What a cause may need of a recording, in words."""
 
 
 @dataclass(frozen=True)
@@ -82,13 +95,15 @@ class Cause:
     source : str
         Where the physics is described.
     needs : tuple of str
-        Columns of a recording without which it cannot be decided.
+        What a recording must hold for it to be decided: words of :data:`NEEDS`.
     once : bool
         It happens once, so that segments left out by kind do not show it.
     sensor : str
         What would measure it directly.
     contains : tuple of str
         Causes that it can imitate in a limit: where both fit alike the simpler one is named.
+    compensable : bool
+        Whether a controller that knows of it can do something about it.
     """
 
     name: str
@@ -102,3 +117,20 @@ class Cause:
     once: bool = False
     sensor: str = ""
     contains: tuple[str, ...] = ()
+    compensable: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse a need that no recording is checked for."""
+        if isinstance(self.needs, str):
+            raise ValueError(f"needs of {self.name} is {self.needs!r}; give a tuple of words")
+        for word in self.needs:
+            if word not in NEEDS:
+                close = difflib.get_close_matches(str(word), NEEDS, n=1)
+                hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(NEEDS)}"
+                raise ValueError(f"{self.name} needs {word!r}, which no recording has; {hint}")
+
+    @property
+    def in_valve(self) -> bool:
+        """Whether all of it acts before the pressure, or in the reading of it."""
+        amounts = [t.name for form in self.forms for t in form.terms if t.amount]
+        return all(name.startswith(("regulator.", "pressure.")) for name in amounts)

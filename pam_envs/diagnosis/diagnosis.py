@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time as clock
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,19 +13,42 @@ from numpy.typing import NDArray
 from pam_envs.data.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis import gain as loops
-from pam_envs.diagnosis.audit import audit, undecidable
+from pam_envs.diagnosis.audit import audit
 from pam_envs.diagnosis.calibrate import calibrate
 from pam_envs.diagnosis.cause import Cause
-from pam_envs.diagnosis.experiment import propose
+from pam_envs.diagnosis.causes import chosen
+from pam_envs.diagnosis.experiment import propose, rival_of
 from pam_envs.diagnosis.fitting import Fit, Problem, column_of
-from pam_envs.diagnosis.held_out import HeldOut, choose
-from pam_envs.diagnosis.isolability import Isolability, isolability
+from pam_envs.diagnosis.held_out import HeldOut, choose, compared, hold_out, interleaved
+from pam_envs.diagnosis.isolability import Isolability
 from pam_envs.diagnosis.noise import ChannelFloor, Floor, noise_floor
+from pam_envs.diagnosis.outcome import Diagnosis
+from pam_envs.diagnosis.plans import Means
+from pam_envs.diagnosis.report import plain
 from pam_envs.diagnosis.rule import Rule
-from pam_envs.diagnosis.search import Blocks, Candidate, refit
-from pam_envs.diagnosis.single_muscle import KELVIN, MuscleFamily, inputs_of, start_plant
+from pam_envs.diagnosis.search import Blocks, Candidate
+from pam_envs.diagnosis.single_muscle import (
+    KELVIN,
+    MuscleFamily,
+    identified,
+    inputs_of,
+    start_plant,
+)
+from pam_envs.diagnosis.steps import steps
 from pam_envs.diagnosis.structure import Regressors
 from pam_envs.diagnosis.summary import report_of
+from pam_envs.diagnosis.summary_causes import judged
+from pam_envs.diagnosis.testable import not_testable, too_few, too_short
+from pam_envs.diagnosis.tolerance import (
+    LOAD,
+    PAYLOAD_ERROR,
+    inside,
+    interval_of,
+    limit_of,
+    released,
+)
+from pam_envs.diagnosis.traces import Traces
+from pam_envs.diagnosis.troubles import explained
 from pam_envs.diagnosis.verdict import Decision, decide, traces_of
 from pam_envs.mechanics.hanging_mass import GRAVITY
 from pam_envs.plants.single_muscle import SingleMuscle
@@ -37,99 +57,8 @@ Array = NDArray[np.float64]
 
 UNDECLARED, BELIEVED = 1.15, 1.5
 """Noise over what repeats or holds show: where none is declared, and the most that is believed."""
-LEAST_SIZE = 1.0
-"""A cause that cannot reach this size over the noise within its bounds is not testable."""
-LEAST_TESTABLE = 5
-"""With fewer testable causes a recording decides nothing."""
-
-
-@dataclass(frozen=True)
-class Traces:
-    """What a report draws; arrays of shape (T,) in SI.
-
-    Attributes
-    ----------
-    time, command, load : ndarray
-        [s], [Pa], [N].
-    segment : ndarray of int
-        Index into ``segments``.
-    segments : tuple of str
-        Labels.
-    held_out : ndarray of bool
-        Samples of the kinds of experiment that the reported errors are of.
-    temperature : ndarray or None
-        [deg C].
-    measured, base, extended : dict of str to ndarray
-        By output.
-    effects : dict of str to dict of str to ndarray
-        Contribution of each named cause, by output.
-    """
-
-    time: Array
-    segment: NDArray[np.int64]
-    segments: tuple[str, ...]
-    held_out: NDArray[np.bool_]
-    command: Array
-    load: Array
-    temperature: Array | None
-    measured: dict[str, Array]
-    base: dict[str, Array]
-    extended: dict[str, Array]
-    effects: dict[str, dict[str, Array]]
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """The outcome.
-
-    Attributes
-    ----------
-    verdict : {"adequate", "named", "ambiguous", "unexplained", "insufficient"}
-        In a word.
-    text : str
-        In a few sentences.
-    causes : tuple of str
-        Names of the causes, in the order of evidence.
-    report : dict
-        All that ``report.json`` holds (``docs/diagnosis_report.md``).
-    base, plant : SingleMuscle
-        The refitted plant, and that with the causes in it; the same where there are none.
-    traces : Traces
-        What the figures draw.
-    """
-
-    verdict: str
-    text: str
-    causes: tuple[str, ...]
-    report: dict[str, Any]
-    base: SingleMuscle
-    plant: SingleMuscle
-    traces: Traces
-    models: dict[str, Any] = field(default_factory=dict, repr=False)
-
-    def write(self, folder: str | Path) -> None:
-        """Write ``report.json``, ``report.html`` and ``plant.yaml``."""
-        from pam_envs.diagnosis.report import write
-
-        write(self, Path(folder))
-
-
-@contextmanager
-def _steps(progress: bool) -> Iterator[Callable[[str], None]]:
-    """Give a function that shows what is being done."""
-    if not progress:
-        yield lambda text: None
-        return
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, transient=True) as bar:
-        task = bar.add_task("reading", total=7)
-
-        def step(text: str) -> None:
-            bar.update(task, description=text, advance=1)
-
-        yield step
+THOROUGH = 3
+"""How many open rivals are fitted as thoroughly as the model without what is held out."""
 
 
 def diagnose(
@@ -138,7 +67,7 @@ def diagnose(
     *,
     rig: Rig | None = None,
     design: Callable[..., Any] | None = None,
-    causes: Sequence[Cause] | None = None,
+    causes: Sequence[Cause | str] | None = None,
     seed: int = 0,
     progress: bool = True,
     simulated: Any = None,
@@ -160,8 +89,8 @@ def diagnose(
     design : callable, optional
         From a plant to a controller, for the comparison in closed loop
         (:mod:`pam_envs.diagnosis.gain`).
-    causes : sequence of Cause, optional
-        Default: :func:`pam_envs.diagnosis.causes.catalogue`.
+    causes : sequence of Cause or str, optional
+        Causes, or names of the catalogue's. Default: :func:`pam_envs.diagnosis.causes.catalogue`.
     seed : int
         Of all draws.
     progress : bool
@@ -186,11 +115,8 @@ def diagnose(
     """
     started = clock.perf_counter()
     rule, sheet = rule or Rule(), rig or Rig()
-    if causes is None:
-        from pam_envs.diagnosis.causes import catalogue
-
-        causes = catalogue()
-    with _steps(progress) as step:
+    asked = chosen(causes)
+    with explained(), steps(progress) as step:
         step("checking the data")
         checked = audit(recording, sheet)
         if checked.problems:
@@ -200,27 +126,29 @@ def diagnose(
         start = plant if plant is not None else start_plant(sheet)
         study = Study.begin(recording, sheet, start, floor)
         step("which causes can be told apart")
-        study.exclude(list(causes), recording, sheet)
+        study.exclude(asked, recording, sheet)
         step("fitting rival causes")
         study.decide(rule, seed)
+        study.weigh(rule, seed)
         step("held-out experiments")
-        study.hold_out()
+        study.hold_out(seed)
         step("the next experiment, and closed loop")
         study.experiment(sheet)
         if closed_loop:
             study.close_loop(design, simulated, oracle, seed)
-        report = report_of(study, rule, seed, (*checked.warnings, *floor.warnings))
-    report["runtime_s"] = clock.perf_counter() - started
-    return Diagnosis(
-        verdict=report["verdict"],
-        text=report["text"],
-        causes=tuple(c["name"] for c in report["causes"]),
-        report=report,
-        base=study.plant_of(study.base),
-        plant=study.plant_of(study.model),
-        traces=study.traces(),
-        models={"study": study},
-    )
+        warnings = (study.short, *checked.warnings, *floor.warnings)
+        report = report_of(study, rule, tuple(filter(None, warnings)))
+        report = plain({**report, "runtime_s": clock.perf_counter() - started})
+        return Diagnosis(
+            verdict=report["verdict"],
+            text=report["text"],
+            causes=tuple(c["name"] for c in report["causes"]),
+            report=report,
+            base=study.identified(study.base, rule),
+            plant=study.identified(study.model, rule),
+            traces=study.traces(),
+            study=study,
+        )
 
 
 def _noise(floor: ChannelFloor) -> float:
@@ -250,10 +178,13 @@ class Study:
     causes: list[Cause] = field(default_factory=list)
     not_testable: dict[str, str] = field(default_factory=dict)
     isolability: Isolability | None = None
+    short: str = ""
     decision: Decision | None = None
     held: HeldOut | None = None
+    compared: HeldOut | None = None
     proposal: dict[str, Any] | None = None
     loop: dict[str, Any] | None = None
+    loop_reason: str | None = "it was not asked for"
 
     @classmethod
     def begin(cls, recording: Recording, sheet: Rig, plant: SingleMuscle, floor: Floor) -> Study:
@@ -295,6 +226,12 @@ class Study:
         """Return a candidate's plant."""
         return self.family.plant_of(self.column(candidate.fit))
 
+    def identified(self, candidate: Candidate, rule: Rule) -> SingleMuscle:
+        """Return a candidate's plant, which says where its numbers come from."""
+        digest = self.recording.digest[:12]
+        source = f"pam-envs diagnose, recording {digest}, rule {rule.version}"
+        return identified(self.plant_of(candidate), candidate.fit.frees, source)
+
     def column(self, fit: Fit) -> Array:
         """Return a fit's parameters, tied."""
         columns = column_of(fit, fit.z)[None]
@@ -305,34 +242,36 @@ class Study:
         """Return what the sensors would show, shape (channels, T)."""
         return self.family.simulate(self.column(candidate.fit)[None])[:, :, 0]
 
-    def exclude(self, causes: list[Cause], recording: Recording, sheet: Rig) -> None:
+    def exclude(self, causes: Sequence[Cause], recording: Recording, sheet: Rig) -> None:
         """Leave out what the recording cannot show."""
-        reasons = undecidable(recording, sheet)
-        present = {f.name for f in self.base.fit.frees}
-        for cause in causes:
-            if all(any(t.name in present for t in form.terms) for form in cause.forms):
-                reasons[cause.name] = "it is a parameter of the plant already: see calibration"
-        left = [c for c in causes if c.name not in reasons]
-        self.isolability = isolability(self.problem, self.family, self.base.fit, left)
-        reach = dict(zip(self.isolability.names, self.isolability.reach, strict=True))
-        for cause in left:
-            if cause.once and cause.forms[0].seeds is not None:
+        self.isolability, self.not_testable = not_testable(
+            self.problem, self.family, self.base.fit, causes, recording, sheet
+        )
+        self.causes = [c for c in causes if c.name not in self.not_testable]
+
+    def weigh(self, rule: Rule, seed: int) -> None:
+        """Decide anew with the loads refitted within their tolerance, where that may be all."""
+        known, decision = self.sheet.tolerance.get(LOAD), self.decision
+        if known is None or decision is None:
+            return
+        loads = self.recording.load / GRAVITY
+        for model in (decision.model, *decision.open_rivals):
+            if PAYLOAD_ERROR not in model.names:
                 continue
-            if reach.get(cause.name, 0.0) < LEAST_SIZE:
-                reasons[cause.name] = (
-                    f"within its bounds it shows at most {reach.get(cause.name, 0.0):.2g} times "
-                    "the noise here, once the plant is refitted"
-                )
-        self.not_testable = {c.name: reasons[c.name] for c in causes if c.name in reasons}
-        self.causes = [c for c in causes if c.name not in reasons]
+            if inside(interval_of(self.problem, self.blocks, model.fit), loads, known):
+                limit = limit_of(loads, known)
+                self.base = released(self.problem, self.blocks, self.family, self.base, limit)
+                self.causes = [c for c in self.causes if c.name != PAYLOAD_ERROR]
+                self.decide(rule, seed)
+                return
 
     def decide(self, rule: Rule, seed: int) -> None:
         """Compare rival causes."""
         moving = np.bincount(self.blocks.of, np.abs(np.diff(self.recording.command, prepend=0.0)))
-        if (
-            len(self.causes) < min(LEAST_TESTABLE, len(self.causes) + len(self.not_testable))
-            or int(np.sum(self.blocks.held_out & (moving > 0.0))) < rule.least_blocks
-        ):
+        moved = int(np.sum(self.blocks.held_out & (moving > 0.0)))
+        if moved < rule.least_blocks:
+            self.short = too_short(moved, rule.least_blocks)
+        if self.short or too_few(len(self.causes), len(self.causes) + len(self.not_testable)):
             self.decision = Decision("insufficient", self.base)
             return
         self.decision = decide(
@@ -346,32 +285,49 @@ class Study:
             seed,
         )
 
-    def hold_out(self) -> None:
-        """Fit base and model again without some kinds of experiment."""
+    def hold_out(self, seed: int) -> None:
+        """Fit base, model and rivals again without some kinds of experiment."""
+        assert self.decision is not None
         once = any(c.once for c, _ in self.model.causes)
-        rows = choose(self.recording, self.blocks) if not once else ~self.blocks.train
-        problem = dataclasses.replace(self.problem, train=~rows)
-        base = refit(problem, self.blocks, self.base)
-        model = refit(problem, self.blocks, self.model) if self.model.causes else base
-        self.held = HeldOut(rows, problem, base, model, "blocks" if once else "kinds")
+        choice = interleaved(self.blocks) if once else choose(self.recording, self.blocks)
+        self.compared = compared(self.problem, self.blocks, self.base, self.model, seed)
+        self.held = hold_out(
+            self.problem,
+            self.blocks,
+            choice,
+            self.base,
+            self.model,
+            [rival for rival, _ in judged(self.decision)],
+            self.decision.open_rivals[:THOROUGH],
+            seed,
+        )
 
     def experiment(self, sheet: Rig) -> None:
         """Look for the experiment that tells the open rivals apart."""
         decision = self.decision
-        if decision is not None and decision.verdict == "ambiguous" and decision.open_rivals:
-            self.proposal = propose(
-                self.plant_of(decision.model),
-                self.plant_of(decision.open_rivals[0]),
-                ("+".join(decision.model.names), "+".join(decision.open_rivals[0].names)),
-                self.problem.noise,
-                self.causes,
-            )
+        if decision is None or decision.verdict != "ambiguous" or not decision.open_rivals:
+            return
+        first, *others = (
+            rival_of(c.names, c.fit, len(self.base.fit.frees), self.problem.tie)
+            for c in (decision.model, *decision.open_rivals)
+        )
+        measured = np.isfinite(self.problem.measured).any(axis=1)
+        self.proposal = propose(
+            self.start,
+            first,
+            others,
+            np.where(measured, self.problem.noise, np.inf),
+            Means.of(self.recording, sheet),
+            self.causes,
+            self.family.inputs.longest_step,
+        )
 
     def close_loop(
         self, design: Callable[..., Any] | None, simulated: Any, oracle: Any, seed: int
     ) -> None:
         """Compare controllers designed on the base and on the extended plant."""
-        if not any(name in loops.COMPENSABLE for name in self.model.names):
+        self.loop_reason = self._no_loop()
+        if self.loop_reason is not None:
             return
         held = self.held
         residuals = None
@@ -392,6 +348,18 @@ class Study:
             kelvin=self._far_from_room(),
             seed=seed,
         )
+        if self.loop is None:
+            self.loop_reason = f"under {load:.3g} kg the stroke is too short to follow a reference"
+
+    def _no_loop(self) -> str | None:
+        """Return why there is nothing to compare controllers on."""
+        causes = [cause for cause, _ in self.model.causes]
+        if not causes:
+            return "no cause was added to the plant"
+        if not any(cause.compensable for cause in causes):
+            names = ", ".join(cause.name for cause in causes)
+            return f"a controller cannot compensate {names}"
+        return None
 
     def _far_from_room(self) -> float | None:
         """Return the temperature [K] of the recording that is furthest from 20 deg C."""

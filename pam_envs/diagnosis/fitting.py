@@ -195,7 +195,7 @@ class Problem:
             outputs[bad] = WORST
             outputs[np.isnan(self.measured)] = 0.0
         flat = outputs.transpose(2, 0, 1).reshape(len(columns), -1)
-        return np.ascontiguousarray(flat[:, self.order])
+        return np.take(flat, self.order, axis=1)
 
     def rows(self, residual: Array) -> Array:
         """Return a residual vector by channel and sample, shape (channels, T)."""

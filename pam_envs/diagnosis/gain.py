@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.gain_references import DURATION, fixed_references
 from pam_envs.diagnosis.plant_inverse import PREVIEW, Controller, Simulated
 from pam_envs.diagnosis.plant_inverse import design as default_design
@@ -39,27 +40,7 @@ Design = Callable[[Any], Controller]
 #   slip_step: happened once; when the clamp will give way next is not in the plant
 #   stick_slip: below the breakaway nothing moves, and where it sticks depends on the noise
 #   resonance: at or above the bandwidth of regulator and loop, which can only avoid it
-COMPENSABLE: tuple[str, ...] = (
-    "creep",
-    "leak",
-    "valve_dead_band",
-    "dead_time",
-    "slew_limit",
-    "sensor_delay",
-    "viscous_loss",
-    "temperature",
-    "first_cycle_softening",
-    "load_dependent_hysteresis",
-    "load_dependent_compliance",
-    "hysteresis_shape",
-    "hysteresis_drive",
-    "supply_droop",
-    "threshold_pressure",
-    "exhaust_asymmetry",
-    "pressure_dependent_friction",
-    "wire_slack",
-    "payload_error",
-)
+COMPENSABLE: tuple[str, ...] = tuple(cause.name for cause in catalogue() if cause.compensable)
 """Causes that a controller can compensate."""
 
 SETTLING = 2.0

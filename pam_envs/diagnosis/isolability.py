@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,15 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.diagnosis.cause import Cause
-from pam_envs.diagnosis.fitting import Fit, Problem, column_of
+from pam_envs.diagnosis.fitting import Fit, Free, Problem, column_of
 from pam_envs.diagnosis.search import begun
 
 Array = NDArray[np.float64]
 
 DIRECTIONS = 1e-8
 """Directions of the base's Jacobian below this part of the largest are not fitted away."""
-TOGETHER = 32
-"""Fits that are simulated in one replay."""
+TOGETHER = 96
+"""Columns that are simulated in one replay."""
+NO_TRACE = 1e-3
+"""Size over the noise below which an effect shows nothing."""
+FAR, FAR_LOG = 30.0, 6.0
+"""How far beyond its start a parameter is tried, as a factor and as a power."""
+ALIKE = 0.9
+"""Cosine from which two causes are told apart by nothing but a further sensor."""
 
 
 def complement(base: Fit) -> Array:
@@ -47,9 +53,10 @@ class Isolability:
     cosine : ndarray, shape (n, n)
         Absolute cosines.
     absorbed : ndarray, shape (n,)
-        Part of each effect's RMS that refitting the base takes up.
+        Part of each effect's RMS that refitting the base takes up; NaN where it shows nothing.
     reach : ndarray, shape (n,)
-        Largest size, over the noise of the channel where it is largest, within the bounds.
+        Largest size, over the noise of the channel where it is largest: where its fits begin, or
+        at the bounds.
     """
 
     names: tuple[str, ...]
@@ -58,74 +65,105 @@ class Isolability:
     reach: Array
 
 
-def neutral_fit(base: Fit, fit: Fit) -> Array:
-    """Return the column of a fit with the base's own values in the cause's place."""
-    column = column_of(fit, fit.z)
-    for free in fit.frees[len(base.frees) :]:
-        column[free.place] = base.column[free.place]
-    return column
+@dataclass(frozen=True)
+class Shown:
+    """What one column shows beside the base.
+
+    Attributes
+    ----------
+    left : ndarray, shape (m,)
+        What refitting the base does not take up.
+    size : float
+        Of that, over the noise of the channel where it is largest.
+    raw : float
+        RMS before the refit, over the noise.
+    """
+
+    left: Array
+    size: float
+    raw: float
+
+    @property
+    def absorbed(self) -> float:
+        """Part of the RMS that refitting takes up; NaN where there is nothing."""
+        rms = float(np.linalg.norm(self.left)) / np.sqrt(self.left.size)
+        return 1.0 - rms / self.raw if self.raw > NO_TRACE else np.nan
 
 
 def isolability(problem: Problem, family: Any, base: Fit, causes: Sequence[Cause]) -> Isolability:
-    """Simulate each cause small at the base's optimum and compare what is left of it."""
-    basis = complement(base)
-    fits = [
-        (cause.name, fit)
-        for cause in causes
-        for form in cause.forms
-        for fit in begun(problem, family, base, cause, form)
-    ]
-    if not fits:
+    """Simulate each cause where its fits begin and at its bounds, and compare what is left."""
+    columns: list[Array] = []
+    begins: dict[str, list[int]] = {}
+    bounds: dict[str, list[int]] = {}
+    for cause in causes:
+        for form in cause.forms:
+            fits = begun(problem, family, base, cause, form)
+            for at, more in ((begins, [column_of(f, f.z) for f in fits]), (bounds, ends(fits))):
+                places = range(len(columns), len(columns) + len(more))
+                at.setdefault(cause.name, []).extend(places)
+                columns += more
+    if not columns:
         return Isolability((), np.zeros((0, 0)), np.zeros(0), np.zeros(0))
-    best: dict[str, tuple[float, Array, float]] = {}
-    for at in range(0, len(fits), TOGETHER):
-        for name, shown in _shown(problem, base, fits[at : at + TOGETHER], basis):
-            if name not in best or shown[0] > best[name][0]:
-                best[name] = shown
-    rows = np.array(
-        [left / max(float(np.linalg.norm(left)), 1e-12) for _, left, _ in best.values()]
-    )
-    return Isolability(
-        tuple(best),
-        np.abs(rows @ rows.T),
-        np.array([share for _, _, share in best.values()]),
-        np.array([size for size, _, _ in best.values()]),
-    )
+    shown = list(_shown(problem, base, columns))
+    names = tuple(name for name, places in begins.items() if places)
+    kept, absorbed, reach = [], [], []
+    for name in names:
+        best = max((shown[k] for k in begins[name]), key=lambda s: s.size)
+        ends_of = max((shown[k] for k in bounds[name]), key=lambda s: s.size)
+        kept.append(best.left if best.raw > NO_TRACE else ends_of.left)
+        absorbed.append(best.absorbed)
+        reach.append(max(best.size, ends_of.size))
+    rows = np.array([row / max(float(np.linalg.norm(row)), 1e-12) for row in kept])
+    return Isolability(names, np.abs(rows @ rows.T), np.array(absorbed), np.array(reach))
 
 
-def _shown(
-    problem: Problem, base: Fit, fits: Sequence[tuple[str, Fit]], basis: Array
-) -> list[tuple[str, tuple[float, Array, float]]]:
-    """Return, for each fit, the largest size, what is left of a small effect, what is taken up."""
-    columns = [
-        column
-        for _, fit in fits
-        for column in (neutral_fit(base, fit), column_of(fit, fit.z), _full(base, fit))
-    ]
-    found = problem.residuals(np.array(columns))
+def ends(fits: Sequence[Fit]) -> list[Array]:
+    """Return columns with all amounts of a form at their bounds, and far from where it starts.
+
+    Not every effect grows all the way: far beyond its usual size it may be taken up by the refit.
+    """
+    if not fits:
+        return []
+    fit = fits[0]
+    terms = fit.label[1].terms
+    frees = fit.frees[len(fit.frees) - len(terms) :]
     made = []
-    for i, (name, _) in enumerate(fits):
-        small, large = found[3 * i + 1] - found[3 * i], found[3 * i + 2] - found[3 * i]
-        left = projected(np.stack([small, large]), basis)
-        raw = float(np.linalg.norm(small))
-        share = 1.0 - float(np.linalg.norm(left[0])) / max(raw, 1e-12)
-        kept = left[0] if raw > 0.0 else left[1]
-        made.append((name, (channel_size(left[1], problem), kept, share)))
+    for place_of in (lambda f: f.low, lambda f: f.high, lambda f: far(f, fit.column[f.place])):
+        column = column_of(fit, fit.z)
+        for term, free in zip(terms, frees, strict=True):
+            if term.amount:
+                column[free.place] = place_of(free)
+        made.append(column)
     return made
 
 
-def _full(base: Fit, fit: Fit) -> Array:
-    """Return the column with the cause far beyond where its fit starts, within its bounds."""
-    column = column_of(fit, fit.z)
-    _, form = fit.label
-    for term, free in zip(form.terms, fit.frees[len(base.frees) :], strict=True):
-        here = base.column[free.place]
-        if not free.log:
-            column[free.place] = np.clip(30.0 * free.start, free.low, free.high)
-        elif term.amount and here > 0.0:
-            far = here * (free.start / here) ** 6
-            column[free.place] = np.clip(far, free.low, free.high)
-    return column
+def far(free: Free, here: float) -> float:
+    """Return a value far beyond where a fit starts, seen from the base's, within the bounds."""
+    value = FAR * free.start
+    if free.log:
+        value = here * (free.start / here) ** FAR_LOG if here > 0.0 else free.start
+    return float(np.clip(value, free.low, free.high))
+
+
+def _shown(problem: Problem, base: Fit, columns: Sequence[Array]) -> Iterator[Shown]:
+    """Yield what each column shows beside the base."""
+    basis, without = complement(base), problem.residuals(column_of(base, base.z)[None])[0]
+    for at in range(0, len(columns), TOGETHER):
+        traces = problem.residuals(np.array(columns[at : at + TOGETHER])) - without
+        for trace, left in zip(traces, projected(traces, basis), strict=True):
+            raw = float(np.linalg.norm(trace)) / np.sqrt(trace.size)
+            yield Shown(left, channel_size(left, problem), raw)
+
+
+def twins(found: Isolability, causes: Sequence[Cause]) -> dict[str, str]:
+    """Return, for causes of the valve or line, another one that looks the same without pressure."""
+    names = {cause.name: k for k, cause in enumerate(causes)}
+    made = {}
+    for k, name in enumerate(found.names):
+        cosines = np.delete(found.cosine[k], k)
+        if causes[names[name]].in_valve and len(cosines) and cosines.max() >= ALIKE:
+            made[name] = np.delete(np.array(found.names), k)[np.argmax(cosines)]
+    return {name: str(other) for name, other in made.items()}
 
 
 def channel_size(trace: Array, problem: Problem) -> float:

@@ -2,14 +2,15 @@
 
 Three estimates, best first: what differs between segments that repeat one another; what is left of
 the end of each hold once a straight line is taken off; and the white part alone, from second
-differences where the command is quiet. A declared noise is compared with them.
+differences where the command is quiet. A declared noise is compared with them. Repeats that differ
+by more than noise, since something changed between them, give way: what changed is for the
+diagnosis to explain.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +18,13 @@ from scipy.optimize import nnls
 
 from pam_envs.data.recording import Recording, repeat_rows
 from pam_envs.data.rig_file import BAR, MM, Rig
+from pam_envs.diagnosis.repeats import DISAGREE, Source, Trust, best, detrended
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-Source = Literal["repeats", "holds", "innovations", "declared"]
 
 CHANNELS = {"contraction": ("mm", MM), "pressure": ("bar", BAR)}
 """Measured outputs, with the unit that people read them in."""
-DISAGREE = 1.5
-"""Ratio from which two figures for one noise are told apart."""
 SETTLING = 1.5
 """Seconds after a change of the command that are never taken for noise."""
 SHORTEST = 1.0
@@ -131,9 +130,11 @@ def _channel(recording: Recording, rig: Rig, channel: str, declared: float | Non
     }
     least = 1e-9 * float(np.ptp(values))
     estimates = {name: float(v) for name, v in found.items() if np.isfinite(v) and v > least}
-    source = _best(estimates)
+    second = round(1.0 / recording.period)
+    trust = Trust.of(differences, ends, second, found["innovations"])
+    source = best(estimates, declared, trust)
     time = _correlation_time(
-        differences if source == "repeats" else [_detrended(e) for e in ends], recording.period
+        differences if source == "repeats" else [detrended(e) for e in ends], recording.period
     )
     rounding = float(resolution(values) / np.sqrt(12.0))  # which a hold does not show
     value = max(estimates.get(source, declared or 0.0), rounding)
@@ -153,20 +154,6 @@ def _reading(recording: Recording, channel: str, value: float) -> float:
     less = white_noise(recording, getattr(recording, channel)) ** 2
     more = white_noise(raw, getattr(raw, channel)) ** 2
     return float(np.sqrt(value**2 + max(0.0, more - less)))
-
-
-def _best(estimates: Mapping[str, float]) -> Source:
-    """Return the estimate to use.
-
-    Repeats that scatter far more than holds do not repeat: the muscle changed in between, and
-    what changed is for the diagnosis to explain, not noise.
-    """
-    repeats, holds = estimates.get("repeats"), estimates.get("holds")
-    if repeats is not None and (holds is None or repeats <= DISAGREE * holds):
-        return "repeats"
-    if holds is not None:
-        return "holds"
-    return "innovations" if "innovations" in estimates else "declared"
 
 
 def resolution(values: Array) -> float:
@@ -197,11 +184,14 @@ def _weak(
 ) -> list[str]:
     """Return warnings on a floor that rests on less than the rig's owner meant it to."""
     unit, scale = CHANNELS[channel]
-    if source == "holds" and "repeats" in estimates:
+    if source != "repeats" and "repeats" in estimates:
+        value = declared if source == "declared" else estimates[source]
+        assert value is not None
+        what = "declared is" if source == "declared" else f"the {source} scatter by"
         return [
-            f"{channel}: the repeats differ by {estimates['repeats'] / scale:.3g} {unit}, the "
-            f"holds scatter by {estimates['holds'] / scale:.3g} {unit}; the muscle or the rig "
-            "changed between the repeats, so the holds are taken as the noise"
+            f"{channel}: the repeats differ by more than noise, by "
+            f"{estimates['repeats'] / scale:.3g} {unit}, while {what} {value / scale:.3g} {unit}; "
+            "the muscle or the rig changed between the repeats, so they do not count"
         ]
     if not estimates:
         more = "the declared noise is used" if declared is not None else "declare the sensor's"
@@ -280,17 +270,11 @@ def hold_ends(recording: Recording) -> list[Indices]:
     return ends
 
 
-def _detrended(values: Array) -> Array:
-    x = np.arange(len(values)) - 0.5 * (len(values) - 1)
-    left = values - values.mean()
-    return left - x * (x @ left) / (x @ x)
-
-
 def _hold_scatter(ends: list[Array], period: float) -> float:
     """Return the RMS of the noise in the ends of holds, without those that still move."""
     if not ends:
         return float("nan")
-    variances = np.array([np.sum(_detrended(end) ** 2) / (len(end) - 2) for end in ends])
+    variances = np.array([np.sum(detrended(end) ** 2) / (len(end) - 2) for end in ends])
     quiet = variances <= 4.0 * np.median(variances)
     kept = [end for end, good in zip(ends, quiet, strict=True) if good]
     plain = float(np.sqrt(np.mean(variances[quiet])))
@@ -328,7 +312,7 @@ def _windows(ends: list[Array], period: float) -> dict[int, list[Array]]:
     for end in ends:
         n = max((size for size in sizes if size <= len(end) + 1e-9), default=0)
         if n >= 10:
-            windows.setdefault(n, []).append(_detrended(end[-n:]))
+            windows.setdefault(n, []).append(detrended(end[-n:]))
     return dict(sorted(windows.items()))
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from pam_envs.diagnosis.figures import Picture, draw
 from pam_envs.diagnosis.figures.quantities import changed
-from pam_envs.diagnosis.page_details import DETAILS, left_over, provenance
+from pam_envs.diagnosis.page_details import DETAILS, held_out, left_over, provenance, why
 from pam_envs.diagnosis.page_parts import (
     DASH,
     TIMES,
@@ -82,7 +82,7 @@ def headline(report: Report) -> str:
         text = enumeration(list(titles.values()))
     elif verdict == "ambiguous" and titles:
         for rival in report.get("rivals") or []:
-            if not rival.get("excluded"):
+            if rival.get("why") == "not excluded":
                 titles.setdefault(rival["name"], _title(rival))
         text = " or ".join(list(titles.values())[:3])
     return text[:1].upper() + text[1:]
@@ -134,7 +134,7 @@ def _numbers(report: Report) -> str:
         if both:
             cells.append(_big("after", after, _times(after)))
         cells.append(_big("noise", floor, f"from {floor['from']}" if floor else ""))
-    note = '<p class="over">Root mean square on what was held out of every fit.</p>'
+    note = f'<p class="over">Root mean square {escape(held_out(report))}.</p>'
     kind = "numbers" if both else "numbers two"
     return f'<div class="{kind}">{"".join(cells)}</div>\n{note}' if len(cells) > len(heads) else ""
 
@@ -170,7 +170,7 @@ def _sections(report: Report, pictures: Mapping[str, Picture]) -> Iterable[tuple
     if report.get("readings"):
         loops = '<p class="none">Settled readings are loops: see the replay.</p>'
     yield "loops", "Hysteresis loops", loops
-    yield "rivals", "Rival causes", shown("rivals")
+    yield "rivals", "Rival causes", shown("rivals") + why(report)
     yield "kinds", "Held out", shown("kinds")
     yield "effects", "What each cause does", shown("effects")
     yield "isolability", "What this recording can tell apart", shown("isolability")
@@ -189,5 +189,5 @@ def _foot(report: Report) -> str:
     package = words((report.get("provenance") or {}).get("package") or "pam-envs")
     return (
         f"<footer>Made by {escape(package)}. Every number stands in report.json beside this page; "
-        "the extended plant, where there is one, in plant.yaml.</footer>"
+        "the refitted plant, with what was found in it, in plant.yaml.</footer>"
     )

@@ -9,6 +9,7 @@ from typing import Any
 from pam_envs.diagnosis.figures.quantities import changed
 from pam_envs.diagnosis.page_parts import (
     bullets,
+    enumeration,
     interval,
     number,
     paragraph,
@@ -41,6 +42,47 @@ def left_over(report: Report) -> str:
     return table(heads, rows, numbers=(1, 2, 3, 4))
 
 
+def held_out(report: Report) -> str:
+    """Return what errors and gains are of, in words."""
+    found = report.get("held_out")
+    if not found:
+        return "on what was left out of the fits"
+    share = f"{100.0 * (found.get('share') or 0.0):.0f} % of the recording"
+    if found["by"] == "blocks":
+        return f"on blocks of a few seconds left out of the fits, {share}"
+    kinds = enumeration([str(k) for k in found["kinds"]])
+    return f"on kinds of experiment left out of the fits ({kinds}), {share}"
+
+
+def why(report: Report) -> str:
+    """Return the table of what became of each rival."""
+    rows = [
+        (
+            r.get("title") or r["name"],
+            r.get("form") or "",
+            _gain(r.get("gain")),
+            _gain(r.get("behind")),
+            str(r.get("held_out") or ""),
+            str(r.get("why") or ""),
+        )
+        for r in report.get("rivals") or []
+    ]
+    return table(("rival", "form", "gain", "behind the best", "held out", ""), rows, (2, 3))
+
+
+def _flags(entry: Report) -> str:
+    """Return what is to be said of a fitted parameter."""
+    return ", ".join(
+        text
+        for key, text in (
+            ("outside_tolerance", "outside its tolerance"),
+            ("at_bound", "at its bound"),
+            ("not_identified", "hardly identified"),
+        )
+        if entry.get(key)
+    )
+
+
 def parameters(report: Report) -> str:
     """Return the tables of the named causes."""
     rows = [
@@ -50,13 +92,13 @@ def parameters(report: Report) -> str:
             quantity(p),
             interval(p.get("interval")),
             number(p.get("neutral")),
+            _flags(p),
         )
         for c in report.get("causes") or []
         for p in c.get("parameters") or []
     ]
-    body = table(
-        ("cause", "parameter", "value", "95 % interval", "switched off at"), rows, (2, 3, 4), (1,)
-    )
+    heads: tuple[str, ...] = ("cause", "parameter", "value", "95 % interval", "switched off at", "")
+    body = table(heads, rows, (2, 3, 4), (1,), flags=5)
     sizes = [
         (
             c.get("title") or c["name"],
@@ -107,7 +149,9 @@ def closed_loop(report: Report) -> str:
     """Return the gain of a controller."""
     found = report.get("closed_loop")
     if not found:
-        return "<h3>In closed loop</h3>\n" + paragraph("No controller was compared.")
+        reason = report.get("closed_loop_reason")
+        text = f"No controller was compared: {reason}." if reason else "No controller was compared."
+        return "<h3>In closed loop</h3>\n" + paragraph(text)
     unit = found.get("unit") or "mm"
     rows = [
         (
@@ -139,14 +183,6 @@ def calibration(report: Report) -> str:
     """Return the table of refitted parameters."""
     rows = []
     for entry in report.get("calibration") or []:
-        flags = [
-            text
-            for key, text in (
-                ("outside_tolerance", "outside its tolerance"),
-                ("at_bound", "at its bound"),
-            )
-            if entry.get(key)
-        ]
         rows.append(
             (
                 entry["name"],
@@ -154,7 +190,7 @@ def calibration(report: Report) -> str:
                 number(entry.get("before")),
                 number(entry.get("after")),
                 interval(entry.get("interval")),
-                ", ".join(flags),
+                _flags(entry),
             )
         )
     heads = ("parameter", "unit", "before", "after", "95 % interval", "")

@@ -68,6 +68,7 @@ def report(f: Findings, seed: int) -> Json:
         "causes": causes(f),
         "rivals": rivals(f),
         "noise_floor": {"contraction": noise_floor(f), "pressure": None},
+        "held_out": None,
         "error_before": error(f, f.base),
         "error_after": error(f, f.model),
         "residual_structure": {
@@ -77,6 +78,7 @@ def report(f: Findings, seed: int) -> Json:
         "isolability": isolability(f.study),
         "experiment": experiment(f),
         "closed_loop": None,
+        "closed_loop_reason": "settled readings have no time",
         "calibration": [calibrated(f, number) for number in f.base.fit.numbers],
         "not_testable": not_testable(f),
         "warnings": warnings(f),
@@ -167,8 +169,18 @@ def _rival(trial: Trial, chosen: bool) -> Json:
         "form": trial.term.form,
         "gain": _gain(trial),
         "behind": {"value": trial.behind, "interval": list(trial.behind_interval)},
+        "why": _why(trial, chosen),
         "excluded": not chosen and (trial.excluded or not trial.passes),
     }
+
+
+def _why(trial: Trial, chosen: bool) -> str:
+    """Return why a form stays or goes, in the words of the report."""
+    if chosen:
+        return "the best"
+    if not trial.passes:
+        return "gains too little"
+    return "surely worse" if trial.excluded else "not excluded"
 
 
 def error(f: Findings, model: Model) -> Json:

@@ -34,12 +34,14 @@ ORDER: dict[str, tuple[str, ...]] = {
         "causes",
         "rivals",
         "noise_floor",
+        "held_out",
         "error_before",
         "error_after",
         "residual_structure",
         "isolability",
         "experiment",
         "closed_loop",
+        "closed_loop_reason",
         "calibration",
         "not_testable",
         "warnings",
@@ -48,8 +50,28 @@ ORDER: dict[str, tuple[str, ...]] = {
         "runtime_s",
     ),
     "causes": ("name", "title", "form", "parameters", "gain", "effect", "size"),
-    "parameters": ("name", "value", "unit", "interval", "neutral"),
-    "rivals": ("name", "title", "form", "gain", "behind", "excluded"),
+    "held_out": ("by", "kinds", "share"),
+    "parameters": (
+        "name",
+        "value",
+        "unit",
+        "interval",
+        "neutral",
+        "at_bound",
+        "not_identified",
+    ),
+    "rivals": (
+        "name",
+        "title",
+        "form",
+        "held_out",
+        "gain",
+        "behind",
+        "judged",
+        "why",
+        "excluded",
+    ),
+    "judged": ("gain", "better"),
     "residual_structure": ("before", "after"),
     "r2": (
         "direction",
@@ -90,6 +112,7 @@ ORDER: dict[str, tuple[str, ...]] = {
         "after",
         "interval",
         "at_bound",
+        "not_identified",
         "outside_tolerance",
     ),
     "not_testable": ("name", "reason"),
@@ -187,13 +210,13 @@ def write(diagnosis: Any, folder: Path) -> None:
 
     Everything is drawn before the first file is replaced, so that a folder holds one diagnosis,
     never parts of two. A plant file or page left there by an earlier diagnosis goes if this one
-    has none.
+    has none: settled readings make no plant.
 
     Parameters
     ----------
     diagnosis : Diagnosis
         Its ``report`` (the mapping), ``traces`` (what the figures show, or None) and ``plant``
-        (the extended plant, or None) are read.
+        (the refitted plant with what was found, or None) are read.
     folder : Path
         Made if it is missing.
 

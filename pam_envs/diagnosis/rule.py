@@ -22,6 +22,8 @@ class Rule:
         Part of every report.
     least_gain : float
         Log mean-square gain on held-out blocks below which nothing is called missing.
+    least_total : float
+        The same, times the number of held-out blocks: what little data has to gain.
     look : float
         What a gain loses for each factor of e in the number of beginnings its best was chosen from.
     flexible : float
@@ -56,6 +58,7 @@ class Rule:
 
     version: str = "1"
     least_gain: float = 0.05
+    least_total: float = 1.2
     look: float = 0.01
     flexible: float = 0.15
     peak: float = 30.0
@@ -95,10 +98,11 @@ def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
         The numbers of the decision.
     """
     levels = evidence["levels"]
-    if len(levels) < 2 or not pays(levels[1], rule.least_gain, rule):
+    least = max(rule.least_gain, rule.least_total / max(1, evidence["blocks"]))
+    if len(levels) < 2 or not pays(levels[1], least, rule):
         return Judgement("unexplained" if structured(levels[0]["left"], rule) else "adequate", 0)
     level = 1
-    wanted = max(rule.second_gain, rule.second_share * levels[1]["gain"])
+    wanted = max(least, rule.second_gain, rule.second_share * levels[1]["gain"])
     while level + 1 < len(levels) and level < rule.most and pays(levels[level + 1], wanted, rule):
         level += 1
     found = levels[level]

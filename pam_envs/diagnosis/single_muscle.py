@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -202,7 +203,38 @@ def start_plant(rig: Any) -> SingleMuscle:
             values[name] = stock.value(name) * ratio
     if rig.max_pressure is not None:
         values["regulator.max_pressure"] = rig.max_pressure
-    return dataclasses.replace(stock, ensemble=(), provenance={}).replace(values)
+    made = dataclasses.replace(stock, ensemble=()).replace(values)
+    return dataclasses.replace(made, provenance=known_of(rig, values))
+
+
+GIVEN = {
+    "muscle.rest_length": "rest_length",
+    "muscle.diameter": "diameter",
+    "regulator.max_pressure": "max_pressure",
+}
+"""Parameters that a rig file can give, with the rig's attribute."""
+
+
+def known_of(rig: Any, values: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
+    """Return provenance and source of what a plant to begin with takes for granted.
+
+    None of it is a published number of the rig at hand, even where it is one of the shipped muscle.
+    """
+    made = {name: ("assumed", TAKEN) for name in values if name != "memory.operator"}
+    for name, attribute in GIVEN.items():
+        given = getattr(rig, attribute) is not None
+        made[name] = ("assumed", "declared, RIG.yaml" if given else TAKEN)
+    made["mass.carried"] = ("assumed", f"load: {rig.load}, RIG.yaml or its default")
+    return made
+
+
+TAKEN = "taken for granted by pam-envs diagnose, not refitted"
+
+
+def identified(plant: SingleMuscle, frees: Iterable[Free], source: str) -> SingleMuscle:
+    """Return a plant whose refitted parameters say so."""
+    found = {f.name: ("identified", source) for f in frees if f.name in R.NAMES}
+    return dataclasses.replace(plant, provenance={**plant.provenance, **found})
 
 
 def inputs_of(recording: Any, rig: Any) -> Inputs:

@@ -1,4 +1,4 @@
-"""A diagnosis in numbers and sentences: the contents of ``report.json``."""
+"""A diagnosis in numbers: the contents of ``report.json``."""
 
 from __future__ import annotations
 
@@ -8,41 +8,34 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.diagnosis.fitting import Fit, Problem, differentiate, normal_equations
-from pam_envs.diagnosis.held_out import kind_of
-from pam_envs.diagnosis.isolability import channel_size, complement, projected
+from pam_envs.diagnosis.held_out import HeldOut, kind_of
 from pam_envs.diagnosis.rule import Rule
-from pam_envs.diagnosis.search import Blocks, Candidate
-from pam_envs.diagnosis.single_muscle import declared
+from pam_envs.diagnosis.search import Candidate
 from pam_envs.diagnosis.structure import binned_r2, flexible_r2, ljung_box, spectral_peak
-from pam_envs.diagnosis.verdict import traces_of
+from pam_envs.diagnosis.summary_causes import SCALE, UNITS, calibration, causes, rivals, seen
+from pam_envs.diagnosis.summary_text import sentence
 
 Array = NDArray[np.float64]
 
-Z = 1.96
-PRESSURE_UNIT = {"contraction": "mm", "pressure": "bar"}
-SCALE = {"contraction": 1e-3, "pressure": 1e5}
-MOST_RIVALS = 14
 
-
-def report_of(study: Any, rule: Rule, seed: int, warnings: tuple[str, ...]) -> dict[str, Any]:
+def report_of(study: Any, rule: Rule, warnings: tuple[str, ...]) -> dict[str, Any]:
     """Return the report of a study, in the order of the documented keys."""
     decision, held = study.decision, study.held
-    draws = study.blocks.draws(rule.draws, seed)
-    named = decision.verdict in ("named", "ambiguous") or bool(decision.model.causes)
-    causes = _causes(study, rule, seed) if named else []
-    floors = _floors(study)
-    before = _errors(study, held.base, seed)
-    after = _errors(study, held.model, seed) if named else None
+    compared = rivals(study, rule)
     report = {
         "schema": 1,
         "verdict": decision.verdict,
         "text": "",
-        "causes": causes,
-        "rivals": _rivals(study, draws, rule),
-        "noise_floor": floors,
-        "error_before": before,
-        "error_after": after,
+        "causes": causes(study),
+        "rivals": compared,
+        "noise_floor": _floors(study),
+        "held_out": {
+            "by": held.choice.by,
+            "kinds": list(held.choice.kinds),
+            "share": float(held.rows.mean()),
+        },
+        "error_before": _errors(study, held.base),
+        "error_after": _errors(study, held.model) if decision.model.causes else None,
         "residual_structure": {
             "before": _structure(study, study.base),
             "after": _structure(study, study.model),
@@ -50,20 +43,21 @@ def report_of(study: Any, rule: Rule, seed: int, warnings: tuple[str, ...]) -> d
         "isolability": _isolability(study),
         "experiment": study.proposal,
         "closed_loop": study.loop,
-        "calibration": _calibration(study),
+        "closed_loop_reason": study.loop_reason,
+        "calibration": calibration(study),
         "not_testable": [{"name": n, "reason": r} for n, r in study.not_testable.items()],
-        "warnings": list(dict.fromkeys(warnings)),
+        "warnings": list(dict.fromkeys((*warnings, *_against(compared)))),
         "rule_version": rule.version,
         "provenance": {
             "recording": {"source": study.recording.source, "digest": study.recording.digest},
-            "rig": study.sheet.plant,
+            "rig": {"source": study.sheet.source, "digest": study.sheet.digest},
             "plant_before": study.start.digest(),
             "plant_after": study.plant_of(study.model).digest(),
             "package": _package(),
-            "seed": seed,
+            "seed": held.seed,
         },
     }
-    report["text"] = sentence(report)
+    report["text"] = sentence(report, rule)
     return report
 
 
@@ -74,46 +68,32 @@ def _package() -> str:
         return "pam-envs"
 
 
-def _seen(study: Any) -> list[tuple[int, str]]:
-    """Return the channels that were measured, with their rows."""
-    return [
-        (k, c)
-        for k, c in enumerate(study.family.channels)
-        if np.isfinite(study.problem.measured[k]).any()
-    ]
-
-
 def _floors(study: Any) -> dict[str, Any]:
     made = {}
-    for _, c in _seen(study):
+    for _, c in seen(study):
         value, source = study.floor_of(c)
-        made[c] = {"value": value / SCALE[c], "unit": PRESSURE_UNIT[c], "from": source}
+        made[c] = {"value": value / SCALE[c], "unit": UNITS[c], "from": source}
     return made
 
 
-def _errors(study: Any, candidate: Candidate, seed: int) -> dict[str, Any]:
+def _errors(study: Any, candidate: Candidate) -> dict[str, Any]:
     """Return errors on what was held out, by channel."""
-    held, blocks = study.held, study.blocks
+    held: HeldOut = study.held
     rows = held.problem.rows(candidate.fit.residual)
-    made: dict[str, Any] = {}
-    rng = np.random.default_rng(seed)
     labels = np.array([kind_of(s) for s in study.recording.segments])[study.recording.segment]
-    for k, c in _seen(study):
+    made: dict[str, Any] = {}
+    for k, c in seen(study):
         use = held.rows & np.isfinite(study.problem.measured[k])
-        squares = np.where(use, rows[k] ** 2, 0.0)
-        sums = np.bincount(blocks.of, squares, minlength=len(blocks.held_out))
-        counts = np.bincount(blocks.of, use, minlength=len(blocks.held_out))
-        places = np.flatnonzero(counts)
-        if not len(places):
+        if not use.any():
             continue
-        drawn = rng.choice(places, (400, len(places)))
-        spread = np.sqrt(sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1))
+        counts = held.draws @ held.blocks.counts[k]
+        spread = np.sqrt(held.draws @ candidate.errors[k] / np.maximum(counts, 1.0))
         scale = study.problem.noise[k] / SCALE[c]
-        value = float(np.sqrt(squares.sum() / max(use.sum(), 1)))
+        value = float(np.sqrt(np.mean(rows[k][use] ** 2)))
         made[c] = {
             "value": value * scale,
-            "unit": PRESSURE_UNIT[c],
-            "interval": [float(v) * scale for v in np.quantile(spread, [0.025, 0.975])],
+            "unit": UNITS[c],
+            "interval": held.interval(spread * scale),
             "times_floor": value * study.problem.noise[k] / study.floor_of(c)[0],
             "kinds": {
                 str(kind): float(np.sqrt(np.mean(rows[k][use & (labels == kind)] ** 2))) * scale
@@ -123,109 +103,24 @@ def _errors(study: Any, candidate: Candidate, seed: int) -> dict[str, Any]:
     return made
 
 
-def intervals(problem: Problem, blocks: Blocks, fit: Fit) -> dict[str, tuple[float, float]]:
-    """Return 95 % intervals of a fit's parameters, in SI.
-
-    From the curvature of the fit and the scatter of the blocks' gradients, so that noise that is
-    correlated within a block counts as it should.
-    """
-    if fit.shared is not None or len(fit.slopes) != len(fit.frees):
-        fit.shared = None
-        differentiate(problem, [fit])
-    normal, _ = normal_equations(problem, fit)
-    n = problem.seen
-    of = np.tile(blocks.of, len(problem.measured))[problem.order[:n]]
-    pulls = fit.slopes[:, :n] * fit.residual[:n]
-    sums = np.stack([np.bincount(of, row, minlength=len(blocks.held_out)) for row in pulls])
-    inverse = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)
-    spread = np.sqrt(np.maximum(np.diag(inverse @ (sums @ sums.T) @ inverse), 0.0))
-    made = {}
-    for free, z, sd in zip(fit.frees, fit.z, spread, strict=True):
-        ends = free.outer(np.array([z - Z * sd, z + Z * sd]))
-        made[free.name] = (float(ends[0]), float(ends[1]))
-    return made
-
-
-def _causes(study: Any, rule: Rule, seed: int) -> list[dict[str, Any]]:
-    model, problem, family = study.model, study.problem, study.family
-    spans = intervals(problem, study.blocks, model.fit)
-    values = model.fit.values()
-    traces = traces_of(problem, family, study.base, model)
-    basis = complement(study.base.fit)
-    draws = study.blocks.draws(rule.draws, seed)
-    total = study.blocks.gain(study.base.errors, model.errors)
-    spread = np.quantile(study.blocks.gains(study.base.errors, model.errors, draws), [0.025, 0.975])
-    made = []
-    for cause, form in model.causes:
-        trace = traces[cause.name]
-        flat = np.where(np.isfinite(problem.measured), trace, 0.0) / problem.noise[:, None]
-        left = projected(flat.ravel()[problem.order][None], basis)[0]
-        made.append(
-            {
-                "name": cause.name,
-                "title": cause.title,
-                "form": form.name,
-                "parameters": [
-                    _parameter(family, t.name, values[t.name], spans[t.name]) for t in form.terms
-                ],
-                "gain": {"value": total, "interval": spread.tolist()},
-                "effect": {
-                    c: {
-                        "value": float(np.sqrt(np.mean(trace[k] ** 2))) / SCALE[c],
-                        "unit": PRESSURE_UNIT[c],
-                    }
-                    for k, c in _seen(study)
-                },
-                "size": channel_size(left, problem),
-            }
-        )
-    return sorted(made, key=lambda c: -c["size"])
-
-
-def _parameter(family: Any, name: str, value: float, span: tuple[float, float]) -> dict[str, Any]:
-    d = declared(family.plant, name)
-    return {
-        "name": name,
-        "value": value,
-        "unit": d.unit,
-        "interval": list(span),
-        "neutral": d.neutral,
-    }
-
-
-def _rivals(study: Any, draws: NDArray[np.int64], rule: Rule) -> list[dict[str, Any]]:
-    decision, blocks = study.decision, study.blocks
-    open_names = {frozenset(c.names) for c in decision.open_rivals}
-    best = decision.model if decision.model.causes else study.base
-    made = []
-    for rival in decision.rivals[:MOST_RIVALS]:
-        gains = blocks.gains(study.base.errors, rival.errors, draws)
-        behind = blocks.gains(rival.errors, best.errors, draws)
-        names = frozenset(rival.names)
-        stays = names == frozenset(best.names) or names in open_names
-        made.append(
-            {
-                "name": "+".join(rival.names),
-                "title": " and ".join(c.title for c, _ in rival.causes),
-                "form": ", ".join(f.name for _, f in rival.causes),
-                "gain": {
-                    "value": blocks.gain(study.base.errors, rival.errors),
-                    "interval": np.quantile(gains, [0.025, 0.975]).tolist(),
-                },
-                "behind": {
-                    "value": blocks.gain(rival.errors, best.errors),
-                    "interval": np.quantile(behind, [0.025, 0.975]).tolist(),
-                },
-                "excluded": not stays,
-            }
-        )
-    return made
+def _against(rivals: list[dict[str, Any]]) -> list[str]:
+    """Return warnings of rivals that are left out but predict better what was held out."""
+    told = []
+    for rival in rivals:
+        high = (rival["behind"]["interval"] or (0.0, 0.0))[1]
+        if rival["why"] not in ("the best", "not excluded") and high < 0.0:
+            told.append(
+                f"on what was held out here {rival['name']} does better than what is named, by "
+                f"{-rival['behind']['value']:.2g}; it is left out ({rival['why']}) because the "
+                "decision rests on blocks of the whole recording"
+            )
+    return told
 
 
 def _structure(study: Any, candidate: Candidate) -> dict[str, Any]:
     rows = study.problem.rows(candidate.fit.residual)
     made = {}
-    for k, c in _seen(study):
+    for k, c in seen(study):
         residual = np.where(np.isfinite(study.problem.measured[k]), rows[k], np.nan)
         frequency, ratio = spectral_peak(
             residual, study.recording.period, study.regressors.values["pressure"]
@@ -249,83 +144,3 @@ def _isolability(study: Any) -> dict[str, Any] | None:
         "cosine": iso.cosine.tolist(),
         "absorbed": dict(zip(iso.names, iso.absorbed.tolist(), strict=True)),
     }
-
-
-def _calibration(study: Any) -> list[dict[str, Any]]:
-    """Return the refitted parameters, those of the final model."""
-    spans = intervals(study.problem, study.blocks, study.model.fit)
-    after, made = study.model.fit.values(), []
-    column = study.family.column
-    for free in study.base.fit.frees:
-        low, high = free.low, free.high
-        value, before = after[free.name], float(column[free.place])
-        unit = "1" if free.name.startswith("memory.weight") else ""
-        if not unit:
-            unit = declared(study.family.plant, free.name).unit
-        tolerance = study.sheet.tolerance.get(free.name)
-        made.append(
-            {
-                "name": free.name,
-                "unit": unit,
-                "before": before,
-                "after": value,
-                "interval": list(spans[free.name]),
-                "at_bound": bool(value <= low or value >= high),
-                "outside_tolerance": bool(
-                    tolerance is not None and abs(value - before) > tolerance * abs(before)
-                ),
-            }
-        )
-    return made
-
-
-def sentence(report: dict[str, Any]) -> str:
-    """Return the verdict in a few sentences."""
-    verdict = report["verdict"]
-    titles = " and ".join(c["title"] for c in report["causes"])
-    if verdict == "insufficient":
-        text = "The recording does not excite what would have to be decided"
-        return f"{text}: {len(report['not_testable'])} causes cannot be tested on it."
-    if verdict == "adequate":
-        return f"The plant is adequate: {_held(report, 'error_before')}, and nothing is left that \
-this recording could show."
-    if verdict == "unexplained":
-        text = f"Something is missing that no candidate carries: {_held(report, 'error_before')}"
-        flexible = max(
-            (s["flexible_r2"] for s in report["residual_structure"]["after"].values()), default=0.0
-        )
-        return f"{text}; a flexible model could explain {100 * flexible:.0f} % of what is left."
-    text = f"Your simulation misses {titles}: with it {_fell(report)}."
-    if verdict == "ambiguous":
-        others = [r["name"] for r in report["rivals"][1:] if not r["excluded"]]
-        text += f" Not excluded: {', '.join(others)}."
-        if report["experiment"] is not None:
-            e = report["experiment"]
-            text += (
-                f" To tell them apart, {e['description']}."
-                if e["enough"]
-                else " No experiment of the list tells them apart; "
-                f"{e['sensor'] or 'another sensor'} would."
-            )
-    if report["closed_loop"] is not None:
-        text += f" {report['closed_loop']['text']}"
-    return text
-
-
-def _held(report: dict[str, Any], key: str) -> str:
-    floors = report["noise_floor"]
-    parts = [
-        f"{e['value']:.3g} {e['unit']} (noise floor {floors[c]['value']:.3g})"
-        for c, e in report[key].items()
-    ]
-    return "the held-out error is " + " and ".join(parts)
-
-
-def _fell(report: dict[str, Any]) -> str:
-    before, after, floors = report["error_before"], report["error_after"], report["noise_floor"]
-    worst = max(before, key=lambda c: before[c]["value"] / max(after[c]["value"], 1e-12))
-    a, b = before[worst], after[worst]
-    return (
-        f"the held-out error of the {worst} falls from {a['value']:.3g} to {b['value']:.3g} "
-        f"{a['unit']} (noise floor {floors[worst]['value']:.3g})"
-    )

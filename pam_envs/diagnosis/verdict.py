@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
+from scipy.special import stdtr
 
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.fitting import Problem, column_of
@@ -112,7 +112,7 @@ def decide(
     levels = [Level(base, [], left_over(problem, blocks, base, regressors))]
     for model, rivals in _ladder(problem, family, blocks, base, causes, rule):
         levels.append(Level(model, rivals, left_over(problem, blocks, model, regressors)))
-    evidence = evidence_of(blocks, levels, rule, seed)
+    evidence = evidence_of(problem, blocks, levels, rule, seed)
     judged = judge(evidence, rule)
     if judged.verdict == "ambiguous":
         cross(problem, blocks, levels, regressors, judged, evidence, rule, seed)
@@ -162,7 +162,7 @@ def cross(
     found["crossed"] = len(rows)
     found["gain"] = rows[0]["gain"]
     found["added"] = worth(every, before, order[0], rule)
-    found["unsure"] = _unsure(every, before, order[0], draws, len(level.rivals), rule)
+    found["unsure"] = unsure(problem, blocks, smaller, level.rivals[places[0]], len(level.rivals))
     rivals = [level.rivals[k] for k in (*places, *others)]
     if rivals[0] is not level.model:
         found["left"] = left_over(problem, blocks, rivals[0], regressors)
@@ -262,15 +262,16 @@ def crossed(
 
 
 def evidence_of(
-    blocks: Blocks, levels: Sequence[Level], rule: Rule, seed: int = 0
+    problem: Problem, blocks: Blocks, levels: Sequence[Level], rule: Rule, seed: int = 0
 ) -> dict[str, Any]:
     """Return what a rule decides on, in plain types.
 
-    Under ``levels``, one entry for each number of causes from none: ``gain`` over the base,
-    ``added`` over the level before, how ``unsure`` that is, what is ``left``, and the ``rivals``,
-    the best first, each with ``names``, ``forms``, ``gain``, ``better``: the part of the samples of
-    blocks in which it is ahead of the best, ``imitates``: whether it has the best as a limit, and
-    ``out``: whether it was excluded before the others were compared on all blocks.
+    ``blocks`` counts those held out. Under ``levels``, one entry for each number of causes from
+    none: ``gain`` over the base, ``added`` over the level before, how ``unsure`` that is, what is
+    ``left``, and the ``rivals``, the best first, each with ``names``, ``forms``, ``gain``,
+    ``better``: the part of the samples of blocks in which it is ahead of the best, ``imitates``:
+    whether it has the best as a limit, and ``out``: whether it was excluded before the others were
+    compared on all blocks.
     """
     base = levels[0].model
     draws = blocks.draws(rule.draws, seed)
@@ -281,7 +282,7 @@ def evidence_of(
             {
                 "gain": worth(blocks, base, level.model, rule),
                 "added": worth(blocks, before, level.model, rule),
-                "unsure": _unsure(blocks, before, level.model, draws, len(level.rivals), rule),
+                "unsure": unsure(problem, blocks, before, level.model, len(level.rivals)),
                 "left": level.left,
                 "rivals": [
                     _row(blocks, base, rival, level.model, draws, rule)
@@ -289,7 +290,7 @@ def evidence_of(
                 ],
             }
         )
-    return {"levels": made}
+    return {"blocks": int(blocks.held_out.sum()), "levels": made}
 
 
 def _row(
@@ -311,22 +312,29 @@ def _row(
     }
 
 
-def _unsure(
-    blocks: Blocks,
-    before: Candidate,
-    after: Candidate,
-    draws: NDArray[np.int64],
-    looked: int,
-    rule: Rule,
+def unsure(
+    problem: Problem, blocks: Blocks, before: Candidate, after: Candidate, looked: int = 1
 ) -> float:
-    """Return how likely the best of as many causes gains nothing, if none of them is there.
+    """Return how likely a cause fits the held-out blocks as well if it is not there.
 
-    One-sided, from the spread of the gain over samples of blocks, times the number of causes among
-    which the best was chosen (Bonferroni).
+    Without it the residual ``e`` of the smaller model is noise, and its product with the change
+    ``d`` that the cause makes has mean zero and at most the variance ``s |d|^2``, with ``s`` the
+    long-run variance of the noise (its spectrum at frequency zero, where that of slow noise is
+    largest), taken from sums over blocks of what the larger model leaves. One-sided, of Student's
+    distribution, times the number of causes among which the best was chosen (Bonferroni).
     """
-    gain = worth(blocks, before, after, rule)
-    spread = float(np.std(blocks.gains(before.errors, after.errors, draws)))
-    return float(min(1.0, max(looked, 1) * ndtr(-gain / max(spread, 1e-12))))
+    here = blocks.held_out[blocks.of]
+    left = problem.rows(after.fit.residual)
+    change = problem.rows(before.fit.residual) - left
+    product, variance = 0.0, 0.0
+    for e, d, counts in zip(left, change, blocks.counts, strict=True):
+        sums = np.bincount(blocks.of, e, minlength=len(counts))
+        slow = float(np.mean((sums**2)[counts > 0] / counts[counts > 0])) if counts.any() else 0.0
+        variance += max(slow, 1.0) * float(np.sum(d[here] ** 2))
+        product += float(np.sum((e + d)[here] * d[here]))
+    freedom = max(1, int((blocks.counts.max(axis=0) > 0).sum()) - 1)
+    likely = stdtr(freedom, -product / max(np.sqrt(variance), 1e-12))
+    return float(min(1.0, max(looked, 1) * likely))
 
 
 def _better(blocks: Blocks, rival: Candidate, best: Candidate, draws: NDArray[np.int64]) -> float:

@@ -17,7 +17,7 @@ from joblib.externals.loky import get_reusable_executor
 
 from benchmarks import diagnosis, diagnosis_study, runner
 from benchmarks.diagnosis import Options, Task, retold, run, select
-from benchmarks.diagnosis_cases import NOISE, Case, cases
+from benchmarks.diagnosis_cases import NOISE, Case, cases, make
 from benchmarks.diagnosis_next import DrivenRig, OracleRig
 from benchmarks.diagnosis_report import figures
 from benchmarks.diagnosis_study import study, trace_errors
@@ -111,13 +111,14 @@ def test_a_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
         run(options, act=stopping)
     counting, ticks = Counting(), []
     report = run(options, lambda total: lambda: ticks.append(total), act=counting)
-    assert (report.found, report.computed) == (10, 25)
-    assert len(counting.asked) == len(ticks) == 25
+    total = len(cases("small"))
+    assert (report.found, report.computed) == (10, total - 10)
+    assert len(counting.asked) == len(ticks) == total - 10
     assert [r["case"]["seed"] for r in report.records] == [c.seed for c in cases("small")]
     again = Counting()
     assert run(options, act=again).records == report.records
     assert again.asked == []
-    assert run(Options(folder=tmp_path, force=True), act=again).computed == 35
+    assert run(Options(folder=tmp_path, force=True), act=again).computed == total
 
 
 def test_a_failed_case_is_kept_told_and_counted_as_wrong(tmp_path: Path) -> None:
@@ -235,6 +236,7 @@ def test_records_are_judged_anew(tmp_path: Path) -> None:
 
     left = {"r2": [0.0, 0.0], "rest": 0.0, "peaks": [], "peak": 0.0, "excess": 1.0}
     evidence = {
+        "blocks": 25,
         "levels": [
             {"gain": 0.0, "added": 0.0, "unsure": 0.0, "left": left, "rivals": []},
             {
@@ -244,7 +246,7 @@ def test_records_are_judged_anew(tmp_path: Path) -> None:
                 "left": left,
                 "rivals": [rival(["leak"], 2.0)],
             },
-        ]
+        ],
     }
 
     def judged(case: Case, stages: Collection[str]) -> dict[str, Any]:
@@ -334,3 +336,16 @@ def test_the_oracle_is_the_rig_that_is_driven_without_its_noise(name: str) -> No
     rig.reset(1)
     oracle.reset(None)
     assert rig.position == oracle.position == 0.0
+
+
+@pytest.mark.parametrize("seconds", [30.0, 60.0])
+def test_a_brief_recording_is_the_beginning_of_a_whole_one(seconds: float) -> None:
+    brief = make(Case("brief", 11, campaign="short", seconds=seconds))
+    whole = make(Case("clean", 11, campaign="short"))
+    n = len(brief.recording.time)
+    assert n == round(seconds / brief.recording.period)
+    assert brief.recording.command.tolist() == whole.recording.command[:n].tolist()
+    assert not brief.truths
+    assert {label for group in brief.sheet.repeats for label in group} <= set(
+        brief.recording.segments
+    )

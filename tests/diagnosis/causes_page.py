@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from pam_envs.diagnosis.cause import Cause, Form, Term
+from pam_envs.diagnosis.cause import NEEDS, Cause, Form, Term
 from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.single_muscle import BASE, declared
 from pam_envs.plants import single_muscle_rows as R
@@ -42,12 +42,6 @@ GIVEN = {
     "pressure.resolution": "the recording; replays are free of steps",
 }
 """Declared parameters, and where they are given."""
-NEEDS = {
-    "contraction": "`contraction_mm`",
-    "pressure": "`pressure_bar`",
-    "loads": "`load_N` with two loads or more",
-    "temperature": "`temperature_C` that varies",
-}
 
 
 def named_by() -> dict[str, list[str]]:

@@ -163,10 +163,23 @@ def rivals(verdict: str) -> list[dict[str, Any]]:
                 "value": gains[0] - g,
                 "interval": [0.8 * (gains[0] - g), 1.2 * (gains[0] - g)],
             },
-            "excluded": not (name == "creep" or (verdict == "ambiguous" and i == 1)),
+            "held_out": "blocks" if name == "slip_step" else "kinds",
+            "judged": {"gain": g - 0.01, "better": 0.0 if i else 1.0},
+            "why": why(name, i, verdict),
+            "excluded": why(name, i, verdict) == "surely worse",
         }
         for i, (name, g) in enumerate(zip(names, gains, strict=True))
     ]
+
+
+def why(name: str, place: int, verdict: str) -> str:
+    """Return what becomes of a rival."""
+    if verdict not in ("named", "ambiguous"):
+        return "surely worse"
+    if name == "sensor_drift":
+        return "imitates it"
+    still = "not excluded" if verdict == "ambiguous" and place == 1 else "surely worse"
+    return still if place else "the best"
 
 
 def isolability() -> dict[str, Any]:
@@ -193,13 +206,17 @@ CREEP = {
             "unit": "1",
             "interval": [0.027, 0.035],
             "neutral": 0.0,
+            "at_bound": False,
+            "not_identified": False,
         },
         {
             "name": "muscle.creep_slow",
             "value": 0.092,
             "unit": "1",
-            "interval": [0.081, 0.104],
+            "interval": [None, 0.104],
             "neutral": 0.0,
+            "at_bound": True,
+            "not_identified": np.bool_(True),
         },
     ],
     "gain": {"value": 2.9, "interval": [2.6, 3.1]},
@@ -260,6 +277,7 @@ def report(verdict: str = "named") -> dict[str, Any]:
             "contraction": {"value": np.float64(0.05), "unit": "mm", "from": "repeats"},
             "pressure": {"value": np.float32(0.012), "unit": "bar", "from": "holds"},
         },
+        "held_out": {"by": "kinds", "kinds": list(HELD), "share": np.float64(1.0 / 3.0)},
         "error_before": before,
         "error_after": after if fixed else before,
         "residual_structure": {
@@ -272,6 +290,7 @@ def report(verdict: str = "named") -> dict[str, Any]:
         "isolability": isolability(),
         "experiment": EXPERIMENT if verdict == "ambiguous" else None,
         "closed_loop": CLOSED_LOOP if fixed else None,
+        "closed_loop_reason": None if fixed else "no cause was added to the plant",
         "calibration": [
             {
                 "name": "muscle.area",
@@ -280,6 +299,7 @@ def report(verdict: str = "named") -> dict[str, Any]:
                 "after": 8.83e-4,
                 "interval": [8.8e-4, 8.9e-4],
                 "at_bound": False,
+                "not_identified": False,
                 "outside_tolerance": np.bool_(False),
             },
             {
@@ -289,6 +309,7 @@ def report(verdict: str = "named") -> dict[str, Any]:
                 "after": 0.25,
                 "interval": [0.24, 0.26],
                 "at_bound": False,
+                "not_identified": False,
                 "outside_tolerance": True,
             },
             {
@@ -296,8 +317,9 @@ def report(verdict: str = "named") -> dict[str, Any]:
                 "unit": "kg",
                 "before": 0.5,
                 "after": 0.1,
-                "interval": None,
+                "interval": [None, 3.0],
                 "at_bound": True,
+                "not_identified": True,
                 "outside_tolerance": False,
             },
         ],
@@ -309,20 +331,20 @@ def report(verdict: str = "named") -> dict[str, Any]:
         "rule_version": "1",
         "provenance": {
             "recording": {"source": "rig_7.csv", "digest": "9f86d081884c7d65"},
-            "rig": "rig.yaml",
+            "rig": {"source": "rig.yaml", "digest": "0d8f4c21aa37be59"},
             "plant_before": "d2a84f4b8b650937",
-            "plant_after": "8f434346648f6b96" if fixed else None,
+            "plant_after": "8f434346648f6b96",
             "package": "pam-envs 0.1.0",
             "seed": np.int64(0),
         },
     }
 
 
-def diagnosis(verdict: str = "named", **size: Any) -> SimpleNamespace:
-    """Return a diagnosis of a verdict."""
+def diagnosis(verdict: str = "named", plant: bool = True, **size: Any) -> SimpleNamespace:
+    """Return a diagnosis of a verdict; settled readings have no plant."""
     fixed = verdict in ("named", "ambiguous")
     return SimpleNamespace(
         report=report(verdict),
         traces=traces(extended=fixed, **size),
-        plant=Plant() if fixed else None,
+        plant=Plant() if plant else None,
     )

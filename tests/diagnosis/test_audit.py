@@ -13,6 +13,8 @@ from pam_envs.data.recording import Recording, Rig
 from pam_envs.data.tables import ContractionTable, load_contraction_table
 from pam_envs.diagnosis.audit import audit, undecidable
 from pam_envs.diagnosis.audit_tables import repeat_trend, scatter, scatter_homogeneity
+from pam_envs.diagnosis.cause import NEEDS, Cause
+from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.noise import hold_ends, noise_floor, resolution, white_noise
 
 PERIOD = 0.02
@@ -24,6 +26,7 @@ RIG = Rig(
     pressure_noise=800.0,
     repeats=(("holds_a", "holds_b"),),
     valve_closed=("shut",),
+    tolerance={"mass.load": 0.02},
 )
 
 
@@ -288,9 +291,45 @@ def test_contractions_that_cannot_be_right():
     assert "more than 40% of the rest length of 200 mm; check its unit" in text
     text = problem(made(contraction=0.2 - contraction))
     assert "looks like the muscle's length" in text
-    text = told(made(contraction=1e-3 * contraction), Rig())
-    assert "if it is in metres, multiply by 1000" in text
     assert "contraction_mm falls as the pressure rises" in told(made(contraction=-contraction))
+
+
+def test_a_stroke_in_metres_is_named():
+    contraction = arrays()["contraction"]
+    for rig in (RIG, Rig(), Rig(rest_length=0.2)):
+        text = problem(made(contraction=1e-3 * contraction), rig)
+        assert "contraction_mm spans only 0.0" in text
+        assert "over 5.5 bar; it looks like metres: multiply by 1000" in text
+    long = Rig(rest_length=2.0)
+    assert "looks like metres" in problem(made(contraction=0.2 * contraction), long)
+    assert "looks like metres" not in told(made(contraction=0.2 * contraction), Rig())
+
+
+def test_a_small_stroke_may_be_right():
+    columns = arrays()
+    narrow = {name: 0.2 * columns[name] for name in ("command", "pressure")}
+    text = told(made(contraction=1e-3 * columns["contraction"], **narrow), Rig())
+    assert "if it is in metres, multiply by 1000" in text
+    jig = np.random.default_rng(0).normal(0.0, 3e-5, len(columns["time"]))
+    assert audit(made(contraction=jig), RIG).problems == ()
+
+
+def test_what_is_told_in_vain_is_said():
+    columns = arrays()
+    text = told(made(supply=np.full(len(columns["time"]), 7e5)))
+    assert "supply_pressure_bar is not used" in text
+    text = told(made(), dataclasses.replace(RIG, cycles_since_rest=3))
+    assert "history.cycles_since_rest = 3 does not enter the replay" in text
+    known = {"mass.load": 0.02, "muscle.area": 0.1, "muscle.rest_length": 0.01}
+    text = told(made(), dataclasses.replace(RIG, tolerance=known))
+    assert text == "tolerance of muscle.rest_length is not used: no refit moves it"
+
+
+def test_a_tolerance_of_no_parameter_is_a_problem():
+    rig = dataclasses.replace(RIG, tolerance={"mass.laod": 0.02})
+    assert "tolerance names 'mass.laod'; did you mean 'mass.load'?" in problem(made(), rig)
+    rig = dataclasses.replace(RIG, tolerance={"engine.oil": 0.02})
+    assert "'engine.oil', which is no parameter of the plant" in problem(made(), rig)
 
 
 def test_loads_in_kilograms_are_found_by_the_force():
@@ -349,16 +388,53 @@ def test_what_absent_columns_make_undecidable():
     assert reasons["payload_error"] == "the load was 25 N throughout"
     assert "load_dependent_hysteresis" in reasons
     assert "load_dependent_compliance" in reasons
-    assert "cannot be told from dead_time" in reasons["sensor_delay"]
+    assert "wire_slack" in reasons
     assert "the valve was never shut" in reasons["leak"]
     assert set(reasons) == {
         "temperature",
         "payload_error",
         "load_dependent_hysteresis",
         "load_dependent_compliance",
-        "sensor_delay",
+        "wire_slack",
         "leak",
     }
+
+
+def test_loads_that_were_not_weighed_have_no_error():
+    reasons = undecidable(made(), dataclasses.replace(RIG, tolerance={}))
+    assert set(reasons) == {"payload_error"}
+    assert "add tolerance: {mass.load: 0.02} to RIG.yaml" in reasons["payload_error"]
+
+
+NEEDY = {
+    "contraction": (made(contraction=None), RIG, "the contraction was not recorded"),
+    "pressure": (made(pressure=None), RIG, "the pressure was not recorded"),
+    "loads": (made(load=25.0), RIG, "the load was 25 N throughout"),
+    "weighed": (made(), Rig(), "no tolerance of the loads is declared"),
+    "temperature": (made(temperature=None), RIG, "the temperature was not recorded"),
+    "valve_closed": (made(valve_closed=()), RIG, "the valve was never shut"),
+    "rest": (made(), dataclasses.replace(RIG, cycles_since_rest=6), "6 cycles since it rested"),
+    "exhaust": (made(command=np.sort(arrays()["command"])), RIG, "never falls by more than"),
+}
+
+
+@pytest.mark.parametrize("word", NEEDS)
+def test_a_users_cause_is_asked_what_it_needs(word):
+    poor, rig, reason = NEEDY[word]
+    cause = Cause("gremlins", "gremlins", (), needs=(word,))
+    assert undecidable(made(), RIG, [cause]) == {}
+    found = undecidable(poor, rig, [cause, Cause("modest", "a modest one", ())])
+    assert set(found) == {"gremlins"}
+    assert reason in found["gremlins"]
+
+
+def test_a_need_that_no_recording_has_is_refused():
+    with pytest.raises(ValueError, match="'load', which no recording has; did you mean 'loads'"):
+        Cause("gremlins", "gremlins", (), needs=("contraction", "load"))
+    with pytest.raises(ValueError, match="known: contraction"):
+        Cause("gremlins", "gremlins", (), needs=("magic",))
+    with pytest.raises(ValueError, match="give a tuple"):
+        Cause("gremlins", "gremlins", (), needs="loads")
 
 
 def test_what_a_campaign_cannot_show():
@@ -372,6 +448,7 @@ def test_what_a_campaign_cannot_show():
     rising = np.sort(arrays()["command"])
     assert "never falls" in undecidable(made(command=rising))["exhaust_asymmetry"]
     reasons = undecidable(made(contraction=None))
+    assert set(reasons) == {c.name for c in catalogue() if "contraction" in c.needs}
     for name in ("creep", "slip_step", "sensor_delay", "stick_slip", "wire_slack"):
         assert reasons[name] == "the contraction was not recorded"
     assert "valve_dead_band" not in reasons

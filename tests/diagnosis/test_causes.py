@@ -10,8 +10,9 @@ import pytest
 
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis import causes as package
-from pam_envs.diagnosis.audit import NEED_CONTRACTION, NEED_LOADS
-from pam_envs.diagnosis.causes import by_name, catalogue
+from pam_envs.diagnosis.cause import NEEDS
+from pam_envs.diagnosis.causes import by_name, catalogue, chosen
+from pam_envs.diagnosis.gain import COMPENSABLE
 from pam_envs.diagnosis.search import frees_of
 from pam_envs.diagnosis.single_muscle import BASE, MuscleFamily, declared, start_plant
 from pam_envs.plants import single_muscle_rows as R
@@ -86,6 +87,11 @@ def campaign(loads: tuple[float, float] = (1.5, 4.0)) -> Inputs:
     )
 
 
+def needing(word: str) -> list[str]:
+    """Return the causes that need something of a recording."""
+    return [cause.name for cause in CATALOGUE if word in cause.needs]
+
+
 INPUTS, EMPTY = campaign(), campaign((0.0, 0.0))
 
 
@@ -123,6 +129,40 @@ def test_every_file_is_one_cause_and_named_as_it():
 def test_an_unknown_cause_is_refused_by_name():
     with pytest.raises(ValueError, match="no cause named 'gremlins'; there are: creep, leak"):
         by_name("gremlins")
+    with pytest.raises(ValueError, match=r"no cause named 'leek'; did you mean 'leak'\?"):
+        by_name("leek")
+
+
+def test_causes_are_chosen_by_name_or_given():
+    assert chosen() == CATALOGUE
+    assert chosen(["leak", users_cause.CAUSE]) == (by_name("leak"), users_cause.CAUSE)
+    with pytest.raises(ValueError, match="did you mean 'creep'"):
+        chosen(["creap"])
+    with pytest.raises(ValueError, match="'leak' twice"):
+        chosen(["leak", by_name("leak")])
+    with pytest.raises(ValueError, match="causes is empty"):
+        chosen([])
+    with pytest.raises(TypeError, match="give a list of causes or names"):
+        chosen("leak")
+    with pytest.raises(TypeError, match="causes holds 3"):
+        chosen([3])
+
+
+def test_what_a_controller_can_compensate_is_said_of_each_cause():
+    assert tuple(c.name for c in CATALOGUE if c.compensable) == COMPENSABLE
+    assert not by_name("slip_step").compensable
+    assert by_name("payload_error").compensable
+
+
+def test_what_acts_in_the_valve_alone():
+    assert {c.name for c in CATALOGUE if c.in_valve} == {
+        "leak",
+        "valve_dead_band",
+        "dead_time",
+        "slew_limit",
+        "supply_droop",
+        "exhaust_asymmetry",
+    }
 
 
 @pytest.mark.parametrize("cause", CATALOGUE, ids=NAMES)
@@ -145,14 +185,12 @@ def test_neighbours_are_causes_and_mutual(cause):
         assert cause.name in by_name(name).neighbours, f"{name} does not know {cause.name}"
 
 
-def test_what_a_cause_needs_is_what_the_audit_asks_for():
-    def needing(column):
-        return {cause.name for cause in CATALOGUE if column in cause.needs}
-
-    assert {n for cause in CATALOGUE for n in cause.needs} <= set(page.NEEDS)
-    assert needing("contraction") == set(NEED_CONTRACTION)
-    assert needing("loads") >= set(NEED_LOADS)
-    assert needing("temperature") == {"temperature"}
+def test_what_a_cause_needs_is_said_on_the_page():
+    assert {n for cause in CATALOGUE for n in cause.needs} <= set(NEEDS)
+    for word in ("loads", "temperature"):
+        assert all("contraction" in by_name(name).needs for name in needing(word))
+    assert needing("temperature") == ["temperature"]
+    assert needing("weighed") == ["payload_error"]
 
 
 @pytest.mark.parametrize(("form", "term"), TERMS)
@@ -221,14 +259,14 @@ def test_a_cause_that_is_off_changes_nothing(cause, form, plain):
         assert np.array_equal(off[name], values)
 
 
-@pytest.mark.parametrize("name", NEED_CONTRACTION)
+@pytest.mark.parametrize("name", needing("contraction"))
 def test_causes_that_need_the_contraction_leave_the_pressure_alone(name, plain):
     for form in by_name(name).forms:
         changed = replay(PLANT.replace(started(form)), INPUTS)
         assert np.array_equal(changed["pressure"], plain["pressure"])
 
 
-@pytest.mark.parametrize("name", NEED_LOADS)
+@pytest.mark.parametrize("name", needing("loads"))
 def test_causes_of_the_load_do_nothing_without_one(name):
     empty = replay(PLANT, EMPTY)
     for form in by_name(name).forms:

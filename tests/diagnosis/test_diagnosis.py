@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +17,12 @@ from pam_envs.__main__ import main
 from pam_envs.data.recording import Recording, load_recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis import Diagnosis, diagnose
+from pam_envs.diagnosis.audit import undecidable
+from pam_envs.diagnosis.causes import catalogue
+from pam_envs.diagnosis.isolability import ALIKE
+from pam_envs.diagnosis.troubles import explained
 from pam_envs.kernels import COMPILED
+from pam_envs.plants.single_muscle import UnstableParameters
 from tests.diagnosis import hidden
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")
@@ -89,12 +95,51 @@ def test_the_command_writes_the_same_bytes(
     assert np.isfinite(env.step(env.action_space.sample())[0]).all()
 
 
-def test_without_pressure_what_is_in_the_valve_is_not_decided(files: Files) -> None:
+def test_without_pressure_what_is_in_the_valve_is_told_apart_or_not_decided(files: Files) -> None:
     recording, rig = files.load()
     columns = {k: getattr(recording, k) for k in ("contraction", "load", "temperature")}
     labels = [recording.segments[k] for k in recording.segment]
-    blind = Recording.from_arrays(recording.time, recording.command, segment=labels, **columns)
+    blind = Recording.from_arrays(
+        recording.time,
+        recording.command,
+        segment=labels,
+        valve_closed=rig.valve_closed,
+        **columns,
+    )
     told = diagnose(blind, rig=rig, progress=False, closed_loop=False)
     assert "temperature" in told.causes
     assert "pressure" not in told.report["error_after"]
-    assert {"leak", "valve_dead_band"} & {entry["name"] for entry in told.report["not_testable"]}
+    assert any("there is no column pressure_bar" in w for w in told.report["warnings"])
+    valve = {cause.name for cause in catalogue() if cause.in_valve}
+    listed = {entry["name"]: entry["reason"] for entry in told.report["not_testable"]}
+    found = told.report["isolability"]
+    assert valve <= {*listed, *found["names"]}
+    assert not valve & set(told.causes)
+    for name in valve - set(listed):
+        k = found["names"].index(name)
+        others = [c for i, c in enumerate(found["cosine"][k]) if i != k]
+        assert max(others) < ALIKE
+    shut = dataclasses.replace(blind, valve_closed=np.zeros(len(blind.time), bool))
+    bare = dataclasses.replace(rig, valve_closed=())
+    assert "valve was never shut" in undecidable(shut, bare)["leak"]
+
+
+def test_causes_may_be_named(files: Files) -> None:
+    recording, rig = files.load()
+    one = diagnose(recording, rig=rig, causes=["temperature"], progress=False, closed_loop=False)
+    assert (one.verdict, one.causes) == ("named", ("temperature",))
+    with pytest.raises(ValueError, match="did you mean 'temperature'"):
+        diagnose(recording, rig=rig, causes=["temprature"], progress=False)
+
+
+def test_what_no_muscle_does_is_a_sentence_on_the_data(files: Files) -> None:
+    recording, _ = files.load()
+    assert recording.contraction is not None
+    metres = dataclasses.replace(recording, contraction=1e-3 * recording.contraction)
+    with pytest.raises(ValueError, match="looks like metres: multiply by 1000"):
+        diagnose(metres, rig=Rig(), progress=False)
+    with (
+        pytest.raises(ValueError, match=r"check the units of contraction_mm.*RIG.yaml"),
+        explained(),
+    ):
+        raise UnstableParameters("too fast for 4 sub-steps")

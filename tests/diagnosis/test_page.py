@@ -80,7 +80,7 @@ def test_text_of_others_is_escaped():
     made.report["text"] = evil
     made.report["warnings"] = [evil]
     made.report["causes"] = [fakes.CREEP | {"title": evil, "form": evil}]
-    made.report["provenance"]["rig"] = evil
+    made.report["provenance"]["rig"]["source"] = evil
     made.report["not_testable"] = [{"name": evil, "reason": evil}]
     made.report["isolability"]["names"][0] = evil
     made.report["rivals"][2]["name"] = made.report["rivals"][2]["title"] = evil
@@ -119,11 +119,12 @@ def test_one_output_alone(channel):
 def test_parts_that_a_recording_lacks():
     made = without("temperature", "load", "command")
     made.report |= {"closed_loop": None, "isolability": None, "rivals": [], "calibration": []}
+    made.report["closed_loop_reason"] = "a controller cannot compensate creep"
     made.report["noise_floor"] = {"contraction": None, "pressure": None}
     found = json.loads(report_json(made.report))
     jsonschema.validate(found, SCHEMA)
     read = Page(page(found, made.traces))
-    assert "No controller was compared." in read.text
+    assert "No controller was compared: a controller cannot compensate creep." in read.text
     assert "Nothing was refitted." in read.text
     assert read.figures["rivals"] == read.figures["isolability"] == set()
     assert read.figures["loops"] == {"loops"}

@@ -6,6 +6,7 @@ import json
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import numpy as np
@@ -13,6 +14,8 @@ import pytest
 
 from pam_envs.diagnosis import page as page_module
 from pam_envs.diagnosis.report import dumps, plain, report_json, write
+from pam_envs.diagnosis.rule import Rule
+from pam_envs.diagnosis.summary_text import sentence
 from tests.diagnosis import report_fakes as fakes
 from tests.diagnosis.page_reader import SECTIONS, Page
 
@@ -44,7 +47,7 @@ def test_every_verdict_makes_a_valid_report_and_a_page(tmp_path, verdict):
     assert found["text"] in read.text
     assert list(read.figures) == list(SECTIONS)
     fixed = verdict in ("named", "ambiguous")
-    assert {p.name for p in folder.iterdir()} == (FILES if fixed else FILES - {"plant.yaml"})
+    assert {p.name for p in folder.iterdir()} == FILES
     assert bool(read.figures["effects"]) == fixed
     assert bool(read.figures["rivals"]) == (verdict != "insufficient")
 
@@ -61,6 +64,17 @@ def test_every_verdict_makes_a_valid_report_and_a_page(tmp_path, verdict):
         (("causes",), []),
         (("residual_structure", "before", "contraction", "r2", "colour"), 0.1),
         (("surprise",), 1),
+        (("held_out",), None),
+        (("held_out", "by"), "chance"),
+        (("held_out", "kinds"), []),
+        (("held_out", "by"), "blocks"),
+        (("rivals", 0, "why"), "a whim"),
+        (("rivals", 0, "excluded"), True),
+        (("rivals", 2, "excluded"), True),
+        (("rivals", 3, "excluded"), False),
+        (("closed_loop",), None),
+        (("closed_loop_reason",), "there is one"),
+        (("provenance", "rig"), "single_muscle"),
     ],
 )
 def test_the_schema_refuses_what_is_wrong(path, value):
@@ -71,6 +85,36 @@ def test_the_schema_refuses_what_is_wrong(path, value):
     place[path[-1]] = value
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(found, SCHEMA)
+
+
+def told(verdict: str, **changes: Any) -> str:
+    return sentence(json.loads(report_json(fakes.report(verdict) | changes)), Rule())
+
+
+def test_the_sentence_says_on_what_and_which_rivals_stay():
+    text = told("ambiguous")
+    assert "of the kinds steps_held and sine_held, left out of the fits" in text
+    assert "Not excluded: first_cycle_softening." in text
+    assert "sensor_drift" not in text  # left out because it imitates the best
+    assert "blocks of 4 s" in told("adequate", held_out={"by": "blocks", "kinds": [], "share": 0.3})
+
+
+def test_of_several_causes_one_that_may_gain_nothing_is_said_to():
+    weak = {"name": "leak", "title": "a leak", "gain": {"value": 0.03, "interval": [-0.01, 0.1]}}
+    text = told("named", causes=[fakes.CREEP, fakes.CREEP | weak])
+    assert "misses creep of the muscle and a leak" in text
+    assert "Of a leak this is not sure" in text
+    assert "Of creep" not in text
+
+
+def test_what_was_added_without_sufficing_is_said():
+    report = fakes.report("unexplained")
+    after = {"contraction": fakes.error(0.18, "mm", 0.05, 0.1)}
+    text = told("unexplained", causes=[fakes.CREEP], error_after=after)
+    assert "creep of the muscle can carry was added, which makes it 0.18 mm" in text
+    assert "does not suffice" in text
+    assert "time since reversal" in text
+    assert "was added" not in sentence(report, Rule())
 
 
 def test_every_key_is_in_the_schema_and_every_one_is_documented():
@@ -170,7 +214,7 @@ def test_when_writing_fails_the_old_file_stays(plain_page, tmp_path, monkeypatch
 
 def test_a_folder_never_holds_parts_of_two_diagnoses(plain_page, tmp_path):
     folder = folder_of(tmp_path, "named")
-    write(fakes.diagnosis("adequate"), folder)
+    write(fakes.diagnosis("adequate", plant=False), folder)
     assert {p.name for p in folder.iterdir()} == FILES - {"plant.yaml"}
 
 

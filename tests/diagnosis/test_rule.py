@@ -6,10 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
+from pam_envs.diagnosis.fitting import Fit, Problem
 from pam_envs.diagnosis.held_out import kind_of
 from pam_envs.diagnosis.rule import Rule, judge
+from pam_envs.diagnosis.search import Blocks, Candidate
 from pam_envs.diagnosis.structure import spectral_peak
+from pam_envs.diagnosis.verdict import unsure
 
 RULE = Rule()
 
@@ -30,7 +34,7 @@ def level(gain: float, *rivals: dict[str, Any], added: float | None = None, **mo
 
 def evidence(*levels: Any, before: dict[str, Any] | None = None) -> dict[str, Any]:
     none = {"gain": 0.0, "added": 0.0, "unsure": 1.0, "rivals": [], "left": before or left()}
-    return {"levels": [none, *levels]}
+    return {"blocks": 25, "levels": [none, *levels]}
 
 
 LEAK = rival("leak", gain=1.0, better=1.0)
@@ -61,6 +65,12 @@ BOTH = rival("leak", "creep", gain=1.3, better=1.0)
 def test_evidence_words_the_verdict(found: dict[str, Any], verdict: str, names: int) -> None:
     judged = judge(found, RULE)
     assert (judged.verdict, judged.level) == (verdict, names)
+
+
+@pytest.mark.parametrize(("blocks", "verdict"), [(25, "named"), (10, "adequate")])
+def test_few_blocks_have_to_gain_more(blocks: int, verdict: str) -> None:
+    found = evidence(level(0.1, LEAK)) | {"blocks": blocks}
+    assert judge(found, RULE).verdict == verdict
 
 
 @pytest.mark.parametrize(("after", "verdict"), [(2.0, "named"), (6.0, "unexplained")])
@@ -98,3 +108,42 @@ def test_white_noise_has_no_peak_and_a_hum_has(seconds: int) -> None:
     frequency, height = spectral_peak(hum, period)
     assert frequency == pytest.approx(6.3, abs=0.2)
     assert height > RULE.peak
+
+
+# --- how sure a gain is --------------------------------------------------------------------------
+
+
+def compared(
+    change: float, slow: float, seed: int, seconds: int = 300, there: bool = True
+) -> float:
+    """Return how unsure a cause is that is a sine, in noise of which part is slow, or not in it."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(seconds * 50) * 0.02
+    white, kept = rng.standard_normal((2, len(time))), np.exp(-0.02)
+    correlated = lfilter([np.sqrt(1.0 - kept**2)], [1.0, -kept], white[1])
+    noise = np.sqrt(1.0 - slow) * white[0] + np.sqrt(slow) * correlated
+    removed = change * np.sqrt(2.0) * np.sin(2.0 * np.pi * 0.1 * time)
+    blocks = Blocks.make(time, noise[None])
+    problem = Problem(lambda columns: columns, noise[None], np.ones(1), blocks.train, time)
+
+    def model(rows: Any) -> Candidate:
+        residual = rows[problem.order]
+        return Candidate((), Fit((), np.zeros(0), np.zeros(0), residual=residual), residual)
+
+    before, after = (noise + removed, noise) if there else (noise, noise - removed)
+    return unsure(problem, blocks, model(before), model(after), looked=25)
+
+
+@pytest.mark.parametrize("slow", [0.0, 0.5])
+def test_what_is_taken_out_of_the_residual_is_sure(slow: float) -> None:
+    assert compared(1.0, slow, 1) < 1e-3
+
+
+@pytest.mark.parametrize("slow", [0.0, 0.5])
+def test_what_is_not_there_is_not(slow: float) -> None:
+    found = [compared(0.1, slow, seed, there=False) for seed in range(60)]
+    assert sum(value <= RULE.doubt for value in found) <= 1
+
+
+def test_more_data_makes_it_surer() -> None:
+    assert compared(0.3, 0.5, 3, seconds=600) < compared(0.3, 0.5, 3, seconds=60)

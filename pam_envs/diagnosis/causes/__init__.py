@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Sequence
+
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.causes import (
     creep,
@@ -76,6 +79,34 @@ def by_name(name: str) -> Cause:
     for cause in catalogue():
         if cause.name == name:
             return cause
-    raise ValueError(
-        f"no cause named {name!r}; there are: {', '.join(c.name for c in catalogue())}"
-    )
+    names = [c.name for c in catalogue()]
+    close = difflib.get_close_matches(name, names, n=1)
+    hint = f"did you mean {close[0]!r}?" if close else f"there are: {', '.join(names)}"
+    raise ValueError(f"no cause named {name!r}; {hint}")
+
+
+def chosen(given: Sequence[Cause | str] | None = None) -> tuple[Cause, ...]:
+    """Return causes, those given by name from the catalogue; all of it where none are given.
+
+    Raises
+    ------
+    ValueError
+        If there are none, if a name is not known or comes twice.
+    TypeError
+        If something is neither a cause nor a name.
+    """
+    if given is None:
+        return catalogue()
+    if isinstance(given, str):
+        raise TypeError(f"causes is {given!r}; give a list of causes or names")
+    made: list[Cause] = []
+    for one in given:
+        cause = by_name(one) if isinstance(one, str) else one
+        if not isinstance(cause, Cause):
+            raise TypeError(f"causes holds {one!r}; give a Cause or the name of one")
+        if cause.name in {c.name for c in made}:
+            raise ValueError(f"causes holds {cause.name!r} twice; give each once")
+        made.append(cause)
+    if not made:
+        raise ValueError("causes is empty; name at least one, or leave it out for the catalogue")
+    return tuple(made)

@@ -51,4 +51,5 @@ CAUSE = Cause(
     ),
     needs=("contraction",),
     sensor="a load cell at a blocked length, beside the pressure",
+    compensable=True,
 )

@@ -35,4 +35,5 @@ CAUSE = Cause(
         "over pressures."
     ),
     sensor="a fast pressure sensor at the valve's outlet",
+    compensable=True,
 )

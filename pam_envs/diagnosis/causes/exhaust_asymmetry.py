@@ -40,5 +40,7 @@ CAUSE = Cause(
         "down, 24 % of the way left after a second; an open wrist-robot project's identified ITV "
         "regulator, with the flow law of ISO 6358."
     ),
+    needs=("exhaust",),
     sensor="a fast pressure sensor at the muscle",
+    compensable=True,
 )

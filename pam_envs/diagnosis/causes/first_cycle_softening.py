@@ -35,7 +35,8 @@ CAUSE = Cause(
         "Mullins 1969, Rubber Chemistry and Technology 42; an open wrist-robot project: loops of "
         "80 kPa in the first cycle, 53 kPa in the second."
     ),
-    needs=("contraction",),
+    needs=("contraction", "rest"),
     once=True,
     sensor="a load cell at a blocked length, over the first cycles",
+    compensable=True,
 )

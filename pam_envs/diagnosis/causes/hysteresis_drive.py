@@ -45,4 +45,5 @@ CAUSE = Cause(
     ),
     needs=("contraction",),
     sensor="a load cell at a blocked length",
+    compensable=True,
 )

@@ -30,4 +30,5 @@ CAUSE = Cause(
     ),
     needs=("contraction",),
     sensor="a load cell at a blocked length, for the part that length does not drive",
+    compensable=True,
 )

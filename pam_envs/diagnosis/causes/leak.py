@@ -26,5 +26,7 @@ CAUSE = Cause(
         "Public fill and leak traces of a 20 mm muscle: time constants of 75 to 250 s, 5200 s on "
         "one tight rig."
     ),
+    needs=("valve_closed",),
     sensor="a flow meter in the feed, read while the pressure is held",
+    compensable=True,
 )

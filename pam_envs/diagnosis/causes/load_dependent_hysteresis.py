@@ -28,4 +28,5 @@ CAUSE = Cause(
     ),
     needs=("contraction", "loads"),
     sensor="a load cell between muscle and load",
+    compensable=True,
 )

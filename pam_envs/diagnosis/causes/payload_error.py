@@ -1,8 +1,8 @@
 """Error of the payload: something hangs beside the load that is told.
 
 A tray, a hook or a forgotten weight pulls and is accelerated with every load. Where nothing hangs
-there is no tray, so that the unloaded curve fits. With loads declared to a tolerance, what lies
-beyond it is an error of the payload.
+there is no tray, so that the unloaded curve fits. It takes loads that are declared to a tolerance:
+what surely lies beyond it is an error of the payload, what lies within is refitted.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ CAUSE = Cause(
         "Assumed: trays and hooks of rigs weigh up to a few hundred grams; it is told from a gain "
         "of the static map by changing the mass."
     ),
-    needs=("contraction", "loads"),
+    needs=("contraction", "loads", "weighed"),
     sensor="scales",
+    compensable=True,
 )

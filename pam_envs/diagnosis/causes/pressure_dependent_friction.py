@@ -38,4 +38,5 @@ CAUSE = Cause(
     ),
     needs=("contraction",),
     sensor="a load cell between muscle and load",
+    compensable=True,
 )

@@ -26,6 +26,7 @@ CAUSE = Cause(
         "An open wrist-robot project: readings 15 to 25 ms behind a simulation driven by the "
         "measured pressure."
     ),
-    needs=("contraction", "pressure"),
+    needs=("contraction",),
     sensor="an accelerometer on the load, or a camera",
+    compensable=True,
 )

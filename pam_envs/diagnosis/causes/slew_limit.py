@@ -35,4 +35,5 @@ CAUSE = Cause(
         "exponential; ISO 6358 for the flow through a valve."
     ),
     sensor="a fast pressure sensor at the muscle",
+    compensable=True,
 )

@@ -44,4 +44,5 @@ CAUSE = Cause(
         "bar over four cycles at the same command."
     ),
     sensor="a pressure sensor before the valve",
+    compensable=True,
 )

@@ -27,4 +27,5 @@ CAUSE = Cause(
     ),
     needs=("contraction", "temperature"),
     sensor="a thermocouple on the muscle",
+    compensable=True,
 )

@@ -36,4 +36,5 @@ CAUSE = Cause(
     ),
     needs=("contraction",),
     sensor="a load cell between muscle and load",
+    compensable=True,
 )

@@ -27,4 +27,5 @@ CAUSE = Cause(
     ),
     needs=("contraction", "loads"),
     sensor="a load cell between muscle and load",
+    compensable=True,
 )

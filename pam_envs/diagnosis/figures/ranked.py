@@ -130,8 +130,7 @@ def rivals(report: Report) -> Picture | None:
     ax = canvas.axes(left, LEGEND, WIDTH - left - 60.0, step * len(entries))
     lows, highs = [0.0], [0.05]
     for i, rival in enumerate(entries):
-        gain = value(rival["gain"]) or 0.0
-        low, high = _spread(rival["gain"], gain)
+        gain, (low, high) = _comparable(rival, entries[0], report)
         colour = _rival_colour(rival, named)
         ax.barh(i, gain, height=0.62, color=colour)
         ax.plot([low, high], [i, i], color=INK, linewidth=1.4, solid_capstyle="butt")
@@ -156,9 +155,11 @@ def rivals(report: Report) -> Picture | None:
     canvas.legend(_rival_legend(entries, named, most), left)
     return canvas.picture(
         "rivals",
-        "gain of the candidates, best first: " + ", ".join(r["name"] for r in entries[:5]),
+        "gain of the candidates, in the order of the decision: "
+        + ", ".join(r["name"] for r in entries[:5]),
         "Each bar is a candidate fitted together with the ordinary parameters, the thin line the "
-        "interval of its gain; at the dashed line nothing but noise would be left.",
+        "interval of its gain, without what is held out; the order is that of the decision, on "
+        "blocks of the whole recording. At the dashed line nothing but noise would be left.",
     )
 
 
@@ -176,19 +177,30 @@ def _spread(gain: Any, middle: float) -> tuple[float, float]:
     return (middle if low is None else float(low), middle if high is None else float(high))
 
 
+def _comparable(rival: Report, best: Report, report: Report) -> tuple[float, tuple[float, float]]:
+    """Return a gain with its interval; judged elsewhere, from how far it is behind there."""
+    where = (report.get("held_out") or {}).get("by")
+    if rival.get("held_out", where) == where or rival.get("behind") is None:
+        gain = value(rival["gain"]) or 0.0
+        return gain, _spread(rival["gain"], gain)
+    top, behind = value(best["gain"]) or 0.0, value(rival["behind"]) or 0.0
+    low, high = _spread(rival["behind"], behind)
+    return top - behind, (top - high, top - low)
+
+
 def _rival_colour(rival: Report, named: set[Any]) -> str:
-    """Tell the named cause, or causes joined by "+", from open and excluded rivals."""
+    """Tell the named cause, or causes joined by "+", from open and other rivals."""
     forms = {n[1] for n in named if isinstance(n, tuple) and n[0] == rival["name"]}
     parts = set(re.split(r"\s*[+,]\s*", rival["name"]))
     if parts <= named and (not forms or rival.get("form") in forms):
         return EXTENDED
-    return GREY if rival.get("excluded") else RISING
+    return RISING if rival.get("why") == "not excluded" else GREY
 
 
 def _rival_legend(
     entries: Sequence[Report], named: set[Any], most: float | None
 ) -> list[tuple[str, str, dict[str, Any]]]:
-    labels = {EXTENDED: "named", RISING: "not excluded", GREY: "excluded"}
+    labels = {EXTENDED: "named", RISING: "not excluded", GREY: "left out: see the table"}
     present = {_rival_colour(r, named) for r in entries}
     legend = [("area", labels[c], {"facecolor": c}) for c in labels if c in present]
     return legend if most is None else [*legend, NOISE_FLOOR]
@@ -223,10 +235,10 @@ def kinds(report: Report) -> Picture | None:
     return panels.canvas.picture(
         "kinds",
         f"held-out error by kind of segment: {', '.join(names)}",
-        "The further left the second dot, the more the fix helped on segments that no fit had "
-        "seen; only chance gets left of the dashed line."
+        "The further left the second dot, the more the fix helped on what was left out of the "
+        "fits; only chance gets left of the dashed line."
         if both
-        else "Each dot is the error on segments that no fit had seen; only chance gets left of the "
+        else "Each dot is the error on what was left out of the fits; only chance gets left of the "
         "dashed line.",
     )
 

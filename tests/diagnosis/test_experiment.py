@@ -1,0 +1,220 @@
+"""The next experiment: what a rig can do, and what tells fitted rivals apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pam_envs.data.recording import Recording, Rig
+from pam_envs.diagnosis.causes import by_name, catalogue
+from pam_envs.diagnosis.experiment import (
+    ENOUGH,
+    Rival,
+    Sensors,
+    inputs_of,
+    propose,
+    rival_of,
+    separations,
+)
+from pam_envs.diagnosis.fitting import Fit
+from pam_envs.diagnosis.plans import PERIOD, Means, plans
+from pam_envs.diagnosis.single_muscle import MuscleFamily, start_plant
+from pam_envs.kernels import COMPILED
+from pam_envs.plants.single_muscle import SingleMuscle
+
+compiled = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")
+
+PLANT = start_plant(Rig(rest_length=0.2))
+NOISE = np.array([5e-5, 1e3])
+ABLE = Means(6e5, (0.0, 15.0, 30.0, 45.0, 60.0), shut=True, warm=True)
+POOR = Means(3e5, (20.0,), shut=False, warm=False)
+
+
+def recording(**changes) -> Recording:
+    n = 2000
+    columns = {
+        "time": PERIOD * np.arange(n),
+        "command": 1e5 * (2.0 + 2.0 * np.sin(0.01 * np.arange(n))),
+        "pressure": 1e5 * (2.0 + 2.0 * np.sin(0.01 * np.arange(n))),
+        "load": np.repeat([10.0, 40.0], n // 2),
+        "segment": ["one"] * (n // 2) + ["shut"] * (n // 2),
+        **changes,
+    }
+    return Recording.from_arrays(columns.pop("time"), columns.pop("command"), **columns)
+
+
+def rival(name: str, *nearby: dict, **values: float) -> Rival:
+    """Return a plant with some parameters, and those that move a little as its own."""
+    here = {key.replace("__", "."): value for key, value in values.items()}
+    plants = [PLANT.replace({**here, **more}) for more in ({}, *nearby)]
+    columns = np.array([p.parameter_rows() for p in plants])
+    return Rival((name,), columns[0], columns[1:])
+
+
+def proposed(first: Rival, *others: Rival, noise=NOISE, means=ABLE):
+    return propose(PLANT, first, others, noise, means, catalogue())
+
+
+# what a rig can do
+
+
+def test_means_are_what_the_recording_shows():
+    plain = Means.of(recording(), Rig())
+    assert plain == Means(pytest.approx(4e5, rel=1e-3), (10.0, 40.0), shut=False, warm=False)
+    assert Means.of(recording(valve_closed=("shut",)), Rig()).shut
+    assert Means.of(recording(), Rig(valve_closed=("shut",))).shut
+    assert Means.of(recording(temperature=np.full(2000, 20.0)), Rig()).warm
+
+
+def test_a_rig_that_can_do_it_all_is_offered_every_plan():
+    names = [p.name for p in plans(ABLE)]
+    assert len(set(names)) == len(names)
+    assert {"valve_shut", "warm_muscle", "heavy_load", "light_load", "several_loads"} <= set(names)
+
+
+def test_a_poor_rig_is_offered_what_it_can_do():
+    offered = plans(POOR)
+    assert {p.name for p in plans(ABLE)} - {p.name for p in offered} == {
+        "valve_shut",
+        "warm_muscle",
+        "heavy_load",
+        "light_load",
+        "several_loads",
+    }
+    for plan in offered:
+        assert set(plan.loads) == {20.0}
+        assert plan.command.min() >= 0.0
+        assert not plan.kelvin.any()
+
+
+@pytest.mark.parametrize("means", [ABLE, POOR, Means(2e5, (5.0, 8.0), shut=True, warm=False)])
+def test_no_plan_leaves_what_was_recorded(means):
+    for plan in plans(means):
+        assert set(plan.loads) <= set(means.loads)
+        assert plan.command.max() <= means.full
+        assert plan.command[plan.command < 0.0].tolist() == [-1.0] * int(np.sum(plan.command < 0))
+        assert len(plan.command) == len(plan.load) == len(plan.kelvin)
+        assert 30.0 < len(plan.command) * PERIOD <= 125.0
+
+
+def test_the_segments_are_what_is_run():
+    for plan in plans(ABLE):
+        assert sum(s["seconds"] for s in plan.segments) == pytest.approx(
+            len(plan.command) * PERIOD, abs=0.05
+        )
+        at = 0
+        for piece in plan.segments:
+            n = round(piece["seconds"] / PERIOD)
+            command, load = plan.command[at : at + n], plan.load[at : at + n]
+            assert set(load) == {piece["load_N"]}
+            if piece["valve"] == "closed":
+                assert set(command) == {-1.0}
+            elif "swing_hz" in piece:
+                assert command.min() == pytest.approx(1e5 * piece["from_bar"], abs=100.0)
+                assert command.max() == pytest.approx(1e5 * piece["to_bar"], abs=3e3)
+            else:
+                assert command[0] == pytest.approx(1e5 * piece["from_bar"], abs=100.0)
+                assert command[-1] == pytest.approx(1e5 * piece["to_bar"], abs=100.0)
+            assert piece["warmer_by_K"] == pytest.approx(plan.kelvin[at + n - 1], abs=0.01)
+            at += n
+
+
+# what tells rivals apart
+
+
+@compiled
+def test_a_sensor_that_is_not_there_sees_nothing():
+    plain, bowed = rival("plain"), rival("sensor_nonlinearity", pressure__bow=0.05)
+    inputs = inputs_of(plans(ABLE)[0])
+    (both,) = separations(PLANT, (plain, bowed), inputs, Sensors(NOISE))
+    (blind,) = separations(PLANT, (plain, bowed), inputs, Sensors(np.array([5e-5, np.inf])))
+    assert both > ENOUGH
+    assert blind == 0.0
+    assert not proposed(plain, bowed, noise=np.array([5e-5, np.inf]))["enough"]
+
+
+@compiled
+def test_a_rival_that_only_has_to_be_refitted_is_not_apart():
+    """More of the same cause is no other cause, however large the difference."""
+    little = rival("leak", {"regulator.leak": 0.0101}, regulator__leak=0.01)
+    more = rival("leak", {"regulator.leak": 0.0102}, regulator__leak=0.0101)
+    fixed = rival("leak", regulator__leak=0.0101)
+    plan = next(p for p in plans(ABLE) if p.name == "valve_shut")
+    loud = Sensors(1e-3 * NOISE)
+    (stiff,) = separations(
+        PLANT, (rival("leak", regulator__leak=0.01), fixed), inputs_of(plan), loud
+    )
+    (free,) = separations(PLANT, (little, more), inputs_of(plan), loud)
+    assert stiff > 10.0
+    assert free < 1e-3 * stiff
+
+
+@compiled
+def test_shutting_the_valve_is_proposed_for_a_leak_where_it_can_be_shut():
+    leak = rival("leak", {"regulator.leak": 0.011}, regulator__leak=0.01)
+    creep = rival("creep", {"memory.creep_2": 0.011}, memory__creep_2=0.01)
+    able = proposed(leak, creep)
+    assert able["name"] == "valve_shut"
+    assert able["enough"]
+    assert {s["valve"] for s in able["segments"]} == {"open", "closed"}
+    poor = proposed(leak, creep, means=POOR)
+    assert poor["name"] != "valve_shut"
+    assert poor["separation"] < able["separation"]
+    assert able["between"] == ["leak", "creep"]
+    assert by_name("leak").sensor in able["sensor"]
+    assert by_name("creep").sensor in able["sensor"]
+
+
+@compiled
+def test_the_nearest_rival_decides():
+    """Each rival alone has its best experiment; for all of them the least one counts."""
+    leak = rival("leak", regulator__leak=0.01)
+    creep = rival("creep", memory__creep_2=0.01)
+    late = rival("dead_time", regulator__dead_time=0.03)
+    both = proposed(leak, creep, late)
+    alone = [proposed(leak, other)["separation"] for other in (creep, late)]
+    assert both["separation"] <= min(alone)
+    assert both["between"] == ["leak", "creep", "dead_time"]
+    plan = next(p for p in plans(ABLE) if p.name == both["name"])
+    assert both["separation"] == pytest.approx(
+        min(separations(PLANT, (leak, creep, late), inputs_of(plan), Sensors(NOISE)))
+    )
+
+
+@compiled
+def test_what_no_experiment_tells_apart_is_said():
+    one = rival("sensor_bias", position__bias=1e-3)
+    other = rival("sensor_drift", position__bias=2e-3)
+    found = proposed(one, other)
+    assert not found["enough"]
+    assert found["separation"] == pytest.approx(0.0, abs=1e-9)
+    assert "no experiment of the list tells sensor_bias from sensor_drift" in found["description"]
+    assert by_name("sensor_bias").sensor in found["sensor"]
+
+
+def test_a_fit_becomes_a_rival_with_its_own_parameters_moved():
+    family = MuscleFamily(PLANT, inputs_of(plans(POOR)[0]))
+    base = family.free("regulator.gain")
+    own = (
+        family.free("regulator.leak", start=0.01, scale=0.005),
+        family.free("mass.slack", start=family_high(family, "mass.slack"), scale=1e-4),
+    )
+    fit = Fit((base, *own), np.array([f.inner(f.start) for f in (base, *own)]), family.column)
+    found = rival_of(("leak", "wire_slack"), fit, 1, family.tie)
+    assert found.label == "leak+wire_slack"
+    moved = found.nearby - found.column
+    assert [np.flatnonzero(row).tolist() for row in moved] == [[f.place] for f in own]
+    assert moved[0, own[0].place] == pytest.approx(0.02 * 0.005)
+    assert moved[1, own[1].place] == pytest.approx(-0.02 * 1e-4)
+
+
+def family_high(family: MuscleFamily, name: str) -> float:
+    return float(family.free(name).high)
+
+
+def test_plans_start_at_rest_with_the_kind_of_the_plant():
+    assert isinstance(PLANT, SingleMuscle)
+    inputs = inputs_of(plans(ABLE)[0], 0.005)
+    assert inputs.longest_step == 0.005
+    assert inputs.fresh.tolist()[:2] == [True, False]
+    assert inputs.command[0] == 0.0

@@ -1,0 +1,138 @@
+"""What is held out, intervals of parameters, why rivals go: on plain numbers."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pam_envs.diagnosis.cause import Cause, Form, Term
+from pam_envs.diagnosis.fitting import Fit, Free
+from pam_envs.diagnosis.held_out import LEAST_BLOCKS, Choice, HeldOut, choose
+from pam_envs.diagnosis.rule import Rule
+from pam_envs.diagnosis.search import Blocks, Candidate
+from pam_envs.diagnosis.summary_causes import EXCLUDED, reasons, span
+from pam_envs.diagnosis.verdict import Decision
+
+PERIOD = 0.05
+
+
+def recording(*labels: str, seconds: float = 20.0) -> Any:
+    """Return as much of a recording as is looked at: a sine in each segment."""
+    n = round(seconds / PERIOD)
+    time = np.arange(n * len(labels)) * PERIOD
+    command = 2e5 * (1.0 + np.sin(time))
+    return SimpleNamespace(
+        segments=labels, segment=np.repeat(np.arange(len(labels)), n), command=command, time=time
+    )
+
+
+def blocks_of(record: Any) -> Blocks:
+    return Blocks.make(record.time, np.zeros((1, len(record.time))))
+
+
+def test_whole_kinds_are_held_out_and_named() -> None:
+    record = recording("sine_a", "steps", "sine_b", "ramp", "holds")
+    choice = choose(record, blocks_of(record))
+    assert choice.by == "kinds"
+    assert set(choice.kinds) < {"sine", "steps", "ramp", "holds"}
+    for k, label in enumerate(record.segments):
+        left = choice.rows[record.segment == k]
+        assert left.all() == left.any() == (label.split("_")[0] in choice.kinds)
+    assert 0.15 <= choice.rows.mean() <= 0.4
+
+
+@pytest.mark.parametrize("labels", [("a",), ("sine", "steps"), ("run1", "run2", "run3", "run4")])
+def test_with_too_few_kinds_blocks_are_held_out_and_it_says_so(labels: tuple[str, ...]) -> None:
+    record = recording(*labels, seconds=60.0)
+    blocks = blocks_of(record)
+    choice = choose(record, blocks)
+    assert (choice.by, choice.kinds) == ("blocks", ())
+    np.testing.assert_array_equal(choice.rows, ~blocks.train)
+
+
+def held(blocks: int) -> HeldOut:
+    """Return something held out in so many blocks."""
+    rng = np.random.default_rng(3)
+    of = np.repeat(np.arange(blocks), 50)
+    part = Blocks(of, np.ones(blocks, bool), np.full((1, blocks), 50.0))
+    errors = rng.uniform(40.0, 60.0, (2, 1, blocks))
+    before, after = (Candidate((), Fit((), np.zeros(0), np.zeros(0)), e) for e in errors)
+    choice = Choice(np.ones(len(of), bool), "blocks")
+    return HeldOut(choice, None, part, 0, before, after)  # type: ignore[arg-type]
+
+
+def test_a_gain_has_an_interval_only_with_blocks_enough() -> None:
+    many, few = held(LEAST_BLOCKS), held(LEAST_BLOCKS - 1)
+    found = many.gain(many.base, many.model)
+    low, high = found["interval"]
+    assert low < found["value"] < high
+    assert few.gain(few.base, few.model)["interval"] is None
+    assert many.gain(many.base, many.base) == {"value": 0.0, "interval": [0.0, 0.0]}
+
+
+def free(log: bool = False) -> Free:
+    return Free("muscle.area", 0, 1.0, 1e4, 1.0, log=log)
+
+
+@pytest.mark.parametrize(
+    ("value", "sd", "log", "ends", "at_bound", "not_identified"),
+    [
+        (100.0, 10.0, False, (80.4, 119.6), False, False),
+        (100.0, 5e3, False, (1.0, 9900.0), False, True),
+        (1.0, 10.0, False, (None, 20.6), True, False),
+        (1e4, 10.0, False, (9980.4, None), True, False),
+        (100.0, 0.1, True, (82.2, 121.7), False, False),
+        (100.0, 0.7, True, (25.36, 394.3), False, True),
+    ],
+)
+def test_an_interval_says_what_it_is_worth(
+    value: float,
+    sd: float,
+    log: bool,
+    ends: tuple[float | None, float | None],
+    at_bound: bool,
+    not_identified: bool,
+) -> None:
+    found = span(free(log), value, free(log).inner(value), sd)
+    for end, wanted in zip(found["interval"], ends, strict=True):
+        assert end == (None if wanted is None else pytest.approx(wanted, rel=1e-3))
+    assert (found["at_bound"], found["not_identified"]) == (at_bound, not_identified)
+
+
+def candidate(*names: str) -> Candidate:
+    causes = tuple((Cause(n, n, ()), Form("linear", (Term("x", (1.0,)),))) for n in names)
+    return Candidate(causes, Fit((), np.zeros(0), np.zeros(0)), np.zeros((1, 1)))
+
+
+def row(c: Candidate, gain: float, better: float, imitates: bool = False) -> dict[str, Any]:
+    forms = [form.name for _, form in c.causes]
+    made = {"names": list(c.names), "forms": forms, "gain": gain, "better": better}
+    return made | {"imitates": imitates}
+
+
+def test_the_words_on_rivals_are_those_of_the_decision() -> None:
+    best, close, like, weak, worse = (
+        candidate(n) for n in ("leak", "creep", "resonance", "temperature", "wire_slack")
+    )
+    rows = [
+        row(best, 1.0, 1.0),
+        row(close, 0.9, 0.3),
+        row(like, 1.0, 0.5, imitates=True),
+        row(weak, 0.5, 0.3),
+        row(worse, 0.9, 0.01),
+    ]
+    evidence = {"levels": [{"rivals": []}, {"rivals": rows}]}
+    rivals = [best, close, like, weak, worse]
+    found = reasons(Decision("ambiguous", best, rivals, [close], {}, evidence), Rule())
+    assert found == ["the best", "not excluded", "imitates it", "gains less", "surely worse"]
+    assert [word in EXCLUDED for word in found] == [False, False, False, True, True]
+
+
+def test_where_nothing_was_named_every_rival_gains_too_little() -> None:
+    rival = candidate("leak")
+    evidence = {"levels": [{"rivals": []}, {"rivals": [row(rival, 0.01, 1.0)]}]}
+    decision = Decision("adequate", candidate(), [rival], [], {}, evidence)
+    assert reasons(decision, Rule()) == ["gains too little"]

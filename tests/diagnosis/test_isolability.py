@@ -1,0 +1,229 @@
+"""Which causes a recording can show: at their bounds, on both sides, and beside one another."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from pam_envs.data.recording import Recording, Rig
+from pam_envs.diagnosis.cause import Cause, Form, Term
+from pam_envs.diagnosis.causes import by_name, catalogue
+from pam_envs.diagnosis.diagnosis import Study
+from pam_envs.diagnosis.isolability import Isolability, ends, isolability, twins
+from pam_envs.diagnosis.noise import noise_floor
+from pam_envs.diagnosis.search import begun
+from pam_envs.diagnosis.single_muscle import start_plant
+from pam_envs.diagnosis.testable import LEAST_SIZE, not_testable, too_few
+from pam_envs.diagnosis.tolerance import inside, limit_of, released
+from pam_envs.kernels import COMPILED
+from tests.diagnosis import hidden, users_cause
+
+needs_kernels = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")
+BAR = 1e5
+
+
+def study_of(**changes: object) -> Study:
+    """Return the base, refitted to a clean rig."""
+    base, campaign = hidden.draw_base(np.random.default_rng(3)), hidden.campaign_short(1)
+    columns = hidden.make_recording(base, [], campaign, noise_seed=5)
+    told = hidden.rig_yaml(base, campaign)
+    sheet = Rig(
+        rest_length=1e-3 * told["muscle"]["rest_length_mm"],
+        diameter=1e-3 * told["muscle"]["diameter_mm"],
+        max_pressure=6e5,
+        contraction_noise=4.5e-5,
+        pressure_noise=1260.0,
+        valve_closed=tuple(told["valve_closed"]),
+        tolerance=told["tolerance"],
+    )
+    recording = Recording.from_arrays(
+        columns["time_s"],
+        columns["pressure_command_bar"] * BAR,
+        pressure=columns["pressure_bar"] * BAR,
+        contraction=columns["contraction_mm"] * 1e-3,
+        load=columns["load_N"],
+        temperature=columns["temperature_C"],
+        segment=columns["segment"].tolist(),
+        valve_closed=sheet.valve_closed,
+    )
+    recording = dataclasses.replace(recording, **changes)
+    return Study.begin(recording, sheet, start_plant(sheet), noise_floor(recording, sheet))
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    return study_of()
+
+
+@pytest.fixture(scope="module")
+def blind() -> Study:
+    return study_of(pressure=None)
+
+
+def of(study: Study, causes: list[Cause]) -> Isolability:
+    return isolability(study.problem, study.family, study.base.fit, causes)
+
+
+def told(study: Study, causes: list[Cause]) -> dict[str, str]:
+    return not_testable(
+        study.problem, study.family, study.base.fit, causes, study.recording, study.sheet
+    )[1]
+
+
+def cause_of(name: str, parameter: str, start: float, **bounds: float) -> Cause:
+    term = Term(parameter, (start,), scale=abs(start), **bounds)
+    return Cause(name, name, (Form("one", (term,)),))
+
+
+@needs_kernels
+def test_what_a_cause_shows_at_most_is_at_its_bounds(study):
+    """The bound counts, not a multiple of where a fit begins; and both signs."""
+    narrow = cause_of("narrow", "position.bias", 1e-7, low=-1e-6, high=1e-6)
+    wide = cause_of("wide", "position.bias", 1e-7, low=-1e-6, high=5e-4)
+    below = cause_of("below", "position.bias", 1e-7, low=-5e-4, high=1e-6)
+    reach = dict(
+        zip(("narrow", "wide", "below"), of(study, [narrow, wide, below]).reach, strict=True)
+    )
+    assert reach["narrow"] < 0.03
+    assert reach["wide"] == pytest.approx(500.0 * reach["narrow"], rel=1e-3)
+    assert reach["below"] == pytest.approx(reach["wide"], rel=1e-6)
+    reasons = told(study, [narrow, wide, below])
+    assert set(reasons) == {"narrow"}
+    assert f"shows at most {reach['narrow']:.2g} times the noise" in reasons["narrow"]
+
+
+@needs_kernels
+def test_both_bounds_of_every_form_are_looked_at(study):
+    for cause in (by_name("creep"), by_name("exhaust_asymmetry"), by_name("supply_droop")):
+        for form in cause.forms:
+            fits = begun(study.problem, study.family, study.base.fit, cause, form)
+            low, high, far = ends(fits)
+            for term, free in zip(form.terms, fits[0].frees[-len(form.terms) :], strict=True):
+                if term.amount:
+                    assert (low[free.place], high[free.place]) == (free.low, free.high)
+                    assert free.low <= far[free.place] <= free.high
+                else:
+                    assert low[free.place] == high[free.place] == pytest.approx(free.start)
+
+
+@needs_kernels
+def test_what_shows_nothing_where_it_begins_has_no_absorbed_share(study):
+    silent = cause_of("silent", "position.bias", 1e-12, low=-5e-4, high=5e-4)
+    found = of(study, [silent, by_name("leak")])
+    assert np.isnan(found.absorbed[0])
+    assert found.reach[0] > LEAST_SIZE
+    assert 0.0 < found.absorbed[1] < 0.5
+    bias = of(study, [silent, by_name("sensor_bias")])
+    assert bias.cosine[0, 1] > 0.5  # what it shows at its bounds stands for it
+
+
+@needs_kernels
+def test_no_more_is_simulated_than_two_columns_a_form_and_one_a_start(study):
+    columns = []
+    problem = dataclasses.replace(
+        study.problem, simulate=lambda c: (columns.append(len(c)), study.problem.simulate(c))[1]
+    )
+    isolability(problem, study.family, study.base.fit, catalogue())  # looks for starts
+    columns.clear()
+    isolability(problem, study.family, study.base.fit, catalogue())
+    assert sum(columns) <= 207
+
+
+@needs_kernels
+def test_a_form_that_has_no_effect_here_is_left_out_with_its_reason(study):
+    reasons = told(study, list(catalogue()))
+    left = {c.name for c in catalogue()} - set(reasons)
+    assert {"creep", "leak", "temperature", "sensor_bias", "stick_slip"} <= left
+    empty = dataclasses.replace(
+        study.recording, load=np.zeros(len(study.recording.time)), temperature=None
+    )
+    lacking = not_testable(
+        study.problem, study.family, study.base.fit, catalogue(), empty, study.sheet
+    )[1]
+    assert lacking["payload_error"] == "the load was 0 N throughout"
+    assert lacking["temperature"] == "the temperature was not recorded"
+
+
+@needs_kernels
+def test_a_users_cause_is_judged_as_ours(study):
+    assert told(study, [users_cause.CAUSE]) == {}
+    one_load = dataclasses.replace(study.recording, load=np.full(len(study.recording.time), 20.0))
+    reasons = not_testable(
+        study.problem, study.family, study.base.fit, [users_cause.CAUSE], one_load, study.sheet
+    )[1]
+    assert reasons == {"sprung_load": "the load was 20 N throughout"}
+
+
+# without pressure
+
+
+@needs_kernels
+def test_without_pressure_what_looks_alike_is_not_decided(blind, study):
+    """A gain of the reading of the pressure shows in nothing else; a delay shows as another."""
+    late = cause_of("late", "regulator.dead_time", 0.01)
+    later = dataclasses.replace(late, name="later")
+    reasons = told(blind, [late, later, by_name("leak")])
+    assert reasons == {
+        "late": "cannot be told from later without pressure_bar",
+        "later": "cannot be told from late without pressure_bar",
+    }
+    assert told(study, [late, later]) == {}
+    bow = cause_of("bow", "pressure.bow", 0.01)
+    assert "shows at most 0 times" in told(blind, [bow, by_name("leak")])["bow"]
+    assert told(study, [bow]) == {}
+
+
+@needs_kernels
+def test_without_pressure_every_cause_of_the_valve_is_told_apart_or_listed(blind):
+    causes = list(catalogue())
+    found, reasons = not_testable(
+        blind.problem, blind.family, blind.base.fit, causes, blind.recording, blind.sheet
+    )
+    valve = [c.name for c in causes if c.in_valve]
+    assert set(valve) <= {*found.names, *reasons}
+    alike = twins(found, causes)
+    assert set(alike) <= set(reasons)
+    for name in valve:
+        if name not in reasons:
+            cosines = np.delete(found.cosine[found.names.index(name)], found.names.index(name))
+            assert cosines.max() < 0.9
+
+
+# loads that are known to a tolerance
+
+
+def test_an_error_of_the_load_is_inside_what_was_declared_or_not():
+    loads = [0.0, 1.5, 3.0, 6.0]
+    assert limit_of(loads, 0.02) == pytest.approx(0.03)
+    assert inside((-0.01, 0.01), loads, 0.02)
+    assert inside((0.025, 0.2), loads, 0.02)  # it may be
+    assert not inside((0.035, 0.2), loads, 0.02)
+    assert inside((-0.2, -0.025), loads, 0.02)
+    assert not inside((-0.2, -0.035), loads, 0.02)
+    assert inside((0.035, 0.2), loads, 0.05)
+    assert not inside((-0.035, -0.2), loads, 0.02)  # either way round
+    assert not inside((0.035, np.inf), loads, 0.02)
+    assert inside((5.0, 6.0), [0.0, 0.0], 0.02)  # of nothing there is no error
+
+
+@needs_kernels
+def test_a_released_load_is_refitted_within_its_tolerance(study):
+    free = released(study.problem, study.blocks, study.family, study.base, 0.03)
+    value = free.fit.values()["mass.load_error"]
+    assert abs(value) <= 0.03
+    assert free.names == ()
+    assert len(free.fit.slopes) == len(free.fit.frees) == len(study.base.fit.frees) + 1
+    assert free.fit.cost <= study.base.fit.cost * (1.0 + 1e-6)
+
+
+# how many are enough
+
+
+@pytest.mark.parametrize(
+    ("testable", "asked", "few"),
+    [(0, 1, True), (1, 1, False), (2, 3, False), (1, 3, True), (4, 25, True), (5, 25, False)],
+)
+def test_few_testable_causes_count_against_those_asked_for(testable, asked, few):
+    assert too_few(testable, asked) is few

@@ -1,0 +1,138 @@
+"""The noise floor where repeats differ by more than noise."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from pam_envs.data.recording import Recording, Rig
+from pam_envs.diagnosis.noise import ChannelFloor, noise_floor
+from tests.diagnosis.test_audit import NOISE, RIG, arrays, made
+
+UNDECLARED = dataclasses.replace(RIG, contraction_noise=None, pressure_noise=None)
+
+
+def recorded(columns: dict) -> Recording:
+    return Recording.from_arrays(columns.pop("time"), columns.pop("command"), **columns)
+
+
+def changed(share: float, white: float = 1.0, slow: float = 0.0, seed: int = 0) -> Recording:
+    """Return a campaign in the second repeat of which the stroke is another.
+
+    ``share`` is the RMS of what that adds to the difference of the repeats, over that of noise.
+    """
+    columns = arrays(seed, white, slow)
+    second = made().rows_of("holds_b")
+    level = columns["command"][second] - columns["command"][second].mean()
+    rms = np.sqrt(2.0) * NOISE["contraction"]
+    columns["contraction"] = columns["contraction"].copy()
+    columns["contraction"][second] += share * rms * level / level.std()
+    return recorded(columns)
+
+
+def contraction(recording: Recording, rig: Rig) -> ChannelFloor:
+    return noise_floor(recording, rig)["contraction"]
+
+
+@pytest.mark.parametrize("rig", [RIG, UNDECLARED])
+@pytest.mark.parametrize("share", [0.7, 1.0])
+def test_an_effect_in_the_repeats_does_not_raise_the_floor(rig, share):
+    floor = contraction(changed(share), rig)
+    assert floor.estimates["repeats"] > 1.15 * NOISE["contraction"]
+    assert floor.source in ("holds", "declared")
+    assert floor.value == pytest.approx(NOISE["contraction"], rel=0.05)
+    assert "contraction: the repeats differ by more than noise" in floor.warnings[0]
+    assert "the muscle or the rig changed between the repeats" in floor.warnings[0]
+
+
+@pytest.mark.parametrize("rig", [RIG, UNDECLARED])
+def test_a_drift_during_the_repeats_does_not_raise_the_floor(rig):
+    columns = arrays()
+    second = made().rows_of("holds_b")
+    slow = 9e-5 * np.linspace(0.0, 1.0, len(second)) ** 2
+    columns["contraction"] = columns["contraction"].copy()
+    columns["contraction"][second] += slow
+    floor = contraction(recorded(columns), rig)
+    assert floor.source in ("holds", "declared")
+    assert floor.value == pytest.approx(NOISE["contraction"], rel=0.05)
+    assert "differ by more than noise" in floor.warnings[0]
+
+
+@pytest.mark.parametrize(("white", "slow", "most"), [(1.0, 0.0, 0), (0.8, 0.6, 0), (0.7, 0.7, 1)])
+def test_repeats_that_repeat_are_believed(white, slow, most):
+    """Slow noise is hard to know from short holds: there one in twenty may be doubted."""
+    doubted = 0
+    for seed in range(5):
+        for rig in (RIG, UNDECLARED):
+            floor = noise_floor(recorded(arrays(seed, white, slow)), rig)
+            believed = [floor[name].source == "repeats" for name in NOISE]
+            doubted += believed.count(False)
+            assert len(floor.warnings) == believed.count(False)
+    assert doubted <= most
+
+
+def test_a_small_effect_is_no_more_than_noise():
+    floor = contraction(changed(0.2), RIG)
+    assert floor.source == "repeats"
+    assert floor.warnings == ()
+
+
+def test_noise_of_the_motion_is_noise():
+    """What is fast and not in holds is no change of the rig: every model leaves it."""
+    columns = arrays()
+    for label in ("holds_a", "holds_b"):
+        at = made().rows_of(label)
+        at = at[np.arange(len(at)) % 200 < 90]  # while the muscle moves
+        rng = np.random.default_rng(len(label) + ord(label[-1]))
+        columns["contraction"] = columns["contraction"].copy()
+        columns["contraction"][at] += 1.2 * NOISE["contraction"] * rng.standard_normal(len(at))
+    floor = contraction(recorded(columns), UNDECLARED)
+    assert floor.estimates["repeats"] > 1.2 * floor.estimates["holds"]
+    assert floor.source == "repeats"
+    assert floor.warnings == ()
+
+
+def test_a_declaration_below_the_holds_is_not_believed():
+    """An owner who is too sure of the sensor does not lower the floor."""
+    sure = dataclasses.replace(RIG, contraction_noise=0.75 * NOISE["contraction"])
+    floor = contraction(changed(1.0), sure)
+    assert floor.source == "holds"
+    assert floor.value == pytest.approx(NOISE["contraction"], rel=0.05)
+    plain = contraction(made(), sure)
+    assert plain.source == "repeats"
+    assert plain.value == pytest.approx(NOISE["contraction"], rel=0.06)
+
+
+def test_what_is_declared_counts_where_holds_do_not_contradict_it():
+    """Holds miss what is slower than they last, declared noise does not."""
+    recording = changed(1.2, white=0.9, slow=0.3)
+    floor = contraction(recording, RIG)
+    assert floor.source in ("holds", "declared")
+    assert floor.value == pytest.approx(
+        max(NOISE["contraction"], floor.estimates["holds"]), rel=1e-6
+    )
+
+
+def test_without_holds_the_declared_noise_is_compared():
+    n, period = 3000, 0.02
+    rng = np.random.default_rng(3)
+    one = 1e5 * (2.5 + 2.0 * np.sin(0.02 * np.arange(n)))
+    command = np.tile(one, 2)
+    contraction_ = 3e-8 * command + 3e-5 * rng.standard_normal(2 * n)
+    contraction_[n:] *= 1.01
+    recording = Recording.from_arrays(
+        period * np.arange(2 * n),
+        command,
+        contraction=contraction_,
+        segment=["a"] * n + ["b"] * n,
+    )
+    rig = Rig(contraction_noise=3.2e-5, repeats=(("a", "b"),))
+    floor = contraction(recording, rig)
+    assert "holds" not in floor.estimates
+    assert floor.source == "declared"
+    assert floor.value == 3.2e-5
+    assert contraction(recording, dataclasses.replace(rig, contraction_noise=None)).source == (
+        "repeats"
+    )

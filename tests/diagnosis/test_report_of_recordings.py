@@ -1,0 +1,133 @@
+"""Reports of real diagnoses: layout, what was held out, provenance, reasons."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+import yaml
+
+from pam_envs.data.recording import Recording, load_recording
+from pam_envs.data.rig_file import Rig
+from pam_envs.diagnosis import Diagnosis, diagnose
+from pam_envs.kernels import COMPILED
+from pam_envs.plants.single_muscle import SingleMuscle
+from tests.diagnosis import hidden
+from tests.diagnosis.page_reader import Page
+
+pytestmark = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")
+SCHEMA = json.loads(
+    (Path(__file__).parents[1] / "schemas/diagnosis.schema.json").read_text(encoding="utf-8")
+)
+CAUSES = ("leak", "temperature", "creep", "slip_step", "sensor_bias", "dead_time")
+
+
+@dataclass(frozen=True)
+class Made:
+    """A recording of a rig that hides effects, and its rig file."""
+
+    recording: Recording
+    rig: Rig
+
+
+def made(name: str, size: float, folder: Path) -> Made:
+    random = np.random.default_rng(8)
+    base, campaign = hidden.draw_base(random), hidden.campaign_short(2)
+    effects = [(hidden.draw_effect(name, random), size)] if size else []
+    hidden.write_csv(
+        hidden.make_recording(base, effects, campaign, noise_seed=4), folder / "recording.csv"
+    )
+    (folder / "rig.yaml").write_text(yaml.safe_dump(hidden.rig_yaml(base, campaign)))
+    rig = Rig.from_yaml(folder / "rig.yaml")
+    return Made(load_recording(folder / "recording.csv", rig), rig)
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Diagnosis]:
+    """Return diagnoses by the effect that was hidden, each made once."""
+    known: dict[str, Diagnosis] = {}
+
+    def tell(name: str) -> Diagnosis:
+        if name not in known:
+            case = made(name, 0.0 if name == "none" else 4.0, tmp_path_factory.mktemp(name))
+            known[name] = diagnose(
+                case.recording, rig=case.rig, causes=CAUSES, progress=False, closed_loop=False
+            )
+        return known[name]
+
+    return tell
+
+
+@pytest.mark.parametrize("name", ["temperature", "slip_step", "none"])
+def test_a_real_report_has_the_layout_and_is_what_is_written(
+    told: Callable[[str], Diagnosis], name: str, tmp_path: Path
+) -> None:
+    found = told(name)
+    assert found.causes == (() if name == "none" else (name,))
+    jsonschema.validate(found.report, SCHEMA)
+    found.write(tmp_path)
+    assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8")) == found.report
+    read = Page((tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert found.text in read.text
+    assert SingleMuscle.from_yaml(tmp_path / "plant.yaml").digest() == found.plant.digest()
+
+
+def test_the_report_says_what_was_held_out(told: Callable[[str], Diagnosis]) -> None:
+    kinds, once = told("temperature"), told("slip_step")
+    assert kinds.report["held_out"]["by"] == "kinds"
+    assert all(kind in kinds.text for kind in kinds.report["held_out"]["kinds"])
+    assert set(kinds.report["error_before"]["contraction"]["kinds"]) == set(
+        kinds.report["held_out"]["kinds"]
+    )
+    assert kinds.report["held_out"]["share"] == pytest.approx(
+        kinds.traces.held_out.mean(), abs=1e-5
+    )
+    assert once.report["held_out"] | {"share": 0.0} == {"by": "blocks", "kinds": [], "share": 0.0}
+    assert "blocks of 4 s" in once.text
+
+
+def test_gains_are_those_of_the_errors_on_what_was_held_out(
+    told: Callable[[str], Diagnosis],
+) -> None:
+    report = told("temperature").report
+    before, after = report["error_before"], report["error_after"]
+    gain = sum(2.0 * np.log(before[c]["value"] / after[c]["value"]) for c in before)
+    assert report["causes"][0]["gain"]["value"] == pytest.approx(gain, rel=1e-3)
+    assert report["rivals"][0]["gain"] == report["causes"][0]["gain"]
+    assert [r["why"] for r in report["rivals"]].count("the best") == 1
+    on = {r["name"]: r["held_out"] for r in report["rivals"]}
+    assert {name for name, by in on.items() if by == "blocks"} <= {"slip_step"}
+
+
+def test_parameters_say_where_they_come_from(told: Callable[[str], Diagnosis]) -> None:
+    found = told("temperature")
+    marks, report = found.plant.provenance, found.report
+    source = report["provenance"]["recording"]["digest"][:12]
+    for name in ("muscle.area", "regulator.gain", "muscle.temperature_gain"):
+        assert marks[name][0] == "identified"
+        assert source in marks[name][1]
+    assert marks["muscle.rest_length"] == ("assumed", "declared, RIG.yaml")
+    assert "published" not in {kind for kind, _ in marks.values()}
+
+
+def test_the_rig_can_be_traced(told: Callable[[str], Diagnosis]) -> None:
+    report = told("temperature").report
+    assert report["provenance"]["rig"]["source"].endswith("rig.yaml")
+    rig = Rig(repeats=(("a", "b"),), tolerance={"mass.load": 0.02})
+    assert rig.digest == Rig(repeats=(("a", "b"),), tolerance={"mass.load": 0.02}).digest
+    assert len({Rig().digest, rig.digest, Rig(rezeroed=True).digest}) == 3
+
+
+def test_without_a_comparison_in_closed_loop_there_is_a_reason(
+    told: Callable[[str], Diagnosis], tmp_path: Path
+) -> None:
+    assert told("temperature").report["closed_loop_reason"] == "it was not asked for"
+    case = made("slip_step", 4.0, tmp_path)
+    found = diagnose(case.recording, rig=case.rig, causes=CAUSES, progress=False)
+    assert found.report["closed_loop"] is None
+    assert "cannot compensate slip_step" in found.report["closed_loop_reason"]
