@@ -42,9 +42,9 @@ from pam_envs.diagnosis.testable import not_testable, too_few, too_short
 from pam_envs.diagnosis.tolerance import (
     LOAD,
     PAYLOAD_ERROR,
-    inside,
-    interval_of,
+    UNWEIGHED,
     limit_of,
+    may_be_load,
     released,
 )
 from pam_envs.diagnosis.traces import Traces
@@ -251,19 +251,16 @@ class Study:
 
     def weigh(self, rule: Rule, seed: int) -> None:
         """Decide anew with the loads refitted within their tolerance, where that may be all."""
-        known, decision = self.sheet.tolerance.get(LOAD), self.decision
-        if known is None or decision is None:
+        if self.decision is None:
             return
-        loads = self.recording.load / GRAVITY
-        for model in (decision.model, *decision.open_rivals):
-            if PAYLOAD_ERROR not in model.names:
-                continue
-            if inside(interval_of(self.problem, self.blocks, model.fit), loads, known):
-                limit = limit_of(loads, known)
-                self.base = released(self.problem, self.blocks, self.family, self.base, limit)
-                self.causes = [c for c in self.causes if c.name != PAYLOAD_ERROR]
-                self.decide(rule, seed)
-                return
+        known, loads = self.sheet.tolerance.get(LOAD), self.recording.load / GRAVITY
+        limit = limit_of(loads, UNWEIGHED if known is None else known)
+        models = (self.decision.model, *self.decision.open_rivals)
+        at_stake = any(may_be_load(self.problem, self.blocks, m, loads, known) for m in models)
+        if at_stake and np.isfinite(limit):
+            self.base = released(self.problem, self.blocks, self.family, self.base, limit)
+            self.causes = [c for c in self.causes if c.name != PAYLOAD_ERROR]
+            self.decide(rule, seed)
 
     def decide(self, rule: Rule, seed: int) -> None:
         """Compare rival causes."""

@@ -23,7 +23,9 @@ from pam_envs.plants import single_muscle_rows as R
 LOAD = "mass.load"
 """The declared parameter whose error a cause stands for."""
 LOAD_ERROR = "mass.load_error"
-PAYLOAD_ERROR = "payload_error"
+PAYLOAD_ERROR, LIKE_PAYLOAD = "payload_error", "load_dependent_compliance"
+UNWEIGHED = 0.5
+"""Relative error of a load of which nothing is declared."""
 
 
 def unknown_names(tolerance: Iterable[str]) -> list[str]:
@@ -78,6 +80,20 @@ def interval_of(problem: Problem, blocks: Blocks, fit: Fit) -> tuple[float, floa
     """Return where the error of the load lies with 95 % [kg]; open at a bound."""
     low, high = spans(problem, blocks, fit)[LOAD_ERROR]["interval"]
     return (-np.inf if low is None else low), (np.inf if high is None else high)
+
+
+def may_be_load(
+    problem: Problem, blocks: Blocks, model: Candidate, loads: ArrayLike, known: float | None
+) -> bool:
+    """Return whether a model may stand for an error of the load that is not excluded.
+
+    Where nothing is declared of the loads, what depends on them may be their error.
+    """
+    if known is None:
+        return LIKE_PAYLOAD in model.names
+    if PAYLOAD_ERROR not in model.names:
+        return False
+    return inside(interval_of(problem, blocks, model.fit), loads, known)
 
 
 def released(
