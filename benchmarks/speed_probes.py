@@ -19,6 +19,7 @@ from benchmarks.speed import Chunk, Measurement, Missing, interleaved, median, r
 from benchmarks.speed_diagnosis import diagnosing
 
 ENV = "PAM/MusclePositioning-v0"
+KNEE = "PAM/KneeWalk-v0"
 ROOT = Path(__file__).resolve().parent.parent
 PENDULUM, CARTPOLE = "InvertedPendulum-v5", "CartPole-v1"
 
@@ -76,6 +77,7 @@ def single(rounds: int) -> list[Measurement]:
     subjects = {"ours": stepping(gym.make(ENV), 20000)}
     preisach = gym.make(ENV, hysteresis="preisach")
     subjects["preisach"] = stepping(preisach, 20000)
+    subjects["KneeWalk"] = stepping(gym.make(KNEE), 10000)
     notes = {}
     for name, steps in ((PENDULUM, 2000), (CARTPOLE, 10000)):
         try:
@@ -91,7 +93,9 @@ def single(rounds: int) -> list[Measurement]:
         value = ratio(rates["ours"], rates[name]) if name in rates else None
         note = notes.get(name, "")
         results.append(Measurement("single", f"ours / {name}", value, "x", floor, aim, note=note))
-    return results
+    knee = ratio(rates["KneeWalk"], rates[PENDULUM]) if PENDULUM in rates else None
+    note, title = notes.get(PENDULUM, ""), f"KneeWalk / {PENDULUM}"
+    return [*results, Measurement("single", title, knee, "x", 5.0, 10.0, note=note)]
 
 
 # --- batches ----------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Draw the rendered frame of the documentation (``make images``)."""
+"""Draw the rendered frames of the documentation (``make images``)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import gymnasium as gym
 import pygame
 
 import pam_envs  # noqa: F401 (registers the environments)
+from pam_envs.envs.rendering_policies import POLICIES
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -16,7 +17,15 @@ sys.path.insert(0, str(ROOT))
 from baselines.catalogue import make_controller  # noqa: E402
 
 
-def frame(path: Path, seconds: float = 21.0, seed: int = 7) -> None:
+def save(env: gym.Env, path: Path) -> None:
+    """Write the present picture of an environment."""
+    picture = pygame.surfarray.make_surface(env.render().swapaxes(0, 1))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pygame.image.save(picture, str(path))
+    env.close()
+
+
+def muscle_frame(path: Path, seconds: float = 21.0, seed: int = 7) -> None:
     """Run the inverse with PID on a staircase and write the picture after ``seconds``."""
     env = gym.make(
         "PAM/MusclePositioning-v0",
@@ -33,11 +42,22 @@ def frame(path: Path, seconds: float = 21.0, seed: int = 7) -> None:
         action, state = controller.predict(observation, state, start)
         observation, *_ = env.step(action)
         start = False
-    picture = pygame.surfarray.make_surface(env.render().swapaxes(0, 1))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    pygame.image.save(picture, str(path))
-    env.close()
+    save(env, path)
+
+
+def knee_frame(name: str, path: Path, seconds: float, **arguments: object) -> None:
+    """Run the inverse of the orthosis and write the picture after ``seconds``."""
+    env = gym.make(name, render_mode="rgb_array", episode_seconds=60.0, **arguments)
+    inner = env.unwrapped
+    observation, _ = env.reset(seed=0)
+    policy = POLICIES[inner.plant.family](inner)
+    for _ in range(round(seconds / inner.control_period)):
+        observation, *_ = env.step(policy(observation))
+    save(env, path)
 
 
 if __name__ == "__main__":
-    frame(ROOT / "docs" / "images" / "muscle_positioning_frame.png")
+    images = ROOT / "docs" / "images"
+    muscle_frame(images / "muscle_positioning_frame.png")
+    knee_frame("PAM/KneeTension-v0", images / "knee_tension_frame.png", 14.0, start="paper")
+    knee_frame("PAM/KneeWalk-v0", images / "knee_walk_frame.png", 10.6, start="heel_contact")

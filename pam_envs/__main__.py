@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from pam_envs.envs.registration import register_all
 from pam_envs.envs.rendering_film import write_film
+from pam_envs.envs.rendering_policies import POLICIES
 from pam_envs.parameters import Signals
 from pam_envs.plants.memory import KINDS, Kind
 
@@ -29,7 +30,7 @@ class List:
 
 @dataclass
 class Render:
-    """Film an environment under the exact inverse of its plant."""
+    """Film an environment under the inverse of its plant."""
 
     env: tyro.conf.Positional[str]
     """Its id, with or without PAM/ and -v0."""
@@ -39,10 +40,10 @@ class Render:
     """Length of the episode [s]."""
     hysteresis: Kind = "maxwell_slip"
     """The muscle's memory."""
-    reference: str = "staircase"
-    """Family of references."""
-    load: float = 2.55
-    """Load [kg]."""
+    reference: str | None = None
+    """Family of references; default: the environment's, a staircase for MusclePositioning."""
+    load: float | None = None
+    """Load [kg], for MusclePositioning; default: 2.55."""
     seed: int = 0
     """Seed of the episode."""
     fps: int = 25
@@ -124,31 +125,9 @@ def list_environments() -> None:
 
 def _names(signals: Signals) -> str:
     """Return names and units; of references to come (``reference_1`` and on), how many."""
-    coming = sum(s.name.startswith("reference_") for s in signals)
-    names = [f"{s.name} ({s.unit})" for s in signals if not s.name.startswith("reference_")]
+    coming = sum(s.ahead > 0.0 for s in signals)
+    names = [f"{s.name} ({s.unit})" for s in signals if s.ahead == 0.0]
     return ", ".join([*names, f"{coming} references to come"] if coming else names)
-
-
-class InverseFeedForward:
-    """The set-point that the plant's own inverse asks for: static law, then memory."""
-
-    def __init__(self, env: Any) -> None:
-        self.plant, self.signals = env.plant, env.signals
-        self.action = env.action_signals[0]
-        self.inverse: Any = None
-        self.state: Any = None
-
-    def __call__(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return the action for an observation."""
-        load = float(self.signals.decode(observation, "load"))
-        if self.inverse is None:
-            full = self.plant.regulator.max_pressure
-            self.inverse = self.plant.memory.inverse(load, full)
-            self.state = self.inverse.initial_state((1,))
-        wanted = self.signals.decode(observation, "reference")
-        drive = np.atleast_1d(self.plant.drive_for(wanted, load))
-        pressure, self.state = self.inverse.pressure(drive, self.state)
-        return np.asarray(self.action.encode(pressure), np.float32)
 
 
 @contextmanager
@@ -171,19 +150,24 @@ def render(options: Render) -> None:
         raise Mistake(f"--video {video} must end in .mp4 or .gif")
     if not 1 <= options.fps <= 100:
         raise Mistake(f"--fps {options.fps} must be from 1 to 100")
-    env = gym.make(
-        name,
-        render_mode="rgb_array",
-        hysteresis=options.hysteresis,
-        reference=options.reference,
-        load=options.load,
-        episode_seconds=options.seconds,
-        start="rest",
-    )
+    env = gym.make(name, render_mode="rgb_array", **_arguments(name, options))
     with whole_file(video) as path:
         write_film(path, _pictures(env, options), options.fps)
     env.close()
     print(f"wrote {video}")
+
+
+def _arguments(name: str, options: Render) -> dict[str, Any]:
+    """Return the keyword arguments of the environment to film."""
+    given: dict[str, Any] = {"hysteresis": options.hysteresis, "episode_seconds": options.seconds}
+    if name == "PAM/MusclePositioning-v0":
+        given |= {"reference": "staircase", "load": 2.55, "start": "rest"}
+    elif options.load is not None:
+        raise Mistake(f"--load is for MusclePositioning; nothing hangs in {name}")
+    for key in ("reference", "load"):
+        if getattr(options, key) is not None:
+            given[key] = getattr(options, key)
+    return given
 
 
 def _pictures(env: Any, options: Render) -> Iterator[NDArray[np.uint8]]:
@@ -193,7 +177,7 @@ def _pictures(env: Any, options: Render) -> Iterator[NDArray[np.uint8]]:
     inner = env.unwrapped
     observation, _ = env.reset(seed=options.seed)
     yield env.render()
-    policy, shown = InverseFeedForward(inner), 1
+    policy, shown = POLICIES[inner.plant.family](inner), 1
     steps = round(options.seconds / inner.control_period)
     for step in track(range(1, steps + 1), description="filming"):
         observation, _, terminated, truncated, _ = env.step(policy(observation))

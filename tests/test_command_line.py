@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pam_envs.__main__ import Mistake, env_id, main
+from pam_envs.__main__ import Mistake, env_id, env_ids, main
 
 
 def test_list(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -29,6 +29,16 @@ def test_a_mistyped_id_names_the_nearest() -> None:
         env_id("MusclePositionin")
     with pytest.raises(Mistake, match="There are: PAM/"):
         env_id("PAM/MusclePositioning-v7")
+
+
+@pytest.mark.parametrize("name", env_ids())
+def test_every_environment_can_be_filmed(name: str, tmp_path: Path) -> None:
+    pytest.importorskip("pygame")
+    imageio = pytest.importorskip("imageio.v2")
+    film = tmp_path / "film.gif"
+    assert main(["render", name, "--video", str(film), "--seconds", "0.3", "--fps", "10"]) == 0
+    with imageio.get_reader(film) as reader:
+        assert len(list(reader)) == 4
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".gif"])
@@ -62,6 +72,7 @@ def test_a_film_lasts_as_long_as_the_episode(tmp_path: Path) -> None:
         (["Muscles"], "no environment named"),
         (["MusclePositioning", "--video", "film.txt"], "must end in .mp4 or .gif"),
         (["MusclePositioning", "--load", "99"], "from 0 to 5 kg"),
+        (["KneeWalk", "--load", "2"], "--load is for MusclePositioning"),
         (["MusclePositioning", "--fps", "0"], "from 1 to 100"),
         (["MusclePositioning", "--reference", "stairs"], "choose one of"),
     ],

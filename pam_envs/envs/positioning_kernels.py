@@ -1,28 +1,25 @@
-"""One step of ``PAM/MusclePositioning-v0``: plant, sensors, reference, reward, end, reset.
+"""What sets ``PAM/MusclePositioning-v0`` apart in a step: reference, report, reward, start.
 
-The same functions serve one environment (a tile of one lane) and a batch (tiles of 32 lanes).
+The step itself stands in :mod:`pam_envs.envs.env_kernels`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cached_property
+from functools import lru_cache
 from typing import Any
 
-from pam_envs.kernels import (
-    LANES,
-    array_at,
-    build,
-    episode_key,
-    interpreted,
-    kernel,
-    normal,
-    prange,
-    routine,
-    scratch,
-    tile_view,
-    uniform,
+from pam_envs.envs.env_kernels import (
+    AT_OWN,
+    EPISODE_SECONDS,
+    FIRST_CHOICE,
+    FIRST_CONFIG,
+    MOST_PREVIEW,
+    PERIOD,
+    SUBSTEPS,
+    write_references,
 )
+from pam_envs.envs.families import Kernels
+from pam_envs.kernels import LANES, kernel, normal, routine, uniform
 from pam_envs.muscle.effective_area import volume
 from pam_envs.plants import single_muscle_rows as R
 from pam_envs.plants.single_muscle_effects import replacements
@@ -37,16 +34,12 @@ from pam_envs.plants.single_muscle_kernels import (
     seen_pressure,
     true_position,
 )
-from pam_envs.plants.single_muscle_rows import N_PARAMETERS
 from pam_envs.references.trajectory import ROWS as REFERENCE_ROWS
 from pam_envs.references.trajectory import SAMPLES, draw_reference, reference_value
 from pam_envs.sensing.sensor import read_sensor
 from pam_envs.tasks.tracking import effort_reward, excess, tracking_reward
 
 REFERENCE = R.END
-SEED_A, SEED_B = R.N_COUNTS, R.N_COUNTS + 1
-"""Integer rows with the key words of the seed."""
-N_COUNTS = R.N_COUNTS + 2
 MEMORY = R.END + REFERENCE_ROWS
 """First row of the memory's state."""
 
@@ -92,17 +85,13 @@ INFO = (
     SENSOR_P,
     SATURATED,
 ) = range(N_WORK, N_WORK + len(INFO))
-SIGNALS = N_WORK + len(INFO)
+ENDED = N_WORK + len(INFO)
+SIGNALS = ENDED + 1
 """First work row of the observation, in SI: contraction, pressure, set-point, load, references."""
 FIXED_SIGNALS = 4
-MOST_PREVIEW = 20
-N_WORK_ROWS = SIGNALS + FIXED_SIGNALS + 1 + MOST_PREVIEW
 
-# numbers of the configuration
+# numbers of the configuration, after those that all families share
 CONFIG = (
-    "period",
-    "episode_seconds",
-    "preview_seconds",
     "tracking_weight",
     "error_scale",
     "effort_weight",
@@ -114,15 +103,8 @@ CONFIG = (
     "reference_high",
     "start_share",
     "load_change",
-    "action_scale",
-    "action_offset",
-    "action_low",
-    "action_high",
 )
 (
-    PERIOD,
-    EPISODE_SECONDS,
-    PREVIEW_SECONDS,
     TRACKING_WEIGHT,
     ERROR_SCALE,
     EFFORT_WEIGHT,
@@ -134,42 +116,20 @@ CONFIG = (
     REFERENCE_HIGH,
     START_SHARE,
     LOAD_CHANGE,
-    ACTION_SCALE,
-    ACTION_OFFSET,
-    ACTION_LOW,
-    ACTION_HIGH,
-) = range(len(CONFIG))
-CHOICES = (
-    "substeps",
-    "elements",
-    "preview",
-    "stride",
-    "family",
-    "sines",
-    "loads",
-    "spread",
-    "members",
-)
-SUBSTEPS, N_ELEMENTS, PREVIEW, STRIDE, FAMILY, SINES, N_LOADS, N_SPREAD, N_MEMBERS = range(
-    len(CHOICES)
-)
-"""Whole numbers of the configuration; ``members`` is 0 where nothing is drawn."""
-
-CONFIG_ROW, LOADS, SCALES = 0, 1, 2
-SPREAD = SCALES + FIXED_SIGNALS + 1 + MOST_PREVIEW
-MEMBERS = SPREAD + len(R.PARAMETERS)
-"""Rows of the settings: configuration, loads to draw from [kg], ``a, b, low, high`` of each signal,
-``row, low, high`` of each parameter that is drawn, and the parameters of each member."""
+) = range(FIRST_CONFIG, FIRST_CONFIG + len(CONFIG))
+CHOICES = ("elements", "family", "sines", "loads")
+N_ELEMENTS, FAMILY, SINES, N_LOADS = range(FIRST_CHOICE, FIRST_CHOICE + len(CHOICES))
+"""Whole numbers of the configuration, after those that all families share. The one own row of the
+settings holds the loads [kg] to draw from."""
 
 ATMOSPHERE = 101325.0
 AIR = 1.0 / (287.05 * 293.15)
 """Density over pressure of air at 20 degrees C [kg/(m3 Pa)]."""
 
-NOISE_X, NOISE_P, START, RANDOM = 1, 2, 3, 4
+NOISE_X, NOISE_P, START = 1, 2, 3
 """Random streams."""
 
-remember: Any = None  # placeholders, filled in for each memory and number of lanes
-N_ROWS = 0
+remember: Any = None  # a placeholder, filled in for each memory
 
 
 @kernel
@@ -181,26 +141,54 @@ def air_in_muscle(rows: Any, fixed: Any, j: int) -> float:
 
 
 @kernel
-def reference_at(rows: Any, samples: Any, config: Any, choices: Any, step: int, lane: int) -> float:
+def reference_at(
+    rows: Any,
+    fixed: Any,
+    samples: Any,
+    settings: Any,
+    choices: Any,
+    step: int,
+    lane: int,
+    channel: int,
+) -> float:
     """Return the reference [m] of one lane at a control period."""
     if choices[FAMILY] == SAMPLES:
-        return samples[min(step, len(samples) - 1)]  # type: ignore[no-any-return]
-    return reference_value(rows, REFERENCE, lane, step * config[PERIOD], choices[SINES])
+        return samples[0][min(step, len(samples[0]) - 1)]  # type: ignore[no-any-return]
+    return reference_value(rows, REFERENCE, lane, step * settings[0][PERIOD], choices[SINES])
 
 
 @kernel
-def look_ahead(rows: Any, counts: Any, ahead: Any, samples: Any, config: Any, choices: Any) -> None:
-    """Add the newest previewed reference to the ring of those to come."""
-    step, mask, far = counts[R.STEP], len(ahead) - 1, choices[PREVIEW] * choices[STRIDE]
-    if choices[FAMILY] == SAMPLES:
-        for j in range(LANES):
-            k = step[j] + far
-            ahead[k & mask][j] = samples[min(k, len(samples) - 1)]
-    else:
-        for j in range(LANES):
-            k = step[j] + far
-            t = k * config[PERIOD]
-            ahead[k & mask][j] = reference_value(rows, REFERENCE, j, t, choices[SINES])
+def change_load(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
+    """Let the load change at its time."""
+    step, load, period = counts[R.STEP], rows[R.LOAD], settings[0][PERIOD]
+    told, when, change = rows[R.TOLD_LOAD], rows[R.CHANGE_TIME], rows[R.CHANGE]
+    for j in range(LANES):
+        load[j] = told[j] + (change[j] if step[j] * period >= when[j] else 0.0)
+
+
+@kernel
+def advance_muscle(
+    rows: Any,
+    fixed: Any,
+    counts: Any,
+    tables: Any,
+    samples: Any,
+    settings: Any,
+    choices: Any,
+    work: Any,
+) -> None:
+    """Advance the plant by a control period."""
+    advance(
+        rows,
+        fixed,
+        counts,
+        tables,
+        MEMORY,
+        choices[N_ELEMENTS],
+        choices[SUBSTEPS],
+        settings[0][PERIOD],
+        work,
+    )
 
 
 @kernel
@@ -209,7 +197,7 @@ def evaluate(
     fixed: Any,
     counts: Any,
     ahead: Any,
-    config: Any,
+    settings: Any,
     choices: Any,
     work: Any,
 ) -> None:
@@ -217,7 +205,8 @@ def evaluate(
     step, key_a, key_b = counts[R.STEP], counts[R.KEY_A], counts[R.KEY_B]
     velocity, pressure = rows[R.VELOCITY], rows[R.PRESSURE]
     set_point, older = rows[R.SET_POINT], rows[R.OLD_SET_POINT]
-    period, stride = config[PERIOD], choices[STRIDE]
+    config = settings[0]
+    period = config[PERIOD]
     for j in range(LANES):
         work[TIME][j] = step[j] * period
         contraction = true_position(rows, j)
@@ -245,11 +234,7 @@ def evaluate(
         work[SIGNALS + 1][j] = work[SENSOR_P][j]
         work[SIGNALS + 2][j] = set_point[j]
         work[SIGNALS + 3][j] = rows[R.TOLD_LOAD][j]
-    mask = len(ahead) - 1
-    for i in range(choices[PREVIEW] + 1):
-        sample = work[SIGNALS + FIXED_SIGNALS + i]
-        for j in range(LANES):
-            sample[j] = ahead[(step[j] + i * stride) & mask][j]
+    write_references(counts, ahead, choices, work, SIGNALS + FIXED_SIGNALS)
     now = work[SIGNALS + FIXED_SIGNALS]
     for j in range(LANES):
         output = work[OUTPUT][j]
@@ -263,6 +248,7 @@ def evaluate(
         work[C_CONTRACTION][j] = excess(output, config[SOFT_CONTRACTION])
         work[C_PRESSURE][j] = excess(pressure[j], config[SOFT_PRESSURE])
         work[M_CONTRACTION][j] = min(config[HIGHEST] - output, output - config[LOWEST])
+        work[ENDED][j] = 1.0 if work[M_CONTRACTION][j] < 0.0 else 0.0
         work[M_PRESSURE][j] = config[SOFT_PRESSURE] - pressure[j]
         air = air_in_muscle(rows, fixed, j)
         work[E_TRAVEL][j] = abs(pressure[j] - rows[R.OLD_PRESSURE][j])
@@ -272,32 +258,22 @@ def evaluate(
 
 
 @routine
-def reset_lane(
+def begin_muscle(
     rows: Any,
     fixed: Any,
     counts: Any,
-    ahead: Any,
-    table: Any,
+    tables: Any,
     samples: Any,
     settings: Any,
     choices: Any,
     work: Any,
+    member: int,
     j: int,
 ) -> None:
-    """Start the episode of lane ``j`` that its episode counter names."""
-    key_a = episode_key(counts[SEED_A][j], counts[R.EPISODE][j])
-    key_b = episode_key(counts[SEED_B][j], counts[R.EPISODE][j])
-    counts[R.KEY_A][j], counts[R.KEY_B][j], counts[R.STEP][j] = key_a, key_b, 0
-    config = settings[CONFIG_ROW]
-    member = int(uniform(key_a, key_b, RANDOM, 0) * choices[N_MEMBERS])
+    """Bring lane ``j`` to rest under a load and a history that are drawn, and its reference."""
+    key_a, key_b, config = counts[R.KEY_A][j], counts[R.KEY_B][j], settings[0]
     counts[R.MEMBER][j] = member
-    for k in range(R.N_PARAMETERS):
-        fixed[k][j] = settings[MEMBERS + member][k]
-    for k in range(choices[N_SPREAD]):
-        drawn = settings[SPREAD + k]
-        u = uniform(key_a, key_b, RANDOM, 1 + k)
-        fixed[int(drawn[0])][j] = drawn[1] + (drawn[2] - drawn[1]) * u
-    load = settings[LOADS][int(uniform(key_a, key_b, START, 0) * choices[N_LOADS])]
+    load = settings[choices[AT_OWN]][int(uniform(key_a, key_b, START, 0) * choices[N_LOADS])]
     rows[R.TOLD_LOAD][j] = load
     rows[R.LOAD][j] = load
     rows[R.CHANGE_TIME][j] = config[EPISODE_SECONDS] * (0.3 + 0.4 * uniform(key_a, key_b, START, 1))
@@ -310,7 +286,7 @@ def reset_lane(
     rows[R.REST][j] = rest_contraction(fixed, j, 0.0, load)
     for pressure in (0.0, peak, begin):
         rows[R.PRESSURE][j] = pressure
-        remember(rows, fixed, counts, table, MEMORY, j, j + 1, choices[N_ELEMENTS], work)
+        remember(rows, fixed, counts, tables, MEMORY, j, j + 1, choices[N_ELEMENTS], work)
     for k in range(R.N_HISTORY):
         rows[R.HISTORY + k][j] = begin
     rows[R.SET_POINT][j] = begin
@@ -320,7 +296,6 @@ def reset_lane(
     rows[R.OLD_PRESSURE][j] = begin
     rows[R.OLD_AIR][j] = air_in_muscle(rows, fixed, j)
     begin_effects(rows, fixed, j)
-    work[SATURATED][j] = 0.0
     if choices[FAMILY] != SAMPLES:
         draw_reference(
             rows,
@@ -332,8 +307,6 @@ def reset_lane(
             config[REFERENCE_LOW],
             config[REFERENCE_HIGH],
         )
-    for k in range(choices[PREVIEW] * choices[STRIDE] + 1):
-        ahead[k][j] = reference_at(rows, samples, config, choices, k, j)
 
 
 @routine
@@ -344,230 +317,31 @@ def _start_memory(rows: Any, counts: Any, j: int) -> None:
     counts[R.STACK_COUNT][j] = 1
 
 
-@routine
-def copy_lane(rows: Any, fixed: Any, counts: Any, ahead: Any, source: int, to: int) -> None:
-    """Make one lane of a tile a copy of another."""
-    for k in range(len(rows)):
-        rows[k][to] = rows[k][source]
-    for k in range(len(fixed)):
-        fixed[k][to] = fixed[k][source]
-    for k in range(len(counts)):
-        counts[k][to] = counts[k][source]
-    for k in range(len(ahead)):
-        ahead[k][to] = ahead[k][source]
-
-
-@routine
-def write_lane(
-    work: Any, settings: Any, observation: Any, info: Any, signals: int, row: int, j: int
-) -> None:
-    """Copy lane ``j`` of ``work`` to row ``row`` of the outputs."""
-    for i in range(signals):
-        scale = settings[SCALES + i]
-        value = scale[0] * work[SIGNALS + i][j] + scale[1]
-        observation[row][i] = max(scale[2], min(scale[3], value))
-    for k in range(1, len(info)):
-        info[k][row] = work[N_WORK + k - 1][j]
-
-
-@kernel
-def take_actions(rows: Any, counts: Any, config: Any, work: Any, actions: Any, start: int) -> None:
-    """Turn actions into set-points, and let the load change at its time."""
-    step, load, set_point = counts[R.STEP], rows[R.LOAD], rows[R.SET_POINT]
-    older = rows[R.OLD_SET_POINT]
-    told, when, change = rows[R.TOLD_LOAD], rows[R.CHANGE_TIME], rows[R.CHANGE]
-    saturated, last = work[SATURATED], len(actions) - 1
-    for j in range(LANES):
-        wanted = float(actions[min(start + j, last)][0])
-        held = max(config[ACTION_LOW], min(config[ACTION_HIGH], wanted))
-        saturated[j] = 0.0 if held == wanted else 1.0
-        older[j] = set_point[j]
-        set_point[j] = config[ACTION_SCALE] * held + config[ACTION_OFFSET]
-        load[j] = told[j] + (change[j] if step[j] * config[PERIOD] >= when[j] else 0.0)
-
-
-@kernel
-def write_tile(
-    work: Any,
-    settings: Any,
-    signals: int,
-    observation: Any,
-    info: Any,
-    flags: Any,
-    start: int,
-    lanes: int,
-) -> int:
-    """Copy a tile to the outputs; return how many of its episodes are over."""
-    over = 0
-    config, reward = settings[CONFIG_ROW], info[0]
-    for j in range(lanes):
-        terminated = 1 if work[M_CONTRACTION][j] < 0.0 else 0
-        truncated = 1 if work[TIME][j] >= config[EPISODE_SECONDS] - 0.5 * config[PERIOD] else 0
-        flags[0][start + j] = terminated
-        flags[1][start + j] = truncated
-        over = over + terminated + truncated
-        reward[start + j] = work[R_TRACKING][j] + work[R_EFFORT][j]
-    for i in range(signals):
-        value, scale = work[SIGNALS + i], settings[SCALES + i]
-        a, b, low, high = scale[0], scale[1], scale[2], scale[3]
-        for j in range(lanes):
-            observation[start + j][i] = max(low, min(high, a * value[j] + b))
-    for k in range(1, len(info)):
-        report, value = info[k], work[N_WORK + k - 1]
-        for j in range(lanes):
-            report[start + j] = value[j]
-    return over
-
-
-@kernel
-def step_tiles(
-    all_rows: Any,
-    all_fixed: Any,
-    all_counts: Any,
-    all_ahead: Any,
-    table: Any,
-    samples: Any,
-    settings: Any,
-    choices: Any,
-    actions: Any,
-    observations: Any,
-    infos: Any,
-    flags: Any,
-    number: int,
-    mode: int,
-) -> None:
-    """Step or reset a batch, tile by tile.
-
-    ``mode`` 0 steps; 1 steps and starts the next episode of what has ended; 2 starts the episodes
-    of the environments whose ``flags[0]`` is set, and does not step. ``observations[0]`` and
-    ``infos[0]`` are the present ones, ``[1]`` those at the end of an episode that has been
-    followed by the next. ``infos[...][0]`` is the reward.
-    """
-    signals = FIXED_SIGNALS + 1 + choices[PREVIEW]
-    config, observation, info = settings[CONFIG_ROW], observations[0], infos[0]
-    for tile in prange(len(all_rows)):
-        rows = tile_view(all_rows, tile, N_ROWS, LANES)
-        fixed = tile_view(all_fixed, min(tile, len(all_fixed) - 1), N_PARAMETERS, LANES)
-        counts = tile_view(all_counts, tile, N_COUNTS, LANES)
-        ahead = all_ahead[tile]
-        work = scratch(N_WORK_ROWS, LANES)
-        start = tile * LANES
-        lanes = min(LANES, number - start)
-        if mode < 2:
-            take_actions(rows, counts, config, work, actions, start)
-            advance(
-                rows,
-                fixed,
-                counts,
-                table,
-                MEMORY,
-                choices[N_ELEMENTS],
-                choices[SUBSTEPS],
-                config[PERIOD],
-                work,
-            )
-            for j in range(LANES):
-                counts[R.STEP][j] = counts[R.STEP][j] + 1
-            look_ahead(rows, counts, ahead, samples, config, choices)
-        else:
-            for j in range(lanes):
-                if flags[0][start + j] > 0:
-                    reset_lane(
-                        rows, fixed, counts, ahead, table, samples, settings, choices, work, j
-                    )
-            for j in range(lanes, LANES):  # the rest of the last tile computes along, unseen
-                copy_lane(rows, fixed, counts, ahead, lanes - 1, j)
-        for again in range(2):
-            evaluate(rows, fixed, counts, ahead, config, choices, work)
-            if mode == 2 or again == 1:
-                for j in range(lanes):
-                    if flags[0][start + j] + flags[1][start + j] > 0:
-                        write_lane(work, settings, observation, info, signals, start + j, j)
-                break
-            over = write_tile(work, settings, signals, observation, info, flags, start, lanes)
-            if mode == 0 or over == 0:
-                break
-            for j in range(lanes):
-                if flags[0][start + j] + flags[1][start + j] > 0:
-                    write_lane(work, settings, observations[1], infos[1], signals, start + j, j)
-                    infos[1][0][start + j] = info[0][start + j]
-                    counts[R.EPISODE][j] = counts[R.EPISODE][j] + 1
-                    reset_lane(
-                        rows, fixed, counts, ahead, table, samples, settings, choices, work, j
-                    )
-
-
-@kernel
-def step_by_address(book: Any, mode: int) -> None:
-    """Step or reset one environment whose arrays stand in an address book."""
-    step_tiles(
-        array_at(book, 0, 3, 0),
-        array_at(book, 1, 3, 0),
-        array_at(book, 2, 3, 1),
-        array_at(book, 3, 3, 0),
-        array_at(book, 4, 3, 0),
-        array_at(book, 5, 1, 0),
-        array_at(book, 6, 2, 0),
-        array_at(book, 7, 1, 1),
-        array_at(book, 8, 2, 0),
-        array_at(book, 9, 3, 2),
-        array_at(book, 10, 3, 0),
-        array_at(book, 11, 2, 3),
-        1,
-        mode,
-    )
-
-
-class Kernels:
-    """The functions for one kind of memory, plain or with effects, built when first asked for."""
-
-    def __init__(self, kind: str, extended: bool = False) -> None:
-        self.kind, self.extended = kind, extended
-        self.n_rows = MEMORY + MEMORY_ROWS[kind] + (R.N_EFFECTS if extended else 0)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle by the kind: compiled code is not copied."""
-        return kernels_for, (self.kind, self.extended)
-
-    def _names(self, lanes: int) -> dict[str, Any]:
-        names = {"remember": MEMORIES[self.kind], "N_ROWS": self.n_rows, "LANES": lanes}
-        if self.extended:
-            names |= replacements(self.kind, MEMORY + MEMORY_ROWS[self.kind])
-        return names
-
-    @property
-    def _suffix(self) -> str:
-        return self.kind + ("_extended" if self.extended else "")
-
-    def _build(self, name: str, lanes: int, parallel: bool = False) -> Callable[..., Any]:
-        return build(step_tiles, f"{name}_{self._suffix}", parallel, **self._names(lanes))
-
-    @cached_property
-    def interpreted(self) -> Callable[..., Any]:
-        """One environment, in plain Python."""
-        return interpreted(step_tiles, self._names(1))
-
-    @cached_property
-    def single(self) -> Callable[..., Any]:
-        """One environment, by an address book of the arrays."""
-        return build(step_by_address, f"single_{self._suffix}", **self._names(1))
-
-    @cached_property
-    def batch(self) -> Callable[..., Any]:
-        """Tiles on one core."""
-        return self._build("batch", LANES)
-
-    @cached_property
-    def parallel(self) -> Callable[..., Any]:
-        """Tiles over all cores."""
-        return self._build("parallel", LANES, parallel=True)
-
-
-KERNELS = {
-    (kind, extended): Kernels(kind, extended) for kind in MEMORIES for extended in (False, True)
-}
-
-
+@lru_cache(maxsize=8)
 def kernels_for(kind: str, extended: bool = False) -> Kernels:
     """Return the kernels for a kind of memory, plain or with effects."""
-    return KERNELS[kind, extended]
+    rows = MEMORY + MEMORY_ROWS[kind]
+    functions = {
+        "env_apply": change_load,
+        "env_advance": advance_muscle,
+        "env_reference": reference_at,
+        "env_evaluate": evaluate,
+        "env_begin": begin_muscle,
+        "remember": MEMORIES[kind],
+    }
+    if extended:
+        functions |= replacements(kind, rows)
+    return Kernels(
+        f"positioning_{kind}" + ("_extended" if extended else ""),
+        kernels_for,
+        (kind, extended),
+        functions,
+        info=INFO,
+        rows=rows + (R.N_EFFECTS if extended else 0),
+        parameters=R.N_PARAMETERS,
+        counts=R.N_COUNTS,
+        scratch=N_WORK,
+        signals=FIXED_SIGNALS + 1 + MOST_PREVIEW,
+        set_points=R.SET_POINT,
+        old_set_points=R.OLD_SET_POINT,
+    )

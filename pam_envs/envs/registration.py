@@ -4,15 +4,26 @@ from __future__ import annotations
 
 import gymnasium as gym
 
+ENVIRONMENTS = {
+    "PAM/MusclePositioning-v0": "muscle_positioning:MusclePositioning",
+    "PAM/KneeTension-v0": "knee_brace:KneeTension",
+    "PAM/KneeStiffness-v0": "knee_brace:KneeStiffness",
+    "PAM/KneeWalk-v0": "knee_gait:KneeWalk",
+    "PAM/KneeStairsUp-v0": "knee_gait:KneeStairsUp",
+    "PAM/KneeStairsDown-v0": "knee_gait:KneeStairsDown",
+}
+"""Module in this folder, and what stands before ``Env`` and ``VectorEnv`` in its classes' names."""
+
 
 def register_all() -> None:
     """Register every environment with Gymnasium, once."""
-    if "PAM/MusclePositioning-v0" in gym.registry:
-        return
-    gym.register(
-        "PAM/MusclePositioning-v0",
-        entry_point="pam_envs.envs.muscle_positioning:MusclePositioningEnv",
-        vector_entry_point="pam_envs.envs.muscle_positioning:MusclePositioningVectorEnv",
-        order_enforce=False,  # the environment itself asks for reset() before step()
-        disable_env_checker=True,  # the checks run in the tests, not in every step of every user
-    )
+    for name, place in ENVIRONMENTS.items():
+        if name in gym.registry:
+            continue
+        gym.register(
+            name,
+            entry_point=f"pam_envs.envs.{place}Env",
+            vector_entry_point=f"pam_envs.envs.{place}VectorEnv",
+            order_enforce=False,  # the environment itself asks for reset() before step()
+            disable_env_checker=True,  # the checks run in the tests, not in every user's steps
+        )

@@ -1,12 +1,13 @@
 """Pictures of an environment: the plant at work, its loop, and the last seconds.
 
 Drawn with pygame-ce on a plain surface, so that ``rgb_array`` needs no display. Drawing reads what
-``step`` returned and touches neither the simulation nor its random numbers. What a family of plants
-looks like stands in ``rendering_scene``; the frame, the loop and the strips are common.
+``step`` returned and touches neither the simulation nor its random numbers. What is drawn of a
+family stands in its view (``VIEWS`` names the modules); frame, loop and strips are common.
 """
 
 from __future__ import annotations
 
+import importlib
 import math
 import os
 from collections import deque
@@ -24,12 +25,13 @@ from pam_envs.envs.rendering_scene import (
     PAPER,
     PRESSURE,
     REFERENCE,
-    SCENES,
     Axes,
     Color,
     Point,
+    Strip,
+    View,
     blend,
-    highest_mm,
+    full_bar,
 )
 
 SIZE = (800, 600)
@@ -37,7 +39,19 @@ SCALE = 2
 """Everything is drawn this many times larger and smoothed down: anti-aliased edges everywhere."""
 STRIP_SECONDS = 8.0
 LOOP_SAMPLES = 1500
-LOWEST_MM = -1.0
+VIEWS = {
+    "single_muscle": "rendering_muscle",
+    "knee_tension": "rendering_knee",
+    "knee_stiffness": "rendering_knee",
+    "knee_gait": "rendering_knee",
+}
+"""Module whose ``VIEWS`` hold what is shown of an environment, by the view in its setup."""
+
+
+def view_of(name: str) -> View:
+    """Return the view of that name."""
+    found: View = importlib.import_module(f"pam_envs.envs.{VIEWS[name]}").VIEWS[name]
+    return found
 
 
 def _pygame() -> Any:
@@ -127,15 +141,16 @@ class Renderer:
     def __init__(self, env: Any) -> None:
         self.env = env
         self.canvas = Canvas()
-        self.scene = SCENES[env.plant.family]
-        self.strip: deque[tuple[float, float, float, float]] = deque(
+        self.view = view_of(env.setup.view)
+        plant, strips = env.plant, self.view.strips
+        self._keys = ("time", *dict.fromkeys(key for strip in strips for key, _, _ in strip.lines))
+        self.strip: deque[tuple[float, ...]] = deque(
             maxlen=round(STRIP_SECONDS / env.control_period) + 1
         )
         self.loop: deque[Point] = deque(maxlen=LOOP_SAMPLES)
         self.info: Any = None
-        self._full = 1e-5 * env.plant.regulator.max_pressure
-        self._span = (LOWEST_MM, highest_mm(env.plant))
-        self._ticks = range(0, int(self._span[1]) + 1, 5)
+        self._full = full_bar(plant)
+        self._spans = [(strip.span(plant), tuple(strip.ticks(plant))) for strip in strips]
         self._window: Any = None
         self._clock: Any = None
         self._dismissed = False
@@ -146,24 +161,23 @@ class Renderer:
             self.strip.clear()
             self.loop.clear()
         self.info = info
-        pressure = info["state/pressure"]
-        self.strip.append((info["time"], info["reference"], info["output"], pressure))
-        self.loop.append((pressure, info["output"]))
+        self.strip.append(tuple([info[key] for key in self._keys]))
+        self.loop.append((info["state/pressure"], info["output"]))
 
     def _draw(self) -> Any:
         self.canvas.clear()
-        self.scene(self.canvas, self.env, self.info)
+        self.view.scene(self.canvas, self.env, self.info)
         self._draw_numbers()
         self._draw_loop()
         self._draw_strips()
         return self.canvas.picture()
 
     def _draw_numbers(self) -> None:
-        info, text = self.info, self.canvas.text
-        error = 1e3 * (info["output"] - info["reference"])
+        info, text, first = self.info, self.canvas.text, self.view.strips[0]
+        error = first.scale * (info["output"] - info["reference"])
         for x, name, value, color in (
             (360, "time", f"{info['time']:.2f} s", INK),
-            (475, "error", f"{error:+.2f} mm", INK),
+            (475, "error", f"{error:+.2f} {first.unit}", INK),
             (600, "pressure", f"{1e-5 * info['state/pressure']:.2f} bar", PRESSURE),
         ):
             text(name, (x, 14), MUTED, 11)
@@ -173,10 +187,11 @@ class Renderer:
             text("clipped", (770, 29), REFERENCE, 16, "right")
 
     def _draw_loop(self) -> None:
-        axes = Axes(self.canvas, (360, 88, 410, 200), (0.0, self._full), self._span)
+        first, (span, across) = self.view.strips[0], self._spans[0]
+        axes = Axes(self.canvas, (360, 88, 410, 200), (0.0, self._full), span)
         ticks = np.arange(0.0, self._full + 0.01, max(1.0, round(self._full / 6)))
-        axes.frame(ticks, self._ticks, "pressure [bar]", "contraction [mm]")
-        points = [axes.at(1e-5 * p, 1e3 * x) for p, x in self.loop]
+        axes.frame(ticks, across, "pressure [bar]", f"{first.name} [{first.unit}]")
+        points = [axes.at(1e-5 * p, first.scale * x) for p, x in self.loop]
         step = 12
         for i in range(0, len(points) - 1, step):
             age = i / len(points)
@@ -185,19 +200,24 @@ class Renderer:
             self.canvas.disc(points[-1], 4.5, OUTPUT)
 
     def _draw_strips(self) -> None:
-        canvas, now = self.canvas, self.strip[-1][0]
-        first = max(0.0, now - STRIP_SECONDS)
-        span = (first, first + STRIP_SECONDS)
-        seconds = range(2 * math.ceil(0.5 * span[0]), math.floor(span[1]) + 1, 2)
-        upper = Axes(canvas, (360, 350, 410, 116), span, self._span)
-        upper.frame(seconds, self._ticks, "", "contraction [mm]", numbers=False)
-        lower = Axes(canvas, (360, 498, 410, 60), span, (0.0, self._full))
-        lower.frame(seconds, (0, 0.5 * self._full, self._full), "time [s]", "pressure [bar]")
-        canvas.line([upper.at(t, 1e3 * r) for t, r, _, _ in self.strip], REFERENCE, 1.5)
-        canvas.line([upper.at(t, 1e3 * x) for t, _, x, _ in self.strip], OUTPUT, 2)
-        canvas.line([lower.at(t, 1e-5 * p) for t, _, _, p in self.strip], PRESSURE, 2)
-        canvas.text("reference", (712, 329), REFERENCE, 12, "right")
-        canvas.text("output", (770, 329), OUTPUT, 12, "right")
+        first = max(0.0, self.strip[-1][0] - STRIP_SECONDS)
+        for i, strip in enumerate(self.view.strips):
+            self._draw_strip(strip, i, (first, first + STRIP_SECONDS))
+        top = self.view.strips[0].top - 21
+        self.canvas.text("reference", (712, top), REFERENCE, 12, "right")
+        self.canvas.text("output", (770, top), OUTPUT, 12, "right")
+
+    def _draw_strip(self, strip: Strip, number: int, seconds: Point) -> None:
+        """Draw one plot of the last seconds; the lowest one has the numbers of the time."""
+        lowest, (span, across) = number == len(self.view.strips) - 1, self._spans[number]
+        whole = range(2 * math.ceil(0.5 * seconds[0]), math.floor(seconds[1]) + 1, 2)
+        axes = Axes(self.canvas, (360, strip.top, 410, strip.height), seconds, span)
+        name = f"{strip.name} [{strip.unit}]"
+        axes.frame(whole, across, "time [s]" if lowest else "", name, numbers=lowest)
+        for key, color, width in strip.lines:
+            k = self._keys.index(key)
+            points = [axes.at(past[0], strip.scale * past[k]) for past in self.strip]
+            self.canvas.line(points, color, width)
 
     def picture(self) -> NDArray[np.uint8]:
         """Return the picture, shape (600, 800, 3)."""

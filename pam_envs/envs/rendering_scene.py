@@ -1,16 +1,14 @@
-"""Scenes: what a family of plants looks like, drawn on the canvas of the renderer.
+"""What scenes are drawn with: colours, a box with ticks, a scale of pressures, what a view shows.
 
-A family of plants adds its own scene to :data:`SCENES`. Scenes read the plant and ``info`` and
-change neither; they draw in the left 320 pixels.
+A view says what the pictures of an environment show; the frame around it is common. Scenes read
+the plant and ``info`` and change neither; they draw in the left 320 pixels.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 if TYPE_CHECKING:
     from pam_envs.envs.rendering import Canvas
@@ -23,15 +21,6 @@ PAPER, INK, MUTED, GRID = (250, 250, 248), (38, 42, 48), (112, 118, 126), (226, 
 OUTPUT, REFERENCE, PRESSURE = (0, 114, 178), (213, 94, 0), (0, 140, 100)
 STEEL, COLD, HOT = (150, 156, 164), (88, 96, 108), (222, 92, 58)
 
-AXIS, TOP, NATURAL, RADIUS = 140.0, 76.0, 300.0, 21.0
-"""Where the muscle hangs, and its length and radius at rest [pixels]."""
-PER_METRE = 5400.0
-"""Pixels for a metre of contraction: the stroke is drawn 1.8 times larger than the muscle."""
-BULGE = 3.0
-"""By how much the change of the radius is drawn larger than it is."""
-THREADS = 12
-LARGEST_LOAD = 5.0
-
 
 def blend(a: Color, b: Color, share: float) -> Color:
     """Return the colour that is ``share`` of the way from ``a`` to ``b``."""
@@ -40,10 +29,69 @@ def blend(a: Color, b: Color, share: float) -> Color:
     return red, green, blue
 
 
-def highest_mm(plant: Any) -> float:
-    """Return the contraction [mm] up to which scales go: a little above the largest at rest."""
-    reached = 1e3 * float(plant.contraction_at(plant.regulator.max_pressure, 0.0))
-    return max(2.0, math.ceil(reached + 0.2))
+@dataclass(frozen=True)
+class Strip:
+    """A plot of the last seconds.
+
+    Attributes
+    ----------
+    name, unit : str
+        Of the axis.
+    scale : float
+        The unit's number over the SI number.
+    lines : tuple of (str, Color, float)
+        Key of ``info``, colour and width of each line.
+    top, height : int
+        Where it stands [pixels].
+    span : callable
+        Lowest and highest value on the axis, in the unit, from the plant.
+    ticks : callable
+        Values with a line across, from the plant.
+    """
+
+    name: str
+    unit: str
+    scale: float
+    lines: tuple[tuple[str, Color, float], ...]
+    top: int
+    height: int
+    span: Callable[[Any], Point]
+    ticks: Callable[[Any], Iterable[float]]
+
+
+@dataclass(frozen=True)
+class View:
+    """What the pictures of a family of environments show.
+
+    Attributes
+    ----------
+    scene : callable
+        ``draw(canvas, env, info)``: the plant at work.
+    strips : tuple of Strip
+        From top to bottom; the first one holds output and reference, and gives the loop its axis.
+    """
+
+    scene: Callable[[Canvas, Any, Any], None]
+    strips: tuple[Strip, ...]
+
+
+def full_bar(plant: Any) -> float:
+    """Return the largest set-point [bar]."""
+    return 1e-5 * float(plant.regulator.max_pressure)
+
+
+def pressure_strip(top: int, height: int) -> Strip:
+    """Return the strip of the pressure."""
+    return Strip(
+        "pressure",
+        "bar",
+        1e-5,
+        (("state/pressure", PRESSURE, 2.0),),
+        top,
+        height,
+        lambda plant: (0.0, full_bar(plant)),
+        lambda plant: (0.0, 0.5 * full_bar(plant), full_bar(plant)),
+    )
 
 
 class Axes:
@@ -84,88 +132,11 @@ class Axes:
         self.canvas.text(y_name, (left - 22, top - 21), MUTED, 12)
 
 
-def muscle_scene(canvas: Canvas, env: Any, info: Any) -> None:
-    """Draw a muscle that lifts a hanging load, with ruler, reference marker and pressure scale."""
-    plant, pressure = env.plant, info["state/pressure"]
-    contraction = info["state/contraction"]
-    bottom = TOP + NATURAL - contraction * PER_METRE
-    full = plant.regulator.max_pressure
-    canvas.rectangle((50, TOP - 30, 180, 12), STEEL, 3)
-    for x in range(56, 230, 14):
-        canvas.line([(x, TOP - 30), (x + 8, TOP - 39)], STEEL, 1.5)
-    canvas.rectangle((AXIS - 9, TOP - 18, 18, 19), INK, 3)
-    _braid(canvas, bottom, plant, contraction, blend(COLD, HOT, pressure / full))
-    canvas.rectangle((AXIS - 9, bottom, 18, 14), INK, 3)
-    _weight(canvas, bottom + 14, info["state/load"])
-    _ruler(canvas, highest_mm(plant), contraction, info["reference"])
-    _pressure_scale(canvas, pressure, full)
-
-
-def _braid(canvas: Canvas, bottom: float, plant: Any, contraction: float, tint: Color) -> None:
-    """Draw the muscle's body: threads of constant length on a tube that bulges as it shortens."""
-    braid_angle = plant.muscle.braid_angle
-    cosine = (1.0 - contraction / plant.muscle.rest_length) * math.cos(braid_angle)
-    widening = math.sqrt(max(0.0, 1.0 - cosine * cosine)) / math.sin(braid_angle)
-    radius, end = RADIUS * (1.0 + BULGE * (widening - 1.0)), 13.0
-    along = np.linspace(0.0, 1.0, 80)
-    profile = end + (radius - end) * np.minimum(1.0, np.sin(np.pi * along) * 2.2) ** 0.7
-    y = TOP + along * (bottom - TOP)
-    left = list(zip(AXIS - profile, y, strict=True))
-    right = list(zip(AXIS + profile, y, strict=True))
-    canvas.polygon(left + right[::-1], tint)
-    turns = NATURAL * math.tan(braid_angle) / (2 * math.pi * RADIUS)  # a thread keeps its turns
-    thread = blend(tint, PAPER, 0.42)
-    for k in range(THREADS):
-        for way in (1.0, -1.0):
-            angle = 2 * np.pi * (way * turns * along + k / THREADS)
-            seen = np.cos(angle) > 0
-            points = list(zip(AXIS + profile * np.sin(angle), y, strict=True))
-            for i in range(len(points) - 1):
-                if seen[i]:
-                    canvas.line(points[i : i + 2], thread, 1.5)
-    for side in (left, right):
-        canvas.line(side, blend(tint, INK, 0.5), 1.5)
-
-
-def _weight(canvas: Canvas, top: float, load: float) -> None:
-    """Draw the load [kg] below ``top``; its width follows the cube root of its mass."""
-    if load < 0.005:
-        canvas.text("no load", (AXIS, TOP + NATURAL + 24), MUTED, 13, "center")
-        return
-    rod, side = top + 18, 12 + 44 * (load / LARGEST_LOAD) ** (1 / 3)
-    canvas.line([(AXIS, top), (AXIS, rod)], INK, 3)
-    waist, foot = 0.62 * side, rod + 1.15 * side
-    corners = [(AXIS - waist, rod), (AXIS + waist, rod), (AXIS + side, foot), (AXIS - side, foot)]
-    canvas.polygon(corners, blend(STEEL, INK, 0.55))
-    if side > 40:
-        canvas.text(f"{load:.2f} kg", (AXIS, rod + 0.47 * side), PAPER, 14, "center")
-    else:
-        canvas.text(f"{load:.2f} kg", (AXIS, foot + 6), INK, 14, "center")
-
-
-def _ruler(canvas: Canvas, highest: float, contraction: float, reference: float) -> None:
-    """Draw a ruler in mm beside the lower fitting, with output and reference [m] on it."""
-
-    def level(metres: float) -> float:
-        return TOP + NATURAL + 7 - metres * PER_METRE
-
-    for mm in range(int(highest) + 1):
-        y = level(1e-3 * mm)
-        canvas.line([(50, y), (62 if mm % 5 == 0 else 57, y)], MUTED, 1)
-        if mm % 5 == 0:
-            canvas.text(f"{mm}", (44, y - 6), MUTED, 11, "right")
-    canvas.line([(50, level(0.0)), (50, level(1e-3 * highest))], MUTED, 1)
-    canvas.text("mm", (50, level(1e-3 * highest) - 22), MUTED, 11, "center")
-    y = level(contraction)
-    canvas.polygon([(66, y), (77, y - 6), (77, y + 6)], OUTPUT)
-    y = level(reference)
-    canvas.dashed((84, y), (208, y), REFERENCE)
-    canvas.text("reference", (214, y - 8), REFERENCE, 12)
-
-
-def _pressure_scale(canvas: Canvas, pressure: float, full: float) -> None:
+def pressure_scale(
+    canvas: Canvas, pressure: float, full: float, left: float = 262.0, top: float = 100.0
+) -> None:
     """Draw the colours of the pressures [Pa] from 0 to ``full``, with a pointer at the present."""
-    left, top, height = 262.0, 100.0, 120.0
+    height = 120.0
     for i in range(60):
         color = blend(HOT, COLD, i / 59)
         canvas.rectangle((left, top + i * height / 60, 12, height / 60 + 0.5), color)
@@ -175,7 +146,3 @@ def _pressure_scale(canvas: Canvas, pressure: float, full: float) -> None:
     canvas.text("bar", (left + 6, top - 22), MUTED, 11, "center")
     y = top + height * (1.0 - min(1.0, max(0.0, pressure / full)))
     canvas.polygon([(left - 2, y), (left - 12, y - 6), (left - 12, y + 6)], PRESSURE)
-
-
-SCENES: dict[str, Callable[[Canvas, Any, Any], None]] = {"single_muscle": muscle_scene}
-"""Scene of each family of plants: ``draw(canvas, env, info)``, in the left 320 pixels."""

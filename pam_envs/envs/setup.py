@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.envs.env_kernels import EPISODE, N_SEED
 from pam_envs.kernels import COMPILED, LANES
 from pam_envs.parameters import Signals
 
@@ -38,7 +39,7 @@ class Setup:
     drawn : bool
         Whether environments differ in their parameters; otherwise all tiles share them.
     ring : int
-        References that are kept for the preview, a power of two.
+        References that are kept for the previews: a power of two for each channel.
     seed_rows : tuple of int
         Integer rows of the two key words and of the episode number.
     info_keys : tuple of str
@@ -49,8 +50,8 @@ class Setup:
         Seconds.
     render_mode : str or None
         As Gymnasium means it.
-    arguments : dict
-        Keyword arguments as given, for records.
+    view : str
+        What pictures show, by its name in ``rendering_scene``.
     """
 
     plant: Any
@@ -68,7 +69,7 @@ class Setup:
     control_period: float
     episode_seconds: float
     render_mode: str | None = None
-    arguments: dict[str, Any] = field(default_factory=dict)
+    view: str = ""
 
     def state(self, tiles: int, lanes: int) -> tuple[NDArray[Any], ...]:
         """Return zeroed state, parameters, integers and previews for tiles of ``lanes`` lanes."""
@@ -78,6 +79,92 @@ class Setup:
             np.zeros((tiles, self.counts, lanes), np.int64),
             np.zeros((tiles, self.ring, lanes)),
         )
+
+
+def compose(
+    plant: Any,
+    kernels: Any,
+    given: Any,
+    *,
+    signals: Signals,
+    actions: Signals,
+    config: Sequence[float],
+    choices: Sequence[int],
+    own: NDArray[np.float64],
+    samples: NDArray[np.float64],
+    tables: NDArray[np.float64],
+    spread: NDArray[np.float64],
+    drawn: bool,
+    view: str | None = None,
+) -> Setup:
+    """Return the setup of an environment from what its family adds to what all share.
+
+    Parameters
+    ----------
+    plant : object
+        With ``control_period``, ``substeps``, ``members``, ``parameter_rows``, ``family``.
+    kernels : Kernels
+        Of :mod:`pam_envs.envs.families`.
+    given : Common
+        Of :mod:`pam_envs.envs.arguments`.
+    signals, actions : Signals
+        Of observation and action.
+    config, choices : sequence of numbers
+        The family's own, behind those that all families share.
+    own : ndarray, shape (n, m)
+        The family's own rows of the settings.
+    samples : ndarray, shape (channels, n)
+        References that are given as samples.
+    tables : ndarray, shape (members, n, m)
+        What the memories of the plant and its members are made of.
+    spread : ndarray, shape (n, 3)
+        Row, low and high of each parameter that is drawn.
+    drawn : bool
+        Whether episodes differ in their parameters.
+    view : str, optional
+        What pictures show; default: the plant's family.
+    """
+    members = plant.members() if drawn else (plant,)
+    blocks = [
+        np.array([(plant.control_period, given.seconds, *config)]),
+        np.array([_action_scale(signal) for signal in actions]),
+        scales_of(signals),
+        spread,
+        np.array([member.parameter_rows() for member in members]),
+        own,
+    ]
+    first = np.cumsum([0, *map(len, blocks)]).tolist()
+    settings = np.zeros((first[-1], max(block.shape[1] for block in blocks)))
+    for begin, block in zip(first, blocks, strict=False):
+        settings[begin : begin + len(block), : block.shape[1]] = block
+    sizes = (plant.substeps, len(actions), len(signals), given.preview, given.stride)
+    whole = (*sizes, len(spread), len(members), *first[1:6], *choices)
+    ring = 1 << (given.preview * given.stride).bit_length()
+    return Setup(
+        plant=plant,
+        signals=signals,
+        action_signals=actions,
+        kernels=kernels,
+        rows=kernels.n_rows,
+        fixed=kernels.n_parameters,
+        drawn=drawn,
+        counts=kernels.n_counts,
+        ring=kernels.channels * ring,
+        seed_rows=(kernels.n_counts - N_SEED, kernels.n_counts - N_SEED + 1, EPISODE),
+        info_keys=kernels.info,
+        shared=(tables[: len(members)], samples, settings, np.array(whole, np.int64)),
+        control_period=plant.control_period,
+        episode_seconds=given.seconds,
+        render_mode=given.render_mode,
+        view=view or plant.family,
+    )
+
+
+def _action_scale(signal: Any) -> tuple[float, float, float, float]:
+    """Return ``scale, offset, low, high``: the set-point is ``scale * clip(action) + offset``."""
+    a, b = signal.scale
+    low, high = (-1.0, 1.0) if signal.normalized else (signal.low, signal.high)
+    return 1.0 / a, -b / a, low, high
 
 
 def for_kernels(array: Any) -> Any:

@@ -18,6 +18,11 @@ from pam_envs.hysteresis.maxwell_slip import (
     slip_step,
     stop,
 )
+from pam_envs.hysteresis.modified_maxwell_slip import (
+    ModifiedMaxwellSlip,
+    pressure_step,
+    stiffness_step,
+)
 from pam_envs.hysteresis.preisach import (
     Preisach,
     PreisachState,
@@ -27,6 +32,7 @@ from pam_envs.hysteresis.preisach import (
 
 __all__ = [
     "MaxwellSlip",
+    "ModifiedMaxwellSlip",
     "PlayOperator",
     "Preisach",
     "PreisachState",
@@ -34,7 +40,9 @@ __all__ = [
     "play_step",
     "preisach_inverse",
     "preisach_step",
+    "pressure_step",
     "slip_step",
+    "stiffness_step",
     "stop",
     "symmetry_error",
     "table_from_weights",

@@ -9,29 +9,37 @@
     ensemble: [{muscle.area: 8.8e-4, memory: {...}}, ...]
     notes: {...}
 
-Everything but ``schema`` and ``family`` may be missing. Notes are free text and not hashed.
+Everything but ``schema`` and ``family`` may be missing. Notes are free text and not hashed. Of a
+family whose plants come in several makes, the file names the choices too (``mounting: leg``).
 """
 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import hashlib
 import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 import yaml
 
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.hysteresis.modified_maxwell_slip import ModifiedMaxwellSlip
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.parameters import PROVENANCES, Declaration, declarations
 
 if TYPE_CHECKING:
+    from pam_envs.plants.knee_orthosis import KneeOrthosis
     from pam_envs.plants.single_muscle import SingleMuscle
 
+    AnyPlant: TypeAlias = SingleMuscle | KneeOrthosis
+    Operator: TypeAlias = PlayOperator | ModifiedMaxwellSlip | Preisach | None
+
+Plant = TypeVar("Plant", "SingleMuscle", "KneeOrthosis")
 COMPONENTS = ("regulator", "memory", "muscle", "mass", "position", "pressure")
 KEYS = ("schema", "family", "substeps", "parameters", "memory", "ensemble", "notes")
 ENTRY_KEYS = ("value", "unit", "provenance", "source")
@@ -97,6 +105,14 @@ def _memory_record(operator: Any) -> dict[str, Any]:
             "thresholds": [float(v) for v in operator.thresholds],
             "weights": [float(v) for v in operator.weights],
         }
+    if isinstance(operator, ModifiedMaxwellSlip):
+        return {
+            "kind": "modified_maxwell_slip",
+            "stiffnesses": [float(v) for v in operator.stiffnesses],
+            "break_stiffnesses": [float(v) for v in operator.break_stiffnesses],
+            "spring": [float(v) for v in operator.spring],
+            "segment": float(operator.segment),
+        }
     if isinstance(operator, Preisach):
         table = [[float(v) for v in row] for row in np.asarray(operator.table)]
         return {
@@ -104,23 +120,25 @@ def _memory_record(operator: Any) -> dict[str, Any]:
             "low": float(operator.low),
             "high": float(operator.high),
             "table": table,
-        }
+        } | ({} if operator.start == "virgin" else {"start": operator.start})
     return {"kind": "none"}
 
 
-def _memory(record: Any, where: str) -> PlayOperator | Preisach | None:
+def _memory(record: Any, where: str) -> Operator:
     fields = {
         "none": set(),
         "maxwell_slip": {"linear", "thresholds", "weights"},
+        "modified_maxwell_slip": {"stiffnesses", "break_stiffnesses", "spring", "segment"},
         "preisach": {"low", "high", "table"},
     }
     if not isinstance(record, Mapping) or record.get("kind") not in fields:
         raise ValueError(
-            f"{where}: memory must be a mapping with kind maxwell_slip, preisach or none, "
-            f"got {record!r}"
+            f"{where}: memory must be a mapping with kind maxwell_slip, modified_maxwell_slip, "
+            f"preisach or none, got {record!r}"
         )
     kind = record["kind"]
-    if set(record) - {"kind"} != fields[kind]:
+    optional = {"start"} if kind == "preisach" else set()
+    if set(record) - {"kind"} - optional != fields[kind]:
         raise ValueError(
             f"{where}: a {kind} memory needs exactly the keys {sorted(fields[kind])}, "
             f"got {sorted(set(record) - {'kind'})}"
@@ -132,23 +150,30 @@ def _memory(record: Any, where: str) -> PlayOperator | Preisach | None:
                 tuple(float(v) for v in record["weights"]),
                 float(record["linear"]),
             )
+        if kind == "modified_maxwell_slip":
+            return ModifiedMaxwellSlip(
+                tuple(float(v) for v in record["stiffnesses"]),
+                tuple(float(v) for v in record["break_stiffnesses"]),
+                tuple(float(v) for v in record["spring"]),
+                float(record["segment"]),
+            )
         if kind == "preisach":
             return Preisach(
                 float(record["low"]),
                 float(record["high"]),
                 tuple(tuple(float(v) for v in row) for row in record["table"]),
-                start="virgin",
+                start=record.get("start", "virgin"),
             )
     except (TypeError, ValueError) as error:
         raise ValueError(f"{where}: memory: {error}") from error
     return None
 
 
-def record(plant: SingleMuscle) -> dict[str, Any]:
+def record(plant: AnyPlant) -> dict[str, Any]:
     """Return a plant as plain data, in the layout of the file."""
     parameters = {}
     absent = _absent(plant)
-    for component in COMPONENTS:
+    for component in _components(plant):
         part = getattr(plant, component)
         for name, declared in declarations(part).items():
             key = f"{component}.{name}"
@@ -170,6 +195,7 @@ def record(plant: SingleMuscle) -> dict[str, Any]:
     return {
         "schema": 1,
         "family": plant.family,
+        **{choice: getattr(plant, choice) for choice in _choices(plant)},
         "substeps": plant.substeps,
         "parameters": parameters,
         "memory": _memory_record(plant.memory.operator),
@@ -177,22 +203,30 @@ def record(plant: SingleMuscle) -> dict[str, Any]:
     }
 
 
-def _absent(plant: SingleMuscle) -> set[str]:
+def _components(plant: Any) -> tuple[str, ...]:
+    return getattr(plant, "components", COMPONENTS)
+
+
+def _choices(plant: Any) -> tuple[str, ...]:
+    return getattr(plant, "choices", ())
+
+
+def _absent(plant: AnyPlant) -> set[str]:
     """Return the parameters of effects that are off, which a file need not name."""
     absent = set()
-    for names in EFFECTS:
+    for names in getattr(plant, "effects", EFFECTS):
         amounts = [n for n in names if _declared(plant, n).neutral is not None]
         if all(plant.value(n) == _declared(plant, n).neutral for n in amounts):
             absent |= set(names)
     return absent
 
 
-def _declared(plant: SingleMuscle, name: str) -> Declaration:
+def _declared(plant: AnyPlant, name: str) -> Declaration:
     component, _, field = name.partition(".")
     return declarations(getattr(plant, component))[field]
 
 
-def digest(plant: SingleMuscle) -> str:
+def digest(plant: AnyPlant) -> str:
     """Return a hash over the canonical values (not provenance, sources or notes)."""
 
     def exact(value: Any) -> Any:
@@ -210,7 +244,7 @@ def digest(plant: SingleMuscle) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def write(plant: SingleMuscle, path: Path, notes: Mapping[str, Any] | None = None) -> None:
+def write(plant: AnyPlant, path: Path, notes: Mapping[str, Any] | None = None) -> None:
     """Write a plant, whole or not at all."""
     data = record(plant)
     if notes:
@@ -225,7 +259,7 @@ def write(plant: SingleMuscle, path: Path, notes: Mapping[str, Any] | None = Non
     os.replace(temporary, path)
 
 
-def read(cls: type[SingleMuscle], path: Path) -> SingleMuscle:
+def read(cls: type[Plant], path: Path) -> Plant:
     """Read a plant file; every complaint names the file, the key and what to do."""
     try:
         with open(path, encoding="utf-8") as file:
@@ -237,9 +271,10 @@ def read(cls: type[SingleMuscle], path: Path) -> SingleMuscle:
     where = f"plant file {path}"
     if not isinstance(data, Mapping):
         raise ValueError(f"{where}: must hold a mapping with the keys {', '.join(KEYS)}")
-    unknown = [str(k) for k in data if k not in KEYS]
+    keys = (*KEYS, *_choices(cls))
+    unknown = [str(k) for k in data if k not in keys]
     if unknown:
-        raise ValueError(f"{where}: unknown key {unknown[0]!r}; known: {', '.join(KEYS)}")
+        raise ValueError(f"{where}: unknown key {unknown[0]!r}; known: {', '.join(keys)}")
     if data.get("schema") != 1:
         raise ValueError(f"{where}: schema is {data.get('schema')!r}; this version reads schema 1")
     if data.get("family") != cls.family:
@@ -253,12 +288,14 @@ def read(cls: type[SingleMuscle], path: Path) -> SingleMuscle:
         raise type(error)(text if text.startswith(where) else f"{where}: {text}") from error
 
 
-def _build(cls: type[SingleMuscle], data: Mapping[str, Any], where: str) -> SingleMuscle:
+def _build(cls: type[Plant], data: Mapping[str, Any], where: str) -> Plant:
     values: dict[str, Any] = {}
     provenance: dict[str, tuple[str, str]] = {}
     given = data.get("parameters") or {}
     known = {
-        f"{c}.{name}": d for c in COMPONENTS for name, d in declarations(getattr(cls(), c)).items()
+        f"{c}.{name}": d
+        for c in _components(cls)
+        for name, d in declarations(getattr(cls(), c)).items()
     }
     if not isinstance(given, Mapping):
         raise ValueError(f"{where}: parameters must be a mapping, got {given!r}")
@@ -284,13 +321,9 @@ def _build(cls: type[SingleMuscle], data: Mapping[str, Any], where: str) -> Sing
             other["memory.operator"] = _memory(member["memory"], place)
         ensemble.append(other)
     substeps = data.get("substeps", 4)
+    choices: Any = {choice: data[choice] for choice in _choices(cls) if choice in data}
     plant = cls(substeps=substeps, provenance=provenance).replace(values)
-    made = type(plant)(
-        **{c: getattr(plant, c) for c in COMPONENTS},
-        provenance=provenance,
-        ensemble=tuple(ensemble),
-        substeps=substeps,
-    )
+    made = dataclasses.replace(plant, ensemble=tuple(ensemble), **choices)
     made.members()  # every member must be a valid plant
     return made
 

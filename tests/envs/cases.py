@@ -8,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 
 import pam_envs  # noqa: F401 (registers)
+from pam_envs.plants.knee_orthosis import KneeOrthosis
 from pam_envs.plants.single_muscle import SingleMuscle
 
 IDS = sorted(name for name in gym.registry if name.startswith("PAM/"))
@@ -59,14 +60,50 @@ EVERY_EFFECT = {
 }
 """What a recording may show, all at once."""
 
-VARIANTS: dict[str, dict[str, Any]] = {
+COMMON: dict[str, dict[str, Any]] = {
     "default": {},
     "preisach": {"hysteresis": "preisach"},
     "none": {"hysteresis": "none", "normalize": False},
-    "random": {"randomize": True, "load": None, "reference": "mixed", "load_disturbance": 1.0},
-    "effects": {"plant": SingleMuscle.mas10().replace(EVERY_EFFECT)},
-    "preisach_random": {"hysteresis": "preisach", "randomize": True, "reference": "staircase"},
+    "random": {"randomize": True, "preview": 2, "preview_stride": 7},
+    "preisach_random": {"hysteresis": "preisach", "randomize": True, "preview": 0},
 }
+"""Arguments that every environment takes."""
+
+OWN: dict[str, dict[str, dict[str, Any]]] = {
+    "PAM/MusclePositioning-v0": {
+        "loads": {
+            "randomize": True,
+            "load": None,
+            "reference": "mixed",
+            "load_disturbance": 1.0,
+        },
+        "effects": {"plant": SingleMuscle.mas10().replace(EVERY_EFFECT)},
+        "staircase": {"hysteresis": "preisach", "randomize": True, "reference": "staircase"},
+        "samples": {
+            "reference": [0.001 * (k // 20 % 13) for k in range(300)],
+            "preview": 3,
+            "preview_stride": 2,
+        },
+    },
+    "PAM/KneeTension-v0": {
+        "measured": {"plant": KneeOrthosis.no_load(dynamics="measured"), "reference": "mixed"},
+        "paper": {"start": "paper", "frequency": 0.5},
+    },
+    "PAM/KneeStiffness-v0": {"samples": {"reference": [20.0 * (k % 300) for k in range(600)]}},
+    "PAM/KneeWalk-v0": {
+        "quick": {"pace": "normal", "assistance": "clipped", "mismatch": 10.0, "ratio": 0.3},
+        "demand": {"reference": "demand", "start": "heel_contact", "preview": 0},
+        "samples": {"reference": [0.1 * (k % 100) for k in range(300)], "preview": 20},
+    },
+}
+"""Arguments of its own that reach further branches of an environment."""
+
+LIVELY: dict[str, dict[str, Any]] = {"PAM/MusclePositioning-v0": {"load": None}}
+"""Arguments under which no entry of the observation stays the same over episodes."""
+
+VARIANTS = {name: {**COMMON, **OWN.get(name, {})} for name in IDS}
+CASES = [(name, variant) for name in IDS for variant in VARIANTS[name]]
+"""Every registered environment in every variant."""
 
 
 def actions_for(space: gym.spaces.Box, steps: int, seed: int = 0) -> np.ndarray:

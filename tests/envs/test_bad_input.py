@@ -15,24 +15,27 @@ from pam_envs.plants.single_muscle import SingleMuscle, UnstableParameters
 from tests.envs.cases import IDS
 
 EVERY = pytest.mark.parametrize("name", IDS)
-BAD_ACTIONS = [
-    [np.nan],
-    [np.inf],
-    [-np.inf],
-    np.zeros(0, np.float32),
-    np.zeros(2, np.float32),
-    np.zeros((1, 1), np.float32),
-    np.float32(0.1),
-    np.array(["up"]),
-    "up",
-    None,
-    {},
-    [[0.1], [0.2, 0.3]],
-    object(),
-    [10**400],
-    [1j],
-    np.array([1j]),
-]
+
+
+def bad_actions(n: int) -> list[Any]:
+    """Return what is no action of ``n`` numbers."""
+    return [
+        *([value] * n for value in (np.nan, np.inf, -np.inf, 10**400, 1j)),
+        [0.1] * (n - 1) + [np.nan],
+        [0.1] * (n + 1),
+        np.zeros(0, np.float32),
+        np.zeros(n + 1, np.float32),
+        np.zeros((1, n), np.float32),
+        np.zeros((n, 1), np.float32),
+        np.float32(0.1),
+        np.array(["up"] * n),
+        "up",
+        None,
+        {},
+        [[0.1], [0.2, 0.3]],
+        object(),
+        np.array([1j] * n),
+    ]
 
 
 @EVERY
@@ -46,7 +49,7 @@ def test_bad_actions_change_nothing(name: str, warm: int) -> None:
         env.step(good)
         twin.step(good)
     before = env.get_state()
-    for action in BAD_ACTIONS:
+    for action in bad_actions(env.action_space.shape[0]):
         with pytest.raises(ValueError, match="action"):
             env.step(action)
     after = env.get_state()
@@ -107,8 +110,8 @@ def test_bad_batches_change_nothing(name: str) -> None:
     before = envs.get_state()
     shape = envs.action_space.shape
     broken = np.zeros(shape)
-    broken[2, 0] = np.nan
-    for actions in (broken, np.zeros((3, shape[1])), np.zeros(4), None, "no", [[1.0], [2.0, 3.0]]):
+    broken[2, -1] = np.nan
+    for actions in (broken, np.zeros((3, shape[1])), np.zeros(5), None, "no", [[1.0], [2.0, 3.0]]):
         with pytest.raises(ValueError, match="actions"):
             envs.step(actions)
     assert all(np.array_equal(v, before[k]) for k, v in envs.get_state().items())
@@ -119,40 +122,56 @@ def test_bad_batches_change_nothing(name: str) -> None:
         gym.make_vec(name, 0, vectorization_mode="vector_entry_point")
 
 
+@EVERY
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         ({"hysteresis": "bouc_wen"}, "hysteresis = 'bouc_wen' is not known; choose one of"),
-        ({"reference": "stairs"}, "choose one of 'steps'"),
-        ({"reference": [0.0, np.nan]}, "finite sample"),
-        ({"reference": [5.0]}, "samples are in metres"),
+        ({"reference": "no such one"}, "reference = 'no such one' is not known; choose one of"),
         ({"reference": object()}, "reference"),
+        ({"reference": [np.nan]}, "reference"),
         ({"preview": -1}, "preview = -1 must be from 0 to 20"),
         ({"preview": 2.5}, "whole number"),
         ({"preview_stride": 0}, "preview_stride = 0"),
         ({"episode_seconds": 0}, "from 0.02 to 3600 s"),
         ({"episode_seconds": float("nan")}, "episode_seconds = nan"),
         ({"episode_seconds": "long"}, "episode_seconds = 'long'"),
+        ({"normalize": 1}, "normalize = 1"),
+        ({"randomize": 3}, "randomize = 3"),
+        ({"randomize": {"mass.colour": (1, 2)}}, "'mass.colour' is not a parameter"),
+        ({"randomize": {"regulator.time_constant": 0.1}}, r"needs \(low, high\)"),
+        ({"randomize": {"regulator.time_constant": (0.2, 0.1)}}, "swap them"),
+        ({"randomize": {"regulator.time_constant": (0.1, 1e9)}}, "outside its bounds"),
+        ({"randomize": {"regulator.max_pressure": (3e5, 3e5)}}, "that can be drawn"),
+        ({"reward": {"luck": 1.0}}, "keys among "),
+        ({"reward": {"effort_weight": -1.0}}, "outside its bounds"),
+        ({"plant": "/nowhere/rig.yaml"}, "cannot be read"),
+        ({"plant": 7}, "plant = '7' must be a "),
+    ],
+)
+def test_bad_arguments_that_all_take(name: str, arguments: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        gym.make(name, **arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"reference": "stairs"}, "choose one of 'steps'"),
+        ({"reference": [0.0, np.nan]}, "finite sample"),
+        ({"reference": [5.0]}, "samples are in m, at most 0.2"),
         ({"load": -1.0}, "load = -1.0 must be a number from 0 to 5 kg"),
         ({"load": 25.0}, "from 0 to 5 kg"),
         ({"load": []}, "load = "),
         ({"load": "heavy"}, "load = 'heavy'"),
         ({"load_disturbance": -0.1}, "load_disturbance"),
         ({"start": "middle"}, "start = 'middle'"),
-        ({"normalize": 1}, "normalize = 1"),
-        ({"randomize": 3}, "randomize = 3"),
-        ({"randomize": {"mass.colour": (1, 2)}}, "'mass.colour' is not a parameter"),
         ({"randomize": {"mass.damping": (300, 100)}}, "swap them"),
-        (
-            {"randomize": {"regulator.max_pressure": (3e5, 3e5)}},
-            "not a parameter that can be drawn",
-        ),
         ({"randomize": {"mass.damping": 100}}, r"needs \(low, high\)"),
         ({"randomize": {"mass.damping": (1, 1e9)}}, "outside its bounds"),
         ({"randomize": {"mass.moving_mass": (0.05, 0.2)}}, "use at least"),
         ({"reward": {"speed": 1.0}}, "keys among tracking_weight"),
         ({"reward": {"error_scale": -1.0}}, "outside its bounds"),
-        ({"plant": "/nowhere/rig.yaml"}, "cannot be read"),
         ({"plant": 7}, "must be a SingleMuscle"),
     ],
 )

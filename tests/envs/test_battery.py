@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from tests.envs.cases import IDS, VARIANTS, actions_for, trajectory
+from tests.envs.cases import CASES, IDS, LIVELY, VARIANTS, actions_for, trajectory
 
 PREFIXES = ("state/", "reward/", "cost/", "margin/", "effort/", "sensor/")
 PLAIN = ("time", "reference", "output", "saturated")
 EVERY = pytest.mark.parametrize("name", IDS)
-EACH_VARIANT = pytest.mark.parametrize("variant", VARIANTS)
+EVERY_CASE = pytest.mark.parametrize(("name", "variant"), CASES)
 
 
 @EVERY
@@ -29,11 +29,10 @@ def test_gymnasium_and_sb3_checkers_have_nothing_to_say(name: str) -> None:
         sb3.check_env(gym.make(name).unwrapped, skip_render_check=True)
 
 
-@EVERY
-@EACH_VARIANT
+@EVERY_CASE
 def test_same_seed_same_bits_and_other_seed_other_bits(name: str, variant: str) -> None:
-    env = gym.make(name, **VARIANTS[variant])
-    first, again = trajectory(env, 5), trajectory(gym.make(name, **VARIANTS[variant]), 5)
+    env = gym.make(name, **VARIANTS[name][variant])
+    first, again = trajectory(env, 5), trajectory(gym.make(name, **VARIANTS[name][variant]), 5)
     assert first == again
     assert first == trajectory(env, 5)  # nothing is left over from the run before
     assert first != trajectory(env, 6)
@@ -63,10 +62,9 @@ def test_global_random_numbers_are_neither_used_nor_disturbed(name: str) -> None
     assert trajectory(env, 2, 20) == first
 
 
-@EVERY
-@EACH_VARIANT
+@EVERY_CASE
 def test_observations_lie_in_their_space_and_every_entry_moves(name: str, variant: str) -> None:
-    env = gym.make(name, **{"load": None, **VARIANTS[variant]})
+    env = gym.make(name, **{**LIVELY.get(name, {}), **VARIANTS[name][variant]})
     seen = []
     for seed in range(4):
         observation, _ = env.reset(seed=seed)
@@ -125,10 +123,9 @@ def test_signals_decode_what_the_sensors_gave(name: str) -> None:
         env.unwrapped.signals[bad]
 
 
-@EVERY
-@EACH_VARIANT
+@EVERY_CASE
 def test_a_saved_state_loses_no_bit(name: str, variant: str) -> None:
-    env = gym.make(name, episode_seconds=1.0, **VARIANTS[variant]).unwrapped
+    env = gym.make(name, episode_seconds=1.0, **VARIANTS[name][variant]).unwrapped
     drive = actions_for(env.action_space, 240, 1)
 
     def run(e: gym.Env, some: np.ndarray) -> list[bytes]:
@@ -147,7 +144,7 @@ def test_a_saved_state_loses_no_bit(name: str, variant: str) -> None:
     after = run(env, drive[70:])
     env.set_state(state)
     assert run(env, drive[70:]) == after
-    fresh = gym.make(name, episode_seconds=1.0, **VARIANTS[variant]).unwrapped
+    fresh = gym.make(name, episode_seconds=1.0, **VARIANTS[name][variant]).unwrapped
     fresh.set_state(state)
     assert run(fresh, drive[70:]) == after
     for other in copies:

@@ -1,0 +1,62 @@
+"""What moves a plant that is filmed: the inverse of its static law and of its memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class InverseFeedForward:
+    """The set-point that the plant's own inverse asks for: static law, then memory."""
+
+    def __init__(self, env: Any) -> None:
+        self.plant, self.signals = env.plant, env.signals
+        self.action = env.action_signals[0]
+        self.inverse: Any = None
+        self.state: Any = None
+
+    def __call__(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the action for an observation."""
+        load = float(self.signals.decode(observation, "load"))
+        if self.inverse is None:
+            full = self.plant.regulator.max_pressure
+            self.inverse = self.plant.memory.inverse(load, full)
+            self.state = self.inverse.initial_state((1,))
+        wanted = self.signals.decode(observation, "reference")
+        drive = np.atleast_1d(self.plant.drive_for(wanted, load))
+        pressure, self.state = self.inverse.pressure(drive, self.state)
+        return np.asarray(self.action.encode(pressure), np.float32)
+
+
+class BraceFeedForward:
+    """The set-point that the orthosis' own inverse asks for: spring and lever, then memory."""
+
+    def __init__(self, env: Any) -> None:
+        self.plant, self.signals = env.plant, env.signals
+        self.action = env.action_signals[0]
+        self.operator: Any = env.plant.memory.scaled
+        self.state: Any = None if self.operator is None else self.operator.initial_state((1,))
+
+    def __call__(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the action for an observation."""
+        wanted = self.signals.decode(observation, "reference")
+        if self.signals["reference"].unit == "N":
+            wanted = self.plant.stiffness_for(wanted, self.signals.decode(observation, "angle"))
+        pressure = np.atleast_1d(wanted / self.plant.muscle.gain)
+        if self.operator is None:
+            pressure = pressure / self.plant.muscle.stiffness_ratio
+        else:
+            held, _ = self.operator.inverse_step(pressure, self.state)
+            pressure = np.clip(held, 0.0, self.plant.regulator.max_pressure)
+            _, self.state = self.operator.step(pressure, self.state)
+        return np.asarray(self.action.encode(pressure), np.float32)
+
+
+POLICIES: dict[str, Callable[[Any], Any]] = {
+    "single_muscle": InverseFeedForward,
+    "knee_orthosis": BraceFeedForward,
+}
+"""What moves each family of plants."""

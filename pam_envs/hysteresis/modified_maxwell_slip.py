@@ -1,0 +1,401 @@
+"""The modified Maxwell-slip model: a nonlinear spring and elasto-slip elements in parallel.
+
+Displacement in, force out, it is the sum of a spring ``g`` and stops (see
+:mod:`~pam_envs.hysteresis.maxwell_slip`); force in, displacement out, it is a hysteresis whose
+loops need not be symmetric. For a muscle the force is its pressure and the displacement its
+stiffness ``s = tension / (length - shortest length)``:
+
+    P = g(s) + sum_i k_i (s - w_i),    w_i = play(s, r_i)
+
+with ``g`` piecewise linear on evenly spaced knots. The pressure of a wanted stiffness is a plain
+sum. The stiffness under a pressure is found by marching along the branch from kink to kink, where
+an element begins to slip or the spring has a knot: exact, with no tolerance.
+
+References
+----------
+T.-J. Yeh, M.-J. Wu, T.-J. Lu, F.-K. Wu, C.-R. Huang, "Control of McKibben pneumatic muscles for a
+power-assist, lower-limb orthosis", Mechatronics 20 (2010), section 3. T.-J. Yeh, S.-W. Lu,
+T.-Y. Wu, "Modeling and identification of hysteresis in piezoelectric actuators", J. Dyn. Sys.,
+Meas., Control 128 (2006).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.hysteresis.checks import (
+    check_not_negative,
+    check_thresholds,
+    floats,
+    series,
+    single_rows,
+)
+from pam_envs.hysteresis.elements import play
+from pam_envs.kernels import entry, kernel
+
+Array = NDArray[np.float64]
+
+FAR = 1e300
+
+
+@kernel
+def _cell(x: float, segment: float, cells: int) -> int:
+    """Return the cell of the spring that ``x`` is in, the end cells reaching on for ever."""
+    last = cells - 1.0
+    return int(max(0.0, min(last, x / segment)))
+
+
+@kernel
+def _line(x: float, cell: int, low: float, high: float, segment: float) -> float:
+    return low + (high - low) * (x / segment - cell)
+
+
+@kernel
+def _next_knot(cell: int, rising: bool, cells: int, segment: float) -> float:
+    """Return the knot at which the spring's slope changes next."""
+    if rising:
+        return (cell + 1) * segment if cell + 1 < cells else FAR
+    return cell * segment if cell > 0 else -FAR
+
+
+@kernel
+def _next_slip(left: bool, w: float, threshold: float, rising: bool) -> float:
+    """Return the stiffness at which an element that is ``left`` begins to slip."""
+    if not left:
+        return FAR if rising else -FAR
+    return w + threshold if rising else w - threshold
+
+
+@kernel
+def _nearer(a: float, b: float, rising: bool) -> float:
+    return min(a, b) if rising else max(a, b)
+
+
+@kernel
+def _beyond(x: float, mark: float, rising: bool) -> bool:
+    return x > mark if rising else x < mark
+
+
+@kernel
+def _spring(x: float, spring: Any, segment: float) -> float:
+    cells = len(spring) - 1
+    cell = _cell(x, segment, cells)
+    return _line(x, cell, spring[cell], spring[cell + 1], segment)
+
+
+@kernel
+def pressure_step(
+    x: float, state: Any, lane: int, breaks: Any, stiffnesses: Any, spring: Any, segment: float,
+    width: float,
+) -> float:  # fmt: skip
+    """Advance the slip positions to the stiffness ``x`` and return the pressure: the inverse.
+
+    Parameters
+    ----------
+    x : float
+        Stiffness [N/m].
+    state : rows of float, shape (n, lanes)
+        Slip positions [N/m]; changed in place.
+    lane : int
+        Column to work on.
+    breaks, stiffnesses : row of float, shape (n,)
+        Deflections [N/m] at which the elements slip, rising, and their stiffnesses [Pa m/N].
+    spring : row of float, shape (m,)
+        Pressures [Pa] of the spring at the stiffnesses ``0, segment, 2 segment, ...``.
+    segment : float
+        Distance of the spring's knots [N/m].
+    width : float
+        Factor on the hysteresis; 0 leaves the line between the tips of the major loop and what
+        the spring departs from its own line.
+
+    Returns
+    -------
+    float
+        Pressure [Pa].
+    """
+    held, friction = 0.0, 0.0
+    for i in range(len(breaks)):
+        w = play(x, breaks[i], state[i][lane])
+        state[i][lane] = w
+        held = held + stiffnesses[i] * (x - w)
+        friction = friction + stiffnesses[i] * breaks[i]
+    along = 2.0 * x / ((len(spring) - 1) * segment) - 1.0  # from -1 to 1 between the tips
+    return _spring(x, spring, segment) + width * held + (1.0 - width) * friction * along
+
+
+@kernel
+def stiffness_step(
+    pressure: float, state: Any, lane: int, breaks: Any, stiffnesses: Any, spring: Any,
+    segment: float, width: float,
+) -> float:  # fmt: skip
+    """Advance the slip positions to the pressure [Pa] and return the stiffness [N/m].
+
+    The other parameters are those of :func:`pressure_step`. Not-a-number gives not-a-number and
+    leaves the state alone.
+
+    Notes
+    -----
+    In every state that the model can reach, the softest-breaking element's slip position lies
+    where no element slips, and from there on the elements slip in the order of their thresholds.
+    """
+    n, cells = len(breaks), len(spring) - 1
+    x = state[0][lane]
+    held, holding, friction = 0.0, 0.0, 0.0
+    for i in range(n):
+        held = held + stiffnesses[i] * (x - state[i][lane])
+        holding = holding + stiffnesses[i]
+        friction = friction + stiffnesses[i] * breaks[i]
+    held, holding, friction = width * held, width * holding, (1.0 - width) * friction
+    tilt = 2.0 * friction / (cells * segment)
+    reached = _spring(x, spring, segment) + held + tilt * x - friction
+    rising = pressure > reached
+    cell, k = _cell(x, segment, cells), 0
+    for _ in range(n + cells):  # no more kinks than that lie on the way
+        slope = tilt + (spring[cell + 1] - spring[cell]) / segment + holding
+        next_one = min(k, n - 1)
+        slip = _next_slip(k < n, state[next_one][lane], breaks[next_one], rising)
+        kink = _nearer(_next_knot(cell, rising, cells, segment), slip, rising)
+        there = reached + slope * (kink - x)
+        if not _beyond(pressure, there, rising):
+            break
+        x, reached = kink, there
+        slips = 1 if kink == slip else 0
+        holding = holding - slips * width * stiffnesses[next_one]
+        k = k + slips
+        cell = cell + (1 - slips) * (1 if rising else -1)
+    slope = tilt + (spring[cell + 1] - spring[cell]) / segment + holding
+    x = x + (pressure - reached) / slope
+    for i in range(n):
+        state[i][lane] = play(x, breaks[i], state[i][lane])
+    return x
+
+
+@entry
+def _advance(
+    values: Array, state: Array, breaks: Array, stiffnesses: Array, spring: Array, segment: float,
+    out: Array,
+) -> None:  # fmt: skip
+    """Advance every lane of ``state`` to its pressure."""
+    for j in range(len(values)):
+        out[j] = stiffness_step(values[j], state, j, breaks, stiffnesses, spring, segment, 1.0)
+
+
+@entry
+def _invert(
+    values: Array, state: Array, breaks: Array, stiffnesses: Array, spring: Array, segment: float,
+    out: Array,
+) -> None:  # fmt: skip
+    """Advance every lane of ``state`` to its stiffness."""
+    for j in range(len(values)):
+        out[j] = pressure_step(values[j], state, j, breaks, stiffnesses, spring, segment, 1.0)
+
+
+@entry
+def _follow(
+    values: Array, state: Array, breaks: Array, stiffnesses: Array, spring: Array, segment: float,
+    inverse: bool, out: Array,
+) -> None:  # fmt: skip
+    """Run one lane over a record."""
+    for t in range(len(values)):
+        if inverse:
+            out[t] = pressure_step(values[t], state, 0, breaks, stiffnesses, spring, segment, 1.0)
+        else:
+            out[t] = stiffness_step(values[t], state, 0, breaks, stiffnesses, spring, segment, 1.0)
+
+
+@dataclass(frozen=True)
+class ModifiedMaxwellSlip:
+    """From pressure [Pa] to stiffness [N/m], with the pressure of a wanted stiffness as inverse.
+
+    Parameters
+    ----------
+    stiffnesses : tuple of float
+        Stiffnesses ``k`` [Pa m/N] of the elements, at least 0.
+    break_stiffnesses : tuple of float
+        Deflections ``r`` [N/m] at which the elements slip, rising, at least 0. The pressure that
+        an element holds when it slips is ``k r``.
+    spring : tuple of float
+        Pressures [Pa] of the nonlinear spring at 0, ``segment``, ``2 segment``, ...: at least two,
+        and rising, so that a pressure has one stiffness where every element slips.
+    segment : float
+        Distance of the spring's knots [N/m].
+
+    Notes
+    -----
+    The state holds the slip positions, shape (..., n). Beyond its knots the spring goes on with
+    its end slopes.
+    """
+
+    stiffnesses: tuple[float, ...]
+    break_stiffnesses: tuple[float, ...]
+    spring: tuple[float, ...]
+    segment: float
+
+    def __post_init__(self) -> None:
+        for name in ("stiffnesses", "break_stiffnesses", "spring"):
+            object.__setattr__(self, name, floats(name, getattr(self, name)))
+        object.__setattr__(self, "segment", floats("segment", (self.segment,))[0])
+        check_thresholds(
+            "break_stiffnesses", self.break_stiffnesses, len(self.stiffnesses), "stiffnesses"
+        )
+        check_not_negative("stiffnesses", self.stiffnesses, "to dissipate and not create energy")
+        if not self.stiffnesses:
+            raise ValueError(
+                "stiffnesses is empty; the model needs 1 element: give 0 for no memory"
+            )
+        if not self.segment > 0.0:
+            raise ValueError(f"segment is {self.segment}; it must be above 0: give the knots' gap")
+        _check_spring(self.spring)
+
+    @property
+    def range(self) -> float:
+        """Stiffness [N/m] of the spring's last knot."""
+        return (len(self.spring) - 1) * self.segment
+
+    @property
+    def friction(self) -> float:
+        """Pressure [Pa] that all elements hold together when all slip."""
+        return math.fsum(
+            k * r for k, r in zip(self.stiffnesses, self.break_stiffnesses, strict=True)
+        )
+
+    @cached_property
+    def arrays(self) -> tuple[Array, Array, Array, float]:
+        """What the kernels take: breaks, stiffnesses, spring, segment."""
+        lists = (self.break_stiffnesses, self.stiffnesses, self.spring)
+        breaks, stiffnesses, spring = (np.array(values) for values in lists)
+        return breaks, stiffnesses, spring, self.segment
+
+    def initial_state(self, batch_shape: tuple[int, ...] = ()) -> Array:
+        """Return the slip positions at stiffness 0 after a larger one, shape (*batch_shape, n).
+
+        That is a muscle that has been inflated and vented before. An element that not even the
+        whole range can make slip is taken to have come from the middle of it.
+        """
+        start = np.minimum(self.break_stiffnesses, 0.5 * self.range)
+        return np.broadcast_to(start, (*batch_shape, len(start))).copy()
+
+    def step(self, pressure: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
+        """Return the stiffness and the new state for one sample of every row.
+
+        Parameters
+        ----------
+        pressure : array_like, shape (...)
+            Pressures [Pa].
+        state : array_like, shape (..., n)
+            Slip positions before [N/m]; they are not changed.
+
+        Returns
+        -------
+        stiffness : ndarray, shape (...)
+            [N/m].
+        state : ndarray, shape (..., n)
+            Slip positions after.
+        """
+        return self._rows(_advance, pressure, state)
+
+    def inverse_step(self, stiffness: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
+        """Return the pressure [Pa] that gives a stiffness [N/m], and the state it leaves.
+
+        The shapes are those of :meth:`step`, whose exact inverse this is.
+        """
+        return self._rows(_invert, stiffness, state)
+
+    def simulate(self, pressure: ArrayLike, state: ArrayLike | None = None) -> tuple[Array, Array]:
+        """Return the stiffnesses, shape (T,), for pressures of shape (T,), and the last state."""
+        return self._record(pressure, state, False)
+
+    def inverse_simulate(
+        self, stiffness: ArrayLike, state: ArrayLike | None = None
+    ) -> tuple[Array, Array]:
+        """Return the pressures, shape (T,), for stiffnesses of shape (T,), and the last state."""
+        return self._record(stiffness, state, True)
+
+    def dissipated(self, before: ArrayLike, after: ArrayLike) -> Array:
+        """Return the friction work ``sum(k r abs(slip))`` of a way without turns, shape (...).
+
+        Summed over a closed cycle it is the loop area, the integral of ``pressure d stiffness``.
+        """
+        slipped = np.abs(np.asarray(after, dtype=float) - np.asarray(before, dtype=float))
+        breaks, stiffnesses = self.arrays[:2]
+        return slipped @ (breaks * stiffnesses)
+
+    def scaled(self, width: float) -> ModifiedMaxwellSlip:
+        """Return this model with its hysteresis ``width`` times as wide, 0 for none.
+
+        The spring takes over what the elements held at the tips of the major loop, so that the
+        tips stay where they are.
+        """
+        (width,) = floats("width", (width,))
+        check_not_negative("width", (width,), "to stay passive")
+        tilt = (1.0 - width) * self.friction * np.linspace(-1.0, 1.0, len(self.spring))
+        stiffnesses = tuple(width * k for k in self.stiffnesses)
+        return replace(self, stiffnesses=stiffnesses, spring=tuple(np.add(self.spring, tilt)))
+
+    def _rows(self, loop: Any, values: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
+        shape, n = np.shape(state)[:-1], len(self.stiffnesses)
+        if np.shape(state)[-1:] != (n,):
+            raise ValueError(
+                f"state has shape {np.shape(state)}; its last axis must be the {n} elements:"
+                " begin with initial_state(batch_shape)"
+            )
+        rows = np.array(np.asarray(state, float).reshape(-1, n).T, order="C")
+        taken = np.array(np.broadcast_to(np.asarray(values, float), shape)).reshape(-1)
+        out = np.empty_like(taken)
+        loop(taken, rows, *self.arrays, out)
+        return out.reshape(shape), np.ascontiguousarray(rows.T).reshape(*shape, n)
+
+    def _record(
+        self, values: ArrayLike, state: ArrayLike | None, inverse: bool
+    ) -> tuple[Array, Array]:
+        taken = series(values)
+        rows = single_rows(self.initial_state() if state is None else state, len(self.stiffnesses))
+        out = np.empty_like(taken)
+        _follow(taken, rows, *self.arrays, inverse, out)
+        return out, rows[:, 0]
+
+
+def _check_spring(spring: tuple[float, ...]) -> None:
+    if len(spring) < 2:
+        raise ValueError(f"spring has {len(spring)} knots; it needs 2: give its two ends")
+    for i, (low, high) in enumerate(pairwise(spring)):
+        if not high > low:
+            raise ValueError(
+                f"spring[{i + 1}] is {high}, not above spring[{i}] = {low}; the spring must rise"
+                " for a pressure to have one stiffness: refit with a least slope"
+            )
+
+
+def even_model(
+    full_pressure: float, full_stiffness: float, friction: float, elements: int = 10
+) -> ModifiedMaxwellSlip:
+    """Return a model with a straight mean line and equal break pressures.
+
+    Parameters
+    ----------
+    full_pressure : float
+        Pressure [Pa] of the major loop's upper tip; the lower one is at 0.
+    full_stiffness : float
+        Stiffness [N/m] there.
+    friction : float
+        Pressure [Pa] that all elements hold together; below half the full pressure.
+    elements : int
+        Number of elements ``N``; the ``i``-th slips at ``i full_stiffness / (2 N)``.
+    """
+    if not 0.0 <= friction < 0.5 * full_pressure:
+        raise ValueError(
+            f"friction is {friction}; it must be from 0 to below half of {full_pressure}, or the"
+            " spring would fall: give a smaller friction"
+        )
+    breaks = 0.5 * full_stiffness * np.arange(1, elements + 1) / elements
+    spring = np.linspace(friction, full_pressure - friction, elements + 1)
+    return ModifiedMaxwellSlip(
+        tuple(friction / elements / breaks), tuple(breaks), tuple(spring), full_stiffness / elements
+    )

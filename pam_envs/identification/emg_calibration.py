@@ -1,0 +1,109 @@
+"""The constants of the two calibrated EMG readings, fitted to seed 000's three reductions.
+
+Run ``python -m pam_envs.identification.emg_calibration`` to write them anew. They are *fitted*, one
+a published figure, and predict nothing: what is assumed is an orthosis that delivers the paper's
+reference exactly, 20 % of Eq. (1) behind the eighth-order low-pass while the heel is loaded, and
+never less than its wire does past the relaxed angle, where a muscle cannot push.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from pam_envs.mechanics.leg import GRAVITY, centre_of_pressure
+from pam_envs.muscle.emg import CONSTANTS, Reading, emg_proxy
+from pam_envs.plants.knee_orthosis import Activity, KneeOrthosis
+from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE, gait_curves
+from pam_envs.sensing.butterworth import PERIOD, filtered
+from pam_envs.sensing.shoe import estimated_torque, heel_load
+
+Array = NDArray[np.float64]
+
+PUBLISHED: dict[Activity, float] = {
+    "walk": 0.07 / 0.11 - 1.0,
+    "stairs_up": -0.33,
+    "stairs_down": -0.261,
+}
+"""Change of the EMG's RMS with the orthosis on: 0.11 to 0.07 V, and two percentages (section 5)."""
+ASSISTANCE_RATIO = 0.2
+RANGES: dict[Reading, tuple[float, float]] = {"A": (0.2, 3.0), "B": (0.3, 8.0)}
+STRIDES = 3
+
+
+def stride_torques(activity: Activity, stride: float = PAPER_STRIDE) -> tuple[Array, Array]:
+    """Return Eq. (1) and the delivered assistance [N m] over one stride in its steady course."""
+    plant = KneeOrthosis.on_leg(activity, stride, "none")
+    leg, shoe = plant.leg, plant.shoe
+    n = round(stride / PERIOD)
+    curves = gait_curves(activity, np.arange(STRIDES * n) / n)
+    vertical = curves["ground_z"] * leg.body_mass * GRAVITY
+    quick, sole = NATURAL_STRIDE / stride, (shoe.heel, shoe.tip)
+    cop = [
+        centre_of_pressure(r, x, z, quick, leg.aim_height, *sole)
+        for r, x, z in zip(curves["cop"], curves["ground_x"], curves["ground_z"], strict=True)
+    ]
+    torque = estimated_torque(vertical, np.array(cop), np.sin(curves["shank"]), leg.shank)  # type: ignore[arg-type]
+    heel = [heel_load(f, r, *sole) for f, r in zip(vertical, cop, strict=True)]
+    stance = np.array(heel) > shoe.threshold
+    wire = -plant.lever.spring_torque(plant.lever.mount_angle + curves["knee"])
+    wanted = np.where(stance, filtered(ASSISTANCE_RATIO * torque), 0.0)
+    return np.asarray(torque)[-n:], np.maximum(wanted, wire)[-n:]
+
+
+def change(activity: Activity, reading: Reading, constant: float) -> float:
+    """Return the change of the proxy's RMS for a constant."""
+    torque, helped = stride_torques(activity)
+    two = (np.tile(torque, 2), np.tile(helped, 2))
+    return emg_proxy(*two, PERIOD, reading=reading, constant=constant).change
+
+
+def root(of: Callable[[float], float], low: float, high: float) -> float:
+    """Return where a function changes its sign, to 1e-9, or raise where it does not."""
+    below = of(low) < 0.0
+    if below == (of(high) < 0.0):
+        raise ValueError(f"no constant between {low:g} and {high:g} gives the published reduction")
+    while high - low > 1e-9:
+        middle = 0.5 * (low + high)
+        if (of(middle) < 0.0) == below:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+def fitted() -> dict[str, dict[Activity, float]]:
+    """Return the constant of each reading and activity."""
+    return {
+        reading: {
+            activity: round(
+                root(
+                    lambda c, a=activity, r=reading: change(a, r, c) - PUBLISHED[a],  # type: ignore[misc]
+                    *bounds,
+                ),
+                4,
+            )
+            for activity in PUBLISHED
+        }
+        for reading, bounds in RANGES.items()
+    }
+
+
+def write(path: Path = CONSTANTS) -> None:
+    """Write the constants."""
+    data = {
+        "provenance": "fitted",
+        "source": "seed 000, section 5: EMG 0.11 to 0.07 V walking, -33 % up, -26.1 % down stairs",
+        "assumed": "20 % of Eq. (1) behind its low-pass in stance, the wire alone in swing",
+        "readings": fitted(),
+    }
+    path.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write()
+    print(CONSTANTS.read_text(encoding="utf-8"))

@@ -1,0 +1,122 @@
+"""The zig-zag wire of the orthosis as a torsion spring, and the lever by which the muscle pulls.
+
+The wire's two arms of length ``L_b`` include the angle ``theta``; the muscle, with fittings of
+length ``L_a``, spans their ends (seed 000, Fig. 4). Bending the knee opens the angle, the muscle
+closes it:
+
+    L = 2 L_b sin(theta / 2) - L_a,          dL / d theta = L_b cos(theta / 2)
+    tau_a = T L_b cos(theta / 2) - kappa (theta_0 - theta)
+
+with ``tau_a`` positive in extension. The paper's Eq. (3) has the opposite sign of ``tau_a``, and
+later a squared cosine, which the virtual work of ``T`` does not.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.kernels import kernel, sine_of_turns
+from pam_envs.parameters import parameter
+
+_GEOMETRY = "reproduces 158 N at 2 bar and 22 cm with seed 000's range of tension and stiffness"
+PER_TURN = 1.0 / (2.0 * math.pi)
+
+
+@dataclass(frozen=True)
+class KneeLever:
+    """Geometry, spring and inertia of the brace.
+
+    ``mount_angle`` is the wire's angle at a straight knee: how the wearer straps the brace on.
+    """
+
+    arm: float = parameter(0.14, "m", 0.05, 0.4, "assumed", f"L_b; {_GEOMETRY}")
+    fittings: float = parameter(0.0094, "m", 0.0, 0.1, "derived", f"L_a; {_GEOMETRY}")
+    stiffness: float = parameter(
+        30.0,
+        "N m/rad",
+        1.0,
+        1e3,
+        "assumed",
+        f"kappa; {_GEOMETRY}",
+        spread=(27.0, 33.0),
+    )
+    relaxed_angle: float = parameter(
+        2.3422, "rad", 0.5, 3.1, "derived", "theta_0 = 134.2 degrees: rest at 2 bar and 110 degrees"
+    )
+    mount_angle: float = parameter(
+        1.7453,
+        "rad",
+        0.5,
+        3.0,
+        "assumed",
+        "100 degrees: 20 % of the torque of a slow stride then takes up to 3.7 bar of 4.5",
+    )
+    inertia: float = parameter(
+        0.02, "kg m2", 1e-3, 0.5, "assumed", "half a brace of 0.8 kg about the knee"
+    )
+    damping: float = parameter(
+        1.0, "N m s/rad", 0.05, 50.0, "assumed", "bearings, wire and muscle: damping ratio 0.5"
+    )
+
+    def length(self, angle: ArrayLike) -> NDArray[np.float64]:
+        """Return the muscle's length ``L`` [m] at an angle [rad], Eq. (4)."""
+        return np.asarray(2.0 * self.arm * np.sin(0.5 * np.asarray(angle)) - self.fittings)
+
+    def angle(self, length: ArrayLike) -> NDArray[np.float64]:
+        """Return the angle [rad] at a muscle's length [m], Eq. (4)."""
+        return np.asarray(2.0 * np.arcsin((np.asarray(length) + self.fittings) / (2.0 * self.arm)))
+
+    def lever_arm(self, angle: ArrayLike) -> NDArray[np.float64]:
+        """Return the lever arm of the tension [m] at an angle [rad]."""
+        return np.asarray(self.arm * np.cos(0.5 * np.asarray(angle)))
+
+    def spring_torque(self, angle: ArrayLike) -> NDArray[np.float64]:
+        """Return the wire's torque [N m] at an angle [rad], positive where it opens."""
+        return np.asarray(self.stiffness * (self.relaxed_angle - np.asarray(angle)))
+
+    def torque(self, tension: ArrayLike, angle: ArrayLike) -> NDArray[np.float64]:
+        """Return the assistive torque [N m], extension positive: Eq. (3), corrected."""
+        return np.asarray(tension) * self.lever_arm(angle) - self.spring_torque(angle)
+
+    def tension(self, torque: ArrayLike, angle: ArrayLike) -> NDArray[np.float64]:
+        """Return the tension ``T_d`` [N] that gives an assistive torque [N m] at an angle [rad]."""
+        return (self.spring_torque(angle) + np.asarray(torque)) / self.lever_arm(angle)
+
+
+@kernel
+def half_angle(angle: float) -> tuple[float, float]:
+    """Return sine and cosine of half an angle [rad]."""
+    turns = angle * (0.5 * PER_TURN)
+    return sine_of_turns(turns), sine_of_turns(turns + 0.25)
+
+
+@kernel
+def muscle_length(sine: float, arm: float, fittings: float) -> float:
+    """Return the muscle's length [m]; ``sine`` is that of half the angle."""
+    return 2.0 * arm * sine - fittings
+
+
+@kernel
+def assistive_torque(
+    tension: float, cosine: float, angle: float, arm: float, stiffness: float, relaxed: float
+) -> float:
+    """Return the torque on the knee [N m], extension positive; ``cosine`` is of half the angle."""
+    return tension * arm * cosine - stiffness * (relaxed - angle)
+
+
+@kernel
+def wanted_tension(
+    angle: float, torque: float, arm: float, stiffness: float, relaxed: float
+) -> float:
+    """Return the tension ``T_d`` [N] for an assistive torque [N m] at an angle [rad].
+
+    ``[kappa (theta_0 - theta) + tau_a] / (L_b cos(theta / 2))``, held at 0: a muscle cannot push.
+    Within half a degree of the toggle, where the tension has no lever arm, that of half a degree
+    counts.
+    """
+    _, cosine = half_angle(angle)
+    return max(0.0, stiffness * (relaxed - angle) + torque) / (arm * max(cosine, 0.00436))

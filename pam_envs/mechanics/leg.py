@@ -1,0 +1,186 @@
+"""Shank and foot about the knee: what the knee has to bear, and how the wearer holds his path.
+
+The shank leans forward by ``psi`` (knee ahead of the ankle), the thigh by ``beta = q - psi`` with
+the knee flexion ``q``. The hip moves evenly, so that the knee's acceleration is the thigh's. The
+*full balance* about the knee, extension positive,
+
+    tau = F_z (l sin psi - r) - F_x h - m c [a_x cos psi ... ] - I psi''
+
+(:func:`knee_torque`) is what the wearer's muscles and the orthosis bear together. Its first term
+is all that Eq. (1) of seed 000 knows of. Off the natural pace the
+force leans less and the centre of pressure moves with it (:func:`centre_of_pressure`).
+
+The wearer walks a path of his own; where the orthosis
+pushes him off it by ``e``, he holds against it like a spring and a damper, the more so the more of
+his weight the leg carries, and gravity on the shank helps or hinders:
+
+    (I + I_brace) e'' = -tau_a - K e - B e' + d(gravity) e
+
+In stance this is a model of the wearer's posture and not of the bodies above the knee. Past the
+relaxed angle of the brace's wire, where no muscle can take its torque from him, he has learnt to
+bear it (``habituation``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pam_envs.kernels import kernel, sine_of_turns
+from pam_envs.mechanics.knee_lever import PER_TURN
+from pam_envs.parameters import parameter
+
+GRAVITY = 9.80665
+_SCALED = "OpenSim segment masses, gait10dof18musc, scaled to the body mass"
+_WEARER = "of the order of measured knee impedance"
+
+
+@dataclass(frozen=True)
+class Leg:
+    """Shank and foot of the wearer, and how he holds his knee."""
+
+    body_mass: float = parameter(
+        72.6, "kg", 20.0, 200.0, "published", "subject of the measured stride", spread=(60.0, 85.0)
+    )
+    mass: float = parameter(5.1, "kg", 1.0, 15.0, "derived", _SCALED)
+    inertia: float = parameter(0.49, "kg m2", 0.05, 2.0, "derived", f"about the knee; {_SCALED}")
+    centre: float = parameter(
+        0.263, "m", 0.05, 0.6, "derived", f"centre of mass below the knee; {_SCALED}"
+    )
+    shank: float = parameter(0.43, "m", 0.2, 0.7, "derived", "L_0, knee to ankle, same model")
+    thigh: float = parameter(0.41, "m", 0.2, 0.7, "derived", "hip to knee, same model")
+    ankle_height: float = parameter(
+        0.08, "m", 0.0, 0.2, "assumed", "ankle above the sole; a risen heel is left out"
+    )
+    aim_height: float = parameter(
+        1.0,
+        "m",
+        0.0,
+        2.0,
+        "assumed",
+        "height that the ground's force points at, about the body's centre of mass; least squares "
+        "on the measured stride give 1.13 m",
+        neutral=0.0,
+        spread=(0.9, 1.15),
+    )
+    damping: float = parameter(
+        0.38, "N m s/rad", 0.0, 20.0, "derived", "passive knee, decay of pendulum tests, 0.35-0.42"
+    )
+    stiffness: float = parameter(
+        2.8, "N m/rad", 0.0, 100.0, "derived", "passive knee, period of pendulum tests"
+    )
+    hold_stiffness: float = parameter(
+        20.0, "N m/rad", 0.0, 500.0, "assumed", f"wearer in swing; {_WEARER}", spread=(12.0, 35.0)
+    )
+    hold_damping: float = parameter(
+        3.0, "N m s/rad", 0.0, 50.0, "assumed", f"wearer in swing; {_WEARER}"
+    )
+    stance_stiffness: float = parameter(
+        250.0,
+        "N m/rad",
+        0.0,
+        2e3,
+        "assumed",
+        f"gained at full body weight; {_WEARER}",
+        spread=(150.0, 350.0),
+    )
+    stance_damping: float = parameter(
+        12.0, "N m s/rad", 0.0, 200.0, "assumed", f"gained at full body weight; {_WEARER}"
+    )
+    habituation: float = parameter(
+        1.0,
+        "1",
+        0.0,
+        1.0,
+        "assumed",
+        "share of the wire's torque past its relaxed angle that the wearer has learnt to bear",
+        spread=(0.7, 1.0),
+    )
+
+
+@kernel
+def centre_of_pressure(
+    natural: float, ground_x: float, ground_z: float, quick: float, aim: float, heel: float,
+    tip: float,
+) -> float:  # fmt: skip
+    """Return the centre of pressure [m ahead of the ankle] at another pace than the natural one.
+
+    Horizontal forces grow with the square of the pace. The body would tip over if the ground's
+    force did not go on pointing at its centre of mass, so a wearer who walks slowly, with a force
+    that is nearly upright, stands further back in early stance and further ahead in late stance.
+
+    Parameters
+    ----------
+    natural : float
+        At natural pace [m].
+    ground_x, ground_z : float
+        Ground force at natural pace, in one unit.
+    quick : float
+        Pace over the natural one.
+    aim : float
+        Height [m] that the force points at; 0 leaves the centre of pressure where it is.
+    heel, tip : float
+        Ends of the sole [m].
+    """
+    leaning = ground_x / max(ground_z, 0.05)
+    return max(heel, min(tip, natural + (1.0 - quick * quick) * aim * leaning))
+
+
+@kernel
+def sine_and_cosine(angle: float) -> tuple[float, float]:
+    """Return sine and cosine of an angle [rad]."""
+    turns = angle * PER_TURN
+    return sine_of_turns(turns), sine_of_turns(turns + 0.25)
+
+
+@kernel
+def knee_acceleration(
+    thigh_angle: float, rate: float, acceleration: float, thigh: float
+) -> tuple[float, float]:
+    """Return the knee's acceleration [m/s2], ahead and up, below a hip that moves evenly."""
+    s, c = sine_and_cosine(thigh_angle)
+    r2 = rate * rate
+    return thigh * (c * acceleration - s * r2), thigh * (s * acceleration + c * r2)
+
+
+@kernel
+def shank_torque(
+    sine: float,
+    cosine: float,
+    ahead: float,
+    up: float,
+    angular: float,
+    mass: float,
+    centre: float,
+    inertia: float,
+) -> float:
+    """Return the knee torque [N m] for the weight and the acceleration of shank and foot.
+
+    Parameters
+    ----------
+    sine, cosine : float
+        Of the shank's lean.
+    ahead, up : float
+        Acceleration of the knee [m/s2].
+    angular : float
+        Second derivative of the lean [rad/s2].
+    mass, centre, inertia : float
+        [kg], [m] below the knee, [kg m2] about the knee.
+    """
+    return mass * centre * (ahead * cosine - (GRAVITY + up) * sine) - inertia * angular
+
+
+@kernel
+def gravity_stiffness(
+    sine: float, cosine: float, ahead: float, up: float, mass: float, centre: float
+) -> float:
+    """Return the restoring torque over deviation [N m/rad] of shank and foot about their path."""
+    return mass * centre * (ahead * sine + (GRAVITY + up) * cosine)
+
+
+@kernel
+def ground_torque(
+    vertical: float, horizontal: float, cop: float, sine: float, cosine: float, shank: float,
+    ankle_height: float,
+) -> float:  # fmt: skip
+    """Return the knee torque [N m] for the ground's force; ``sine, cosine`` of the shank's lean."""
+    return vertical * (shank * sine - cop) - horizontal * (ankle_height + shank * cosine)

@@ -1,0 +1,179 @@
+"""An EMG proxy of the knee's extensors, and what more the flexors do.
+
+The extensors bear what the orthosis does not, ``u = max(0, tau - tau_a) / tau_max`` above a floor
+of co-contraction; where the orthosis extends more than is wanted, the flexors work against it:
+
+    extensors  max(0, tau - tau_a)          flexors  max(0, tau_a - tau)
+
+Excitation becomes activation by a first-order lag, faster on the way up.
+
+Three readings of the demand ``tau``. *Uncalibrated*: the full balance about the knee. Both
+*calibrated* ones start from the paper's own estimate ``tau_w``, Eq. (1), and have one constant an
+activity, fitted to its three published reductions: *A* takes the true demand to be ``lambda
+tau_w``; *B* takes the EMG to be a power ``n`` of the torque. They count from the muscles' resting
+level, so that one constant is enough.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import yaml
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.kernels import decay, entry, kernel
+from pam_envs.parameters import parameter
+
+Reading = Literal["uncalibrated", "A", "B"]
+READINGS: tuple[Reading, ...] = ("uncalibrated", "A", "B")
+CONSTANTS = Path(__file__).resolve().parent.parent / "data" / "emg_calibration.yaml"
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MuscleActivation:
+    """From the torque that the wearer's muscles bear to their activation."""
+
+    largest_torque: float = parameter(
+        200.0, "N m", 20.0, 600.0, "assumed", "strongest extension of an adult's knee"
+    )
+    floor: float = parameter(
+        0.03, "1", 0.0, 0.3, "assumed", "co-contraction, 0.02 to 0.05", neutral=0.0
+    )
+    rise_time: float = parameter(
+        0.0125, "s", 0.001, 0.2, "assumed", "activation dynamics, 10 to 15 ms"
+    )
+    fall_time: float = parameter(
+        0.05, "s", 0.001, 0.5, "assumed", "activation dynamics, 40 to 60 ms"
+    )
+
+
+@kernel
+def excitation(torque: float, largest: float, floor: float) -> float:
+    """Return the excitation, 0 to 1, of muscles that bear a torque [N m] (below 0: none)."""
+    return max(0.0, min(1.0, floor + max(0.0, torque) / largest))
+
+
+@kernel
+def activation(before: float, wanted: float, risen: float, fallen: float) -> float:
+    """Return the activation one period on; ``risen, fallen`` are what is left of a gap by then."""
+    left = risen if wanted > before else fallen
+    return wanted + (before - wanted) * left
+
+
+@kernel
+def left_of_gap(period: float, time: float) -> float:
+    """Return the share of a gap that is left after a period of a first-order lag."""
+    return decay(min(20.0, period / time))
+
+
+@entry
+def _activations(wanted: Any, risen: float, fallen: float, out: Any) -> None:
+    """Run the activation over a record, from rest at its first value."""
+    level = wanted[0]
+    for t in range(len(wanted)):
+        level = activation(level, wanted[t], risen, fallen)
+        out[t] = level
+
+
+def activation_of(torque: ArrayLike, period: float, muscle: MuscleActivation) -> Array:
+    """Return the activation, shape (T,), of muscles that bear torques [N m], shape (T,)."""
+    borne = np.maximum(0.0, np.asarray(torque, float))
+    wanted = np.clip(muscle.floor + borne / muscle.largest_torque, 0.0, 1.0)
+    out = np.empty_like(wanted)
+    risen, fallen = (left_of_gap(period, t) for t in (muscle.rise_time, muscle.fall_time))
+    _activations(wanted, risen, fallen, out)
+    return out
+
+
+@functools.cache
+def calibration(activity: str, reading: Reading) -> float:
+    """Return the fitted constant of a calibrated reading for an activity.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    with open(CONSTANTS, encoding="utf-8") as file:
+        known = yaml.safe_load(file)["readings"]
+    if reading not in known or activity not in known[reading]:
+        raise ValueError(
+            f"reading = {reading!r}, activity = {activity!r}; there are constants for the readings "
+            f"{', '.join(known)} and the activities {', '.join(known['A'])}"
+        )
+    return float(known[reading][activity])
+
+
+@dataclass(frozen=True)
+class EmgProxy:
+    """Activations with and without the orthosis, shape (T,) each.
+
+    ``extensors`` over ``extensors_free`` is what the paper's electrodes compare.
+    """
+
+    extensors: Array
+    extensors_free: Array
+    flexors: Array
+    flexors_free: Array
+
+    @property
+    def change(self) -> float:
+        """Change of the extensors' RMS, -0.2 for a reduction by 20 %."""
+        return rms(self.extensors) / rms(self.extensors_free) - 1.0
+
+    @property
+    def change_with_flexors(self) -> float:
+        """Change of the RMS where what the flexors do more than without counts as well."""
+        more = np.maximum(0.0, self.flexors - self.flexors_free)
+        return rms(self.extensors + more) / rms(self.extensors_free) - 1.0
+
+
+def rms(values: Array) -> float:
+    """Return the root of the mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def emg_proxy(
+    demand: ArrayLike,
+    assistance: ArrayLike,
+    period: float,
+    muscle: MuscleActivation | None = None,
+    reading: Reading = "uncalibrated",
+    constant: float = 1.0,
+) -> EmgProxy:
+    """Return the EMG proxy of a record.
+
+    Parameters
+    ----------
+    demand : array_like, shape (T,)
+        Knee torque [N m], extension positive: the full balance for the uncalibrated reading, the
+        estimate of Eq. (1) for ``"A"`` and ``"B"``.
+    assistance : array_like, shape (T,)
+        Torque of the orthosis as delivered [N m].
+    period : float
+        [s].
+    muscle : MuscleActivation, optional
+        Defaults to its defaults. Calibrated readings leave its floor out.
+    reading : {"uncalibrated", "A", "B"}
+        See the module.
+    constant : float
+        ``lambda`` of reading A, ``n`` of reading B.
+    """
+    muscle = MuscleActivation() if muscle is None else muscle
+    muscle = muscle if reading == "uncalibrated" else replace(muscle, floor=0.0)
+    wanted, helped = np.asarray(demand, float), np.asarray(assistance, float)
+    if reading == "A":
+        wanted = constant * wanted
+    power = constant if reading == "B" else 1.0
+
+    def active(torque: Array) -> Array:
+        share = np.maximum(0.0, torque) / muscle.largest_torque
+        return activation_of(share**power * muscle.largest_torque, period, muscle)
+
+    rest = wanted - helped
+    return EmgProxy(active(rest), active(wanted), active(-rest), active(-wanted))

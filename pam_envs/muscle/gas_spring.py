@@ -1,0 +1,90 @@
+"""A muscle as a gas spring whose stiffness follows its pressure.
+
+    T = s (L - L_min),    s = alpha P  where there is no hysteresis
+
+(seed 000, Eq. 6). A muscle at its shortest length, or with no stiffness, is slack. The volume is
+the one whose virtual work is this tension, ``T = -P dV/dL``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.kernels import kernel
+from pam_envs.parameters import parameter
+
+
+@dataclass(frozen=True)
+class GasSpring:
+    """The muscle of the orthosis."""
+
+    shortest_length: float = parameter(
+        0.17, "m", 0.02, 1.0, "assumed", "L_min: 5 cm below the nominal length of seed 000"
+    )
+    gain: float = parameter(
+        1.0,
+        "1",
+        0.5,
+        1.5,
+        "assumed",
+        "stiffness of this specimen over that of its memory",
+        neutral=1.0,
+        spread=(0.9, 1.1),
+    )
+    stiffness_ratio: float = parameter(
+        0.0158,
+        "N/(m Pa)",
+        1e-4,
+        1.0,
+        "derived",
+        "alpha: 158 N at 2 bar and L_min + 5 cm (seed 000, section 4.1)",
+        spread=(0.0142, 0.0174),
+    )
+    full_volume: float = parameter(
+        1.33e-4,
+        "m3",
+        1e-6,
+        1e-2,
+        "derived",
+        "at L_min, from Eq. (5) corrected: threads of 29.4 cm in 2.43 turns",
+    )
+
+    def tension(self, stiffness: ArrayLike, length: ArrayLike) -> NDArray[np.float64]:
+        """Return the tension [N] at a stiffness [N/m] and a length [m]."""
+        stretch = np.maximum(0.0, np.asarray(length) - self.shortest_length)
+        return np.asarray(np.maximum(0.0, stiffness) * stretch)
+
+    def stiffness(self, tension: ArrayLike, length: ArrayLike) -> NDArray[np.float64]:
+        """Return the stiffness ``T / dL`` [N/m] that gives a tension [N] at a length [m].
+
+        Within 0.1 mm of the shortest length that of 0.1 mm counts.
+        """
+        stretch = np.maximum(1e-4, np.asarray(length) - self.shortest_length)
+        return np.asarray(tension) / stretch
+
+    def volume(self, length: ArrayLike) -> NDArray[np.float64]:
+        """Return the inner volume [m3] at a length [m]."""
+        stretch = np.asarray(length) - self.shortest_length
+        return np.asarray(self.full_volume - 0.5 * self.stiffness_ratio * stretch**2)
+
+
+@kernel
+def stretch_of(length: float, shortest: float) -> float:
+    """Return how far the muscle is above its shortest length [m]; slack, 0."""
+    return max(0.0, length - shortest)
+
+
+@kernel
+def spring_tension(stiffness: float, stretch: float) -> float:
+    """Return the tension [N]."""
+    return max(0.0, stiffness) * stretch
+
+
+@kernel
+def gas_volume(length: float, shortest: float, ratio: float, full: float) -> float:
+    """Return the inner volume [m3] at a length [m]."""
+    stretch = length - shortest
+    return full - 0.5 * ratio * stretch * stretch

@@ -1,0 +1,126 @@
+"""The orthosis' measured frequency response as exact modes, and its plain regulator.
+
+Seed 000 identifies the response from pressure set-point to tension as ``G_T(s)``, Eq. (10):
+seven poles, four zeros. Divided by its gain at rest it is what lies between set-point and
+pressure in the preset "measured". In partial fractions each mode is
+
+    x' = p (x - u),    pressure = sum_i gain_i x_i
+
+so that a step at a held set-point is exact for any duration, and every mode of a plant at rest
+is the set-point itself.
+"""
+
+from __future__ import annotations
+
+import cmath
+from dataclasses import dataclass
+
+from pam_envs.kernels import decay, kernel, sine_of_turns
+from pam_envs.parameters import parameter
+
+NUMERATOR = ((1.0, 17.45, 75.79), (1.0, 7.39, 13.41))
+DENOMINATOR = ((0.0, 1.0, 12.33), (1.0, 17.97, 78.51), (1.0, 13.78, 47.43), (1.0, 8.11, 17.12))
+GAIN = 572.157
+"""Seed 000, Eq. (10), factor by factor; tension [N] over pressure [kPa]."""
+REAL_MODES = 5
+MODES = REAL_MODES + 2
+"""Rows of state: five real modes, real and imaginary part of the slow pair."""
+
+
+@dataclass(frozen=True)
+class OrthosisRegulator:
+    """The electronic pressure valve (SMC ITV1031), as the muscle feels it.
+
+    A first-order lag with a limited rate. A plant with ``dynamics="measured"`` has the paper's
+    frequency response in its place.
+    """
+
+    max_pressure: float = parameter(
+        4.5e5, "Pa", 1e4, 1.2e6, "published", "seed 000, section 5.2: capacity of the muscle"
+    )
+    time_constant: float = parameter(
+        0.0425,
+        "s",
+        0.002,
+        2.0,
+        "assumed",
+        "gives the published 2.07 % of the inverse alone at 0.1 Hz, with the hold of 10 ms",
+        spread=(0.035, 0.1),
+    )
+    slew_rate: float = parameter(
+        1e9, "Pa/s", 1e4, 1e9, "assumed", "not published; no limit", neutral=1e9
+    )
+
+
+def roots(factor: tuple[float, float, float]) -> tuple[complex, ...]:
+    """Return the roots of ``a s^2 + b s + c`` (of ``b s + c`` where ``a = 0``)."""
+    a, b, c = factor
+    if a == 0.0:
+        return (complex(-c / b),)
+    half = cmath.sqrt(0.25 * b * b - a * c)
+    return (-0.5 * b + half) / a, (-0.5 * b - half) / a
+
+
+def gain_at_rest() -> float:
+    """Return ``G_T(0)`` [N/kPa], 0.7398."""
+    value = GAIN
+    for _, _, c in NUMERATOR:
+        value *= c
+    for _, _, c in DENOMINATOR:
+        value /= c
+    return value
+
+
+def modes() -> list[tuple[complex, complex]]:
+    """Return pole [1/s] and gain of each mode of ``G_T(s) / G_T(0)``; of the pair, the upper one.
+
+    The real modes come first. The gains of the real modes and twice the real part of the pair's
+    sum to 1.
+    """
+    zeros = [z for factor in NUMERATOR for z in roots(factor)]
+    poles = [p for factor in DENOMINATOR for p in roots(factor)]
+    result = []
+    for i, pole in enumerate(poles):
+        if pole.imag < 0.0:
+            continue
+        residue = complex(GAIN / gain_at_rest())
+        for zero in zeros:
+            residue *= pole - zero
+        for k, other in enumerate(poles):
+            if k != i:
+                residue /= pole - other
+        result.append((pole, -residue / pole))
+    return sorted(result, key=lambda mode: (mode[0].imag > 0.0, mode[0].real))
+
+
+def mode_rows() -> list[float]:
+    """Return what the kernel needs of the modes.
+
+    Rates and gains of the real ones, then decay [1/s] and frequency [turns/s] of the pair, and the
+    real and imaginary part of its gain, doubled.
+    """
+    found = modes()
+    real, (pole, gain) = found[:-1], found[-1]
+    rates = [-p.real for p, _ in real]
+    gains = [g.real for _, g in real]
+    return [
+        *rates, *gains, -pole.real, pole.imag / (2.0 * cmath.pi), 2.0 * gain.real, 2.0 * gain.imag,
+    ]  # fmt: skip
+
+
+MODE_ROWS = 2 * REAL_MODES + 4
+
+
+@kernel
+def pair_factor(decay_rate: float, frequency: float, h: float) -> tuple[float, float]:
+    """Return real and imaginary part of ``exp(p h)`` of the slow pair."""
+    shrink = decay(decay_rate * h)
+    turns = frequency * h
+    return shrink * sine_of_turns(turns + 0.25), shrink * sine_of_turns(turns)
+
+
+@kernel
+def turned(u: float, real: float, imaginary: float, c: float, s: float) -> tuple[float, float]:
+    """Return the pair's state after an interval at the set-point ``u``; ``c + i s`` is exp(p h)."""
+    a = real - u
+    return u + a * c - imaginary * s, a * s + imaginary * c

@@ -1,0 +1,50 @@
+"""The pressure shoe: load on the heel, stance or swing, and the paper's estimate of knee torque."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pam_envs.kernels import kernel
+from pam_envs.parameters import parameter
+
+GRAVITY = 9.80665
+HEEL_CELLS = 3.0
+"""Load cells near the heel (seed 000, section 4.2)."""
+
+
+@dataclass(frozen=True)
+class Shoe:
+    """A stiff sole on load cells; those of the heel tell stance from swing."""
+
+    heel: float = parameter(
+        -0.05, "m", -0.15, 0.05, "assumed", "heel cells, ahead of the ankle: behind it"
+    )
+    tip: float = parameter(0.22, "m", 0.1, 0.4, "assumed", "tip of the sole, ahead of the ankle")
+    threshold: float = parameter(
+        5.0, "kg", 0.1, 50.0, "published", "seed 000, section 4.2: mean load of the heel cells"
+    )
+    flat_foot: float = parameter(
+        0.0,
+        "1",
+        0.0,
+        1.0,
+        "assumed",
+        "0: q_a is the shank's inclination; 1: the ankle's angle, as if the foot were flat",
+        neutral=0.0,
+    )
+
+
+@kernel
+def heel_load(vertical: float, cop: float, heel: float, tip: float) -> float:
+    """Return the mean load [kg] on a heel cell of a sole that rests on heel and tip."""
+    share = max(0.0, min(1.0, (tip - cop) / (tip - heel)))
+    return max(0.0, vertical) * share / (GRAVITY * HEEL_CELLS)
+
+
+@kernel
+def estimated_torque(vertical: float, cop: float, inclination_sine: float, shank: float) -> float:
+    """Return ``tau_w = f (L_0 cos q_a - r)`` [N m], seed 000, Eq. (1).
+
+    ``inclination_sine`` is the sine of the shank's lean from the vertical, ``cos q_a``.
+    """
+    return vertical * (shank * inclination_sine - cop)

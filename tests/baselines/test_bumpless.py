@@ -1,0 +1,196 @@
+"""The bumpless compensator: its inequality, its exactness on its own model, the switch."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baselines.bumpless import SMALLEST, Bumpless, BumplessGains, certificate, design_bumpless
+from baselines.bumpless import make_bumpless as make
+from baselines.knee_published import printed_bumpless, printed_controller, printed_plant
+from baselines.linear import LinearSystem
+
+PLANT, GAINS = printed_bumpless()
+PERIOD = 0.01
+NONE = BumplessGains(np.zeros(7))
+
+
+def compensated(low: float = -200.0, high: float = 250.0, gains: BumplessGains = GAINS) -> Bumpless:
+    return make(PLANT, printed_controller(), PERIOD, low, high, gains)
+
+
+def switched(loop: Bumpless, offset: float, seconds: float = 2.0) -> tuple[float, float]:
+    """Swing with a reference that is off by ``offset`` [N], then stance on the true one.
+
+    Returns the largest tension error [N] and jump of the pressure [kPa] after the switch.
+    """
+    rig = PLANT.discrete(PERIOD, "zoh")
+    inside, state, last = rig.initial_state(), loop.initial_state(), 0.0
+    errors, jumps = [], []
+    for k in range(600):
+        stance = k * PERIOD >= seconds
+        measured, reference = float(inside @ rig.c), 0.0 if stance else offset
+        command = float(loop.output(reference, measured, state)) if stance else 0.0
+        state = loop.advance(reference, measured, command, state)
+        inside = rig.advance(command, inside)
+        if stance:
+            errors.append(abs(measured))
+            jumps.append(abs(command - last))
+        last = command
+    return max(errors), jumps[0]
+
+
+def test_switch_with_a_mismatch_of_10_newton():
+    with_error, with_jump = switched(compensated(), 10.0)
+    plain_error, plain_jump = switched(compensated().without(), 10.0)
+    assert with_error < 15.0
+    assert plain_error > 40.0
+    assert with_jump < 10.0 < 150.0 < plain_jump
+
+
+def test_without_mismatch_there_is_nothing_to_do():
+    assert switched(compensated(), 0.0) == (0.0, 0.0)
+    assert switched(compensated().without(), 0.0) == (0.0, 0.0)
+
+
+def test_in_charge_and_unlimited_it_is_the_plain_controller():
+    loop, rig = compensated(-1e9, 1e9, NONE), PLANT.discrete(PERIOD, "zoh")
+    plain = loop.without()
+    states = [one.initial_state() for one in (loop, plain)]
+    inside = [rig.initial_state(), rig.initial_state()]
+    for k in range(300):
+        reference = 20.0 * np.sin(0.03 * k)
+        commands = []
+        for i, one in enumerate((loop, plain)):
+            measured = float(inside[i] @ rig.c)
+            command = float(one.output(reference, measured, states[i]))
+            states[i] = one.advance(reference, measured, command, states[i])
+            inside[i] = rig.advance(command, inside[i])
+            commands.append(command)
+        assert commands[0] == pytest.approx(commands[1], abs=1e-9)
+    np.testing.assert_array_equal(states[0].model, np.zeros(7))
+
+
+def test_idle_controller_sees_the_loop_it_would_have_closed():
+    """On its own model the fictitious loop is the real one, whatever another controller does."""
+    loop, rig = compensated(gains=NONE), PLANT.discrete(PERIOD, "zoh")
+    idle, real = loop.initial_state(), loop.initial_state()
+    foreign, own = rig.initial_state(), rig.initial_state()
+    pressures = np.random.default_rng(0).uniform(-100.0, 100.0, 300)
+    for k, pressure in enumerate(pressures):
+        reference = 10.0 * np.cos(0.02 * k)
+        idle_sees = float(foreign @ rig.c) - float(idle.model @ rig.c)
+        assert idle_sees == pytest.approx(float(own @ rig.c), abs=1e-6)
+        command = float(loop.output(reference, float(own @ rig.c), real))
+        real = loop.advance(reference, float(own @ rig.c), command, real)
+        idle = loop.advance(reference, float(foreign @ rig.c), pressure, idle)
+        own, foreign = rig.advance(command, own), rig.advance(pressure, foreign)
+
+
+def test_limits_do_not_wind_the_controller_up():
+    rig = PLANT.discrete(PERIOD, "zoh")
+
+    def time_back(loop: Bumpless) -> int:
+        inside, state, back = rig.initial_state(), loop.initial_state(), 0
+        for k in range(800):
+            reference = 100.0 if k < 300 else 0.0  # 100 N needs 135 kPa, the limit is 50
+            measured = float(inside @ rig.c)
+            command = float(loop.output(reference, measured, state))
+            assert -50.0 <= command <= 50.0
+            state = loop.advance(reference, measured, command, state)
+            inside = rig.advance(command, inside)
+            back += int(k >= 300 and abs(measured) > 5.0)
+        return back
+
+    assert (
+        time_back(compensated(-50.0, 50.0))
+        < 150
+        < 300
+        < time_back(compensated(-50.0, 50.0).without())
+    )
+
+
+def test_rows_are_independent():
+    loop = compensated()
+    rows, one = loop.initial_state(3), loop.initial_state()
+    rng = np.random.default_rng(1)
+    for _ in range(40):
+        reference, measured, applied = rng.normal(0.0, 20.0, (3, 3))
+        many = loop.output(reference, measured, rows)
+        single = loop.output(reference[1], measured[1], one)
+        assert many[1] == pytest.approx(float(single), rel=1e-9, abs=1e-9)
+        rows = loop.advance(reference, measured, applied, rows)
+        one = loop.advance(reference[1], measured[1], applied[1], one)
+
+
+def test_direct_gain_acts_only_as_a_factor_of_the_state_gain():
+    half = BumplessGains(GAINS.state_gain / (1.0 - GAINS.direct_gain), 0.0)
+    one, other = compensated(), compensated(gains=half)
+    state = one.initial_state()._replace(model=np.linspace(1.0, 1e6, 7))
+    assert one.output(5.0, 0.0, state) == other.output(5.0, 0.0, state)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"model": PLANT.discrete(0.02, "zoh")}, "periods? is|period is 0.01"),
+        ({"low": 300.0}, "low is 300.0"),
+    ],
+)
+def test_bad_parts_are_refused(change, message):
+    from dataclasses import replace
+
+    with pytest.raises(ValueError, match=message):
+        replace(compensated(), **change)
+
+
+def test_direct_gain_of_1_is_refused():
+    with pytest.raises(ValueError, match="direct_gain is 1"):
+        BumplessGains(np.zeros(7), 1.0)
+
+
+# --- the inequality (cvxpy) -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("decay", [0.0, 1.0, 3.0, 4.05])
+def test_printed_gains_satisfy_the_inequality(decay):
+    pytest.importorskip("cvxpy")
+    assert certificate(PLANT, GAINS, decay) > SMALLEST
+
+
+def test_nothing_satisfies_it_beyond_the_slowest_pole():
+    pytest.importorskip("cvxpy")
+    assert certificate(PLANT, GAINS, 4.06) < SMALLEST
+    with pytest.raises(ValueError, match=r"below 4\.055"):
+        design_bumpless(printed_plant(), 4.06)
+
+
+def test_destabilising_gains_do_not_satisfy_it():
+    pytest.importorskip("cvxpy")
+    plant = printed_plant()
+    gains = BumplessGains(5.0 * plant.c / plant.static_gain)
+    assert np.max(np.linalg.eigvals(plant.a + np.outer(plant.b, gains.feedback)).real) > 0.0
+    assert certificate(plant, gains) < SMALLEST
+
+
+@pytest.mark.parametrize("decay", [0.0, 3.0, 4.05])
+def test_design_satisfies_its_own_inequality(decay):
+    pytest.importorskip("cvxpy")
+    plant = printed_plant()
+    gains = design_bumpless(plant, decay)
+    assert certificate(plant, gains, decay) > SMALLEST
+    poles = np.linalg.eigvals(plant.a + np.outer(plant.b, gains.feedback))
+    assert np.max(poles.real) < -decay
+
+
+def test_designed_gains_act_as_the_printed_ones():
+    pytest.importorskip("cvxpy")
+    plant = printed_plant()
+    ours = make(plant, printed_controller(), PERIOD, -200.0, 250.0)
+    assert switched(ours, 10.0) == pytest.approx(switched(compensated(), 10.0), rel=0.02)
+
+
+def test_unstable_plants_are_refused():
+    pytest.importorskip("cvxpy")
+    with pytest.raises(ValueError, match="must be stable"):
+        design_bumpless(LinearSystem.from_polynomials([1.0], [1.0, -1.0]))

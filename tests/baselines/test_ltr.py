@@ -1,0 +1,192 @@
+"""Loop transfer recovery against its theory, and linear systems against theirs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from baselines.knee_published import printed_controller, printed_plant
+from baselines.linear import LinearSystem
+from baselines.ltr import closed_loop_poles, design_ltr, loop_figures, sampled_figures
+from pam_envs.identification.frequency import fit_rational
+
+PLANT = printed_plant()
+W = np.geomspace(0.1, 60.0, 50)
+
+
+def test_system_is_its_transfer_function():
+    top, low = [3.0, 5.0], [2.0, 7.0, 11.0, 1.0]
+    system = LinearSystem.from_polynomials(top, low)
+    s = 1j * W
+    np.testing.assert_allclose(
+        system.response(W), np.polyval(top, s) / np.polyval(low, s), rtol=1e-12
+    )
+    np.testing.assert_allclose(system.zeros, [-5.0 / 3.0], rtol=1e-10)
+    assert system.static_gain == pytest.approx(5.0)
+
+
+def test_system_from_roots_and_in_series():
+    first = LinearSystem.from_roots([-3.0], [-1.0, -2.0 + 1j, -2.0 - 1j], 0.5)
+    second = LinearSystem.from_polynomials([1.0, 2.0], [1.0, 9.0])
+    assert first.static_gain == pytest.approx(0.5)
+    np.testing.assert_allclose(
+        first.series(second).response(W), first.response(W) * second.response(W), rtol=1e-10
+    )
+
+
+def test_recovered_loop_is_the_integrator_asked_for():
+    w = np.geomspace(0.1, 26.2, 20)
+    errors = []
+    for weight in (1e-8, 1e-12, 1e-16):
+        controller = design_ltr(PLANT, 26.2, weight).controller
+        recovered = PLANT.response(w) * controller.response(w) * 1j * w / 26.2
+        errors.append(np.max(np.abs(recovered - 1.0)))
+    assert errors[2] < 0.18
+    # the distance falls with the eighth root: 10**0.5 = 3.2 for each of these steps in the limit
+    assert 1.7 < errors[0] / errors[1] < errors[1] / errors[2] < 3.2
+
+
+def test_weight_beyond_the_arithmetic_is_refused():
+    with pytest.raises(ValueError, match="too small for the arithmetic"):
+        design_ltr(PLANT, 26.2, 1e-20)
+
+
+def test_recipe_gives_the_bandwidth_of_26_2():
+    figures = design_ltr(PLANT, 26.2, 1e-10).figures
+    assert figures.bandwidth == pytest.approx(26.19, abs=0.015)
+    assert figures.peak_tracking < 1.001
+
+
+def test_controller_has_an_integrator_and_zeros_on_the_plants_poles():
+    controller = design_ltr(PLANT, 26.2, 1e-8).controller
+    assert abs(controller.poles[0]) < 1e-9
+    assert controller.order == PLANT.order + 2
+    on_poles = np.abs(controller.response(np.array([1e-4]))) * 1e-4
+    assert on_poles == pytest.approx(np.abs(controller.response(np.array([1e-5]))) * 1e-5, rel=1e-3)
+    found = np.sort_complex(controller.zeros)
+    np.testing.assert_allclose(found, np.sort_complex(PLANT.poles), atol=1e-3)
+
+
+@pytest.mark.parametrize(("bandwidth", "weight"), [(5.0, 1e-6), (26.2, 1e-8), (60.0, 1e-10)])
+def test_closed_loop_is_stable_with_the_poles_of_filter_and_regulator(bandwidth, weight):
+    design = design_ltr(PLANT, bandwidth, weight)
+    poles = closed_loop_poles(design.plant, design.controller)
+    assert np.all(poles.real < 0.0)
+    # separation: the filter keeps the plant's poles and one at the bandwidth
+    for wanted in [*PLANT.poles, -bandwidth]:
+        assert np.min(np.abs(poles - wanted)) < 1e-2 * abs(wanted)
+
+
+def test_figures_of_a_known_loop():
+    figures = loop_figures(lambda w: 10.0 / (1j * w * (1.0 + 0.05j * w) ** 2))
+    assert figures.gain_margin == pytest.approx(4.0, rel=1e-3)  # 2 / tau over 10
+    crossing = figures.crossover
+    assert crossing * (1.0 + (0.05 * crossing) ** 2) == pytest.approx(10.0)
+    phase = math.pi / 2.0 - 2.0 * math.atan(0.05 * crossing)
+    assert figures.phase_margin == pytest.approx(phase, rel=1e-5)
+    assert figures.delay_margin == pytest.approx(phase / crossing, rel=1e-5)
+
+
+def test_first_order_loop_has_no_peak():
+    figures = loop_figures(lambda w: 7.0 / (1j * w))
+    assert figures.bandwidth == pytest.approx(7.0, rel=1e-5)
+    assert figures.peak_tracking == pytest.approx(1.0, abs=1e-5)
+    assert figures.gain_margin == math.inf
+
+
+def test_discrete_controller_keeps_integrator_and_response():
+    controller = printed_controller()
+    discrete = controller.discrete(0.01)
+    assert np.max(np.abs(np.linalg.eigvals(discrete.a))) == pytest.approx(1.0, abs=1e-9)
+    w = np.array([0.5, 5.0, 20.0])
+    np.testing.assert_allclose(discrete.response(w), controller.response(w), rtol=0.012)
+
+
+def test_step_is_the_difference_equation_for_rows_and_for_one():
+    discrete = printed_controller().discrete(0.01)
+    errors = np.random.default_rng(0).normal(size=(30, 4))
+    rows, one = discrete.initial_state(4), discrete.initial_state()
+    for error in errors:
+        many, rows = discrete.step(error, rows)
+        single, one = discrete.step(error[2], one)
+        assert many[2] == pytest.approx(float(single), rel=1e-12, abs=1e-12)
+
+
+def test_rest_state_rests():
+    held = PLANT.discrete(0.01, "zoh")
+    state = held.rest_state(200.0)
+    assert held.output(0.0, state) == pytest.approx(200.0 * PLANT.static_gain)
+    np.testing.assert_allclose(held.advance(200.0, state), state, rtol=1e-12, atol=1e-12)
+
+
+def test_sampling_and_delay_cost_phase_as_delays_do():
+    design = design_ltr(PLANT, 26.2, 1e-8)
+    smooth, sampled = design.figures, design.sampled_figures(0.01)
+    late = design.sampled_figures(0.01, delay=0.01)
+    lost = smooth.phase_margin - sampled.phase_margin
+    assert lost == pytest.approx(0.005 * smooth.crossover, rel=0.1)  # half a period of the hold
+    lost = sampled.phase_margin - late.phase_margin
+    assert lost == pytest.approx(0.01 * sampled.crossover, rel=1e-3)
+    assert sampled_figures(PLANT, design.discrete(0.01), 0.9 * sampled.delay_margin).bandwidth > 0.0
+
+
+def test_delay_margin_is_where_the_sampled_loop_becomes_unstable():
+    discrete = printed_controller().discrete(0.01)
+    plant = PLANT.discrete(0.01, "zoh")
+    margin = sampled_figures(PLANT, discrete).delay_margin
+
+    def growth(delay: int) -> float:
+        """Return the size of the error after 20 s over that after 10 s."""
+        inside, state = plant.initial_state(), discrete.initial_state()
+        waiting, sizes = [0.0] * delay, []
+        for _ in range(2000):
+            error = 1.0 - float(inside @ plant.c)
+            command, state = discrete.step(error, state)
+            waiting.append(float(command))
+            inside = plant.advance(waiting.pop(0), inside)
+            sizes.append(abs(error))
+        return max(sizes[-300:]) / max(sizes[700:1000])
+
+    steps = margin / 0.01
+    assert growth(math.floor(steps) - 1) < 0.5
+    assert growth(math.ceil(steps) + 1) > 2.0
+
+
+def test_frequency_response_to_controller():
+    """The whole way: a noisy response, a fit of low order, a loop on the true plant."""
+    rng = np.random.default_rng(2)
+    w = 2.0 * np.pi * np.geomspace(0.1, 2.0, 40)
+    noise = 1.0 + 0.01 * (rng.normal(size=40) + 1j * rng.normal(size=40))
+    fit = fit_rational(w, PLANT.response(w) * noise, 3, relative_degree=3)
+    design = design_ltr(fit, 15.0, 1e-7)
+    poles = closed_loop_poles(PLANT, design.controller)
+    assert np.all(poles.real < 0.0)
+    on_true = loop_figures(lambda x: PLANT.response(x) * design.controller.response(x))
+    assert on_true.bandwidth == pytest.approx(15.0, rel=0.15)
+    assert on_true.phase_margin > math.radians(50.0)
+
+
+@pytest.mark.parametrize(
+    ("plant", "bandwidth", "weight", "message"),
+    [
+        (LinearSystem.from_roots([5.0], [-1.0, -2.0], 1.0), 5.0, 1e-4, "zero lies at 5"),
+        (LinearSystem.from_polynomials([1.0], [1.0, 0.0]), 5.0, 1e-4, "pole has real part"),
+        (LinearSystem.from_polynomials([1.0, 2.0], [1.0, 1.0]), 5.0, 1e-4, "strictly proper"),
+        (PLANT, 0.0, 1e-4, "bandwidth is 0.0"),
+        (PLANT, 5.0, -1.0, "control_weight is -1.0"),
+    ],
+)
+def test_plants_that_cannot_be_recovered_are_refused(plant, bandwidth, weight, message):
+    with pytest.raises(ValueError, match=message):
+        design_ltr(plant, bandwidth, weight)
+
+
+def test_bad_systems_are_refused():
+    with pytest.raises(ValueError, match="a has shape"):
+        LinearSystem(np.eye(3), np.ones(2), np.ones(2))
+    with pytest.raises(ValueError, match="proper"):
+        LinearSystem.from_polynomials([1.0, 2.0, 3.0], [1.0, 1.0])
+    with pytest.raises(ValueError, match="period is 0"):
+        PLANT.discrete(0.0)

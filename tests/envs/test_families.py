@@ -1,0 +1,256 @@
+"""What a family adds to the common step, shown on three carts that are pushed at once."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import pickle
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pam_envs.envs.arguments import common
+from pam_envs.envs.env_kernels import PERIOD, write_references
+from pam_envs.envs.families import Kernels
+from pam_envs.envs.plant_env import PlantEnv
+from pam_envs.envs.setup import Setup, compose
+from pam_envs.envs.vector_env import PlantVectorEnv
+from pam_envs.kernels import LANES, kernel, normal, routine, uniform
+from pam_envs.parameters import Signal, Signals
+
+CARTS = 3
+PLACE, PUSH, OLD_PUSH, DRIFT = 0, CARTS, 2 * CARTS, 3 * CARTS
+MASS = 0
+INFO = ("time", "reference", "output", "reward/near", "reward/calm", "state/drift", "saturated")
+TIME, REF, OUT, NEAR, CALM, S_DRIFT, SATURATED = range(len(INFO))
+ENDED = len(INFO)
+SIGNALS = ENDED + 1
+FARTHEST = 5.0
+
+
+@kernel
+def drift(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
+    for j in range(LANES):
+        rows[DRIFT][j] = 0.1 * normal(counts[0][j], counts[1][j], 1, counts[3][j])
+
+
+@kernel
+def roll(
+    rows: Any,
+    fixed: Any,
+    counts: Any,
+    tables: Any,
+    samples: Any,
+    settings: Any,
+    choices: Any,
+    work: Any,
+) -> None:
+    for k in range(CARTS):
+        for j in range(LANES):
+            push = (rows[PUSH + k][j] + rows[DRIFT][j]) / fixed[MASS][j]
+            rows[PLACE + k][j] = rows[PLACE + k][j] + settings[0][PERIOD] * push
+
+
+@kernel
+def wanted(
+    rows: Any,
+    fixed: Any,
+    samples: Any,
+    settings: Any,
+    choices: Any,
+    step: int,
+    lane: int,
+    channel: int,
+) -> float:
+    return 0.01 * (channel + 1) * step
+
+
+@kernel
+def judge(
+    rows: Any, fixed: Any, counts: Any, ahead: Any, settings: Any, choices: Any, work: Any
+) -> None:
+    for j in range(LANES):
+        work[TIME][j] = counts[3][j] * settings[0][PERIOD]
+        far, change = 0.0, 0.0
+        for k in range(CARTS):
+            work[SIGNALS + k][j] = rows[PLACE + k][j]
+            far = max(far, abs(rows[PLACE + k][j]))
+            change = change + abs(rows[PUSH + k][j] - rows[OLD_PUSH + k][j])
+        work[REF][j], work[OUT][j] = fixed[MASS][j], far
+        work[NEAR][j], work[CALM][j] = -far, -change
+        work[S_DRIFT][j] = rows[DRIFT][j]
+        work[ENDED][j] = 1.0 if far > FARTHEST else 0.0
+    write_references(counts, ahead, choices, work, SIGNALS + CARTS)
+
+
+@routine
+def begin(
+    rows: Any,
+    fixed: Any,
+    counts: Any,
+    tables: Any,
+    samples: Any,
+    settings: Any,
+    choices: Any,
+    work: Any,
+    member: int,
+    j: int,
+) -> None:
+    for k in range(len(rows)):
+        rows[k][j] = 0.0
+    for k in range(CARTS):
+        rows[PLACE + k][j] = uniform(counts[0][j], counts[1][j], 2, k)
+
+
+def carts() -> Kernels:
+    functions = {
+        "env_apply": drift,
+        "env_advance": roll,
+        "env_reference": wanted,
+        "env_evaluate": judge,
+        "env_begin": begin,
+    }
+    return Kernels(
+        f"carts_{hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:12]}",
+        carts,
+        (),
+        functions,
+        info=INFO,
+        rows=3 * CARTS + 1,
+        parameters=1,
+        counts=4,
+        scratch=0,
+        signals=CARTS + 2 * 5,
+        set_points=PUSH,
+        old_set_points=OLD_PUSH,
+        channels=2,
+    )
+
+
+class Plant(SimpleNamespace):
+    family, control_period, substeps = "carts", 0.01, 1
+
+    def members(self) -> tuple[Any, ...]:
+        return (self,)
+
+    def parameter_rows(self) -> np.ndarray:
+        return np.array([self.mass])
+
+
+def setup(normalize: bool = True, seconds: float = 0.4) -> Setup:
+    given = common(4, 3, seconds, normalize, None)
+    names = [f"place_{k}" for k in range(CARTS)]
+    names += [f"{n}_{k}" for n in ("first", "second") for k in range(5)]
+    return compose(
+        Plant(mass=2.0),
+        carts(),
+        given,
+        signals=Signals(Signal(n, "m", -5.0, 5.0, i, normalize) for i, n in enumerate(names)),
+        actions=Signals(
+            Signal(f"push_{k}", "N", -10.0, 10.0 * (k + 1), k, normalize) for k in range(CARTS)
+        ),
+        config=(),
+        choices=(),
+        own=np.zeros((1, 1)),
+        samples=np.zeros((2, 1)),
+        tables=np.zeros((1, 2, 2)),
+        spread=np.array([[MASS, 1.0, 3.0]]),
+        drawn=True,
+    )
+
+
+def test_every_action_pushes_its_own_cart() -> None:
+    env = PlantEnv(setup(normalize=False))
+    observation, info = env.reset(seed=1)
+    mass, before = info["reference"], observation[:CARTS].astype(float)
+    assert 1.0 < mass < 3.0
+    after, reward, *_, info = env.step(np.array([1.0, -2.0, 30.0], np.float32))
+    moved = 0.01 * (np.array([1.0, -2.0, 30.0]) + info["state/drift"]) / mass
+    assert np.allclose(after[:CARTS] - before, moved, atol=1e-6)
+    assert reward == info["reward/near"] + info["reward/calm"]
+    assert info["reward/calm"] == -33.0
+    assert info["saturated"] == 0.0
+
+
+@pytest.mark.parametrize("which", range(CARTS))
+def test_one_action_out_of_range_is_clipped_and_reported(which: int) -> None:
+    env, twin = PlantEnv(setup()), PlantEnv(setup())
+    env.reset(seed=2)
+    twin.reset(seed=2)
+    action = np.zeros(CARTS, np.float32)
+    action[which] = 1.0
+    edge = twin.step(action)
+    action[which] = 4.0
+    far = env.step(action)
+    assert np.array_equal(edge[0], far[0])
+    assert (edge[4]["saturated"], far[4]["saturated"]) == (0.0, 1.0)
+
+
+def test_channels_have_previews_of_their_own() -> None:
+    env = PlantEnv(setup(normalize=False))
+    env.reset(seed=0)
+    for step in range(1, 8):
+        observation, *_ = env.step(np.zeros(CARTS, np.float32))
+        steps = step + 3 * np.arange(5)
+        assert np.allclose(observation[CARTS : CARTS + 5], 0.01 * steps, atol=1e-6)
+        assert np.allclose(observation[CARTS + 5 :], 0.02 * steps, atol=1e-6)
+
+
+def test_a_wrong_number_of_actions_names_them() -> None:
+    env = PlantEnv(setup())
+    env.reset(seed=0)
+    for wrong in (np.zeros(2), np.zeros(4), np.zeros((3, 1)), np.float32(0.0)):
+        with pytest.raises(ValueError, match="push_0, push_1, push_2"):
+            env.step(wrong)
+    with pytest.raises(ValueError, match=r"action\[1\] \(push_1\) is nan"):
+        env.step(np.array([0.0, np.nan, 0.0]))
+
+
+def test_rows_of_a_batch_are_single_environments_through_ends_and_restarts() -> None:
+    number = 40
+    batch = PlantVectorEnv(setup(), number)
+    singles = {i: PlantEnv(setup()) for i in (0, 31, 32, 39)}
+    observations, _ = batch.reset(seed=5)
+    for i, env in singles.items():
+        assert np.array_equal(env.reset(seed=5 + i)[0], observations[i])
+    random, ends = np.random.default_rng(0), 0
+    for _ in range(120):
+        actions = random.uniform(-1.0, 1.0, (number, CARTS)).astype(np.float32)
+        observations, rewards, terminated, truncated, infos = batch.step(actions)
+        for i, env in singles.items():
+            observation, reward, ended, cut, info = env.step(actions[i])
+            assert (reward, ended, cut) == (rewards[i], terminated[i], truncated[i])
+            if ended or cut:
+                ends += 1
+                assert np.array_equal(observation, infos["final_obs"][i])
+                observation, info = env.reset()
+            assert np.array_equal(observation, observations[i])
+            assert {k: infos[k][i] for k in info} == info
+    assert ends >= 3 * len(singles)
+
+
+def test_a_limit_ends_the_episode() -> None:
+    env = PlantEnv(setup(seconds=60.0))
+    env.reset(seed=0)
+    steps = 0
+    terminated = False
+    while not terminated:
+        _, _, terminated, truncated, info = env.step(np.ones(CARTS, np.float32))
+        assert not truncated
+        steps += 1
+    assert info["output"] > FARTHEST
+    assert steps < 200
+
+
+def test_copies_go_on_alike() -> None:
+    env = PlantEnv(setup())
+    env.reset(seed=4)
+    for _ in range(60):
+        env.step(np.full(CARTS, 0.2, np.float32))
+    others = [copy.deepcopy(env), pickle.loads(pickle.dumps(env))]
+    action = np.array([0.3, -0.4, 0.5], np.float32)
+    wanted = env.step(action)[0]
+    assert all(np.array_equal(other.step(action)[0], wanted) for other in others)

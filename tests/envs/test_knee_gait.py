@@ -1,0 +1,168 @@
+"""The knee orthosis on a leg: references, assistance and effort follow from what is recorded."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from pam_envs.muscle.emg import calibration, emg_proxy
+from pam_envs.plants.knee_orthosis import KneeOrthosis
+from pam_envs.sensing.butterworth import filtered
+from tests.envs.cases import actions_for
+
+GAITS = {
+    "PAM/KneeWalk-v0": "walk",
+    "PAM/KneeStairsUp-v0": "stairs_up",
+    "PAM/KneeStairsDown-v0": "stairs_down",
+}
+EACH_GAIT = pytest.mark.parametrize("name", GAITS)
+
+
+def quiet(name: str) -> KneeOrthosis:
+    return KneeOrthosis.on_leg(GAITS[name], stride=2.0).without_noise()
+
+
+def record(
+    name: str, steps: int = 300, **arguments: Any
+) -> tuple[Any, dict[str, np.ndarray], np.ndarray]:
+    """Return the environment, ``info`` as arrays and the observations in SI, the reset first."""
+    env = gym.make(name, normalize=False, episode_seconds=60.0, **arguments).unwrapped
+    observation, info = env.reset(seed=3)
+    infos, observations = [dict(info)], [observation]
+    for action in actions_for(env.action_space, steps, 1):
+        observation, _, terminated, _, info = env.step(0.5 * action)
+        assert not terminated
+        infos.append(dict(info))
+        observations.append(observation)
+    return env, {k: np.array([i[k] for i in infos]) for k in infos[0]}, np.array(observations)
+
+
+@EACH_GAIT
+@pytest.mark.parametrize("mismatch", [0.0, 10.0, -20.0])
+def test_the_tension_gives_the_wanted_torque_in_stance_and_is_off_by_the_mismatch_in_swing(
+    name: str, mismatch: float
+) -> None:
+    env, info, _ = record(name, mismatch=mismatch)
+    stance = info["sensor/stance"] > 0.5
+    assert 0 < stance.mean() < 1
+    torque = np.where(stance, info["state/torque_reference"], 0.0)
+    tension = np.maximum(0.0, env.plant.tension_for(info["sensor/angle"], torque))
+    shift = np.where(stance, 0.0, mismatch)
+    assert np.allclose(info["reference"], tension + shift, rtol=1e-9, atol=1e-9)
+
+
+@EACH_GAIT
+def test_in_swing_the_angle_should_be_that_of_the_path_and_in_stance_it_is_what_it_is(
+    name: str,
+) -> None:
+    env, info, _ = record(name)
+    stance = info["sensor/stance"] > 0.5
+    path = env.plant.lever.mount_angle + info["state/knee"]
+    wanted = np.where(stance, info["sensor/angle"], path)
+    assert np.allclose(info["state/angle_reference"], wanted, atol=1e-12)
+    assert np.allclose(info["state/angle"], path + info["state/deviation"], atol=1e-12)
+
+
+@EACH_GAIT
+@pytest.mark.parametrize(("assistance", "lowest"), [("signed", -np.inf), ("clipped", 0.0)])
+@pytest.mark.parametrize(("source", "key"), [("estimate", "estimate"), ("demand", "demand")])
+def test_the_wanted_torque_is_a_share_after_the_low_pass(
+    name: str, assistance: str, lowest: float, source: str, key: str
+) -> None:
+    arguments = {"assistance": assistance, "reference": source, "ratio": 0.3}
+    _, info, _ = record(name, 450, plant=quiet(name), **arguments)
+    share = np.maximum(lowest, 0.3 * info[f"state/{key}"])
+    settled = slice(200, None)  # what was before the episode has faded by then
+    assert np.ptp(share[settled]) > 1.0
+    assert np.allclose(info["state/torque_reference"][settled], filtered(share)[settled], atol=2e-3)
+
+
+def test_samples_are_the_wanted_torque_themselves() -> None:
+    samples = 3.0 * np.sin(0.05 * np.arange(100))
+    _, info, _ = record("PAM/KneeWalk-v0", 150, reference=samples)
+    later = samples[np.minimum(np.arange(151), 99)]
+    assert np.allclose(info["state/torque_reference"], later, atol=1e-12)
+
+
+@EACH_GAIT
+def test_the_preview_is_what_comes_when_nothing_disturbs(name: str) -> None:
+    plant = quiet(name).replace({"leg.hold_stiffness": 500.0, "leg.stance_stiffness": 2e3})
+    env, info, seen = record(name, plant=plant, preview=3, preview_stride=5)
+    signals = env.signals
+    now, ahead = signals["reference"].index, signals["reference_3"].index
+    assert signals["reference_3"].ahead == pytest.approx(0.15)
+    stiff = np.abs(info["state/deviation"][15:]) < 0.01
+    error = seen[:-15, ahead] - seen[15:, now]
+    assert np.ptp(seen[:, now]) > 100.0
+    assert stiff.mean() > 0.3
+    assert np.median(np.abs(error[stiff])) < 2.0
+    now, ahead = signals["angle_reference"].index, signals["angle_reference_3"].index
+    swing = info["state/stance"][15:] < 0.5
+    assert np.allclose(seen[:-15, ahead][swing], seen[15:, now][swing], atol=1e-5)
+
+
+@EACH_GAIT
+def test_the_emg_proxies_are_those_of_the_recorded_torques(name: str) -> None:
+    env, info, _ = record(name)
+    period, muscle = env.control_period, env.plant.activation
+    helped = info["state/torque"]
+    plain = emg_proxy(info["state/demand"], helped, period, muscle)
+    share = calibration(GAITS[name], "A")
+    fitted = emg_proxy(info["state/estimate"], helped, period, muscle, "A", share)
+    settled = slice(50, None)
+    for key, wanted in (
+        ("extensors", plain.extensors),
+        ("extensors_free", plain.extensors_free),
+        ("flexors", plain.flexors),
+        ("flexors_free", plain.flexors_free),
+        ("extensors_calibrated", fitted.extensors),
+        ("extensors_free_calibrated", fitted.extensors_free),
+    ):
+        assert np.allclose(info[f"effort/{key}"][settled], wanted[settled], atol=1e-6), key
+
+
+def test_over_assistance_is_torque_beyond_the_demand_or_against_it() -> None:
+    _, info, _ = record("PAM/KneeWalk-v0")
+    torque, demand = info["state/torque"], info["state/demand"]
+    between = np.clip(torque, np.minimum(0.0, demand), np.maximum(0.0, demand))
+    assert np.allclose(info["effort/over_assistance"], np.abs(torque - between), atol=1e-12)
+    assert (info["effort/over_assistance"] > 1.0).any()
+
+
+def test_rewards_are_gated_by_the_true_stance() -> None:
+    _, info, _ = record("PAM/KneeWalk-v0")
+    stance = info["state/stance"] > 0.5
+    assert (info["reward/angle"][stance] == 0.0).all()
+    assert (info["reward/tension"][~stance] == 0.0).all()
+    error = np.abs(info["output"] - info["reference"])[stance]
+    assert np.allclose(info["reward/tension"][stance], -error / 10.0)
+
+
+@EACH_GAIT
+def test_paces_have_their_stride(name: str) -> None:
+    for pace, seconds in (("slow", 5.0), ("normal", 1.224), (2.5, 2.5)):
+        _, info, _ = record(name, 20, pace=pace, start="heel_contact")
+        assert info["state/phase"][0] == 0.0
+        assert info["state/phase"][20] == pytest.approx(0.2 / seconds)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"pace": "fast"}, "pace = 'fast' is not known; choose one of 'slow', 'normal'"),
+        ({"pace": 0.1}, "from 0.8 to 20 s a stride"),
+        ({"ratio": 1.5}, "ratio = 1.5 must be a number from 0 to 1"),
+        ({"assistance": "some"}, "choose one of 'signed', 'clipped'"),
+        ({"mismatch": 1e3}, "from -100 to 100 N"),
+        ({"start": "toe_off"}, "choose one of 'random', 'heel_contact'"),
+        ({"plant": KneeOrthosis.no_load()}, r"give KneeOrthosis.on_leg\('walk'\)"),
+        ({"plant": KneeOrthosis.on_leg("stairs_up")}, r"give KneeOrthosis.on_leg\('walk'\)"),
+        ({"reference": [1e3]}, "samples are in N m, at most 100"),
+    ],
+)
+def test_bad_arguments(arguments: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        gym.make("PAM/KneeWalk-v0", **arguments)

@@ -1,0 +1,69 @@
+"""Geometry and torque of the brace: virtual work, the inverse, the published nominal point."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pam_envs.mechanics.knee_lever import (
+    KneeLever,
+    assistive_torque,
+    half_angle,
+    muscle_length,
+    wanted_tension,
+)
+
+ANGLES = np.radians(np.linspace(82.0, 178.0, 49))
+
+
+def test_the_lever_arm_is_what_virtual_work_says() -> None:
+    lever, h = KneeLever(), 1e-5
+    slope = (lever.length(ANGLES + h) - lever.length(ANGLES - h)) / (2.0 * h)
+    assert np.allclose(slope, lever.lever_arm(ANGLES), atol=1e-10)
+
+
+def test_the_torque_is_minus_the_gradient_of_the_energy() -> None:
+    """A constant tension and the spring: work over angle, with no formula of the torque."""
+    lever, tension, h = KneeLever(), 158.0, 1e-5
+
+    def energy(angle: np.ndarray) -> np.ndarray:
+        spring = 0.5 * lever.stiffness * (angle - lever.relaxed_angle) ** 2
+        return tension * lever.length(angle) + spring
+
+    slope = (energy(ANGLES + h) - energy(ANGLES - h)) / (2.0 * h)
+    assert np.allclose(slope, lever.torque(tension, ANGLES), atol=1e-8)
+
+
+def test_the_wanted_tension_gives_the_wanted_torque_and_grows_with_it() -> None:
+    lever = KneeLever()
+    for torque in (-8.0, 0.0, 12.0):
+        tension = lever.tension(torque, ANGLES)
+        assert np.allclose(lever.torque(tension, ANGLES), torque, atol=1e-12)
+    assert np.all(lever.tension(5.0, ANGLES) > lever.tension(0.0, ANGLES))
+
+
+def test_length_and_angle_are_inverses() -> None:
+    lever = KneeLever()
+    assert np.allclose(lever.angle(lever.length(ANGLES)), ANGLES, atol=1e-9)
+    assert lever.length(math.radians(110.0)) == pytest.approx(0.22, abs=1e-4)
+
+
+def test_the_kernels_are_the_methods() -> None:
+    lever = KneeLever()
+    numbers = (lever.arm, lever.stiffness, lever.relaxed_angle)
+    for angle in ANGLES:
+        sine, cosine = half_angle(angle)
+        length = muscle_length(sine, lever.arm, lever.fittings)
+        assert length == pytest.approx(float(lever.length(angle)), abs=1e-15)
+        torque = assistive_torque(200.0, cosine, angle, *numbers)
+        assert torque == pytest.approx(float(lever.torque(200.0, angle)), abs=1e-12)
+        wanted = wanted_tension(angle, 3.0, *numbers)
+        held = max(0.0, float(lever.tension(3.0, angle)))
+        assert wanted == pytest.approx(held, rel=1e-9, abs=1e-12)
+
+
+def test_no_tension_pushes() -> None:
+    lever = KneeLever()
+    assert wanted_tension(math.radians(150.0), -9.0, lever.arm, 30.0, lever.relaxed_angle) == 0.0

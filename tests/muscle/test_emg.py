@@ -1,0 +1,82 @@
+"""The EMG proxy: what it must give where the answer is known, and the calibrated constants."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pam_envs.identification.emg_calibration import PUBLISHED, change
+from pam_envs.muscle.emg import (
+    MuscleActivation,
+    activation,
+    activation_of,
+    calibration,
+    emg_proxy,
+    excitation,
+    left_of_gap,
+)
+from pam_envs.references.gait import ACTIVITIES
+
+PERIOD = 0.01
+T = PERIOD * np.arange(1000)
+DEMAND = 60.0 * np.sin(2 * np.pi * 0.2 * T)
+BARE = MuscleActivation(floor=0.0)
+
+
+def test_an_exact_share_of_the_demand_takes_that_share_away() -> None:
+    assert emg_proxy(DEMAND, 0.2 * DEMAND, PERIOD, BARE).change == pytest.approx(-0.2, abs=1e-3)
+
+
+def test_a_floor_of_co_contraction_hides_part_of_it() -> None:
+    shown = emg_proxy(DEMAND, 0.2 * DEMAND, PERIOD, MuscleActivation(floor=0.05)).change
+    assert -0.2 < shown < -0.12
+
+
+def test_reading_a_makes_more_of_it_the_less_the_wearer_has_to_bear() -> None:
+    shown = emg_proxy(DEMAND, 0.2 * DEMAND, PERIOD, reading="A", constant=0.55)
+    assert shown.change == pytest.approx(-0.2 / 0.55, abs=2e-3)
+
+
+def test_reading_b_is_a_power() -> None:
+    shown = emg_proxy(DEMAND, 0.2 * DEMAND, PERIOD, reading="B", constant=2.03)
+    assert shown.change == pytest.approx(0.8**2.03 - 1.0, abs=3e-3)
+
+
+def test_too_much_assistance_is_the_flexors_work() -> None:
+    much = emg_proxy(DEMAND, 1.5 * np.abs(DEMAND), PERIOD, BARE)
+    assert much.change < -0.95
+    assert much.change_with_flexors > 0.0
+    little = emg_proxy(DEMAND, 0.2 * DEMAND, PERIOD, BARE)
+    assert little.change_with_flexors == pytest.approx(little.change, abs=1e-3)
+
+
+def test_activation_rises_faster_than_it_falls() -> None:
+    muscle = MuscleActivation(floor=0.0)
+    a = activation_of(np.where((T > 1.0) & (T < 2.0), 100.0, 0.0), PERIOD, muscle)
+    risen, fallen = np.argmax(a > 0.5 * 0.63), np.argmax((T > 2.0) & (a < 0.5 * 0.37))
+    assert (risen - 100) * PERIOD == pytest.approx(muscle.rise_time, abs=PERIOD)
+    assert (fallen - 200) * PERIOD == pytest.approx(muscle.fall_time, abs=1.5 * PERIOD)
+
+
+def test_kernels_and_records_agree() -> None:
+    muscle = MuscleActivation()
+    record = activation_of(DEMAND, PERIOD, muscle)
+    risen, fallen = (left_of_gap(PERIOD, t) for t in (muscle.rise_time, muscle.fall_time))
+    level, made = excitation(DEMAND[0], muscle.largest_torque, muscle.floor), []
+    for torque in DEMAND:
+        wanted = excitation(torque, muscle.largest_torque, muscle.floor)
+        level = activation(level, wanted, risen, fallen)
+        made.append(level)
+    assert np.array_equal(record, made)
+
+
+@pytest.mark.parametrize("activity", ACTIVITIES)
+@pytest.mark.parametrize("reading", ["A", "B"])
+def test_the_constants_give_the_figure_that_they_were_fitted_to(activity, reading) -> None:  # type: ignore[no-untyped-def]
+    constant = calibration(activity, reading)
+    assert change(activity, reading, constant) == pytest.approx(PUBLISHED[activity], abs=2e-4)
+
+
+def test_an_unknown_constant_is_named() -> None:
+    with pytest.raises(ValueError, match="activity = 'hop'"):
+        calibration("hop", "A")

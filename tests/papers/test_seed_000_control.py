@@ -1,0 +1,133 @@
+"""Seed 000: printed transfer functions, their loop, and tracking with the inverse."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from baselines import knee_published as seed
+from baselines.ltr import closed_loop_poles, design_ltr, loop_figures
+from benchmarks import papers_knee as figures
+
+PLANT, CONTROLLER = seed.printed_plant(), seed.printed_controller()
+
+
+def test_printed_plant():
+    poles = np.sort_complex(PLANT.poles)
+    np.testing.assert_allclose(
+        poles,
+        [-12.33, -10.475, -7.495, -7.095, -6.685, -4.055 - 0.823j, -4.055 + 0.823j],
+        atol=1e-3,
+    )
+    np.testing.assert_allclose(np.sort(PLANT.zeros.real), [-9.30, -8.15, -4.19, -3.20], atol=6e-3)
+    assert PLANT.static_gain == pytest.approx(0.7398, abs=5e-5)
+    phase = np.degrees(np.unwrap(np.angle(PLANT.response(2 * np.pi * np.array([0.1, 0.5, 1, 2])))))
+    np.testing.assert_allclose(phase, [-10.6, -55.8, -105.4, -163.8], atol=0.06)
+    at_3_db = PLANT.response(np.array([2.0 * np.pi * 0.824]))[0]
+    assert abs(at_3_db) / PLANT.static_gain == pytest.approx(math.sqrt(0.5), abs=1e-3)
+
+
+def test_printed_controller_roots():
+    upper = [-23.55, -20.53 + 3.99j, -13.87 + 1.09j, -6.417, -5.284]
+    found = sorted(CONTROLLER.zeros[CONTROLLER.zeros.imag > -1e-9], key=lambda z: z.real)
+    np.testing.assert_allclose(found, upper, atol=6e-3)
+    assert abs(CONTROLLER.poles[0]) < 1e-9
+
+
+def test_printed_loop():
+    loop = loop_figures(lambda w: PLANT.response(w) * CONTROLLER.response(w))
+    assert loop.crossover == pytest.approx(9.02, abs=0.005)
+    assert math.degrees(loop.phase_margin) == pytest.approx(56.5, abs=0.05)
+    assert loop.gain_margin == pytest.approx(2.65, abs=0.005)
+    assert loop.delay_margin == pytest.approx(0.109, abs=5e-4)
+    assert loop.bandwidth == pytest.approx(20.43, abs=0.005)
+    assert loop.peak_sensitivity == pytest.approx(1.635, abs=5e-4)
+    assert loop.peak_tracking == pytest.approx(1.058, abs=5e-4)
+    assert closed_loop_poles(PLANT, CONTROLLER)[0].real == pytest.approx(-2.84, abs=5e-3)
+    slow = np.array([1e-4])
+    velocity = abs(PLANT.response(slow) * CONTROLLER.response(slow))[0] * 1e-4
+    assert velocity == pytest.approx(8.14, abs=0.005)
+    s = 1.0 / (1.0 + (PLANT.response(w := np.array([0.2 * np.pi])) * CONTROLLER.response(w))[0])
+    assert abs(s) == pytest.approx(0.076, abs=5e-4)
+
+
+def test_controller_is_a_design_on_the_inferred_plant():
+    refit = seed.refit_controller()
+    assert refit.largest_error < 4.5e-4
+    inferred = refit.design.plant
+    assert inferred.static_gain == pytest.approx(0.789, abs=5e-4)
+    assert refit.fourth_zero == pytest.approx(-69.7, abs=0.05)
+    assert refit.design.bandwidth == pytest.approx(62.7, abs=0.05)
+    assert refit.design.control_weight == pytest.approx(9.5e-7, abs=0.1e-7)
+    w = np.geomspace(0.1, 100.0, 60)
+    ours = refit.design.controller.response(w)
+    np.testing.assert_allclose(ours, CONTROLLER.response(w), rtol=5e-3)
+    loop = loop_figures(lambda w: inferred.response(w) * CONTROLLER.response(w))
+    assert loop.bandwidth == pytest.approx(26.0, abs=0.05)
+    assert loop.peak_tracking < 1.001
+
+
+def test_a_bandwidth_of_10_hz_serves_as_well():
+    assert seed.refit_controller(20.0 * math.pi).largest_error < 6.5e-4
+
+
+def test_both_plants_fit_the_same_measurement():
+    w = np.linspace(0.6, 20.0, 200)
+    ratio = seed.refit_controller().design.plant.response(w) / PLANT.response(w)
+    assert 0.92 < np.min(np.abs(ratio)) < np.max(np.abs(ratio)) < 1.14
+    assert np.max(np.abs(np.degrees(np.angle(ratio)))) < 5.0
+
+
+def test_the_controller_is_not_a_design_on_the_printed_plant():
+    distance = np.abs(CONTROLLER.zeros[:, None] - PLANT.poles[None, :]).min(axis=1)
+    assert np.max(distance) > 10.0
+
+
+def test_26_2_hertz_is_not_credible():
+    at_100_hz = np.array([200.0 * np.pi])
+    needed = design_ltr(PLANT, 2.0 * np.pi * 26.2, 1e-14).controller.response(at_100_hz)
+    assert abs(needed[0]) > 4000.0
+    assert abs(CONTROLLER.response(at_100_hz)[0]) == pytest.approx(0.16, abs=0.005)
+
+
+def test_stiffness_tracking_preset_static():
+    inverse, line = figures.stiffness_tracking()
+    assert inverse == pytest.approx(2.07, abs=0.01)
+    assert 1.5 <= inverse <= 2.3
+    assert 10.5 <= line <= 11.5
+
+
+def test_without_lag_the_inverse_is_exact():
+    inverse, line = figures.stiffness_tracking(lag=1e-6)
+    assert inverse < 0.01
+    assert line > 9.0
+
+
+def test_without_hysteresis_the_line_is_as_good():
+    inverse, line = figures.stiffness_tracking(friction=0.0)
+    assert inverse == pytest.approx(line, rel=1e-9)
+
+
+def test_tension_tracking_preset_dynamic():
+    found = [figures.tension_tracking(width) for width in figures.LOOP_WIDTHS]
+    for one in found:
+        assert 5.0 < one.feedback < 5.52
+        assert 0.9 < one.with_inverse < 1.06
+        assert one.feedback > 3.5 * one.with_inverse
+    narrow, _, wide = found
+    assert narrow.with_line == pytest.approx(narrow.with_inverse, rel=1e-6)
+    assert 1.4 < wide.with_line / wide.with_inverse < 1.7
+
+
+@pytest.mark.parametrize("group", figures.GROUPS, ids=lambda group: group.__name__)
+def test_every_figure_is_within_its_tolerance_and_tagged(group):
+    if group is figures.bumpless_inequality:
+        pytest.importorskip("cvxpy")
+    for figure in group():
+        assert figure.passed, figure
+        if figure.unit == "%" and "section 4.1" not in figure.source:
+            assert "first 2 s dropped" in figure.note
+            assert "preset" in figure.note
+            assert figure.note.startswith(("calibrated", "predicted"))

@@ -1,0 +1,290 @@
+"""The orthosis in motion: against independent integrations, balances, published figures."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from pam_envs.kernels import COMPILED, interpreted
+from pam_envs.muscle.emg import MuscleActivation, calibration, emg_proxy
+from pam_envs.plants.knee_orthosis import KneeOrthosis
+from pam_envs.plants.knee_rollout import (
+    OUTPUTS,
+    arrays_for,
+    kernel_names,
+    run_knee,
+    simulate_knee,
+)
+from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE, gait_curves
+
+PERIOD = KneeOrthosis.control_period
+slow = pytest.mark.skipif(not COMPILED, reason="too many sub-steps for plain Python")
+
+
+def steps(n: int, every: int = 10, seed: int = 0) -> np.ndarray:
+    drawn = np.random.default_rng(seed).uniform(0.3e5, 4.3e5, -(-n // every))
+    return np.repeat(drawn, every)[:n]
+
+
+def integrated(plant: KneeOrthosis, set_points: np.ndarray, start: dict[str, float]) -> np.ndarray:
+    """Angle [rad] of a plant without hysteresis, from its differential equations written anew."""
+    lever, leg, muscle = plant.lever, plant.leg, plant.muscle
+    worn = plant.mounting == "leg"
+    time = plant.stride.time
+
+    def path(t: float) -> list[float]:
+        phase = start["phase"] + t / time
+        return [
+            float(gait_curves(plant.activity, phase, k)["knee"]) / time**k if worn else 0.0
+            for k in range(3)
+        ]
+
+    def hold(index: float) -> tuple[float, float]:
+        i = int(index)
+        i = min(max(i, 0), len(start["hold"]) - 1)  # type: ignore[arg-type]
+        return start["hold"][i], start["hold_rate"][i]  # type: ignore[index]
+
+    def derivative(t: float, state: np.ndarray, u: float, stiff: float, damp: float) -> list[float]:
+        x, v, p = state
+        knee, rate, bend = path(t)
+        theta = x + (lever.mount_angle + knee if worn else 0.0)
+        length = 2.0 * lever.arm * np.sin(theta / 2.0) - lever.fittings
+        tension = muscle.stiffness_ratio * p * max(0.0, length - muscle.shortest_length)
+        torque = tension * lever.arm * np.cos(theta / 2.0)
+        torque -= lever.stiffness * (lever.relaxed_angle - theta)
+        inertia, pull = lever.inertia, -torque - lever.damping * v
+        if worn:
+            inertia += leg.inertia
+            pull -= lever.damping * rate + lever.inertia * bend + stiff * x + damp * v
+            past = lever.mount_angle + knee - lever.relaxed_angle
+            pull += leg.habituation * lever.stiffness * max(0.0, past)
+        return [v, pull / inertia, (u - p) / plant.regulator.time_constant]
+
+    state = np.array([start["x"], 0.0, start["pressure"]])
+    made = []
+    for k, u in enumerate(set_points):
+        stiff, damp = hold(k)
+        run = solve_ivp(
+            derivative, (k * PERIOD, (k + 1) * PERIOD), state, args=(u, stiff, damp),
+            rtol=1e-8, atol=[1e-10, 1e-9, 1e-3],
+        )  # fmt: skip
+        state = run.y[:, -1]
+        made.append(state[0] + (lever.mount_angle + path((k + 1) * PERIOD)[0] if worn else 0.0))
+    return np.array(made)
+
+
+def test_the_brace_alone_follows_its_differential_equation() -> None:
+    plant, u = KneeOrthosis.no_load("none"), steps(120)
+    made = simulate_knee(plant, u, pressure=1e5)["angle"]
+    x = float(plant.angle_at(plant.muscle.stiffness_ratio * 1e5))
+    truth = integrated(plant, u, {"x": x, "pressure": 1e5, "phase": 0.0, "hold": [0.0], "hold_rate": [0.0]})  # type: ignore[dict-item]  # fmt: skip  # noqa: E501
+    assert np.abs(made - truth).max() < 1e-4
+
+
+def test_the_brace_on_the_leg_follows_its_differential_equation() -> None:
+    plant, u = KneeOrthosis.on_leg("walk", 1.4, "none"), steps(100)
+    made = simulate_knee(plant, u, pressure=1e5, phase=0.55)
+    rest = simulate_knee(plant, u[:1], pressure=1e5, phase=0.55 - 1e-9)
+    hold = [np.concatenate([rest[name], made[name]]) for name in ("hold", "hold_rate")]
+    middle = [0.5 * (values[:-1] + values[1:]) for values in hold]
+    still = dataclasses.replace(plant, substeps=100)
+    first = simulate_knee(still, np.full(1, 1e5), pressure=1e5, phase=0.55)
+    start = {
+        "x": float(first["deviation"][0]),
+        "pressure": 1e5,
+        "phase": 0.55,
+        "hold": middle[0],
+        "hold_rate": middle[1],
+    }
+    truth = integrated(plant, u, start)  # type: ignore[arg-type]
+    later = slice(40, None)  # the two starts differ by one period of the stride
+    assert np.abs(made["angle"] - truth)[later].max() < 1e-3
+
+
+@slow
+@pytest.mark.parametrize(
+    "plant",
+    [KneeOrthosis.no_load(), KneeOrthosis.on_leg("walk", NATURAL_STRIDE)],
+    ids=["no load", "leg"],
+)
+def test_the_integrator_is_of_second_order_and_fine_enough(plant: KneeOrthosis) -> None:
+    u = steps(400, every=5)
+
+    def run(substeps: int) -> dict[str, np.ndarray]:
+        return simulate_knee(dataclasses.replace(plant, substeps=substeps), u, pressure=1e5)
+
+    truth = run(100)
+    errors = {n: np.abs(run(n)["length"] - truth["length"]).max() for n in (1, 2, 4, 8)}
+    slope = np.polyfit(np.log(list(errors)), np.log(list(errors.values())), 1)[0]
+    assert slope == pytest.approx(-2.0, abs=0.25)
+    assert errors[plant.substeps] < 10e-6
+    assert np.abs(run(plant.substeps)["tension"] - truth["tension"]).max() < 0.05
+
+
+@pytest.mark.parametrize("mounting", ["rig", "no_load"])
+@pytest.mark.parametrize("dynamics", ["lag", "measured"])
+def test_rest_is_rest(mounting: str, dynamics: str) -> None:
+    plant = getattr(KneeOrthosis, mounting)("none", dynamics)
+    made = simulate_knee(plant, np.full(50, 2e5), pressure=2e5)
+    assert np.ptp(made["tension"]) < 1e-6
+    assert np.abs(made["tension"] - 158.0).max() < 0.3
+    assert np.abs(made["velocity"]).max() < 1e-9
+
+
+def test_friction_and_muscle_take_what_the_spring_gives_up() -> None:
+    """After a vent, wire and motion lose what the bearings turn to heat."""
+    plant = KneeOrthosis.no_load("none", regulator__time_constant=0.002, lever__inertia=0.3)
+    made = simulate_knee(plant, np.zeros(200), pressure=3e5)
+    vented = slice(3, None)
+    theta, omega = made["angle"][vented], made["velocity"][vented]
+    lever = plant.lever
+    energy = 0.5 * lever.inertia * omega**2
+    energy += 0.5 * lever.stiffness * (lever.relaxed_angle - theta) ** 2
+    power = lever.damping * omega**2
+    heat = np.cumsum(0.5 * (power[1:] + power[:-1])) * PERIOD
+    assert energy[0] > 0.05
+    assert np.abs(energy[0] - energy[1:] - heat).max() < 0.01 * energy[0]
+
+
+def test_the_published_dynamics_lie_between_set_point_and_tension() -> None:
+    """On the rig, without hysteresis: 79 N/bar and the published phase at 0.5 Hz."""
+    plant = KneeOrthosis.rig("none", "measured")
+    t = PERIOD * np.arange(1200)
+    u = 2e5 + 2e4 * np.sin(np.pi * t)
+    tension = simulate_knee(plant, u, pressure=2e5)["tension"][600:]
+    carrier = np.exp(-1j * np.pi * (t[600:] + PERIOD))
+    response = 2.0 * np.mean((tension - tension.mean()) * carrier) * 1j / 2e4
+    reached = response / (79.0 / 1e5)
+    assert np.degrees(np.angle(reached)) == pytest.approx(-55.8, abs=1.5)
+
+
+def tracking_error(plant: KneeOrthosis, command: Callable[[np.ndarray], np.ndarray]) -> float:
+    """RMS over half range [1] of a stiffness that follows a sine of 0.1 Hz, 1 to 71 N/cm."""
+    t = PERIOD * np.arange(2000)
+    wanted = 3600.0 - 3500.0 * np.cos(0.2 * np.pi * t)
+    made = simulate_knee(plant, np.clip(command(wanted), 0.0, 4.5e5))["stiffness"]
+    error = made - (3600.0 - 3500.0 * np.cos(0.2 * np.pi * (t + PERIOD)))
+    return float(np.sqrt(np.mean(error[1000:] ** 2)) / 3500.0)
+
+
+def test_the_inverse_alone_tracks_as_published() -> None:
+    plant = KneeOrthosis.rig()
+    model = plant.memory.operator
+    inverse = tracking_error(plant, lambda s: model.inverse_simulate(s)[0])  # type: ignore[union-attr]
+    line = tracking_error(plant, lambda s: s / plant.muscle.stiffness_ratio)
+    assert inverse == pytest.approx(0.0207, abs=1e-3)
+    assert line == pytest.approx(0.1111, abs=2e-3)
+
+
+def stride(plant: KneeOrthosis) -> dict[str, np.ndarray]:
+    n = round(plant.stride.time / PERIOD)
+    return simulate_knee(plant, np.full(n, 1.5e5), pressure=1.5e5)
+
+
+@pytest.mark.parametrize(("time", "least", "most"), [(PAPER_STRIDE, 0.0, 4.0), (NATURAL_STRIDE, 30.0, 40.0)])  # fmt: skip  # noqa: E501
+def test_equation_1_is_good_at_the_papers_pace_and_wrong_at_the_natural(
+    time: float, least: float, most: float
+) -> None:
+    made = stride(KneeOrthosis.on_leg("walk", time, "none"))
+    stance = made["stance"] > 0
+    error = np.sqrt(np.mean((made["estimate"] - made["demand"])[stance] ** 2))
+    assert least <= error < most
+
+
+def test_what_equation_1_misses_is_the_horizontal_force() -> None:
+    plant = KneeOrthosis.on_leg("walk", NATURAL_STRIDE, "none")
+    made = stride(plant)
+    leg, stance = plant.leg, made["ground_z"] > 50.0
+    height = leg.ankle_height + leg.shank * np.cos(made["shank"])
+    whole = made["estimate"] - made["ground_x"] * height
+    assert np.corrcoef(whole[stance], made["demand"][stance])[0, 1] > 0.97
+    assert np.corrcoef(made["estimate"][stance], made["demand"][stance])[0, 1] < 0.3
+
+
+def test_the_heel_tells_stance_from_swing() -> None:
+    made = stride(KneeOrthosis.on_leg("walk", PAPER_STRIDE, "none"))
+    assert np.array_equal(made["stance"] > 0, made["heel"] > 5.0)
+    switches = np.abs(np.diff(made["stance"])).sum()
+    assert switches == 2
+    assert 0.3 < made["stance"].mean() < 0.65
+
+
+@pytest.mark.parametrize("activity", ["walk", "stairs_up", "stairs_down"])
+def test_strides_repeat(activity: str) -> None:
+    plant = KneeOrthosis.on_leg(activity, 2.0, "none")  # type: ignore[arg-type]
+    made = simulate_knee(plant, np.full(600, 1.5e5), pressure=1.5e5)
+    for name in ("angle", "tension", "torque", "demand", "quads"):
+        scale = np.ptp(made[name])
+        assert np.abs(made[name][200:400] - made[name][400:]).max() < 1e-3 * scale
+
+
+def test_pushed_off_his_path_the_wearer_bears_the_difference() -> None:
+    """In slow motion the torque of the brace past what he has learnt is held by his stiffness."""
+    plant = KneeOrthosis.on_leg("walk", 20.0, "none")
+    made = simulate_knee(plant, np.full(400, 2.5e5), pressure=2.5e5)
+    held = made["hold"] * made["deviation"] + made["torque"]
+    past = plant.lever.mount_angle + made["knee"] - plant.lever.relaxed_angle
+    held -= plant.lever.stiffness * np.maximum(0.0, past)
+    assert np.abs(held[100:]).max() < 1.5
+    assert np.abs(made["torque"][100:]).max() > 4.0
+
+
+def emg_change(time: float) -> float:
+    """Change of the extensors' RMS where 20 % of Eq. (1) is delivered exactly."""
+    made = stride(KneeOrthosis.on_leg("walk", time, "none"))
+    bare = MuscleActivation(floor=0.0)
+    return emg_proxy(made["demand"], 0.2 * made["estimate"], PERIOD, bare).change
+
+
+def test_exact_assistance_helps_at_the_papers_pace_and_hinders_at_the_natural() -> None:
+    assert emg_change(PAPER_STRIDE) == pytest.approx(-0.19, abs=0.02)
+    assert emg_change(NATURAL_STRIDE) > 0.1
+
+
+def test_the_activations_are_those_of_the_proxy() -> None:
+    plant = KneeOrthosis.on_leg("stairs_up", PAPER_STRIDE, "none")
+    made = stride(plant)
+    proxy = emg_proxy(made["demand"], made["torque"], PERIOD, plant.activation)
+    settled = slice(50, None)
+    for name, wanted in (
+        ("quads", proxy.extensors),
+        ("quads_free", proxy.extensors_free),
+        ("flexors", proxy.flexors),
+        ("flexors_free", proxy.flexors_free),
+    ):
+        assert np.allclose(made[name][settled], wanted[settled], atol=1e-6)
+
+
+def test_constants_are_at_hand_for_every_activity() -> None:
+    assert all(0.2 < calibration(a, "A") < 1.0 for a in ("walk", "stairs_up", "stairs_down"))  # type: ignore[arg-type]
+
+
+@slow
+@pytest.mark.parametrize(
+    "plant",
+    [KneeOrthosis.on_leg("walk", 1.3), KneeOrthosis.no_load("preisach", "measured")],
+    ids=["leg", "no load"],
+)
+def test_plain_python_gives_the_same_bits(plant: KneeOrthosis) -> None:
+    u = steps(80)
+    compiled = simulate_knee(plant, u, pressure=1e5, phase=0.4)
+    names = kernel_names(plant.memory.kind, plant.mounting, plant.dynamics, 1)
+    arrays = [a.tolist() for a in arrays_for([plant], u, 1)]
+    run = interpreted(run_knee, names)
+    run(*arrays, plant.elements, plant.substeps, PERIOD, 0.4, 1e5)
+    plain = np.array(arrays[-1])[:, :, 0]
+    for k, name in enumerate(OUTPUTS):
+        assert np.array_equal(compiled[name], plain[k]), name
+
+
+def test_rows_of_a_batch_are_the_single_plants() -> None:
+    plants = [KneeOrthosis.on_leg("walk", time) for time in (1.3, 2.0, 5.0)]
+    u = np.stack([steps(60, seed=k) for k in range(3)], axis=1)
+    batch = simulate_knee(plants, u, pressure=1e5)
+    for k, plant in enumerate(plants):
+        alone = simulate_knee(plant, u[:, k], pressure=1e5)
+        assert all(np.array_equal(alone[name], batch[name][:, k]) for name in alone)

@@ -1,0 +1,164 @@
+"""The knee orthosis at rest: published points, presets, files, bad values."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pam_envs.plants import knee_orthosis_rows as K
+from pam_envs.plants.knee_memory import FULL_STIFFNESS, knee_memory, preisach_of
+from pam_envs.plants.knee_orthosis import KneeOrthosis
+from pam_envs.plants.memory import KINDS
+
+POINTS = ((0.5e5, 56.7), (0.75e5, 80.6), (2e5, 158.0), (4.5e5, 211.5))
+"""Pressure [Pa] and tension [N] of the brace without load and without hysteresis."""
+
+
+def test_the_brace_without_load_has_the_published_range() -> None:
+    plant = KneeOrthosis.no_load("none")
+    stiffness = plant.muscle.stiffness_ratio * np.array([p for p, _ in POINTS])
+    angle = plant.angle_at(stiffness)
+    length = plant.lever.length(angle)
+    tension = plant.muscle.tension(stiffness, length)
+    assert tension == pytest.approx([t for _, t in POINTS], rel=2e-3)
+    assert np.degrees(angle[[0, -1]]) == pytest.approx([127.5, 96.6], abs=0.1)
+    assert 100.0 * length[[0, -1]] == pytest.approx([24.2, 20.0], abs=0.05)
+    assert stiffness[-1] == pytest.approx(FULL_STIFFNESS)
+    assert plant.tension_for(angle) == pytest.approx(tension, rel=1e-9)
+    assert plant.stiffness_for(tension, angle) == pytest.approx(stiffness, rel=1e-9)
+
+
+def test_the_nominal_point() -> None:
+    plant = KneeOrthosis.no_load("none")
+    angle = float(plant.angle_at(plant.muscle.stiffness_ratio * 2e5))
+    assert math.degrees(angle) == pytest.approx(110.0, abs=0.1)
+    assert float(plant.lever.length(angle)) == pytest.approx(0.22, abs=2e-4)
+    rig = KneeOrthosis.rig("none")
+    tension = rig.muscle.tension(rig.muscle.stiffness_ratio * 2e5, rig.fixture.length)
+    assert float(tension) == pytest.approx(158.0, abs=0.1)
+
+
+def test_more_assistance_takes_more_tension() -> None:
+    plant = KneeOrthosis.on_leg("walk")
+    angles = np.radians([100.0, 120.0, 140.0])
+    assert np.all(plant.tension_for(angles, 8.0) > plant.tension_for(angles, 0.0))
+
+
+def test_the_volume_does_the_muscles_work() -> None:
+    """T = -P dV/dL."""
+    muscle, h = KneeOrthosis.rig("none").muscle, 1e-6
+    for length in (0.18, 0.22, 0.24):
+        slope = float(muscle.volume(length + h) - muscle.volume(length - h)) / (2 * h)
+        tension = float(muscle.tension(muscle.stiffness_ratio * 2e5, length))
+        assert -2e5 * slope == pytest.approx(tension, rel=1e-6)
+
+
+def test_both_memories_have_the_same_loops() -> None:
+    slips, relays = (knee_memory(kind).operator for kind in ("maxwell_slip", "preisach"))
+    t = np.arange(900) / 300
+    pressure = 2.25e5 * (1.0 - np.cos(2 * np.pi * t)) * (0.3 + 0.35 * (2 - np.floor(t)))
+    assert pressure.max() == pytest.approx(4.5e5, rel=1e-3)
+    first, second = slips.simulate(pressure)[0], relays.simulate(pressure)[0]  # type: ignore[union-attr]
+    assert np.abs(first - second).max() < 0.01 * FULL_STIFFNESS
+    up, down = first[75], first[225]
+    assert (down - up) / FULL_STIFFNESS == pytest.approx(0.15, abs=0.03)
+
+
+def test_preisach_of_a_bent_spring_is_passive() -> None:
+    model = knee_memory("maxwell_slip").operator
+    assert model is not None
+    bent = dataclasses.replace(model, spring=tuple(p + 0.05 * p * p / 4e5 for p in model.spring))  # type: ignore[union-attr]
+    assert preisach_of(bent, 4.5e5).table[-1][0] > 0.0  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("mounting", ["rig", "no_load", "walk", "stairs_up"])
+def test_files_hold_the_whole_plant(tmp_path: Path, kind, mounting: str) -> None:  # type: ignore[no-untyped-def]
+    if mounting in ("rig", "no_load"):
+        plant = getattr(KneeOrthosis, mounting)(kind, "measured", lever__damping=1.25)
+    else:
+        plant = KneeOrthosis.on_leg(mounting, 1.5, kind, memory__width=0.7)  # type: ignore[arg-type]
+    plant.to_yaml(tmp_path / "plant.yaml")
+    read = KneeOrthosis.from_yaml(tmp_path / "plant.yaml")
+    assert read == plant
+    assert read.digest() == plant.digest()
+
+
+def test_the_digest_tells_plants_apart() -> None:
+    plants = [
+        KneeOrthosis.rig(),
+        KneeOrthosis.no_load(),
+        KneeOrthosis.no_load(dynamics="measured"),
+        KneeOrthosis.no_load("preisach"),
+        KneeOrthosis.no_load("none"),
+        KneeOrthosis.on_leg("walk"),
+        KneeOrthosis.on_leg("walk", 1.224),
+        KneeOrthosis.on_leg("stairs_up"),
+        KneeOrthosis.no_load(lever__stiffness=31.0),
+    ]
+    assert len({plant.digest() for plant in plants}) == len(plants)
+
+
+def test_every_parameter_has_its_row() -> None:
+    plant = KneeOrthosis.on_leg("walk", 1.7)
+    column = plant.parameter_rows()
+    assert column.shape == (K.N_PARAMETERS,)
+    for name in K.NAMES:
+        assert column[K.place(name)] == plant.value(name)
+    assert column[K.STRIDE_TIME] == 1.7
+    assert column[K.LEVER_STIFFNESS] == plant.lever.stiffness
+    assert column[K.ANKLE_BIAS] == plant.ankle.bias
+
+
+def test_members_may_have_memories_of_their_own() -> None:
+    other = knee_memory("maxwell_slip").operator.scaled(0.5)  # type: ignore[union-attr]
+    plant = dataclasses.replace(KneeOrthosis.rig(), ensemble=({"memory.operator": other},))
+    tables = plant.memory_tables()
+    assert tables.shape == (2, 4, plant.elements)
+    assert tables[1, 1, 0] == pytest.approx(0.5 * tables[0, 1, 0])
+
+
+def test_noise_can_be_switched_off() -> None:
+    plant = KneeOrthosis.no_load()
+    assert plant.tension.noise > 0.0
+    quiet = plant.without_noise()
+    assert quiet.tension.noise == quiet.cop.noise == quiet.pressure.resolution == 0.0
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: KneeOrthosis(mounting="shelf"), r"mounting = 'shelf'.*rig, no_load, leg"),  # type: ignore[arg-type]
+        (lambda: KneeOrthosis.rig("bouc"), r"hysteresis = 'bouc'"),  # type: ignore[arg-type]
+        (lambda: KneeOrthosis.on_leg("hop"), r"activity = 'hop'"),  # type: ignore[arg-type]
+        (lambda: KneeOrthosis.rig(lever__stiffness=-1.0), r"lever\.stiffness = -1"),
+        (lambda: KneeOrthosis.rig(lever__colour=1.0), r"no parameter named 'lever\.colour'"),
+        (lambda: dataclasses.replace(KneeOrthosis.rig(), substeps=0), r"substeps = 0"),
+        (
+            lambda: KneeOrthosis.on_leg("stairs_up", lever__mount_angle=1.8),
+            r"past its toggle.*less than 1\.5",
+        ),
+        (
+            lambda: KneeOrthosis.no_load(lever__inertia=1e-3, lever__damping=50.0),
+            r"moves too fast.*more sub-steps",
+        ),
+        (
+            lambda: KneeOrthosis.rig("preisach", regulator__max_pressure=5e5),
+            r"Everett map spans",
+        ),
+    ],
+)
+def test_bad_values_are_refused_with_a_remedy(make, message: str) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_a_file_with_a_wrong_choice_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text("schema: 1\nfamily: knee_orthosis\nmounting: shelf\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"rig\.yaml: mounting = 'shelf'"):
+        KneeOrthosis.from_yaml(path)
