@@ -11,7 +11,7 @@ from __future__ import annotations
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.seeds import grid
 
-_SUPPLIES, _DROOPS = (5.6e5, 6.1e5, 6.4e5, 6.8e5, 7.2e5), (0.05, 0.2, 0.5)
+_SUPPLIES, _DROOPS = (5.6e5, 6.1e5, 6.4e5, 6.8e5, 7.2e5), (0.1, 0.4)
 _TIMES, _RECOVERIES = (0.03, 0.08, 0.2), (2.0, 6.0)
 
 CAUSE = Cause(
