@@ -14,8 +14,8 @@ Signals = Mapping[str, Array]
 STANCE = "#e8edf3"
 WANTED, OURS, PRESSURE, FREE = "0.25", "#0072b2", "#009e73", "#d55e00"
 BAR, DEGREES = 1e-5, 180.0 / np.pi
-LOOK_AFTER = 1.0
-"""Seconds after a switch in which its transient is looked for."""
+LOOK_AFTER = 0.5
+"""Seconds after a switch in which its transient is looked for, as in the metrics."""
 
 
 def spans(flags: Array, time: Array) -> list[tuple[float, float]]:
