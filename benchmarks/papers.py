@@ -177,9 +177,9 @@ GROUPS: tuple[Callable[[], list[Figure]], ...] = (
 
 def groups() -> tuple[Callable[[], list[Figure]], ...]:
     """Return the groups of all papers."""
-    from benchmarks import papers_gait, papers_knee  # they import Figure from here
+    from benchmarks import papers_gait, papers_knee, papers_knee_envs  # they import Figure
 
-    return GROUPS + papers_knee.GROUPS + papers_gait.GROUPS
+    return GROUPS + papers_knee.GROUPS + papers_gait.GROUPS + papers_knee_envs.GROUPS
 
 
 def all_figures() -> list[Figure]:

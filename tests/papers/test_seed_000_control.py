@@ -12,6 +12,7 @@ from baselines.ltr import closed_loop_poles, design_ltr, loop_figures
 from benchmarks import papers
 from benchmarks import papers_gait as gait
 from benchmarks import papers_knee as figures
+from benchmarks import papers_knee_envs as envs
 
 PLANT, CONTROLLER = seed.printed_plant(), seed.printed_controller()
 
@@ -123,7 +124,9 @@ def test_tension_tracking_preset_dynamic():
     assert 1.4 < wide.with_line / wide.with_inverse < 1.7
 
 
-@pytest.mark.parametrize("group", [*figures.GROUPS, *gait.GROUPS], ids=lambda g: g.__name__)
+@pytest.mark.parametrize(
+    "group", [*figures.GROUPS, *gait.GROUPS, *envs.GROUPS], ids=lambda g: g.__name__
+)
 def test_every_figure_is_within_its_tolerance_and_says_how_it_came_about(group):
     if group is figures.bumpless_inequality:
         pytest.importorskip("cvxpy")
@@ -147,7 +150,7 @@ def test_what_is_fitted_is_called_calibrated_and_what_is_not_judged_is_not_fitte
 
 def test_the_table_holds_the_figures_of_both_papers():
     made = papers.groups()
-    assert {*papers.GROUPS, *figures.GROUPS, *gait.GROUPS} == set(made)
+    assert {*papers.GROUPS, *figures.GROUPS, *gait.GROUPS, *envs.GROUPS} == set(made)
     lines = papers.table(gait.switching_transient()).splitlines()
     assert len(lines) == 5
     assert all("pass" in line and "mismatch 10 N" in line for line in lines[1:])
