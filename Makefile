@@ -41,9 +41,9 @@ benchmark: $(READY) ## Score every controller and write the leaderboard
 
 test: $(READY) ## Run the tests: a part without the compiler, then all
 ifneq ($(PLAIN),)
-	PAM_ENVS_COMPILE=0 $(BIN)/python -m pytest --quiet --numprocesses $(JOBS) $(PLAIN)
+	PAM_ENVS_COMPILE=0 $(BIN)/python -m pytest --quiet --numprocesses $(JOBS) --dist loadgroup $(PLAIN)
 endif
-	$(BIN)/python -m pytest --numprocesses $(JOBS)
+	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadgroup
 
 lint: $(READY) ## Check style and format
 	$(BIN)/ruff check --quiet .

@@ -155,7 +155,7 @@ class Bumpless:
         """
         wanted = self._wanted(reference, measured, state)
         if self.compensated:
-            wanted = wanted + state.model @ self.gains.feedback
+            wanted = wanted + np.einsum("...i,i->...", state.model, self.gains.feedback)
         low, high = self.low if low is None else low, self.high if high is None else high
         return np.asarray(np.minimum(np.maximum(wanted, low), high))
 
@@ -176,7 +176,11 @@ class Bumpless:
 
     def _error(self, reference: ArrayLike, measured: ArrayLike, state: BumplessState) -> Array:
         error = np.asarray(reference, float) - np.asarray(measured, float)
-        return error + state.model @ self.model.c if self.compensated else error
+        return (
+            error + np.einsum("...i,i->...", state.model, self.model.c)
+            if self.compensated
+            else error
+        )
 
     def _wanted(self, reference: ArrayLike, measured: ArrayLike, state: BumplessState) -> Array:
         return self.controller.output(self._error(reference, measured, state), state.controller)

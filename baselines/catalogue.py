@@ -9,68 +9,37 @@ controller knows the true model, and a table of results should say so.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, TypeVar
 
 from baselines.contraction_tables import LOADS
 from baselines.controller import Controller, reader
+from baselines.entry import POSITIONING, Entry
 from baselines.inverse import make_inverse
 from baselines.inverse_pid import make_inverse_pid
+from baselines.knee_catalogue import KNEE, KNEE_CONTROLLERS, KNEE_MAKERS, SIMC
 from baselines.pid import make_pid
 from baselines.plc_polynomial import make_one_cubic, make_plc_as_printed, make_plc_refitted
 from baselines.table_inverse import make_table_inverse
 from baselines.trivial import Constant, Line, Random
 from pam_envs.data.tables import load_contraction_table
 from pam_envs.parameters import Signals
+from pam_envs.plants.knee_orthosis import KneeOrthosis
 from pam_envs.plants.single_muscle import SingleMuscle
 
-Knowledge = Literal["nothing", "tables", "nominal model", "true model"]
-POSITIONING = ("PAM/MusclePositioning-v0",)
 SEED_003 = "Seed 003: Studies regarding the Use of Pneumatic Muscles in Precise Positioning Systems"
+P = TypeVar("P")
 KREJCI = (
     "P. Krejci, K. Kuhnen, Inverse control of systems with hysteresis and creep, IEE Proc. Control "
     "Theory Appl. 148 (2001); I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer 1991"
 )
-SIMC = (
-    "S. Skogestad, Simple analytic rules for model reduction and PID controller tuning, J. Process "
-    "Control 13 (2003) 291-309"
-)
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A controller of the catalogue.
-
-    Attributes
-    ----------
-    summary : str
-        One line on what it does.
-    knowledge : {"nothing", "tables", "nominal model", "true model"}
-        What it is told of the muscle; see this module's page on the last two.
-    preview : bool
-        Whether it reads the previewed reference samples (all that the observation has).
-    feedback : bool
-        Whether it uses measurements beyond the first of an episode.
-    citation : str
-        Where the method is from; empty for what needs no source.
-    envs : tuple of str
-        Environment ids that it is for.
-    kind : str
-        "classical": a row of results is verified by running it again.
-    """
-
-    summary: str
-    knowledge: Knowledge
-    preview: bool = False
-    feedback: bool = False
-    citation: str = ""
-    envs: tuple[str, ...] = POSITIONING
-    kind: str = "classical"
-
 
 CONTROLLERS: dict[str, Entry] = {
-    "zero": Entry("no pressure, ever", "nothing"),
-    "random": Entry("set-points drawn evenly from the whole range, seeded", "nothing"),
+    "zero": Entry("no pressure, ever", "nothing", envs=(*POSITIONING, *KNEE)),
+    "random": Entry(
+        "set-points drawn evenly from the whole range, seeded",
+        "nothing",
+        envs=(*POSITIONING, *KNEE),
+    ),
     "linear": Entry(
         "straight line through the end points of the table at the nearest load", "tables"
     ),
@@ -119,6 +88,7 @@ CONTROLLERS: dict[str, Entry] = {
         feedback=True,
         citation=f"{KREJCI}; {SIMC}",
     ),
+    **KNEE_CONTROLLERS,
 }
 
 
@@ -136,7 +106,7 @@ def make_linear(signals: Signals, action_signals: Signals) -> Line:
 
 def make_controller(
     name: str,
-    plant: SingleMuscle,
+    plant: SingleMuscle | KneeOrthosis,
     signals: Signals,
     action_signals: Signals,
     seed: int = 0,
@@ -147,7 +117,7 @@ def make_controller(
     ----------
     name : str
         One of ``CONTROLLERS``.
-    plant : SingleMuscle
+    plant : SingleMuscle or KneeOrthosis
         Nominal plant: what the controller is told of the muscle. Controllers that know nothing or
         tables do not look at it.
     signals, action_signals : Signals
@@ -161,6 +131,13 @@ def make_controller(
         If there is no controller of that name.
     """
     told = (signals, action_signals)
+    if name in KNEE_MAKERS:
+        made: Controller = KNEE_MAKERS[name](_as(KneeOrthosis, plant, name), *told)
+        return made
+
+    def muscle() -> SingleMuscle:
+        return _as(SingleMuscle, plant, name)
+
     makers: dict[str, Callable[[], Any]] = {
         "zero": lambda: Constant(action_signals["pressure_set_point"]),
         "random": lambda: Random(action_signals["pressure_set_point"], seed),
@@ -169,13 +146,23 @@ def make_controller(
         "plc_as_printed": lambda: make_plc_as_printed(*told),
         "plc_refitted": lambda: make_plc_refitted(*told),
         "table": lambda: make_table_inverse(*told),
-        "pid": lambda: make_pid(plant, *told),
-        "inverse_no_preview": lambda: make_inverse(plant, *told, preview=False),
-        "inverse": lambda: make_inverse(plant, *told),
-        "inverse_pid_no_preview": lambda: make_inverse_pid(plant, *told, preview=False),
-        "inverse_pid": lambda: make_inverse_pid(plant, *told),
+        "pid": lambda: make_pid(muscle(), *told),
+        "inverse_no_preview": lambda: make_inverse(muscle(), *told, preview=False),
+        "inverse": lambda: make_inverse(muscle(), *told),
+        "inverse_pid_no_preview": lambda: make_inverse_pid(muscle(), *told, preview=False),
+        "inverse_pid": lambda: make_inverse_pid(muscle(), *told),
     }
     if name not in makers:
         raise ValueError(f"no controller named {name!r}; there are: {', '.join(CONTROLLERS)}")
-    made: Controller = makers[name]()
-    return made
+    built: Controller = makers[name]()
+    return built
+
+
+def _as(family: type[P], plant: Any, name: str) -> P:
+    """Return a plant of a family, or say which one a controller needs."""
+    if not isinstance(plant, family):
+        raise ValueError(
+            f"{name} is for a {family.__name__}, and the plant is a {type(plant).__name__}; "
+            "choose a controller whose envs name the environment"
+        )
+    return plant

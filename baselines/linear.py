@@ -178,11 +178,12 @@ class DiscreteSystem:
 
     def output(self, u: ArrayLike, state: Array) -> Array:
         """Return the output, shape (...), without moving on."""
-        return np.asarray(state @ self.c + self.d * np.asarray(u, float))
+        return np.einsum("...i,i->...", state, self.c) + self.d * np.asarray(u, float)
 
     def advance(self, u: ArrayLike, state: Array) -> Array:
         """Return the next state, shape (..., n)."""
-        return np.asarray(state @ self.a.T + np.multiply.outer(np.asarray(u, float), self.b))
+        moved = np.einsum("...j,ij->...i", state, self.a)
+        return np.asarray(moved + np.multiply.outer(np.asarray(u, float), self.b))
 
     def response(self, frequency: ArrayLike) -> Complex:
         """Return the response of the sampled system at angular frequencies [rad/s]."""

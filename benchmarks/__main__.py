@@ -109,9 +109,10 @@ def _tell(report: Any) -> int:
     for path in report.rows:
         row = rows.load(path)
         head, failures = row["aggregate"]["rms_error"], row["failures"]
+        unit, factor = rows.shown(row["scenarios"]["content"])
+        mean, low, high = (factor * head[name] for name in ("mean", "low", "high"))
         print(
-            f"{path.stem}: RMS {1e3 * head['mean']:.3f} mm "
-            f"[{1e3 * head['low']:.3f}, {1e3 * head['high']:.3f}]"
+            f"{path.stem}: RMS {mean:.3f} {unit} [{low:.3f}, {high:.3f}]"
             + (f", {failures} of {len(row['episodes'])} episodes failed" if failures else "")
         )
     for line in report.missing:

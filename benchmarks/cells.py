@@ -6,6 +6,7 @@ import base64
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -19,6 +20,8 @@ from benchmarks.scenarios import Scenario, ScenarioSet
 
 PROBED_STEPS = 250
 """Steps of the episode on which the use of the preview is measured."""
+PLANTS = Path(__file__).parent / "scenarios" / "plants"
+"""Plants that scenario files name."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +67,13 @@ def cells_of(entrant: Entrant, track: ScenarioSet) -> list[Cell]:
 
 
 def make_env(env: str, kwargs: Mapping[str, Any]) -> Any:
-    """Return the single environment of a scenario."""
+    """Return the single environment of a scenario; a plant is the name of a file in ``PLANTS``."""
     import pam_envs  # noqa: F401  registers the ids
 
-    return gym.make(env, disable_env_checker=True, **kwargs)
+    given = dict(kwargs)
+    if isinstance(given.get("plant"), str):
+        given["plant"] = PLANTS / given["plant"]
+    return gym.make(env, disable_env_checker=True, **given)
 
 
 def model_for(cell: Cell, env: Any) -> Any:
@@ -144,6 +150,9 @@ def episode_record(cell: Cell, seed: int, episode: rollout.Episode) -> dict[str,
             float(content["settle_seconds"]),
             float(content["hold_seconds"]),
             content["cost_scales"],
+            content.get("gate", ""),
+            content.get("metrics") or (),
+            content.get("activity", ""),
         )
     except (ValueError, IndexError, KeyError):
         if not episode.failed:

@@ -6,10 +6,13 @@ with the external reference; what a sensor saw is scored beside it and never ins
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from benchmarks import metrics_knee
 
 Array = NDArray[np.float64]
 
@@ -26,6 +29,17 @@ METRICS: dict[str, str] = {
 """The scored quantities and their units, the headline first. Less is better for all of them."""
 
 HEADLINE = "rms_error"
+GROUPS: dict[str, dict[str, str]] = {"range": metrics_knee.RANGE, "gait": metrics_knee.GAIT}
+"""What a track may be scored by beside ``METRICS``, by the names that its file gives."""
+
+
+def of_track(content: Mapping[str, Any]) -> dict[str, str]:
+    """Return the metrics and units of a track from the content of its scenario file."""
+    unit = content.get("unit", "m")
+    units = METRICS | {name: unit for name, own in METRICS.items() if own == "m"}
+    for group in content.get("metrics") or ():
+        units = units | GROUPS[group]
+    return units
 
 
 def rms(error: Array) -> float:
@@ -89,6 +103,9 @@ def score(
     settle_seconds: float,
     hold_seconds: float,
     cost_scales: Mapping[str, float],
+    gate: str = "",
+    groups: Sequence[str] = (),
+    activity: str = "",
 ) -> dict[str, float]:
     """Return every metric of one finished episode.
 
@@ -104,11 +121,17 @@ def score(
         How long the reference must have rested for a steady-state error.
     cost_scales : mapping of float
         Scale of each soft-limit cost.
+    gate : str
+        Signal that is 1 where the output is tracked; everywhere if not given.
+    groups : sequence of str
+        Of ``GROUPS``.
+    activity : str
+        Of a gait.
 
     Raises
     ------
     ValueError
-        If nothing is left after the settling window.
+        If nothing is left after the settling window, or of what is tracked.
     """
     time = np.asarray(signals["time"])
     window = time > settle_seconds + 0.5 * period
@@ -117,11 +140,14 @@ def score(
             f"the episode ends at {time[-1]:g} s, inside the settling window of "
             f"{settle_seconds:g} s; lengthen the episode or shorten the window"
         )
-    reference = np.asarray(signals["reference"])[window]
-    error = np.asarray(signals["output"])[window] - reference
-    sensed = np.asarray(signals["sensed"])[window] - reference
+    tracked = window & (signals[gate] > 0.5) if gate else window
+    reference = np.asarray(signals["reference"])[tracked]
+    error = np.asarray(signals["output"])[tracked] - reference
+    sensed = np.asarray(signals["sensed"])[tracked] - reference
+    if not len(error):
+        raise ValueError(f"{gate} is 0 all the time: lengthen the episode or choose another gate")
     seconds = float(window.sum()) * period
-    return {
+    scores = {
         "rms_error": rms(error),
         "p95_error": percentile_95(error),
         "max_error": float(np.abs(error).max()),
@@ -131,6 +157,11 @@ def score(
         "air_use": float(np.sum(signals["effort/air"][window])) / seconds,
         "constraint_cost": constraint_cost(signals, cost_scales),
     }
+    if "range" in groups:
+        scores |= metrics_knee.of_range(signals, window, tracked)
+    if "gait" in groups:
+        scores |= metrics_knee.of_gait(signals, window, tracked, period, activity)
+    return scores
 
 
 def worst_of(scores: Mapping[str, float], worst: Mapping[str, float]) -> dict[str, float]:

@@ -128,6 +128,12 @@ def _tracked(friction: float, feed_forward: str) -> float:
 
 NORM = "RMS over half-range, first 2 s dropped"
 STATIC, DYNAMIC = "preset static", "preset dynamic"
+BEFORE = "not in the paper: computed beforehand by another program"
+
+
+def note(kind: str, preset: str, norm: str, *more: str) -> str:
+    """Return what stands behind a figure: calibrated or predicted, with what, measured how."""
+    return "; ".join((kind, preset, norm, *more))
 
 
 def loop_shape() -> list[Figure]:
@@ -148,19 +154,26 @@ def loop_shape() -> list[Figure]:
         f" printed controller has {abs(has[0]):.2f}"
     )
     slowest = float(closed_loop_poles(plant, controller)[0].real)
+    ours = design_ltr(plant, 26.2, 1e-10).figures.bandwidth
+    as_printed = ("predicted", "preset as printed", "continuous loop")
+    behind = ("calibrated", "preset plant behind (11)", "continuous loop")
     lines = [
-        ("static gain of (10); 158 N / 200 kPa", "N/kPa", 0.79, plant.static_gain, 0.06, ""),
-        ("static gain of the inferred plant", "N/kPa", 0.79, inferred.static_gain, 0.005, ""),
-        ("crossover of (11) on (10)", "rad/s", 9.02, printed.crossover, 0.005, "computed before"),
-        ("-3 dB of (11) on (10)", "rad/s", 20.4, printed.bandwidth, 0.05, "computed before"),
-        ("-3 dB of (11) on the inferred plant", "rad/s", 26.2, wide.bandwidth, 0.3, hertz),
-        ("-3 dB of our design for 26.2 rad/s", "rad/s", 26.2,
-         design_ltr(plant, 26.2, 1e-10).figures.bandwidth, 0.02, "predicted"),
-        ("slowest closed-loop pole", "rad/s", -2.84, slowest, 0.005, "computed before"),
+        ("static gain of (10); 158 N / 200 kPa", "N/kPa", 0.79, plant.static_gain, 0.06,
+         note(*as_printed)),
+        ("static gain of the inferred plant", "N/kPa", 0.79, inferred.static_gain, 0.005,
+         note(*behind)),
+        ("crossover of (11) on (10)", "rad/s", 9.02, printed.crossover, 0.005,
+         note(*as_printed, BEFORE)),
+        ("-3 dB of (11) on (10)", "rad/s", 20.4, printed.bandwidth, 0.05,
+         note(*as_printed, BEFORE)),
+        ("-3 dB of (11) on the inferred plant", "rad/s", 26.2, wide.bandwidth, 0.3,
+         note(*behind, hertz)),
+        ("-3 dB of our design for 26.2 rad/s", "rad/s", 26.2, ours, 0.02, note(*as_printed)),
+        ("slowest closed-loop pole", "rad/s", -2.84, slowest, 0.005, note(*as_printed, BEFORE)),
         ("largest error of the nine coefficients of (11), refitted", "%", 0.0,
-         100.0 * refit.largest_error, 0.1, "calibrated: 4 unknowns for 9 coefficients"),
+         100.0 * refit.largest_error, 0.1, note(*behind, "4 unknowns for 9 coefficients")),
     ]  # fmt: skip
-    return [Figure(n, f"{SOURCE}, section 4.1", u, p, o, t, note) for n, u, p, o, t, note in lines]
+    return [Figure(n, f"{SOURCE}, section 4.1", u, p, o, t, text) for n, u, p, o, t, text in lines]
 
 
 def hysteresis_inverse() -> list[Figure]:
@@ -169,9 +182,9 @@ def hysteresis_inverse() -> list[Figure]:
     where = f"{SOURCE}, section 3.2"
     return [
         Figure("stiffness, inverse of the hysteresis", where, "%", 2.07, inverse, 0.4,
-               f"calibrated (lag); {STATIC}; {NORM}"),
+               note("calibrated (lag)", STATIC, NORM)),
         Figure("stiffness, straight line", where, "%", 11.11, line, 0.6,
-               f"calibrated (loop width); {STATIC}; {NORM}"),
+               note("calibrated (loop width)", STATIC, NORM)),
     ]  # fmt: skip
 
 
@@ -180,22 +193,36 @@ def tension_feedback() -> list[Figure]:
     found = {width: tension_tracking(width) for width in LOOP_WIDTHS}
     where, lines = f"{SOURCE}, section 5.1", list[Figure]()
     for width, errors in found.items():
-        tag = f"predicted; {DYNAMIC}, {1e-5 * width:g} bar; {NORM}"
+        tag = note("predicted", f"{DYNAMIC}, loop width {1e-5 * width:g} bar", NORM)
         names = ("LTR", "LTR + inverse", "LTR + straight line")
         values = (errors.feedback, errors.with_inverse, errors.with_line)
         published = ((4.66, 0.9), (1.33, 0.4), (LINE[width], 0.1))
         for name, (value, band), ours in zip(names, published, values, strict=True):
             full_name = f"tension, {name}, {1e-5 * width:g} bar"
-            lines.append(Figure(full_name, where, "%", value, ours, band, tag))
-    best = found[FRICTION]
-    note = f"predicted; {DYNAMIC}; published is a lower bound here: more is better"
-    gain = best.feedback / best.with_inverse
-    lines.append(Figure("LTR alone over LTR + inverse, 0.5 bar", where, "", 3.5, gain, 2.0, note))
-    return lines
+            text = f"{tag}; {BEFORE}" if name.endswith("line") else tag
+            lines.append(Figure(full_name, where, "%", value, ours, band, text))
+    return [*lines, *_gains(found[FRICTION], where)]
+
+
+def _gains(best: Tracking, where: str) -> list[Figure]:
+    """Return what the inverse gains over no feed-forward, and over a straight line."""
+    tag = ("predicted", f"{DYNAMIC}, loop width {1e-5 * FRICTION:g} bar", f"ratio of two {NORM}")
+    over_none, over_line = (e / best.with_inverse for e in (best.feedback, best.with_line))
+    return [
+        Figure("LTR alone over LTR + inverse", where, "", 3.5, over_none, 2.0,
+               note(*tag, "published is a lower bound: more is better")),
+        Figure("LTR + straight line over LTR + inverse", where, "", 1.5, over_line, 0.2,
+               note(*tag, BEFORE, "1 without hysteresis: the rest is feed-forward as such")),
+    ]  # fmt: skip
+
+
+LOOP_SETS = {(): 16, (5,): 18, (9,): 20, (5, 3): 19, (7, 5): 20}
+"""Minor loops beside the major one, by how many of its ten segments they climb: rank of 21. One of
+``n`` segments adds the whole part of ``n / 2``, up to 20."""
 
 
 def slip_programme() -> list[Figure]:
-    """Fit a known model by the linear programme: objective, and rank for three sets of loops."""
+    """Fit a known model by the linear programme: objective, and rank for sets of loops."""
     from pam_envs.hysteresis.modified_maxwell_slip import even_model
     from pam_envs.identification.maxwell_slip_lp import (
         OpenParameters,
@@ -211,19 +238,21 @@ def slip_programme() -> list[Figure]:
         return memory.inverse_simulate(path)[0], path
 
     where, lines = f"{SOURCE}, section 3.1", list[Figure]()
-    for minor, rank in ((0, 16), (5, 18), (9, 20)):
-        loops = [loop(10), *([loop(minor)] if minor else [])]
+    tag = ("predicted", "preset a known model, N = 10, equal break pressures")
+    for minor, rank in LOOP_SETS.items():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", OpenParameters)
-            fit = fit_slip_programme(loops)
-        name = f"rank of 21, major loop{f' and one of {minor} segments' if minor else ''}"
-        lines.append(Figure(name, where, "", rank, fit.rank, 0.0, "computed before"))
+            fit = fit_slip_programme([loop(10), *(loop(n) for n in minor)])
+        name = "rank of 21: major loop" + "".join(f" + minor of {n} segments" for n in minor)
+        text = note(*tag, "rank of the equations", BEFORE)
+        lines.append(Figure(name, where, "", rank, fit.rank, 0.0, text))
     bar = 1e-5 * FULL_PRESSURE
-    note = "predicted; a known model, equal break pressures"
+    text = note(*tag, "sum of absolute errors", BEFORE)
     right, wrong = bar * fit.relative_objective, bar * printed_programme([loop(10)])[0]
-    lines.append(Figure("objective, corrected", where, "bar", 0.0, right, 1e-4, note))
-    lines.append(Figure("objective, right-hand sides as printed", where, "bar", 0.99, wrong, 0.01,
-                        f"{note}; computed before"))  # fmt: skip
+    lines.append(Figure("objective, corrected", where, "bar", 0.0, right, 1e-4, text))
+    lines.append(
+        Figure("objective, right-hand sides as printed", where, "bar", 0.99, wrong, 0.01, text)
+    )
     return lines
 
 
@@ -236,9 +265,15 @@ def bumpless_inequality() -> list[Figure]:
     rates = (0.0, 1.0, 3.0, 4.05, 4.06)
     inside = [certificate(plant, gains, rate) > SMALLEST for rate in rates]
     fastest = max(rate for rate, ok in zip(rates, inside, strict=True) if ok)
-    note = "at 0, 1, 3, 4.05 and not at 4.06 1/s; the slowest pole decays at 4.055 1/s"
+    text = note(
+        "predicted",
+        "preset as printed",
+        "inequality holds at 0, 1, 3, 4.05 and not at 4.06 1/s",
+        "the slowest pole decays at 4.055 1/s",
+        BEFORE,
+    )
     where = f"{SOURCE}, section 4.2"
-    return [Figure("largest decay of the printed K, L", where, "1/s", 4.05, fastest, 0.0, note)]
+    return [Figure("largest decay of the printed K, L", where, "1/s", 4.05, fastest, 0.0, text)]
 
 
 GROUPS: tuple[Callable[[], list[Figure]], ...] = (

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.metrics import HEADLINE
+from benchmarks.rows import shown
 
 COLOURS = {
     "nothing": "#7f7f7f",
@@ -37,6 +38,7 @@ def error_against_effort(ordered: Sequence[Mapping[str, Any]]) -> str:
     import matplotlib
     from matplotlib.figure import Figure
 
+    unit, _ = shown(ordered[0]["scenarios"]["content"])
     with matplotlib.rc_context(_FIXED):
         figure = Figure(figsize=(6.4, 4.0), layout="constrained")
         axes = figure.add_subplot()
@@ -45,7 +47,7 @@ def error_against_effort(ordered: Sequence[Mapping[str, Any]]) -> str:
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_xlabel("pressure travel [bar/s]")
-        axes.set_ylabel("RMS error [mm], mean and 95 % interval")
+        axes.set_ylabel(f"RMS error [{unit}], mean and 95 % interval")
         axes.grid(True, which="both", linewidth=0.3)
         known = {row["controller"]["knowledge"] for row in ordered}
         for knowledge in (k for k in COLOURS if k in known):
@@ -58,8 +60,9 @@ def error_against_effort(ordered: Sequence[Mapping[str, Any]]) -> str:
 
 def _point(axes: Any, row: Mapping[str, Any]) -> None:
     head, effort = row["aggregate"][HEADLINE], row["aggregate"]["pressure_travel"]
-    x, y = max(1e-5 * effort["mean"], 1e-3), max(1e3 * head["mean"], 1e-4)
-    bounds = 1e3 * np.array([[head["mean"] - head["low"]], [head["high"] - head["mean"]]])
+    _, factor = shown(row["scenarios"]["content"])
+    x, y = max(1e-5 * effort["mean"], 1e-3), max(factor * head["mean"], 1e-4)
+    bounds = factor * np.array([[head["mean"] - head["low"]], [head["high"] - head["mean"]]])
     colour = COLOURS.get(row["controller"]["knowledge"], "#000000")
     axes.errorbar(x, y, np.maximum(bounds, 0.0), fmt="o", markersize=4, color=colour, linewidth=1)
     axes.annotate(

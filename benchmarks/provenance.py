@@ -14,7 +14,14 @@ from benchmarks.canonical import sources_digest
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("numpy", "scipy", "numba", "gymnasium", "onnxruntime")
-SCORING = ("canonical.py", "cells.py", "controllers.py", "metrics.py", "rollout.py")
+SCORING = (
+    "canonical.py",
+    "cells.py",
+    "controllers.py",
+    "metrics.py",
+    "metrics_knee.py",
+    "rollout.py",
+)
 """Pages of this package that a score depends on."""
 
 

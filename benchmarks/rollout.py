@@ -130,22 +130,30 @@ def preview_used(episode: Episode, controller: Controller, signals: Any) -> int:
         An episode of this controller.
     controller : Controller
     signals : Signals
-        Of the observation; the preview is ``reference_1``, ``reference_2``, ...
+        Of the observation; the preview of a signal ``reference`` is ``reference_1``, ...
     """
-    index = {signal.name: signal.index for signal in signals}
-    ahead = sorted(
-        (int(name.split("_")[1]), i) for name, i in index.items() if name.startswith("reference_")
-    )
+    ahead = _previewed({signal.name: signal.index for signal in signals})
     if not ahead or not len(episode.observations):
         return 0
     plain = _answers(controller, episode.observations)
-    for number, first in reversed(list(enumerate(ahead, start=1))):
+    for first in range(len(ahead), 0, -1):
         masked = episode.observations.copy()
-        for _, column in ahead[number - 1 :]:
-            masked[:, column] = masked[:, index["reference"]]
+        for number in range(first, len(ahead) + 1):
+            for column, present in ahead[number]:
+                masked[:, column] = masked[:, present]
         if not np.array_equal(_answers(controller, masked), plain, equal_nan=True):
-            return first[0]
+            return first
     return 0
+
+
+def _previewed(index: Mapping[str, int]) -> dict[int, list[tuple[int, int]]]:
+    """Return the columns of each preview sample, 1, 2, ..., with those of the present value."""
+    found: dict[int, list[tuple[int, int]]] = {}
+    for name, column in index.items():
+        base, _, number = name.rpartition("_")
+        if number.isdigit() and base in index:
+            found.setdefault(int(number), []).append((column, index[base]))
+    return found
 
 
 def _answers(controller: Controller, observations: NDArray[Any]) -> NDArray[Any]:

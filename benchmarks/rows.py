@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks import provenance, statistics
 from benchmarks.canonical import digest
 from benchmarks.controllers import Entrant
-from benchmarks.metrics import HEADLINE, METRICS
+from benchmarks.metrics import HEADLINE, METRICS, of_track
 from benchmarks.scenarios import ScenarioSet
 from benchmarks.store import read_record, write_record
 
@@ -20,6 +20,14 @@ SCHEMA = 1
 RESULTS = Path(__file__).parent / "results"
 
 Row = dict[str, Any]
+SHOWN: dict[str, Any] = {"unit": "mm", "factor": 1e3}
+"""How errors are shown where the scenario file does not say."""
+
+
+def shown(content: Mapping[str, Any]) -> tuple[str, float]:
+    """Return the unit in which errors are shown, and its factor from SI."""
+    how = content.get("shown") or SHOWN
+    return str(how["unit"]), float(how["factor"])
 
 
 def row_name(track: str, controller: str) -> str:
@@ -62,7 +70,7 @@ def assemble(entrant: Entrant, track: ScenarioSet, cells: Sequence[Mapping[str, 
         },
         "episodes": episodes,
         "failures": sum(bool(episode["failed"]) for episode in episodes),
-        "aggregate": aggregate(episodes),
+        "aggregate": aggregate(episodes, of_track(track.content)),
         "by": breakdown(track, episodes),
         "volatile": {
             **provenance.occasion(),
@@ -109,14 +117,16 @@ def scores_of(episodes: Sequence[Mapping[str, Any]], metric: str) -> np.ndarray[
     return np.array([np.nan if value is None else value for value in values], float)
 
 
-def aggregate(episodes: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def aggregate(
+    episodes: Sequence[Mapping[str, Any]], metrics: Iterable[str] = METRICS
+) -> dict[str, Any]:
     """Return mean and interquartile mean of every metric with their intervals.
 
     The mean leads: an interquartile mean would drop failures.
     """
     strata = [episode["scenario"] for episode in episodes]
     table: dict[str, Any] = {}
-    for metric in METRICS:
+    for metric in metrics:
         values = scores_of(episodes, metric)
         middle = statistics.bootstrap(values, strata)
         inner = statistics.bootstrap(values, strata, statistics.interquartile_mean)

@@ -16,7 +16,7 @@ from typing import Any
 import yaml
 
 from benchmarks.canonical import digest, plain
-from benchmarks.metrics import METRICS
+from benchmarks.metrics import GROUPS, of_track
 
 FOLDER = Path(__file__).parent / "scenarios"
 _KEYS = {
@@ -36,8 +36,25 @@ _KEYS = {
     "grid",
     "per_reference",
     "model",
+    "metrics",
+    "gate",
+    "activity",
+    "unit",
+    "shown",
 }
-_OPTIONAL: dict[str, Any] = {"kwargs": {}, "grid": {}, "per_reference": {}, "model": {}}
+_OPTIONAL = {
+    "kwargs",
+    "grid",
+    "per_reference",
+    "model",
+    "metrics",
+    "gate",
+    "activity",
+    "unit",
+    "shown",
+}
+_UNITS = {"load": "kg", "mismatch": "N", "pace": "s"}
+"""Of the axes of a grid, for the scenarios' names."""
 
 
 @dataclass(frozen=True)
@@ -78,13 +95,19 @@ class ScenarioSet:
     def __post_init__(self) -> None:
         """Check the keys and the values that the scores rest on."""
         given, name = set(self.content), self.content.get("name", "the scenario file")
-        if given - _KEYS or _KEYS - given - set(_OPTIONAL):
+        if given - _KEYS or _KEYS - given - _OPTIONAL:
             raise ValueError(
                 f"{name}: unknown keys {sorted(given - _KEYS)}, "
-                f"missing keys {sorted(_KEYS - given - set(_OPTIONAL))}"
+                f"missing keys {sorted(_KEYS - given - _OPTIONAL)}"
             )
-        if set(self.content["worst_case"]) != set(METRICS):
-            raise ValueError(f"{name}: worst_case needs a value for each of {', '.join(METRICS)}")
+        unknown = set(self.content.get("metrics") or ()) - set(GROUPS)
+        if unknown:
+            raise ValueError(
+                f"{name}: no metrics {sorted(unknown)}; choose from {', '.join(GROUPS)}"
+            )
+        wanted = of_track(self.content)
+        if set(self.content["worst_case"]) != set(wanted):
+            raise ValueError(f"{name}: worst_case needs a value for each of {', '.join(wanted)}")
         seeds = self.content["seeds"]
         if not seeds or len(set(seeds)) != len(seeds):
             raise ValueError(f"{name}: seeds must be different whole numbers, got {seeds}")
@@ -126,15 +149,17 @@ class ScenarioSet:
         reference = kwargs.get("reference")
         kwargs |= (self.content.get("per_reference") or {}).get(reference, {})
         return Scenario(
-            name="_".join(_word(value) for value in point.values()) or "only",
+            name="_".join(_word(axis, value) for axis, value in point.items()) or "only",
             kwargs=kwargs,
             model=dict(self.content.get("model") or {}),
             rests=reference in self.content["rests"],
         )
 
 
-def _word(value: Any) -> str:
-    return f"{value:g}kg" if isinstance(value, (int, float)) else str(value)
+def _word(axis: str, value: Any) -> str:
+    if isinstance(value, (int, float)):
+        return f"{value:g}{_UNITS.get(axis, '')}"
+    return Path(value).stem if axis == "plant" else str(value)
 
 
 def load(path: Path) -> ScenarioSet:

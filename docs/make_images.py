@@ -1,4 +1,4 @@
-"""Draw the rendered frames of the documentation (``make images``)."""
+"""Draw the pictures of the documentation (``make images``)."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from baselines.catalogue import make_controller  # noqa: E402
+from benchmarks import knee_studies, plots_knee  # noqa: E402
 
 
 def save(env: gym.Env, path: Path) -> None:
@@ -56,8 +57,21 @@ def knee_frame(name: str, path: Path, seconds: float, **arguments: object) -> No
     save(env, path)
 
 
+def stride(path: Path, mismatch: float = 10.0) -> None:
+    """Draw the third stride of a walk, with and without bumpless transfer."""
+    walks = [knee_studies.stride("walk", mismatch, bumpless) for bumpless in (True, False)]
+    records = [plots_knee.cut(walk, 9.2, 15.4) for walk in walks]
+    title = (
+        "Walking at 5 s a stride with 20 % assistance, inverse + LTR; out of charge (in swing) the"
+        f" tension's controller sees a reference that is off by {mismatch:g} N"
+    )
+    titles = ("I   with bumpless transfer", "II   without")
+    plots_knee.stride_figure(records, titles, title).savefig(path, dpi=100)
+
+
 if __name__ == "__main__":
     images = ROOT / "docs" / "images"
     muscle_frame(images / "muscle_positioning_frame.png")
     knee_frame("PAM/KneeTension-v0", images / "knee_tension_frame.png", 14.0, start="paper")
     knee_frame("PAM/KneeWalk-v0", images / "knee_walk_frame.png", 10.6, start="heel_contact")
+    stride(images / "knee_stride.png")

@@ -163,8 +163,13 @@ __all__ = ["compiled", "get_num_threads"]
 _BUILT: dict[Any, dict[Any, Any]] = {}
 
 
-def _finish(made: Callable[..., Any], original: Any) -> Callable[..., Any]:
-    """Compile a callee."""
+def _finish(made: Callable[..., Any], original: Any, name: str) -> Callable[..., Any]:
+    """Compile a callee, under a name that says what it was built for.
+
+    Code from the disk links by name. Callees with other placeholders in them would otherwise pass
+    for one another where they were compiled in different processes.
+    """
+    made.__qualname__ = made.__name__ = f"{original.__name__}_for_{name}"
     return njit(forceinline=original.__pam_kernel__, **_OPTIONS)(made)  # type: ignore[no-any-return]
 
 
@@ -179,7 +184,7 @@ def compiled(
 
     def finish(made: Callable[..., Any], original: Any) -> Callable[..., Any]:
         if original is not function:
-            return _finish(made, original)
+            return _finish(made, original, name)
         made.__qualname__ = made.__name__ = name
         dispatcher = njit(parallel=parallel, **_OPTIONS)(made)
         with contextlib.suppress(RuntimeError):  # without a place to write: compile in memory

@@ -174,3 +174,52 @@ def test_what_the_cache_leaves_out_holds_no_kernels() -> None:
     assert len(files) > 40
     marked = re.compile(r"^\s*@(kernel|routine)\b|\bbuild\(|\bentry\(", re.MULTILINE)
     assert [path for path in files if marked.search(path.read_text())] == []
+
+
+_BUILT_APART = """
+import sys
+import numpy as np
+from pam_envs.kernels import build, kernel, routine
+last = None
+@kernel
+def one(x): return x + 1.0
+@kernel
+def two(x): return x + 2.0
+@routine
+def between(rows, n, x):
+    total = 0.0
+    for k in range(n):
+        for m in range(n):
+            if rows[k][m] > 0.5:
+                total = total + last(x) * k
+            else:
+                rows[k][m] = total
+                total = total - last(rows[m][k]) / (1.0 + k * m)
+        if total > 100.0 * n:
+            total = total * 0.5
+    return total
+@kernel
+def top(rows, n):
+    s = 0.0
+    for i in range(n):
+        s = s + between(rows, n, 1.0 * i) + between(rows, n - 1, s) * between(rows, n - 2, 2.0)
+    return s + between(rows, n, 1.0)
+for name in sys.argv[1:]:
+    made = build(top, f"top_{name}", last=globals()[name])
+    print(made(np.zeros((4, 4)), 4))
+"""
+
+
+@pytest.mark.skipif(not kernels.COMPILED, reason="nothing is kept on disk")
+def test_kernels_that_were_compiled_apart_run_side_by_side(tmp_path: Path) -> None:
+    (tmp_path / "apart.py").write_text(_BUILT_APART)
+    environment = {**os.environ, "PAM_ENVS_CACHE": str(tmp_path / "cache")}
+
+    def run(*names: str) -> list[str]:
+        command = [sys.executable, str(tmp_path / "apart.py"), *names]
+        done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
+        return done.stdout.split()
+
+    one, two = run("one"), run("two")
+    assert one != two
+    assert run("one", "two") == [*one, *two]

@@ -11,15 +11,33 @@ LINK = re.compile(r"\]\(([^)#\s]+)")
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
-def test_the_snippets_of_the_readme_run(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    text = (ROOT / "README.md").read_text()
-    names: dict[str, object] = {"__name__": "readme"}
+def run_snippets(page: Path) -> dict[str, object]:
+    """Run the snippets of a page one after the other; return the names that they made."""
+    text = page.read_text()
+    names: dict[str, object] = {"__name__": page.stem}
     for found in SNIPPET.finditer(text):
         line = text.count("\n", 0, found.start(1))
-        exec(compile("\n" * line + found[1], "README.md", "exec"), names)
+        exec(compile("\n" * line + found[1], page.name, "exec"), names)
+    return names
+
+
+def test_the_snippets_of_the_readme_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = run_snippets(ROOT / "README.md")
     assert names["rms"] < 0.5e-3  # m; what the page says of its controller
     assert (tmp_path / "rig.yaml").exists()
+
+
+def test_the_snippets_of_the_orthosis_run_and_give_what_the_page_says(capsys):
+    pytest.importorskip("cvxpy")
+    names = run_snippets(ROOT / "docs/knee_orthosis.md")
+    said = capsys.readouterr().out
+    assert "16 of 21 unknowns; k_1, k_2, k_3, k_4, k_6, k_7, k_8, k_9, k_10 stay open" in said
+    assert any("stay open" in str(one.message) for one in names["said"])
+    assert names["worst"](names["few"], 3.3e5) > 1.0 > 0.1 > names["worst"](names["enough"], 3.3e5)
+    assert 1.5 <= names["stiffness"]["knee_inverse"] <= 2.3
+    assert 10.5 <= names["stiffness"]["knee_line"] <= 11.6
+    assert names["kick"](names["plain"]) > 3.0 * names["kick"](names["tension"])
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

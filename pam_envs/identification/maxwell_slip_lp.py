@@ -18,7 +18,8 @@ second term of the sum repeats the first, and the two last constraints are missi
 :func:`printed_programme` keeps the mixed right-hand sides to show what they give.
 
 A major loop does not fix every ``k``. The rank of the equations is handed back with the names of
-what they leave open.
+what they leave open. A loop that turns between two break points ties down a little more, in
+combinations that noise would drown: these do not count.
 
 References
 ----------
@@ -48,6 +49,11 @@ Form = Literal["corrected", "printed"]
 
 LEAST_SLOPE = 1e-3
 """Least slope of the spring over that of the line between the tips of the major loop."""
+WEAKEST = 1.2e-3
+"""Least singular value of the equations, over the largest, that counts as fixing something. What
+lies below would pass the noise of a record on nearly a thousandfold."""
+OPEN = 0.05
+"""Part of an element in a combination that is not fixed, from which on the element is open."""
 AT_ZERO = 0.02
 """Part of the largest stiffness within which a loop's bottom counts as 0."""
 
@@ -326,7 +332,7 @@ def _fixed(rows: Array, elements: int) -> tuple[int, tuple[str, ...]]:
     """Return the rank of the equations, and the names of the elements that they leave open."""
     sizes = np.linalg.norm(rows, axis=0)
     scaled = rows / np.where(sizes > 0.0, sizes, 1.0)
-    free = null_space(scaled, rcond=1e-10)
-    left_open = np.max(np.abs(free[:elements]), axis=1, initial=0.0) > 1e-8
+    free = null_space(scaled, rcond=WEAKEST)
+    left_open = np.max(np.abs(free[:elements]), axis=1, initial=0.0) > OPEN
     names = tuple(f"k_{m + 1}" for m in np.flatnonzero(left_open))
     return rows.shape[1] - free.shape[1], names

@@ -22,6 +22,11 @@ def test_every_preset_is_sound_and_fits_its_environment(env: str, algo: str) -> 
     assert len(matrix) == len(made.signals) + len(config.network.differences)
 
 
+def test_every_environment_has_a_preset_of_ppo() -> None:
+    ids = {name for name in gym.registry if name.startswith("PAM/")}
+    assert {(name, "ppo") for name in ids} <= set(configs.presets())
+
+
 def test_both_algorithms_have_a_preset_for_muscle_positioning() -> None:
     assert {(ID, "ppo"), (ID, "sac")} <= set(configs.presets())
 

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from baselines.catalogue import CONTROLLERS, make_controller
-from tests.baselines.conftest import built, make_env
+from baselines.catalogue import CONTROLLERS as ALL
+from baselines.catalogue import make_controller
+from tests.baselines.conftest import ID, built, make_env
 
+CONTROLLERS = {name: entry for name, entry in ALL.items() if ID in entry.envs}
 SOME = ("random", "table", "pid", "inverse", "inverse_pid")
 
 

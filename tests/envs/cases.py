@@ -8,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 
 import pam_envs  # noqa: F401 (registers)
+from pam_envs.kernels import COMPILED
 from pam_envs.plants.knee_orthosis import KneeOrthosis
 from pam_envs.plants.single_muscle import SingleMuscle
 
@@ -62,15 +63,18 @@ EVERY_EFFECT = {
 
 COMMON: dict[str, dict[str, Any]] = {
     "default": {},
-    "preisach": {"hysteresis": "preisach"},
-    "none": {"hysteresis": "none", "normalize": False},
     "random": {"randomize": True, "preview": 2, "preview_stride": 7},
-    "preisach_random": {"hysteresis": "preisach", "randomize": True, "preview": 0},
 }
-"""Arguments that every environment takes."""
+"""Arguments that every environment takes, with which every one has to pass."""
+
+PREISACH = {"hysteresis": "preisach", "randomize": True, "preview": 0}
+NONE = {"hysteresis": "none", "normalize": False}
 
 OWN: dict[str, dict[str, dict[str, Any]]] = {
     "PAM/MusclePositioning-v0": {
+        "preisach": {"hysteresis": "preisach"},
+        "preisach_random": PREISACH,
+        "none": NONE,
         "loads": {
             "randomize": True,
             "load": None,
@@ -86,11 +90,13 @@ OWN: dict[str, dict[str, dict[str, Any]]] = {
         },
     },
     "PAM/KneeTension-v0": {
+        "preisach_random": PREISACH,
         "measured": {"plant": KneeOrthosis.no_load(dynamics="measured"), "reference": "mixed"},
         "paper": {"start": "paper", "frequency": 0.5},
     },
     "PAM/KneeStiffness-v0": {"samples": {"reference": [20.0 * (k % 300) for k in range(600)]}},
     "PAM/KneeWalk-v0": {
+        "preisach_random": PREISACH,
         "quick": {"pace": "normal", "assistance": "clipped", "mismatch": 10.0, "ratio": 0.3},
         "demand": {"reference": "demand", "start": "heel_contact", "preview": 0},
         "samples": {"reference": [0.1 * (k % 100) for k in range(300)], "preview": 20},
@@ -98,12 +104,25 @@ OWN: dict[str, dict[str, dict[str, Any]]] = {
 }
 """Arguments of its own that reach further branches of an environment."""
 
+PLAIN: dict[str, dict[str, dict[str, Any]]] = {
+    "PAM/KneeTension-v0": {"none": NONE},
+    "PAM/KneeStiffness-v0": {"preisach_random": PREISACH, "none": NONE},
+    "PAM/KneeWalk-v0": {"none": NONE},
+    "PAM/KneeStairsUp-v0": {"preisach_random": PREISACH},
+    "PAM/KneeStairsDown-v0": {"none": NONE},
+}
+"""What runs uncompiled only: each memory, mounting and regulator is machine code of its own, half a
+minute to make, and a mounting is compiled with another memory already."""
+
 LIVELY: dict[str, dict[str, Any]] = {"PAM/MusclePositioning-v0": {"load": None}}
 """Arguments under which no entry of the observation stays the same over episodes."""
 
-VARIANTS = {name: {**COMMON, **OWN.get(name, {})} for name in IDS}
+ALWAYS = {name: {**COMMON, **OWN.get(name, {})} for name in IDS}
+VARIANTS = {name: {**ALWAYS[name], **({} if COMPILED else PLAIN.get(name, {}))} for name in IDS}
 CASES = [(name, variant) for name in IDS for variant in VARIANTS[name]]
 """Every registered environment in every variant."""
+SHARED = [(name, variant) for name in IDS for variant in ALWAYS[name]]
+"""Those that run compiled and uncompiled."""
 
 
 def actions_for(space: gym.spaces.Box, steps: int, seed: int = 0) -> np.ndarray:

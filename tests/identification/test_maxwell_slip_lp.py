@@ -47,7 +47,15 @@ def fit(*segments: int):
 
 @pytest.mark.parametrize(
     ("segments", "rank"),
-    [((10,), 16), ((10, 3), 17), ((10, 5), 18), ((10, 5, 3), 19), ((10, 9), 20), ((10, 9, 5), 20)],
+    [
+        ((10,), 16),
+        ((10, 3), 17),
+        ((10, 5), 18),
+        ((10, 5, 3), 19),
+        ((10, 8), 20),
+        ((10, 9), 20),
+        ((10, 9, 5), 20),
+    ],
 )
 def test_rank_of_the_loop_sets(segments, rank):
     found = fit(*segments)
@@ -81,6 +89,26 @@ def test_too_few_loops_are_told_with_names():
         fit_slip_programme([loop(10)])
     assert "minor loop" in str(caught[0].message)
     assert "k_5," not in str(caught[0].message)  # the one that a major loop of ten does fix
+
+
+@pytest.mark.parametrize(("segments", "rank"), [((10, 5), 18), ((10, 4.83), 18), ((10, 9), 20)])
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 3e-3])
+def test_neither_noise_nor_a_turn_between_breaks_passes_for_knowledge(segments, rank, noise):
+    rng, loops = np.random.default_rng(1), []
+    for n in segments:
+        up = np.linspace(0.0, n * EVEN.segment, round(40 * n) + 1)
+        path = np.concatenate([up, up[-2::-1]])
+        pressure, seen = (
+            EVEN.inverse_simulate(path)[0],
+            path + noise * FULL * rng.normal(size=path.size),
+        )
+        loops.append((pressure, np.concatenate([[0.0], seen[1:]])))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", OpenParameters)
+        found = fit_slip_programme(loops)
+    assert found.rank == rank
+    assert ("k_9" in found.open) == (rank < 20)
+    assert "k_10" in found.open
 
 
 def test_enough_loops_give_no_warning():

@@ -1,0 +1,132 @@
+"""The classical controllers of the knee orthosis by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from baselines.entry import Entry
+from baselines.knee_inverse import make_knee_forward
+from baselines.knee_ltr import make_knee_ltr
+from baselines.knee_pid import make_knee_pid
+from baselines.knee_published import NOMINAL_PRESSURE
+from baselines.trivial import Constant
+from pam_envs.parameters import Signals
+from pam_envs.plants.knee_orthosis import KneeOrthosis
+
+BRACE = ("PAM/KneeTension-v0", "PAM/KneeStiffness-v0")
+GAIT = ("PAM/KneeWalk-v0", "PAM/KneeStairsUp-v0", "PAM/KneeStairsDown-v0")
+KNEE = (*BRACE, *GAIT)
+SEED_000 = (
+    "T.-J. Yeh, M.-J. Wu, T.-J. Lu, F.-K. Wu, C.-R. Huang, Control of McKibben pneumatic muscles "
+    "for a power-assist, lower-limb orthosis, Mechatronics 20 (2010)"
+)
+LTR = "M. Athans, A tutorial on the LQG/LTR method, American Control Conference 1986"
+BUMPLESS = (
+    "L. Zaccarian, A. R. Teel, A common framework for anti-windup, bumpless transfer and reliable "
+    "designs, Automatica 38 (2002)"
+)
+SIMC = (
+    "S. Skogestad, Simple analytic rules for model reduction and PID controller tuning, J. Process "
+    "Control 13 (2003) 291-309"
+)
+MODEL = "nominal model"
+
+KNEE_CONTROLLERS: dict[str, Entry] = {
+    "knee_hold": Entry("2 bar always, the nominal pressure", "nothing", envs=KNEE),
+    "knee_free": Entry(
+        "inverse for no torque on the knee: neither helps nor hinders",
+        MODEL,
+        citation=SEED_000,
+        envs=GAIT,
+    ),
+    "knee_pid": Entry(
+        "PI of the tension, SIMC tuning", MODEL, feedback=True, citation=SIMC, envs=KNEE
+    ),
+    "knee_line": Entry(
+        "straight line between the tips of the loop: hysteresis ignored", MODEL, envs=KNEE
+    ),
+    "knee_inverse": Entry(
+        "inverse of the hysteresis at the present reference, as in the paper",
+        MODEL,
+        citation=SEED_000,
+        envs=KNEE,
+    ),
+    "knee_inverse_ahead": Entry(
+        "knee_inverse, at the reference one lag of the regulator ahead",
+        MODEL,
+        preview=True,
+        citation=SEED_000,
+        envs=KNEE,
+    ),
+    "knee_ltr": Entry(
+        "loop transfer recovery on the identified plant, about 2 bar",
+        MODEL,
+        feedback=True,
+        citation=f"{SEED_000}; {LTR}; {BUMPLESS}",
+        envs=KNEE,
+    ),
+    "knee_line_ltr": Entry(
+        "knee_ltr and knee_line: how much of the gain is feed-forward alone",
+        MODEL,
+        feedback=True,
+        citation=f"{LTR}; {BUMPLESS}",
+        envs=KNEE,
+    ),
+    "knee_inverse_ltr": Entry(
+        "knee_ltr and knee_inverse: the paper's control system",
+        MODEL,
+        feedback=True,
+        citation=f"{SEED_000}; {LTR}; {BUMPLESS}",
+        envs=KNEE,
+    ),
+    "knee_inverse_ahead_ltr": Entry(
+        "knee_inverse_ltr, its feed-forward one lag of the regulator ahead",
+        MODEL,
+        preview=True,
+        feedback=True,
+        citation=f"{SEED_000}; {LTR}; {BUMPLESS}",
+        envs=KNEE,
+    ),
+    "knee_inverse_ltr_bumpy": Entry(
+        "knee_inverse_ltr with the compensators of bumpless transfer turned off",
+        MODEL,
+        feedback=True,
+        citation=f"{SEED_000}; {LTR}",
+        envs=GAIT,
+    ),
+    "knee_printed": Entry(
+        "knee_inverse_ltr with the printed tension controller (11) and compensator",
+        MODEL,
+        feedback=True,
+        citation=SEED_000,
+        envs=KNEE,
+    ),
+}
+
+Maker = Callable[[KneeOrthosis, Signals, Signals], Any]
+
+
+def _forward(**how: Any) -> Maker:
+    return lambda plant, signals, actions: make_knee_forward(plant, signals, actions, **how)
+
+
+def _ltr(**how: Any) -> Maker:
+    return lambda plant, signals, actions: make_knee_ltr(plant, signals, actions, **how)
+
+
+KNEE_MAKERS: Mapping[str, Maker] = {
+    "knee_hold": lambda _, __, actions: Constant(actions["pressure_set_point"], NOMINAL_PRESSURE),
+    "knee_free": _forward(assist=False),
+    "knee_pid": make_knee_pid,
+    "knee_line": _forward(kind="line"),
+    "knee_inverse": _forward(),
+    "knee_inverse_ahead": _forward(preview=True),
+    "knee_ltr": _ltr(forward="nominal"),
+    "knee_line_ltr": _ltr(forward="line"),
+    "knee_inverse_ltr": _ltr(),
+    "knee_inverse_ahead_ltr": _ltr(preview=True),
+    "knee_inverse_ltr_bumpy": _ltr(bumpless=False),
+    "knee_printed": _ltr(printed=True),
+}
+"""From nominal plant, signals and action signals to the controller."""

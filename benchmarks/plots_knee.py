@@ -1,0 +1,159 @@
+"""The picture of a stride with the knee orthosis, beside the paper's Fig. 12 and 13."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Signals = Mapping[str, Array]
+
+STANCE = "#e8edf3"
+WANTED, OURS, PRESSURE, FREE = "0.25", "#0072b2", "#009e73", "#d55e00"
+BAR, DEGREES = 1e-5, 180.0 / np.pi
+LOOK_AFTER = 0.5
+"""Seconds after a switch in which its transient is looked for, as in the metrics."""
+
+
+def spans(flags: Array, time: Array) -> list[tuple[float, float]]:
+    """Return the times between which flags are set."""
+    edges = np.diff(np.concatenate([[0], (flags > 0.5).astype(int), [0]]))
+    ends = np.append(time, 2.0 * time[-1] - time[-2])
+    starts, stops = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+    return [(float(ends[a]), float(ends[b])) for a, b in zip(starts, stops, strict=True)]
+
+
+def cut(signals: Signals, first: float, last: float) -> dict[str, Array]:
+    """Return a record from one time [s] to another, its clock set to 0 at its first heel contact.
+
+    Parameters
+    ----------
+    signals : mapping of (T,) arrays
+        Recorded ``info``.
+    """
+    time = signals["time"]
+    kept = (time > first - 1e-9) & (time < last + 1e-9)
+    made = {name: values[kept] for name, values in signals.items()}
+    contact = np.flatnonzero(np.diff(made["state/stance"]) > 0.5)
+    made["time"] = made["time"] - made["time"][contact[0] + 1]
+    return made
+
+
+def stride_figure(records: Sequence[Signals], titles: Sequence[str], title: str) -> Any:
+    """Return a figure with a column for each record: tension, angle, pressure, EMG proxy.
+
+    Parameters
+    ----------
+    records : sequence of mappings of (T,) arrays
+        Recorded ``info`` in SI, ``time`` 0 at a heel contact, and ``set_point`` [Pa].
+    titles : sequence of str
+        Of the columns.
+    title : str
+        Of the whole.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 10.0), layout="constrained")
+    grid = figure.subplots(4, len(records), sharex=True, sharey="row", squeeze=False)
+    for column, (signals, name) in enumerate(zip(records, titles, strict=True)):
+        axes = grid[:, column]
+        for draw, ax in zip((_tension, _angle, _pressure, _emg), axes, strict=True):
+            _shade(ax, signals)
+            draw(ax, signals)
+        _phases(axes[0], signals)
+        axes[0].set_title(name, fontweight="bold", pad=18.0)
+        axes[-1].set_xlabel("time since heel contact [s]")
+    for ax, (text, top, place) in zip(grid[:, 0], ROWS, strict=True):
+        ax.set_ylabel(text)
+        ax.set_ylim(top=top)
+        ax.legend(loc=place, ncols=3, fontsize=8, framealpha=0.9)
+    figure.suptitle(title, fontsize=10)
+    return figure
+
+
+ROWS = (
+    ("tension of the\nmuscle [N]", 350.0, "upper right"),
+    ("angle of the brace [deg],\nupwards: bent", 195.0, "upper right"),
+    ("pressure [bar]", 5.6, "upper right"),
+    ("EMG proxy of the\nextensors [% of largest]", 36.0, "upper right"),
+)
+"""Label, upper end and place of the legend of each row."""
+
+
+def _shade(ax: Any, signals: Signals) -> None:
+    time = signals["time"]
+    for begin, end in spans(signals["state/stance"], time):
+        ax.axvspan(begin, end, color=STANCE, zorder=0)
+        for edge in (begin, end):
+            ax.axvline(edge, color="0.65", linewidth=0.8, zorder=1)
+    ax.set_xlim(time[0], time[-1])
+    ax.grid(True, linewidth=0.3)
+
+
+def _phases(ax: Any, signals: Signals) -> None:
+    """Write above the panel which phase a span is, and what is controlled in it."""
+    time, stance = signals["time"], signals["state/stance"]
+    for flags, name in ((stance, "stance: tension"), (1.0 - stance, "swing: angle")):
+        for begin, end in spans(flags, time):
+            if end - begin > 0.2 * (time[-1] - time[0]):
+                ax.text(0.5 * (begin + end), 1.02, name, transform=ax.get_xaxis_transform(),
+                        ha="center", va="bottom", fontsize=8.5, color="0.35")  # fmt: skip
+
+
+def _tension(ax: Any, signals: Signals) -> None:
+    both = (signals["state/stance"] > 0.5) & (signals["sensor/stance"] > 0.5)
+    wanted = np.where(both, signals["reference"], np.nan)
+    ax.plot(signals["time"], signals["output"], color=OURS, label="tension")
+    ax.plot(signals["time"], wanted, color=WANTED, linestyle="--", label="wanted in stance")
+    at, error = after_switch(signals)
+    ax.annotate(f"{error:.0f} N off\nafter the switch", xy=at, xytext=(3.6, 120.0), fontsize=9,
+                ha="center", arrowprops={"arrowstyle": "->", "color": "0.3"})  # fmt: skip
+
+
+def after_switch(signals: Signals) -> tuple[tuple[float, float], float]:
+    """Return when [s] and where [N] the tension is off most after heel contact, by how much [N]."""
+    time, stance = signals["time"], signals["state/stance"] > 0.5
+    looked = stance & (signals["sensor/stance"] > 0.5) & (time >= 0.0) & (time < LOOK_AFTER)
+    error = np.where(looked, np.abs(signals["output"] - signals["reference"]), -1.0)
+    at = int(np.argmax(error))
+    return (float(time[at]), float(signals["output"][at])), float(error[at])
+
+
+def _angle(ax: Any, signals: Signals) -> None:
+    path = signals["state/angle"] - signals["state/deviation"]
+    ax.plot(signals["time"], DEGREES * signals["state/angle"], color=OURS, label="angle")
+    ax.plot(signals["time"], DEGREES * path, color=WANTED, linestyle="--", label="wearer's path")
+
+
+def _pressure(ax: Any, signals: Signals) -> None:
+    time = signals["time"]
+    ax.plot(time, BAR * signals["set_point"], color="0.55", linewidth=0.8, label="set-point")
+    ax.plot(time, BAR * signals["state/pressure"], color=PRESSURE, label="pressure")
+    ax.axhline(4.5, color="0.4", linewidth=0.8, linestyle=":", label="capacity")
+
+
+def _emg(ax: Any, signals: Signals) -> None:
+    time = signals["time"]
+    free, worn = signals["effort/extensors_free"], signals["effort/extensors"]
+    ax.plot(time, 100.0 * free, color=FREE, linestyle="--", label="without orthosis")
+    ax.plot(time, 100.0 * worn, color=OURS, label="with orthosis")
+    plain, fitted = (reduction(signals, f"effort/extensors{{}}{kind}") for kind in KINDS)
+    words = (
+        f"RMS of this stride: {plain:+.0f} %\n(calibrated reading A: {fitted:+.0f} %;\n"
+        "the paper's EMG: -36 %)"
+    )
+    ax.text(3.5, 21.0, words, ha="center", va="center", fontsize=9)
+
+
+KINDS = ("", "_calibrated")
+
+
+def reduction(signals: Signals, pattern: str, stride: float = 5.0) -> float:
+    """Return the change [%] of a proxy's RMS over the stride that begins at 0."""
+    time = signals["time"]
+    kept = (time >= 0.0) & (time < stride)
+    free, worn = (np.mean(signals[pattern.format(x)][kept] ** 2) for x in ("_free", ""))
+    return 100.0 * float(np.sqrt(worn / free) - 1.0)

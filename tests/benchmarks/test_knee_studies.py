@@ -1,0 +1,45 @@
+"""The studies of the knee give the figures that the orthosis paper reports, or known ones."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks import knee_studies as studies
+
+
+def test_inverse_and_straight_line_of_the_stiffness() -> None:
+    inverse, line = studies.stiffness_errors()
+    assert 1.5 < inverse < 2.3
+    assert 10.5 < line < 11.5
+
+
+@pytest.mark.parametrize(
+    ("width", "feedback", "line", "over_line"),
+    [(0.0, 5.06, 0.95, 1.0), (0.25e5, 5.20, 1.31, 1.3), (0.5e5, 5.37, 1.69, 1.6)],
+)
+def test_printed_feedback_with_two_feed_forwards(
+    width: float, feedback: float, line: float, over_line: float
+) -> None:
+    errors = studies.tension_errors(width)
+    assert errors.with_inverse < 1.33
+    assert errors.gain > 3.5
+    assert errors.feedback == pytest.approx(feedback, abs=0.2)
+    assert errors.with_line == pytest.approx(line, abs=0.2)
+    assert errors.gain_over_line == pytest.approx(over_line, abs=0.1)
+
+
+def test_designed_feedback_does_no_worse_than_the_printed_one() -> None:
+    assert studies.tension_errors(feedback="designed").with_inverse < 1.05
+
+
+def test_switch_with_and_without_bumpless_transfer() -> None:
+    smooth, bumpy = (studies.switching(10.0, bumpless=b) for b in (True, False))
+    assert smooth.tension < 20.0 < 40.0 < bumpy.tension
+    assert smooth.command < 0.3e5 < 2e5 < bumpy.command
+    assert studies.switching(10.0, preview=True).tension < 15.0
+
+
+def test_emg_falls_and_least_by_the_full_balance() -> None:
+    ratios = studies.emg_ratios("walk")
+    assert ratios["emg_ratio_fitted_a"] == pytest.approx(0.64, abs=0.02)
+    assert ratios["emg_ratio_fitted_a"] < ratios["emg_ratio"] < 0.95

@@ -1,0 +1,127 @@
+"""The knee's metrics, on signals whose scores are known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks import metrics, metrics_knee
+from benchmarks.scenarios import ScenarioSet, available
+
+PERIOD = 0.01
+N = 1000
+GATE = "state/stance"
+TIME = PERIOD * np.arange(1, N + 1)
+STANCE = ((TIME % 5.0) > 2.5).astype(float)
+
+
+def signals(**changes: Any) -> dict[str, np.ndarray]:
+    """Return a record in which the tension is right in stance and the angle in swing."""
+    reference = 100.0 + 50.0 * np.sin(2.0 * np.pi * TIME)
+    path = 1.5 + 0.5 * np.sin(2.0 * np.pi * TIME)
+    level = 0.1 + 0.05 * np.sin(2.0 * np.pi * TIME)
+    made = {
+        "time": TIME,
+        "reference": reference,
+        "output": reference.copy(),
+        "sensed": reference.copy(),
+        "state/stance": STANCE,
+        "sensor/stance": STANCE.copy(),
+        "state/angle_reference": path,
+        "state/angle": path.copy(),
+        "state/pressure": np.full(N, 2e5),
+        "state/torque": np.full(N, 3.0),
+        "state/torque_reference": np.full(N, 3.0),
+        "state/torque_ideal": np.full(N, 5.0),
+        "state/estimate": 30.0 * (1.0 + np.sin(2.0 * np.pi * TIME)),
+        "cost/pressure": np.zeros(N),
+        "effort/pressure_travel": np.zeros(N),
+        "effort/air": np.zeros(N),
+        "effort/over_assistance": np.zeros(N),
+    }
+    for reading in ("", "_calibrated"):
+        made[f"effort/extensors{reading}"] = 0.8 * level
+        made[f"effort/extensors_free{reading}"] = level
+    made |= {"effort/flexors": 2.0 * level, "effort/flexors_free": level}
+    return made | changes
+
+
+def score(record: dict[str, np.ndarray], **how: Any) -> dict[str, float]:
+    how = {"gate": GATE, "groups": ("range", "gait"), "activity": "walk"} | how
+    return metrics.score(record, PERIOD, 0.0, 0.5, {"cost/pressure": 1e5}, **how)
+
+
+def test_perfect_record_has_no_error_and_the_ratios_that_were_put_in() -> None:
+    scores = score(signals())
+    assert set(scores) == set(metrics.of_track({"metrics": ["range", "gait"]}))
+    for name in ("rms_error", "rms_percent", "angle_rms", "tension_jump", "torque_rms"):
+        assert scores[name] == 0.0
+    assert scores["torque_ideal_rms"] == pytest.approx(2.0)
+    assert scores["emg_ratio"] == scores["emg_ratio_fitted_a"] == pytest.approx(0.8)
+    assert scores["emg_flexors_ratio"] == pytest.approx(2.0)
+    assert 0.0 < scores["emg_ratio_fitted_b"] < 1.0
+
+
+def test_tension_counts_in_stance_and_angle_in_swing() -> None:
+    record = signals()
+    record["output"] = record["reference"] + np.where(STANCE > 0.5, 5.0, 80.0)
+    record["state/angle"] = record["state/angle_reference"] + np.where(STANCE > 0.5, 0.5, 0.1)
+    scores = score(record)
+    assert scores["rms_error"] == pytest.approx(5.0)
+    assert scores["rms_percent"] == pytest.approx(10.0, rel=1e-3)
+    assert scores["angle_rms"] == pytest.approx(0.1)
+    assert scores["angle_rms_percent"] == pytest.approx(20.0, rel=1e-3)
+    assert score(record, gate="")["rms_error"] > 50.0
+
+
+def test_a_gate_that_never_opens_is_told() -> None:
+    with pytest.raises(ValueError, match="state/stance is 0 all the time"):
+        score(signals(**{"state/stance": np.zeros(N)}))
+
+
+def test_landings_are_first_samples_of_stance_after_a_swing() -> None:
+    stance = np.zeros(400)
+    stance[100:200] = 1.0
+    stance[205:210] = 1.0  # a heel that chatters as it is lifted
+    stance[300:] = 1.0
+    np.testing.assert_array_equal(metrics_knee.landings(stance, PERIOD), [100, 300])
+
+
+def test_jumps_are_the_mean_over_landings_of_the_largest_that_follows() -> None:
+    record, starts = signals(), np.flatnonzero(np.diff(STANCE) > 0.0) + 1
+    first, second = starts
+    for k, size, change in ((first, 30.0, 1e4), (second, 10.0, 3e4)):
+        record["output"][k + 49] -= size
+        record["output"][k + 50] += 90.0  # too late to count
+        record["state/pressure"][k + 9 :] += change
+    scores = score(record)
+    assert scores["tension_jump"] == pytest.approx(20.0)
+    assert scores["pressure_jump"] == pytest.approx(2e4)
+
+
+def test_saturated_time_is_the_share_at_the_capacity() -> None:
+    over = np.where(TIME <= 2.5, 1e3, 0.0)
+    assert score(signals(**{"cost/pressure": over}))["saturated_time"] == pytest.approx(0.25)
+
+
+def test_a_muscle_that_never_works_has_no_ratio() -> None:
+    still = np.zeros(N)
+    scores = score(signals(**{"effort/flexors": still, "effort/flexors_free": still}))
+    assert np.isnan(scores["emg_flexors_ratio"])
+
+
+def test_units_follow_the_track() -> None:
+    units = metrics.of_track({"unit": "N", "metrics": ["gait"]})
+    assert units["rms_error"] == units["max_error"] == "N"
+    assert units["angle_rms"] == "rad" and units["air_use"] == "kg/s"
+    assert metrics.of_track({}) == metrics.METRICS
+
+
+def test_a_track_with_an_unknown_group_or_a_missing_worst_case_is_refused() -> None:
+    content = dict(available()["knee_walk_nominal"].content)
+    with pytest.raises(ValueError, match="choose from range, gait"):
+        ScenarioSet(content | {"metrics": ["stride"]})
+    with pytest.raises(ValueError, match=r"worst_case needs a value for each of .*tension_jump"):
+        ScenarioSet(content | {"worst_case": {"rms_error": 1.0}})

@@ -1,0 +1,94 @@
+"""What the pages of the environments say of signals, info and arguments is what the code has."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+from pathlib import Path
+
+import gymnasium as gym
+import pytest
+
+from pam_envs.envs import knee_brace, knee_gait, muscle_positioning
+from tests.envs.cases import IDS
+
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "envs"
+MODULES = {"muscle_positioning": muscle_positioning, "knee_brace": knee_brace, "knee_gait": knee_gait}  # fmt: skip  # noqa: E501
+FIXED_BY_THE_ID = {"self", "activity", "quantity", "mounting"}
+EVERY = pytest.mark.parametrize("name", IDS)
+
+
+def page(name: str) -> str:
+    """Return the name of the page whose second line of text lists an id."""
+    (found,) = [p.stem for p in DOCS.glob("*.md") if f"`{name}`" in p.read_text().split("![")[0]]
+    return found
+
+
+def table(name: str, heading: str) -> list[list[str]]:
+    """Return the cells of the first table below a heading, without its head."""
+    text = (DOCS / f"{page(name)}.md").read_text().split(f"\n## {heading}\n")[1]
+    rows = re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE)[0].splitlines()[2:]
+    return [[cell.strip() for cell in re.split(r"(?<!\\)\|", row)[1:-1]] for row in rows]
+
+
+def quoted(cell: str) -> list[str]:
+    return re.findall(r"`([^`]+)`", cell)
+
+
+@EVERY
+def test_spaces(name: str) -> None:
+    text = (DOCS / f"{page(name)}.md").read_text()
+    env = gym.make(name).unwrapped
+    assert f"| Action space | `Box(-1, 1, {env.action_space.shape}, float32)` |" in text
+    assert f"| Observation space | `Box(-1, 1, {env.observation_space.shape}, float32)`" in text
+
+
+@EVERY
+def test_signals_stand_in_their_order(name: str) -> None:
+    env = gym.make(name, preview=0).unwrapped
+    first = [re.split(r"[ ,:;]", row[1])[0] for row in table(name, "Observation")]
+    listed = [word for word in first if not word.endswith("_1")]
+    assert [n for n in listed if n] == list(env.signals.names())
+    (action,) = table(name, "Action")
+    assert action[1] == env.action_signals[0].name
+    assert [float(action[3]), float(action[4])] == [
+        env.action_signals[0].low,
+        env.action_signals[0].high,
+    ]
+
+
+@EVERY
+def test_ranges_of_signals(name: str) -> None:
+    env = gym.make(name, preview=0).unwrapped
+    for row in table(name, "Observation"):
+        word = re.split(r"[ ,:;]", row[1])[0]
+        if word in env.signals.names() and " or " not in row[3] + row[4]:
+            signal = env.signals[word]
+            assert (float(row[3]), float(row[4]), row[2]) == (signal.low, signal.high, signal.unit)
+
+
+@EVERY
+def test_info_keys(name: str) -> None:
+    listed = [key for row in table(name, "Info") for key in quoted(row[0])]
+    assert len(listed) == len(set(listed))
+    assert set(listed) == set(gym.make(name).unwrapped.setup.info_keys)
+
+
+@EVERY
+def test_arguments_and_their_defaults(name: str) -> None:
+    taken = inspect.signature(MODULES[page(name)].make_setup).parameters
+    listed = {}
+    for row in table(name, "Arguments"):
+        names = quoted(row[0])
+        values = row[1].split(", ") if len(names) > 1 else [row[1]]
+        listed |= dict(zip(names, values, strict=True))
+    assert set(listed) == set(taken) - FIXED_BY_THE_ID
+    for argument, said in listed.items():
+        default = taken[argument].default
+        try:
+            value = ast.literal_eval(said.strip("`"))
+        except (SyntaxError, ValueError):
+            continue  # words, or nothing
+        resolved = {"hysteresis": "maxwell_slip", "pace": "slow"}.get(argument)
+        assert value == (resolved if default is None and resolved else default), argument
