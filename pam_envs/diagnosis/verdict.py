@@ -269,10 +269,10 @@ def evidence_of(
 
     ``blocks`` counts those held out. Under ``levels``, one entry for each number of causes from
     none: ``gain`` over the base, ``added`` over the level before, what it would be if nothing but
-    noise were left (``possible``), how ``unsure`` it is, what is ``left``, and the ``rivals``, the best first, each with ``names``, ``forms``, ``gain``,
-    ``better``: the part of the samples of blocks in which it is ahead of the best, ``imitates``:
-    whether it has the best as a limit, and ``out``: whether it was excluded before the others were
-    compared on all blocks.
+    noise were left (``possible``), how ``unsure`` it is, what is ``left``, and the ``rivals``, the
+    best first, each with ``names``, ``forms``, ``gain``, ``better``: the part of the samples of
+    blocks in which it is ahead of the best, ``imitates``: whether it has the best as a limit, and
+    ``out``: whether it was excluded before the others were compared on all blocks.
     """
     base = levels[0].model
     draws = blocks.draws(rule.draws, seed)
