@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 from baselines.contraction_tables import LOADS
 from baselines.controller import Controller, reader
+from baselines.elbow_catalogue import ELBOW_CONTROLLERS, ELBOW_MAKERS
 from baselines.entry import POSITIONING, Entry
 from baselines.inverse import make_inverse
 from baselines.inverse_pid import make_inverse_pid
@@ -23,7 +24,9 @@ from baselines.table_inverse import make_table_inverse
 from baselines.trivial import Constant, Line, Random
 from pam_envs.data.tables import load_contraction_table
 from pam_envs.parameters import Signals
+from pam_envs.plants.elbow_orthosis import ElbowOrthosis
 from pam_envs.plants.knee_orthosis import KneeOrthosis
+from pam_envs.plants.plant import Plant
 from pam_envs.plants.single_muscle import SingleMuscle
 
 SEED_003 = "Seed 003: Studies regarding the Use of Pneumatic Muscles in Precise Positioning Systems"
@@ -89,6 +92,7 @@ CONTROLLERS: dict[str, Entry] = {
         citation=f"{KREJCI}; {SIMC}",
     ),
     **KNEE_CONTROLLERS,
+    **ELBOW_CONTROLLERS,
 }
 
 
@@ -106,7 +110,7 @@ def make_linear(signals: Signals, action_signals: Signals) -> Line:
 
 def make_controller(
     name: str,
-    plant: SingleMuscle | KneeOrthosis,
+    plant: Plant,
     signals: Signals,
     action_signals: Signals,
     seed: int = 0,
@@ -117,7 +121,7 @@ def make_controller(
     ----------
     name : str
         One of ``CONTROLLERS``.
-    plant : SingleMuscle or KneeOrthosis
+    plant : Plant
         Nominal plant: what the controller is told of the muscle. Controllers that know nothing or
         tables do not look at it.
     signals, action_signals : Signals
@@ -134,6 +138,10 @@ def make_controller(
     if name in KNEE_MAKERS:
         made: Controller = KNEE_MAKERS[name](_as(KneeOrthosis, plant, name), *told)
         return made
+    if name in ELBOW_MAKERS:
+        seeded = {"seed": seed} if name == "elbow_random" else {}
+        bending: Controller = ELBOW_MAKERS[name](_as(ElbowOrthosis, plant, name), *told, **seeded)
+        return bending
 
     def muscle() -> SingleMuscle:
         return _as(SingleMuscle, plant, name)

@@ -37,12 +37,26 @@ GAIT: tuple[Column, ...] = (
 )
 """Metric, heading and factor from SI of the columns after the headline, of a gait."""
 
+ELBOW: tuple[Column, ...] = (
+    ("p95_error", "p95 [N m]", 1.0),
+    ("max_error", "max [N m]", 1.0),
+    ("sensed_rms_error", "estimated RMS [N m]", 1.0),
+    ("stiffness_rms", "stiffness RMS [N m/rad]", 1.0),
+    ("felt_rms", "felt beside the object, RMS [N m]", 1.0),
+    *EFFORT,
+    ("switchings", "switchings [1/s]", 1.0),
+    ("saturated_time", "out of reach [%]", 100.0),
+)
+"""Of the elbow orthosis."""
+
 
 def columns_of(content: Mapping[str, Any]) -> tuple[Column, ...]:
     """Return the columns after the headline of a track, from the content of its file."""
     groups = content.get("metrics") or ()
     if "gait" in groups:
         return GAIT
+    if "elbow" in groups:
+        return ELBOW
     unit, factor = shown(content)
     errors: tuple[Column, ...] = (
         ("p95_error", f"p95 [{unit}]", factor),
@@ -79,6 +93,10 @@ holds what runs it again: `python -m benchmarks verify ROW`.
   balance of the knee, *predicted*; the two *fitted* ones follow the paper's own estimate of the
   torque, with one constant an activity that was chosen to give its published reductions. Below 1
   the wearer is helped.
+- Of the elbow, the error is of the torque, against what the pressures can give at the true angle;
+  *estimated* is the torque as computed from the sensors, without friction. *Felt beside the object*
+  is the torque that the orthosis puts on the wearer less that of the object he is to feel: in free
+  motion, all that he feels. *Out of reach*: more torque or stiffness was asked for than there is.
 - A controller's name leads to its row, where every metric of every episode stands.
 - Times per step are in [results/TIMES.md](results/TIMES.md), since no two runs give the same.
 """

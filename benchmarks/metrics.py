@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks import metrics_knee
+from benchmarks import metrics_elbow, metrics_knee
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,11 @@ METRICS: dict[str, str] = {
 """The scored quantities and their units, the headline first. Less is better for all of them."""
 
 HEADLINE = "rms_error"
-GROUPS: dict[str, dict[str, str]] = {"range": metrics_knee.RANGE, "gait": metrics_knee.GAIT}
+GROUPS: dict[str, dict[str, str]] = {
+    "range": metrics_knee.RANGE,
+    "gait": metrics_knee.GAIT,
+    "elbow": metrics_elbow.ELBOW,
+}
 """What a track may be scored by beside ``METRICS``, by the names that its file gives."""
 
 
@@ -161,6 +165,8 @@ def score(
         scores |= metrics_knee.of_range(signals, window, tracked)
     if "gait" in groups:
         scores |= metrics_knee.of_gait(signals, window, tracked, period, activity)
+    if "elbow" in groups:
+        scores |= metrics_elbow.of_elbow(signals, window, period)
     return scores
 
 

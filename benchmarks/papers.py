@@ -177,9 +177,15 @@ GROUPS: tuple[Callable[[], list[Figure]], ...] = (
 
 def groups() -> tuple[Callable[[], list[Figure]], ...]:
     """Return the groups of all papers."""
-    from benchmarks import papers_gait, papers_knee, papers_knee_envs  # they import Figure
+    from benchmarks import (  # they import Figure
+        papers_elbow,
+        papers_gait,
+        papers_knee,
+        papers_knee_envs,
+    )
 
-    return GROUPS + papers_knee.GROUPS + papers_gait.GROUPS + papers_knee_envs.GROUPS
+    knee = papers_knee.GROUPS + papers_gait.GROUPS + papers_knee_envs.GROUPS
+    return GROUPS + knee + papers_elbow.GROUPS
 
 
 def all_figures() -> list[Figure]:

@@ -19,6 +19,7 @@ SCORING = (
     "cells.py",
     "controllers.py",
     "metrics.py",
+    "metrics_elbow.py",
     "metrics_knee.py",
     "rollout.py",
 )

@@ -20,6 +20,7 @@ from benchmarks.speed_diagnosis import diagnosing
 
 ENV = "PAM/MusclePositioning-v0"
 KNEE = "PAM/KneeWalk-v0"
+ELBOW = "PAM/ElbowOrthosis-v0"
 ROOT = Path(__file__).resolve().parent.parent
 PENDULUM, CARTPOLE = "InvertedPendulum-v5", "CartPole-v1"
 
@@ -96,6 +97,28 @@ def single(rounds: int) -> list[Measurement]:
     knee = ratio(rates["KneeWalk"], rates[PENDULUM]) if PENDULUM in rates else None
     note, title = notes.get(PENDULUM, ""), f"KneeWalk / {PENDULUM}"
     return [*results, Measurement("single", title, knee, "x", 5.0, 10.0, note=note)]
+
+
+def single_elbow(rounds: int) -> list[Measurement]:
+    """Elbow orthosis with either make of valves, beside MuJoCo's hopper."""
+    gym, hopper = _gym(), "Hopper-v5"
+    subjects = {
+        "elbow": stepping(gym.make(ELBOW), 5000),
+        "elbow, on/off valves": stepping(gym.make(ELBOW, valves="on_off"), 5000),
+    }
+    note = ""
+    try:
+        subjects[hopper] = stepping(gym.make(hopper), 1000)
+    except (ImportError, gym.error.DependencyNotInstalled) as error:
+        note = f"not installed: {error}"
+    rates = interleaved(subjects, rounds)
+    results = [
+        Measurement("single", f"{name}, steps per CPU second", median(rates[name]), "1/s")
+        for name in subjects
+    ]
+    value = ratio(rates["elbow"], rates[hopper]) if hopper in rates else None
+    title = f"{ELBOW[4:-3]} / {hopper}"
+    return [*results, Measurement("single", title, value, "x", 8.0, 16.0, note=note)]
 
 
 # --- batches ----------------------------------------------------------------------------------
@@ -364,7 +387,7 @@ def learning(rounds: int) -> list[Measurement]:
 
 
 GROUPS: dict[str, tuple[Callable[[int], list[Measurement]], ...]] = {
-    "single": (single,),
+    "single": (single, single_elbow),
     "batch": (batch, variants, growth, cores, processes),
     "plain": (uncompiled, jacobian),
     "start": (start_up,),

@@ -100,6 +100,23 @@ OWN: dict[str, dict[str, dict[str, Any]]] = {
         "demand": {"reference": "demand", "start": "heel_contact", "preview": 0},
         "samples": {"reference": [0.1 * (k % 100) for k in range(300)], "preview": 20},
     },
+    "PAM/ElbowOrthosis-v0": {
+        "pulses": {"valves": "on_off", "motion": "sines", "reference": "wall", "preview": 3},
+        "pulses_preisach": {"valves": "on_off", "hysteresis": "preisach", "randomize": True},
+        "by_torque": {
+            "action": "torque_stiffness",
+            "reference": "weight",
+            "motion": "mixed",
+            "start": "random",
+            "normalize": False,
+        },
+        "samples": {
+            "reference": [[0.05 * (k % 200) - 5.0, 0.01 * (k % 900)] for k in range(300)],
+            "bear": False,
+            "span": (0.4, 1.2),
+            "preview": 1,
+        },
+    },
 }
 """Arguments of its own that reach further branches of an environment."""
 
@@ -109,6 +126,11 @@ PLAIN: dict[str, dict[str, dict[str, Any]]] = {
     "PAM/KneeWalk-v0": {"preisach_random": PREISACH, "none": NONE},
     "PAM/KneeStairsUp-v0": {"preisach_random": PREISACH},
     "PAM/KneeStairsDown-v0": {"none": NONE},
+    "PAM/ElbowOrthosis-v0": {
+        "preisach_random": PREISACH,
+        "none": {**NONE, "reference": "wall"},
+        "pulses_none": {"valves": "on_off", "hysteresis": "none", "reference": "wall"},
+    },
 }
 """What runs uncompiled only: each memory, mounting and regulator is machine code of its own, half a
 minute to make, and a mounting is compiled with another memory already."""

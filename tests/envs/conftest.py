@@ -11,6 +11,7 @@ FAMILIES = {
     "KneeWalk": "gait",
     "KneeStairsUp": "gait",
     "KneeStairsDown": "gait",
+    "ElbowOrthosis": "elbow",
 }
 """Environments with machine code in common."""
 
