@@ -33,8 +33,19 @@ costs no other case."""
 SHUFFLE = 20_260_101
 
 LOOP_FILES = ("gain.py", "gain_references.py", "plant_inverse.py")
-NOT_DECIDING = ("page", "readings", "report", "audit_tables")
+NOT_DECIDING = ("page", "readings", "report", "audit_tables", "outcome", "steps", "summary_text")
 """Beginnings of the names of files that only tell what was decided, or read tables."""
+LIBRARY = (
+    *("compiler.py", "kernels.py", "parameters.py", "data/mas10_maxwell_slip.yaml"),
+    *("data/rig_file.py", "data/recording_segments.py"),
+    *(f"data/{name}.py" for name in ("recording", "recording_clock", "recording_columns")),
+    *(f"hysteresis/{name}.py" for name in ("elements", "everett", "maxwell_slip", "preisach")),
+    *("hysteresis/checks.py", "hysteresis/extrema.py", "mechanics/hanging_mass.py"),
+    *("muscle/effective_area.py", "pneumatics/regulator.py", "sensing/sensor.py"),
+    *(f"plants/{name}.py" for name in ("memory", "replay", "stepping", "single_muscle")),
+    *(f"plants/single_muscle_{name}.py" for name in ("effects", "kernels", "rows")),
+)
+"""What of the library besides the diagnosis decides: the one plant it knows, and its data."""
 OURS = ("diagnosis_cases.py", "diagnosis_study.py")
 
 Study = Callable[[Case, Collection[str]], dict[str, Any]]
@@ -46,12 +57,11 @@ def sources(stage: str) -> str:
     """Return the digest of the code and data that a stage depends on."""
     library = provenance.ROOT / "pam_envs"
     engine = [p for p in sorted((library / "diagnosis").glob("*.py")) if _decides(p, stage)]
-    physics = ("data", "hysteresis", "mechanics", "muscle", "plants", "pneumatics", "sensing")
     own = OURS if stage == "verdict" else (*OURS, "diagnosis_next.py")
     paths = [
         *engine,
         library / "diagnosis" / "causes",
-        *(library / name for name in (*physics, "kernels.py", "parameters.py")),
+        *(library / name for name in LIBRARY),
         provenance.ROOT / "tests" / "diagnosis" / "hidden",
         *(HERE / name for name in own),
     ]

@@ -351,11 +351,13 @@ class Counts:
     unknown: int
     idle: int
     brief: int
-    loud: bool = True
+    loud: int
 
 
-SMALL = Counts(single=1, weak=0, clean=3, decoy=2, pair=2, unknown=2, idle=1, brief=1, loud=False)
-FULL = Counts(single=40, weak=20, clean=200, decoy=100, pair=100, unknown=60, idle=20, brief=60)
+SMALL = Counts(single=1, weak=0, clean=3, decoy=2, pair=2, unknown=2, idle=1, brief=1, loud=0)
+FULL = Counts(
+    single=40, weak=20, clean=200, decoy=100, pair=100, unknown=60, idle=20, brief=60, loud=6
+)
 
 
 def first_seed(chosen: str, offset: int = 0) -> int:
@@ -386,13 +388,15 @@ def cases(chosen: str = "small", offset: int = 0) -> list[Case]:
     rng = np.random.default_rng(start)
     made = list(_wanted(counts, unknown, rng))
     numbered = [replace(case, seed=start + i) for i, case in enumerate(made)]
-    if counts.loud:
-        numbered += [
-            replace(case, kind="loud", noise=LOUDER)
+    return numbered + [
+        replace(case, kind="loud", noise=LOUDER)
+        for name in hidden.EFFECTS
+        for case in [
+            case
             for case in numbered
-            if case.kind == "single" and case.sizes[0] >= LOUDER
-        ]
-    return numbered
+            if case.kind == "single" and case.names == (name,) and case.sizes[0] >= LOUDER
+        ][: counts.loud]
+    ]
 
 
 def _wanted(counts: Counts, unknown: Sequence[str], rng: np.random.Generator) -> Iterator[Case]:

@@ -56,9 +56,9 @@ class Rule:
         Bootstrap samples.
     """
 
-    version: str = "1"
-    least_gain: float = 0.05
-    least_total: float = 1.2
+    version: str = "2"
+    least_gain: float = 0.1
+    least_total: float = 2.4
     look: float = 0.01
     flexible: float = 0.15
     peak: float = 30.0

@@ -68,7 +68,13 @@ class HangingMass:
         5e-3, "m/s", 1e-4, 1.0, "assumed", "speed at which friction falls to the kinetic one"
     )
     ring_share: float = parameter(
-        0.0, "1", 0.0, 1.0, "assumed", "share of the motion behind a soft mount", neutral=0.0
+        0.0,
+        "1",
+        -1.0,
+        1.0,
+        "assumed",
+        "share of the motion behind a mount that gives or tilts",
+        neutral=0.0,
     )
     ring_frequency: float = parameter(7.0, "Hz", 0.5, 20.0, "assumed", "of the mount")
     ring_damping: float = parameter(0.1, "1", 0.005, 2.0, "assumed", "damping ratio of the mount")

@@ -107,9 +107,11 @@ def filled(rows: Any, fixed: Any, j: int, target: float, width: float) -> float:
     rows[FIRST + R.OPEN][j] = opened if stopped == reached else 0.0
     reached = stopped
     reached = pressure if target < 0.0 else reached
-    rows[FIRST + R.DROP][j] = (
-        drop + fixed[R.SUPPLY_DROOP][j] * max(0.0, reached - pressure)
-    ) * decay(width / fixed[R.SUPPLY_RECOVERY][j])
+    # the reservoir is filled through an orifice, as the root of what it lacks
+    lacks = math.sqrt(drop + fixed[R.SUPPLY_DROOP][j] * max(0.0, reached - pressure))
+    full = math.sqrt(0.5 * (fixed[R.SUPPLY_PRESSURE][j] + ATMOSPHERE))
+    lacks = max(0.0, lacks - full * width / fixed[R.SUPPLY_RECOVERY][j])
+    rows[FIRST + R.DROP][j] = lacks * lacks
     return reached * decay(fixed[R.LEAK][j] * width)  # type: ignore[no-any-return]
 
 

@@ -100,7 +100,7 @@ class Regulator:
         0.01, "s", 0.001, 5.0, "assumed", "filling to the supply takes at full flow"
     )
     supply_recovery: float = parameter(
-        10.0, "s", 0.1, 1e3, "assumed", "time constant of the reservoir's recovery"
+        10.0, "s", 0.1, 1e3, "assumed", "filling the empty reservoir takes at full flow"
     )
     ring_share: float = parameter(
         0.0, "1", 0.0, 1.0, "assumed", "share of the pressure behind a line that rings", neutral=0.0

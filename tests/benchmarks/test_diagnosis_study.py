@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import os
 from collections.abc import Collection
@@ -154,6 +155,32 @@ def test_a_stage_depends_on_what_decides_it() -> None:
     assert not {"gain.py", "page.py", "readings.py", "report.py"} & files["verdict"]
     assert "plant_inverse.py" in files["loop"]
     assert len({diagnosis.sources(stage) for stage in diagnosis.STAGES}) == 3
+
+
+def imported(path: Path) -> set[Path]:
+    """Return the library's files that a file imports, wherever in it."""
+    named: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            named |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    files = {ROOT.joinpath(*name.split(".")).with_suffix(".py") for name in named}
+    return {file for file in files if file.is_file() and "pam_envs" in file.parts}
+
+
+def test_what_the_diagnosis_imports_is_in_the_digest() -> None:
+    library = ROOT / "pam_envs"
+    apart = {library / "plants" / "plant_file.py", library / "data" / "tables.py"}  # only files
+    known = {library / name for name in diagnosis.LIBRARY}
+    assert all(path.is_file() for path in known)
+    left, seen = [library / "diagnosis" / "diagnosis.py"], set()
+    while left:
+        path = left.pop()
+        if path not in seen | apart and not path.name.startswith(diagnosis.NOT_DECIDING):
+            seen.add(path)
+            left += imported(path)
+    outside = {path for path in seen if "diagnosis" not in path.parts}
+    assert len(outside) > 15
+    assert outside <= known
 
 
 def test_loops_and_experiments_are_run_where_they_count(tmp_path: Path) -> None:

@@ -69,7 +69,7 @@ def test_evidence_words_the_verdict(found: dict[str, Any], verdict: str, names: 
 
 @pytest.mark.parametrize(("blocks", "verdict"), [(25, "named"), (10, "adequate")])
 def test_few_blocks_have_to_gain_more(blocks: int, verdict: str) -> None:
-    found = evidence(level(0.1, LEAK)) | {"blocks": blocks}
+    found = evidence(level(0.2, LEAK)) | {"blocks": blocks}
     assert judge(found, RULE).verdict == verdict
 
 

@@ -11,13 +11,15 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.seeds import grid
 
 _SHARES, _DAMPINGS, _FLOWS = (0.1,), (0.03, 0.1), (0.1,)
+_TILTS, _TILT_DAMPINGS = (0.05, -0.05), (0.05,)
+"""A target that tilts with its mount moves either way."""
 _FLOW = Term("regulator.ring_flow", (0.1,), scale=0.05)
 _HERTZ = (3.0, 3.5, 4.0, 4.6, 5.2, 5.8, 6.5, 7.2, 8.0, 8.8, 9.6, 10.5, 11.5, 12.6, 14.0)
 
 
-def _ring(component: str, *more: Term) -> tuple[Term, ...]:
+def _ring(component: str, low: float, *more: Term) -> tuple[Term, ...]:
     return (
-        Term(f"{component}.ring_share", (0.1,), high=0.8, scale=0.05),
+        Term(f"{component}.ring_share", (0.1,), low=low, high=0.8, scale=0.05),
         Term(f"{component}.ring_frequency", (7.0,), log=True, amount=False),
         Term(f"{component}.ring_damping", (0.1,), high=0.2, log=True, amount=False),
         *more,
@@ -28,8 +30,8 @@ CAUSE = Cause(
     name="resonance",
     title="a resonance of line or mount",
     forms=(
-        Form("line", _ring("regulator", _FLOW), grid(_SHARES, _HERTZ, _DAMPINGS, _FLOWS)),
-        Form("mount", _ring("mass"), grid(_SHARES, _HERTZ, _DAMPINGS)),
+        Form("line", _ring("regulator", 0.0, _FLOW), grid(_SHARES, _HERTZ, _DAMPINGS, _FLOWS)),
+        Form("mount", _ring("mass", -0.8), grid(_TILTS, _HERTZ, _TILT_DAMPINGS)),
     ),
     signature=(
         "a decaying oscillation of one frequency after every step, whatever its size; a peak in "

@@ -10,9 +10,9 @@ from __future__ import annotations
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.seeds import grid
 
-_BREAKS = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 15.0)
-_HOLDS = (0.35, 0.5, 0.65, 0.8)
-_SPEEDS = (2e-4, 1e-3, 3e-3)
+_BREAKS = (0.8, 1.3, 2.1, 3.4, 5.0, 7.2, 10.0, 15.0)
+_HOLDS = (0.45, 0.7)
+_SPEEDS = (5e-4, 3e-3)
 
 CAUSE = Cause(
     name="stick_slip",

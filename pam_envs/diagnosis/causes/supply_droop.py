@@ -3,7 +3,7 @@
 A small reservoir or a long feed loses pressure as air is taken and recovers slowly. High commands
 are then missed or reached late, the more the busier the rig has been; below the supply's pressure
 nothing is felt. In the plant filling runs through a throat from a supply that falls with what is
-filled and comes back exponentially.
+filled and comes back through an orifice.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from __future__ import annotations
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.seeds import grid
 
-_SUPPLIES, _DROOPS = (5.6e5, 6.1e5, 6.4e5, 6.8e5, 7.2e5), (0.05, 0.2, 0.5)
-_TIMES, _RECOVERIES = (0.03, 0.08, 0.2), (2.0, 6.0)
+_SUPPLIES, _DROOPS = (5.6e5, 6.1e5, 6.4e5, 6.8e5, 7.2e5), (0.1, 0.4)
+_TIMES, _RECOVERIES = (0.02, 0.06, 0.2), (2.0, 6.0)
 
 CAUSE = Cause(
     name="supply_droop",

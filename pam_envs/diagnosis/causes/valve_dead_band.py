@@ -12,8 +12,8 @@ from __future__ import annotations
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.seeds import grid
 
-_OPENS = (1e3, 2e3, 3e3, 4e3, 5e3, 6e3, 7.2e3, 8.6e3, 1e4, 1.2e4, 1.4e4, 1.7e4, 2e4)
-_CLOSES = (0.15, 0.3, 0.45, 0.6, 0.8)
+_OPENS = (1.5e3, 3e3, 4.5e3, 6e3, 7.5e3, 9.5e3, 1.2e4, 1.5e4, 2e4)
+_CLOSES = (0.2, 0.45, 0.7)
 
 CAUSE = Cause(
     name="valve_dead_band",
