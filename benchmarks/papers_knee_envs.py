@@ -91,13 +91,13 @@ def emg_environment() -> list[Figure]:
     where, figures = f"{SOURCE}, sections 5.2 and 5.3", list[Figure]()
     preset = "preset on a leg, 5 s a stride, knee_inverse_ltr"
     why = "less than published for the reasons given where the delivery is exact"
-    fitted = "the constant is fitted to exact delivery, this is what the controller delivers"
+    fitted = "the constant is fitted to delivery at once, this is behind low-pass and controller"
     for activity, name in NAMES.items():
         found = emg_ratios(activity)
         for reading, key, kind, band, words in (
             ("uncalibrated", "emg_ratio", "predicted", None, why),
-            ("calibrated A", "emg_ratio_fitted_a", "calibrated", 5.0, fitted),
-            ("calibrated B", "emg_ratio_fitted_b", "calibrated", 5.0, fitted),
+            ("calibrated A", "emg_ratio_fitted_a", "predicted", None, fitted),
+            ("calibrated B", "emg_ratio_fitted_b", "predicted", None, fitted),
         ):
             ours, published = 100.0 * (found[key] - 1.0), 100.0 * PUBLISHED[activity]
             text = note(kind, preset, RMS_NORM, NO_NOISE, words)
