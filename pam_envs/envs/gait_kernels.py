@@ -250,7 +250,7 @@ def judge(rows: Any, fixed: Any, counts: Any, settings: Any, work: Any) -> None:
     pressure, set_point, older = rows[K.PRESSURE], rows[K.SET_POINT], rows[K.OLD_SET_POINT]
     for j in range(LANES):
         stance, tension, off = rows[K.STANCE][j], rows[K.TENSION][j], abs(rows[K.DEVIATION][j])
-        demand = rows[K.DEMAND][j]
+        seen, demand = rows[READ_STANCE][j], rows[K.DEMAND][j]
         over = over_assistance(rows[K.TORQUE][j], demand)
         work[TIME][j] = step[j] * config[PERIOD]
         work[REF][j] = rows[WANTED_TENSION][j]
@@ -258,12 +258,12 @@ def judge(rows: Any, fixed: Any, counts: Any, settings: Any, work: Any) -> None:
         work[S_IDEAL][j] = config[RATIO] * demand
         work[R_TENSION][j] = gated_reward(
             tension - rows[WANTED_TENSION][j],
-            stance,
+            stance * seen,
             config[TENSION_SCALE],
             config[TENSION_WEIGHT],
         )
         work[R_ANGLE][j] = gated_reward(
-            off, 1.0 - stance, config[ANGLE_SCALE], config[ANGLE_WEIGHT]
+            off, (1.0 - stance) * (1.0 - seen), config[ANGLE_SCALE], config[ANGLE_WEIGHT]
         )
         work[R_OVER][j] = gated_reward(over, 1.0, config[OVER_SCALE], config[OVER_WEIGHT])
         work[R_EFFORT][j] = effort_reward(

@@ -162,10 +162,13 @@ def test_ambient_air_costs_nothing() -> None:
     assert max(i["effort/air"] for i in infos) == 0.0
 
 
-def test_rewards_are_gated_by_the_true_stance() -> None:
-    _, info, _ = record("PAM/KneeWalk-v0")
-    stance = info["state/stance"] > 0.5
-    assert (info["reward/angle"][stance] == 0.0).all()
+def test_rewards_are_gated_by_the_stance_that_sensor_and_truth_agree_on() -> None:
+    noisy = KneeOrthosis.on_leg("walk", stride=2.0).replace({"heel.noise": 2.0})
+    _, info, _ = record("PAM/KneeWalk-v0", plant=noisy)
+    true, seen = info["state/stance"] > 0.5, info["sensor/stance"] > 0.5
+    assert (true != seen).any()
+    stance = true & seen
+    assert (info["reward/angle"][true | seen] == 0.0).all()
     assert (info["reward/tension"][~stance] == 0.0).all()
     error = np.abs(info["output"] - info["reference"])[stance]
     assert np.allclose(info["reward/tension"][stance], -error / 10.0)
