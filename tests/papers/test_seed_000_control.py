@@ -153,7 +153,20 @@ def test_the_table_holds_the_figures_of_both_papers():
     assert {*papers.GROUPS, *figures.GROUPS, *gait.GROUPS, *envs.GROUPS} == set(made)
     lines = papers.table(gait.switching_transient()).splitlines()
     assert len(lines) == 5
-    assert all("pass" in line and "mismatch 10 N" in line for line in lines[1:])
+    assert all("mismatch 10 N" in line for line in lines[1:])
+    assert ["pass" in line for line in lines[1:]] == ["tension" in line[:10] for line in lines[1:]]
+
+
+def test_a_figure_is_judged_by_what_is_expected_and_by_its_bounds():
+    def judged(ours, tolerance=None, **bounds):
+        return papers.Figure("a", "b", "", 3.5, ours, tolerance, **bounds).verdict
+
+    assert judged(1.6, at_least=3.5) == "MISSED"
+    assert judged(5.6, at_least=3.5) == "pass"
+    assert judged(1.4, at_most=1.33) == "MISSED"
+    assert judged(5.5, 0.2, expected=5.52) == "pass"
+    assert judged(3.5, 0.2, expected=5.52) == "FAIL"
+    assert judged(3.5, expected=5.52) == "reported"
 
 
 def test_a_group_that_cannot_be_computed_is_one_line(monkeypatch):
