@@ -25,10 +25,6 @@ from baselines.ltr import LtrDesign, design_ltr
 
 NOMINAL_PRESSURE = 2e5
 """Pressure [Pa] that deviations are counted from (section 4.1)."""
-NOMINAL_TENSION = 158.0
-"""Tension [N] there."""
-NOMINAL_LENGTH = 0.22
-"""Length [m] there."""
 
 CONTROLLER_NUMERATOR = (
     6.418e4, 6.679e6, 2.892e8, 6.714e9, 8.96e10, 6.816e11, 2.713e12, 4.343e12,

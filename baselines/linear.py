@@ -195,12 +195,6 @@ class DiscreteSystem:
         return np.asarray(states[..., 0] @ self.c + self.d)
 
 
-def _response(s: Complex, a: Array, b: Array, c: Array, d: float) -> Complex:
-    inputs = np.broadcast_to(b[:, None], (*s.shape, len(b), 1))
-    states = np.linalg.solve(s[..., None, None] * np.eye(len(b)) - a, inputs)
-    return np.asarray(states[..., 0] @ c + d)
-
-
 def _time_scale(denominator: Array) -> float:
     """Return the geometric mean of the poles that are not at 0 [rad/s], or 1."""
     poles = np.abs(np.roots(denominator))

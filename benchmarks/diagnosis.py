@@ -42,7 +42,7 @@ LIBRARY = (
     *(f"hysteresis/{name}.py" for name in ("elements", "everett", "maxwell_slip", "preisach")),
     *("hysteresis/checks.py", "hysteresis/extrema.py", "mechanics/hanging_mass.py"),
     *("muscle/effective_area.py", "pneumatics/regulator.py", "sensing/sensor.py"),
-    *(f"plants/{name}.py" for name in ("memory", "replay", "stepping", "single_muscle")),
+    *(f"plants/{name}.py" for name in ("memory", "plant", "replay", "stepping", "single_muscle")),
     *(f"plants/single_muscle_{name}.py" for name in ("effects", "kernels", "rows")),
 )
 """What of the library besides the diagnosis decides: the one plant it knows, and its data."""

@@ -213,7 +213,10 @@ for name in sys.argv[1:]:
 @pytest.mark.skipif(not kernels.COMPILED, reason="nothing is kept on disk")
 def test_kernels_that_were_compiled_apart_run_side_by_side(tmp_path: Path) -> None:
     (tmp_path / "apart.py").write_text(_BUILT_APART)
-    environment = {**os.environ, "PAM_ENVS_CACHE": str(tmp_path / "cache")}
+    library = str(Path(kernels.__file__).parents[1])  # also where the package is not installed
+    known = os.pathsep.join(filter(None, (library, os.environ.get("PYTHONPATH"))))
+    cache = {"PAM_ENVS_CACHE": str(tmp_path / "cache"), "PYTHONPATH": known}
+    environment = {**os.environ, **cache}
 
     def run(*names: str) -> list[str]:
         command = [sys.executable, str(tmp_path / "apart.py"), *names]

@@ -16,7 +16,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -29,11 +28,11 @@ from pam_envs.mechanics.knee_lever import KneeLever
 from pam_envs.mechanics.leg import Leg
 from pam_envs.muscle.emg import MuscleActivation
 from pam_envs.muscle.gas_spring import GasSpring
-from pam_envs.parameters import check, parameter
+from pam_envs.parameters import parameter
 from pam_envs.plants import knee_orthosis_rows as K
-from pam_envs.plants import plant_file
 from pam_envs.plants.knee_memory import KneeMemory, knee_memory
 from pam_envs.plants.memory import Kind
+from pam_envs.plants.plant import Plant
 from pam_envs.pneumatics.measured_dynamics import OrthosisRegulator, mode_rows
 from pam_envs.references.gait import ACTIVITIES, PAPER_STRIDE, SIGNALS, gait_table
 from pam_envs.sensing.orthosis import (
@@ -83,7 +82,7 @@ class Stride:
 
 
 @dataclass(frozen=True)
-class KneeOrthosis:
+class KneeOrthosis(Plant):
     """The plant; another one is :meth:`replace` of it.
 
     Attributes
@@ -100,16 +99,9 @@ class KneeOrthosis:
         The components.
     tension, angle, pressure, heel, ground, cop, ankle
         The sensors.
-    provenance : mapping
-        Parameter name to ``(provenance, source)`` where it differs from the declaration.
-    ensemble : tuple of mapping
-        Other parameter sets for domain randomisation, as in ``SingleMuscle``.
-    substeps : int
-        Steps of the integrator in a control period.
     """
 
     family: ClassVar[str] = "knee_orthosis"
-    control_period: ClassVar[float] = 0.01
     components: ClassVar[tuple[str, ...]] = (
         "regulator",
         "memory",
@@ -128,8 +120,8 @@ class KneeOrthosis:
         "cop",
         "ankle",
     )
+    names: ClassVar[tuple[str, ...]] = K.NAMES
     choices: ClassVar[tuple[str, ...]] = tuple(MAKES)
-    effects: ClassVar[tuple[tuple[str, ...], ...]] = ()
     extended: ClassVar[bool] = False
 
     mounting: Mounting = "no_load"
@@ -151,9 +143,6 @@ class KneeOrthosis:
     ground: GroundSensor = field(default_factory=GroundSensor)
     cop: CopSensor = field(default_factory=CopSensor)
     ankle: AngleSensor = field(default_factory=AngleSensor)
-    provenance: Mapping[str, tuple[str, str]] = field(default_factory=dict, compare=False)
-    ensemble: tuple[Mapping[str, Any], ...] = field(default=(), compare=False)
-    substeps: int = 4
 
     def __post_init__(self) -> None:
         """Check every parameter, and that the motion can be followed."""
@@ -162,13 +151,7 @@ class KneeOrthosis:
                 raise ValueError(
                     f"{name} = {getattr(self, name)!r}; choose one of {', '.join(allowed)}"
                 )
-        for name in self.components:
-            check(getattr(self, name), name)
-        if not isinstance(self.substeps, int) or not 1 <= self.substeps <= 100:
-            raise ValueError(
-                f"substeps = {self.substeps!r} must be a whole number from 1 to 100; "
-                "4 is the default"
-            )
+        self.check_components()
         self._check_memory()
         self._check_motion()
         self._check_toggle()
@@ -288,24 +271,6 @@ class KneeOrthosis:
             {f"{s}.{what}": 0.0 for s in sensors for what in ("noise", "resolution")}
         )
 
-    def replace(self, values: Mapping[str, Any]) -> KneeOrthosis:
-        """Return the plant with parameters replaced by dotted name (``"lever.stiffness"``)."""
-        changed: dict[str, dict[str, Any]] = {}
-        for name, value in values.items():
-            component, _, entry = name.partition(".")
-            if name not in K.NAMES and name != "memory.operator":
-                raise ValueError(f"no parameter named {name!r}; there are: {', '.join(K.NAMES)}")
-            changed.setdefault(component, {})[entry] = value
-        parts: dict[str, Any] = {
-            c: dataclasses.replace(getattr(self, c), **v) for c, v in changed.items()
-        }
-        return dataclasses.replace(self, **parts)
-
-    def value(self, name: str) -> float:
-        """Return a parameter by dotted name, in SI."""
-        component, _, entry = name.partition(".")
-        return float(getattr(getattr(self, component), entry))
-
     # --- statics ----------------------------------------------------------------------------------
 
     def tension_for(self, angle: ArrayLike, torque: ArrayLike = 0.0) -> NDArray[np.float64]:
@@ -349,10 +314,6 @@ class KneeOrthosis:
         operator = self.memory.operator
         return len(operator.spring) if isinstance(operator, ModifiedMaxwellSlip) else 0
 
-    def members(self) -> tuple[KneeOrthosis, ...]:
-        """Return this plant and the equally good fits beside it."""
-        return (self, *(self.replace(values) for values in self.ensemble))
-
     def memory_tables(self) -> NDArray[np.float64]:
         """Return what the memories of all members are made of, shape (members, ., .).
 
@@ -364,25 +325,6 @@ class KneeOrthosis:
         maps = [np.asarray(o.table, float) for o in operators if isinstance(o, Preisach)]
         tables = slips or maps
         return np.ascontiguousarray(tables) if tables else np.zeros((1, 2, 2))
-
-    def to_yaml(self, path: str | Path) -> None:
-        """Write the plant to a file that :meth:`from_yaml` and ``gym.make(plant=...)`` read."""
-        plant_file.write(self, Path(path))
-
-    @classmethod
-    def from_yaml(cls, path: str | Path) -> KneeOrthosis:
-        """Read a plant; what the file leaves out keeps its default.
-
-        Raises
-        ------
-        ValueError
-            If the file cannot be read, or a value is unknown or out of bounds.
-        """
-        return plant_file.read(cls, Path(path))
-
-    def digest(self) -> str:
-        """Return a hash of family, make, parameters and memory, 16 hexadecimal digits."""
-        return plant_file.digest(self)
 
 
 def _slip_table(operator: ModifiedMaxwellSlip) -> NDArray[np.float64]:

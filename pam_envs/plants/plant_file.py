@@ -33,67 +33,13 @@ from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.parameters import PROVENANCES, Declaration, declarations
 
 if TYPE_CHECKING:
-    from pam_envs.plants.knee_orthosis import KneeOrthosis
-    from pam_envs.plants.single_muscle import SingleMuscle
+    from pam_envs.plants.plant import Plant
 
-    AnyPlant: TypeAlias = SingleMuscle | KneeOrthosis
     Operator: TypeAlias = PlayOperator | ModifiedMaxwellSlip | Preisach | None
 
-Plant = TypeVar("Plant", "SingleMuscle", "KneeOrthosis")
-COMPONENTS = ("regulator", "memory", "muscle", "mass", "position", "pressure")
+P = TypeVar("P", bound="Plant")
 KEYS = ("schema", "family", "substeps", "parameters", "memory", "ensemble", "notes")
 ENTRY_KEYS = ("value", "unit", "provenance", "source")
-_CREEP_TIMES = tuple(f"memory.creep_time_{k}" for k in (1, 2, 3, 4))
-EFFECTS: tuple[tuple[str, ...], ...] = (
-    ("regulator.gain",),
-    ("regulator.slew_bend",),
-    ("regulator.dead_band", "regulator.dead_close"),
-    ("regulator.overlap", "regulator.overlap_leak"),
-    ("regulator.exhaust_ratio", "regulator.exhaust_taper"),
-    ("regulator.exhaust_rate",),
-    ("regulator.leak",),
-    (
-        "regulator.supply_pressure",
-        "regulator.supply_droop",
-        "regulator.supply_time",
-        "regulator.supply_recovery",
-    ),
-    (
-        "regulator.ring_share",
-        "regulator.ring_flow",
-        "regulator.ring_frequency",
-        "regulator.ring_damping",
-    ),
-    ("memory.shape",),
-    ("memory.pressure_slope",),
-    ("memory.pressure_bend",),
-    (*(f"{c}.creep_{k}" for c in ("memory", "muscle") for k in (1, 2, 3, 4)), *_CREEP_TIMES),
-    ("memory.first_width", "memory.first_loss", "memory.first_travel"),
-    ("memory.threshold",),
-    ("muscle.area_curve",),
-    ("muscle.softening",),
-    ("muscle.stiffening",),
-    ("muscle.temperature", "muscle.temperature_gain"),
-    ("muscle.load_curve",),
-    ("muscle.load_stiffening",),
-    ("muscle.load_stiffening_2",),
-    (*(f"muscle.strand_{k}" for k in (1, 2, 3, 4)), "muscle.strand_break"),
-    ("muscle.viscosity", "muscle.viscosity_speed"),
-    ("mass.carried",),
-    ("mass.load_error",),
-    ("mass.slack",),
-    ("mass.stick", "mass.stick_kinetic", "mass.stick_speed"),
-    ("mass.ring_share", "mass.ring_frequency", "mass.ring_damping"),
-    ("position.drift", "position.drift_time"),
-    ("position.ramp", "position.ramp_at", "position.ramp_over"),
-    ("position.delay",),
-    ("position.bow",),
-    ("position.slip", "position.slip_at"),
-    ("pressure.drift",),
-    ("pressure.bow",),
-)
-"""Parameters that switch an effect on, each with those that shape it. A file leaves out what is
-off, so that a plant's digest stays when a new effect is added."""
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
@@ -169,12 +115,12 @@ def _memory(record: Any, where: str) -> Operator:
     return None
 
 
-def record(plant: AnyPlant) -> dict[str, Any]:
+def record(plant: Plant) -> dict[str, Any]:
     """Return a plant as plain data, in the layout of the file."""
     parameters = {}
     absent = _absent(plant)
-    for component in _components(plant):
-        part = getattr(plant, component)
+    parts = {component: getattr(plant, component) for component in plant.components}
+    for component, part in parts.items():
         for name, declared in declarations(part).items():
             key = f"{component}.{name}"
             if key in absent:
@@ -195,38 +141,30 @@ def record(plant: AnyPlant) -> dict[str, Any]:
     return {
         "schema": 1,
         "family": plant.family,
-        **{choice: getattr(plant, choice) for choice in _choices(plant)},
+        **{choice: getattr(plant, choice) for choice in plant.choices},
         "substeps": plant.substeps,
         "parameters": parameters,
-        "memory": _memory_record(plant.memory.operator),
+        "memory": _memory_record(parts["memory"].operator),
         "ensemble": ensemble,
     }
 
 
-def _components(plant: Any) -> tuple[str, ...]:
-    return getattr(plant, "components", COMPONENTS)
-
-
-def _choices(plant: Any) -> tuple[str, ...]:
-    return getattr(plant, "choices", ())
-
-
-def _absent(plant: AnyPlant) -> set[str]:
+def _absent(plant: Plant) -> set[str]:
     """Return the parameters of effects that are off, which a file need not name."""
     absent = set()
-    for names in getattr(plant, "effects", EFFECTS):
+    for names in plant.effects:
         amounts = [n for n in names if _declared(plant, n).neutral is not None]
         if all(plant.value(n) == _declared(plant, n).neutral for n in amounts):
             absent |= set(names)
     return absent
 
 
-def _declared(plant: AnyPlant, name: str) -> Declaration:
+def _declared(plant: Plant, name: str) -> Declaration:
     component, _, field = name.partition(".")
     return declarations(getattr(plant, component))[field]
 
 
-def digest(plant: AnyPlant) -> str:
+def digest(plant: Plant) -> str:
     """Return a hash over the canonical values (not provenance, sources or notes)."""
 
     def exact(value: Any) -> Any:
@@ -244,7 +182,7 @@ def digest(plant: AnyPlant) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def write(plant: AnyPlant, path: Path, notes: Mapping[str, Any] | None = None) -> None:
+def write(plant: Plant, path: Path, notes: Mapping[str, Any] | None = None) -> None:
     """Write a plant, whole or not at all."""
     data = record(plant)
     if notes:
@@ -259,7 +197,7 @@ def write(plant: AnyPlant, path: Path, notes: Mapping[str, Any] | None = None) -
     os.replace(temporary, path)
 
 
-def read(cls: type[Plant], path: Path) -> Plant:
+def read(cls: type[P], path: Path) -> P:
     """Read a plant file; every complaint names the file, the key and what to do."""
     try:
         with open(path, encoding="utf-8") as file:
@@ -271,7 +209,7 @@ def read(cls: type[Plant], path: Path) -> Plant:
     where = f"plant file {path}"
     if not isinstance(data, Mapping):
         raise ValueError(f"{where}: must hold a mapping with the keys {', '.join(KEYS)}")
-    keys = (*KEYS, *_choices(cls))
+    keys = (*KEYS, *cls.choices)
     unknown = [str(k) for k in data if k not in keys]
     if unknown:
         raise ValueError(f"{where}: unknown key {unknown[0]!r}; known: {', '.join(keys)}")
@@ -288,13 +226,13 @@ def read(cls: type[Plant], path: Path) -> Plant:
         raise type(error)(text if text.startswith(where) else f"{where}: {text}") from error
 
 
-def _build(cls: type[Plant], data: Mapping[str, Any], where: str) -> Plant:
+def _build(cls: type[P], data: Mapping[str, Any], where: str) -> P:
     values: dict[str, Any] = {}
     provenance: dict[str, tuple[str, str]] = {}
     given = data.get("parameters") or {}
     known = {
         f"{c}.{name}": d
-        for c in _components(cls)
+        for c in cls.components
         for name, d in declarations(getattr(cls(), c)).items()
     }
     if not isinstance(given, Mapping):
@@ -321,7 +259,7 @@ def _build(cls: type[Plant], data: Mapping[str, Any], where: str) -> Plant:
             other["memory.operator"] = _memory(member["memory"], place)
         ensemble.append(other)
     substeps = data.get("substeps", 4)
-    choices: Any = {choice: data[choice] for choice in _choices(cls) if choice in data}
+    choices: Any = {choice: data[choice] for choice in cls.choices if choice in data}
     plant = cls(substeps=substeps, provenance=provenance).replace(values)
     made = dataclasses.replace(plant, ensemble=tuple(ensemble), **choices)
     made.members()  # every member must be a valid plant

@@ -8,9 +8,7 @@ start, as in the paper's tables.
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -22,10 +20,10 @@ from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.mechanics.hanging_mass import GRAVITY, LARGEST_PHASE, HangingMass
 from pam_envs.muscle.effective_area import EffectiveAreaMuscle
-from pam_envs.parameters import check, declarations
-from pam_envs.plants import plant_file
+from pam_envs.parameters import declarations
 from pam_envs.plants import single_muscle_rows as R
 from pam_envs.plants.memory import Kind, Memory
+from pam_envs.plants.plant import Plant
 from pam_envs.pneumatics.regulator import Regulator
 from pam_envs.sensing.sensor import PositionSensor, PressureSensor
 
@@ -44,6 +42,57 @@ NEUTRAL: dict[str, float] = {
 }
 """The values at which each effect is off."""
 
+_CREEP_TIMES = tuple(f"memory.creep_time_{k}" for k in (1, 2, 3, 4))
+EFFECTS: tuple[tuple[str, ...], ...] = (
+    ("regulator.gain",),
+    ("regulator.slew_bend",),
+    ("regulator.dead_band", "regulator.dead_close"),
+    ("regulator.overlap", "regulator.overlap_leak"),
+    ("regulator.exhaust_ratio", "regulator.exhaust_taper"),
+    ("regulator.exhaust_rate",),
+    ("regulator.leak",),
+    (
+        "regulator.supply_pressure",
+        "regulator.supply_droop",
+        "regulator.supply_time",
+        "regulator.supply_recovery",
+    ),
+    (
+        "regulator.ring_share",
+        "regulator.ring_flow",
+        "regulator.ring_frequency",
+        "regulator.ring_damping",
+    ),
+    ("memory.shape",),
+    ("memory.pressure_slope",),
+    ("memory.pressure_bend",),
+    (*(f"{c}.creep_{k}" for c in ("memory", "muscle") for k in (1, 2, 3, 4)), *_CREEP_TIMES),
+    ("memory.first_width", "memory.first_loss", "memory.first_travel"),
+    ("memory.threshold",),
+    ("muscle.area_curve",),
+    ("muscle.softening",),
+    ("muscle.stiffening",),
+    ("muscle.temperature", "muscle.temperature_gain"),
+    ("muscle.load_curve",),
+    ("muscle.load_stiffening",),
+    ("muscle.load_stiffening_2",),
+    (*(f"muscle.strand_{k}" for k in (1, 2, 3, 4)), "muscle.strand_break"),
+    ("muscle.viscosity", "muscle.viscosity_speed"),
+    ("mass.carried",),
+    ("mass.load_error",),
+    ("mass.slack",),
+    ("mass.stick", "mass.stick_kinetic", "mass.stick_speed"),
+    ("mass.ring_share", "mass.ring_frequency", "mass.ring_damping"),
+    ("position.drift", "position.drift_time"),
+    ("position.ramp", "position.ramp_at", "position.ramp_over"),
+    ("position.delay",),
+    ("position.bow",),
+    ("position.slip", "position.slip_at"),
+    ("pressure.drift",),
+    ("pressure.bow",),
+)
+"""See :class:`pam_envs.plants.plant.Plant`."""
+
 FOLDER = Path(__file__).resolve().parent.parent / "data"
 
 
@@ -52,25 +101,26 @@ class UnstableParameters(ValueError):
 
 
 @dataclass(frozen=True)
-class SingleMuscle:
+class SingleMuscle(Plant):
     """The plant; an extended one is ``dataclasses.replace`` of it.
 
     Attributes
     ----------
     regulator, memory, muscle, mass, position, pressure
         Its components, in the order of the signal.
-    provenance : mapping
-        Parameter name (``"muscle.area"``) to ``(provenance, source)`` where it differs from the
-        declaration.
-    ensemble : tuple of mapping
-        Other parameter sets that fit the data equally well (parameter name to value; Preisach
-        operators under ``"memory.operator"``), for domain randomisation.
-    substeps : int
-        Steps of the integrator in a control period.
     """
 
     family: ClassVar[str] = "single_muscle"
-    control_period: ClassVar[float] = 0.01
+    components: ClassVar[tuple[str, ...]] = (
+        "regulator",
+        "memory",
+        "muscle",
+        "mass",
+        "position",
+        "pressure",
+    )
+    names: ClassVar[tuple[str, ...]] = R.NAMES
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = EFFECTS
 
     regulator: Regulator = field(default_factory=Regulator)
     memory: Memory = field(default_factory=Memory)
@@ -78,19 +128,10 @@ class SingleMuscle:
     mass: HangingMass = field(default_factory=HangingMass)
     position: PositionSensor = field(default_factory=PositionSensor)
     pressure: PressureSensor = field(default_factory=PressureSensor)
-    provenance: Mapping[str, tuple[str, str]] = field(default_factory=dict, compare=False)
-    ensemble: tuple[Mapping[str, Any], ...] = field(default=(), compare=False)
-    substeps: int = 4
 
     def __post_init__(self) -> None:
         """Check every parameter, and that the motion can be followed."""
-        for name in plant_file.COMPONENTS:
-            check(getattr(self, name), name)
-        if not isinstance(self.substeps, int) or not 1 <= self.substeps <= 100:
-            raise ValueError(
-                f"substeps = {self.substeps!r} must be a whole number from 1 to 100; "
-                "4 is the default"
-            )
+        self.check_components()
         self._check_memory()
         self._check_motion()
 
@@ -158,24 +199,6 @@ class SingleMuscle:
             )
         plant = cls.from_yaml(FOLDER / f"mas10_{hysteresis}.yaml")
         return plant.replace({k.replace("__", "."): v for k, v in changes.items()})
-
-    def replace(self, values: Mapping[str, Any]) -> SingleMuscle:
-        """Return the plant with parameters replaced by dotted name (``"mass.load"``)."""
-        changed: dict[str, dict[str, Any]] = {}
-        for name, value in values.items():
-            component, _, entry = name.partition(".")
-            if name not in R.NAMES and name != "memory.operator":
-                raise ValueError(f"no parameter named {name!r}; there are: {', '.join(R.NAMES)}")
-            changed.setdefault(component, {})[entry] = value
-        parts: dict[str, Any] = {
-            c: dataclasses.replace(getattr(self, c), **v) for c, v in changed.items()
-        }
-        return dataclasses.replace(self, **parts)
-
-    def value(self, name: str) -> float:
-        """Return a parameter by dotted name, in SI."""
-        component, _, entry = name.partition(".")
-        return float(getattr(getattr(self, component), entry))
 
     # --- the static law and its inverse -----------------------------------------------------
 
@@ -253,31 +276,8 @@ class SingleMuscle:
         operator = self.memory.operator
         return len(operator.weights) if isinstance(operator, PlayOperator) else 0
 
-    def members(self) -> tuple[SingleMuscle, ...]:
-        """Return this plant and the equally good fits beside it."""
-        return (self, *(self.replace(values) for values in self.ensemble))
-
     def everett_tables(self) -> NDArray[np.float64]:
         """Return the Everett maps of all members, shape (members, n, n); (1, 2, 2) if none."""
         operators = [m.memory.operator for m in self.members()]
         tables = [np.asarray(o.table, float) for o in operators if isinstance(o, Preisach)]
         return np.ascontiguousarray(tables) if tables else np.zeros((1, 2, 2))
-
-    def to_yaml(self, path: str | Path) -> None:
-        """Write the plant to a file that :meth:`from_yaml` and ``gym.make(plant=...)`` read."""
-        plant_file.write(self, Path(path))
-
-    @classmethod
-    def from_yaml(cls, path: str | Path) -> SingleMuscle:
-        """Read a plant; what the file leaves out keeps its default.
-
-        Raises
-        ------
-        ValueError
-            If the file cannot be read, or a value is unknown or out of bounds.
-        """
-        return plant_file.read(cls, Path(path))
-
-    def digest(self) -> str:
-        """Return a hash of family, parameters and memory, 16 hexadecimal digits."""
-        return plant_file.digest(self)

@@ -17,6 +17,7 @@ from benchmarks.diagnosis_cases import Case
 from benchmarks.diagnosis_study import study
 from pam_envs.kernels import COMPILED
 
+pytestmark = pytest.mark.xdist_group("hidden effects")  # one process makes the sample
 compiled = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")
 
 SIZE = 3.0

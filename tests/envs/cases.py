@@ -96,7 +96,6 @@ OWN: dict[str, dict[str, dict[str, Any]]] = {
     },
     "PAM/KneeStiffness-v0": {"samples": {"reference": [20.0 * (k % 300) for k in range(600)]}},
     "PAM/KneeWalk-v0": {
-        "preisach_random": PREISACH,
         "quick": {"pace": "normal", "assistance": "clipped", "mismatch": 10.0, "ratio": 0.3},
         "demand": {"reference": "demand", "start": "heel_contact", "preview": 0},
         "samples": {"reference": [0.1 * (k % 100) for k in range(300)], "preview": 20},
@@ -107,7 +106,7 @@ OWN: dict[str, dict[str, dict[str, Any]]] = {
 PLAIN: dict[str, dict[str, dict[str, Any]]] = {
     "PAM/KneeTension-v0": {"none": NONE},
     "PAM/KneeStiffness-v0": {"preisach_random": PREISACH, "none": NONE},
-    "PAM/KneeWalk-v0": {"none": NONE},
+    "PAM/KneeWalk-v0": {"preisach_random": PREISACH, "none": NONE},
     "PAM/KneeStairsUp-v0": {"preisach_random": PREISACH},
     "PAM/KneeStairsDown-v0": {"none": NONE},
 }

@@ -197,9 +197,8 @@ def test_a_sparse_plant_file_takes_defaults(tmp_path: Path) -> None:
 
 def test_every_parameter_carries_unit_bounds_provenance_and_source() -> None:
     from pam_envs.parameters import PROVENANCES, declarations
-    from pam_envs.plants.plant_file import COMPONENTS
 
-    for component in COMPONENTS:
+    for component in SingleMuscle.components:
         for name, d in declarations(getattr(SingleMuscle(), component)).items():
             assert d.unit, name
             assert d.low < d.high, name
