@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from benchmarks.papers import Figure
 from benchmarks.papers_knee import BEFORE, PERIOD, SOURCE, UNKNOWN, note
 from pam_envs.identification.emg_calibration import PUBLISHED, change, stride_torques
+from pam_envs.mechanics.leg import GRAVITY
 from pam_envs.muscle.emg import MuscleActivation, Reading, calibration, emg_proxy
 from pam_envs.plants.knee_orthosis import Activity, KneeOrthosis
 from pam_envs.plants.knee_rollout import simulate_knee
@@ -40,6 +41,11 @@ ASSUMED: dict[Activity, str] = {
 }
 LEANS = ("the shank itself", "the ankle's angle, foot flat")
 """What Eq. (1) takes for the shank's lean, ``shoe.flat_foot`` 0 and 1."""
+LEFT_OUT = ("horizontal force", "weight of the shank")
+"""What the paper says that Eq. (1) neglects, beside all acceleration."""
+MOST_ERROR = 4.0
+"""Our target [N m] for Eq. (1) at the paper's pace, where the paper takes it to be good; it gives no
+error of its own."""
 READINGS: tuple[Reading, ...] = ("A", "B")
 MISMATCH = 10.0
 """Error [N] of the tension's reference in swing."""
@@ -87,10 +93,30 @@ def uncalibrated_change(
     return emg_proxy(*(np.tile(x, 2) for x in (made["demand"], helped)), PERIOD, muscle).change
 
 
-def estimator_error(activity: Activity, stride: float, flat_foot: float = 0.0) -> float:
-    """Return the RMS error [N m] of Eq. (1) in stance."""
+def estimator_error(
+    activity: Activity, stride: float, flat_foot: float = 0.0, added: tuple[str, ...] = ()
+) -> float:
+    """Return the RMS error [N m] of Eq. (1) in stance.
+
+    Parameters
+    ----------
+    activity : {"walk", "stairs_up", "stairs_down"}
+    stride : float
+        Duration of a stride [s].
+    flat_foot : {0.0, 1.0}
+        1: the lean is the ankle's angle.
+    added : tuple of str
+        Of ``LEFT_OUT``, what is added to Eq. (1).
+    """
     made = stride_record(activity, stride, {"shoe.flat_foot": flat_foot})
-    error = (made["estimate"] - made["demand"])[made["stance"] > 0.0]
+    leg = KneeOrthosis.on_leg(activity).leg
+    missing = {
+        "horizontal force": -made["ground_x"]
+        * (leg.ankle_height + leg.shank * np.cos(made["shank"])),
+        "weight of the shank": -leg.mass * leg.centre * GRAVITY * np.sin(made["shank"]),
+    }
+    torque = made["estimate"] + sum(missing[name] for name in added)
+    error = (torque - made["demand"])[made["stance"] > 0.0]
     return float(np.sqrt(np.mean(error**2)))
 
 
@@ -155,14 +181,38 @@ def _natural_pace() -> list[Figure]:
     quick = 100.0 * uncalibrated_change("walk", NATURAL_STRIDE)
     title = f"EMG, walking, {NATURAL_STRIDE:g} s a stride, uncalibrated"
     figures = [Figure(title, where, "%", unknown, quick, None, text)]
-    for stride in (PAPER_STRIDE, NATURAL_STRIDE):
-        for flat, sensed in enumerate(LEANS):
-            missing = "it leaves out the ground's horizontal force and inertia"
-            text = note("predicted", "preset full balance of the leg", "RMS in stance", missing)
-            name = f"error of Eq. (1), {stride:g} s a stride, lean from {sensed}"
-            error = estimator_error("walk", stride, float(flat))
-            figures.append(Figure(name, where, "N m", unknown, error, None, text))
+    return [*figures, *(f for t in (PAPER_STRIDE, NATURAL_STRIDE) for f in _estimator_errors(t))]
+
+
+def _estimator_errors(stride: float) -> list[Figure]:
+    """Return the error of Eq. (1) by what the lean is taken from, and by what is added to it."""
+    where, figures = f"{SOURCE}, sections 2 and 5.2", list[Figure]()
+    tag = ("predicted", "preset full balance of the leg", "RMS in stance")
+    slow = stride == PAPER_STRIDE
+    for flat, sensed in enumerate(LEANS):
+        judged = slow and not flat
+        why = "it leaves out the ground's horizontal force and the shank's weight and inertia"
+        more = (
+            (f"our target is {MOST_ERROR:g} N m, the paper gives none; {LATE}",) if judged else ()
+        )
+        name = f"error of Eq. (1), {stride:g} s a stride, lean from {sensed}"
+        error = estimator_error("walk", stride, float(flat))
+        text = note(*tag, why, *more)
+        figures.append(
+            Figure(name, where, "N m", UNKNOWN, error, None, text,
+                   at_most=MOST_ERROR if judged else None)
+        )  # fmt: skip
+    for added in ((LEFT_OUT[0],), (LEFT_OUT[1],), LEFT_OUT):
+        name = f"error of Eq. (1), {stride:g} s a stride, with the {' and the '.join(added)}"
+        error = estimator_error("walk", stride, added=added)
+        figures.append(Figure(name, where, "N m", UNKNOWN, error, None, note(*tag)))
     return figures
+
+
+LATE = (
+    "most of it is of late stance, where the shank leans and its weight, which the paper takes to"
+    " be ignorable, comes to 3 N m RMS"
+)
 
 
 def linear_switch(mismatch: float, compensated: bool) -> tuple[float, float]:
