@@ -44,8 +44,8 @@ LEANS = ("the shank itself", "the ankle's angle, foot flat")
 LEFT_OUT = ("horizontal force", "weight of the shank")
 """What the paper says that Eq. (1) neglects, beside all acceleration."""
 MOST_ERROR = 4.0
-"""Our target [N m] for Eq. (1) at the paper's pace, where the paper takes it to be good; it gives no
-error of its own."""
+"""Our target [N m] for Eq. (1) at the paper's pace, where the paper takes it to be good; it gives
+no error of its own."""
 READINGS: tuple[Reading, ...] = ("A", "B")
 MISMATCH = 10.0
 """Error [N] of the tension's reference in swing."""
@@ -192,9 +192,7 @@ def _estimator_errors(stride: float) -> list[Figure]:
     for flat, sensed in enumerate(LEANS):
         judged = slow and not flat
         why = "it leaves out the ground's horizontal force and the shank's weight and inertia"
-        more = (
-            (f"our target is {MOST_ERROR:g} N m, the paper gives none; {LATE}",) if judged else ()
-        )
+        more = (f"our target, the paper gives none; {LATE}",) if judged else ()
         name = f"error of Eq. (1), {stride:g} s a stride, lean from {sensed}"
         error = estimator_error("walk", stride, float(flat))
         text = note(*tag, why, *more)
