@@ -97,14 +97,31 @@ def test_a_sample_in_which_sensor_and_truth_disagree_moves_no_score(seen: float)
 
 
 def test_a_valve_that_is_open_is_no_help_to_the_wearer() -> None:
-    env: Any = gym.make("PAM/KneeWalk-v0", start="heel_contact", episode_seconds=6.0).unwrapped
+    env: Any = gym.make("PAM/KneeWalk-v0", start="heel_contact", episode_seconds=16.0).unwrapped
     full = Constant(env.action_signals["pressure_set_point"], 4.5e5)
     made = rollout.run(env, full, 0).signals
-    ratios = metrics_knee.emg(made, made["time"] > 1.0, PERIOD, "walk")
+    window = (made["time"] > 5.0) & (made["time"] < 15.0 + 0.5 * PERIOD)
+    ratios = metrics_knee.emg(made, window, PERIOD, "walk")
     for reading in ("", "_fitted_a", "_fitted_b"):
         assert ratios[f"emg_extensors_ratio{reading}"] < ratios[f"emg_ratio{reading}"]
-    assert ratios["emg_ratio"] > 1.0
-    assert ratios["emg_extensors_ratio"] < 0.7
+    assert ratios["emg_extensors_ratio"] == pytest.approx(0.593, abs=0.01)
+    assert ratios["emg_ratio"] == pytest.approx(1.139, abs=0.02)
+    assert ratios["emg_ratio_fitted_a"] == pytest.approx(1.66, abs=0.03)
+
+
+def test_reading_b_makes_little_of_a_small_torque_that_is_held_against_for_long() -> None:
+    """All of Eq. (1) as demand, and a power of 2: the flexors' 15 N m are a tenth of the peak."""
+    demand = np.where(STANCE > 0.5, 50.0, 0.0)
+    open_valve = np.full(N, 15.0)
+    record = signals(**{"state/estimate": demand, "state/torque": open_valve})
+    whole = np.ones(N, bool)
+    ratios = metrics_knee.emg(record, whole, PERIOD, "walk")
+    power, share = 2.0255, 15.0 / 50.0
+    assert ratios["emg_ratio_fitted_b"] == pytest.approx(
+        np.hypot((1.0 - share) ** power, share**power), abs=0.02
+    )
+    assert ratios["emg_ratio_fitted_b"] < 0.55
+    assert ratios["emg_ratio_fitted_a"] > 0.65  # (27.5 - 15) / 27.5 and 15 / 27.5
 
 
 def test_a_gate_that_never_opens_is_told() -> None:

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from pam_envs.kernels import COMPILED, interpreted
 from pam_envs.mechanics.leg import GRAVITY
-from pam_envs.muscle.emg import MuscleActivation, calibration, emg_proxy
+from pam_envs.muscle.emg import MuscleActivation, emg_proxy
 from pam_envs.plants.knee_orthosis import KneeOrthosis
 from pam_envs.plants.knee_rollout import (
     OUTPUTS,
@@ -278,8 +278,8 @@ def test_pushed_off_his_path_the_wearer_bears_the_difference() -> None:
     held = made["hold"] * made["deviation"] + made["torque"]
     past = plant.lever.mount_angle + made["knee"] - plant.lever.relaxed_angle
     held -= plant.lever.stiffness * np.maximum(0.0, past)
-    assert np.abs(held[100:]).max() < 1.5
-    assert np.abs(made["torque"][100:]).max() > 4.0
+    assert np.abs(held[100:]).max() < 0.5
+    assert np.abs(made["torque"][100:]).max() > 8.0
 
 
 def emg_change(time: float) -> float:
@@ -306,10 +306,6 @@ def test_the_activations_are_those_of_the_proxy() -> None:
         ("flexors_free", proxy.flexors_free),
     ):
         assert np.allclose(made[name][settled], wanted[settled], atol=1e-6)
-
-
-def test_constants_are_at_hand_for_every_activity() -> None:
-    assert all(0.2 < calibration(a, "A") < 1.0 for a in ("walk", "stairs_up", "stairs_down"))  # type: ignore[arg-type]
 
 
 @slow
