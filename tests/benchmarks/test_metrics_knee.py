@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from baselines.trivial import Constant
-from benchmarks import metrics, metrics_knee, rollout
+from benchmarks import metrics, metrics_knee, rollout, rows
 from benchmarks.scenarios import ScenarioSet, available
 
 PERIOD = 0.01
@@ -175,3 +175,16 @@ def test_a_track_with_an_unknown_group_or_a_missing_worst_case_is_refused() -> N
         ScenarioSet(content | {"metrics": ["stride"]})
     with pytest.raises(ValueError, match=r"worst_case needs a value for each of .*switch_error"):
         ScenarioSet(content | {"worst_case": {"rms_error": 1.0}})
+
+
+def test_no_finished_episode_of_the_board_is_worse_than_the_worst_case() -> None:
+    """Or a controller would gain by having an episode ended."""
+    found = sorted(rows.RESULTS.glob("knee_*--*.json"))
+    assert len(found) > 100
+    for path in found:
+        row = rows.load(path)
+        worst = row["scenarios"]["content"]["worst_case"]
+        finished = [e["scores"] for e in row["episodes"] if not e["failed"]]
+        for name, most in worst.items():
+            values = [s[name] for s in finished if s[name] is not None]
+            assert max(values, default=0.0) <= most, (path.stem, name)
