@@ -87,7 +87,8 @@ holds what runs it again: `python -m benchmarks verify ROW`.
   assistance beyond the demand has to be held by them. *Of extensors* leaves that out, as electrodes
   on the thigh would. The two *fitted* ones follow the paper's own estimate of the torque, with one
   constant an activity that was chosen to give its published reductions. Below 1 the wearer is
-  helped.
+  helped. *Fitted, B* is no score: it takes activity to grow as the square of torque, so that a
+  valve that is simply open has 0.77 in walking, where the EMG ratio is 1.14 and A 1.66.
 - *True pressure at capacity* is time above 4.45 bar in the muscle, of whatever the valve was told.
 - A controller's name leads to its row, where every metric of every episode stands.
 - Times per step are in [results/TIMES.md](results/TIMES.md), since no two runs give the same.
