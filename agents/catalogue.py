@@ -38,12 +38,14 @@ class Entry:
     kind: str = "learned"
 
 
+PPO_CITATION = "Schulman et al., Proximal policy optimization algorithms, arXiv:1707.06347, 2017"
+
 CONTROLLERS: dict[str, Entry] = {
     "ppo": Entry(
         file="MusclePositioning-v0.ppo.onnx",
         summary="PPO, two layers of 64 beside a linear path; no memory, 0.2 s of preview",
         knowledge="nominal model",
-        citation="Schulman et al., Proximal policy optimization algorithms, arXiv:1707.06347, 2017",
+        citation=PPO_CITATION,
         envs=("PAM/MusclePositioning-v0",),
     ),
 }

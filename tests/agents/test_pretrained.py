@@ -89,8 +89,8 @@ def test_it_tracks_where_a_law_without_memory_cannot(
 
 
 def test_benchmarks_find_it_among_the_controllers() -> None:
-    env = gym.make(ID).unwrapped
     for name, entry in catalogue.CONTROLLERS.items():
+        env = gym.make(*entry.envs).unwrapped
         made = catalogue.make_controller(name, env.plant, env.signals, env.action_signals, seed=0)
         assert entry.envs == (made.card["env"],)
         assert made.digest() == catalogue.load_pretrained(name).digest()
