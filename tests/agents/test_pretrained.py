@@ -104,6 +104,7 @@ def test_benchmarks_find_it_among_the_controllers() -> None:
     [
         ("knee_walk_nominal--ppo_knee_walk", "knee_walk_nominal--knee_inverse_ltr", 0.4),
         ("knee_walk_wrong_model--ppo_knee_walk", "knee_walk_wrong_model--knee_pid", 0.6),
+        ("knee_tension_nominal--ppo_knee_tension", "knee_tension_nominal--knee_pid", 0.7),
     ],
 )
 def test_the_knees_policies_do_better_than_classical_ones(
