@@ -38,11 +38,30 @@ GAIT: tuple[Column, ...] = (
 """Metric, heading and factor from SI of the columns after the headline, of a gait."""
 
 
+DEGREES = float(np.degrees(1.0))
+MODEL: Column = ("model_rms_error", "error to its own model, RMS [deg]", DEGREES)
+OUT_OF_REACH: Column = ("saturated_time", "out of reach [%]", 100.0)
+CHAIN: tuple[Column, ...] = (
+    ("p95_error", "p95 [mm]", 1e3),
+    ("max_error", "max [mm]", 1e3),
+    ("sensed_rms_error", "sensed RMS [mm]", 1e3),
+    ("pointing_rms", "pointing RMS [deg]", DEGREES),
+    ("joint_rms", "joints RMS [deg]", DEGREES),
+    ("largest_angle", "largest joint angle [deg]", DEGREES),
+    MODEL,
+    *EFFORT,
+    OUT_OF_REACH,
+)
+"""Of a chain of joints whose tool follows a path."""
+
+
 def columns_of(content: Mapping[str, Any]) -> tuple[Column, ...]:
     """Return the columns after the headline of a track, from the content of its file."""
     groups = content.get("metrics") or ()
     if "gait" in groups:
         return GAIT
+    if "chain" in groups:
+        return CHAIN
     unit, factor = shown(content)
     errors: tuple[Column, ...] = (
         ("p95_error", f"p95 [{unit}]", factor),
@@ -53,6 +72,9 @@ def columns_of(content: Mapping[str, Any]) -> tuple[Column, ...]:
     if "range" in groups:
         errors = (("rms_percent", "RMS [% of half-range]", 1.0), *errors[:2], errors[3])
         return (*errors, *EFFORT, SATURATED)
+    if "joint" in groups:
+        errors = (("rms_percent", "RMS [% of half-range]", 1.0), *errors, MODEL)
+        return (*errors, *EFFORT, OUT_OF_REACH)
     return (*errors, *EFFORT, ("constraint_cost", "constraint cost", 1.0))
 
 
@@ -79,6 +101,9 @@ holds what runs it again: `python -m benchmarks verify ROW`.
   balance of the knee, *predicted*; the two *fitted* ones follow the paper's own estimate of the
   torque, with one constant an activity that was chosen to give its published reductions. Below 1
   the wearer is helped.
+- Of a chain, the error is how far the tip is off its path, and *pointing* is of its direction;
+  *joints* are compared with the planned angles, of which the tip knows nothing. *Error to its own
+  model* is of controllers that follow a model: the true angle less the model's.
 - A controller's name leads to its row, where every metric of every episode stands.
 - Times per step are in [results/TIMES.md](results/TIMES.md), since no two runs give the same.
 """

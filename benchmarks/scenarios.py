@@ -53,7 +53,7 @@ _OPTIONAL = {
     "unit",
     "shown",
 }
-_UNITS = {"load": "kg", "mismatch": "N", "pace": "s"}
+_UNITS = {"load": "kg", "mismatch": "N", "pace": "s", "payload": "kg"}
 """Of the axes of a grid, for the scenarios' names."""
 
 
