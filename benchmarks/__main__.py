@@ -282,6 +282,7 @@ def diagnosis(
     jobs: int = os.cpu_count() or 1,
     force: bool = False,
     retell: bool = False,
+    timed: bool = False,
     cells: Path | None = None,
     out: Path | None = None,
 ) -> int:
@@ -299,12 +300,16 @@ def diagnosis(
         jobs: Processes.
         force: Compute again what is there already.
         retell: Run nothing; judge what earlier runs recorded by the present rule.
+        timed: Also time whole reports of ten minutes at 50 Hz on two cores, afterwards.
         cells: Folder of the records, the checkpoint.
         out: Folder of the page, of its numbers and of its figure. By default benchmarks/results for
             the whole of the final set, otherwise beside the records.
     """
     from benchmarks import diagnosis as running
     from benchmarks import diagnosis_report as telling
+    from benchmarks.speed_diagnosis import whole_reports
+    from pam_envs.data.tables import load_contraction_table
+    from pam_envs.diagnosis.readings import diagnose_readings
 
     folder = running.FOLDER if cells is None else cells
     options = running.Options(
@@ -325,7 +330,12 @@ def diagnosis(
         print(f"FAILED, counted as wrong: {line}", file=sys.stderr)
     official = chosen == "final" and options.whole
     place = out or (rows.RESULTS if official else folder / "pages" / chosen)
-    for path in telling.write(report.records, place, options.arguments):
+    beside = {
+        "tables": diagnose_readings(load_contraction_table()),
+        "whole_report_s": whole_reports() if timed else (),
+    }
+    arguments = options.arguments + " --timed" * timed
+    for path in telling.write(report.records, place, arguments, **beside):
         print(path)
     return 0
 

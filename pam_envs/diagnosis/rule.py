@@ -34,14 +34,18 @@ class Rule:
         Held-out mean square over that of the noise floor that counts as structure.
     explained : float
         Unexplained when structure is left and less of the excess than this part has gone.
-    close : float
-        A rival within this part of the best gain is not excluded...
     least_blocks : int
         With fewer held-out blocks in which something moves nothing is decided.
+    close, apart : float
+        A rival within this part of the best gain, or no further below it than this, is not
+        excluded...
     doubt : float
         ... if the difference is not surer than this (one-sided, blocks drawn again).
-    second_gain, second_share : float
-        A further cause has to gain this much, and this part of the first's gain.
+    second_gain : float
+        A further cause has to gain this much...
+    second_share, second_enough, second_clear : float
+        ... and this part of the first's gain, or this much, or this part of what a model that
+        leaves nothing but noise would: else it corrects the form of the first.
     hint : float
         A search for a further cause goes on if its first rounds promise this part of it.
     beam : int
@@ -65,10 +69,13 @@ class Rule:
     excess: float = 1.6
     explained: float = 0.6
     close: float = 0.8
+    apart: float = 0.1
     least_blocks: int = 6
     doubt: float = 0.05
     second_gain: float = 0.1
-    second_share: float = 0.12
+    second_share: float = 0.3
+    second_enough: float = 0.6
+    second_clear: float = 0.75
     hint: float = 0.4
     beam: int = 3
     most: int = 3
@@ -101,9 +108,11 @@ def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
     least = max(rule.least_gain, rule.least_total / max(1, evidence["blocks"]))
     if len(levels) < 2 or not pays(levels[1], least, rule):
         return Judgement("unexplained" if structured(levels[0]["left"], rule) else "adequate", 0)
-    level = 1
-    wanted = max(least, rule.second_gain, rule.second_share * levels[1]["gain"])
-    while level + 1 < len(levels) and level < rule.most and pays(levels[level + 1], wanted, rule):
+    level, first = 1, levels[1]["gain"]
+    while level + 1 < len(levels) and level < rule.most:
+        wanted = max(least, wanted_of_further(first, levels[level + 1]["possible"], rule))
+        if not pays(levels[level + 1], wanted, rule):
+            break
         level += 1
     found = levels[level]
     if structured(found["left"], rule) and gone(levels[0], found) < rule.explained:
@@ -117,6 +126,22 @@ def structured(left: dict[str, Any], rule: Rule) -> bool:
     return bool(
         max(left["r2"]) > rule.flexible or left["peak"] > rule.peak or left["excess"] > rule.excess
     )
+
+
+def wanted_of_further(first: float, possible: float, rule: Rule) -> float:
+    """Return what a further cause has to gain, after a first that gained so much.
+
+    Parameters
+    ----------
+    first : float
+        Gain of the first cause.
+    possible : float
+        Gain of a model that leaves nothing but noise over what is named so far.
+    rule : Rule
+        The numbers of the decision.
+    """
+    ways = (rule.second_share * first, rule.second_enough, rule.second_clear * possible)
+    return max(rule.second_gain, min(ways))
 
 
 def pays(level: Mapping[str, Any], wanted: float, rule: Rule) -> bool:
@@ -140,6 +165,7 @@ def not_excluded(rivals: Sequence[Mapping[str, Any]], rule: Rule) -> tuple[int, 
         and len(rival["names"]) == len(best["names"])
         and not rival["imitates"]
         and not rival.get("out", False)
-        and rival["gain"] >= rule.close * best["gain"]
+        and rival["gain"] >= min(rule.close * best["gain"], best["gain"] - rule.apart)
+        and rival["gain"] > 0.0
         and rival["better"] > rule.doubt
     )

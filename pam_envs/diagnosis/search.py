@@ -201,12 +201,18 @@ def search(
         if name not in best or fit.cost < best[name].cost:
             best[name] = fit
     ranked = sorted(best.values(), key=lambda f: f.cost)
-    polish(problem, ranked[:polished])
+    held_out = sorted(ranked, key=lambda f: -_gain(problem, blocks, base, f))
+    chosen = {f.label[0].name: f for f in (*ranked[:polished], *held_out[:polished])}
+    polish(problem, list(chosen.values()))
     found = [
         Candidate((*base.causes, fit.label), fit, blocks.errors(problem.rows(fit.residual)))
         for fit in ranked
     ]
     return sorted(found, key=lambda c: -blocks.gain(base.errors, c.errors))
+
+
+def _gain(problem: Problem, blocks: Blocks, base: Candidate, fit: Fit) -> float:
+    return blocks.gain(base.errors, blocks.errors(problem.rows(fit.residual)))
 
 
 def polish(problem: Problem, fits: Sequence[Fit], rounds: int = POLISH) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from pam_envs.diagnosis.fitting import Fit, Free, Problem, differentiate, normal_equations
 from pam_envs.diagnosis.isolability import channel_size, complement, projected
@@ -18,7 +19,8 @@ from pam_envs.diagnosis.verdict import Decision, traces_of
 Array = NDArray[np.float64]
 Json = dict[str, Any]
 
-Z = 1.96
+LEAST_LEFT = 2
+"""Degrees of freedom that are assumed where there are hardly more blocks than parameters."""
 UNITS = {"contraction": "mm", "pressure": "bar"}
 SCALE = {"contraction": 1e-3, "pressure": 1e5}
 WIDE_LOG, WIDE = 10.0, 0.5
@@ -44,11 +46,13 @@ def at_bound(free: Free, value: float) -> bool:
     return bool(value <= free.low or value >= free.high)
 
 
-def deviations(problem: Problem, blocks: Blocks, fit: Fit) -> Array:
-    """Return standard deviations of a fit's internal coordinates.
+def half_widths(problem: Problem, blocks: Blocks, fit: Fit) -> Array:
+    """Return half the widths of the 95 % intervals of a fit's internal coordinates.
 
     From the curvature of the fit and the scatter of the blocks' gradients, so that noise that is
-    correlated within a block counts as it should. What stands at a bound does not widen the rest.
+    correlated within a block counts as it should; never less than what white noise of the declared
+    size gives. Each parameter takes a block's worth of freedom, and Student's t has what is left.
+    What stands at a bound does not widen the rest.
     """
     if fit.shared is not None or len(fit.slopes) != len(fit.frees):
         fit.shared = None
@@ -60,25 +64,29 @@ def deviations(problem: Problem, blocks: Blocks, fit: Fit) -> Array:
     sums = np.stack([np.bincount(of, row, minlength=len(blocks.held_out)) for row in pulls])
     scatter, values = sums @ sums.T, fit.values()
     inside = np.array([not at_bound(f, values[f.name]) for f in fit.frees])
+    number = len(np.unique(of))
     found = np.zeros(len(fit.frees))
     for places in (np.arange(len(found)), np.flatnonzero(inside)):
         part = np.ix_(places, places)
         inverse = np.linalg.pinv(normal[part], rcond=1e-12, hermitian=True)
-        found[places] = np.sqrt(np.maximum(np.diag(inverse @ scatter[part] @ inverse), 0.0))
+        left = max(number - len(places), LEAST_LEFT)
+        spread = np.diag(inverse @ scatter[part] @ inverse) * number / left
+        wide = np.sqrt(np.maximum(spread, np.diag(inverse)))
+        found[places] = float(stdtrit(left, 0.975)) * wide
     return found
 
 
 def spans(problem: Problem, blocks: Blocks, fit: Fit) -> dict[str, Json]:
     """Return, by parameter, its 95 % interval in SI and what is to be said of it."""
     made, values = {}, fit.values()
-    for free, z, sd in zip(fit.frees, fit.z, deviations(problem, blocks, fit), strict=True):
-        made[free.name] = span(free, values[free.name], float(z), float(sd))
+    for free, z, half in zip(fit.frees, fit.z, half_widths(problem, blocks, fit), strict=True):
+        made[free.name] = span(free, values[free.name], float(z), float(half))
     return made
 
 
-def span(free: Free, value: float, z: float, sd: float) -> Json:
+def span(free: Free, value: float, z: float, half: float) -> Json:
     """Return the interval of one parameter; open on the side on which the fit hit a bound."""
-    low, high = (float(v) for v in free.outer(np.array([z - Z * sd, z + Z * sd])))
+    low, high = (float(v) for v in free.outer(np.array([z - half, z + half])))
     if free.log:
         wide = low <= 0.0 or high > WIDE_LOG * low
     else:

@@ -12,7 +12,7 @@ from scipy.special import stdtr
 
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.fitting import Problem, column_of
-from pam_envs.diagnosis.rule import Judgement, Rule, judge
+from pam_envs.diagnosis.rule import Judgement, Rule, judge, wanted_of_further
 from pam_envs.diagnosis.search import Blocks, Candidate, refit, search
 from pam_envs.diagnosis.structure import Regressors, flexible_r2, spectral_peak
 
@@ -186,8 +186,9 @@ def _ladder(
     model = rivals[0]
     first_gain = worth(blocks, base, model, rule)
     while first_gain >= rule.least_gain and len(model.causes) < rule.most:
-        wanted = max(rule.second_gain, rule.second_share * first_gain)
-        if attainable(blocks, model) < wanted:
+        possible = attainable(blocks, model)
+        wanted = wanted_of_further(first_gain, possible, rule)
+        if possible < wanted:
             break
         larger = search(problem, family, blocks, model, causes, 2, rule.hint * wanted)
         more = max((worth(blocks, model, c, rule) for c in larger), default=0.0)
@@ -267,11 +268,11 @@ def evidence_of(
     """Return what a rule decides on, in plain types.
 
     ``blocks`` counts those held out. Under ``levels``, one entry for each number of causes from
-    none: ``gain`` over the base, ``added`` over the level before, how ``unsure`` that is, what is
-    ``left``, and the ``rivals``, the best first, each with ``names``, ``forms``, ``gain``,
-    ``better``: the part of the samples of blocks in which it is ahead of the best, ``imitates``:
-    whether it has the best as a limit, and ``out``: whether it was excluded before the others were
-    compared on all blocks.
+    none: ``gain`` over the base, ``added`` over the level before, what it would be if nothing but
+    noise were left (``possible``), how ``unsure`` it is, what is ``left``, and the ``rivals``, the
+    best first, each with ``names``, ``forms``, ``gain``, ``better``: the part of the samples of
+    blocks in which it is ahead of the best, ``imitates``: whether it has the best as a limit, and
+    ``out``: whether it was excluded before the others were compared on all blocks.
     """
     base = levels[0].model
     draws = blocks.draws(rule.draws, seed)
@@ -282,6 +283,7 @@ def evidence_of(
             {
                 "gain": worth(blocks, base, level.model, rule),
                 "added": worth(blocks, before, level.model, rule),
+                "possible": attainable(blocks, before),
                 "unsure": unsure(problem, blocks, before, level.model, len(level.rivals)),
                 "left": level.left,
                 "rivals": [

@@ -24,6 +24,8 @@ REFERENCES = (*NAMES, "paths", "drawn")
 """One of the presets; an episode draws one of them; it draws one of a pool of random ones."""
 DRAWN, DRAW_SEED = 16, 2
 """How many paths the pool has, and their seed."""
+TRIED, LEAP = 40, 5.0
+"""How many are drawn for it; a plan leaps where a joint moves by more than so many even steps."""
 PRESET_JOINTS = len(PATHS[0].start_degrees)
 LONGEST = 10_000
 """Most poses of a given path."""
@@ -81,17 +83,32 @@ def _given(reference: Any) -> Array:
 @lru_cache(maxsize=32)
 def _named(chain: SerialChain, limit: float, reference: str, weighted: bool) -> Array:
     if reference == "drawn":
-        ends = zip(*draw_ends(DRAW_SEED, DRAWN, chain.stages, limit), strict=True)
-        lines = [joint_line(first, last) for first, last in ends]
-    else:
-        if chain.stages != PRESET_JOINTS:
-            raise ValueError(
-                f"reference = {reference!r} is for an arm of {PRESET_JOINTS} joints and this one "
-                f"has {chain.stages}; take reference = 'drawn', or give poses"
-            )
-        lines = [path.angles() for path in PATHS if reference in (path.name, "paths")]
+        return _drawn(chain, limit, weighted)
+    if chain.stages != PRESET_JOINTS:
+        raise ValueError(
+            f"reference = {reference!r} is for an arm of {PRESET_JOINTS} joints and this one "
+            f"has {chain.stages}; take reference = 'drawn', or give poses"
+        )
+    lines = [path.angles() for path in PATHS if reference in (path.name, "paths")]
     return np.concatenate(
         [planned(chain, poses_of(chain, line), limit, weighted) for line in lines]
+    )
+
+
+def _drawn(chain: SerialChain, limit: float, weighted: bool) -> Array:
+    """Return the first of the paths drawn whose plan does not leap, where its minimum vanishes."""
+    kept: list[Array] = []
+    for first, last in zip(*draw_ends(DRAW_SEED, TRIED, chain.stages, limit), strict=True):
+        line = joint_line(first, last)
+        found = planned(chain, poses_of(chain, line), limit, weighted)
+        even = np.abs(last - first).max() / (len(line) - 1)
+        if np.abs(np.diff(found[N_POSE:])).max() <= LEAP * even:
+            kept.append(found)
+        if len(kept) == DRAWN:
+            return np.concatenate(kept)
+    raise ValueError(
+        f"of {TRIED} paths drawn within {np.degrees(limit):.1f} degrees a joint only {len(kept)} "
+        f"have a plan without a leap and {DRAWN} are needed; give poses, or weighted=False"
     )
 
 

@@ -13,9 +13,10 @@ from typing import Any
 import pytest
 
 import pam_envs
-from benchmarks.diagnosis_cases import Case
-from benchmarks.diagnosis_study import study
+from benchmarks.diagnosis_cases import Case, make
+from benchmarks.diagnosis_study import diagnosed, study
 from pam_envs.kernels import COMPILED
+from tests.diagnosis.hidden import EFFECTS
 
 pytestmark = pytest.mark.xdist_group("hidden effects")  # one process makes the sample
 compiled = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")
@@ -36,7 +37,18 @@ SAMPLED = (
     "slip_step",
     "supply_droop",
 )
-SINGLE = [Case("single", SEED + k, (name,), (SIZE,)) for k, name in enumerate(SAMPLED)]
+REST = [name for name in EFFECTS if name not in SAMPLED]
+NOT_FOUND = "stick_slip"
+"""A fit by least squares cannot hold the phase of many small slips."""
+SINGLE = [
+    *(Case("single", SEED + k, (name,), (SIZE,)) for k, name in enumerate(SAMPLED)),
+    *(Case("single", SEED + 50 + k, (name,), (SIZE,)) for k, name in enumerate(REST)),
+]
+FAINT = [
+    Case("weak", SEED + 80, ("leak",), (0.15,)),
+    Case("weak", SEED + 81, ("viscous_loss",), (0.15,)),
+]
+IDLE = Case("idle", SEED + 82, campaign="idle")
 ADEQUATE = [Case("clean", SEED + 20), Case("clean", SEED + 21), Case("decoy", SEED + 22)]
 PAIR = Case("pair", SEED + 30, ("creep", "exhaust_asymmetry"), (SIZE, SIZE))
 UNKNOWN = Case("unknown", SEED + 40, ("vibration",), (SIZE,))
@@ -48,13 +60,21 @@ Records = Mapping[Case, dict[str, Any]]
 @pytest.fixture(scope="module")
 def records() -> Records:
     """What the study of every case of the sample returns; two are made at a time."""
-    chosen = [*SINGLE, *ADEQUATE, PAIR, UNKNOWN]
+    chosen = [*SINGLE, *ADEQUATE, *FAINT, PAIR, UNKNOWN, IDLE]
     with ProcessPoolExecutor(min(2, os.cpu_count() or 1), get_context("spawn")) as pool:
         return dict(zip(chosen, pool.map(study, chosen), strict=True))
 
 
+def one(case: Case) -> Any:
+    """Return a case as a parameter; what is known not to be found has to stay so, or be told."""
+    missed = pytest.mark.xfail(reason="stick-slip of this form is left unexplained", strict=True)
+    return pytest.param(
+        case, id=case.names[0], marks=[missed] if case.names[0] == NOT_FOUND else []
+    )
+
+
 @compiled
-@pytest.mark.parametrize("case", SINGLE, ids=lambda case: case.names[0])
+@pytest.mark.parametrize("case", [one(case) for case in SINGLE])
 def test_one_hidden_effect_is_the_first_name(case: Case, records: Records) -> None:
     found = records[case]
     assert found["failure"] is None
@@ -74,6 +94,33 @@ def test_nothing_is_called_missing_where_nothing_is_hidden(case: Case, records: 
 
 
 @compiled
+@pytest.mark.parametrize("case", FAINT, ids=lambda case: case.names[0])
+def test_below_the_noise_nothing_wrong_is_named(case: Case, records: Records) -> None:
+    found = records[case]
+    assert found["failure"] is None
+    assert found["verdict"] in ("adequate", "named", "ambiguous")
+    assert found["verdict"] == "adequate" or found["names"] == list(case.names)
+
+
+@compiled
+def test_a_recording_in_which_nothing_moves_decides_nothing(records: Records) -> None:
+    found = records[IDLE]
+    assert (found["verdict"], found["names"]) == ("insufficient", [])
+
+
+@compiled
+def test_a_wrong_base_parameter_is_refitted_and_reported_as_such() -> None:
+    made = make(Case("decoy", SEED + 22))
+    found = diagnosed(made.recording, made.sheet)
+    told = {entry["name"]: entry for entry in found.report["calibration"]}
+    lag = told["regulator.time_constant"]
+    assert abs(made.ground.base.lag / lag["before"] - 1.0) > 0.15
+    assert lag["after"] == pytest.approx(made.ground.base.lag, rel=0.1)
+    assert found.verdict == "adequate"
+    assert not found.causes
+
+
+@compiled
 def test_two_hidden_effects_are_both_named(records: Records) -> None:
     found = records[PAIR]
     assert found["failure"] is None
@@ -86,6 +133,12 @@ def test_an_effect_outside_the_catalogue_is_left_unexplained(records: Records) -
     found = records[UNKNOWN]
     assert found["failure"] is None
     assert found["verdict"] == "unexplained"
+
+
+def test_one_process_makes_the_sample(request: pytest.FixtureRequest) -> None:
+    if not request.config.getoption("loadgroup", False):
+        pytest.skip("the tests are not spread over processes by group")
+    assert request.node.nodeid.endswith("@hidden effects")
 
 
 def test_nothing_in_the_library_imports_the_tests() -> None:

@@ -29,6 +29,7 @@ def rival(*names: str, gain: float, better: float = 0.0, **marks: bool) -> dict[
 
 def level(gain: float, *rivals: dict[str, Any], added: float | None = None, **more: Any) -> Any:
     made = {"gain": gain, "added": gain if added is None else added, "unsure": 0.0}
+    made["possible"] = 9.0
     return {**made, "left": left(), "rivals": list(rivals), **more}
 
 
@@ -38,6 +39,7 @@ def evidence(*levels: Any, before: dict[str, Any] | None = None) -> dict[str, An
 
 
 LEAK = rival("leak", gain=1.0, better=1.0)
+WEAK = rival("leak", gain=0.3, better=1.0)
 LIKE = rival("ring", gain=1.0, better=0.5, imitates=True)
 BOTH = rival("leak", "creep", gain=1.3, better=1.0)
 
@@ -55,11 +57,17 @@ BOTH = rival("leak", "creep", gain=1.3, better=1.0)
         (evidence(level(1.0, LEAK, rival("creep", gain=0.9, better=0.2))), "ambiguous", 1),
         (evidence(level(1.0, LEAK, rival("creep", gain=0.9, better=0.01))), "named", 1),
         (evidence(level(1.0, LEAK, rival("creep", gain=0.5, better=0.2))), "named", 1),
+        (evidence(level(0.3, WEAK, rival("creep", gain=0.22, better=0.2))), "ambiguous", 1),
+        (evidence(level(0.3, WEAK, rival("creep", gain=0.18, better=0.2))), "named", 1),
         (evidence(level(1.0, LEAK, LIKE)), "named", 1),
         (evidence(level(1.0, LEAK, rival("creep", gain=0.9, better=0.2, out=True))), "named", 1),
         (evidence(level(1.0, LEAK), level(1.3, BOTH, added=0.3)), "named", 2),
         (evidence(level(1.0, LEAK), level(1.3, BOTH, added=0.3, unsure=0.1)), "named", 1),
         (evidence(level(1.0, LEAK), level(1.1, BOTH, added=0.1)), "named", 1),
+        (evidence(level(3.0, LEAK), level(3.4, BOTH, added=0.4)), "named", 1),
+        (evidence(level(3.0, LEAK), level(3.4, BOTH, added=0.4, possible=0.5)), "named", 2),
+        (evidence(level(3.0, LEAK), level(3.7, BOTH, added=0.7)), "named", 2),
+        (evidence(level(3.0, LEAK), level(3.08, BOTH, added=0.08, possible=0.1)), "named", 1),
     ],
 )
 def test_evidence_words_the_verdict(found: dict[str, Any], verdict: str, names: int) -> None:
