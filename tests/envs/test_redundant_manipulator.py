@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pam_envs.envs.manipulator_layout import POSE
+from pam_envs.envs.manipulator_paths import DRAWN, paths_for
 from pam_envs.mechanics.redundancy import UnreachablePose
 from pam_envs.mechanics.serial_chain import SerialChain
 from pam_envs.plants.redundant_manipulator import RedundantManipulator
@@ -201,3 +202,12 @@ def test_a_joint_at_its_stop_ends_the_episode() -> None:
 def test_bad_arguments(arguments: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         gym.make(NAME, **arguments)
+
+
+def test_no_drawn_plan_leaps_from_one_pose_to_the_next() -> None:
+    paths = paths_for(PLANT.chain, PLANT.angle_range[1], "drawn", weighted=True)
+    angles = paths.reshape(DRAWN, 6 + PLANT.stages, -1)[:, 6:]
+    leaps = np.abs(np.diff(angles, axis=2)).max(axis=(1, 2))
+    moved = np.ptp(angles, axis=2).max(axis=1)
+    assert (leaps < 0.2 * moved + 1e-3).all()
+    assert len(np.unique(paths[:, 0])) > 6 * DRAWN  # no path twice
