@@ -41,11 +41,30 @@ GAIT: tuple[Column, ...] = (
 """Metric, heading and factor from SI of the columns after the headline, of a gait."""
 
 
+DEGREES = float(np.degrees(1.0))
+MODEL: Column = ("model_rms_error", "error to its own model, RMS [deg]", DEGREES)
+OUT_OF_REACH: Column = ("saturated_time", "out of reach [%]", 100.0)
+CHAIN: tuple[Column, ...] = (
+    ("p95_error", "p95 [mm]", 1e3),
+    ("max_error", "max [mm]", 1e3),
+    ("sensed_rms_error", "sensed RMS [mm]", 1e3),
+    ("pointing_rms", "pointing RMS [deg]", DEGREES),
+    ("joint_rms", "joints RMS [deg]", DEGREES),
+    ("largest_angle", "largest joint angle [deg]", DEGREES),
+    MODEL,
+    *EFFORT,
+    OUT_OF_REACH,
+)
+"""Of a chain of joints whose tool follows a path."""
+
+
 def columns_of(content: Mapping[str, Any]) -> tuple[Column, ...]:
     """Return the columns after the headline of a track, from the content of its file."""
     groups = content.get("metrics") or ()
     if "gait" in groups:
         return GAIT
+    if "chain" in groups:
+        return CHAIN
     unit, factor = shown(content)
     errors: tuple[Column, ...] = (
         ("p95_error", f"p95 [{unit}]", factor),
@@ -56,6 +75,9 @@ def columns_of(content: Mapping[str, Any]) -> tuple[Column, ...]:
     if "range" in groups:
         errors = (("rms_percent", "RMS [% of half-range]", 1.0), *errors[:2], errors[3])
         return (*errors, *EFFORT, SATURATED)
+    if "joint" in groups:
+        errors = (("rms_percent", "RMS [% of half-range]", 1.0), *errors, MODEL)
+        return (*errors, *EFFORT, OUT_OF_REACH)
     return (*errors, *EFFORT, ("constraint_cost", "constraint cost", 1.0))
 
 
@@ -90,6 +112,9 @@ holds what runs it again: `python -m benchmarks verify ROW`.
   helped. *Fitted, B* is no score: it takes activity to grow as the square of torque, so that a
   valve that is simply open has 0.77 in walking, where the EMG ratio is 1.14 and A 1.66.
 - *True pressure at capacity* is time above 4.45 bar in the muscle, of whatever the valve was told.
+- Of a chain, the error is how far the tip is off its path, and *pointing* is of its direction;
+  *joints* are compared with the planned angles, of which the tip knows nothing. *Error to its own
+  model* is of controllers that follow a model: the true angle less the model's.
 - A controller's name leads to its row, where every metric of every episode stands.
 - Times per step are in [results/TIMES.md](results/TIMES.md), since no two runs give the same.
 """

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks import metrics_knee
+from benchmarks import metrics_joint, metrics_knee
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,12 @@ METRICS: dict[str, str] = {
 """The scored quantities and their units, the headline first. Less is better for all of them."""
 
 HEADLINE = "rms_error"
-GROUPS: dict[str, dict[str, str]] = {"range": metrics_knee.RANGE, "gait": metrics_knee.GAIT}
+GROUPS: dict[str, dict[str, str]] = {
+    "range": metrics_knee.RANGE,
+    "gait": metrics_knee.GAIT,
+    "joint": metrics_joint.JOINT,
+    "chain": metrics_joint.CHAIN,
+}
 """What a track may be scored by beside ``METRICS``, by the names that its file gives."""
 
 
@@ -169,6 +174,10 @@ def score(
         scores |= metrics_knee.of_range(signals, window, tracked, half_range)
     if "gait" in groups:
         scores |= metrics_knee.of_gait(signals, window, tracked, period, activity)
+    if "joint" in groups:
+        scores |= metrics_joint.of_joint(signals, window)
+    if "chain" in groups:
+        scores |= metrics_joint.of_chain(signals, window)
     return scores
 
 

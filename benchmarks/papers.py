@@ -203,9 +203,16 @@ GROUPS: tuple[Callable[[], list[Figure]], ...] = (
 
 def groups() -> tuple[Callable[[], list[Figure]], ...]:
     """Return the groups of all papers."""
-    from benchmarks import papers_gait, papers_knee, papers_knee_envs  # they import Figure
+    from benchmarks import (
+        papers_gait,
+        papers_joint,
+        papers_knee,
+        papers_knee_envs,
+        papers_manipulator,
+    )
 
-    return GROUPS + papers_knee.GROUPS + papers_gait.GROUPS + papers_knee_envs.GROUPS
+    knee = papers_knee.GROUPS + papers_gait.GROUPS + papers_knee_envs.GROUPS  # they import Figure
+    return GROUPS + knee + papers_joint.GROUPS + papers_manipulator.GROUPS
 
 
 def all_figures() -> list[Figure]:

@@ -19,6 +19,7 @@ SCORING = (
     "cells.py",
     "controllers.py",
     "metrics.py",
+    "metrics_joint.py",
     "metrics_knee.py",
     "rollout.py",
 )

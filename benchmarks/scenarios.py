@@ -55,7 +55,7 @@ _OPTIONAL = {
     "unit",
     "shown",
 }
-_UNITS = {"load": "kg", "mismatch": "N", "pace": "s"}
+_UNITS = {"load": "kg", "mismatch": "N", "pace": "s", "payload": "kg"}
 """Of the axes of a grid, for the scenarios' names."""
 
 

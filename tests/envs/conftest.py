@@ -11,6 +11,8 @@ FAMILIES = {
     "KneeWalk": "gait",
     "KneeStairsUp": "gait",
     "KneeStairsDown": "gait",
+    "AntagonisticJoint": "joint",
+    "RedundantManipulator": "manipulator",
 }
 """Environments with machine code in common."""
 
