@@ -58,6 +58,7 @@ CONTROLLERS: dict[str, Entry] = {
     "ppo_knee_stiffness": _ppo("KneeStiffness-v0"),
     "ppo_knee_walk": _ppo("KneeWalk-v0", "; trained at 5 s a stride"),
     "ppo_knee_stairs_up": _ppo("KneeStairsUp-v0", "; trained at the paper's pace"),
+    "ppo_knee_stairs_down": _ppo("KneeStairsDown-v0", "; trained at the paper's pace"),
 }
 PRETRAINED: dict[str, str] = {name: str(FOLDER / entry.file) for name, entry in CONTROLLERS.items()}
 
