@@ -55,7 +55,10 @@ def _ppo(env: str, where: str = "") -> Entry:
 CONTROLLERS: dict[str, Entry] = {
     "ppo": _ppo("MusclePositioning-v0"),
     "ppo_knee_tension": _ppo("KneeTension-v0", "; trained on the brace that is free to move"),
+    "ppo_knee_stiffness": _ppo("KneeStiffness-v0"),
     "ppo_knee_walk": _ppo("KneeWalk-v0", "; trained at 5 s a stride"),
+    "ppo_knee_stairs_up": _ppo("KneeStairsUp-v0", "; trained at the paper's pace"),
+    "ppo_knee_stairs_down": _ppo("KneeStairsDown-v0", "; trained at the paper's pace"),
 }
 PRETRAINED: dict[str, str] = {name: str(FOLDER / entry.file) for name, entry in CONTROLLERS.items()}
 

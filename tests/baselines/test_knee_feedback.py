@@ -13,7 +13,8 @@ from baselines.linear import LinearSystem
 from baselines.ltr import plant_system
 from benchmarks.metrics_knee import landings
 from pam_envs.plants.knee_orthosis import KneeOrthosis
-from tests.baselines.knee_runs import built, make_knee, quiet, run, walked
+from tests.baselines.conftest import built
+from tests.baselines.knee_runs import make_knee, quiet, run, walked
 
 CASES = [
     (mounting, hysteresis, output)
