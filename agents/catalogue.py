@@ -38,14 +38,27 @@ class Entry:
     kind: str = "learned"
 
 
-CONTROLLERS: dict[str, Entry] = {
-    "ppo": Entry(
-        file="MusclePositioning-v0.ppo.onnx",
-        summary="PPO, two layers of 64 beside a linear path; no memory, 0.2 s of preview",
+_CITATION = "Schulman et al., Proximal policy optimization algorithms, arXiv:1707.06347, 2017"
+
+
+def _ppo(env: str, where: str = "") -> Entry:
+    """Return the entry of the preset's PPO run in an environment."""
+    return Entry(
+        file=f"{env}.ppo.onnx",
+        summary=f"PPO, two layers of 64 beside a linear path; no memory, 0.2 s of preview{where}",
         knowledge="nominal model",
-        citation="Schulman et al., Proximal policy optimization algorithms, arXiv:1707.06347, 2017",
-        envs=("PAM/MusclePositioning-v0",),
-    ),
+        citation=_CITATION,
+        envs=(f"PAM/{env}",),
+    )
+
+
+CONTROLLERS: dict[str, Entry] = {
+    "ppo": _ppo("MusclePositioning-v0"),
+    "ppo_knee_tension": _ppo("KneeTension-v0", "; trained on the brace that is free to move"),
+    "ppo_knee_stiffness": _ppo("KneeStiffness-v0"),
+    "ppo_knee_walk": _ppo("KneeWalk-v0", "; trained at 5 s a stride"),
+    "ppo_knee_stairs_up": _ppo("KneeStairsUp-v0", "; trained at the paper's pace"),
+    "ppo_knee_stairs_down": _ppo("KneeStairsDown-v0", "; trained at the paper's pace"),
 }
 PRETRAINED: dict[str, str] = {name: str(FOLDER / entry.file) for name, entry in CONTROLLERS.items()}
 

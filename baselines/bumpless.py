@@ -33,6 +33,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,6 +48,10 @@ SMALLEST = 1e-7
 
 PRICE = 1e-2
 """Distance from the bound that a unit of state feedback has to earn."""
+
+
+LIMITED = 1e-9
+"""Difference between a command and what was applied that is more than rounding."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +114,9 @@ class Bumpless:
     low, high : float
         Limits of the command.
     compensated : bool
-        Whether the compensator acts; without it the controller sees the measurement as it is.
+        Whether the compensator acts; without it the controller sees the measurement as it is, and
+        in charge it has plain clamping against windup: no error that would drive a limited command
+        further reaches it. So with and without differ in the hand-over alone.
     """
 
     controller: DiscreteSystem
@@ -129,7 +136,7 @@ class Bumpless:
             raise ValueError(f"low is {self.low} and high {self.high}; low must be below: swap")
 
     def without(self) -> Bumpless:
-        """Return this controller without its compensator."""
+        """Return this controller without its compensator, with clamping in its place."""
         return replace(self, compensated=False)
 
     def initial_state(self, rows: int | tuple[int, ...] = ()) -> BumplessState:
@@ -160,19 +167,34 @@ class Bumpless:
         return np.asarray(np.minimum(np.maximum(wanted, low), high))
 
     def advance(
-        self, reference: ArrayLike, measured: ArrayLike, applied: ArrayLike, state: BumplessState
+        self,
+        reference: ArrayLike,
+        measured: ArrayLike,
+        applied: ArrayLike,
+        state: BumplessState,
+        in_charge: ArrayLike = False,
     ) -> BumplessState:
         """Return the state after a period in which the command ``applied``, (...), acted.
 
         Where a feed-forward is added behind this controller, ``applied`` is what was applied less
-        this controller's own feed-forward.
+        this controller's own feed-forward. ``in_charge``, (...), says whether it was its own
+        command; that matters without the compensator alone, which has to know what was limited.
         """
         error = self._error(reference, measured, state)
         wanted, after = self.controller.step(error, state.controller)
-        if not self.compensated:
-            return BumplessState(after, state.model)
         difference = np.asarray(applied, float) - wanted
-        return BumplessState(after, self.model.advance(difference, state.model))
+        if self.compensated:
+            return BumplessState(after, self.model.advance(difference, state.model))
+        further = np.asarray(in_charge, bool) & (self._sign * difference * error < 0.0)
+        limited = further & (np.abs(difference) > LIMITED)
+        _, after = self.controller.step(np.where(limited, 0.0, error), state.controller)
+        return BumplessState(after, state.model)
+
+    @cached_property
+    def _sign(self) -> float:
+        """Sign of what a command does to the output, in the end."""
+        a, b = self.model.a, self.model.b
+        return float(np.sign(self.model.c @ np.linalg.solve(np.eye(len(b)) - a, b)))
 
     def _error(self, reference: ArrayLike, measured: ArrayLike, state: BumplessState) -> Array:
         error = np.asarray(reference, float) - np.asarray(measured, float)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from baselines.bumpless import Bumpless, BumplessGains, BumplessState, make_bumpless
 from baselines.controller import Array
@@ -86,14 +87,19 @@ class Loop:
         return np.asarray(KILO * made)
 
     def advance(
-        self, wanted: Array, measured: Array, applied: Array, state: BumplessState
+        self,
+        wanted: Array,
+        measured: Array,
+        applied: Array,
+        state: BumplessState,
+        in_charge: ArrayLike = False,
     ) -> BumplessState:
-        """Return the state after a period in which a command [Pa] acted."""
-        return self.bumpless.advance(wanted, measured, applied / KILO, state)
+        """Return the state after a period in which a command [Pa], its own or not, acted."""
+        return self.bumpless.advance(wanted, measured, applied / KILO, state, in_charge)
 
 
 def make_loop(plant: KneeOrthosis, output: Output, bumpless: bool = True) -> Loop:
-    """Return the designed feedback of an output; ``bumpless=False`` leaves the compensator out."""
+    """Return the designed feedback of an output; ``bumpless=False`` has clamping instead."""
     made = design(plant, output)
     order = made.plant.order
     whole = make_bumpless(

@@ -7,7 +7,8 @@
 controllers run always; which of them is applied is told by the heel's load as sensed. The one
 off-line is shown what the environment's references are then (in swing a tension that may be off,
 in stance the angle itself). With the compensators each knows what was applied in its place;
-without them it goes on integrating an error that it cannot change. With the brace alone it is
+without them it goes on integrating an error that it cannot change (the one in charge is
+clamped, so that the difference is the hand-over). With the brace alone it is
 always stance.
 """
 
@@ -90,9 +91,10 @@ class KneeLtr:
             swing = free + self._share(self.angle, path, sensed, free, state.angle)
             command = np.where(view.stance, stance, swing)
             used = np.where(view.stance, forward, free)
-            angle = self.angle.advance(path, sensed, command - free, state.angle)
+            off = ~view.stance
+            angle = self.angle.advance(path, sensed, command - free, state.angle, off)
         stance_state = self.tension.advance(
-            view.wanted, view.tension, command - forward, state.tension
+            view.wanted, view.tension, command - forward, state.tension, view.stance
         )
         after = LtrState(stance_state, angle, self.forward.move(used, state.memory))
         return answer(self.action_signal, command, observation), after

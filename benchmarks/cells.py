@@ -150,9 +150,10 @@ def episode_record(cell: Cell, seed: int, episode: rollout.Episode) -> dict[str,
             float(content["settle_seconds"]),
             float(content["hold_seconds"]),
             content["cost_scales"],
-            content.get("gate", ""),
+            content.get("gate") or (),
             content.get("metrics") or (),
             content.get("activity", ""),
+            content.get("half_range"),
         )
     except (ValueError, IndexError, KeyError):
         if not episode.failed:

@@ -65,6 +65,10 @@ class Switch:
     ----------
     tension : float
         Largest error [N] in the first 0.5 s.
+    at_switch : float
+        Error [N] in the first period of stance: what the swing's controller left behind.
+    excess : float
+        By how much [N] the largest error is above that: the transient of the one taking over.
     pressure : float
         Largest change of the pressure [Pa] in the first 0.1 s.
     command : float
@@ -74,6 +78,8 @@ class Switch:
     """
 
     tension: float
+    at_switch: float
+    excess: float
     pressure: float
     command: float
     worst_tension: float
@@ -189,13 +195,18 @@ def stride(
     return {**episode.signals, "set_point": command}
 
 
-def switching(mismatch: float = 10.0, bumpless: bool = True, preview: bool = False) -> Switch:
-    """Return the transient after the switches to stance in ``PAM/KneeWalk-v0``, 5 s a stride.
+def switching(
+    mismatch: float = 10.0,
+    bumpless: bool = True,
+    preview: bool = False,
+    pace: float = PAPER_STRIDE,
+) -> Switch:
+    """Return the transient after the switches to stance in ``PAM/KneeWalk-v0``.
 
     The parameters are those of :func:`stride`. A set-point of the last period of swing is compared
     with the first that the tension's controller gives.
     """
-    signals, period = stride("walk", mismatch, bumpless, preview), KneeOrthosis.control_period
+    signals, period = stride("walk", mismatch, bumpless, preview, pace), KneeOrthosis.control_period
     starts = metrics_knee.landings(signals["sensor/stance"], period)
     error = signals["output"] - signals["reference"]
     seconds = (metrics_knee.JUMP_SECONDS, metrics_knee.BRIEF_SECONDS)
@@ -205,6 +216,8 @@ def switching(mismatch: float = 10.0, bumpless: bool = True, preview: bool = Fal
     peaks = [float(np.abs(error[k : k + long]).max()) for k in starts]
     return Switch(
         tension=float(np.mean(peaks)),
+        at_switch=metrics_knee.largest_after(error, starts, 1),
+        excess=metrics_knee.excess_after(error, starts, long),
         pressure=metrics_knee.pressure_jump(signals["state/pressure"], starts, brief),
         command=float(np.mean(jumps)),
         worst_tension=max(peaks),
@@ -223,7 +236,7 @@ def emg_ratios(activity: Activity = "walk", pace: float = PAPER_STRIDE) -> dict[
     Returns
     -------
     dict
-        ``emg_ratio``, ``emg_flexors_ratio`` (predicted), ``emg_ratio_fitted_a`` and ``_b``.
+        The ``emg_`` metrics of :data:`benchmarks.metrics_knee.GAIT`.
     """
     signals = stride(activity, pace=pace)
     window = (signals["time"] > pace) & (signals["time"] < 3.0 * pace + 1e-6)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks import metrics_elbow, metrics_knee
+from benchmarks import metrics_elbow, metrics_joint, metrics_knee
 
 Array = NDArray[np.float64]
 
@@ -33,6 +33,8 @@ GROUPS: dict[str, dict[str, str]] = {
     "range": metrics_knee.RANGE,
     "gait": metrics_knee.GAIT,
     "elbow": metrics_elbow.ELBOW,
+    "joint": metrics_joint.JOINT,
+    "chain": metrics_joint.CHAIN,
 }
 """What a track may be scored by beside ``METRICS``, by the names that its file gives."""
 
@@ -107,9 +109,10 @@ def score(
     settle_seconds: float,
     hold_seconds: float,
     cost_scales: Mapping[str, float],
-    gate: str = "",
+    gate: Sequence[str] = (),
     groups: Sequence[str] = (),
     activity: str = "",
+    half_range: float | None = None,
 ) -> dict[str, float]:
     """Return every metric of one finished episode.
 
@@ -125,12 +128,14 @@ def score(
         How long the reference must have rested for a steady-state error.
     cost_scales : mapping of float
         Scale of each soft-limit cost.
-    gate : str
-        Signal that is 1 where the output is tracked; everywhere if not given.
+    gate : sequence of str
+        Signals that are all 1 where the output is tracked; everywhere if none is given.
     groups : sequence of str
         Of ``GROUPS``.
     activity : str
         Of a gait.
+    half_range : float, optional
+        What an error in percent refers to; half of what the reference went through if not given.
 
     Raises
     ------
@@ -144,12 +149,17 @@ def score(
             f"the episode ends at {time[-1]:g} s, inside the settling window of "
             f"{settle_seconds:g} s; lengthen the episode or shorten the window"
         )
-    tracked = window & (signals[gate] > 0.5) if gate else window
+    tracked = window.copy()
+    for name in gate:
+        tracked &= np.asarray(signals[name]) > 0.5
     reference = np.asarray(signals["reference"])[tracked]
     error = np.asarray(signals["output"])[tracked] - reference
     sensed = np.asarray(signals["sensed"])[tracked] - reference
     if not len(error):
-        raise ValueError(f"{gate} is 0 all the time: lengthen the episode or choose another gate")
+        raise ValueError(
+            f"{' and '.join(gate)} are never 1 together: lengthen the episode or choose"
+            " another gate"
+        )
     seconds = float(window.sum()) * period
     scores = {
         "rms_error": rms(error),
@@ -162,11 +172,15 @@ def score(
         "constraint_cost": constraint_cost(signals, cost_scales),
     }
     if "range" in groups:
-        scores |= metrics_knee.of_range(signals, window, tracked)
+        scores |= metrics_knee.of_range(signals, window, tracked, half_range)
     if "gait" in groups:
         scores |= metrics_knee.of_gait(signals, window, tracked, period, activity)
     if "elbow" in groups:
         scores |= metrics_elbow.of_elbow(signals, window, period)
+    if "joint" in groups:
+        scores |= metrics_joint.of_joint(signals, window)
+    if "chain" in groups:
+        scores |= metrics_joint.of_chain(signals, window)
     return scores
 
 

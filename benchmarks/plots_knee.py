@@ -145,7 +145,7 @@ def _emg(ax: Any, signals: Signals) -> None:
         f"RMS of this stride: {plain:+.0f} %\n(calibrated reading A: {fitted:+.0f} %;\n"
         "the paper's EMG: -36 %)"
     )
-    ax.text(3.5, 21.0, words, ha="center", va="center", fontsize=9)
+    ax.text(3.5, 26.0, words, ha="center", va="center", fontsize=9)
 
 
 KINDS = ("", "_calibrated")

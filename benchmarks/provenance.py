@@ -20,6 +20,7 @@ SCORING = (
     "controllers.py",
     "metrics.py",
     "metrics_elbow.py",
+    "metrics_joint.py",
     "metrics_knee.py",
     "rollout.py",
 )

@@ -38,6 +38,7 @@ _KEYS = {
     "model",
     "metrics",
     "gate",
+    "half_range",
     "activity",
     "unit",
     "shown",
@@ -49,11 +50,12 @@ _OPTIONAL = {
     "model",
     "metrics",
     "gate",
+    "half_range",
     "activity",
     "unit",
     "shown",
 }
-_UNITS = {"load": "kg", "mismatch": "N", "pace": "s"}
+_UNITS = {"load": "kg", "mismatch": "N", "pace": "s", "payload": "kg"}
 """Of the axes of a grid, for the scenarios' names."""
 
 

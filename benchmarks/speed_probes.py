@@ -22,7 +22,8 @@ ENV = "PAM/MusclePositioning-v0"
 KNEE = "PAM/KneeWalk-v0"
 ELBOW = "PAM/ElbowOrthosis-v0"
 ROOT = Path(__file__).resolve().parent.parent
-PENDULUM, CARTPOLE = "InvertedPendulum-v5", "CartPole-v1"
+JOINT, ARM = "PAM/AntagonisticJoint-v0", "PAM/RedundantManipulator-v0"
+PENDULUM, CARTPOLE, HOPPER = "InvertedPendulum-v5", "CartPole-v1", "Hopper-v5"
 
 
 def stepping(env: Any, steps: int) -> Chunk:
@@ -99,16 +100,18 @@ def single(rounds: int) -> list[Measurement]:
     return [*results, Measurement("single", title, knee, "x", 5.0, 10.0, note=note)]
 
 
-def single_elbow(rounds: int) -> list[Measurement]:
-    """Elbow orthosis with either make of valves, beside MuJoCo's hopper."""
-    gym, hopper = _gym(), "Hopper-v5"
+def single_joints(rounds: int) -> list[Measurement]:
+    """Elbow with either make of valves, one joint, and an arm of six, beside MuJoCo's hopper."""
+    gym = _gym()
     subjects = {
         "elbow": stepping(gym.make(ELBOW), 5000),
         "elbow, on/off valves": stepping(gym.make(ELBOW, valves="on_off"), 5000),
+        "joint": stepping(gym.make(JOINT), 5000),
+        "arm": stepping(gym.make(ARM), 2000),
     }
     note = ""
     try:
-        subjects[hopper] = stepping(gym.make(hopper), 1000)
+        subjects[HOPPER] = stepping(gym.make(HOPPER), 1000)
     except (ImportError, gym.error.DependencyNotInstalled) as error:
         note = f"not installed: {error}"
     rates = interleaved(subjects, rounds)
@@ -116,9 +119,11 @@ def single_elbow(rounds: int) -> list[Measurement]:
         Measurement("single", f"{name}, steps per CPU second", median(rates[name]), "1/s")
         for name in subjects
     ]
-    value = ratio(rates["elbow"], rates[hopper]) if hopper in rates else None
-    title = f"{ELBOW[4:-3]} / {hopper}"
-    return [*results, Measurement("single", title, value, "x", 8.0, 16.0, note=note)]
+    for name, env, floor in (("elbow", ELBOW, 8.0), ("joint", JOINT, 8.0), ("arm", ARM, 2.0)):
+        value = ratio(rates[name], rates[HOPPER]) if HOPPER in rates else None
+        title = f"{env[4:-3]} / {HOPPER}"
+        results.append(Measurement("single", title, value, "x", floor, 2 * floor, note=note))
+    return results
 
 
 # --- batches ----------------------------------------------------------------------------------
@@ -387,7 +392,7 @@ def learning(rounds: int) -> list[Measurement]:
 
 
 GROUPS: dict[str, tuple[Callable[[int], list[Measurement]], ...]] = {
-    "single": (single, single_elbow),
+    "single": (single, single_joints),
     "batch": (batch, variants, growth, cores, processes),
     "plain": (uncompiled, jacobian),
     "start": (start_up,),

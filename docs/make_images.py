@@ -77,4 +77,8 @@ if __name__ == "__main__":
     elbow = images / "elbow_orthosis_frame.png"
     frame("PAM/ElbowOrthosis-v0", elbow, 6.6, reference="weight", motion="sines")
     papers_elbow.bundle_figure().savefig(images / "elbow_bundles.png", dpi=100)
+    joint = images / "antagonistic_joint_frame.png"
+    frame("PAM/AntagonisticJoint-v0", joint, 8.9, reference="sine", payload=0.5, disturbance=1.5)
+    arm = images / "redundant_manipulator_frame.png"
+    frame("PAM/RedundantManipulator-v0", arm, 4.2, reference="path_3")
     stride(images / "knee_stride.png")

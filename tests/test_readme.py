@@ -38,6 +38,9 @@ def test_the_snippets_of_the_orthosis_run_and_give_what_the_page_says(capsys):
     assert 1.5 <= names["stiffness"]["knee_inverse"] <= 2.3
     assert 10.5 <= names["stiffness"]["knee_line"] <= 11.6
     assert names["kick"](names["plain"]) > 3.0 * names["kick"](names["tension"])
+    assert names["found"].names[0] == "horizontal_force"
+    assert "named ('horizontal_force', 'inertia') 1.03" in said
+    assert "horizontal_force: 3.98" in said
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.data.recording import Recording
-from pam_envs.diagnosis.fitting import FEW_DAMPINGS, Fit, Problem, evaluate, improve, share
-from pam_envs.diagnosis.search import Blocks, Candidate, polish, refit, whole
+from pam_envs.diagnosis.fitting import FEW_DAMPINGS, Problem, evaluate, improve, share
+from pam_envs.diagnosis.search import Blocks, Candidate, fresh, less_one, polish, refit, whole
 
 Array = NDArray[np.float64]
 
@@ -197,7 +197,7 @@ def hold_out(
     for k, candidate in zip(others, fitted, strict=True):
         thorough = any(rivals[k] is c for c in close)
         found[k] = _thoroughly(again, blocks, old, rivals[k]) if thorough else candidate
-    less = _less_one(again, old, new) if len(model.causes) > 1 else {}
+    less = less_one(again, blocks, old, new) if len(model.causes) > 1 else {}
 
     def scored(candidate: Candidate) -> Candidate:
         left = np.where(rows, again.rows(candidate.fit.residual), 0.0)
@@ -223,7 +223,7 @@ def _side_by_side(
         return []
     whole(problem, base.fit)
     shared = share(problem, base.fit)
-    fits = [_fresh(c.fit, z=_begun_at(base, c), shared=shared) for c in candidates]
+    fits = [fresh(c.fit, z=_begun_at(base, c), shared=shared) for c in candidates]
     evaluate(problem, fits)
     improve(problem, fits, ROUNDS, 1e-4, FEW_DAMPINGS)
     return [replace(c, fit=fit) for c, fit in zip(candidates, fits, strict=True)]
@@ -240,37 +240,3 @@ def _thoroughly(problem: Problem, blocks: Blocks, base: Candidate, model: Candid
 def _begun_at(base: Candidate, candidate: Candidate) -> Array:
     """Return where a candidate's fit begins if its base is another one."""
     return np.concatenate([base.fit.z, candidate.fit.z[len(base.fit.z) :]])
-
-
-def _fresh(fit: Fit, **changes: Any) -> Fit:
-    """Return a copy of a fit that has not begun."""
-    empty = np.zeros((0, 0))
-    return replace(fit, done=False, damping=1.0, begins={}, slopes=empty, **changes)
-
-
-def _less_one(problem: Problem, base: Candidate, model: Candidate) -> dict[str, Candidate]:
-    """Return the model refitted without each one of its causes, the better of two beginnings."""
-    fits, labels = [], []
-    for gone, form in model.causes:
-        dropped = {t.name for t in form.terms}
-        kept = [k for k, f in enumerate(model.fit.frees) if f.name not in dropped]
-        frees, z = tuple(model.fit.frees[k] for k in kept), model.fit.z[kept]
-        of_base = np.concatenate([base.fit.z, z[len(base.fit.z) :]])
-        for start in (z, of_base):
-            fits.append(_fresh(replace(model.fit, frees=frees, z=start.copy()), shared=None))
-            labels.append(gone.name)
-    whole(problem, base.fit)
-    shared = share(problem, base.fit)
-    for fit in fits:
-        fit.shared = shared
-    evaluate(problem, fits)
-    improve(problem, fits, ROUNDS, 1e-4, FEW_DAMPINGS)
-    best: dict[str, Fit] = {}
-    for name, fit in zip(labels, fits, strict=True):
-        if name not in best or fit.cost < best[name].cost:
-            best[name] = fit
-    polish(problem, list(best.values()))
-    return {
-        name: Candidate(tuple(c for c in model.causes if c[0].name != name), fit, model.errors)
-        for name, fit in best.items()
-    }

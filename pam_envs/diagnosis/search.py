@@ -36,6 +36,8 @@ POLISH = 6
 """Rounds, at most, with all of the Jacobian."""
 POLISHED = 3
 """How many of the best rivals are polished."""
+FEW_ROUNDS = 3
+"""Rounds of a model with a cause less."""
 POLISHED_ENOUGH = 1e-3
 """Part of the cost that a round has to gain for another one."""
 
@@ -254,3 +256,43 @@ def refit(problem: Problem, blocks: Blocks, candidate: Candidate, rounds: int = 
     evaluate(problem, [fit])
     improve(problem, [fit], rounds, 1e-5)
     return Candidate(candidate.causes, fit, blocks.errors(problem.rows(fit.residual)))
+
+
+def fresh(fit: Fit, **changes: Any) -> Fit:
+    """Return a copy of a fit that has not begun."""
+    empty = np.zeros((0, 0))
+    return replace(fit, done=False, damping=1.0, begins={}, slopes=empty, **changes)
+
+
+def less_one(
+    problem: Problem, blocks: Blocks, base: Candidate, model: Candidate
+) -> dict[str, Candidate]:
+    """Return the model refitted without each one of its causes, the better of two beginnings."""
+    fits, labels = [], []
+    for gone, form in model.causes:
+        dropped = {t.name for t in form.terms}
+        kept = [k for k, f in enumerate(model.fit.frees) if f.name not in dropped]
+        frees, z = tuple(model.fit.frees[k] for k in kept), model.fit.z[kept]
+        of_base = np.concatenate([base.fit.z, z[len(base.fit.z) :]])
+        for start in (z, of_base):
+            fits.append(fresh(replace(model.fit, frees=frees, z=start.copy()), shared=None))
+            labels.append(gone.name)
+    whole(problem, base.fit)
+    shared = share(problem, base.fit)
+    for fit in fits:
+        fit.shared = shared
+    evaluate(problem, fits)
+    improve(problem, fits, FEW_ROUNDS, 1e-4, FEW_DAMPINGS)
+    best: dict[str, Fit] = {}
+    for name, fit in zip(labels, fits, strict=True):
+        if name not in best or fit.cost < best[name].cost:
+            best[name] = fit
+    polish(problem, list(best.values()))
+    return {
+        name: Candidate(
+            tuple(c for c in model.causes if c[0].name != name),
+            fit,
+            blocks.errors(problem.rows(fit.residual)),
+        )
+        for name, fit in best.items()
+    }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,7 +13,7 @@ from scipy.special import stdtr
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.fitting import Problem, column_of
 from pam_envs.diagnosis.rule import Judgement, Rule, judge, wanted_of_further
-from pam_envs.diagnosis.search import Blocks, Candidate, refit, search
+from pam_envs.diagnosis.search import Blocks, Candidate, less_one, refit, search
 from pam_envs.diagnosis.structure import Regressors, flexible_r2, spectral_peak
 
 Array = NDArray[np.float64]
@@ -176,31 +176,71 @@ def _ladder(
     base: Candidate,
     causes: Sequence[Cause],
     rule: Rule,
-) -> Iterator[tuple[Candidate, list[Candidate]]]:
+) -> list[tuple[Candidate, list[Candidate]]]:
     """Return the best model with one cause, two, ... and its rivals, while a cause may pay."""
     rivals = search(problem, family, blocks, base, causes)
     if not rivals:
-        return
+        return []
     rivals = preferred(blocks, base, rivals, rule)
-    yield rivals[0], rivals
-    model = rivals[0]
-    first_gain = worth(blocks, base, model, rule)
-    while first_gain >= rule.least_gain and len(model.causes) < rule.most:
-        possible = attainable(blocks, model)
-        wanted = wanted_of_further(first_gain, possible, rule)
-        if possible < wanted:
+    found, mended = [(rivals[0], rivals)], False
+    while len(found) < rule.most:
+        larger = _larger(problem, family, blocks, base, causes, found, rule)
+        if not larger:
             break
-        larger = search(problem, family, blocks, model, causes, 2, rule.hint * wanted)
-        more = max((worth(blocks, model, c, rule) for c in larger), default=0.0)
-        if more < wanted:
-            break
-        if len(model.causes) == 1:
-            for first in rivals[1 : rule.beam]:
-                larger += search(problem, family, blocks, first, causes, 2)[:4]
-        larger.sort(key=lambda c: -worth(blocks, base, c, rule))
-        rivals = preferred(blocks, base, distinct(larger), rule)
-        model = rivals[0]
-        yield model, rivals
+        better = None if mended else smaller(problem, blocks, base, larger[0], found[-1], rule)
+        mended = better is not None
+        if better is not None:  # what was added only mended a fit that had stuck
+            found[-1] = better
+            continue
+        found.append((larger[0], larger))
+    return found
+
+
+def _larger(
+    problem: Problem,
+    family: Any,
+    blocks: Blocks,
+    base: Candidate,
+    causes: Sequence[Cause],
+    found: Sequence[tuple[Candidate, list[Candidate]]],
+    rule: Rule,
+) -> list[Candidate]:
+    """Return models with one more cause than the last found, the best first; none if none pays."""
+    model, rivals = found[-1]
+    first_gain = worth(blocks, base, found[0][0], rule)
+    possible = attainable(blocks, model)
+    wanted = wanted_of_further(first_gain, possible, rule)
+    if first_gain < rule.least_gain or possible < wanted:
+        return []
+    larger = search(problem, family, blocks, model, causes, 2, rule.hint * wanted)
+    if max((worth(blocks, model, c, rule) for c in larger), default=0.0) < wanted:
+        return []
+    if len(found) == 1:
+        for first in rivals[1 : rule.beam]:
+            larger += search(problem, family, blocks, first, causes, 2)[:4]
+    larger.sort(key=lambda c: -worth(blocks, base, c, rule))
+    return preferred(blocks, base, distinct(larger), rule)
+
+
+def smaller(
+    problem: Problem,
+    blocks: Blocks,
+    base: Candidate,
+    model: Candidate,
+    known: tuple[Candidate, list[Candidate]],
+    rule: Rule,
+) -> tuple[Candidate, list[Candidate]] | None:
+    """Return the models with a cause less, if one begun at a larger model does better than known.
+
+    A fit that has stuck borrows a second cause to get away; without it, it may then stay there.
+    """
+    made = list(less_one(problem, blocks, base, model).values())
+    best = max(made, key=lambda c: worth(blocks, base, c, rule))
+    if worth(blocks, base, best, rule) < worth(blocks, base, known[0], rule) + rule.simpler:
+        return None
+    rivals = [best, *(r for r in known[1] if set(r.names) != set(best.names))]
+    rivals = preferred(blocks, base, rivals, rule)
+    return rivals[0], rivals
 
 
 def attainable(blocks: Blocks, model: Candidate) -> float:

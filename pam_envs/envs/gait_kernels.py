@@ -42,6 +42,10 @@ from pam_envs.envs.gait_layout import (
     FIXED_SIGNALS,
     HIGHEST_TENSION,
     INFO,
+    KNOWN_ARM,
+    KNOWN_RELAXED,
+    KNOWN_SHANK,
+    KNOWN_WIRE,
     LARGEST_DEVIATION,
     LOWEST_TORQUE,
     M_DEVIATION,
@@ -104,6 +108,9 @@ from pam_envs.sensing.shoe import estimated_torque
 from pam_envs.tasks.gait_assistance import assistance_wanted, gated_reward, over_assistance
 from pam_envs.tasks.tracking import effort_reward, excess
 
+VENTED = 1e3
+"""Gauge pressure [Pa] up to which a muscle that grows draws ambient air, which costs nothing."""
+
 
 @kernel
 def sense(rows: Any, fixed: Any, counts: Any, k: int, step: int, j: int) -> None:
@@ -126,9 +133,7 @@ def share_of_torque(rows: Any, fixed: Any, settings: Any, choices: Any, j: int) 
     ankle, config = rows[READ_ANKLE][j], settings[0]
     shank = rows[K.SHANK][j] + (ankle - rows[K.ANKLE][j])
     sine, _ = sine_and_cosine(lean(shank, ankle, fixed[K.SHOE_FLAT_FOOT][j]))
-    estimate = estimated_torque(
-        rows[READ_GROUND][j], rows[READ_COP][j], sine, fixed[K.LEG_SHANK][j]
-    )
+    estimate = estimated_torque(rows[READ_GROUND][j], rows[READ_COP][j], sine, config[KNOWN_SHANK])
     if choices[SOURCE] == DEMAND:
         estimate = rows[K.DEMAND][j]
     return assistance_wanted(estimate, config[RATIO], config[LOWEST_TORQUE])
@@ -140,20 +145,21 @@ def set_references(rows: Any, fixed: Any, settings: Any, j: int) -> None:
 
     In stance the tension gives the wanted torque at the angle as sensed, and the angle's reference
     is the angle itself; in swing the angle's reference is the wearer's path, and the tension's is
-    that of no assistance, but for a mismatch.
+    that of no assistance, but for a mismatch. Where the brace was drawn, it is not the one that
+    the tension is computed for.
     """
-    torque, shift = rows[WANTED_TORQUE][j], 0.0
+    config, torque, shift = settings[0], rows[WANTED_TORQUE][j], 0.0
     wanted = rows[READ_ANGLE][j]
     if rows[READ_STANCE][j] < 0.5:
-        torque, shift = 0.0, settings[0][MISMATCH]
+        torque, shift = 0.0, config[MISMATCH]
         wanted = fixed[K.LEVER_MOUNT_ANGLE][j] + rows[K.KNEE][j]
     rows[WANTED_ANGLE][j] = wanted
     rows[WANTED_TENSION][j] = shift + wanted_tension(
         rows[READ_ANGLE][j],
         torque,
-        fixed[K.LEVER_ARM][j],
-        fixed[K.LEVER_STIFFNESS][j],
-        fixed[K.LEVER_RELAXED_ANGLE][j],
+        config[KNOWN_ARM],
+        config[KNOWN_WIRE],
+        config[KNOWN_RELAXED],
     )
 
 
@@ -244,7 +250,7 @@ def judge(rows: Any, fixed: Any, counts: Any, settings: Any, work: Any) -> None:
     pressure, set_point, older = rows[K.PRESSURE], rows[K.SET_POINT], rows[K.OLD_SET_POINT]
     for j in range(LANES):
         stance, tension, off = rows[K.STANCE][j], rows[K.TENSION][j], abs(rows[K.DEVIATION][j])
-        demand = rows[K.DEMAND][j]
+        seen, demand = rows[READ_STANCE][j], rows[K.DEMAND][j]
         over = over_assistance(rows[K.TORQUE][j], demand)
         work[TIME][j] = step[j] * config[PERIOD]
         work[REF][j] = rows[WANTED_TENSION][j]
@@ -252,12 +258,12 @@ def judge(rows: Any, fixed: Any, counts: Any, settings: Any, work: Any) -> None:
         work[S_IDEAL][j] = config[RATIO] * demand
         work[R_TENSION][j] = gated_reward(
             tension - rows[WANTED_TENSION][j],
-            stance,
+            stance * seen,
             config[TENSION_SCALE],
             config[TENSION_WEIGHT],
         )
         work[R_ANGLE][j] = gated_reward(
-            off, 1.0 - stance, config[ANGLE_SCALE], config[ANGLE_WEIGHT]
+            off, (1.0 - stance) * (1.0 - seen), config[ANGLE_SCALE], config[ANGLE_WEIGHT]
         )
         work[R_OVER][j] = gated_reward(over, 1.0, config[OVER_SCALE], config[OVER_WEIGHT])
         work[R_EFFORT][j] = effort_reward(
@@ -272,7 +278,8 @@ def judge(rows: Any, fixed: Any, counts: Any, settings: Any, work: Any) -> None:
         work[ENDED][j] = 1.0 if broken < 0.0 else 0.0
         work[E_OVER][j] = over
         work[E_TRAVEL][j] = abs(pressure[j] - rows[K.OLD_PRESSURE][j])
-        work[E_AIR][j] = max(0.0, rows[K.AIR][j] - rows[K.OLD_AIR][j])
+        drawn = max(0.0, rows[K.AIR][j] - rows[K.OLD_AIR][j])
+        work[E_AIR][j] = drawn if pressure[j] > VENTED else 0.0
         rows[K.OLD_PRESSURE][j] = pressure[j]
         rows[K.OLD_AIR][j] = rows[K.AIR][j]
 

@@ -148,7 +148,14 @@ CONFIG = (
     "demand_share",
     "start_phase",
     "start_spread",
+    "known_arm",
+    "known_wire",
+    "known_relaxed",
+    "known_shank",
+    "known_mass",
 )
+"""The last five are what the orthosis knows of itself and its wearer, in SI: the parameters of the
+plant before any is drawn. Its references follow from these."""
 (
     TENSION_WEIGHT,
     TENSION_SCALE,
@@ -167,6 +174,11 @@ CONFIG = (
     DEMAND_SHARE,
     START_PHASE,
     START_SPREAD,
+    KNOWN_ARM,
+    KNOWN_WIRE,
+    KNOWN_RELAXED,
+    KNOWN_SHANK,
+    KNOWN_MASS,
 ) = range(FIRST_CONFIG, FIRST_CONFIG + len(CONFIG))
 CHOICES = ("elements", "source")
 N_ELEMENTS, SOURCE = range(FIRST_CHOICE, FIRST_CHOICE + len(CHOICES))

@@ -1,4 +1,8 @@
-"""The stride as planned: what the references will be if the wearer goes on as he does."""
+"""The stride as planned: what the references will be if the wearer goes on as he does.
+
+The plan knows the wearer's path and pace, but of his body and of the brace no more than the
+orthosis does: the parameters before any is drawn.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,11 @@ from pam_envs.envs.env_kernels import AT_OWN, PERIOD
 from pam_envs.envs.gait_layout import (
     ANGLE_CHANNEL,
     FILTER,
+    KNOWN_ARM,
+    KNOWN_MASS,
+    KNOWN_RELAXED,
+    KNOWN_SHANK,
+    KNOWN_WIRE,
     LOWEST_TORQUE,
     MISMATCH,
     PLAN_FILTER,
@@ -45,7 +54,9 @@ def lean(shank: float, ankle: float, flat_foot: float) -> float:
 
 
 @kernel
-def planned_sole(fixed: Any, gait: Any, phase: float, j: int) -> tuple[float, float]:
+def planned_sole(
+    fixed: Any, gait: Any, phase: float, body_mass: float, j: int
+) -> tuple[float, float]:
     """Return ground force [N] and centre of pressure [m] at a phase of the planned stride."""
     loaded = curve(gait, GROUND_Z, phase)
     cop = centre_of_pressure(
@@ -57,24 +68,25 @@ def planned_sole(fixed: Any, gait: Any, phase: float, j: int) -> tuple[float, fl
         fixed[K.SHOE_HEEL][j],
         fixed[K.SHOE_TIP][j],
     )
-    return fixed[K.LEG_BODY_MASS][j] * GRAVITY * max(0.0, loaded), cop
+    return body_mass * GRAVITY * max(0.0, loaded), cop
 
 
 @kernel
 def planned_torque(
-    fixed: Any, settings: Any, choices: Any, phase: float, j: int
+    fixed: Any, settings: Any, choices: Any, phase: float, body_mass: float, j: int
 ) -> tuple[float, bool]:
     """Return the assistance [N m] before the low-pass, and whether it is stance, as planned.
 
-    Of the sensors' estimate: the true demand is not planned ahead.
+    Of the sensors' estimate for a wearer of ``body_mass`` [kg]: the true demand is not planned
+    ahead.
     """
     gait, config = settings[choices[AT_OWN] :], settings[0]
-    ground, cop = planned_sole(fixed, gait, phase, j)
+    ground, cop = planned_sole(fixed, gait, phase, body_mass, j)
     inclination = lean(
         curve(gait, SHANK, phase), curve(gait, ANKLE, phase), fixed[K.SHOE_FLAT_FOOT][j]
     )
     sine, _ = sine_and_cosine(inclination)
-    estimate = estimated_torque(ground, cop, sine, fixed[K.LEG_SHANK][j])
+    estimate = estimated_torque(ground, cop, sine, config[KNOWN_SHANK])
     heel = heel_load(ground, cop, fixed[K.SHOE_HEEL][j], fixed[K.SHOE_TIP][j])
     stance = heel > fixed[K.SHOE_THRESHOLD][j]
     return assistance_wanted(estimate, config[RATIO], config[LOWEST_TORQUE]), stance
@@ -101,7 +113,7 @@ def planned_reference(
     angle = fixed[K.LEVER_MOUNT_ANGLE][lane] + curve(settings[choices[AT_OWN] :], KNEE, phase)
     if channel == ANGLE_CHANNEL:
         return angle
-    share, stance = planned_torque(fixed, settings, choices, phase, lane)
+    share, stance = planned_torque(fixed, settings, choices, phase, config[KNOWN_MASS], lane)
     torque, shift = butterworth(rows, PLAN_FILTER, lane, share), 0.0
     if choices[SOURCE] == SAMPLES:
         torque = samples[0][min(step, len(samples[0]) - 1)]
@@ -110,20 +122,23 @@ def planned_reference(
     return shift + wanted_tension(  # type: ignore[no-any-return]
         angle,
         torque,
-        fixed[K.LEVER_ARM][lane],
-        fixed[K.LEVER_STIFFNESS][lane],
-        fixed[K.LEVER_RELAXED_ANGLE][lane],
+        config[KNOWN_ARM],
+        config[KNOWN_WIRE],
+        config[KNOWN_RELAXED],
     )
 
 
 @routine
 def prime(rows: Any, fixed: Any, settings: Any, choices: Any, phase: float, j: int) -> float:
-    """Let both low-passes of lane ``j`` see the stride before; return their output [N m]."""
+    """Let both low-passes of lane ``j`` see the stride before; return their output [N m].
+
+    The stride before was sensed and not planned: it is of the wearer's true mass.
+    """
     per_step = settings[0][PERIOD] / fixed[K.STRIDE_TIME][j]
     start, torque = phase + 1000.0 - PRIMING * per_step, 0.0
     for k in range(PRIMING + 1):
         there = fraction_of_turn(start + k * per_step)
-        share, _ = planned_torque(fixed, settings, choices, there, j)
+        share, _ = planned_torque(fixed, settings, choices, there, fixed[K.LEG_BODY_MASS][j], j)
         if k == 0:
             settle_filter(rows, FILTER, j, share)
         if k == PRIMING:  # the plan's low-pass will be shown this period by itself

@@ -167,7 +167,8 @@ def make_setup(
         Duration of a stride [s]: 5 s ("slow", as in the paper), 1.224 s ("normal", as measured).
         Default: that of ``plant``, or slow.
     ratio : float
-        Share of the knee torque that the orthosis is to give.
+        Share of the knee torque that the orthosis is to give, up to a half: on stairs that is
+        beyond what the muscle can give at its capacity.
     assistance : {"signed", "clipped"}
         Whether it helps flexion where the share is negative, or not at all.
     mismatch : float
@@ -187,7 +188,7 @@ def make_setup(
     given = common(preview, preview_stride, episode_seconds, normalize, render_mode)
     check_choice("assistance", assistance, tuple(ASSISTANCE))
     check_choice("start", start, STARTS)
-    share = check_number("ratio", ratio, 0.0, 1.0, "")
+    share = check_number("ratio", ratio, 0.0, 0.5, "")
     shift = check_number("mismatch", mismatch, -100.0, 100.0, "N")
     task = task_of(GaitAssistance, reward)
     full = made.regulator.max_pressure
@@ -209,6 +210,11 @@ def make_setup(
         calibration(activity, "A"),
         -1.0 if start == "random" else 0.0,
         0.1 if start == "random" else 0.0,
+        made.lever.arm,
+        made.lever.stiffness,
+        made.lever.relaxed_angle,
+        made.leg.shank,
+        made.leg.body_mass,
     )
     example = "{'leg.body_mass': (60, 85)}"
     return compose(

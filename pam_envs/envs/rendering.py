@@ -44,6 +44,8 @@ VIEWS = {
     "knee_stiffness": "rendering_knee",
     "knee_gait": "rendering_knee",
     "elbow_orthosis": "rendering_elbow",
+    "antagonistic_joint": "rendering_joint",
+    **{f"redundant_manipulator_{n}": "rendering_manipulator" for n in range(1, 9)},
 }
 """Module whose ``VIEWS`` hold what is shown of an environment, by the view in its setup."""
 

@@ -7,8 +7,9 @@ the knee flexion ``q``. The hip moves evenly, so that the knee's acceleration is
     tau = F_z (l sin psi - r) - F_x h - m c [a_x cos psi ... ] - I psi''
 
 (:func:`knee_torque`) is what the wearer's muscles and the orthosis bear together. Its first term
-is all that Eq. (1) of seed 000 knows of. Off the natural pace the
-force leans less and the centre of pressure moves with it (:func:`centre_of_pressure`).
+is all that Eq. (1) of seed 000 knows of. Off the natural pace the force leans less, with the
+square of the pace, and the centre of pressure stays at the heel for longer
+(:func:`centre_of_pressure`).
 
 The wearer walks a path of his own; where the orthosis
 pushes him off it by ``e``, he holds against it like a spring and a damper, the more so the more of
@@ -57,8 +58,8 @@ class Leg:
         0.0,
         2.0,
         "assumed",
-        "height that the ground's force points at, about the body's centre of mass; least squares "
-        "on the measured stride give 1.13 m",
+        "height that the ground's force goes on pointing at while it brakes, at another pace; "
+        "least squares on the measured stride give 1.13 m; 0: the centre of pressure as measured",
         neutral=0.0,
         spread=(0.9, 1.15),
     )
@@ -105,8 +106,10 @@ def centre_of_pressure(
     """Return the centre of pressure [m ahead of the ankle] at another pace than the natural one.
 
     Horizontal forces grow with the square of the pace. The body would tip over if the ground's
-    force did not go on pointing at its centre of mass, so a wearer who walks slowly, with a force
-    that is nearly upright, stands further back in early stance and further ahead in late stance.
+    force did not go on pointing at about its centre of mass, so a wearer who walks slowly, with a
+    force that is nearly upright, stays at the heel for longer. While the force drives the body
+    ahead nothing moves: the centre of pressure is at the ball of the foot already, and further
+    ahead the heel would be free under the whole body weight.
 
     Parameters
     ----------
@@ -117,11 +120,11 @@ def centre_of_pressure(
     quick : float
         Pace over the natural one.
     aim : float
-        Height [m] that the force points at; 0 leaves the centre of pressure where it is.
+        Height [m] that the braking force points at; 0: the centre of pressure as measured.
     heel, tip : float
         Ends of the sole [m].
     """
-    leaning = ground_x / max(ground_z, 0.05)
+    leaning = min(0.0, ground_x) / max(ground_z, 0.05)
     return max(heel, min(tip, natural + (1.0 - quick * quick) * aim * leaning))
 
 

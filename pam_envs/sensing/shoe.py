@@ -19,7 +19,15 @@ class Shoe:
     heel: float = parameter(
         -0.05, "m", -0.15, 0.05, "assumed", "heel cells, ahead of the ankle: behind it"
     )
-    tip: float = parameter(0.22, "m", 0.1, 0.4, "assumed", "tip of the sole, ahead of the ankle")
+    tip: float = parameter(
+        0.28,
+        "m",
+        0.1,
+        0.4,
+        "assumed",
+        "tip of the stiff sole, ahead of the ankle; chosen so that a walking leg whose heel is "
+        "free bears less than half of the body weight (what swing is: seed 000, section 2)",
+    )
     threshold: float = parameter(
         5.0, "kg", 0.1, 50.0, "published", "seed 000, section 4.2: mean load of the heel cells"
     )

@@ -12,6 +12,9 @@ from pam_envs.parameters import parameter
 class GaitAssistance:
     """Weights and limits: tension is tracked in stance, the angle in swing.
 
+    Where the sensed phase is not the true one the reference is that of the wrong phase, and neither
+    is rewarded.
+
     ``reward = reward/tension + reward/angle + reward/over_assistance + reward/effort``.
     """
 

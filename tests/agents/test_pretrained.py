@@ -12,6 +12,7 @@ from short_runs import ID
 
 from agents import catalogue, configs
 from agents.policy import OnnxPolicy
+from benchmarks import rows
 
 NAMES = sorted(catalogue.PRETRAINED)
 
@@ -89,10 +90,29 @@ def test_it_tracks_where_a_law_without_memory_cannot(
 
 
 def test_benchmarks_find_it_among_the_controllers() -> None:
-    env = gym.make(ID).unwrapped
     for name, entry in catalogue.CONTROLLERS.items():
+        env = gym.make(*entry.envs).unwrapped
         made = catalogue.make_controller(name, env.plant, env.signals, env.action_signals, seed=0)
         assert entry.envs == (made.card["env"],)
         assert made.digest() == catalogue.load_pretrained(name).digest()
     with pytest.raises(ValueError, match="no policy named 'pppo'; did you mean 'ppo'"):
         catalogue.load_pretrained("pppo")
+
+
+@pytest.mark.parametrize(
+    ("row", "other", "share"),
+    [
+        ("knee_walk_nominal--ppo_knee_walk", "knee_walk_nominal--knee_inverse_ltr", 0.4),
+        ("knee_walk_wrong_model--ppo_knee_walk", "knee_walk_wrong_model--knee_pid", 0.6),
+        ("knee_tension_nominal--ppo_knee_tension", "knee_tension_nominal--knee_pid", 0.7),
+    ],
+)
+def test_the_knees_policies_do_better_than_classical_ones(
+    row: str, other: str, share: float
+) -> None:
+    ours, theirs = (rows.load(rows.RESULTS / f"{name}.json") for name in (row, other))
+    assert ours["failures"] == 0
+    errors = [r["aggregate"]["rms_error"]["mean"] for r in (ours, theirs)]
+    assert errors[0] < share * errors[1]
+    policy = catalogue.load_pretrained(ours["controller"]["name"])
+    assert policy.card["env"] == ours["env"]["id"]

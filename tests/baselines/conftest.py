@@ -56,6 +56,29 @@ def rollout(env: Any, controller: Controller, seed: int = 1) -> dict[str, np.nda
     return {key: np.array([row[key] for row in rows]) for key in rows[0]}
 
 
+def observations_of(env: Any, steps: int = 40, rows: int = 4) -> np.ndarray:
+    """Return observations of shape (steps, rows, n_obs): rows with other loads and references."""
+    seen = []
+    for row in range(rows):
+        seen.append([env.reset(seed=row)[0]])
+        for k in range(steps - 1):
+            action = np.array([np.sin(0.3 * k + row)], np.float32)
+            seen[-1].append(env.step(action)[0])
+    return np.array(seen).swapaxes(0, 1)
+
+
+def check_form(controller: Controller, env: Any) -> None:
+    """Assert that actions are in the space and have the form of the observation, one or a batch."""
+    batch = np.array([env.reset(seed=s)[0] for s in range(3)])
+    for observation, shape in ((batch[0], (1,)), (batch, (3, 1))):
+        state = None
+        for _ in range(3):
+            action, state = controller.predict(observation, state)
+            assert action.shape == shape
+            assert action.dtype == np.float32
+            assert all(row in env.action_space for row in action.reshape(-1, 1))
+
+
 @pytest.fixture
 def staircase() -> np.ndarray:
     """Held levels [m], up, part of the way down, up again and down: inner loops included."""

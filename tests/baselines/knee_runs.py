@@ -9,8 +9,8 @@ import gymnasium as gym
 import numpy as np
 
 import pam_envs  # noqa: F401  registers the ids
-from baselines.catalogue import make_controller
 from pam_envs.plants.knee_orthosis import KneeOrthosis
+from tests.baselines.conftest import built
 
 PROMPT = {"regulator.time_constant": 2e-3}
 
@@ -39,12 +39,6 @@ def run(env: Any, controller: Any, seed: int = 1) -> dict[str, np.ndarray]:
     record = {key: np.array([row[key] for row in rows]) for key in rows[0]}
     signal = env.action_signals["pressure_set_point"]
     return record | {"set_point": signal.decode(np.array(actions))}
-
-
-def built(name: str, env: Any, plant: Any = None) -> Any:
-    """Return a controller of the catalogue for an environment."""
-    model = env.plant if plant is None else plant
-    return make_controller(name, model, env.signals, env.action_signals)
 
 
 @cache

@@ -8,7 +8,8 @@ import pytest
 from baselines.catalogue import CONTROLLERS, make_controller
 from baselines.knee_catalogue import KNEE, KNEE_CONTROLLERS, KNEE_MAKERS
 from pam_envs.plants.single_muscle import SingleMuscle
-from tests.baselines.knee_runs import built, make_knee, quiet, run
+from tests.baselines.conftest import built, check_form, observations_of
+from tests.baselines.knee_runs import make_knee, quiet, run
 
 PAIRS = [
     (env.split("/")[1].split("-")[0], name)
@@ -26,32 +27,21 @@ def test_catalogue_and_makers_name_the_same():
 @pytest.mark.parametrize(("family", "name"), PAIRS)
 def test_action_is_in_the_space_and_has_the_form_of_the_observation(family, name, normalize):
     env = make_knee(family, normalize=normalize)
-    controller = built(name, env)
-    batch = np.array([env.reset(seed=s)[0] for s in range(3)])
-    for observation, shape in ((batch[0], (1,)), (batch, (3, 1))):
-        state = None
-        for _ in range(3):
-            action, state = controller.predict(observation, state)
-            assert action.shape == shape
-            assert action.dtype == np.float32
-            assert all(row in env.action_space for row in action.reshape(-1, 1))
+    check_form(built(name, env), env)
 
 
 @pytest.mark.parametrize(("family", "name"), [p for p in PAIRS if p[1] != "random"])
 def test_rows_of_a_batch_are_single_runs(family, name):
     env = make_knee(family)
     controller = built(name, env)
-    seen = []
-    for row in range(3):
-        seen.append([env.reset(seed=row)[0]])
-        seen[-1] += [env.step(np.array([np.sin(0.3 * k + row)], np.float32))[0] for k in range(30)]
+    seen = observations_of(env, steps=31, rows=3)
     state, together = None, []
-    for observation in np.array(seen).swapaxes(0, 1):
+    for observation in seen:
         action, state = controller.predict(observation, state)
         together.append(action[:, 0])
     for row in range(3):
         state, alone = None, []
-        for observation in seen[row]:
+        for observation in seen[:, row]:
             action, state = controller.predict(observation, state)
             alone.append(action[0])
         np.testing.assert_array_equal(np.array(together)[:, row], alone)

@@ -10,7 +10,7 @@ import pytest
 
 from baselines.catalogue import CONTROLLERS as ALL
 from baselines.catalogue import make_controller
-from tests.baselines.conftest import ID, built, make_env
+from tests.baselines.conftest import ID, built, check_form, make_env, observations_of
 
 CONTROLLERS = {name: entry for name, entry in ALL.items() if ID in entry.envs}
 SOME = ("random", "table", "pid", "inverse", "inverse_pid")
@@ -22,17 +22,6 @@ def _arrays(state: Any) -> list[np.ndarray]:
     return [a for part in state for a in (_arrays(part) if isinstance(part, tuple) else [part])]
 
 
-def _observations(env: Any, steps: int = 40, rows: int = 4) -> np.ndarray:
-    """Return observations of shape (steps, rows, n_obs): rows with other loads and references."""
-    seen = []
-    for row in range(rows):
-        seen.append([env.reset(seed=row)[0]])
-        for k in range(steps - 1):
-            action = np.array([np.sin(0.3 * k + row)], np.float32)
-            seen[-1].append(env.step(action)[0])
-    return np.array(seen).swapaxes(0, 1)
-
-
 @pytest.fixture(scope="module", params=["maxwell_slip", "preisach", "none"])
 def env(request: pytest.FixtureRequest) -> Any:
     return make_env(hysteresis=request.param, load=None, reference="sines")
@@ -42,15 +31,7 @@ def env(request: pytest.FixtureRequest) -> Any:
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_action_is_in_the_space_and_has_the_form_of_the_observation(name, normalize):
     env = make_env(normalize=normalize, load=None)
-    controller = built(name, env)
-    batch = np.array([env.reset(seed=s)[0] for s in range(3)])
-    for observation, shape in ((batch[0], (1,)), (batch, (3, 1))):
-        state = None
-        for _ in range(3):
-            action, state = controller.predict(observation, state)
-            assert action.shape == shape
-            assert action.dtype == np.float32
-            assert all(row in env.action_space for row in action.reshape(-1, 1))
+    check_form(built(name, env), env)
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
@@ -67,7 +48,7 @@ def test_extreme_observations_give_actions_in_the_space(name):
 @pytest.mark.parametrize("name", [n for n in CONTROLLERS if n != "random"])
 def test_a_row_of_a_batch_is_what_it_is_alone(name, env):
     controller = built(name, env)
-    observations = _observations(env)
+    observations = observations_of(env)
     loads = env.signals.decode(observations[0], "load")
     assert len(np.unique(loads.round(3))) > 1
     state, alone = None, [None] * observations.shape[1]
@@ -85,7 +66,7 @@ def test_a_row_of_a_batch_is_what_it_is_alone(name, env):
 @pytest.mark.parametrize("name", SOME)
 def test_episode_start_forgets_and_only_those_rows(name, env):
     controller = built(name, env)
-    observations = _observations(env)
+    observations = observations_of(env)
     state = None
     for batch in observations[:20]:
         _, state = controller.predict(batch, state)
@@ -100,7 +81,7 @@ def test_episode_start_forgets_and_only_those_rows(name, env):
 @pytest.mark.parametrize("name", SOME)
 def test_the_callers_state_is_left_alone(name, env):
     controller = built(name, env)
-    observations = _observations(env, steps=12)
+    observations = observations_of(env, steps=12)
     state = None
     for batch in observations[:10]:
         _, state = controller.predict(batch, state)
@@ -139,7 +120,7 @@ def test_entry_is_complete_and_true_about_the_preview(name):
     assert entry.knowledge in ("nothing", "tables", "nominal model", "true model")
     env = make_env(reference="sines")
     controller = built(name, env)
-    observations = _observations(env, steps=40, rows=2)[:, 1]
+    observations = observations_of(env, steps=40, rows=2)[:, 1]
     hidden = observations.copy()
     hidden[:, 5:] = hidden[:, [4]]
     answers = []

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
-from benchmarks import metrics, metrics_knee
+from baselines.trivial import Constant
+from benchmarks import metrics, metrics_knee, rollout, rows
 from benchmarks.scenarios import ScenarioSet, available
 
 PERIOD = 0.01
 N = 1000
-GATE = "state/stance"
+GATE = ("state/stance", "sensor/stance")
 TIME = PERIOD * np.arange(1, N + 1)
 STANCE = ((TIME % 5.0) > 2.5).astype(float)
 
@@ -56,10 +58,12 @@ def score(record: dict[str, np.ndarray], **how: Any) -> dict[str, float]:
 def test_perfect_record_has_no_error_and_the_ratios_that_were_put_in() -> None:
     scores = score(signals())
     assert set(scores) == set(metrics.of_track({"metrics": ["range", "gait"]}))
-    for name in ("rms_error", "rms_percent", "angle_rms", "tension_jump", "torque_rms"):
+    for name in ("rms_error", "rms_percent", "angle_rms", "switch_error", "torque_rms"):
         assert scores[name] == 0.0
     assert scores["torque_ideal_rms"] == pytest.approx(2.0)
-    assert scores["emg_ratio"] == scores["emg_ratio_fitted_a"] == pytest.approx(0.8)
+    assert scores["emg_extensors_ratio"] == pytest.approx(0.8)
+    assert scores["emg_ratio"] == pytest.approx(1.8)  # the flexors' 2 less 1 on top
+    assert scores["emg_extensors_ratio_fitted_a"] <= scores["emg_ratio_fitted_a"]
     assert scores["emg_flexors_ratio"] == pytest.approx(2.0)
     assert 0.0 < scores["emg_ratio_fitted_b"] < 1.0
 
@@ -73,11 +77,55 @@ def test_tension_counts_in_stance_and_angle_in_swing() -> None:
     assert scores["rms_percent"] == pytest.approx(10.0, rel=1e-3)
     assert scores["angle_rms"] == pytest.approx(0.1)
     assert scores["angle_rms_percent"] == pytest.approx(20.0, rel=1e-3)
-    assert score(record, gate="")["rms_error"] > 50.0
+    assert score(record, gate=())["rms_error"] > 50.0
+    assert score(record, half_range=125.0)["rms_percent"] == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize("seen", [0.0, 1.0])
+def test_a_sample_in_which_sensor_and_truth_disagree_moves_no_score(seen: float) -> None:
+    record = signals()
+    record["output"] = record["reference"] + 5.0
+    record["state/angle"] = record["state/angle_reference"] + 0.1
+    before = score(record)
+    odd = int(np.flatnonzero(seen != STANCE)[60])  # well within a phase, not at its ends
+    record["sensor/stance"][odd] = seen
+    record["output"][odd] += 214.0
+    record["state/angle"][odd] += 1.0
+    after = score(record)
+    for name in ("rms_error", "p95_error", "max_error", "angle_rms", "rms_percent"):
+        assert after[name] == pytest.approx(before[name], rel=1e-3), name
+
+
+def test_a_valve_that_is_open_is_no_help_to_the_wearer() -> None:
+    env: Any = gym.make("PAM/KneeWalk-v0", start="heel_contact", episode_seconds=16.0).unwrapped
+    full = Constant(env.action_signals["pressure_set_point"], 4.5e5)
+    made = rollout.run(env, full, 0).signals
+    window = (made["time"] > 5.0) & (made["time"] < 15.0 + 0.5 * PERIOD)
+    ratios = metrics_knee.emg(made, window, PERIOD, "walk")
+    for reading in ("", "_fitted_a", "_fitted_b"):
+        assert ratios[f"emg_extensors_ratio{reading}"] < ratios[f"emg_ratio{reading}"]
+    assert ratios["emg_extensors_ratio"] == pytest.approx(0.593, abs=0.01)
+    assert ratios["emg_ratio"] == pytest.approx(1.139, abs=0.02)
+    assert ratios["emg_ratio_fitted_a"] == pytest.approx(1.66, abs=0.03)
+
+
+def test_reading_b_makes_little_of_a_small_torque_that_is_held_against_for_long() -> None:
+    """All of Eq. (1) as demand, and a power of 2: the flexors' 15 N m are a tenth of the peak."""
+    demand = np.where(STANCE > 0.5, 50.0, 0.0)
+    open_valve = np.full(N, 15.0)
+    record = signals(**{"state/estimate": demand, "state/torque": open_valve})
+    whole = np.ones(N, bool)
+    ratios = metrics_knee.emg(record, whole, PERIOD, "walk")
+    power, share = 2.0255, 15.0 / 50.0
+    assert ratios["emg_ratio_fitted_b"] == pytest.approx(
+        np.hypot((1.0 - share) ** power, share**power), abs=0.02
+    )
+    assert ratios["emg_ratio_fitted_b"] < 0.55
+    assert ratios["emg_ratio_fitted_a"] > 0.65  # (27.5 - 15) / 27.5 and 15 / 27.5
 
 
 def test_a_gate_that_never_opens_is_told() -> None:
-    with pytest.raises(ValueError, match="state/stance is 0 all the time"):
+    with pytest.raises(ValueError, match="state/stance and sensor/stance are never 1 together"):
         score(signals(**{"state/stance": np.zeros(N)}))
 
 
@@ -93,11 +141,13 @@ def test_jumps_are_the_mean_over_landings_of_the_largest_that_follows() -> None:
     record, starts = signals(), np.flatnonzero(np.diff(STANCE) > 0.0) + 1
     first, second = starts
     for k, size, change in ((first, 30.0, 1e4), (second, 10.0, 3e4)):
+        record["output"][k] += 4.0
         record["output"][k + 49] -= size
         record["output"][k + 50] += 90.0  # too late to count
         record["state/pressure"][k + 9 :] += change
     scores = score(record)
-    assert scores["tension_jump"] == pytest.approx(20.0)
+    assert scores["switch_error"] == pytest.approx(4.0)
+    assert scores["switch_excess"] == pytest.approx(16.0)
     assert scores["pressure_jump"] == pytest.approx(2e4)
 
 
@@ -123,5 +173,18 @@ def test_a_track_with_an_unknown_group_or_a_missing_worst_case_is_refused() -> N
     content = dict(available()["knee_walk_nominal"].content)
     with pytest.raises(ValueError, match="choose from range, gait"):
         ScenarioSet(content | {"metrics": ["stride"]})
-    with pytest.raises(ValueError, match=r"worst_case needs a value for each of .*tension_jump"):
+    with pytest.raises(ValueError, match=r"worst_case needs a value for each of .*switch_error"):
         ScenarioSet(content | {"worst_case": {"rms_error": 1.0}})
+
+
+def test_no_finished_episode_of_the_board_is_worse_than_the_worst_case() -> None:
+    """Or a controller would gain by having an episode ended."""
+    found = sorted(rows.RESULTS.glob("knee_*--*.json"))
+    assert len(found) > 100
+    for path in found:
+        row = rows.load(path)
+        worst = row["scenarios"]["content"]["worst_case"]
+        finished = [e["scores"] for e in row["episodes"] if not e["failed"]]
+        for name, most in worst.items():
+            values = [s[name] for s in finished if s[name] is not None]
+            assert max(values, default=0.0) <= most, (path.stem, name)

@@ -135,6 +135,12 @@ def test_an_effect_outside_the_catalogue_is_left_unexplained(records: Records) -
     assert found["verdict"] == "unexplained"
 
 
+def test_one_process_makes_the_sample(request: pytest.FixtureRequest) -> None:
+    if not request.config.getoption("loadgroup", False):
+        pytest.skip("the tests are not spread over processes by group")
+    assert request.node.nodeid.endswith("@hidden effects")
+
+
 def test_nothing_in_the_library_imports_the_tests() -> None:
     folder = Path(pam_envs.__file__).parent
     files = sorted(folder.rglob("*.py"))

@@ -96,7 +96,7 @@ def test_an_interval_says_what_it_is_worth(
     at_bound: bool,
     not_identified: bool,
 ) -> None:
-    found = span(free(log), value, free(log).inner(value), sd)
+    found = span(free(log), value, free(log).inner(value), 1.96 * sd)
     for end, wanted in zip(found["interval"], ends, strict=True):
         assert end == (None if wanted is None else pytest.approx(wanted, rel=1e-3))
     assert (found["at_bound"], found["not_identified"]) == (at_bound, not_identified)

@@ -12,10 +12,13 @@ FAMILIES = {
     "KneeStairsUp": "gait",
     "KneeStairsDown": "gait",
     "ElbowOrthosis": "elbow",
+    "AntagonisticJoint": "joint",
+    "RedundantManipulator": "manipulator",
 }
 """Environments with machine code in common."""
 
 
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Group the tests that have an environment's name among their arguments (see ``make test``)."""
     for item in items:

@@ -10,7 +10,14 @@ from pathlib import Path
 import gymnasium as gym
 import pytest
 
-from pam_envs.envs import elbow_orthosis, knee_brace, knee_gait, muscle_positioning
+from pam_envs.envs import (
+    antagonistic_joint,
+    elbow_orthosis,
+    knee_brace,
+    knee_gait,
+    muscle_positioning,
+    redundant_manipulator,
+)
 from tests.envs.cases import IDS
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "envs"
@@ -19,6 +26,8 @@ MODULES = {
     "knee_brace": knee_brace,
     "knee_gait": knee_gait,
     "elbow_orthosis": elbow_orthosis,
+    "antagonistic_joint": antagonistic_joint,
+    "redundant_manipulator": redundant_manipulator,
 }
 FIXED_BY_THE_ID = {"self", "activity", "quantity", "mounting"}
 EVERY = pytest.mark.parametrize("name", IDS)

