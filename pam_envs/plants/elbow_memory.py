@@ -23,10 +23,9 @@ import numpy as np
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.parameters import parameter
+from pam_envs.plants.joint_memory import ELEMENTS
 from pam_envs.plants.memory import Kind
 
-ELEMENTS = 8
-"""Most plays of a memory."""
 SMALLEST, LARGEST = 6e-4, 9e-3
 """Thresholds of the preset's plays [m]: 0.15 % and 2.3 % of the nominal length."""
 WIDEST, LEVELS = 0.06, 121
@@ -93,28 +92,3 @@ def elbow_memory(kind: Kind) -> ElbowMemory:
         wide = Preisach.from_play(travel_plays(), -WIDEST, WIDEST, LEVELS, start="virgin")
         return ElbowMemory(wide)
     raise ValueError(f"hysteresis = {kind!r}; choose 'maxwell_slip', 'preisach' or 'none'")
-
-
-def check_operator(operator: object) -> None:
-    """Refuse an operator that the kernels cannot run."""
-    if isinstance(operator, PlayOperator):
-        if len(operator.thresholds) > ELEMENTS:
-            raise ValueError(
-                f"memory: {len(operator.thresholds)} plays, and at most {ELEMENTS} are simulated: "
-                "identify with fewer"
-            )
-        if abs(operator.total_slope - 1.0) > 1e-9:
-            raise ValueError(
-                f"memory: the plays' total slope is {operator.total_slope:g}; it must be 1 (the "
-                "travel that is felt): divide linear and weights by it"
-            )
-    elif isinstance(operator, Preisach):
-        if operator.start != "virgin" or operator.depth != 24:
-            raise ValueError(
-                f"memory: a Preisach operator with start {operator.start!r} and depth "
-                f"{operator.depth}; an elbow needs a virgin one (range -h to h) of depth 24"
-            )
-    elif operator is not None:
-        raise ValueError(
-            f"memory: an elbow takes a PlayOperator, a Preisach operator or None, got {operator!r}"
-        )

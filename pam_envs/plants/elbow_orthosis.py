@@ -20,14 +20,14 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.mechanics.forearm import OrthosisLink, Wearer
 from pam_envs.mechanics.hanging_mass import LARGEST_PHASE
 from pam_envs.mechanics.pulley import Pulley
 from pam_envs.muscle.quadratic_bundle import QuadraticBundle
 from pam_envs.plants import elbow_orthosis_rows as K
-from pam_envs.plants.elbow_memory import ELEMENTS, ElbowMemory, check_operator, elbow_memory
+from pam_envs.plants.elbow_memory import ElbowMemory, elbow_memory
+from pam_envs.plants.joint_memory_tables import check_operator, map_tables, model_rows, plays_of
 from pam_envs.plants.memory import Kind
 from pam_envs.plants.plant import Plant
 from pam_envs.pneumatics.bundle_regulator import BundleRegulator
@@ -292,24 +292,15 @@ class ElbowOrthosis(Plant):
         """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
         column = np.zeros(K.N_PARAMETERS)
         column[: K.MODEL] = [self.value(name) for name in K.NAMES]
-        operator = self.memory.operator
-        if isinstance(operator, PlayOperator):
-            n = len(operator.thresholds)
-            column[K.MODEL : K.MODEL + n] = operator.thresholds
-            column[K.MODEL + ELEMENTS : K.MODEL + ELEMENTS + n] = operator.weights
-        elif isinstance(operator, Preisach):
-            column[K.MODEL] = operator.high
+        column[K.MODEL : K.LARGEST_LAG] = model_rows(self.memory.operator)
         column[K.LARGEST_LAG] = self.memory.largest_lag
         return column
 
     @property
     def elements(self) -> int:
         """Plays of the memory."""
-        operator = self.memory.operator
-        return len(operator.thresholds) if isinstance(operator, PlayOperator) else 0
+        return plays_of(self.memory.operator)
 
     def memory_tables(self) -> Array:
         """Return the Everett maps of all members, shape (members, n, n), or zeros."""
-        operators = [m.memory.operator for m in self.members()]
-        maps = [np.asarray(o.table, float) for o in operators if isinstance(o, Preisach)]
-        return np.ascontiguousarray(maps) if maps else np.zeros((1, 2, 2))
+        return map_tables([m.memory.operator for m in self.members()])

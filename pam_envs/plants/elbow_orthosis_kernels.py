@@ -25,7 +25,6 @@ from pam_envs.plants.elbow_bundles import (
     travel_at,
     weight_of,
 )
-from pam_envs.plants.elbow_memory_kernels import MEMORIES, MEMORY_ROWS
 from pam_envs.plants.elbow_orthosis_air import (
     AIR,
     DRIVE_WAS,
@@ -54,6 +53,8 @@ from pam_envs.plants.elbow_orthosis_rows import (
     LINK_INERTIA,
     LINK_MASS,
     LOWEST,
+    MEMBER,
+    MODEL,
     PRESSURE_A,
     RADIUS,
     STACK_COUNT,
@@ -65,6 +66,8 @@ from pam_envs.plants.elbow_orthosis_rows import (
     WEARER_MASS,
     WEARER_STIFFNESS,
 )
+from pam_envs.plants.joint_memory_kernels import MEMORIES
+from pam_envs.plants.joint_memory_kernels import ROWS_PER_OPERATOR as MEMORY_ROWS
 
 __all__ = [
     "MEMORY_ROWS",
@@ -200,13 +203,19 @@ def advance(
         for j in range(LANES):
             work[MIDDLE][j] = rows[ANGLE][j] + 0.5 * h * rows[VELOCITY][j]
             rows[AT][j] = travel_at(fixed, j, work[MIDDLE][j])
-        remember(rows, fixed, counts, table, memory, elements, 0, LANES)
+        remember(
+            rows, fixed, counts, table, memory, elements, AT, LAG, 1, MODEL, STACK_COUNT, MEMBER,
+            0, LANES,
+        )  # fmt: skip
         breathe(rows, fixed, h, work)
         swing(rows, fixed, i, substeps, h, work)
         settle(rows, fixed, work)
     for j in range(LANES):
         rows[AT][j] = travel_at(fixed, j, rows[ANGLE][j])
-    remember(rows, fixed, counts, table, memory, elements, 0, LANES)
+    remember(
+        rows, fixed, counts, table, memory, elements, AT, LAG, 1, MODEL, STACK_COUNT, MEMBER,
+        0, LANES,
+    )  # fmt: skip
     for j in range(LANES):
         report(rows, fixed, j)
 
@@ -286,7 +295,10 @@ def begin_lane(
         angle = 0.5 * (low + high)
         start_memory(rows, counts, memory, j)
         rows[AT][j] = travel_at(fixed, j, angle)
-        remember(rows, fixed, counts, table, memory, elements, j, j + 1)
+        remember(
+            rows, fixed, counts, table, memory, elements, AT, LAG, 1, MODEL, STACK_COUNT, MEMBER,
+            j, j + 1,
+        )  # fmt: skip
         if resting_torque(rows, fixed, j, angle) > 0.0:
             low = angle
         else:
@@ -318,4 +330,4 @@ STARTS = {"proportional": start_regulated, "on_off": start_pulsed}
 
 def replacements(kind: str, valves: str) -> dict[str, Any]:
     """Return the kernels that a plant of this make puts in the place of the placeholders."""
-    return {"remember": MEMORIES[kind], "start_air": STARTS[valves]} | AIR[valves]
+    return {"remember": MEMORIES[kind]["remember"], "start_air": STARTS[valves]} | AIR[valves]

@@ -8,7 +8,7 @@ first is bundle a's, which straightens the elbow.
 
 from __future__ import annotations
 
-from pam_envs.plants.elbow_memory import ELEMENTS
+from pam_envs.plants.joint_memory import ELEMENTS
 
 (
     ANGLE,

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.kernels import kernel, routine, sine_of_turns, uniform
+from pam_envs.references.path import least_jerk
 
 MOTIONS = ("reaches", "sines", "still", "mixed")
 REACHES, SINES, STILL, MIXED = range(len(MOTIONS))
@@ -29,15 +30,8 @@ TURN = 6.283185307179586
 
 
 @kernel
-def least_jerk_course(share: float) -> float:
-    """Return the share of the way at a share of the time, from rest to rest."""
-    u = max(0.0, min(1.0, share))
-    return u * u * u * (10.0 + u * (6.0 * u - 15.0))
-
-
-@kernel
 def least_jerk_rate(share: float) -> float:
-    """Return the slope of :func:`least_jerk_course`."""
+    """Return the slope of :func:`~pam_envs.references.path.least_jerk`."""
     u = max(0.0, min(1.0, share))
     v = u * (1.0 - u)
     return 30.0 * v * v
@@ -45,7 +39,7 @@ def least_jerk_rate(share: float) -> float:
 
 @kernel
 def least_jerk_bend(share: float) -> float:
-    """Return the second derivative of :func:`least_jerk_course`."""
+    """Return the second derivative of :func:`~pam_envs.references.path.least_jerk`."""
     u = max(0.0, min(1.0, share))
     return 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u)
 
@@ -72,7 +66,7 @@ def reach(rows: Any, base: int, lane: int, t: float) -> tuple[float, float, floa
     share = ((t / length - window) - rest) / taken
     start = place_of(rows, base, lane, window - 1)
     way = place_of(rows, base, lane, window) - start
-    angle, per_second = start + way * least_jerk_course(share), 1.0 / (taken * length)
+    angle, per_second = start + way * least_jerk(share), 1.0 / (taken * length)
     rate = way * least_jerk_rate(share) * per_second
     return angle, rate, way * least_jerk_bend(share) * per_second * per_second
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pam_envs.kernels import entry, seed_words
+from pam_envs.references.path import least_jerk
 from pam_envs.references.reaches import (
     KIND,
     MIXED,
@@ -17,7 +18,6 @@ from pam_envs.references.reaches import (
     WINDOW,
     draw_motion,
     least_jerk_bend,
-    least_jerk_course,
     least_jerk_rate,
     motion_at,
 )
@@ -66,7 +66,7 @@ def test_reaches_join_and_rest_between() -> None:
 def test_the_course_is_the_one_of_least_jerk() -> None:
     """Fifth order, symmetric, with neither speed nor acceleration at its ends."""
     u = np.linspace(0.0, 1.0, 41)
-    s = np.array([least_jerk_course(float(x)) for x in u])
+    s = np.array([least_jerk(float(x)) for x in u])
     assert (s[0], s[-1], s[20]) == (0.0, 1.0, 0.5)
     assert np.allclose(s + s[::-1], 1.0)
     assert np.allclose(np.diff(s, 6), 0.0, atol=1e-12)  # no sixth derivative
