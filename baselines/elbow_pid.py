@@ -2,9 +2,11 @@
 
 Both pressures start from the same one and move against each other: bundle b up, bundle a down. The
 torque that is fed back is the estimate from angle and pressures, since there is no sensor of it.
+The pressure that both start from, a fifth of the largest, gives a stiffness amid those that the
+tasks ask for; friction grows with it, so that a higher one makes the torque worse.
 Tuning: SIMC for a lag (S. Skogestad, J. Process Control 13 (2003) 291-309) with the steepest torque
-per pressure over the range, the regulator's lag, or for on/off valves one cycle of theirs, and one
-and a half periods of dead time.
+per pressure over the range, and the regulator's lag, or for on/off valves one cycle of theirs. The
+dead time is half of what a command is held for, and a control period for a computer to work it out.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from baselines.pid import Gains, PidState, pid_start, pid_step
 from pam_envs.parameters import Signals
 from pam_envs.plants.elbow_orthosis import ElbowOrthosis
 
-SHARE = 0.4
+SHARE = 0.2
 """Pressure that both bundles start from, over the largest."""
 
 
@@ -32,7 +34,8 @@ def simc_torque(plant: ElbowOrthosis) -> Gains:
     steepest = float(np.max(swing)) / full
     pulsed = plant.valves == "on_off"
     step = plant.cycle if pulsed else plant.control_period
-    tau, theta = (step if pulsed else plant.regulator.time_constant), 1.5 * step
+    tau = step if pulsed else plant.regulator.time_constant
+    theta = 0.5 * step + plant.control_period
     gain = tau / (steepest * 2.0 * theta)
     reset = min(tau, 8.0 * theta)
     return Gains(

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from baselines.controller import Answer
 from baselines.elbow_valves import PressureLoop, make_pressure_loop
 from baselines.elbow_view import ElbowEyes, make_elbow_eyes
-from baselines.trivial import Random, RandomState
+from baselines.trivial import RandomEach, random_each
 from pam_envs.parameters import Signals
 from pam_envs.plants.elbow_orthosis import ElbowOrthosis
 
@@ -69,38 +69,6 @@ class Held:
         return self.eyes.act(self.loop.commands(view, wanted), observation), None
 
 
-@dataclass(frozen=True)
-class ElbowRandom:
-    """Commands drawn evenly from the whole range, each bundle with a seed of its own.
-
-    Attributes
-    ----------
-    eyes : ElbowEyes
-    draws : tuple of Random
-        One for each bundle.
-    """
-
-    eyes: ElbowEyes
-    draws: tuple[Random, ...]
-
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: tuple[RandomState, ...] | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Answer:
-        """Return the next draws; see :class:`~baselines.controller.Controller`."""
-        rows = np.atleast_2d(np.asarray(observation))
-        found, states = [], []
-        for k, draw in enumerate(self.draws):
-            action, after = draw.predict(rows, state and state[k], episode_start)
-            gain, offset = draw.action_signal.scale
-            found.append((action[:, 0].astype(float) - offset) / gain)
-            states.append(after)
-        return self.eyes.act(np.array(found), observation), tuple(states)
-
-
 def make_limp(plant: ElbowOrthosis, signals: Signals, action_signals: Signals) -> Limp:
     """Return the controller; it looks at no more of the plant than its control period."""
     return Limp(make_elbow_eyes(signals, action_signals, plant.control_period))
@@ -119,7 +87,6 @@ def make_held(
 
 def make_elbow_random(
     plant: ElbowOrthosis, signals: Signals, action_signals: Signals, seed: int = 0
-) -> ElbowRandom:
-    """Return the controller; it looks at no more of the plant than its control period."""
-    eyes = make_elbow_eyes(signals, action_signals, plant.control_period)
-    return ElbowRandom(eyes, tuple(Random(s, 2 * seed + k) for k, s in enumerate(eyes.actions)))
+) -> RandomEach:
+    """Return the controller; it does not look at the plant."""
+    return random_each(action_signals, seed)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import plots, rows, statistics
-from benchmarks.metrics import HEADLINE
+from benchmarks.metrics import headline_of
 from benchmarks.rows import Row, shown
 from benchmarks.statistics import Interval
 from benchmarks.store import write_text
@@ -45,10 +45,11 @@ MODEL: Column = ("model_rms_error", "error to its own model, RMS [deg]", DEGREES
 OUT_OF_REACH: Column = ("saturated_time", "out of reach [%]", 100.0)
 
 ELBOW: tuple[Column, ...] = (
+    ("rms_error", "torque RMS [N m]", 1.0),
+    ("stiffness_rms", "stiffness RMS [N m/rad]", 1.0),
     ("p95_error", "p95 [N m]", 1.0),
     ("max_error", "max [N m]", 1.0),
     ("sensed_rms_error", "estimated RMS [N m]", 1.0),
-    ("stiffness_rms", "stiffness RMS [N m/rad]", 1.0),
     ("felt_rms", "felt beside the object, RMS [N m]", 1.0),
     *EFFORT,
     ("switchings", "switchings [1/s]", 1.0),
@@ -129,18 +130,21 @@ holds what runs it again: `python -m benchmarks verify ROW`.
 - Of a chain, the error is how far the tip is off its path, and *pointing* is of its direction;
   *joints* are compared with the planned angles, of which the tip knows nothing. *Error to its own
   model* is of controllers that follow a model: the true angle less the model's.
-- Of the elbow, the error is of the torque, against what the pressures can give at the true angle;
-  *estimated* is the torque as computed from the sensors, without friction. *Felt beside the object*
-  is the torque that the orthosis puts on the wearer less that of the object he is to feel: in free
-  motion, all that he feels. *Out of reach*: more torque or stiffness was asked for than there is.
+- Of the elbow, the headline is of torque and stiffness together: the error of the torque, RMS over
+  two angles, 0.2 rad on either side of the present one, from the torque here and the stiffness.
+  *Torque* is the error at the present angle alone, against what the pressures can give there (as
+  are p95 and max); *estimated* is the torque as computed from the sensors, without friction. *Felt
+  beside the object* is the torque that the orthosis puts on the wearer less that of the object he
+  is to feel, whether it can be given or not: in free motion, all that he feels. *Out of reach*:
+  more torque or stiffness was asked for than there is.
 - A controller's name leads to its row, where every metric of every episode stands.
 - Times per step are in [results/TIMES.md](results/TIMES.md), since no two runs give the same.
 """
 
 
-def interval(row: Mapping[str, Any], metric: str = HEADLINE) -> Interval:
-    """Return a metric's mean with its interval."""
-    entry = row["aggregate"][metric]
+def interval(row: Mapping[str, Any], metric: str = "") -> Interval:
+    """Return a metric's mean with its interval, the headline's where none is named."""
+    entry = row["aggregate"][metric or headline_of(row["scenarios"]["content"])]
     return Interval(entry["mean"], entry["low"], entry["high"])
 
 
@@ -217,13 +221,15 @@ def _matching(first: Row, second: Row) -> bool:
 
 
 def _pair_line(row: Row, above: Row | None) -> list[str]:
-    inner, (_, factor) = row["aggregate"][HEADLINE], shown(row["scenarios"]["content"])
+    content = row["scenarios"]["content"]
+    headline, (_, factor) = headline_of(content), shown(content)
+    inner = row["aggregate"][headline]
     middle = f"{number(factor * inner['iqm'])}"
     bounds = f"[{number(factor * inner['iqm_low'])}, {number(factor * inner['iqm_high'])}]"
     line = [f"`{row['controller']['name']}`", f"{middle} {bounds}"]
     if above is None or not _matching(row, above):
         return [*line, "-", "-"]
-    ours, theirs = (rows.scores_of(r["episodes"], HEADLINE) for r in (row, above))
+    ours, theirs = (rows.scores_of(r["episodes"], headline) for r in (row, above))
     gap = statistics.paired_difference(
         ours, theirs, [episode["scenario"] for episode in row["episodes"]]
     )
@@ -253,7 +259,7 @@ def _track_page(name: str, ordered: Sequence[Row], figure: str | None) -> list[s
         f"`{first['env']['id']}`, scenarios `{name}` version {content['version']} "
         f"(`{first['scenarios']['digest'][:12]}`), {len(first['plants'])} scenarios x "
         f"{len(first['seeds'])} seeds, settling window {content['settle_seconds']:g} s, "
-        f"worst case {factor * content['worst_case'][HEADLINE]:g} {unit}.",
+        f"worst case {factor * content['worst_case'][headline_of(content)]:g} {unit}.",
         "",
     ]
     if len(digests) > 1:

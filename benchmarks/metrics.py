@@ -26,7 +26,7 @@ METRICS: dict[str, str] = {
     "air_use": "kg/s",
     "constraint_cost": "1",
 }
-"""The scored quantities and their units, the headline first. Less is better for all of them."""
+"""The scored quantities and their units, the usual headline first. Less is better for all."""
 
 HEADLINE = "rms_error"
 GROUPS: dict[str, dict[str, str]] = {
@@ -46,6 +46,11 @@ def of_track(content: Mapping[str, Any]) -> dict[str, str]:
     for group in content.get("metrics") or ():
         units = units | GROUPS[group]
     return units
+
+
+def headline_of(content: Mapping[str, Any]) -> str:
+    """Return the metric that ranks the rows of a track, from the content of its scenario file."""
+    return str(content.get("headline", HEADLINE))
 
 
 def rms(error: Array) -> float:

@@ -60,6 +60,7 @@ from pam_envs.envs.elbow_layout import (
     PLACE,
     PULSED,
     R_EFFORT,
+    R_ENDED,
     R_STIFFNESS,
     R_TORQUE,
     REF,
@@ -91,6 +92,7 @@ from pam_envs.envs.elbow_layout import (
     TORQUE_SCALE,
     TORQUE_WEIGHT,
     WINDOW,
+    WORST_PERIOD,
 )
 from pam_envs.envs.elbow_program import (
     asked_for,
@@ -101,6 +103,7 @@ from pam_envs.envs.elbow_program import (
 )
 from pam_envs.envs.env_kernels import (
     AT_OWN,
+    EPISODE_SECONDS,
     MOST_PREVIEW,
     PERIOD,
     PREVIEW,
@@ -122,12 +125,15 @@ from pam_envs.plants.elbow_orthosis_kernels import (
 from pam_envs.references.reaches import draw_motion, motion_at
 from pam_envs.sensing.sensor import read_sensor
 from pam_envs.tasks.torque_stiffness import FREE, MIXED, WALL, WEIGHT, error_reward
-from pam_envs.tasks.tracking import effort_reward, excess
+from pam_envs.tasks.tracking import effort_reward, ended_reward, excess
 
 
 @kernel
 def apply_elbow(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
-    """Move the wearer's intention on, and turn what is asked for into commands to the valves."""
+    """Move the wearer's intention on, and turn what is asked for into commands to the valves.
+
+    Pulses are kept as they were taken until the next ones are.
+    """
     step, period, by_torque = counts[K.STEP], settings[0][PERIOD], choices[MODE] == BY_TORQUE
     model = settings[choices[AT_OWN]]
     for j in range(LANES):
@@ -144,6 +150,8 @@ def apply_elbow(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any,
             torque, stiffness = estimate(model, rows[SEEN_ANGLE][j], a, b)
             if abs(torque - wanted) + abs(stiffness - stiff) > 1e-9:
                 work[SATURATED][j] = 1.0
+        if choices[PULSED] > 0 and rows[K.CLOCK][j] >= 0.5 * period:
+            a, b = rows[K.COMMAND_A][j], rows[K.COMMAND_B][j]
         rows[K.COMMAND_A][j] = a
         rows[K.COMMAND_B][j] = b
 
@@ -291,6 +299,13 @@ def judge(rows: Any, counts: Any, settings: Any, choices: Any, work: Any, j: int
     work[C_ANGLE][j] = excess(beyond, 0.0)
     work[M_ANGLE][j] = min(angle - config[LOWEST_ANGLE], config[HIGHEST_ANGLE] - angle)
     work[ENDED][j] = 1.0 if work[M_ANGLE][j] < 0.0 else 0.0
+    work[R_ENDED][j] = ended_reward(
+        work[ENDED][j],
+        work[TIME][j],
+        config[EPISODE_SECONDS],
+        config[PERIOD],
+        config[WORST_PERIOD],
+    )
     work[E_TRAVEL][j] = abs(a - rows[OLD_A][j]) + abs(b - rows[OLD_B][j])
     work[E_AIR][j] = max(0.0, rows[K.USED][j] - rows[OLD_USED][j])
     work[E_SWITCHINGS][j] = rows[K.SWITCHES][j] - rows[OLD_SWITCHES][j]
@@ -298,7 +313,7 @@ def judge(rows: Any, counts: Any, settings: Any, choices: Any, work: Any, j: int
 
 @kernel
 def effort_of(rows: Any, choices: Any, j: int) -> float:
-    """Return how far both commands moved, or how long both pulses are."""
+    """Return how far both set-points moved, or how long both pulses are that were last taken."""
     a, b = rows[K.COMMAND_A][j], rows[K.COMMAND_B][j]
     if choices[PULSED] > 0:
         return abs(a) + abs(b)

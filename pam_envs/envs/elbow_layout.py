@@ -55,6 +55,7 @@ JUDGED = (
     "reward/torque",
     "reward/stiffness",
     "reward/effort",
+    "reward/ended",
     "cost/pressure",
     "cost/angle",
     "margin/pressure",
@@ -76,6 +77,7 @@ JUDGED = (
     R_TORQUE,
     R_STIFFNESS,
     R_EFFORT,
+    R_ENDED,
     C_PRESSURE,
     C_ANGLE,
     M_PRESSURE,
@@ -128,6 +130,7 @@ CONFIG = (
     "window",
     "command_range",
     "start_share",
+    "worst_period",
 )
 (
     TORQUE_WEIGHT,
@@ -156,6 +159,7 @@ CONFIG = (
     WINDOW,
     COMMAND_RANGE,
     START_SHARE,
+    WORST_PERIOD,
 ) = range(FIRST_CONFIG, FIRST_CONFIG + len(CONFIG))
 CHOICES = ("elements", "object", "motion", "mode", "pulsed", "fixed_signals", "samples")
 N_ELEMENTS, OBJECT_KIND, MOTION_KIND, MODE, PULSED, FIXED_SIGNALS, N_SAMPLES = range(

@@ -14,7 +14,7 @@ Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=F
 | 1 | rate, of the last two readings of the angle | rad/s | -10 .. 10 |
 | 2 | pressure_a, sensed | Pa | 0 .. 6e5 |
 | 3 | pressure_b, sensed | Pa | 0 .. 6e5 |
-| 4 | set_point_a, of the last period (on/off valves: pulse_a) | Pa (s) | as the action |
+| 4 | set_point_a, of the last period (on/off valves: the last pulse_a) | Pa (s) | as the action |
 | 5 | set_point_b (pulse_b) | Pa (s) | as the action |
 | 6 | torque, from angle and pressures as sensed, without friction | N m | -30 .. 30 |
 | 7 | stiffness, likewise | N m/rad | 0 .. 15 |
@@ -28,7 +28,9 @@ Action: pressure_a_set_point and pressure_b_set_point, 0 .. 6e5 Pa; with on/off 
 pulse_b, -0.05 .. 0.05 s, of which one in 50 ms is taken, positive to fill; or torque and stiffness.
 
 Reward, each control period: ``- |torque error| / 0.5 N m - 0.5 |stiffness error| / 0.5 N m/rad
-- 0.2 (change of both set-points) / 12 bar`` (on/off valves: the pulses' widths / 0.1 s).
+- 0.2 (change of both set-points) / 12 bar`` (on/off valves: the widths of the pulses that were last
+taken / 0.1 s); where a stop ends the episode, the worst that a period can cost for each one that is
+left as well, so that it never pays.
 
 Start: at rest where the wearer holds the forearm, under the pressures that are asked for there
 (``start="random"``: under any of half the range). End: truncated after ``episode_seconds``;
@@ -52,7 +54,7 @@ from pam_envs.envs.elbow_kernels import kernels_for
 from pam_envs.envs.plant_env import PlantEnv
 from pam_envs.envs.setup import Setup, check_choice, check_number, compose
 from pam_envs.envs.vector_env import PlantVectorEnv
-from pam_envs.parameters import Signal, Signals
+from pam_envs.parameters import Signal, Signals, declarations
 from pam_envs.plants import elbow_orthosis_rows as R
 from pam_envs.plants.elbow_orthosis import MAKES, ElbowOrthosis, Valves
 from pam_envs.plants.memory import Kind
@@ -171,6 +173,17 @@ def _signals(plant: ElbowOrthosis, preview: int, spacing: float, normalize: bool
         Signal(name, unit, low, high, i, normalize, ahead)
         for i, (name, unit, (low, high), ahead) in enumerate(parts)
     )
+
+
+def largest_errors(plant: ElbowOrthosis) -> tuple[float, float]:
+    """Return more than torque [N m] and stiffness [N m/rad] can ever be off.
+
+    References lie between the corners of the nominal bundles; true ones can be stronger by the
+    largest gain that is allowed.
+    """
+    torques, stiffnesses = plant.corners(np.linspace(*plant.hard_limits, 49))
+    strongest = declarations(plant.bundle_a)["gain"].high
+    return strongest * float(np.ptp(torques)), strongest * float(stiffnesses.max())
 
 
 def _span(plant: ElbowOrthosis, span: Any) -> tuple[float, float]:
@@ -308,6 +321,7 @@ def make_setup(
         check_number("pace", pace, 0.2, 60.0, "s"),
         2.0 * (made.cycle if pulsed else full),
         0.5 * full if start == "random" else 0.0,
+        task.worst(*largest_errors(made)),
     )
     fixed = L.COMMON_SIGNALS + (1 if pulsed else 0)
     mode = L.ACTIONS.index(action)

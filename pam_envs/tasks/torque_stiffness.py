@@ -24,7 +24,7 @@ PER_TURN = 0.15915494309189535
 class TorqueStiffness:
     """Weights, limits and objects.
 
-    ``reward = reward/torque + reward/stiffness + reward/effort``.
+    ``reward = reward/torque + reward/stiffness + reward/effort + reward/ended``.
     """
 
     torque_weight: float = parameter(
@@ -40,7 +40,12 @@ class TorqueStiffness:
         0.5, "N m/rad", 1e-4, 1e3, "assumed", "a stiffness off by 0.5 costs stiffness_weight"
     )
     effort_weight: float = parameter(
-        0.2, "1", 0.0, 1e3, "assumed", "cost of moving both actions over their whole range"
+        0.2,
+        "1",
+        0.0,
+        1e3,
+        "assumed",
+        "cost of moving both set-points over their range, or of coils that are always on",
     )
     soft_pressure: float = parameter(
         5.9e5, "Pa", 0.0, 1e7, "assumed", "just below the supply of 600 kPa, seed 001"
@@ -78,6 +83,17 @@ class TorqueStiffness:
     wall_depth: float = parameter(
         0.05, "rad", 1e-3, 1.0, "assumed", "over which the stiffness grows to that of the wall"
     )
+
+    def worst(self, torque: float, stiffness: float) -> float:
+        """Return what a control period costs at most.
+
+        Parameters
+        ----------
+        torque, stiffness : float
+            Largest errors that there can be [N m], [N m/rad].
+        """
+        off = self.torque_weight * torque / self.torque_scale
+        return off + self.stiffness_weight * stiffness / self.stiffness_scale + self.effort_weight
 
 
 @kernel

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks import metrics
 from benchmarks.leaderboard import columns_of
-from benchmarks.metrics_elbow import ELBOW
+from benchmarks.metrics_elbow import ELBOW, NEAR
 from benchmarks.scenarios import available
 
 PERIOD, N = 0.01, 400
@@ -57,6 +57,10 @@ def test_a_perfect_record_scores_nothing() -> None:
 
 def test_each_metric_sees_what_it_is_of() -> None:
     assert score(stiffness=4.5 + WAVE)["stiffness_rms"] == pytest.approx(0.5)
+    assert score(stiffness=4.5 + WAVE)["impedance_rms"] == pytest.approx(0.5 * NEAR)
+    assert score(output=WAVE + 0.3)["impedance_rms"] == pytest.approx(0.3)
+    both = score(output=WAVE + 0.3, stiffness=2.0 + WAVE)
+    assert both["impedance_rms"] == pytest.approx(np.hypot(0.3, 2.0 * NEAR))
     assert score(felt=-WAVE + 0.2)["felt_rms"] == pytest.approx(0.2)
     quarter = np.where(np.arange(N) < N // 4, 2.0, 0.0)
     beyond = score(torque_clipped=-quarter)
@@ -77,3 +81,4 @@ def test_tracks_have_a_worst_case_of_every_metric_and_columns_of_theirs(name: st
     wanted = set(metrics.of_track(content))
     assert set(content["worst_case"]) == wanted
     assert {column for column, *_ in columns_of(content)} <= wanted
+    assert metrics.headline_of(content) == "impedance_rms"

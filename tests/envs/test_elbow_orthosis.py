@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 import pam_envs  # noqa: F401 (registers)
-from pam_envs.envs.elbow_orthosis import model_row
+from baselines.catalogue import make_controller
+from pam_envs.envs.elbow_orthosis import largest_errors, model_row
 from pam_envs.envs.elbow_program import estimate, pressures_for, within_reach
 from pam_envs.mechanics.hanging_mass import GRAVITY
 from pam_envs.plants.elbow_orthosis import ElbowOrthosis
+from pam_envs.tasks.torque_stiffness import TorqueStiffness
 
 ID = "PAM/ElbowOrthosis-v0"
 PLANT = ElbowOrthosis.paper()
@@ -160,6 +162,73 @@ def test_pulses_are_taken_once_in_a_cycle() -> None:
     never = pressures([rest] * 10)
     assert once[4] > never[4] + 1e3
     assert pressures([rest, pulse, pulse, *[rest] * 7]) == never
+
+
+def test_pulses_are_shown_and_paid_for_until_the_next_ones() -> None:
+    env = made(valves="on_off", motion="still")
+    env.reset(seed=0)
+    seen, paid = [], []
+    for action in [[0.5, -1.0], *[[1.0, 1.0]] * 4, [0.0, 0.0]]:
+        observation, *_, info = env.step(np.array(action, np.float32))
+        seen.append([float(env.signals.decode(observation, f"pulse_{k}")) for k in "ab"])
+        paid.append(info["reward/effort"])
+    assert np.allclose(seen[:5], [0.025, -0.05], atol=1e-6)
+    assert np.allclose(seen[5], 0.0, atol=1e-6)
+    assert np.allclose(paid, [-0.2 * 0.75] * 5 + [0.0], atol=1e-6)
+
+
+FLIMSY = ElbowOrthosis.paper(pulley__stop_stiffness=10.0, wearer__stiffness=4.0, link__gravity=0.0)
+"""Stops that the bundles break against a wearer who hardly holds on; the preset's they cannot."""
+
+
+def rewards(policy: Any, seed: int) -> tuple[np.ndarray, dict[str, Any]]:
+    """Return the rewards of an episode, and its last info."""
+    env = made(plant=FLIMSY, reference="free", episode_seconds=4.0)
+    if isinstance(policy, str):
+        policy = make_controller(policy, env.plant, env.signals, env.action_signals)
+    observation, _ = env.reset(seed=seed)
+    found, state, over = [], None, False
+    while not over:
+        if isinstance(policy, list):
+            action = np.array(policy, np.float32)
+        else:
+            action, state = policy.predict(observation, state, state is None)
+        observation, reward, terminated, truncated, info = env.step(action)
+        found.append(reward)
+        over = terminated or truncated
+    return np.array(found), info | {"terminated": terminated}
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_to_break_a_stop_never_pays(seed: int) -> None:
+    crash, info = rewards([-1.0, 1.0], seed)
+    assert info["terminated"]
+    assert len(crash) < 100
+    held, allocated = (rewards(f"elbow_{name}", seed)[0] for name in ("hold", "allocation"))
+    assert len(held) == len(allocated) == 400
+    for discount in (1.0, 0.97):
+        values = [float(r @ discount ** np.arange(len(r))) for r in (crash, held, allocated)]
+        assert values == sorted(values)
+    left = 400 - len(crash) + 1
+    per_period = -info["reward/ended"] / left
+    assert per_period > -2.0 * min(held.min(), crash[:-1].min())  # no period costs as much
+
+
+def test_no_period_costs_as_much_as_one_that_is_left() -> None:
+    torque, stiffness = largest_errors(PLANT)
+    angles = np.linspace(*PLANT.hard_limits, 25)
+    torques, stiffnesses = PLANT.corners(angles)
+    assert torque > 1.4 * np.ptp(torques, axis=1).max()
+    assert stiffness > 1.4 * np.ptp(stiffnesses, axis=1).max()
+    env = made(randomize=True, motion="sines", span=(0.1, 2.0), pace=1.0, start="random")
+    worst = TorqueStiffness().worst(torque, stiffness)
+    random = np.random.default_rng(0)
+    for seed in range(3):
+        env.reset(seed=seed)
+        for _ in range(150):
+            _, reward, terminated, *_ = env.step(random.choice([-1.0, 1.0], 2).astype(np.float32))
+            assert not terminated
+            assert reward > -0.7 * worst
 
 
 @pytest.mark.parametrize(
