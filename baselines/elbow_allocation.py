@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from baselines.controller import Answer, Array, beginning, choose
 from baselines.elbow_valves import PressureLoop, make_pressure_loop
-from baselines.elbow_view import ElbowEyes, ElbowView, make_elbow_eyes
+from baselines.elbow_view import ElbowSignalMap, ElbowView, make_elbow_signal_map
 from baselines.nominal import MemoryRows, MemoryState, NoMemory, PlayRows, PreisachRows
 from baselines.torque_stiffness import Allocation
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
@@ -43,7 +43,7 @@ class ElbowAllocation:
     Attributes
     ----------
     allocation : Allocation
-    eyes : ElbowEyes
+    signals : ElbowSignalMap
     loop : PressureLoop
     memory : MemoryRows
         That is undone; none is if it never lags.
@@ -52,7 +52,7 @@ class ElbowAllocation:
     """
 
     allocation: Allocation
-    eyes: ElbowEyes
+    signals: ElbowSignalMap
     loop: PressureLoop
     memory: MemoryRows
     early: bool = False
@@ -65,7 +65,7 @@ class ElbowAllocation:
         deterministic: bool = True,
     ) -> Answer:
         """Return the commands; see :class:`~baselines.controller.Controller`."""
-        view = self.eyes.look(observation)
+        view = self.signals.read(observation)
         begin = beginning(state, episode_start, len(view.angle))
         if state is None or begin.any():
             fresh = AllocationState(self.memory.initial(len(view.angle)))
@@ -76,7 +76,7 @@ class ElbowAllocation:
             view.angle, view.wanted, view.stiffness, friction, limits
         )
         commands = self.loop.commands(view, np.array(wanted))
-        return self.eyes.act(commands, observation), AllocationState(memory)
+        return self.signals.write(commands, observation), AllocationState(memory)
 
     def _friction(
         self, view: ElbowView, state: MemoryState
@@ -114,7 +114,7 @@ def make_elbow_allocation(
     """
     return ElbowAllocation(
         Allocation(plant),
-        make_elbow_eyes(signals, action_signals, plant.control_period),
+        make_elbow_signal_map(signals, action_signals, plant.control_period),
         make_pressure_loop(plant),
         _rows(plant.memory.operator if memory else None),
         early,

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from baselines.controller import Answer, beginning, choose
 from baselines.elbow_valves import PressureLoop, make_pressure_loop
-from baselines.elbow_view import ElbowEyes, make_elbow_eyes
+from baselines.elbow_view import ElbowSignalMap, make_elbow_signal_map
 from baselines.pid import Gains, PidState, pid_start, pid_step
 from pam_envs.parameters import Signals
 from pam_envs.plants.elbow_orthosis import ElbowOrthosis
@@ -54,7 +54,7 @@ class ElbowPid:
     Attributes
     ----------
     gains : Gains
-    eyes : ElbowEyes
+    signals : ElbowSignalMap
     loop : PressureLoop or None
         Around the pressures of on/off valves; regulators have one inside.
     middle, full : float
@@ -64,7 +64,7 @@ class ElbowPid:
     """
 
     gains: Gains
-    eyes: ElbowEyes
+    signals: ElbowSignalMap
     loop: PressureLoop | None
     middle: float
     full: float
@@ -78,7 +78,7 @@ class ElbowPid:
         deterministic: bool = True,
     ) -> Answer:
         """Return the commands; see :class:`~baselines.controller.Controller`."""
-        view = self.eyes.look(observation)
+        view = self.signals.read(observation)
         begin = beginning(state, episode_start, len(view.angle))
         if state is None or begin.any():
             state = choose(
@@ -88,7 +88,7 @@ class ElbowPid:
         shift, after = pid_step(self.gains, state, error, view.torque, -most, most, self.period)
         wanted = np.clip(self.middle + np.array([-shift, shift]), 0.0, most)
         commands = wanted if self.loop is None else self.loop.commands(view, wanted)
-        return self.eyes.act(commands, observation), after
+        return self.signals.write(commands, observation), after
 
 
 def make_elbow_pid(
@@ -98,7 +98,7 @@ def make_elbow_pid(
     full = plant.full_pressure
     return ElbowPid(
         simc_torque(plant) if gains is None else gains,
-        make_elbow_eyes(signals, action_signals, plant.control_period),
+        make_elbow_signal_map(signals, action_signals, plant.control_period),
         make_pressure_loop(plant) if plant.valves == "on_off" else None,
         SHARE * full,
         full,

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from baselines.controller import Answer
 from baselines.elbow_valves import PressureLoop, make_pressure_loop
-from baselines.elbow_view import ElbowEyes, make_elbow_eyes
+from baselines.elbow_view import ElbowSignalMap, make_elbow_signal_map
 from baselines.trivial import RandomEach, random_each
 from pam_envs.parameters import Signals
 from pam_envs.plants.elbow_orthosis import ElbowOrthosis
@@ -22,10 +22,10 @@ class Limp:
 
     Attributes
     ----------
-    eyes : ElbowEyes
+    signals : ElbowSignalMap
     """
 
-    eyes: ElbowEyes
+    signals: ElbowSignalMap
 
     def predict(
         self,
@@ -36,8 +36,8 @@ class Limp:
     ) -> Answer:
         """Return the commands, and no state; see :class:`~baselines.controller.Controller`."""
         rows = 1 if np.ndim(observation) == 1 else len(np.asarray(observation))
-        lowest = np.array([signal.low for signal in self.eyes.actions])
-        return self.eyes.act(np.repeat(lowest[:, None], rows, axis=1), observation), None
+        lowest = np.array([signal.low for signal in self.signals.actions])
+        return self.signals.write(np.repeat(lowest[:, None], rows, axis=1), observation), None
 
 
 @dataclass(frozen=True)
@@ -46,13 +46,13 @@ class Held:
 
     Attributes
     ----------
-    eyes : ElbowEyes
+    signals : ElbowSignalMap
     loop : PressureLoop
     pressure : float
         Of both bundles [Pa].
     """
 
-    eyes: ElbowEyes
+    signals: ElbowSignalMap
     loop: PressureLoop
     pressure: float
 
@@ -64,14 +64,14 @@ class Held:
         deterministic: bool = True,
     ) -> Answer:
         """Return the commands, and no state; see :class:`~baselines.controller.Controller`."""
-        view = self.eyes.look(observation)
+        view = self.signals.read(observation)
         wanted = np.full_like(view.pressure, self.pressure)
-        return self.eyes.act(self.loop.commands(view, wanted), observation), None
+        return self.signals.write(self.loop.commands(view, wanted), observation), None
 
 
 def make_limp(plant: ElbowOrthosis, signals: Signals, action_signals: Signals) -> Limp:
     """Return the controller; it looks at no more of the plant than its control period."""
-    return Limp(make_elbow_eyes(signals, action_signals, plant.control_period))
+    return Limp(make_elbow_signal_map(signals, action_signals, plant.control_period))
 
 
 def make_held(
@@ -79,7 +79,7 @@ def make_held(
 ) -> Held:
     """Return the controller that holds ``share`` of the largest pressure in both bundles."""
     return Held(
-        make_elbow_eyes(signals, action_signals, plant.control_period),
+        make_elbow_signal_map(signals, action_signals, plant.control_period),
         make_pressure_loop(plant),
         share * plant.full_pressure,
     )

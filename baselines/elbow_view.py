@@ -49,7 +49,7 @@ class ElbowView(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ElbowEyes:
+class ElbowSignalMap:
     """Makes an :class:`ElbowView` of observations, and actions of two commands.
 
     Attributes
@@ -68,7 +68,7 @@ class ElbowEyes:
     actions: tuple[Signal, Signal]
     period: float
 
-    def look(self, observation: ArrayLike) -> ElbowView:
+    def read(self, observation: ArrayLike) -> ElbowView:
         """Return what an observation of shape (n_obs,) or (n_env, n_obs) shows."""
         angle, rate, a, b, torque, wanted, stiffness = self.reader.rows(observation)
         taken = np.ones(len(angle), bool)
@@ -76,7 +76,7 @@ class ElbowEyes:
             taken = self.to_pulse.rows(observation)[0] < 0.5 * self.period
         return ElbowView(angle, rate, np.array([a, b]), torque, wanted, stiffness, taken)
 
-    def act(self, commands: Array, observation: ArrayLike) -> NDArray[np.float32]:
+    def write(self, commands: Array, observation: ArrayLike) -> NDArray[np.float32]:
         """Return the action for commands of both bundles, shape (2, n_env)."""
         action = np.zeros((commands.shape[1], 2))
         for signal, value in zip(self.actions, commands, strict=True):
@@ -86,7 +86,9 @@ class ElbowEyes:
         return made if np.ndim(observation) == 2 else made[0]
 
 
-def make_elbow_eyes(signals: Signals, action_signals: Signals, period: float) -> ElbowEyes:
+def make_elbow_signal_map(
+    signals: Signals, action_signals: Signals, period: float
+) -> ElbowSignalMap:
     """Return what reads and writes the signals of the elbow.
 
     Raises
@@ -102,7 +104,7 @@ def make_elbow_eyes(signals: Signals, action_signals: Signals, period: float) ->
             "pulses: make the environment with action='pressures'"
         )
     there = "to_pulse" in signals.names()
-    return ElbowEyes(
+    return ElbowSignalMap(
         reader(signals, list(NAMES)),
         reader(signals, ["to_pulse"]) if there else None,
         (action_signals[form.format("a")], action_signals[form.format("b")]),

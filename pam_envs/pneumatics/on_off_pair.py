@@ -26,8 +26,8 @@ REFERENCE_DENSITY = 1.185
 """Of air in the reference state of ISO 8778, 20 degrees C and 1 bar [kg/m3]."""
 
 _MAKER = (
-    "maker's data sheet of the V100 series, standard V114 (the valve that seed 001, section 4 names "
-    "and says no more of)"
+    "maker's data sheet of the V100 series, standard V114, the valve that seed 001 names in "
+    "section 4 and says no more of"
 )
 _RESTORED = (
     ", read from a copy that has lost digits; restored so that the flow is the 8.4 l/min that it "

@@ -12,7 +12,7 @@ import pam_envs  # noqa: F401  registers the ids
 from baselines.catalogue import CONTROLLERS, make_controller
 from baselines.elbow_catalogue import ELBOW, ELBOW_CONTROLLERS, ELBOW_MAKERS
 from baselines.elbow_valves import make_pressure_loop
-from baselines.elbow_view import make_elbow_eyes
+from baselines.elbow_view import make_elbow_signal_map
 from baselines.torque_stiffness import Allocation
 from pam_envs.plants.elbow_orthosis import ElbowOrthosis
 from pam_envs.plants.single_muscle import SingleMuscle
@@ -190,12 +190,12 @@ def test_the_next_steps_pressures_keep_the_torque_first_on_the_way(valves):
 @pytest.mark.parametrize("valves", VALVES)
 def test_the_reach_of_the_valves_is_where_their_longest_commands_lead(valves):
     env = make_env(plant=quiet("none", valves=valves), motion="still", reference="free")
-    eyes = make_elbow_eyes(env.signals, env.action_signals, env.control_period)
+    signals = make_elbow_signal_map(env.signals, env.action_signals, env.control_period)
     loop, steps = make_pressure_loop(env.plant), 2 if valves == "proportional" else 5
     for sign, side in ((-1.0, 0), (1.0, 1)):
         observation, info = env.reset(seed=2)
         before = np.array([info["state/pressure_a"], info["state/pressure_b"]])
-        told = loop.reach(eyes.look(observation))[side][:, 0]
+        told = loop.reach(signals.read(observation))[side][:, 0]
         for _ in range(steps):
             *_, info = env.step(np.full(2, sign, np.float32))
         found = np.array([info["state/pressure_a"], info["state/pressure_b"]])
@@ -204,18 +204,18 @@ def test_the_reach_of_the_valves_is_where_their_longest_commands_lead(valves):
 
 def test_pulses_bring_pressures_where_they_are_wanted():
     env = make_env(plant=quiet("none", valves="on_off"), motion="still", episode_seconds=30.0)
-    eyes = make_elbow_eyes(env.signals, env.action_signals, env.control_period)
+    signals = make_elbow_signal_map(env.signals, env.action_signals, env.control_period)
     loop, observation = make_pressure_loop(env.plant), env.reset(seed=0)[0]
     for levels in ((3e5, 1e5), (1e5, 3e5), (2.0e5, 2.0e5)):
         wanted = np.array(levels)[:, None]
         for _ in range(500):
-            action = eyes.act(loop.commands(eyes.look(observation), wanted), observation)
+            action = signals.write(loop.commands(signals.read(observation), wanted), observation)
             observation, *_, info = env.step(action)
         found = (info["state/pressure_a"], info["state/pressure_b"])
         assert found == pytest.approx(levels, abs=6e3)  # half of the least pulse
     before = info
     for _ in range(50):
-        action = eyes.act(loop.commands(eyes.look(observation), wanted), observation)
+        action = signals.write(loop.commands(signals.read(observation), wanted), observation)
         observation, *_, info = env.step(action)
         assert info["effort/switchings"] == 0.0  # what is as near as can be is left alone
     assert before["state/pressure_a"] == pytest.approx(info["state/pressure_a"], abs=500.0)

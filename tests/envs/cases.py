@@ -108,14 +108,20 @@ OWN: dict[str, dict[str, dict[str, Any]]] = {
         "samples": {"reference": [0.1 * (k % 100) for k in range(300)], "preview": 20},
     },
     "PAM/ElbowOrthosis-v0": {
-        "pulses": {"valves": "on_off", "motion": "sines", "reference": "wall", "preview": 3},
-        "pulses_preisach": {"valves": "on_off", "hysteresis": "preisach", "randomize": True},
+        "pulses": {
+            "valves": "on_off",
+            "hysteresis": "preisach",
+            "randomize": True,
+            "motion": "sines",
+            "reference": "wall",
+            "preview": 3,
+        },
         "by_torque": {
+            **NONE,
             "action": "torque_stiffness",
             "reference": "weight",
             "motion": "mixed",
             "start": "random",
-            "normalize": False,
         },
         "samples": {
             "reference": [[0.05 * (k % 200) - 5.0, 0.01 * (k % 900)] for k in range(300)],
@@ -172,7 +178,7 @@ PLAIN: dict[str, dict[str, dict[str, Any]]] = {
     "PAM/KneeStairsDown-v0": {"none": NONE},
     "PAM/ElbowOrthosis-v0": {
         "preisach_random": PREISACH,
-        "none": {**NONE, "reference": "wall"},
+        "pulses_plays": {"valves": "on_off", "motion": "mixed", "randomize": True},
         "pulses_none": {"valves": "on_off", "hysteresis": "none", "reference": "wall"},
     },
     "PAM/AntagonisticJoint-v0": {
