@@ -112,6 +112,13 @@ holds what runs it again: `python -m benchmarks verify ROW`.
   measured on what it does.
 - Steady-state errors are of references that rest. Constraint cost 1 is one millimetre (or one bar)
   over a soft limit all the time.
+- Of the elbow, the headline is of torque and stiffness together: the error of the torque, RMS over
+  two angles, 0.2 rad on either side of the present one, from the torque here and the stiffness.
+  *Torque* is the error at the present angle alone, against what the pressures can give there (as
+  are p95 and max); *estimated* is the torque as computed from the sensors, without friction. *Felt
+  beside the object* is the torque that the orthosis puts on the wearer less that of the object he
+  is to feel, whether it can be given or not: in free motion, all that he feels. *Out of reach*:
+  more torque or stiffness was asked for than there is.
 - Of a gait, the tension is scored while the heel bears weight and the angle while it does not, and
   neither in the few periods in which the sensed phase is not the true one. *Error at the switch* is
   what swing leaves of the tension's error in the first period of stance; *excess* is by how much it
@@ -130,13 +137,6 @@ holds what runs it again: `python -m benchmarks verify ROW`.
 - Of a chain, the error is how far the tip is off its path, and *pointing* is of its direction;
   *joints* are compared with the planned angles, of which the tip knows nothing. *Error to its own
   model* is of controllers that follow a model: the true angle less the model's.
-- Of the elbow, the headline is of torque and stiffness together: the error of the torque, RMS over
-  two angles, 0.2 rad on either side of the present one, from the torque here and the stiffness.
-  *Torque* is the error at the present angle alone, against what the pressures can give there (as
-  are p95 and max); *estimated* is the torque as computed from the sensors, without friction. *Felt
-  beside the object* is the torque that the orthosis puts on the wearer less that of the object he
-  is to feel, whether it can be given or not: in free motion, all that he feels. *Out of reach*:
-  more torque or stiffness was asked for than there is.
 - A controller's name leads to its row, where every metric of every episode stands.
 - Times per step are in [results/TIMES.md](results/TIMES.md), since no two runs give the same.
 """
