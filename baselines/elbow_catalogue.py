@@ -25,7 +25,7 @@ ELBOW_CONTROLLERS: dict[str, Entry] = {
     ),
     "elbow_hold": Entry("3 bar in both bundles always", MODEL, feedback=True, envs=ELBOW),
     "elbow_pid": Entry(
-        "PI of the torque as estimated, SIMC tuning; stiffness as it comes",
+        "PI of the torque as estimated from 1.2 bar in both, SIMC tuning; stiffness as it comes",
         MODEL,
         feedback=True,
         citation=SIMC,
