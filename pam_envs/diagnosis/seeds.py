@@ -1,6 +1,6 @@
 """Where fits begin whose starting values have to be looked for.
 
-A step or a drift of the position begins where it explains most of the base's residual; an effect
+A step or a drift begins where it explains most of the base's residual; an effect
 of events (a valve that opens, a guide that breaks away) has many local optima, and begins at the
 best points of a grid.
 """
@@ -26,17 +26,17 @@ APART = 0.02
 CANDIDATES = 2
 
 
-def step_starts(problem: Problem, family: Any, base: Fit, form: Any) -> Starts:
-    """Return sizes [m] and times [s] of steps of the position, the best explanations first.
+def step_starts(problem: Problem, family: Any, base: Fit, form: Any, output: int = 0) -> Starts:
+    """Return sizes [m], [Pa] and times [s] of steps of an output, the best explanations first.
 
     For every sample the step from there on is projected on what refitting the base cannot take up;
     the sums over all tails cost one pass.
     """
     samples = problem.measured.shape[1]
-    good = problem.train & np.isfinite(problem.measured[0])
-    residual = np.where(good, problem.rows(base.residual)[0], 0.0)
+    good = problem.train & np.isfinite(problem.measured[output])
+    residual = np.where(good, problem.rows(base.residual)[output], 0.0)
     slopes = base.slopes[:, : problem.seen]
-    every = np.array([problem.rows(row)[0] for row in base.slopes])
+    every = np.array([problem.rows(row)[output] for row in base.slopes])
     moved = np.where(good, every, 0.0)
     normal = np.einsum("im,jm->ij", slopes, slopes)
     inverse = np.linalg.pinv(normal, rcond=1e-9)
@@ -52,7 +52,7 @@ def step_starts(problem: Problem, family: Any, base: Fit, form: Any) -> Starts:
         k = int(np.argmax(score))
         if score[k] <= 0.0:
             break
-        size = float(-tails[k] / norm[k] * problem.noise[0])
+        size = float(-tails[k] / norm[k] * problem.noise[output])
         starts.append((size, float(problem.time[k])))
         reach = round(APART * samples)
         score[max(0, k - reach) : k + reach] = 0.0
@@ -62,13 +62,21 @@ def step_starts(problem: Problem, family: Any, base: Fit, form: Any) -> Starts:
 step_starts.looks = 100  # type: ignore[attr-defined]
 
 
-def ramp_starts(problem: Problem, family: Any, base: Fit, form: Any) -> Starts:
+def ramp_starts(problem: Problem, family: Any, base: Fit, form: Any, output: int = 0) -> Starts:
     """Return sizes [m], middles [s] and durations [s] of slow drifts, about the best steps."""
-    found = step_starts(problem, family, base, form)[:1]
+    found = step_starts(problem, family, base, form, output)[:1]
     return [(size, middle, slow) for size, middle in found for slow in SLOW]
 
 
 ramp_starts.looks = 200  # type: ignore[attr-defined]
+
+
+def pressure_ramp_starts(problem: Problem, family: Any, base: Fit, form: Any) -> Starts:
+    """Return sizes [Pa], middles [s] and durations [s] of slow drifts of the pressure's reading."""
+    return ramp_starts(problem, family, base, form, output=1)
+
+
+pressure_ramp_starts.looks = 200  # type: ignore[attr-defined]
 
 
 def grid(*values: Sequence[float], best: int = 3) -> Callable[..., Starts]:

@@ -68,6 +68,9 @@ class EffectiveAreaMuscle:
     load_stiffening_2: float = parameter(
         0.0, "1/N2", -2e-4, 1e-3, "assumed", "the same by load squared", neutral=0.0
     )
+    load_stiffening_root: float = parameter(
+        0.0, "1/N^0.5", -0.1, 0.5, "assumed", "the same by the root of the load", neutral=0.0
+    )
     creep_1: float = parameter(
         0.0, "1", -0.5, 2.0, "assumed", "length that follows at memory.creep_time_1", neutral=0.0
     )

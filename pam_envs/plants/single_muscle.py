@@ -76,6 +76,7 @@ EFFECTS: tuple[tuple[str, ...], ...] = (
     ("muscle.load_curve",),
     ("muscle.load_stiffening",),
     ("muscle.load_stiffening_2",),
+    ("muscle.load_stiffening_root",),
     (*(f"muscle.strand_{k}" for k in (1, 2, 3, 4)), "muscle.strand_break"),
     ("muscle.viscosity", "muscle.viscosity_speed"),
     ("mass.carried",),
@@ -88,7 +89,8 @@ EFFECTS: tuple[tuple[str, ...], ...] = (
     ("position.delay",),
     ("position.bow",),
     ("position.slip", "position.slip_at"),
-    ("pressure.drift",),
+    ("pressure.drift", "pressure.drift_time"),
+    ("pressure.ramp", "pressure.ramp_at", "pressure.ramp_over"),
     ("pressure.bow",),
 )
 """See :class:`pam_envs.plants.plant.Plant`."""
@@ -224,7 +226,11 @@ class SingleMuscle(Plant):
         """Return the weight [N], the factor on the stiffness and the pressure shift [Pa]."""
         weight = (load + self.mass.load_error * (load > 0.0)) * GRAVITY
         law = self.muscle
-        stiffer = 1.0 + (law.load_stiffening + law.load_stiffening_2 * weight) * weight
+        stiffer = (
+            1.0
+            + (law.load_stiffening + law.load_stiffening_2 * weight) * weight
+            + law.load_stiffening_root * np.sqrt(np.maximum(weight, 0.0))
+        )
         return weight, stiffer, self.muscle.load_curve * weight * weight
 
     def drive_for(self, contraction: ArrayLike, load: ArrayLike) -> NDArray[np.float64]:

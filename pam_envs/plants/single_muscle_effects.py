@@ -238,7 +238,9 @@ def balance(fixed: Any, lane: int, drive: float, load: float, hangs: float) -> f
     mass = load + (fixed[R.LOAD_ERROR][lane] if load > 0.0 else 0.0)
     weight = mass * GRAVITY
     stiffer = (
-        1.0 + (fixed[R.LOAD_STIFFENING][lane] + fixed[R.LOAD_STIFFENING_2][lane] * weight) * weight
+        1.0
+        + (fixed[R.LOAD_STIFFENING][lane] + fixed[R.LOAD_STIFFENING_2][lane] * weight) * weight
+        + fixed[R.LOAD_STIFFENING_ROOT][lane] * math.sqrt(max(0.0, weight))
     )
     shifted = drive - fixed[R.LOAD_CURVE][lane] * weight * weight
     low, high = -0.3, 0.6
@@ -305,6 +307,19 @@ def begin_effects(rows: Any, fixed: Any, j: int) -> None:
     sense(rows, fixed, j, 0, 0.0, 0.01)
 
 
+@routine
+def drifted(time: float, rate: float, span: float) -> float:
+    """Return a drift that begins at a rate and settles within a span [s]."""
+    return rate * span * (1.0 - decay(min(40.0, time / span)))
+
+
+@routine
+def ramped(time: float, middle: float, over: float) -> float:
+    """Return what rises from 0 to 1 about a middle [s], without a corner."""
+    s = max(0.0, min(1.0, (time - middle) / over + 0.5))
+    return s * s * (3.0 - 2.0 * s)
+
+
 @kernel
 def sense(rows: Any, fixed: Any, j: int, step: int, time: float, period: float) -> None:
     """Write what the sensors of lane ``j`` show, but for bias, noise and quantisation."""
@@ -315,21 +330,25 @@ def sense(rows: Any, fixed: Any, j: int, step: int, time: float, period: float) 
     newer = rows[FIRST + R.SEEN + ((step + R.N_HISTORY - whole) & (R.N_HISTORY - 1))][j]
     older = rows[FIRST + R.SEEN + ((step + R.N_HISTORY - whole - 1) & (R.N_HISTORY - 1))][j]
     x = newer + (age - whole) * (older - newer)
-    full, span = FULL_STRAIN * fixed[R.REST_LENGTH][j], fixed[R.DRIFT_TIME][j]
+    full = FULL_STRAIN * fixed[R.REST_LENGTH][j]
     slipped = max(0.0, min(1.0, (time - fixed[R.SLIP_AT][j]) / SLIDE + 0.5))
-    ramped = max(0.0, min(1.0, (time - fixed[R.RAMP_AT][j]) / fixed[R.RAMP_OVER][j] + 0.5))
+    drift = drifted(time, fixed[R.POSITION_DRIFT][j], fixed[R.DRIFT_TIME][j])
+    ramp = fixed[R.RAMP][j] * ramped(time, fixed[R.RAMP_AT][j], fixed[R.RAMP_OVER][j])
     rows[FIRST + R.SEEN_POSITION][j] = (
         x
         + fixed[R.POSITION_BOW][j] * x * (x / full - 1.0)
-        + fixed[R.POSITION_DRIFT][j] * span * (1.0 - decay(min(40.0, time / span)))
-        + fixed[R.RAMP][j] * ramped * ramped * (3.0 - 2.0 * ramped)
+        + drift
+        + ramp
         + fixed[R.SLIP][j] * slipped
     )
     top = fixed[R.MAX_PRESSURE][j]
+    drift = drifted(time, fixed[R.PRESSURE_DRIFT][j], fixed[R.PRESSURE_DRIFT_TIME][j])
+    middle, over = fixed[R.PRESSURE_RAMP_AT][j], fixed[R.PRESSURE_RAMP_OVER][j]
     rows[FIRST + R.SEEN_PRESSURE][j] = (
         pressure
         + fixed[R.PRESSURE_BOW][j] * pressure * (pressure / top - 1.0)
-        + fixed[R.PRESSURE_DRIFT][j] * time
+        + drift
+        + fixed[R.PRESSURE_RAMP][j] * ramped(time, middle, over)
     )
 
 
@@ -412,7 +431,9 @@ def move(
         mass = load[j] + (fixed[R.LOAD_ERROR][j] if load[j] > 0.0 else 0.0)
         weight = mass * GRAVITY
         stiffer = (
-            1.0 + (fixed[R.LOAD_STIFFENING][j] + fixed[R.LOAD_STIFFENING_2][j] * weight) * weight
+            1.0
+            + (fixed[R.LOAD_STIFFENING][j] + fixed[R.LOAD_STIFFENING_2][j] * weight) * weight
+            + fixed[R.LOAD_STIFFENING_ROOT][j] * math.sqrt(max(0.0, weight))
         )
         shift = fixed[R.LOAD_CURVE][j] * weight * weight
         ahead = 0.5 * h * v[j]

@@ -121,6 +121,7 @@ EFFECTS = (
     "muscle.load_curve",
     "muscle.load_stiffening",
     "muscle.load_stiffening_2",
+    "muscle.load_stiffening_root",
     "muscle.creep_1",
     "muscle.creep_2",
     "muscle.creep_3",
@@ -151,6 +152,10 @@ EFFECTS = (
     "position.slip",
     "position.slip_at",
     "pressure.drift",
+    "pressure.drift_time",
+    "pressure.ramp",
+    "pressure.ramp_at",
+    "pressure.ramp_over",
     "pressure.bow",
 )
 (
@@ -195,6 +200,7 @@ EFFECTS = (
     LOAD_CURVE,
     LOAD_STIFFENING,
     LOAD_STIFFENING_2,
+    LOAD_STIFFENING_ROOT,
     LENGTH_CREEP_1,
     LENGTH_CREEP_2,
     LENGTH_CREEP_3,
@@ -225,6 +231,10 @@ EFFECTS = (
     SLIP,
     SLIP_AT,
     PRESSURE_DRIFT,
+    PRESSURE_DRIFT_TIME,
+    PRESSURE_RAMP,
+    PRESSURE_RAMP_AT,
+    PRESSURE_RAMP_OVER,
     PRESSURE_BOW,
 ) = range(WEIGHT + ELEMENTS, WEIGHT + ELEMENTS + len(EFFECTS))
 N_PARAMETERS = WEIGHT + ELEMENTS + len(EFFECTS)

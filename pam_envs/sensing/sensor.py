@@ -20,7 +20,7 @@ class PositionSensor:
     )
     bias: float = parameter(0.0, "m", -0.05, 0.05, "assumed", "zeroed at rest", neutral=0.0)
     # effects, neutral unless a recording shows them
-    drift: float = parameter(0.0, "m/s", -1e-3, 1e-3, "assumed", "at the start", neutral=0.0)
+    drift: float = parameter(0.0, "m/s", -0.02, 0.02, "assumed", "at the start", neutral=0.0)
     drift_time: float = parameter(1e4, "s", 1.0, 1e4, "assumed", "time in which the drift settles")
     ramp: float = parameter(0.0, "m", -0.02, 0.02, "assumed", "drift that ends", neutral=0.0)
     ramp_at: float = parameter(0.0, "s", 0.0, 1e6, "assumed", "its middle")
@@ -45,7 +45,11 @@ class PressureSensor:
     )
     bias: float = parameter(0.0, "Pa", -1e5, 1e5, "assumed", "zeroed at rest", neutral=0.0)
     # effects, neutral unless a recording shows them
-    drift: float = parameter(0.0, "Pa/s", -1e3, 1e3, "assumed", "at the start", neutral=0.0)
+    drift: float = parameter(0.0, "Pa/s", -1e5, 1e5, "assumed", "at the start", neutral=0.0)
+    drift_time: float = parameter(1e4, "s", 1.0, 1e4, "assumed", "time in which the drift settles")
+    ramp: float = parameter(0.0, "Pa", -1e5, 1e5, "assumed", "drift that ends", neutral=0.0)
+    ramp_at: float = parameter(0.0, "s", 0.0, 1e6, "assumed", "its middle")
+    ramp_over: float = parameter(60.0, "s", 1.0, 1e6, "assumed", "how long it takes")
     bow: float = parameter(0.0, "1", -0.5, 0.5, "assumed", "parabola over full scale", neutral=0.0)
 
 

@@ -52,7 +52,7 @@ NAMES = [
 CATALOGUE = catalogue()
 PLANT = start_plant(Rig(rest_length=0.2))
 PERIOD = 0.02
-EARLY = {"position.slip_at": 8.0, "position.ramp_at": 8.0}
+EARLY = {"position.slip_at": 8.0, "position.ramp_at": 8.0, "pressure.ramp_at": 8.0}
 """Moments [s] within the short campaign, for those that are looked for in a recording."""
 FORMS = [
     pytest.param(cause, form, id=f"{cause.name}-{form.name}")

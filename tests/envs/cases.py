@@ -45,6 +45,7 @@ EVERY_EFFECT = {
     "muscle.temperature_gain": 0.002,
     "muscle.load_curve": 2.0,
     "muscle.load_stiffening": 1e-3,
+    "muscle.load_stiffening_root": 2e-3,
     "muscle.creep_2": 0.02,
     "muscle.strand_2": 3.0,
     "muscle.strand_4": 2.0,

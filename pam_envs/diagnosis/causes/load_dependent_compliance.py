@@ -2,7 +2,8 @@
 
 The law of the base gives a load its share of the pull, in proportion. A real muscle is necked at
 its ends and its fittings give way, so that the load costs more pressure than that (a shift with its
-square) or meets another stiffness (passive force times a polynomial in the load).
+square) or meets another stiffness (passive force times a polynomial in the
+root of the load).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ CAUSE = Cause(
             (
                 Term("muscle.load_stiffening", (5e-4, -5e-4), scale=5e-4),
                 Term("muscle.load_stiffening_2", (1e-6,), scale=1e-5),
+                Term("muscle.load_stiffening_root", (1e-4,), scale=5e-3),
             ),
         ),
     ),

@@ -1,8 +1,9 @@
 """Bias: a reading is off by a constant.
 
 The zero of an amplifier, or a muscle that had not come to rest when the sensor was zeroed, shifts
-every reading by the same amount, at all pressures and loads. The bias acts on the reading alone, so
-that nothing else in the rig feels it.
+every reading by the same amount, at all pressures and loads. An amplifier that was just switched on
+needs some seconds to get there. The bias acts on the reading alone, so that nothing else in the rig
+feels it.
 """
 
 from __future__ import annotations
@@ -18,6 +19,20 @@ CAUSE = Cause(
             (
                 Term("position.bias", (1e-4,), scale=1e-4),
                 Term("pressure.bias", (1e3,), scale=1e3),
+            ),
+        ),
+        Form(
+            "warming up",
+            (
+                Term("position.drift", (1e-4,), scale=1e-4),
+                Term("position.drift_time", (2.0,), low=1.0, high=8.0, log=True, amount=False),
+            ),
+        ),
+        Form(
+            "warming up, pressure",
+            (
+                Term("pressure.drift", (1e3,), scale=1e3),
+                Term("pressure.drift_time", (2.0,), low=1.0, high=8.0, log=True, amount=False),
             ),
         ),
     ),

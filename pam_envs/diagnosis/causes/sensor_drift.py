@@ -2,13 +2,13 @@
 
 Electronics warm up, a clamp or a coating settles, a bridge amplifier follows the room. The error
 has nothing to do with what the muscle does, only with time: it settles along an exponential, or
-happens between two moments and then stays. The pressure reading drifts along a straight line.
+happens between two moments and then stays.
 """
 
 from __future__ import annotations
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
-from pam_envs.diagnosis.seeds import ramp_starts
+from pam_envs.diagnosis.seeds import pressure_ramp_starts, ramp_starts
 
 CAUSE = Cause(
     name="sensor_drift",
@@ -18,7 +18,7 @@ CAUSE = Cause(
             "position",
             (
                 Term("position.drift", (1e-6,), scale=1e-6),
-                Term("position.drift_time", (60.0,), log=True, amount=False),
+                Term("position.drift_time", (60.0,), low=10.0, log=True, amount=False),
             ),
         ),
         Form(
@@ -30,7 +30,22 @@ CAUSE = Cause(
             ),
             seeds=ramp_starts,
         ),
-        Form("pressure", (Term("pressure.drift", (10.0,), scale=10.0),)),
+        Form(
+            "pressure",
+            (
+                Term("pressure.drift", (10.0,), scale=10.0),
+                Term("pressure.drift_time", (1000.0,), low=10.0, log=True, amount=False),
+            ),
+        ),
+        Form(
+            "pressure ramp",
+            (
+                Term("pressure.ramp", (1e3,), scale=1e3),
+                Term("pressure.ramp_at", (100.0,), scale=20.0, amount=False),
+                Term("pressure.ramp_over", (60.0,), low=15.0, log=True, amount=False),
+            ),
+            seeds=pressure_ramp_starts,
+        ),
     ),
     signature=(
         "a slow function of the time since the start, the same at rest and under pressure, on one "

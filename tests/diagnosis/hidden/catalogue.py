@@ -12,7 +12,7 @@ valve_dead_band             overlapping spool: rounded onset   dead zone, or com
 dead_time                   four to six short lags             fractional delay of the command
 slew_limit                  coil that saturates as tanh, or    sharp limit, blended with a soft
                             bent slope, unequal by direction   minimum of power two
-sensor_bias                 offset that appears in 2 s         constant offset
+sensor_bias                 offset along a parabola, over 5 s  constant, or an exponential
 sensor_drift                hyperbola or sigmoid of time       exponential, smooth step or line
 sensor_delay                cascade of lags or running mean    pure delay of the reading
 viscous_loss                Eyring: arsinh of the speed        damping that falls as 1 over a root

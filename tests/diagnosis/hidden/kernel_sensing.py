@@ -7,6 +7,9 @@ import math
 from .kernel_tools import PRESSURE_SPAN, STEP, jit, uniform
 from .records import HISTORY
 
+WARM_UP = 5.0
+"""Seconds from switching on until the electronics read what they will."""
+
 
 @jit
 def position_mm(p, s):
@@ -85,7 +88,8 @@ def read(p, s):
         place += p.bow_mm * bow(p, place / (160.0 * p.length))
     if p.bow_bar != 0.0:
         pressure += p.bow_bar * bow(p, pressure / PRESSURE_SPAN)
-    warm = 1.0 - math.exp(-0.5 * t)
+    cold = max(0.0, 1.0 - t / WARM_UP)
+    warm = 1.0 - cold * cold
     place += p.bias_mm * warm
     pressure += p.bias_bar * warm
     if p.drift_time > 0.0:
