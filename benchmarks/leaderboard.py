@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import plots, rows, statistics
-from benchmarks.metrics import HEADLINE
+from benchmarks.metrics import headline_of
 from benchmarks.rows import Row, shown
 from benchmarks.statistics import Interval
 from benchmarks.store import write_text
@@ -45,10 +45,12 @@ DEGREES = float(np.degrees(1.0))
 MODEL: Column = ("model_rms_error", "error to its own model, RMS [deg]", DEGREES)
 OUT_OF_REACH: Column = ("saturated_time", "out of reach [%]", 100.0)
 CHAIN: tuple[Column, ...] = (
+    ("rms_error", "tip RMS [mm]", 1e3),
+    ("pointing_rms", "pointing RMS [deg]", DEGREES),
     ("p95_error", "p95 [mm]", 1e3),
     ("max_error", "max [mm]", 1e3),
+    ("steady_state_error", "steady [mm]", 1e3),
     ("sensed_rms_error", "sensed RMS [mm]", 1e3),
-    ("pointing_rms", "pointing RMS [deg]", DEGREES),
     ("joint_rms", "joints RMS [deg]", DEGREES),
     ("largest_angle", "largest joint angle [deg]", DEGREES),
     MODEL,
@@ -112,17 +114,19 @@ holds what runs it again: `python -m benchmarks verify ROW`.
   helped. *Fitted, B* is no score: it takes activity to grow as the square of torque, so that a
   valve that is simply open has 0.77 in walking, where the EMG ratio is 1.14 and A 1.66.
 - *True pressure at capacity* is time above 4.45 bar in the muscle, of whatever the valve was told.
-- Of a chain, the error is how far the tip is off its path, and *pointing* is of its direction;
-  *joints* are compared with the planned angles, of which the tip knows nothing. *Error to its own
-  model* is of controllers that follow a model: the true angle less the model's.
+- Of a chain, the headline is of the whole tool, which has a place and a direction: RMS over the tip
+  and the point one link behind it along the tool. *Tip* is how far the tip alone is off its path
+  (as are p95, max, steady and sensed), and *pointing* is of the direction; *joints* are compared
+  with the planned angles, of which the tool knows nothing. *Error to its own model* is of
+  controllers that follow a model: the true angle less the model's.
 - A controller's name leads to its row, where every metric of every episode stands.
 - Times per step are in [results/TIMES.md](results/TIMES.md), since no two runs give the same.
 """
 
 
-def interval(row: Mapping[str, Any], metric: str = HEADLINE) -> Interval:
-    """Return a metric's mean with its interval."""
-    entry = row["aggregate"][metric]
+def interval(row: Mapping[str, Any], metric: str = "") -> Interval:
+    """Return a metric's mean with its interval, the headline's where none is named."""
+    entry = row["aggregate"][metric or headline_of(row["scenarios"]["content"])]
     return Interval(entry["mean"], entry["low"], entry["high"])
 
 
@@ -199,13 +203,15 @@ def _matching(first: Row, second: Row) -> bool:
 
 
 def _pair_line(row: Row, above: Row | None) -> list[str]:
-    inner, (_, factor) = row["aggregate"][HEADLINE], shown(row["scenarios"]["content"])
+    content = row["scenarios"]["content"]
+    headline, (_, factor) = headline_of(content), shown(content)
+    inner = row["aggregate"][headline]
     middle = f"{number(factor * inner['iqm'])}"
     bounds = f"[{number(factor * inner['iqm_low'])}, {number(factor * inner['iqm_high'])}]"
     line = [f"`{row['controller']['name']}`", f"{middle} {bounds}"]
     if above is None or not _matching(row, above):
         return [*line, "-", "-"]
-    ours, theirs = (rows.scores_of(r["episodes"], HEADLINE) for r in (row, above))
+    ours, theirs = (rows.scores_of(r["episodes"], headline) for r in (row, above))
     gap = statistics.paired_difference(
         ours, theirs, [episode["scenario"] for episode in row["episodes"]]
     )
@@ -235,7 +241,7 @@ def _track_page(name: str, ordered: Sequence[Row], figure: str | None) -> list[s
         f"`{first['env']['id']}`, scenarios `{name}` version {content['version']} "
         f"(`{first['scenarios']['digest'][:12]}`), {len(first['plants'])} scenarios x "
         f"{len(first['seeds'])} seeds, settling window {content['settle_seconds']:g} s, "
-        f"worst case {factor * content['worst_case'][HEADLINE]:g} {unit}.",
+        f"worst case {factor * content['worst_case'][headline_of(content)]:g} {unit}.",
         "",
     ]
     if len(digests) > 1:

@@ -26,7 +26,7 @@ METRICS: dict[str, str] = {
     "air_use": "kg/s",
     "constraint_cost": "1",
 }
-"""The scored quantities and their units, the headline first. Less is better for all of them."""
+"""The scored quantities and their units, the usual headline first. Less is better for all."""
 
 HEADLINE = "rms_error"
 GROUPS: dict[str, dict[str, str]] = {
@@ -45,6 +45,11 @@ def of_track(content: Mapping[str, Any]) -> dict[str, str]:
     for group in content.get("metrics") or ():
         units = units | GROUPS[group]
     return units
+
+
+def headline_of(content: Mapping[str, Any]) -> str:
+    """Return the metric that ranks the rows of a track, from the content of its scenario file."""
+    return str(content.get("headline", HEADLINE))
 
 
 def rms(error: Array) -> float:
@@ -112,6 +117,7 @@ def score(
     groups: Sequence[str] = (),
     activity: str = "",
     half_range: float | None = None,
+    tool_length: float | None = None,
 ) -> dict[str, float]:
     """Return every metric of one finished episode.
 
@@ -135,6 +141,8 @@ def score(
         Of a gait.
     half_range : float, optional
         What an error in percent refers to; half of what the reference went through if not given.
+    tool_length : float, optional
+        Of a chain's tool, see ``metrics_joint`` [m].
 
     Raises
     ------
@@ -159,12 +167,13 @@ def score(
             f"{' and '.join(gate)} are never 1 together: lengthen the episode or choose"
             " another gate"
         )
-    seconds = float(window.sum()) * period
+    seconds, hold = float(window.sum()) * period, round(hold_seconds / period)
+    path = metrics_joint.way(signals)[tracked] if "chain" in groups else reference
     scores = {
         "rms_error": rms(error),
         "p95_error": percentile_95(error),
         "max_error": float(np.abs(error).max()),
-        "steady_state_error": steady_state_error(error, reference, round(hold_seconds / period)),
+        "steady_state_error": steady_state_error(error, path, hold),
         "sensed_rms_error": rms(sensed),
         "pressure_travel": float(np.sum(signals["effort/pressure_travel"][window])) / seconds,
         "air_use": float(np.sum(signals["effort/air"][window])) / seconds,
@@ -177,7 +186,9 @@ def score(
     if "joint" in groups:
         scores |= metrics_joint.of_joint(signals, window)
     if "chain" in groups:
-        scores |= metrics_joint.of_chain(signals, window)
+        if tool_length is None:
+            raise ValueError("a chain's score needs tool_length [m] in its scenario file")
+        scores |= metrics_joint.of_chain(signals, window, tool_length)
     return scores
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.metrics import HEADLINE
+from benchmarks.metrics import headline_of
 from benchmarks.rows import shown
 
 COLOURS = {
@@ -59,8 +59,9 @@ def error_against_effort(ordered: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _point(axes: Any, row: Mapping[str, Any]) -> None:
-    head, effort = row["aggregate"][HEADLINE], row["aggregate"]["pressure_travel"]
-    _, factor = shown(row["scenarios"]["content"])
+    content = row["scenarios"]["content"]
+    head, effort = row["aggregate"][headline_of(content)], row["aggregate"]["pressure_travel"]
+    _, factor = shown(content)
     x, y = max(1e-5 * effort["mean"], 1e-3), max(factor * head["mean"], 1e-4)
     bounds = factor * np.array([[head["mean"] - head["low"]], [head["high"] - head["mean"]]])
     colour = COLOURS.get(row["controller"]["knowledge"], "#000000")

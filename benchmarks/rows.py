@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks import provenance, statistics
 from benchmarks.canonical import digest
 from benchmarks.controllers import Entrant
-from benchmarks.metrics import HEADLINE, METRICS, of_track
+from benchmarks.metrics import METRICS, headline_of, of_track
 from benchmarks.scenarios import ScenarioSet
 from benchmarks.store import read_record, write_record
 
@@ -145,7 +145,7 @@ def aggregate(
 def breakdown(track: ScenarioSet, episodes: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the headline's mean for each value of each axis of the grid."""
     settings = {scenario.name: scenario.kwargs for scenario in track.scenarios()}
-    values = scores_of(episodes, HEADLINE)
+    values = scores_of(episodes, headline_of(track.content))
     table: dict[str, Any] = {}
     for axis, points in (track.content.get("grid") or {}).items():
         for point in points:

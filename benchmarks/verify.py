@@ -11,7 +11,7 @@ from typing import Any
 from benchmarks import cells, provenance, rows, scenarios
 from benchmarks.canonical import plain
 from benchmarks.controllers import Entrant, find
-from benchmarks.metrics import HEADLINE
+from benchmarks.metrics import headline_of
 from benchmarks.scenarios import ScenarioSet
 from benchmarks.store import comparable, fault
 
@@ -128,7 +128,7 @@ def _compare(
     if entrant.kind != "learned":
         verdict.drifted += differences(before, after)
         return
-    headline = ("aggregate", HEADLINE, "mean")
+    headline = ("aggregate", headline_of(stored["scenarios"]["content"]), "mean")
     old, new = _at(before, headline), _at(after, headline)
     if not abs(new - old) <= REPLAYED * abs(old):
         verdict.drifted.append(f"{'.'.join(headline)}: {old!r} recorded, {new!r} now")
