@@ -17,7 +17,7 @@ from baselines.elbow_catalogue import ELBOW_CONTROLLERS, ELBOW_MAKERS
 from baselines.entry import POSITIONING, Entry
 from baselines.inverse import make_inverse
 from baselines.inverse_pid import make_inverse_pid
-from baselines.joint_catalogue import JOINT_CONTROLLERS, JOINT_MAKERS
+from baselines.joint_catalogue import ARM, JOINT_CONTROLLERS, JOINT_MAKERS
 from baselines.knee_catalogue import KNEE, KNEE_CONTROLLERS, KNEE_MAKERS, SIMC
 from baselines.pid import make_pid
 from baselines.plc_polynomial import make_one_cubic, make_plc_as_printed, make_plc_refitted
@@ -174,8 +174,8 @@ def make_controller(
 
 
 def _joint(plant: Any, name: str) -> AntagonisticJoint | RedundantManipulator:
-    if isinstance(plant, RedundantManipulator):
-        return plant
+    if isinstance(plant, RedundantManipulator) or JOINT_CONTROLLERS[name].envs == ARM:
+        return _as(RedundantManipulator, plant, name)
     return _as(AntagonisticJoint, plant, name)
 
 

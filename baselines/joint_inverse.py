@@ -16,10 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.controller import Answer, beginning, choose
+from baselines.joint_ahead import Lookahead, lookahead_for
 from baselines.joint_gravity import Gravity
 from baselines.joint_memory_rows import JointMemories
 from baselines.joint_model import JointModel, joint_model
-from baselines.joint_view import JointEyes, make_joint_eyes
+from baselines.joint_poles import joint_delays
+from baselines.joint_view import JointSignalMap, make_joint_signal_map
 from baselines.nominal import MemoryState
 from pam_envs.parameters import Signals
 
@@ -31,13 +33,15 @@ class JointInverse:
     Attributes
     ----------
     model : JointModel
-    eyes : JointEyes
+    signals : JointSignalMap
     gravity : Gravity
+    lookahead : Lookahead
     """
 
     model: JointModel
-    eyes: JointEyes
+    signals: JointSignalMap
     gravity: Gravity
+    lookahead: Lookahead
 
     def predict(
         self,
@@ -47,16 +51,16 @@ class JointInverse:
         deterministic: bool = True,
     ) -> Answer:
         """Return the set-points; see :class:`~baselines.controller.Controller`."""
-        view, memories = self.eyes.look(observation), JointMemories(self.model)
+        view, memories = self.signals.read(observation), JointMemories(self.model)
         begin = beginning(state, episode_start, len(view.angle))
         if state is None or begin.any():
             held = view.set_point - self.gravity.shift(view.angle, view.payload)
             state = choose(begin, memories.start(held)[1], state)
         shift = self.gravity.shift(view.reference, view.payload)
-        found = memories.inverse(view.reference, state) + shift
+        found = memories.inverse(self.lookahead.wanted(view.samples), state) + shift
         set_point = np.minimum(np.maximum(found, self.model.low), self.model.high)
         after = memories.forward(set_point - shift, state)[1]
-        return self.eyes.act(set_point, observation), after
+        return self.signals.write(set_point, observation), after
 
 
 def make_joint_inverse(
@@ -65,6 +69,7 @@ def make_joint_inverse(
     action_signals: Signals,
     inverse: float = 1.0,
     gravity: bool = False,
+    ahead: bool = False,
 ) -> JointInverse:
     """Return the controller.
 
@@ -78,9 +83,10 @@ def make_joint_inverse(
         the line between the tips of the loop.
     gravity : bool
         Whether the set-points carry the weight of the links and the payload that is told.
+    ahead : bool
+        Whether the previewed reference is inverted, ahead by the delay of each joint.
     """
-    return JointInverse(
-        joint_model(plant).narrowed(inverse),
-        make_joint_eyes(signals, action_signals),
-        Gravity(plant if gravity else None),
-    )
+    model = joint_model(plant).narrowed(inverse)
+    made = make_joint_signal_map(signals, action_signals)
+    lookahead = lookahead_for(made, joint_delays(plant) if ahead else None, model.period)
+    return JointInverse(model, made, Gravity(plant if gravity else None), lookahead)

@@ -8,6 +8,7 @@ manipulator it is one stage, without the others.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -127,9 +128,17 @@ def joint_model(plant: Any, levels: int = LEVELS, poles: tuple[float, ...] = (PO
         Levels of the identified map.
     poles : tuple of float
         Of each joint [rad/s].
+
+    Warns
+    -----
+    UserWarning
+        If the memory is no symmetric Preisach operator; the model is then the map as measured.
     """
     key = f"{plant.digest()} {levels}"
     low, high = plant.angle_range
     if key not in _MEMORIES:
-        _MEMORIES[key] = measure_joint(plant.rest_angles, high, levels).model
+        found = measure_joint(plant.rest_angles, high, levels)
+        if not (found.symmetric and found.preisach):
+            warnings.warn(f"the memory of the nominal plant {found.verdict}", stacklevel=2)
+        _MEMORIES[key] = found.model
     return JointModel(_MEMORIES[key], low, high, plant.control_period, poles)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.controller import Answer
-from baselines.joint_view import JointEyes, make_joint_eyes
+from baselines.joint_view import JointSignalMap, make_joint_signal_map
 from baselines.trivial import Random, RandomState
 from pam_envs.parameters import Signals
 
@@ -18,7 +18,7 @@ from pam_envs.parameters import Signals
 class Straight:
     """Set-points of 0 always."""
 
-    eyes: JointEyes
+    signals: JointSignalMap
 
     def predict(
         self,
@@ -28,8 +28,8 @@ class Straight:
         deterministic: bool = True,
     ) -> Answer:
         """Return 0, and no state; see :class:`~baselines.controller.Controller`."""
-        angle = self.eyes.look(observation).angle
-        return self.eyes.act(np.zeros_like(angle), observation), None
+        angle = self.signals.read(observation).angle
+        return self.signals.write(np.zeros_like(angle), observation), None
 
 
 @dataclass(frozen=True)
@@ -38,12 +38,12 @@ class JointRandom:
 
     Attributes
     ----------
-    eyes : JointEyes
+    signals : JointSignalMap
     draws : tuple of Random
         One for each joint.
     """
 
-    eyes: JointEyes
+    signals: JointSignalMap
     draws: tuple[Random, ...]
 
     def predict(
@@ -60,7 +60,7 @@ class JointRandom:
             action, after = draw.predict(rows, state and state[k], episode_start)
             found.append(draw.action_signal.decode(self._placed(action, k)))
             states.append(after)
-        return self.eyes.act(np.array(found).T, observation), tuple(states)
+        return self.signals.write(np.array(found).T, observation), tuple(states)
 
     def _placed(self, action: Any, joint: int) -> Any:
         """Return an action of one number where its signal looks for it."""
@@ -71,13 +71,13 @@ class JointRandom:
 
 def make_straight(plant: Any, signals: Signals, action_signals: Signals) -> Straight:
     """Return the controller; it does not look at the plant."""
-    return Straight(make_joint_eyes(signals, action_signals))
+    return Straight(make_joint_signal_map(signals, action_signals))
 
 
 def make_joint_random(
     plant: Any, signals: Signals, action_signals: Signals, seed: int = 0
 ) -> JointRandom:
     """Return the controller; it does not look at the plant."""
-    eyes = make_joint_eyes(signals, action_signals)
-    draws = tuple(Random(s, seed * len(eyes.actions) + k) for k, s in enumerate(eyes.actions))
-    return JointRandom(eyes, draws)
+    made = make_joint_signal_map(signals, action_signals)
+    draws = tuple(Random(s, seed * len(made.actions) + k) for k, s in enumerate(made.actions))
+    return JointRandom(made, draws)

@@ -26,25 +26,34 @@ class JointView(NamedTuple):
         As sensed [rad].
     set_point : ndarray
         Of the last period [rad].
-    reference : ndarray
-        Angle that is wanted [rad].
+    samples : ndarray, shape (n_env, n_joints, n_samples)
+        Angle that is wanted [rad]: now, and as previewed.
     payload : ndarray, shape (n_env,)
         As told [kg]; 0 where nothing is said of it.
     """
 
     angle: Array
     set_point: Array
-    reference: Array
+    samples: Array
     payload: Array
+
+    @property
+    def reference(self) -> Array:
+        """Angle that is wanted now [rad], shape (n_env, n_joints)."""
+        return self.samples[..., 0]
 
 
 @dataclass(frozen=True)
-class JointEyes:
+class JointSignalMap:
     """Makes a :class:`JointView` of observations, and actions of set-points.
 
     Attributes
     ----------
-    angle, set_point, reference : Reader
+    angle, set_point : Reader
+    samples : Reader
+        Of the wanted angles, joint by joint: now, and as previewed.
+    times : tuple of float
+        Of these samples, from now on [s].
     payload, prestress : Reader or None
     actions : tuple of Signal
         Set-points of the joints, in their order.
@@ -54,16 +63,12 @@ class JointEyes:
 
     angle: Reader
     set_point: Reader
-    reference: Reader
+    samples: Reader
+    times: tuple[float, ...]
     payload: Reader | None
     prestress: Reader | None
     actions: tuple[Signal, ...]
     prestress_action: Signal | None
-
-    @property
-    def joints(self) -> int:
-        """Number of joints."""
-        return len(self.actions)
 
     @property
     def low(self) -> float:
@@ -75,16 +80,17 @@ class JointEyes:
         """Highest set-point [rad]."""
         return self.actions[0].high
 
-    def look(self, observation: ArrayLike) -> JointView:
+    def read(self, observation: ArrayLike) -> JointView:
         """Return what an observation of shape (n_obs,) or (n_env, n_obs) shows."""
         angle = self.angle.rows(observation).T
         payload = np.zeros(len(angle))
         if self.payload is not None:
             payload = self.payload.rows(observation)[0]
         set_point = self.set_point.rows(observation).T
-        return JointView(angle, set_point, self.reference.rows(observation).T, payload)
+        samples = self.samples.rows(observation).T.reshape(*angle.shape, len(self.times))
+        return JointView(angle, set_point, samples, payload)
 
-    def act(self, set_points: Array, observation: ArrayLike) -> NDArray[np.float32]:
+    def write(self, set_points: Array, observation: ArrayLike) -> NDArray[np.float32]:
         """Return the action for set-points [rad], shape (n_env, n_joints)."""
         held = np.minimum(np.maximum(set_points, self.low), self.high)
         width = len(self.actions) + (self.prestress_action is not None)
@@ -107,41 +113,54 @@ class JointEyes:
         return np.asarray(gain * np.minimum(np.maximum(value, signal.low), signal.high) + offset)
 
 
-def make_joint_eyes(signals: Signals, action_signals: Signals) -> JointEyes:
+def make_joint_signal_map(signals: Signals, action_signals: Signals) -> JointSignalMap:
     """Return what reads and writes the signals of one joint or of a manipulator.
 
     Raises
     ------
     ValueError
-        If the actions are not set-points of angles.
+        If the actions are not set-points of angles, or the wanted angles are not observed.
     """
-    actions = set(action_signals.names())
+    actions, names = set(action_signals.names()), set(signals.names())
     ends = [""] if "angle_set_point" in actions else _numbered(actions)
     if not ends:
         raise ValueError(
             f"the actions are {', '.join(sorted(actions))}; these controllers give set-points of"
             " angles: make the environment with action='angle'"
         )
-    wanted = "reference" if ends == [""] else "joint_reference"
-    names = set(signals.names())
+    wanted = [f"{'reference' if ends == [''] else 'joint_reference'}{end}" for end in ends]
+    if wanted[0] not in names:
+        raise ValueError(
+            f"there is no signal {wanted[0]!r}; these controllers follow planned angles: make the"
+            " environment with plan=True, or take 'joint_inverse_kinematics', which plans itself"
+        )
+    previews = _previews(wanted[0], names)
 
-    def eye(name: str) -> Reader | None:
+    def known(name: str) -> Reader | None:
         return reader(signals, [name]) if name in names else None
 
-    return JointEyes(
+    return JointSignalMap(
         reader(signals, [f"angle{end}" for end in ends]),
         reader(signals, [f"set_point{end}" for end in ends]),
-        reader(signals, [f"{wanted}{end}" for end in ends]),
-        eye("payload"),
-        eye("prestress"),
+        reader(signals, [f"{name}{late}" for name in wanted for late in previews]),
+        tuple(signals[f"{wanted[0]}{late}"].ahead for late in previews),
+        known("payload"),
+        known("prestress"),
         tuple(action_signals[f"angle_set_point{end}"] for end in ends),
         action_signals["prestress"] if "prestress" in actions else None,
     )
 
 
 def _numbered(names: set[str]) -> list[str]:
-    ends, k = [], 0
-    while f"angle_set_point_{k}" in names:
-        ends.append(f"_{k}")
-        k += 1
+    ends: list[str] = []
+    while f"angle_set_point_{len(ends)}" in names:
+        ends.append(f"_{len(ends)}")
     return ends
+
+
+def _previews(name: str, names: set[str]) -> list[str]:
+    """Return the ends of the names of a signal and its previews, the present one first."""
+    found = [""]
+    while f"{name}_{len(found)}" in names:
+        found.append(f"_{len(found)}")
+    return found

@@ -25,13 +25,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.controller import Answer, Array, beginning, choose
+from baselines.joint_ahead import Lookahead, double_lags, lookahead_for
 from baselines.joint_gravity import Gravity
 from baselines.joint_loop import JointLoop, LoopState, make_loop
 from baselines.joint_memory_rows import JointMemories
 from baselines.joint_model import JointModel, joint_model
 from baselines.joint_poles import joint_poles
 from baselines.joint_tracking import ModelLoop, make_model_loop
-from baselines.joint_view import JointEyes, JointView, make_joint_eyes
+from baselines.joint_view import JointSignalMap, JointView, make_joint_signal_map
 from baselines.nominal import MemoryState
 from baselines.robust import Kind, robust_controller
 from pam_envs.parameters import Signals
@@ -67,15 +68,18 @@ class ModelFollowing:
         Whose memory is inverted.
     tracking : ModelLoop
     disturbance : JointLoop
-    eyes : JointEyes
+    signals : JointSignalMap
     gravity : Gravity
+    lookahead : Lookahead
+        On the reference of the model loop.
     """
 
     model: JointModel
     tracking: ModelLoop
     disturbance: JointLoop
-    eyes: JointEyes
+    signals: JointSignalMap
     gravity: Gravity
+    lookahead: Lookahead
 
     def predict(
         self,
@@ -85,7 +89,7 @@ class ModelFollowing:
         deterministic: bool = True,
     ) -> Answer:
         """Return the set-points; see :class:`~baselines.controller.Controller`."""
-        view = self.eyes.look(observation)
+        view = self.signals.read(observation)
         begin = beginning(state, episode_start, len(view.angle))
         if state is None or begin.any():
             state = choose(begin, self._start(view), state)
@@ -93,7 +97,7 @@ class ModelFollowing:
         wanted = self._wanted(view, state)
         set_point = self._inverse(sum(wanted), state.memory) + shift
         set_point = np.minimum(np.maximum(set_point, self.model.low), self.model.high)
-        return self.eyes.act(set_point, observation), self._after(
+        return self.signals.write(set_point, observation), self._after(
             view, state, wanted[0], set_point - shift
         )
 
@@ -117,7 +121,8 @@ class ModelFollowing:
         """Return what both loops want: angles at rest [rad]."""
         low, high = self.model.reach
         angle = self.model_output(state)
-        tracking = self.tracking.output(view.reference, state.tracking, low, high)
+        aim = self.lookahead.wanted(view.samples)
+        tracking = self.tracking.output(aim, state.tracking, low, high)
         more = self.disturbance.output(
             angle, view.angle, state.disturbance, low - tracking, high - tracking
         )
@@ -136,7 +141,7 @@ class ModelFollowing:
         )
         return FollowingState(
             self.model.motion.advance(tracking, state.model),
-            self.tracking.advance(view.reference, state.tracking),
+            self.tracking.advance(self.lookahead.wanted(view.samples), state.tracking),
             disturbance,
             memory,
         )
@@ -149,6 +154,7 @@ def make_model_following(
     kind: Kind = "mu",
     inverse: float = 1.0,
     gravity: bool = False,
+    ahead: bool = False,
 ) -> ModelFollowing:
     """Return the controller.
 
@@ -164,12 +170,16 @@ def make_model_following(
         none.
     gravity : bool
         Whether the set-points carry the weight of the links and the payload that is told.
+    ahead : bool
+        Whether the model loop is given the previewed reference in place of the present one.
     """
     model = joint_model(plant, poles=joint_poles(plant)).narrowed(inverse)
+    made = make_joint_signal_map(signals, action_signals)
     return ModelFollowing(
         model,
         make_model_loop(model),
         make_loop(model, lambda pole: robust_controller(kind, pole=pole)),
-        make_joint_eyes(signals, action_signals),
+        made,
         Gravity(plant if gravity else None),
+        lookahead_for(made, double_lags(model.poles) if ahead else None, model.period),
     )

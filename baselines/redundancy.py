@@ -3,8 +3,9 @@
 Seed 002, section 2: of all joint angles that give a pose, those that minimise the weight (2.1),
 which keeps joints off their limits, or the sum of their squares. A period starts from the angles
 and multipliers of the period before, so that a few Newton iterations do; an episode starts from
-the sensed angles. A pose out of reach leaves the set-points where they are, and is counted. A
-whole path is planned at once by :func:`pam_envs.mechanics.redundancy.resolve`, which raises there.
+the sensed angles. A pose out of reach, or without a direction, leaves the set-points where they
+are, and is counted. A whole path is planned at once by
+:func:`pam_envs.mechanics.redundancy.resolve`, which raises there.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from baselines.controller import Answer, Array, beginning, choose, reader
 from pam_envs.mechanics.redundancy import LIMIT, Resolution, UnreachablePose, resolve
 from pam_envs.mechanics.serial_chain import SerialChain
 from pam_envs.parameters import Signals
+from pam_envs.plants.redundant_manipulator import RedundantManipulator
 
 POSE = ("x", "y", "z", "point_x", "point_y", "point_z")
 INSIDE = 0.999
@@ -43,7 +45,7 @@ class PlanState(NamedTuple):
     missed: Array
 
 
-class PoseFollower:
+class InverseKinematics:
     """Set-points of all joints for the wanted pose: feed-forward, without feedback of the tool.
 
     Parameters
@@ -103,6 +105,9 @@ class PoseFollower:
         angles, multipliers, missed = (np.array(part) for part in state)
         for i, pose in enumerate(poses):
             given = None if begin[i] else multipliers[i]
+            if not np.any(pose[3:]):
+                missed[i] += 1
+                continue
             try:
                 found = self._resolve(pose, angles[i], given)
             except UnreachablePose:
@@ -113,6 +118,13 @@ class PoseFollower:
 
     def _resolve(self, pose: Array, start: Array, multipliers: Any) -> Resolution:
         return resolve(self.chain, pose[None], self.limit, self.weighted, start, multipliers)
+
+
+def make_inverse_kinematics(
+    plant: RedundantManipulator, signals: Signals, action_signals: Signals
+) -> InverseKinematics:
+    """Return the controller for the chain and the range of angles of a nominal arm."""
+    return InverseKinematics(plant.chain, signals, action_signals, plant.angle_range[1])
 
 
 @dataclass(frozen=True)

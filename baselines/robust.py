@@ -2,8 +2,15 @@
 
 The numbers come from ``joint_robust.json``, which :mod:`baselines.joint_synthesis` writes. Both
 loops act on the angle of the model less that of the joint, and were designed for poles at 23 rad/s.
-For a joint with other poles ``p`` the loop is ``C(23 s / p)``: time runs slower, and gain, ``mu``
-and peaks stay what they are, at ``p / 23`` of the bandwidth.
+For a joint with other poles ``p`` the loop is ``C(23 s / p)``: time runs slower, and with a double
+pole there the loop gain is the same at ``p / 23`` of the frequency. ``mu`` is then no larger, as
+the bound on what is neglected stays where it is while the loop comes down from it.
+
+In an arm the double pole only stands in for a joint that swings and is moved by the others: at the
+base the error is a fifth beyond what the design allows for, so that ``mu`` says nothing there. With
+the arm straight and without friction all six loops together are stable over the whole sector of
+gains, with 0.1 kg at the tip too, and at the nominal gain the sensitivity peaks at 1.24 (1.48 with
+the 0.1 kg), where one stage has 1.02.
 """
 
 from __future__ import annotations

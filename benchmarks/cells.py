@@ -154,6 +154,7 @@ def episode_record(cell: Cell, seed: int, episode: rollout.Episode) -> dict[str,
             content.get("metrics") or (),
             content.get("activity", ""),
             content.get("half_range"),
+            content.get("tool_length"),
         )
     except (ValueError, IndexError, KeyError):
         if not episode.failed:

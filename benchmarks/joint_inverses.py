@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.joint_model import JointModel, joint_model
-from benchmarks.joint_studies import DEGREE, RANGE, ReducedRig
+from benchmarks.joint_studies import DEGREE, RANGE
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.identification.everett_series import series_inverse
 
@@ -45,17 +45,20 @@ def loop_width(plant: Any, model: JointModel, amplitude: float = 20.0 * DEGREE) 
     return float(np.max(np.abs(reached[41:122][::-1] - reached[122:])))
 
 
-def width_ratio(plant: Any = None) -> float:
+def width_ratio(plant: Any, amplitude: float = 10.0 * DEGREE) -> float:
     """Return the loop's width with a line for the inverse, over that with the inverse.
 
     Parameters
     ----------
-    plant : object, optional
-        With ``rest_angles``; the reduced plant of the studies if not given.
+    plant : object
+        With ``rest_angles``. On one that is a Preisach operator itself the ratio says nothing but
+        how fine the grid of the identified map is.
+    amplitude : float
+        Of the wanted angles [rad].
     """
-    rig = ReducedRig() if plant is None else plant
-    model = joint_model(rig)
-    return loop_width(rig, model.narrowed(0.0)) / loop_width(rig, model)
+    model = joint_model(plant)
+    widths = [loop_width(plant, told, amplitude) for told in (model.narrowed(0.0), model)]
+    return widths[0] / widths[1]
 
 
 def inhomogeneous() -> Preisach:

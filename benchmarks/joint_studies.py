@@ -189,6 +189,7 @@ STEPPED = (
     "joint_pi",
     "joint_pi_slow",
     "joint_pid",
+    "joint_pid_smooth",
     "joint_mfc_hinf",
     "joint_mfc_mu",
     "joint_mfc_mu_plain",
@@ -263,18 +264,32 @@ def rejection(name: str, width: float = 1.0, size: float = 2.0 * DEGREE) -> floa
 
 
 def tracking_error(
-    name: str, frequency: float = 0.5, amplitude: float = 20.0 * DEGREE
+    name: str,
+    frequency: float = 0.5,
+    amplitude: float = 20.0 * DEGREE,
+    period: float = PERIOD,
 ) -> tuple[float, float]:
     """Return the RMS error of a sine [% of the amplitude], and to the model's output [deg].
 
-    The first period is left out. Without a model the second is not a number.
+    The first cycle is left out. Without a model the second is not a number.
+
+    Parameters
+    ----------
+    name : str
+        Of the controller.
+    frequency : float
+        [Hz].
+    amplitude : float
+        [rad].
+    period : float
+        Control period [s].
     """
-    rig = ReducedRig()
-    periods = round(3.0 / (frequency * PERIOD))
-    time = np.arange(periods + 1) * PERIOD
+    rig = ReducedRig(control_period=period)
+    periods = round(3.0 / (frequency * period))
+    time = np.arange(periods + 1) * period
     reference = amplitude * np.sin(2.0 * np.pi * frequency * time)
     found = run(controller(name, rig), reference[:-1], rig)
-    reached, kept = found.angle[round(PERIOD / FINE) - 1 :: round(PERIOD / FINE)], periods // 3
+    reached, kept = found.angle[round(period / FINE) - 1 :: round(period / FINE)], periods // 3
     error = (reached - reference[1:])[kept:]
     size = 100.0 * float(np.sqrt(np.mean(error**2))) / amplitude
     if not found.model.size:

@@ -58,10 +58,12 @@ ELBOW: tuple[Column, ...] = (
 """Of the elbow orthosis."""
 
 CHAIN: tuple[Column, ...] = (
+    ("rms_error", "tip RMS [mm]", 1e3),
+    ("pointing_rms", "pointing RMS [deg]", DEGREES),
     ("p95_error", "p95 [mm]", 1e3),
     ("max_error", "max [mm]", 1e3),
+    ("steady_state_error", "steady [mm]", 1e3),
     ("sensed_rms_error", "sensed RMS [mm]", 1e3),
-    ("pointing_rms", "pointing RMS [deg]", DEGREES),
     ("joint_rms", "joints RMS [deg]", DEGREES),
     ("largest_angle", "largest joint angle [deg]", DEGREES),
     MODEL,
@@ -134,9 +136,11 @@ holds what runs it again: `python -m benchmarks verify ROW`.
   helped. *Fitted, B* is no score: it takes activity to grow as the square of torque, so that a
   valve that is simply open has 0.77 in walking, where the EMG ratio is 1.14 and A 1.66.
 - *True pressure at capacity* is time above 4.45 bar in the muscle, of whatever the valve was told.
-- Of a chain, the error is how far the tip is off its path, and *pointing* is of its direction;
-  *joints* are compared with the planned angles, of which the tip knows nothing. *Error to its own
-  model* is of controllers that follow a model: the true angle less the model's.
+- Of a chain, the headline is of the whole tool, which has a place and a direction: RMS over the tip
+  and the point one link behind it along the tool. *Tip* is how far the tip alone is off its path
+  (as are p95, max, steady and sensed), and *pointing* is of the direction; *joints* are compared
+  with the planned angles, of which the tool knows nothing. *Error to its own model* is of
+  controllers that follow a model: the true angle less the model's.
 - A controller's name leads to its row, where every metric of every episode stands.
 - Times per step are in [results/TIMES.md](results/TIMES.md), since no two runs give the same.
 """

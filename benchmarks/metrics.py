@@ -118,6 +118,7 @@ def score(
     groups: Sequence[str] = (),
     activity: str = "",
     half_range: float | None = None,
+    tool_length: float | None = None,
 ) -> dict[str, float]:
     """Return every metric of one finished episode.
 
@@ -141,6 +142,8 @@ def score(
         Of a gait.
     half_range : float, optional
         What an error in percent refers to; half of what the reference went through if not given.
+    tool_length : float, optional
+        Of a chain's tool, see ``metrics_joint`` [m].
 
     Raises
     ------
@@ -165,12 +168,13 @@ def score(
             f"{' and '.join(gate)} are never 1 together: lengthen the episode or choose"
             " another gate"
         )
-    seconds = float(window.sum()) * period
+    seconds, hold = float(window.sum()) * period, round(hold_seconds / period)
+    path = metrics_joint.way(signals)[tracked] if "chain" in groups else reference
     scores = {
         "rms_error": rms(error),
         "p95_error": percentile_95(error),
         "max_error": float(np.abs(error).max()),
-        "steady_state_error": steady_state_error(error, reference, round(hold_seconds / period)),
+        "steady_state_error": steady_state_error(error, path, hold),
         "sensed_rms_error": rms(sensed),
         "pressure_travel": float(np.sum(signals["effort/pressure_travel"][window])) / seconds,
         "air_use": float(np.sum(signals["effort/air"][window])) / seconds,
@@ -185,7 +189,9 @@ def score(
     if "joint" in groups:
         scores |= metrics_joint.of_joint(signals, window)
     if "chain" in groups:
-        scores |= metrics_joint.of_chain(signals, window)
+        if tool_length is None:
+            raise ValueError("a chain's score needs tool_length [m] in its scenario file")
+        scores |= metrics_joint.of_chain(signals, window, tool_length)
     return scores
 
 

@@ -40,6 +40,7 @@ _KEYS = {
     "gate",
     "half_range",
     "headline",
+    "tool_length",
     "activity",
     "unit",
     "shown",
@@ -53,6 +54,7 @@ _OPTIONAL = {
     "gate",
     "half_range",
     "headline",
+    "tool_length",
     "activity",
     "unit",
     "shown",
@@ -113,6 +115,8 @@ class ScenarioSet:
         headline = headline_of(self.content)
         if headline not in wanted:
             raise ValueError(f"{name}: no headline {headline!r}; choose from {', '.join(wanted)}")
+        if "chain" in (self.content.get("metrics") or ()) and "tool_length" not in given:
+            raise ValueError(f"{name}: the metrics of a chain need tool_length [m]")
         if set(self.content["worst_case"]) != set(wanted):
             raise ValueError(f"{name}: worst_case needs a value for each of {', '.join(wanted)}")
         seeds = self.content["seeds"]

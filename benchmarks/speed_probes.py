@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks.speed import Chunk, Measurement, Missing, interleaved, median, ratio
 from benchmarks.speed_diagnosis import diagnosing
+from benchmarks.speed_planning import planning
 
 ENV = "PAM/MusclePositioning-v0"
 KNEE = "PAM/KneeWalk-v0"
@@ -394,6 +395,7 @@ def learning(rounds: int) -> list[Measurement]:
 GROUPS: dict[str, tuple[Callable[[int], list[Measurement]], ...]] = {
     "single": (single, single_joints),
     "batch": (batch, variants, growth, cores, processes),
+    "planning": (planning,),
     "plain": (uncompiled, jacobian),
     "start": (start_up,),
     "learning": (learning,),

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from baselines.catalogue import make_controller  # noqa: E402
-from benchmarks import knee_studies, papers_elbow, plots_knee  # noqa: E402
+from benchmarks import knee_studies, papers_elbow, plots_joint, plots_knee  # noqa: E402
 
 
 def save(env: gym.Env, path: Path) -> None:
@@ -82,3 +82,4 @@ if __name__ == "__main__":
     arm = images / "redundant_manipulator_frame.png"
     frame("PAM/RedundantManipulator-v0", arm, 4.2, reference="path_3")
     stride(images / "knee_stride.png")
+    plots_joint.step_figure().savefig(images / "joint_step.png", dpi=100)

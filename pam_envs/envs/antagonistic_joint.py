@@ -25,7 +25,8 @@ Action: angle_set_point, over the joint's range; or angle_set_point and prestres
 pressure_a_set_point and pressure_b_set_point, 0 .. 6.5e5 Pa.
 
 Reward: ``-|angle - reference| / 1 degree - 0.2 (change of both pressures' set-points) / 13 bar``
-each control period.
+each control period; where a limit ends the episode, the worst that a period can cost for each one
+that is left as well, so that it never pays.
 
 Start: at rest at a random angle (``start="straight"``: at 0). End: truncated after
 ``episode_seconds``; terminated beyond the joint's hard limit.
@@ -38,6 +39,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pam_envs.envs import joint_layout as K
 from pam_envs.envs.arguments import common, payloads_of, plant_of, reference_of, spread_of, task_of
 from pam_envs.envs.joint_kernels import kernels_for
@@ -47,6 +50,7 @@ from pam_envs.envs.vector_env import PlantVectorEnv
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants import antagonistic_joint_rows as R
 from pam_envs.plants.antagonistic_joint import AntagonisticJoint
+from pam_envs.plants.bearing import check_borne
 from pam_envs.plants.memory import Kind
 from pam_envs.references.trajectory import FAMILIES, SAMPLES, sines_needed
 from pam_envs.tasks.joint_tracking import JointTracking
@@ -149,6 +153,7 @@ def make_setup(
         Set-point of the angle under a fixed prestress; of angle and prestress; of both pressures.
     amplitude : float, optional
         References run from minus this to this [rad]. Default: two thirds of the joint's limit.
+        The muscles have to hold link and heaviest payload there.
     frequency : float
         Of the reference "sine" [Hz].
     payload : float, sequence of float or None
@@ -164,6 +169,8 @@ def make_setup(
 
     Raises
     ------
+    UnbearableLoad
+        If the muscles cannot hold the largest angle with the heaviest payload.
     ValueError
         Naming the argument, its value, the bounds and the remedy.
     """
@@ -181,10 +188,14 @@ def make_setup(
         )
     usual = USUAL_SHARE * most
     reach = usual if amplitude is None else check_number("amplitude", amplitude, 0.0, most, "rad")
-    task = task_of(JointTracking, reward)
+    task, by_pressure = task_of(JointTracking, reward), action == "pressures"
     actions = _actions(made, action, normalize)
     signals = _signals(made, action, given.preview, given.stride * made.control_period, normalize)
     payloads = payloads_of(payload, MOST_PAYLOAD)
+    change = check_number("payload_change", payload_change, 0.0, MOST_PAYLOAD, "kg")
+    largest = np.abs(samples).max() if family == SAMPLES else reach
+    ends = np.array([[-largest], [largest]])
+    check_borne(made, ends, float(payloads.max()) + change, "the reference's ends", by_pressure)
     config = (
         task.tracking_weight,
         task.error_scale,
@@ -196,8 +207,9 @@ def make_setup(
         check_number("frequency", frequency, 1e-3, 20.0, "Hz"),
         usual if start == "random" else 0.0,
         made.prestress,
-        check_number("payload_change", payload_change, 0.0, MOST_PAYLOAD, "kg"),
+        change,
         check_number("disturbance", disturbance, 0.0, 100.0, "N m"),
+        task.worst(made.largest_angle + most),
     )
     fixed = len(signals) - 1 - given.preview
     sines = sines_needed(family)

@@ -24,8 +24,6 @@ from pam_envs.envs.joint_layout import (
     BY_PRESSURE,
     C_ANGLE,
     C_PRESSURE,
-    CHANGE,
-    CHANGE_TIME,
     COMMON_SIGNALS,
     COPIED_ROWS,
     DISTURBANCE,
@@ -62,6 +60,7 @@ from pam_envs.envs.joint_layout import (
     PULSE_WINDOW,
     PULSES,
     R_EFFORT,
+    R_ENDED,
     R_TRACKING,
     REF,
     REFERENCE,
@@ -80,7 +79,9 @@ from pam_envs.envs.joint_layout import (
     TIME,
     TOLD_PAYLOAD,
     TRACKING_WEIGHT,
+    WORST_PERIOD,
 )
+from pam_envs.envs.payload import carry_payload, draw_payload
 from pam_envs.kernels import LANES, kernel, normal, routine, sine_of_turns, uniform
 from pam_envs.plants import antagonistic_joint_rows as K
 from pam_envs.plants.antagonistic_joint_kernels import (
@@ -88,13 +89,13 @@ from pam_envs.plants.antagonistic_joint_kernels import (
     N_WORK,
     advance,
     begin_lane,
-    feed_forward,
     replacements,
     start_memory,
 )
+from pam_envs.plants.antagonistic_pair import command
 from pam_envs.references.trajectory import SAMPLES, draw_reference, reference_value
 from pam_envs.sensing.sensor import read_sensor
-from pam_envs.tasks.tracking import effort_reward, excess, tracking_reward
+from pam_envs.tasks.tracking import effort_reward, ended_reward, excess, tracking_reward
 
 
 @kernel
@@ -116,9 +117,8 @@ def pulse(key_a: int, key_b: int, step: int, size: float) -> float:
 def apply_joint(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
     """Change payload and disturbance at their times, and turn what is asked for into pressures."""
     step, config, mode = counts[K.STEP], settings[0], choices[MODE]
+    carry_payload(rows, step, config[PERIOD], TOLD_PAYLOAD, K.PAYLOAD)
     for j in range(LANES):
-        changed = step[j] * config[PERIOD] >= rows[CHANGE_TIME][j]
-        rows[K.PAYLOAD][j] = rows[TOLD_PAYLOAD][j] + (rows[CHANGE][j] if changed else 0.0)
         rows[OLD_SET_A][j] = rows[K.SET_POINT_A][j]
         rows[OLD_SET_B][j] = rows[K.SET_POINT_B][j]
     if config[DISTURBANCE] > 0.0:
@@ -132,19 +132,10 @@ def apply_joint(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any,
             rows[K.SET_POINT_B][j] = rows[ACTION + 1][j]
         else:
             prestress = rows[ACTION + 1][j] if mode == BY_BOTH else config[PRESTRESS]
-            short = command(rows, fixed, rows[ACTION][j], prestress, j)
+            short = command(
+                rows, fixed, j, rows[ACTION][j], prestress, K.COMMAND, K.PRESTRESS, K.SET_POINT_A
+            )
             work[SATURATED][j] = max(work[SATURATED][j], short)
-
-
-@kernel
-def command(rows: Any, fixed: Any, angle: float, prestress: float, j: int) -> float:
-    """Set the pressures of lane ``j`` for an angle [rad] and a prestress [N]; 1 if out of reach."""
-    a, b, short = feed_forward(fixed, j, angle, prestress)
-    rows[K.COMMAND][j] = angle
-    rows[K.PRESTRESS][j] = prestress
-    rows[K.SET_POINT_A][j] = a
-    rows[K.SET_POINT_B][j] = b
-    return short
 
 
 @kernel
@@ -261,6 +252,13 @@ def judge(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work:
         work[M_ANGLE][j] = config[LARGEST_ANGLE] - abs(angle)
         work[M_PRESSURE][j] = config[SOFT_PRESSURE] - higher
         work[ENDED][j] = 1.0 if work[M_ANGLE][j] < 0.0 else 0.0
+        work[R_ENDED][j] = ended_reward(
+            work[ENDED][j],
+            work[TIME][j],
+            config[EPISODE_SECONDS],
+            config[PERIOD],
+            config[WORST_PERIOD],
+        )
         travel = abs(pressure_a - rows[OLD_A][j]) + abs(pressure_b - rows[OLD_B][j])
         work[E_TRAVEL][j] = travel
         work[E_AIR][j] = max(0.0, rows[K.AIR][j] - rows[OLD_AIR][j])
@@ -292,14 +290,11 @@ def begin_joint(
     key_a, key_b, config = counts[K.KEY_A][j], counts[K.KEY_B][j], settings[0]
     counts[K.MEMBER][j] = member
     payloads = settings[choices[AT_OWN]]
-    payload = payloads[int(uniform(key_a, key_b, START, 0) * choices[N_PAYLOADS])]
-    rows[TOLD_PAYLOAD][j] = rows[K.PAYLOAD][j] = payload
+    draw_payload(
+        rows, key_a, key_b, START, payloads, choices[N_PAYLOADS], config[PAYLOAD_CHANGE],
+        config[EPISODE_SECONDS], TOLD_PAYLOAD, K.PAYLOAD, j,
+    )  # fmt: skip
     rows[K.DISTURBANCE][j] = 0.0
-    when = 0.3 + 0.4 * uniform(key_a, key_b, START, 1)
-    rows[CHANGE_TIME][j] = config[EPISODE_SECONDS] * when
-    rows[CHANGE][j] = config[PAYLOAD_CHANGE]
-    if uniform(key_a, key_b, START, 2) < 0.5:
-        rows[CHANGE][j] = max(-payload, -config[PAYLOAD_CHANGE])
     angle = config[START_ANGLE] * (2.0 * uniform(key_a, key_b, START, 3) - 1.0)
     prestress, elements = config[PRESTRESS], choices[N_ELEMENTS]
     start_memory(rows, counts, MEMORY, j)

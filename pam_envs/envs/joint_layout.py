@@ -24,6 +24,7 @@ INFO = (
     "output",
     "reward/tracking",
     "reward/effort",
+    "reward/ended",
     "cost/angle",
     "cost/pressure",
     "margin/angle",
@@ -56,6 +57,7 @@ INFO = (
     OUTPUT,
     R_TRACKING,
     R_EFFORT,
+    R_ENDED,
     C_ANGLE,
     C_PRESSURE,
     M_ANGLE,
@@ -63,7 +65,7 @@ INFO = (
     E_TRAVEL,
     E_AIR,
     FIRST_COPIED,
-) = range(N_WORK, N_WORK + 12)
+) = range(N_WORK, N_WORK + 13)
 COPIED_ROWS = (
     K.ANGLE,
     K.VELOCITY,
@@ -104,6 +106,7 @@ CONFIG = (
     "prestress",
     "payload_change",
     "disturbance",
+    "worst_period",
 )
 (
     TRACKING_WEIGHT,
@@ -118,6 +121,7 @@ CONFIG = (
     PRESTRESS,
     PAYLOAD_CHANGE,
     DISTURBANCE,
+    WORST_PERIOD,
 ) = range(FIRST_CONFIG, FIRST_CONFIG + len(CONFIG))
 CHOICES = ("elements", "family", "sines", "mode", "payloads", "fixed_signals")
 N_ELEMENTS, FAMILY, N_SINES, MODE, N_PAYLOADS, FIXED_SIGNALS = range(

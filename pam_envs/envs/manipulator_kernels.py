@@ -25,8 +25,6 @@ from pam_envs.envs.manipulator_layout import (
     ACTION,
     BY_ANGLE,
     BY_PRESSURE,
-    CHANGE,
-    CHANGE_TIME,
     MEMORY,
     MODE,
     N_ELEMENTS,
@@ -43,6 +41,8 @@ from pam_envs.envs.manipulator_layout import (
     PATH_SECONDS,
     PAYLOAD_CHANGE,
     PRESTRESS,
+    RATE,
+    RATE_TIME,
     READ_ANGLE,
     READ_PRESSURE,
     REST_SECONDS,
@@ -51,14 +51,15 @@ from pam_envs.envs.manipulator_layout import (
     info_keys,
 )
 from pam_envs.envs.manipulator_report import evaluate
+from pam_envs.envs.payload import carry_payload, draw_payload
 from pam_envs.kernels import LANES, kernel, normal, routine, uniform
 from pam_envs.mechanics.serial_chain_kinematics import N_STAGES
 from pam_envs.mechanics.serial_chain_rows import parameter_rows
 from pam_envs.plants import redundant_manipulator_rows as M
+from pam_envs.plants.antagonistic_pair import command
 from pam_envs.plants.redundant_manipulator_kernels import (
     advance,
     begin_lane,
-    feed_forward,
     memory_rows,
     replacements,
     start_memory,
@@ -72,9 +73,7 @@ from pam_envs.sensing.sensor import read_sensor
 def apply_chain(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
     """Change the payload at its time, and turn what is asked for into pressures."""
     step, config, saturated = counts[M.STEP], settings[0], work[FIRST_INFO + N_INFO - 1]
-    for j in range(LANES):
-        changed = step[j] * config[PERIOD] >= rows[CHANGE_TIME][j]
-        rows[M.PAYLOAD][j] = rows[TOLD_PAYLOAD][j] + (rows[CHANGE][j] if changed else 0.0)
+    carry_payload(rows, step, config[PERIOD], TOLD_PAYLOAD, M.PAYLOAD)
     for k in range(2 * N_STAGES):
         old, set_point = rows[OLD_SET_POINT + k], rows[M.SET_POINT + k]
         for j in range(LANES):
@@ -86,19 +85,11 @@ def apply_chain(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any,
     if choices[MODE] == BY_ANGLE:
         for k in range(N_STAGES):
             for j in range(LANES):
-                short = command(rows, fixed, k, rows[ACTION + k][j], config[PRESTRESS], j)
+                short = command(
+                    rows, fixed, j, rows[ACTION + k][j], config[PRESTRESS], M.COMMAND + k,
+                    M.PRESTRESS + k, M.SET_POINT + 2 * k,
+                )  # fmt: skip
                 saturated[j] = max(saturated[j], short)
-
-
-@kernel
-def command(rows: Any, fixed: Any, k: int, angle: float, prestress: float, j: int) -> float:
-    """Set the pressures of a joint for an angle [rad] and a prestress [N]; 1 if out of reach."""
-    a, b, short = feed_forward(fixed, j, angle, prestress)
-    rows[M.COMMAND + k][j] = angle
-    rows[M.PRESTRESS + k][j] = prestress
-    rows[M.SET_POINT + 2 * k][j] = a
-    rows[M.SET_POINT + 2 * k + 1][j] = b
-    return short  # type: ignore[no-any-return]
 
 
 @kernel
@@ -124,23 +115,27 @@ def advance_chain(
         settings[0][PERIOD],
         work,
     )
-    step = counts[M.STEP]
+    step, period = counts[M.STEP], settings[0][PERIOD]
     for j in range(LANES):
-        read_lane(rows, fixed, counts, step[j] + 1, j)
+        read_lane(rows, fixed, counts, step[j] + 1, period, j)
 
 
 @kernel
-def read_lane(rows: Any, fixed: Any, counts: Any, step: int, j: int) -> None:
-    """Read the sensors of lane ``j`` at a control period."""
+def read_lane(rows: Any, fixed: Any, counts: Any, step: int, period: float, j: int) -> None:
+    """Read the sensors of lane ``j`` at a control period, and how fast the angles change."""
     key_a, key_b = counts[M.KEY_A][j], counts[M.KEY_B][j]
     for k in range(N_STAGES):
-        rows[READ_ANGLE + k][j] = read_sensor(
+        angle = read_sensor(
             rows[M.ANGLE + k][j],
             fixed[M.ANGLE_NOISE][j],
             fixed[M.ANGLE_RESOLUTION][j],
             fixed[M.ANGLE_BIAS][j],
             normal(key_a, key_b, NOISE_ANGLE, step * N_STAGES + k),
         )
+        rate = rows[RATE + k][j]
+        change = angle - rows[READ_ANGLE + k][j] - period * rate
+        rows[RATE + k][j] = 0.0 if step == 0 else rate + change / (RATE_TIME + period)
+        rows[READ_ANGLE + k][j] = angle
     for k in range(2 * N_STAGES):
         rows[READ_PRESSURE + k][j] = read_sensor(
             rows[M.PRESSURE + k][j],
@@ -188,13 +183,10 @@ def begin_chain(
     key_a, key_b, config = counts[M.KEY_A][j], counts[M.KEY_B][j], settings[0]
     counts[M.MEMBER][j] = member
     payloads = settings[choices[AT_OWN]]
-    payload = payloads[int(uniform(key_a, key_b, START, 0) * choices[N_PAYLOADS])]
-    rows[TOLD_PAYLOAD][j] = rows[M.PAYLOAD][j] = payload
-    when = 0.3 + 0.4 * uniform(key_a, key_b, START, 1)
-    rows[CHANGE_TIME][j] = config[EPISODE_SECONDS] * when
-    rows[CHANGE][j] = config[PAYLOAD_CHANGE]
-    if uniform(key_a, key_b, START, 2) < 0.5:
-        rows[CHANGE][j] = max(-payload, -config[PAYLOAD_CHANGE])
+    draw_payload(
+        rows, key_a, key_b, START, payloads, choices[N_PAYLOADS], config[PAYLOAD_CHANGE],
+        config[EPISODE_SECONDS], TOLD_PAYLOAD, M.PAYLOAD, j,
+    )  # fmt: skip
     path = int(uniform(key_a, key_b, START, 3) * choices[N_PATHS])
     rows[PATH][j] = path
     for k in range(N_STAGES):
@@ -210,7 +202,7 @@ def begin_chain(
         for k in range(N_STAGES):
             rows[ACTION + k][j] = rows[M.COMMAND + k][j]
     rows[OLD_AIR][j] = rows[M.AIR][j]
-    read_lane(rows, fixed, counts, 0, j)
+    read_lane(rows, fixed, counts, 0, config[PERIOD], j)
 
 
 @lru_cache(maxsize=16)
@@ -235,7 +227,7 @@ def kernels_for(kind: str, stages: int) -> Kernels:
         parameters=M.CHAIN + parameter_rows(stages),
         counts=M.N_COUNTS,
         scratch=work_rows(stages),
-        signals=5 * stages + 1 + N_POSE + channels * (1 + MOST_PREVIEW),
+        signals=6 * stages + 1 + N_POSE + channels * (1 + MOST_PREVIEW),
         set_points=ACTION,
         old_set_points=OLD_ACTION,
         channels=channels,

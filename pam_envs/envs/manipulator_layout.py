@@ -19,9 +19,12 @@ OLD_SET_POINT = OLD_ACTION + 2 * MOST
 OLD_PRESSURE = OLD_SET_POINT + 2 * MOST
 READ_ANGLE = OLD_PRESSURE + 2 * MOST
 READ_PRESSURE = READ_ANGLE + MOST
-OLD_AIR, TOLD_PAYLOAD, CHANGE_TIME, CHANGE, PATH = range(
-    READ_PRESSURE + 2 * MOST, READ_PRESSURE + 2 * MOST + 5
-)
+RATE = READ_PRESSURE + 2 * MOST
+"""First row of the rates [rad/s] of the sensed angles."""
+OLD_AIR, TOLD_PAYLOAD, CHANGE_TIME, CHANGE, PATH = range(RATE + MOST, RATE + MOST + 5)
+RATE_TIME = 0.03
+"""Time constant [s] that smooths the rates. The difference of two readings 10 ms apart is mostly
+noise; this leaves a fifth of it, and is quicker than the quickest joint (1 / 23 s)."""
 MEMORY = PATH + 1
 """First row of the memory's state."""
 
@@ -36,6 +39,7 @@ SCALARS = (
     "reward/position",
     "reward/pointing",
     "reward/effort",
+    "reward/ended",
     "cost/angle",
     "cost/pressure",
     "margin/angle",
@@ -48,6 +52,7 @@ SCALARS = (
     "state/payload",
     "state/slack",
     "state/path",
+    "state/resting",
 )
 (
     TIME,
@@ -56,6 +61,7 @@ SCALARS = (
     R_POSITION,
     R_POINTING,
     R_EFFORT,
+    R_ENDED,
     C_ANGLE,
     C_PRESSURE,
     M_ANGLE,
@@ -68,6 +74,7 @@ SCALARS = (
     S_PAYLOAD,
     S_SLACK,
     S_PATH,
+    S_RESTING,
     S_POSE,
 ) = range(len(SCALARS) + 1)
 """Places in ``info``, from its first row on."""
@@ -81,6 +88,7 @@ BY_JOINT = {
     "state/torque": M.TORQUE,
     "state/stiffness": M.STIFFNESS,
     "sensor/angle": READ_ANGLE,
+    "sensor/rate": RATE,
 }
 BY_MUSCLE = {
     "state/pressure": M.PRESSURE,
@@ -103,6 +111,7 @@ CONFIG = (
     "payload_change",
     "path_seconds",
     "rest_seconds",
+    "worst_period",
 )
 (
     POSITION_WEIGHT,
@@ -117,6 +126,7 @@ CONFIG = (
     PAYLOAD_CHANGE,
     PATH_SECONDS,
     REST_SECONDS,
+    WORST_PERIOD,
 ) = range(FIRST_CONFIG, FIRST_CONFIG + len(CONFIG))
 CHOICES = ("elements", "mode", "payloads", "paths")
 N_ELEMENTS, MODE, N_PAYLOADS, N_PATHS = range(FIRST_CHOICE, FIRST_CHOICE + len(CHOICES))

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from pam_envs.envs.manipulator_layout import N_POSE
 from pam_envs.envs.setup import check_choice
 from pam_envs.kernels import interpreted
-from pam_envs.mechanics.redundancy import resolve
+from pam_envs.mechanics.redundancy import UnreachablePose, resolve
 from pam_envs.mechanics.serial_chain import SerialChain
 from pam_envs.mechanics.serial_chain_kinematics import place_chain
 from pam_envs.mechanics.serial_chain_rows import pointing_row, tip_row, work_rows
+from pam_envs.plants.bearing import bearable_payload
+from pam_envs.plants.redundant_manipulator import RedundantManipulator
 from pam_envs.references.path import PATHS, draw_ends, joint_line
 
 Array = NDArray[np.float64]
@@ -24,22 +26,22 @@ REFERENCES = (*NAMES, "paths", "drawn")
 """One of the presets; an episode draws one of them; it draws one of a pool of random ones."""
 DRAWN, DRAW_SEED = 16, 2
 """How many paths the pool has, and their seed."""
-TRIED, LEAP = 40, 5.0
+TRIED, LEAP = 48, 5.0
 """How many are drawn for it; a plan leaps where a joint moves by more than so many even steps."""
 PRESET_JOINTS = len(PATHS[0].start_degrees)
 LONGEST = 10_000
 """Most poses of a given path."""
+USUAL_PAYLOAD = 0.03
+"""Drawn paths are such that this payload [kg] is borne on them."""
 
 
-def paths_for(chain: SerialChain, limit: float, reference: Any, weighted: bool) -> Array:
-    """Return poses and planned angles of all paths that episodes draw from.
+def paths_for(plant: RedundantManipulator, reference: Any, weighted: bool) -> dict[str, Array]:
+    """Return poses and planned angles of all paths that episodes draw from, by their names.
 
     Parameters
     ----------
-    chain : SerialChain
-        The arm.
-    limit : float
-        Largest planned angle of a joint [rad].
+    plant : RedundantManipulator
+        The arm; no planned angle is beyond ``plant.angle_range``.
     reference : str or array_like, shape (k, 6)
         As given by the user.
     weighted : bool
@@ -47,20 +49,29 @@ def paths_for(chain: SerialChain, limit: float, reference: Any, weighted: bool) 
 
     Returns
     -------
-    ndarray, shape (paths * (6 + n), points)
-        Of each path x, y, z [m], the direction [1], and the planned angles [rad].
+    dict of ndarray, shape (6 + n, points)
+        x, y, z [m], the direction [1], and the planned angles [rad].
 
     Raises
     ------
     UnreachablePose
-        If there are no joint angles for a pose.
+        If there are no joint angles for a given pose.
     ValueError
-        If the reference is none.
+        If the reference is none, or one that is not for this arm.
     """
-    if isinstance(reference, str):
-        check_choice("reference", reference, REFERENCES)
-        return _named(chain, limit, reference, weighted)
-    return planned(chain, _given(reference), limit, weighted)
+    chain, limit = plant.nominal_chain, plant.angle_range[1]
+    if not isinstance(reference, str):
+        return {"reference": planned(chain, _given(reference), limit, weighted)}
+    check_choice("reference", reference, REFERENCES)
+    if reference == "drawn":
+        return _drawn(plant, weighted)
+    if plant.stages != PRESET_JOINTS:
+        raise ValueError(
+            f"reference = {reference!r} is for an arm of {PRESET_JOINTS} joints and this one "
+            f"has {plant.stages}; take reference = 'drawn', or give poses"
+        )
+    names = NAMES if reference == "paths" else (reference,)
+    return {name: _preset(chain, limit, name, weighted) for name in names}
 
 
 def _given(reference: Any) -> Array:
@@ -80,36 +91,54 @@ def _given(reference: Any) -> Array:
     return poses
 
 
-@lru_cache(maxsize=32)
-def _named(chain: SerialChain, limit: float, reference: str, weighted: bool) -> Array:
-    if reference == "drawn":
-        return _drawn(chain, limit, weighted)
-    if chain.stages != PRESET_JOINTS:
+@lru_cache(maxsize=64)
+def _preset(chain: SerialChain, limit: float, name: str, weighted: bool) -> Array:
+    line = PATHS[NAMES.index(name)].angles()
+    try:
+        return planned(chain, poses_of(chain, line), limit, weighted)
+    except UnreachablePose as error:
         raise ValueError(
-            f"reference = {reference!r} is for an arm of {PRESET_JOINTS} joints and this one "
-            f"has {chain.stages}; take reference = 'drawn', or give poses"
-        )
-    lines = [path.angles() for path in PATHS if reference in (path.name, "paths")]
-    return np.concatenate(
-        [planned(chain, poses_of(chain, line), limit, weighted) for line in lines]
-    )
+            f"reference: {name} is out of reach of this arm, whose joints end at "
+            f"{np.degrees(limit):.1f} degrees ({error}); take reference = 'drawn', whose paths "
+            "are made for the arm, or give poses"
+        ) from error
 
 
-def _drawn(chain: SerialChain, limit: float, weighted: bool) -> Array:
-    """Return the first of the paths drawn whose plan does not leap, where its minimum vanishes."""
-    kept: list[Array] = []
-    for first, last in zip(*draw_ends(DRAW_SEED, TRIED, chain.stages, limit), strict=True):
-        line = joint_line(first, last)
-        found = planned(chain, poses_of(chain, line), limit, weighted)
-        even = np.abs(last - first).max() / (len(line) - 1)
-        if np.abs(np.diff(found[N_POSE:])).max() <= LEAP * even:
-            kept.append(found)
+def _drawn(plant: RedundantManipulator, weighted: bool) -> dict[str, Array]:
+    """Return the first of the paths drawn on which the plan does not leap and weights are borne."""
+    chain, limit = plant.nominal_chain, plant.angle_range[1]
+    kept: dict[str, Array] = {}
+    for i in range(TRIED):
+        found = _drawn_path(chain, limit, i)
+        if found is None:
+            continue
+        if bearable_payload(plant, found[N_POSE:].T) < USUAL_PAYLOAD:
+            continue
+        if not weighted:
+            found = planned(chain, found[:N_POSE].T, limit, weighted)
+        kept[f"drawn path {i}"] = found
         if len(kept) == DRAWN:
-            return np.concatenate(kept)
+            return kept
     raise ValueError(
         f"of {TRIED} paths drawn within {np.degrees(limit):.1f} degrees a joint only {len(kept)} "
-        f"have a plan without a leap and {DRAWN} are needed; give poses, or weighted=False"
+        f"have a plan without a leap on which {USUAL_PAYLOAD:g} kg are borne, and {DRAWN} are "
+        "needed; take lighter links, or give poses"
     )
+
+
+@lru_cache(maxsize=128)
+def _drawn_path(chain: SerialChain, limit: float, i: int) -> Array | None:
+    """Return path ``i`` of those drawn, or None if its plan leaps where a minimum vanishes."""
+    first, last = (ends[i] for ends in _ends(chain.stages, limit))
+    line = joint_line(first, last)
+    found = planned(chain, poses_of(chain, line), limit, True)
+    even = np.abs(last - first).max() / (len(line) - 1)
+    return found if np.abs(np.diff(found[N_POSE:])).max() <= LEAP * even else None
+
+
+@lru_cache(maxsize=16)
+def _ends(stages: int, limit: float) -> tuple[Array, Array]:
+    return draw_ends(DRAW_SEED, TRIED, stages, limit)
 
 
 def planned(chain: SerialChain, poses: Array, limit: float, weighted: bool) -> Array:

@@ -5,7 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from pam_envs.envs.env_kernels import FIRST_INFO, N_INFO, PERIOD, PREVIEW, write_references
+from pam_envs.envs.env_kernels import (
+    EPISODE_SECONDS,
+    FIRST_INFO,
+    N_INFO,
+    PERIOD,
+    PREVIEW,
+    write_references,
+)
 from pam_envs.envs.manipulator_layout import (
     ACTION,
     BY_ANGLE,
@@ -27,36 +34,43 @@ from pam_envs.envs.manipulator_layout import (
     OLD_SET_POINT,
     OUTPUT,
     PATH,
+    PATH_SECONDS,
     POINTING_SCALE,
     POINTING_WEIGHT,
     POSITION_SCALE,
     POSITION_WEIGHT,
     R_EFFORT,
+    R_ENDED,
     R_POINTING,
     R_POSITION,
+    RATE,
     READ_ANGLE,
     READ_PRESSURE,
     REF,
+    REST_SECONDS,
     S_JOINTS,
     S_PATH,
     S_PAYLOAD,
     S_POINTING,
     S_POSE,
     S_REFERENCE,
+    S_RESTING,
     S_SLACK,
     SEEN_OUTPUT,
     SOFT_ANGLE,
     SOFT_PRESSURE,
     TIME,
     TOLD_PAYLOAD,
+    WORST_PERIOD,
 )
 from pam_envs.kernels import LANES, kernel
 from pam_envs.mechanics.serial_chain_kinematics import N_STAGES, place_chain
 from pam_envs.mechanics.serial_chain_rows import DIRECTION, POINT, block
 from pam_envs.plants import redundant_manipulator_rows as M
 from pam_envs.plants.redundant_manipulator_kernels import CHAIN_WORK
+from pam_envs.references.path import along
 from pam_envs.tasks.joint_tracking import distance
-from pam_envs.tasks.tracking import effort_reward, excess, tracking_reward
+from pam_envs.tasks.tracking import effort_reward, ended_reward, excess, tracking_reward
 
 
 @kernel
@@ -81,7 +95,8 @@ def observe(rows: Any, fixed: Any, choices: Any, work: Any) -> int:
     first = FIRST_INFO + N_INFO + 1
     for k in range(N_STAGES):
         copy_row(rows[READ_ANGLE + k], work[first + k])
-    first = first + N_STAGES
+        copy_row(rows[RATE + k], work[first + N_STAGES + k])
+    first = first + 2 * N_STAGES
     for k in range(2 * N_STAGES):
         copy_row(rows[READ_PRESSURE + k], work[first + k])
     first = first + 2 * N_STAGES
@@ -144,6 +159,10 @@ def evaluate(
         work[FIRST_INFO + S_PAYLOAD][j] = rows[M.PAYLOAD][j]
         work[FIRST_INFO + S_SLACK][j] = slack
         work[FIRST_INFO + S_PATH][j] = rows[PATH][j]
+        share = along(
+            work[FIRST_INFO + TIME][j], settings[0][REST_SECONDS], settings[0][PATH_SECONDS]
+        )
+        work[FIRST_INFO + S_RESTING][j] = 0.0 if 0.0 < share < 1.0 else 1.0
         work[FIRST_INFO + E_TRAVEL][j] = travel
         judge(rows, fixed, settings[0], work, largest, higher, asked, j)
 
@@ -171,7 +190,7 @@ def judge(
     pose, wanted = FIRST_INFO + S_POSE, FIRST_INFO + S_REFERENCE
     off = apart(work, pose, wanted, j)
     aside = apart(work, pose + 3, wanted + 3, j)
-    seen = FIRST_INFO + N_INFO + 2 + 3 * N_STAGES
+    seen = FIRST_INFO + N_INFO + 2 + 4 * N_STAGES
     work[FIRST_INFO + SEEN_OUTPUT][j] = apart(work, seen, wanted, j)
     work[FIRST_INFO + REF][j] = 0.0
     work[FIRST_INFO + OUTPUT][j] = off
@@ -188,6 +207,11 @@ def judge(
     work[FIRST_INFO + C_PRESSURE][j] = excess(higher, config[SOFT_PRESSURE])
     work[FIRST_INFO + M_ANGLE][j] = config[LARGEST_ANGLE] - largest
     work[FIRST_INFO + M_PRESSURE][j] = config[SOFT_PRESSURE] - higher
-    work[FIRST_INFO + N_INFO][j] = 1.0 if largest > config[LARGEST_ANGLE] else 0.0
+    ended = 1.0 if largest > config[LARGEST_ANGLE] else 0.0
+    work[FIRST_INFO + N_INFO][j] = ended
+    work[FIRST_INFO + R_ENDED][j] = ended_reward(
+        ended, work[FIRST_INFO + TIME][j], config[EPISODE_SECONDS], config[PERIOD],
+        config[WORST_PERIOD],
+    )  # fmt: skip
     work[FIRST_INFO + E_AIR][j] = max(0.0, rows[M.AIR][j] - rows[OLD_AIR][j])
     rows[OLD_AIR][j] = rows[M.AIR][j]

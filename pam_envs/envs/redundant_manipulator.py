@@ -13,8 +13,9 @@ that count from the base, k = 0 .. n - 1:
 | how many | signal | unit | range |
 |----------|--------|------|-------|
 | n | angle_k, sensed | rad | -0.8 .. 0.8 |
+| n | rate_k, of the sensed angle, smoothed over 30 ms | rad/s | -6 .. 6 |
 | 2 n | pressure_ka, pressure_kb, sensed | Pa | 0 .. 6.5e5 |
-| 1 | payload, at the start | kg | 0 .. 0.5 |
+| 1 | payload, at the start | kg | 0 .. 0.1 |
 | 6 | x, y, z, point_x, point_y, point_z: tip and direction of the sensed angles | m, 1 | |
 | n | set_point_k, of the last period (*) | rad | its range |
 | 6 | reference_x .. reference_point_z, and previews ``preview_stride`` periods apart | m, 1 | |
@@ -26,7 +27,8 @@ Action: angle_set_point_k, over the joints' range; or pressure_ka_set_point and
 pressure_kb_set_point, 0 .. 6.5e5 Pa.
 
 Reward: ``-|tip - path| / 2 cm - 0.5 |direction - path's| / 2 degrees - 0.2 (change of all
-pressures' set-points) / (2 n 6.5 bar)`` each control period.
+pressures' set-points) / (2 n 6.5 bar)`` each control period; where a limit ends the episode, the
+worst that a period can cost for each one that is left as well, so that it never pays.
 
 Start: at the beginning of the path. End: truncated after ``episode_seconds``; terminated when a
 joint is beyond its hard limit.
@@ -39,6 +41,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pam_envs.envs.arguments import common, payloads_of, plant_of, spread_of, task_of
 from pam_envs.envs.manipulator_kernels import kernels_for
 from pam_envs.envs.manipulator_layout import MODES, POSE, joint_names, muscle_names
@@ -48,14 +53,17 @@ from pam_envs.envs.setup import Setup, check_choice, check_number, compose
 from pam_envs.envs.vector_env import PlantVectorEnv
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants import redundant_manipulator_rows as R
+from pam_envs.plants.bearing import bearable_payload, check_borne
 from pam_envs.plants.memory import Kind
 from pam_envs.plants.redundant_manipulator import RedundantManipulator
 from pam_envs.tasks.joint_tracking import PathTracking
 
 ANGLES = (-0.8, 0.8)
 """Range [rad] of angles in the observation."""
-MOST_PAYLOAD = 0.5
-"""Largest payload [kg]."""
+RATES = (-6.0, 6.0)
+"""Range [rad/s] of their rates."""
+MOST_PAYLOAD = 0.1
+"""Largest payload [kg]. Some paths bear less, which is checked."""
 NOT_DRAWN = ("regulator.max_pressure", "link.limit", "link.stop", "nominal.prestress")
 """Parameters that ``randomize`` may not draw: they scale the action or enter derived numbers."""
 
@@ -93,6 +101,7 @@ def _signals(
     n, pressures = plant.stages, ("Pa", 0.0, plant.regulator.max_pressure)
     angles = ("rad", *ANGLES)
     parts: list[Part] = [(name, *angles) for name in joint_names("angle", n)]
+    parts += [(name, "rad/s", *RATES) for name in joint_names("rate", n)]
     parts += [(name, *pressures) for name in muscle_names("pressure", n)]
     parts += [("payload", "kg", 0.0, MOST_PAYLOAD), *_pose(plant, "")]
     if action == "angle":
@@ -111,6 +120,22 @@ def _signals(
         Signal(*part, i, normalize, late)
         for i, (part, late) in enumerate(zip(made, ahead, strict=True))
     )
+
+
+def _payloads(
+    plant: RedundantManipulator, payload: Any, change: float, paths: Mapping[str, Any],
+    by_pressure: bool,
+) -> NDArray[np.float64]:  # fmt: skip
+    """Return the payloads [kg] to draw from, shape (1, n), if all paths' weights are borne."""
+    plans = {name: path[len(POSE) :].T for name, path in paths.items()}
+    most = MOST_PAYLOAD
+    if payload is None:
+        borne = [bearable_payload(plant, plan, by_pressure) for plan in plans.values()]
+        most = max(0.0, min(most, *borne) - change)
+    payloads = payloads_of(payload, most)
+    for name, plan in plans.items():
+        check_borne(plant, plan, float(payloads.max()) + change, name, by_pressure)
+    return payloads
 
 
 def make_setup(
@@ -165,7 +190,9 @@ def make_setup(
     path_seconds, rest_seconds : float
         Duration [s] of the way along the path, and of the rest at either end.
     payload : float, sequence of float or None
-        Mass [kg] at the tip; several: each episode draws one; None: any from 0 to 0.5 kg.
+        Mass [kg] at the tip; several: each episode draws one; None: any that the paths bear, up to
+        0.1 kg. The muscles have to bear the heaviest at rest, with its change, in every pose of the
+        plan; where set-points are angles, with set-points within their range.
     payload_change : float
         By how much [kg] the payload grows or shrinks, untold, in the middle of an episode.
     reward : mapping, optional
@@ -175,6 +202,8 @@ def make_setup(
     ------
     UnreachablePose
         If the arm cannot take a pose of the path.
+    UnbearableLoad
+        If its muscles cannot hold it there with the heaviest payload.
     ValueError
         Naming the argument, its value, the bounds and the remedy.
     """
@@ -184,8 +213,11 @@ def make_setup(
     check_choice("plan", plan, (True, False))
     check_choice("weighted", weighted, (True, False))
     task = task_of(PathTracking, reward)
-    payloads = payloads_of(payload, MOST_PAYLOAD)
-    samples = paths_for(made.chain, made.angle_range[1], reference, weighted)
+    change = check_number("payload_change", payload_change, 0.0, MOST_PAYLOAD, "kg")
+    paths = paths_for(made, reference, True)
+    payloads = _payloads(made, payload, change, paths, action == "pressures")
+    if not weighted:
+        paths = paths_for(made, reference, weighted)
     config = (
         task.position_weight,
         task.position_scale,
@@ -196,11 +228,11 @@ def make_setup(
         task.soft_pressure,
         made.largest_angle,
         made.prestress,
-        check_number("payload_change", payload_change, 0.0, MOST_PAYLOAD, "kg"),
+        change,
         check_number("path_seconds", path_seconds, 0.1, 600.0, "s"),
         check_number("rest_seconds", rest_seconds, 0.0, 600.0, "s"),
+        task.worst(float(made.chain.reach)),
     )
-    paths = len(samples) // (len(POSE) + made.stages)
     spacing = given.stride * made.control_period
     example = "{'regulator.time_constant': (0.03, 0.06)}"
     return compose(
@@ -210,9 +242,9 @@ def make_setup(
         signals=_signals(made, action, plan, given.preview, spacing, normalize),
         actions=_actions(made, action, normalize),
         config=config,
-        choices=(made.elements, MODES.index(action), payloads.size, paths),
+        choices=(made.elements, MODES.index(action), payloads.size, len(paths)),
         own=payloads,
-        samples=samples,
+        samples=np.concatenate(list(paths.values())),
         tables=made.memory_tables(),
         spread=spread_of(made, R.PARAMETERS, NOT_DRAWN, randomize, example, {}),
         drawn=randomize is not False,

@@ -11,6 +11,7 @@ formulas here are those of a textbook, by Jacobians; the kernels of ``serial_cha
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -19,11 +20,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.mechanics.serial_chain_rows import GRAVITY_ROWS, LINK_ROWS
+from pam_envs.parameters import parameter
 
 Array = NDArray[np.float64]
 
 STANDARD_GRAVITY = 9.80665
-MOST_STAGES = 12
+MOST_JOINTS = 12
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 BOUNDS = {
     "lengths": ("m", 1e-3, 5.0),
@@ -33,6 +35,35 @@ BOUNDS = {
     "along": ("kg m2", 1e-9, 100.0),
 }
 """Unit and bounds of what each link has."""
+
+
+HEAVY = ("masses", "across", "along")
+"""What grows with the mass of the links."""
+
+
+@dataclass(frozen=True)
+class LinkForm:
+    """A link of the arm of seed 002, as a solid cylinder, unless a chain says otherwise."""
+
+    length: float = parameter(
+        0.25, "m", 1e-3, 5.0, "assumed", "of seed 002's chain, as its figures suggest"
+    )
+    mass: float = parameter(
+        0.1,
+        "kg",
+        1e-3,
+        100.0,
+        "assumed",
+        "not published; about what two DMSP-10 a joint bear where seed 002's paths bend most, and "
+        "less than the muscles and their fittings weigh",
+    )
+    centre: float = parameter(
+        0.5, "1", 0.0, 1.0, "assumed", "place of the mass, as a share of the length"
+    )
+    radius: float = parameter(0.05, "m", 1e-4, 1.0, "assumed", "of the cylinder")
+
+
+FORM = LinkForm()
 
 
 @dataclass(frozen=True)
@@ -65,9 +96,9 @@ class SerialChain:
 
     def __post_init__(self) -> None:
         """Check names, numbers of entries and bounds."""
-        if not 1 <= len(self.axes) <= MOST_STAGES or set(self.axes) - set(AXES):
+        if not 1 <= len(self.axes) <= MOST_JOINTS or set(self.axes) - set(AXES):
             raise ValueError(
-                f"axes = {self.axes!r}; give 1 to {MOST_STAGES} of the letters x, y, z, one a joint"
+                f"axes = {self.axes!r}; give 1 to {MOST_JOINTS} of the letters x, y, z, one a joint"
             )
         for name, (unit, low, high) in BOUNDS.items():
             values = getattr(self, name)
@@ -84,10 +115,10 @@ class SerialChain:
     def uniform(
         cls,
         axes: str | tuple[str, ...] = "xyxyxy",
-        length: float = 0.25,
-        mass: float = 0.5,
-        centre: float = 0.5,
-        radius: float = 0.05,
+        length: float = FORM.length,
+        mass: float = FORM.mass,
+        centre: float = FORM.centre,
+        radius: float = FORM.radius,
         gravity: tuple[float, float, float] = (0.0, 0.0, STANDARD_GRAVITY),
     ) -> Self:
         """Return a chain of equal links, each with the inertia of a solid cylinder.
@@ -97,7 +128,7 @@ class SerialChain:
         axes : str or tuple of str
             One letter a joint.
         length, mass, radius : float
-            Of one link [m], [kg], [m].
+            Of one link [m], [kg], [m]; by default those of :class:`LinkForm`.
         centre : float
             Where its mass is, as a share of its length.
         gravity : tuple of float
@@ -123,6 +154,11 @@ class SerialChain:
     def reach(self) -> float:
         """Return the length of the straight arm [m]."""
         return float(sum(self.lengths))
+
+    def heavier(self, factor: float) -> Self:
+        """Return the chain with masses and moments of inertia times a factor."""
+        scaled = {name: tuple(factor * v for v in getattr(self, name)) for name in HEAVY}
+        return dataclasses.replace(self, **scaled)
 
     def rows(self) -> Array:
         """Return gravity and links as the kernels read them, shape (3 + 8 n,)."""
@@ -230,11 +266,20 @@ class SerialChain:
             total += mass * linear.T @ drift + angular.T @ (inertia @ turn + gyro)
         return total
 
-    def gravity_torque(self, angles: ArrayLike, payload: float = 0.0) -> Array:
-        """Return the torques [N m] that hold the arm still, shape (n,)."""
-        pull = np.array(self.gravity)
-        bodies = self._bodies(angles, payload)
-        return np.asarray(sum(-mass * linear.T @ pull for mass, linear, *_ in bodies))
+    def gravity_torque(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
+        """Return the torques [N m] that hold the arm still, shape (..., n).
+
+        ``angles`` [rad] have shape (..., n), ``payload`` [kg] shape (...) or ().
+        """
+        axes, points, directions = self.frames(angles)
+        joints, load = points[..., :-1, :], np.asarray(payload, float)[..., None]
+        centres = joints + np.array(self.centres)[:, None] * directions
+        masses = np.array(self.masses)
+        beyond = np.cumsum(masses[::-1])[::-1] + load
+        moments = np.cumsum((masses[:, None] * centres)[..., ::-1, :], axis=-2)[..., ::-1, :]
+        moments = moments + load[..., None] * points[..., -1:, :]
+        arms = moments - beyond[..., None] * joints
+        return np.asarray(-np.cross(axes, arms) @ np.array(self.gravity))
 
     def energy(
         self, angles: ArrayLike, rates: ArrayLike, payload: float = 0.0

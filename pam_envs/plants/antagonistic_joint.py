@@ -242,6 +242,19 @@ class AntagonisticJoint(Plant):
         moment = self.link.mass * self.link.centre + np.asarray(payload) * self.link.length
         return np.asarray(self.link.gravity * moment * np.sin(angle))
 
+    def torque_range(self, angles: ArrayLike, by_pressure: bool = False) -> tuple[Array, Array]:
+        """Return the least and the largest torque [N m] at angles [rad].
+
+        Set-points of angles end at their limit, and so does what they exert; pressures do not.
+        """
+        if self.dynamics == "reduced":
+            low, high = (
+                self.nominal.stiffness * (end - np.asarray(angles)) for end in self.angle_range
+            )
+            return low, high
+        limit = None if by_pressure else self.link.limit
+        return pair_statics.torque_range(self, angles, limit, self.prestress)
+
     def gravity_shift(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
         """Return what to add to set-points [rad] so that gravity is borne, shape (..., 1).
 

@@ -30,9 +30,8 @@ from pam_envs.plants.antagonistic_joint_rows import (
     LAG_A,
     LAG_B,
     LINK_CENTRE,
-    LINK_INERTIA,
+    LINK_GYRATION,
     LINK_MASS,
-    MAX_PRESSURE,
     MEMBER,
     MODEL,
     NOMINAL_POLE,
@@ -43,25 +42,26 @@ from pam_envs.plants.antagonistic_joint_rows import (
     PRESSURE_B,
     REST_LENGTH,
     SET_POINT_A,
-    SLEW_RATE,
     STACK_COUNT,
     STICK_A,
     STICK_B,
     STOP,
     STRAIGHT,
-    TIME_CONSTANT,
     VELOCITY,
 )
 from pam_envs.plants.antagonistic_pair import (
     air_of,
+    clear_memories,
+    command,
+    contract,
     feed_forward,
+    fill,
     lever_of,
     pulled,
     stop_torque,
     turning,
 )
 from pam_envs.plants.joint_memory_kernels import MEMORIES, ROWS_PER_OPERATOR
-from pam_envs.pneumatics.regulator import regulator_step
 
 __all__ = [
     "MEMORY_ROWS",
@@ -87,18 +87,6 @@ report: Any = None
 
 
 @kernel
-def fill(rows: Any, fixed: Any, h: float, work: Any) -> None:
-    """Advance both pressures of a tile towards their set-points."""
-    for side in range(2):
-        pressure, set_point, was = rows[PRESSURE_A + side], rows[SET_POINT_A + side], work[side]
-        for j in range(LANES):
-            time, slew = fixed[TIME_CONSTANT][j], fixed[SLEW_RATE][j]
-            target = max(0.0, min(fixed[MAX_PRESSURE][j], set_point[j]))
-            was[j] = pressure[j]
-            pressure[j] = regulator_step(pressure[j], target, time, 1.0 / time, slew, 1.0 / slew, h)
-
-
-@kernel
 def load_torque(rows: Any, fixed: Any, j: int, angle: float) -> tuple[float, float]:
     """Return the torque [N m] of disturbance, weight and stop, and minus its slope [N m/rad]."""
     sine, cosine = sine_and_cosine_of(angle)
@@ -112,7 +100,8 @@ def load_torque(rows: Any, fixed: Any, j: int, angle: float) -> tuple[float, flo
 @kernel
 def inertia_of(rows: Any, fixed: Any, j: int) -> float:
     """Return the inertia about the joint [kg m2], payload included."""
-    return fixed[LINK_INERTIA][j] + rows[PAYLOAD][j] * fixed[PAYLOAD_ARM][j] * fixed[PAYLOAD_ARM][j]
+    radius, arm = fixed[LINK_GYRATION][j], fixed[PAYLOAD_ARM][j]
+    return fixed[LINK_MASS][j] * radius * radius + rows[PAYLOAD][j] * arm * arm  # type: ignore[no-any-return]
 
 
 @kernel
@@ -155,19 +144,11 @@ def swing(
             h,
         )
         angle[j] = angle[j] + du
-        contract(rows, fixed, j, angle[j])
+        contract(rows, fixed, j, angle[j], AT_A, STRAIGHT)
     remember(
         rows, fixed, counts, table, memory, elements, AT_A, LAG_A, 2, MODEL, STACK_COUNT, MEMBER,
         0, LANES,
     )  # fmt: skip
-
-
-@kernel
-def contract(rows: Any, fixed: Any, j: int, angle: float) -> None:
-    """Write the contractions at an angle, as the memories' inputs."""
-    x_a, _, _ = lever_of(fixed, j, angle, 1.0)
-    x_b, _, _ = lever_of(fixed, j, angle, -1.0)
-    rows[AT_A][j], rows[AT_A + 1][j] = x_a - rows[STRAIGHT][j], x_b - rows[STRAIGHT][j]
 
 
 @kernel
@@ -225,7 +206,8 @@ def advance(
     """
     h = period / substeps
     for _ in range(substeps):
-        fill(rows, fixed, h, work)
+        for side in range(2):
+            fill(rows[PRESSURE_A + side], rows[SET_POINT_A + side], work[side], fixed, h)
         move(rows, fixed, counts, table, memory, elements, h, work)
     for j in range(LANES):
         report(rows, fixed, j)
@@ -261,10 +243,7 @@ def report_reduced(rows: Any, fixed: Any, j: int) -> None:
 @kernel
 def start_memory(rows: Any, counts: Any, memory: int, j: int) -> None:
     """Put the memories of one lane into their virgin state."""
-    for k in range(len(rows) - memory):
-        rows[memory + k][j] = 0.0
-    counts[STACK_COUNT][j] = 1
-    counts[STACK_COUNT + 1][j] = 1
+    clear_memories(rows, counts, memory, STACK_COUNT, 2, j)
 
 
 @routine
@@ -277,10 +256,8 @@ def begin_lane(
     The joint comes there from a straight and virgin state. ``PAYLOAD``, ``DISTURBANCE`` and
     ``counts[MEMBER]`` are set before, and the memory cleared with :func:`start_memory`.
     """
-    p_a, p_b, _ = feed_forward(fixed, j, angle, prestress)
-    rows[PRESSURE_A][j] = rows[SET_POINT_A][j] = p_a
-    rows[PRESSURE_B][j] = rows[SET_POINT_A + 1][j] = p_b
-    rows[COMMAND][j], rows[K.PRESTRESS][j] = angle, prestress
+    command(rows, fixed, j, angle, prestress, COMMAND, K.PRESTRESS, SET_POINT_A)
+    rows[PRESSURE_A][j], rows[PRESSURE_B][j] = rows[SET_POINT_A][j], rows[SET_POINT_A + 1][j]
     straight, _, _ = lever_of(fixed, j, 0.0, 1.0)
     rows[STRAIGHT][j] = straight
     rows[LAG_A][j] = rows[LAG_A + 1][j] = 0.0
@@ -309,7 +286,7 @@ def rest_muscles(
     low, high = -fixed[STOP][j] - 0.1, fixed[STOP][j] + 0.1
     for _ in range(52):
         angle = 0.5 * (low + high)
-        contract(rows, fixed, j, angle)
+        contract(rows, fixed, j, angle, AT_A, STRAIGHT)
         peek(
             rows, fixed, counts, table, memory, elements, AT_A, LAG_A, STICK_A, 2, MODEL,
             STACK_COUNT, MEMBER, j, j + 1,
@@ -319,7 +296,7 @@ def rest_muscles(
         else:
             high = angle
     rows[ANGLE][j] = 0.5 * (low + high)
-    contract(rows, fixed, j, rows[ANGLE][j])
+    contract(rows, fixed, j, rows[ANGLE][j], AT_A, STRAIGHT)
     remember(
         rows, fixed, counts, table, memory, elements, AT_A, LAG_A, 2, MODEL, STACK_COUNT, MEMBER,
         j, j + 1,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from pam_envs.kernels import kernel
+from pam_envs.kernels import LANES, kernel
 from pam_envs.mechanics.antagonistic_lever import sine_and_cosine_of, span, squares
 from pam_envs.muscle.force_map import force_terms, inner_volume
 from pam_envs.plants.antagonistic_joint_rows import (
@@ -27,17 +27,53 @@ from pam_envs.plants.antagonistic_joint_rows import (
     R_O,
     R_U,
     REST_LENGTH,
+    SLEW_RATE,
     STOP,
     STOP_STIFFNESS,
     STRETCH,
     TAPER,
     THRESHOLD,
+    TIME_CONSTANT,
     VISCOSITY,
 )
+from pam_envs.pneumatics.regulator import regulator_step
 
 ATMOSPHERE = 101325.0
 AIR_DENSITY = 1.0 / (287.05 * 293.15)
 """Over pressure, of air at 20 degrees C [kg/(m3 Pa)]."""
+
+
+@kernel
+def fill(pressure: Any, set_point: Any, was: Any, fixed: Any, h: float) -> None:
+    """Advance the pressures of one muscle in all lanes, and keep those before."""
+    for j in range(LANES):
+        time, slew = fixed[TIME_CONSTANT][j], fixed[SLEW_RATE][j]
+        target = max(0.0, min(fixed[MAX_PRESSURE][j], set_point[j]))
+        was[j] = pressure[j]
+        pressure[j] = regulator_step(pressure[j], target, time, 1.0 / time, slew, 1.0 / slew, h)
+
+
+@kernel
+def contract(rows: Any, fixed: Any, j: int, angle: float, at: int, straight: int) -> None:
+    """Write the contractions of a pair at an angle, as its memories' inputs (two rows from ``at``).
+
+    They count from that of the straight joint, which stands in the row ``straight``.
+    """
+    x_a, _, _ = lever_of(fixed, j, angle, 1.0)
+    x_b, _, _ = lever_of(fixed, j, angle, -1.0)
+    rows[at][j], rows[at + 1][j] = x_a - rows[straight][j], x_b - rows[straight][j]
+
+
+@kernel
+def clear_memories(rows: Any, counts: Any, memory: int, first: int, number: int, j: int) -> None:
+    """Put the memories of one lane into their virgin state, ``number`` of them.
+
+    Their state is all that stands in ``rows`` from ``memory`` on; their counts begin at ``first``.
+    """
+    for k in range(len(rows) - memory):
+        rows[memory + k][j] = 0.0
+    for m in range(number):
+        counts[first + m][j] = 1
 
 
 @kernel
@@ -193,3 +229,18 @@ def feed_forward(fixed: Any, j: int, angle: float, prestress: float) -> tuple[fl
     p_b, _ = set_pressure(fixed, j, x_b, min(f_b, max(0.0, -f_a * rate_a / rate_b)))
     beyond = abs(angle) > limit + 1e-12 or min(f_a, f_b) < 0.0
     return p_a, p_b, 1.0 if beyond else 0.0
+
+
+@kernel
+def command(
+    rows: Any, fixed: Any, j: int, angle: float, prestress: float, asked: int, stress: int,
+    set_point: int,
+) -> float:  # fmt: skip
+    """Set the pressures of a pair for an angle [rad] and a prestress [N]; 1 if out of reach.
+
+    ``asked``, ``stress`` and ``set_point`` are the rows of both, and the first of the pressures'.
+    """
+    a, b, short = feed_forward(fixed, j, angle, prestress)
+    rows[asked][j], rows[stress][j] = angle, prestress
+    rows[set_point][j], rows[set_point + 1][j] = a, b
+    return short

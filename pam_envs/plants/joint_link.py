@@ -39,10 +39,10 @@ class Link(Stage):
     length: float = parameter(
         0.25, "m", 0.02, 2.0, "assumed", "of seed 002's chain, as its figures suggest"
     )
-    mass: float = parameter(0.3, "kg", 0.0, 20.0, "assumed", _FORM, spread=(0.2, 0.5))
+    mass: float = parameter(0.3, "kg", 0.01, 20.0, "assumed", _FORM, spread=(0.2, 0.5))
     centre: float = parameter(0.125, "m", 0.0, 2.0, "derived", _FORM)
-    inertia: float = parameter(
-        0.00625, "kg m2", 1e-4, 10.0, "derived", _FORM, spread=(0.004, 0.012)
+    gyration: float = parameter(
+        0.14433756729740646, "m", 0.01, 2.0, "derived", "0.25 m over the root of 3: " + _FORM
     )
     gravity: float = parameter(
         GRAVITY,
@@ -52,6 +52,39 @@ class Link(Stage):
         "published",
         "standard gravity; 0 for a vertical axis",
         neutral=0.0,
+    )
+
+    @property
+    def inertia(self) -> float:
+        """Return the inertia about the joint [kg m2]; ``gyration`` is its radius."""
+        return self.mass * self.gyration * self.gyration
+
+
+@dataclass(frozen=True)
+class ArmFactors:
+    """What all links and all joints of a chain have in common beside their own numbers.
+
+    The masses of seed 002's arm are not published. A link weighs what
+    :class:`~pam_envs.mechanics.serial_chain.LinkForm` says, unless a chain is given.
+    """
+
+    mass_factor: float = parameter(
+        1.0,
+        "1",
+        0.05,
+        20.0,
+        "assumed",
+        "of masses and inertias of all links; more than a tenth and path_3 is out of torque",
+        spread=(0.9, 1.1),
+    )
+    damping_factor: float = parameter(
+        1.0,
+        "1",
+        0.0,
+        20.0,
+        "assumed",
+        "of joint_damping, which makes up a ratio of a half with the straight arm rigid",
+        spread=(0.7, 1.4),
     )
 
 

@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from pam_envs.kernels import COMPILED, build, kernel, scratch
 from pam_envs.mechanics.serial_chain_kinematics import N_STAGES
 from pam_envs.plants import redundant_manipulator_rows as M
+from pam_envs.plants.antagonistic_pair import command
 from pam_envs.plants.redundant_manipulator import RedundantManipulator
 from pam_envs.plants.redundant_manipulator_kernels import (
     advance,
     begin_lane,
-    feed_forward,
     memory_rows,
     replacements,
     start_memory,
@@ -49,11 +49,11 @@ def order(rows: Any, fixed: Any, commands: Any, stress: float, shove: Any, mass:
     """Write what drives the arm in one control period."""
     rows[M.PAYLOAD][0] = mass[0]
     for k in range(N_STAGES):
-        rows[M.COMMAND + k][0] = commands[k]
-        rows[M.PRESTRESS + k][0] = stress
         rows[M.DISTURBANCE + k][0] = shove[k]
-        p_a, p_b, _ = feed_forward(fixed, 0, commands[k], stress)
-        rows[M.SET_POINT + 2 * k][0], rows[M.SET_POINT + 2 * k + 1][0] = p_a, p_b
+        command(
+            rows, fixed, 0, commands[k], stress, M.COMMAND + k, M.PRESTRESS + k,
+            M.SET_POINT + 2 * k,
+        )  # fmt: skip
 
 
 @kernel

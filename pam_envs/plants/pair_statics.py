@@ -130,6 +130,20 @@ def stiffness(pair: Pair, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: A
     return (pull(pair, phi - STEP, pressure_a, pressure_b) - ahead) / (2.0 * STEP)
 
 
+def torque_range(
+    pair: Pair, angle: ArrayLike, limit: float | None, prestress: float
+) -> tuple[Array, Array]:
+    """Return the least and the largest torque [N m] of the muscles at an angle [rad].
+
+    ``limit`` [rad] bounds the set-points at a co-contraction [N]; without one the pressures are
+    free.
+    """
+    a, b = np.array(pair.regulator.max_pressure), np.array(0.0)
+    if limit is not None:
+        a, b, _ = pressures_for(pair, limit, prestress)
+    return pull(pair, angle, b, a), pull(pair, angle, a, b)
+
+
 def reachable_angle(
     pair: Pair, stop: float, prestress: float, load: Callable[[float], float]
 ) -> float:

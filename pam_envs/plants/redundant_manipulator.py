@@ -7,8 +7,10 @@ the regulators and the feed-forward of a single joint (:mod:`pam_envs.plants.ant
 Gravity, inertia and the payload at the tip couple the joints. The arm hangs.
 
 Masses and damping are not published. Links of 0.1 kg are about as heavy as the muscles of a stage
-bear where the paper's paths bend the arm most; each joint has, beside the viscosity of its muscles,
-the damping that gives it a ratio of one half with the rest of the straight arm held rigid.
+bear where the paper's paths bend the arm most, and lighter than two muscles with their fittings:
+the arm is as if its muscles weighed nothing. Each joint has, beside the viscosity of its muscles,
+the damping that gives it a ratio of one half with the rest of the straight arm held rigid. Both
+have a common factor (``arm.mass_factor``, ``arm.damping_factor``) that can be drawn.
 """
 
 from __future__ import annotations
@@ -34,7 +36,7 @@ from pam_envs.plants.antagonistic_joint import (
     STRETCHED,
     AntagonisticJoint,
 )
-from pam_envs.plants.joint_link import Link, NominalPoint, Stage, StagePoint
+from pam_envs.plants.joint_link import ArmFactors, Link, NominalPoint, Stage, StagePoint
 from pam_envs.plants.joint_memory import JointMemory, joint_memory
 from pam_envs.plants.joint_memory_tables import check_operator, map_tables, model_rows, plays_of
 from pam_envs.plants.memory import Kind
@@ -45,7 +47,7 @@ from pam_envs.sensing.orthosis import GaugeSensor
 
 Array = NDArray[np.float64]
 
-LINK = SerialChain.uniform(mass=0.1)
+LINK = SerialChain.uniform()
 """The chain unless another one is given."""
 DAMPING_RATIO = 0.5
 MOST_DAMPING = 100.0
@@ -59,9 +61,13 @@ class RedundantManipulator(Plant):
     Attributes
     ----------
     axes, lengths, masses, centres, across, along, gravity
-        The chain, as in :class:`~pam_envs.mechanics.serial_chain.SerialChain`.
+        The chain, as in :class:`~pam_envs.mechanics.serial_chain.SerialChain`, for an
+        ``arm.mass_factor`` of 1.
     joint_damping : tuple of float
-        Of each joint [N m s/rad], beside ``link.damping`` and the muscles' viscosity.
+        Of each joint [N m s/rad], beside ``link.damping`` and the muscles' viscosity, for an
+        ``arm.damping_factor`` of 1.
+    arm
+        Factors of all masses and of all damping.
     regulator, memory, muscle, lever, link, nominal
         The components of every stage.
     angle, pressure
@@ -70,6 +76,7 @@ class RedundantManipulator(Plant):
 
     family: ClassVar[str] = "redundant_manipulator"
     components: ClassVar[tuple[str, ...]] = (
+        "arm",
         "regulator",
         "memory",
         "muscle",
@@ -92,6 +99,7 @@ class RedundantManipulator(Plant):
     along: tuple[float, ...] = LINK.along
     gravity: tuple[float, ...] = LINK.gravity
     joint_damping: tuple[float, ...] = (0.0,) * LINK.stages
+    arm: ArmFactors = field(default_factory=ArmFactors)
     regulator: JointRegulator = field(default_factory=JointRegulator)
     memory: JointMemory = field(default_factory=JointMemory)
     muscle: ForceMap = field(default_factory=ForceMap)
@@ -149,7 +157,8 @@ class RedundantManipulator(Plant):
         """Return the arm with muscles as measured; what they reach is the limit of its joints.
 
         The limit is the largest angle that every joint alone reaches at the nominal co-contraction
-        within the regulators' range, against the weight of the arm beyond it.
+        within the regulators' range, against the weight of the straight arm beyond it. Bent, the
+        arm may have to bear more; what a path takes is checked when an environment is made.
         """
         plant = cls._of(chain, hysteresis, ForceMap(), {"link.limit": REACHED}, changes)
         if "link__limit" in changes:
@@ -198,7 +207,12 @@ class RedundantManipulator(Plant):
 
     @cached_property
     def chain(self) -> SerialChain:
-        """Joints and links."""
+        """Joints and links as heavy as they are."""
+        return self.nominal_chain.heavier(self.arm.mass_factor)
+
+    @cached_property
+    def nominal_chain(self) -> SerialChain:
+        """Joints and links for a mass factor of 1."""
         x, y, z = self.gravity
         parts = {name: getattr(self, name) for name in LINKS}
         return SerialChain(tuple(self.axes), **parts, gravity=(x, y, z))
@@ -289,15 +303,21 @@ class RedundantManipulator(Plant):
             Mass at the tip [kg].
         """
         phi = np.asarray(angles, float)
-        masses = np.broadcast_to(np.asarray(payload, float), phi.shape[:-1])
-        weight = np.array(
-            [
-                self.chain.gravity_torque(q, float(m))
-                for q, m in zip(phi.reshape(-1, self.stages), masses.ravel(), strict=True)
-            ]
-        ).reshape(phi.shape)
+        weight = self.weight_torque(phi, payload)
         held = np.clip(phi, *self.angle_range)
         return pair_statics.shift_for(self, held, self.prestress, weight, self.link.limit)
+
+    def weight_torque(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
+        """Return the torques [N m] that hold arm and payload [kg] at angles (..., n) [rad]."""
+        return self.chain.gravity_torque(angles, payload)
+
+    def torque_range(self, angles: ArrayLike, by_pressure: bool = False) -> tuple[Array, Array]:
+        """Return the least and the largest torque [N m] of the muscles at angles [rad].
+
+        Set-points of angles end at their limit, and so does what they exert; pressures do not.
+        """
+        limit = None if by_pressure else self.link.limit
+        return pair_statics.torque_range(self, angles, limit, self.prestress)
 
     def stage(self) -> AntagonisticJoint:
         """Return one stage on its own, with its own link."""
@@ -307,9 +327,9 @@ class RedundantManipulator(Plant):
             length=chain.lengths[-1],
             mass=chain.masses[-1],
             centre=chain.centres[-1],
-            inertia=chain.across[-1] + chain.masses[-1] * chain.centres[-1] ** 2,
+            gyration=math.sqrt(chain.across[-1] / chain.masses[-1] + chain.centres[-1] ** 2),
         )
-        same = {name: getattr(self, name) for name in self.components}
+        same = {name: getattr(self, name) for name in self.components if name != "arm"}
         same |= {"link": link, "nominal": NominalPoint(prestress=self.prestress)}
         return AntagonisticJoint(**same)
 
@@ -326,7 +346,8 @@ class RedundantManipulator(Plant):
         """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
         damping = [*self.joint_damping, *[0.0] * (M.MOST_STAGES - self.stages)]
         named = [self.value(name) for name in M.NAMES]
-        return np.array([*named, *model_rows(self.memory.operator), *damping, *self.chain.rows()])
+        chain = self.nominal_chain.rows()
+        return np.array([*named, *model_rows(self.memory.operator), *damping, *chain])
 
     @property
     def elements(self) -> int:

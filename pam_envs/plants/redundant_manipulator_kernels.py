@@ -8,6 +8,9 @@ the stiffness and damping of the joints, which their inertia couples:
     (M + h/2 D + h^2/4 K) dv = h [torque - bias - D v]
 
 It is of second order, and has no stability limit from stiff muscles on light links.
+
+A factor ``f`` of all links' masses stands before the whole of M and bias, with the payload over
+``f`` in them: so ``f`` divides what stands beside them, and the chain's terms do not know it.
 """
 
 from __future__ import annotations
@@ -30,7 +33,11 @@ from pam_envs.mechanics.serial_chain_rows import work_rows as chain_work_rows
 from pam_envs.plants import redundant_manipulator_rows as M
 from pam_envs.plants.antagonistic_pair import (
     air_of,
+    clear_memories,
+    command,
+    contract,
     feed_forward,
+    fill,
     friction_of,
     lever_of,
     pulled,
@@ -45,10 +52,11 @@ from pam_envs.plants.redundant_manipulator_rows import (
     CHANGE,
     COMMAND,
     DAMPING,
+    DAMPING_FACTOR,
     DISTURBANCE,
     JOINT_DAMPING,
     LAG,
-    MAX_PRESSURE,
+    MASS_FACTOR,
     MEMBER,
     MIDDLE,
     MIDDLE_RATE,
@@ -59,14 +67,12 @@ from pam_envs.plants.redundant_manipulator_rows import (
     PRESTRESS,
     REST_LENGTH,
     SET_POINT,
-    SLEW_RATE,
+    SHARE,
     STACK_COUNT,
     STICK,
     STRAIGHT,
-    TIME_CONSTANT,
     VELOCITY,
 )
-from pam_envs.pneumatics.regulator import regulator_step
 
 __all__ = [
     "CHAIN_WORK",
@@ -93,20 +99,10 @@ OPERATOR_ROWS = 0
 
 
 @kernel
-def fill(rows: Any, fixed: Any, h: float, work: Any) -> None:
-    """Advance the pressures of a tile towards their set-points."""
-    for m in range(2 * N_STAGES):
-        pressure, set_point, was = rows[PRESSURE + m], rows[SET_POINT + m], work[WAS + m]
-        for j in range(LANES):
-            time, slew = fixed[TIME_CONSTANT][j], fixed[SLEW_RATE][j]
-            target = max(0.0, min(fixed[MAX_PRESSURE][j], set_point[j]))
-            was[j] = pressure[j]
-            pressure[j] = regulator_step(pressure[j], target, time, 1.0 / time, slew, 1.0 / slew, h)
-
-
-@kernel
 def foresee(rows: Any, fixed: Any, h: float, work: Any) -> None:
-    """Write the predicted middle of a sub-step."""
+    """Write the predicted middle of a sub-step, and the payload of the nominal links."""
+    for j in range(LANES):
+        rows[SHARE][j] = rows[PAYLOAD][j] / fixed[MASS_FACTOR][j]
     for k in range(N_STAGES):
         a, b = 2 * k, 2 * k + 1
         for j in range(LANES):
@@ -138,10 +134,12 @@ def balance(rows: Any, fixed: Any, k: int, h: float, work: Any) -> None:
             rows[STICK + b][j],
         )  # fmt: skip
         torque = stop + disturbance[j] + 0.5 * (old_a + new_a + old_b + new_b)
-        drag = fixed[DAMPING][j] + fixed[JOINT_DAMPING + k][j] + drag_a + drag_b
+        own = fixed[DAMPING_FACTOR][j] * fixed[JOINT_DAMPING + k][j]
+        drag = fixed[DAMPING][j] + own + drag_a + drag_b
         slope = max(0.0, slope + slope_a + slope_b)
-        right[j] = h * (torque - bias[j] - drag * velocity[j])
-        diagonal[j] = diagonal[j] + 0.5 * h * drag + 0.25 * h * h * slope
+        per = 1.0 / fixed[MASS_FACTOR][j]
+        right[j] = h * (per * (torque - drag * velocity[j]) - bias[j])
+        diagonal[j] = diagonal[j] + per * (0.5 * h * drag + 0.25 * h * h * slope)
 
 
 @kernel
@@ -154,7 +152,7 @@ def swing(
         rows, fixed, counts, table, memory, elements, AT, LAG, STICK, 2 * N_STAGES, MODEL,
         STACK_COUNT, MEMBER, 0, LANES,
     )  # fmt: skip
-    chain_terms(rows, fixed, work, MIDDLE, MIDDLE_RATE, PAYLOAD, CHAIN, CHAIN_WORK)
+    chain_terms(rows, fixed, work, MIDDLE, MIDDLE_RATE, SHARE, CHAIN, CHAIN_WORK)
     for k in range(N_STAGES):
         balance(rows, fixed, k, h, work)
     chain_solve(work, CHAIN_WORK)
@@ -167,20 +165,11 @@ def swing(
             velocity[j] = velocity[j] + found[j]
     for k in range(N_STAGES):
         for j in range(LANES):
-            contract(rows, fixed, j, k, rows[ANGLE + k][j])
+            contract(rows, fixed, j, rows[ANGLE + k][j], AT + 2 * k, STRAIGHT)
     remember(
         rows, fixed, counts, table, memory, elements, AT, LAG, 2 * N_STAGES, MODEL, STACK_COUNT,
         MEMBER, 0, LANES,
     )  # fmt: skip
-
-
-@kernel
-def contract(rows: Any, fixed: Any, j: int, k: int, angle: float) -> None:
-    """Write the contractions of joint ``k`` at an angle, as the memories' inputs."""
-    x_a, _, _ = lever_of(fixed, j, angle, 1.0)
-    x_b, _, _ = lever_of(fixed, j, angle, -1.0)
-    straight = rows[STRAIGHT][j]
-    rows[AT + 2 * k][j], rows[AT + 2 * k + 1][j] = x_a - straight, x_b - straight
 
 
 @kernel
@@ -206,7 +195,8 @@ def advance(
     """
     h = period / substeps
     for _ in range(substeps):
-        fill(rows, fixed, h, work)
+        for m in range(2 * N_STAGES):
+            fill(rows[PRESSURE + m], rows[SET_POINT + m], work[WAS + m], fixed, h)
         swing(rows, fixed, counts, table, memory, elements, h, work)
     for j in range(LANES):
         report(rows, fixed, j)
@@ -244,10 +234,7 @@ def report(rows: Any, fixed: Any, j: int) -> None:
 @kernel
 def start_memory(rows: Any, counts: Any, memory: int, j: int) -> None:
     """Put the memories of one lane into their virgin state."""
-    for k in range(len(rows) - memory):
-        rows[memory + k][j] = 0.0
-    for m in range(2 * MOST_STAGES):
-        counts[STACK_COUNT + m][j] = 1
+    clear_memories(rows, counts, memory, STACK_COUNT, 2 * MOST_STAGES, j)
 
 
 @routine
@@ -261,22 +248,28 @@ def begin_lane(
     """
     straight, _, _ = lever_of(fixed, j, 0.0, 1.0)
     rows[STRAIGHT][j] = straight
+    factor = fixed[MASS_FACTOR][j]
+    rows[SHARE][j] = rows[PAYLOAD][j] / factor
     for k in range(N_STAGES):
-        p_a, p_b, _ = feed_forward(fixed, j, rows[COMMAND + k][j], rows[PRESTRESS + k][j])
-        rows[PRESSURE + 2 * k][j] = rows[SET_POINT + 2 * k][j] = p_a
-        rows[PRESSURE + 2 * k + 1][j] = rows[SET_POINT + 2 * k + 1][j] = p_b
+        asked, stress, a = rows[COMMAND + k][j], rows[PRESTRESS + k][j], 2 * k
+        command(rows, fixed, j, asked, stress, COMMAND + k, PRESTRESS + k, SET_POINT + a)
+        rows[PRESSURE + a][j], rows[PRESSURE + a + 1][j] = (
+            rows[SET_POINT + a][j],
+            rows[SET_POINT + a + 1][j],
+        )
         rows[VELOCITY + k][j] = rows[MIDDLE_RATE + k][j] = 0.0
         rows[CHANGE + k][j] = weight_bound(rows, fixed, j, k)
         rows[ANGLE + k][j] = rows[COMMAND + k][j]
     for _ in range(RESTING):
         for k in range(N_STAGES):
             rows[MIDDLE + k][j] = rows[ANGLE + k][j]
-        chain_terms(rows, fixed, work, MIDDLE, MIDDLE_RATE, PAYLOAD, CHAIN, CHAIN_WORK)
+        chain_terms(rows, fixed, work, MIDDLE, MIDDLE_RATE, SHARE, CHAIN, CHAIN_WORK)
         for k in range(N_STAGES):
-            settle(rows, fixed, counts, table, memory, elements, j, k, work[CHAIN_WORK + k][j])
+            weight = factor * work[CHAIN_WORK + k][j]
+            settle(rows, fixed, counts, table, memory, elements, j, k, weight)
     for k in range(N_STAGES):
         rows[CHANGE + k][j] = 0.0
-        contract(rows, fixed, j, k, rows[ANGLE + k][j])
+        contract(rows, fixed, j, rows[ANGLE + k][j], AT + 2 * k, STRAIGHT)
     remember(
         rows, fixed, counts, table, memory, elements, AT, LAG, 2 * N_STAGES, MODEL, STACK_COUNT,
         MEMBER, j, j + 1,
@@ -308,11 +301,11 @@ def moment_beyond(rows: Any, fixed: Any, j: int, i: int) -> float:
         link = CHAIN + GRAVITY_ROWS + LINK_ROWS * k
         moment = moment + fixed[link + MASS][j] * (distance + fixed[link + CENTRE][j])
         distance = distance + fixed[link + LENGTH][j]
-    moment = moment + rows[PAYLOAD][j] * distance
+    moment = moment + rows[SHARE][j] * distance
     gravity = 0.0
     for r in range(GRAVITY_ROWS):
         gravity = gravity + abs(fixed[CHAIN + r][j])
-    return gravity * moment
+    return gravity * fixed[MASS_FACTOR][j] * moment  # type: ignore[no-any-return]
 
 
 @kernel
@@ -322,7 +315,7 @@ def settle(
 ) -> None:  # fmt: skip
     """Move joint ``k`` of a lane towards its rest against a weight's torque [N m]."""
     angle = rows[ANGLE + k][j]
-    contract(rows, fixed, j, k, angle)
+    contract(rows, fixed, j, angle, AT + 2 * k, STRAIGHT)
     peek(
         rows, fixed, counts, table, memory + 2 * k * OPERATOR_ROWS, elements, AT + 2 * k,
         LAG + 2 * k, STICK + 2 * k, 2, MODEL, STACK_COUNT + 2 * k, MEMBER, j, j + 1,

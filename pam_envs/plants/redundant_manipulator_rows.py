@@ -64,11 +64,13 @@ MOST_STAGES = 8
 PRESSURE, SET_POINT, FORCE, CONTRACTION, LAG, AT, STICK = range(
     10 * MOST_STAGES, 24 * MOST_STAGES, 2 * MOST_STAGES
 )
-PAYLOAD, SLACK, AIR, STRAIGHT = range(24 * MOST_STAGES, 24 * MOST_STAGES + 4)
-END = STRAIGHT + 1
+PAYLOAD, SLACK, AIR, STRAIGHT, SHARE = range(24 * MOST_STAGES, 24 * MOST_STAGES + 5)
+"""``SHARE`` is the payload over the links' common factor (see :func:`swing` of the kernels)."""
+END = SHARE + 1
 """First row after the plant's state; the memory's state follows."""
 
-PARAMETERS = MUSCLE_PARAMETERS
+PARAMETERS = (*MUSCLE_PARAMETERS, "arm.mass_factor", "arm.damping_factor")
+MASS_FACTOR, DAMPING_FACTOR = range(len(MUSCLE_PARAMETERS), len(PARAMETERS))
 MODEL = len(PARAMETERS)
 """First row of the memory's operator."""
 JOINT_DAMPING = MODEL + MODEL_ROWS

@@ -36,12 +36,16 @@ class PathEnds:
     start_degrees, end_degrees : tuple of float
     source : str
         Where they come from.
+    calibrated : bool
+        Whether the ends were searched for such that the angles peak as published. The peaks are
+        then inputs, and no evidence for what is computed with them.
     """
 
     name: str
     start_degrees: tuple[float, ...]
     end_degrees: tuple[float, ...]
     source: str
+    calibrated: bool
 
     def angles(self, points: int = POINTS) -> Array:
         """Return the joint angles [rad] of the path, shape (points, n)."""
@@ -55,18 +59,21 @@ PATHS = (
         (-1.21, 0.89, 12.33, -1.26, 4.02, 6.03),
         (0.3, -3.64, 27.76, -22.21, -1.25, 21.02),
         _OURS,
+        True,
     ),
     PathEnds(
         "path_2",
         (-14.39, 12.43, -9.41, 8.2, 27.97, -7.99),
         (-20.95, 21.65, -18.55, -28.0, -7.08, 11.57),
         _OURS,
+        True,
     ),
     PathEnds(
         "path_3",
         (-5.65, 7.18, -12.57, -10.03, -12.03, 7.89),
         (-10.53, 12.52, -26.49, -26.45, -25.94, 21.0),
         "the example worked out for seed 002, section 2",
+        False,
     ),
 )
 """Three paths of the six-joint arm (axes x-y-x-y-x-y, links of 0.25 m, +-30 degrees)."""

@@ -11,7 +11,10 @@ from pam_envs.parameters import parameter
 
 @dataclass(frozen=True)
 class JointTracking:
-    """Weights and limits of one joint (``reward = reward/tracking + reward/effort``)."""
+    """Weights and limits of one joint.
+
+    ``reward = reward/tracking + reward/effort + reward/ended``.
+    """
 
     tracking_weight: float = parameter(
         1.0, "1", 0.0, 1e3, "assumed", "reward per control period at an error of error_scale"
@@ -29,12 +32,16 @@ class JointTracking:
         6.4e5, "Pa", 0.0, 1e7, "assumed", "just below the largest pressure of 6.5 bar"
     )
 
+    def worst(self, largest_error: float) -> float:
+        """Return the most that a control period can cost at an error of at most this [rad]."""
+        return self.tracking_weight * largest_error / self.error_scale + self.effort_weight
+
 
 @dataclass(frozen=True)
 class PathTracking:
     """Weights and limits of a chain of joints whose tool follows a path.
 
-    ``reward = reward/position + reward/pointing + reward/effort``.
+    ``reward = reward/position + reward/pointing + reward/effort + reward/ended``.
     """
 
     position_weight: float = parameter(
@@ -58,6 +65,11 @@ class PathTracking:
     soft_pressure: float = parameter(
         6.4e5, "Pa", 0.0, 1e7, "assumed", "just below the largest pressure of 6.5 bar"
     )
+
+    def worst(self, reach: float) -> float:
+        """Return the most that a control period can cost an arm of this length [m]."""
+        off = self.position_weight * 2.0 * reach / self.position_scale
+        return off + self.pointing_weight * 2.0 / self.pointing_scale + self.effort_weight
 
 
 @kernel

@@ -7,11 +7,11 @@ import copy
 import numpy as np
 import pytest
 
-from baselines.catalogue import CONTROLLERS
-from baselines.joint_catalogue import JOINT, JOINT_CONTROLLERS, JOINT_MAKERS
+from baselines.catalogue import CONTROLLERS, make_controller
+from baselines.joint_catalogue import ARM, JOINT, JOINT_CONTROLLERS, JOINT_MAKERS
 from baselines.joint_gravity import Gravity
 from baselines.joint_poles import FREQUENCIES, phase
-from baselines.joint_view import make_joint_eyes
+from baselines.joint_view import make_joint_signal_map
 from benchmarks.joint_studies import (
     ACTIONS,
     DEGREE,
@@ -21,11 +21,13 @@ from benchmarks.joint_studies import (
     controller,
     run,
 )
+from pam_envs.envs import antagonistic_joint, redundant_manipulator
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.antagonistic_joint import AntagonisticJoint
+from pam_envs.plants.redundant_manipulator import RedundantManipulator
 
-BOUND = ("joint_mfc_mu_gravity",)
-"""Need a plant that knows its weight."""
+BOUND = [n for n in JOINT_CONTROLLERS if n.endswith(("_gravity", "_ahead", "_kinematics"))]
+"""Need a plant that knows its weight, or its chain."""
 NAMES = [name for name in JOINT_CONTROLLERS if name not in BOUND]
 RIG = ReducedRig()
 
@@ -57,7 +59,8 @@ def test_catalogue_and_makers_name_the_same():
     assert set(JOINT_CONTROLLERS) == set(JOINT_MAKERS)
     for name, entry in JOINT_CONTROLLERS.items():
         assert CONTROLLERS[name] is entry
-        assert entry.envs == JOINT and entry.summary
+        assert entry.envs == (ARM if name == "joint_inverse_kinematics" else JOINT)
+        assert entry.summary
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -105,10 +108,56 @@ def test_two_joints_are_two_single_ones(name):
             assert actions[k].decode(both) == pytest.approx(float(action[0]), abs=1e-6)
 
 
+SETUPS = {
+    JOINT[0]: (AntagonisticJoint.paper, antagonistic_joint.make_setup),
+    JOINT[1]: (RedundantManipulator.paper, redundant_manipulator.make_setup),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "env"), [(n, e) for n in BOUND for e in JOINT_CONTROLLERS[n].envs]
+)
+def test_rows_are_single_runs_on_the_plants_themselves_whatever_is_observed(name, env):
+    plant, setup = SETUPS[env][0](), SETUPS[env][1]()
+    made = make_controller(name, plant, setup.signals, setup.action_signals)
+    seen = np.random.default_rng(3).uniform(-1.0, 1.0, (6, 2, len(setup.signals))).astype("f4")
+    state, alone = None, [None, None]
+    for batch in seen:
+        actions, state = made.predict(batch, state)
+        assert actions.shape == (2, plant.stages) and np.all(np.abs(actions) <= 1.0)
+        for i, row in enumerate(batch):
+            action, alone[i] = made.predict(row, alone[i])
+            np.testing.assert_array_equal(action, actions[i])
+
+
+def test_joint_without_a_chain_has_no_inverse_kinematics():
+    setup = antagonistic_joint.make_setup()
+    with pytest.raises(ValueError, match="is for a RedundantManipulator"):
+        told = (setup.signals, setup.action_signals)
+        make_controller("joint_inverse_kinematics", AntagonisticJoint.paper(), *told)
+
+
+def test_arm_without_a_plan_is_refused_and_the_remedy_named():
+    setup = redundant_manipulator.make_setup(plan=False)
+    with pytest.raises(ValueError, match="make the environment with plan=True"):
+        make_joint_signal_map(setup.signals, setup.action_signals)
+
+
+def test_inverse_kinematics_needs_no_plan():
+    setup = redundant_manipulator.make_setup(plan=False)
+    told = (setup.signals, setup.action_signals)
+    made = make_controller("joint_inverse_kinematics", RedundantManipulator.paper(), *told)
+    assert made.limit == RedundantManipulator.paper().angle_range[1]
+    nowhere = np.zeros(len(setup.signals), np.float32)  # a pose without a direction
+    action, state = made.predict(nowhere)
+    np.testing.assert_array_equal(action, np.zeros(6))
+    assert state.missed[0] == 1
+
+
 def test_other_actions_are_refused():
     actions = Signals([Signal("pressure_a_set_point", "Pa", 0.0, 6e5, 0)])
     with pytest.raises(ValueError, match="action='angle'"):
-        make_joint_eyes(SIGNALS, actions)
+        make_joint_signal_map(SIGNALS, actions)
 
 
 def test_co_contraction_is_held_where_it_is():
@@ -116,8 +165,8 @@ def test_co_contraction_is_held_where_it_is():
     signals = Signals(Signal(n, "", -1.0, 99.0, k, False) for k, n in enumerate(names))
     low, high = 20.0, 120.0
     actions = Signals([ACTIONS[0], Signal("prestress", "N", low, high, 1)])
-    eyes = make_joint_eyes(signals, actions)
-    action = eyes.act(np.array([[0.1]]), np.array([0.0, 0.0, 0.0, 45.0]))
+    made = make_joint_signal_map(signals, actions)
+    action = made.write(np.array([[0.1]]), np.array([0.0, 0.0, 0.0, 45.0]))
     assert actions[1].decode(action) == pytest.approx(45.0)
 
 
@@ -131,7 +180,9 @@ def test_joint_held_off_limits_comes_back_without_windup(name):
     assert np.max(np.abs(fallen - 5.0 * DEGREE)) < 1.0 * DEGREE
 
 
-@pytest.mark.parametrize("name", ["joint_pi", "joint_pi_slow", "joint_pid", "joint_mfc_mu"])
+@pytest.mark.parametrize(
+    "name", ["joint_pi", "joint_pi_slow", "joint_pid", "joint_pid_smooth", "joint_mfc_mu"]
+)
 def test_start_at_rest_elsewhere_has_no_bump(name):
     made, command = controller(name, RIG), 12.0 * DEGREE
     rest = float(RIG.rest_angles(np.array([command]))[0])

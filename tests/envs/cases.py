@@ -157,8 +157,8 @@ OWN: dict[str, dict[str, dict[str, Any]]] = {
         "pressures": {
             "action": "pressures",
             "reference": "path_3",
-            "payload": [0.0, 0.1, 0.3],
-            "payload_change": 0.1,
+            "payload": [0.0, 0.01, 0.02],
+            "payload_change": 0.01,
             "plan": False,
             "preview": 0,
         },

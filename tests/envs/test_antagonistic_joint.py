@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pam_envs.plants.antagonistic_joint import AntagonisticJoint
+from pam_envs.plants.bearing import UnbearableLoad
 
 NAME = "PAM/AntagonisticJoint-v0"
 STILL: dict[str, Any] = {
@@ -155,6 +156,15 @@ def test_the_mechanical_stop_ends_the_episode() -> None:
         if ended:
             break
     assert ended
+
+
+def test_angles_that_the_weight_does_not_allow_are_refused_when_it_is_made() -> None:
+    with pytest.raises(UnbearableLoad, match=r"needs 0.184 N m at -30.0 degrees .* exert 0 N m"):
+        make(reference="sine", amplitude=math.radians(30.0))
+    make(reference="sine", amplitude=math.radians(29.0))
+    with pytest.raises(UnbearableLoad, match=r"with 2 kg of payload .* payload of 1.01 kg or"):
+        make(reference=[math.radians(28.0)], payload=[0.0, 1.0], payload_change=1.0)
+    make(reference=[math.radians(28.0)], payload=0.5)
 
 
 def test_references_that_are_the_joints_own() -> None:

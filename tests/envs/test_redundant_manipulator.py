@@ -10,16 +10,17 @@ import numpy as np
 import pytest
 
 from pam_envs.envs.manipulator_layout import POSE
-from pam_envs.envs.manipulator_paths import DRAWN, paths_for
+from pam_envs.envs.manipulator_paths import DRAWN, USUAL_PAYLOAD, paths_for
 from pam_envs.mechanics.redundancy import UnreachablePose
 from pam_envs.mechanics.serial_chain import SerialChain
+from pam_envs.plants.bearing import UnbearableLoad, bearable_payload
 from pam_envs.plants.redundant_manipulator import RedundantManipulator
 from pam_envs.references.path import PATHS
 
 NAME = "PAM/RedundantManipulator-v0"
 PLANT = RedundantManipulator.paper()
 LIGHT = RedundantManipulator.paper(
-    chain=SerialChain.uniform(mass=0.1, gravity=(0.0, 0.0, 0.0)), memory__width=0.0
+    chain=SerialChain.uniform(gravity=(0.0, 0.0, 0.0)), memory__width=0.0
 )
 """Without memory and weight: set-points are the angles at rest."""
 
@@ -172,7 +173,7 @@ def test_twelve_pressures_are_actions() -> None:
 
 
 def test_a_joint_at_its_stop_ends_the_episode() -> None:
-    env = make(action="pressures", payload=0.5)
+    env = make(action="pressures", payload=0.1)
     env.reset(seed=0)
     ended = False
     for _ in range(400):
@@ -193,7 +194,7 @@ def test_a_joint_at_its_stop_ends_the_episode() -> None:
         ({"weighted": "yes"}, "weighted = 'yes'"),
         ({"path_seconds": 0.0}, "path_seconds = 0.0"),
         ({"rest_seconds": -1.0}, "rest_seconds"),
-        ({"payload": 0.8}, "from 0 to 0.5 kg"),
+        ({"payload": 0.8}, "from 0 to 0.1 kg"),
         ({"reference": np.zeros((4, 5))}, r"shape \(4, 5\); give from 2 to 10000 finite poses"),
         ({"reference": np.zeros((1, 6))}, "from 2 to"),
         ({"randomize": {"link.stop": (0.6, 0.61)}}, "can be drawn"),
@@ -204,10 +205,80 @@ def test_bad_arguments(arguments: dict[str, Any], said: str) -> None:
         gym.make(NAME, **arguments)
 
 
-def test_no_drawn_plan_leaps_from_one_pose_to_the_next() -> None:
-    paths = paths_for(PLANT.chain, PLANT.angle_range[1], "drawn", weighted=True)
-    angles = paths.reshape(DRAWN, 6 + PLANT.stages, -1)[:, 6:]
-    leaps = np.abs(np.diff(angles, axis=2)).max(axis=(1, 2))
-    moved = np.ptp(angles, axis=2).max(axis=1)
-    assert (leaps < 0.2 * moved + 1e-3).all()
-    assert len(np.unique(paths[:, 0])) > 6 * DRAWN  # no path twice
+@pytest.mark.parametrize("make_arm", [RedundantManipulator.paper, RedundantManipulator.measured])
+def test_drawn_plans_do_not_leap_and_are_borne(make_arm: Any) -> None:
+    arm = make_arm("none")
+    paths = paths_for(arm, "drawn", weighted=True)
+    assert len(paths) == DRAWN
+    for path in paths.values():
+        angles = path[6:].T
+        moved = np.ptp(angles, axis=0).max()
+        assert np.abs(np.diff(angles, axis=0)).max() < 0.2 * moved + 1e-3
+        assert np.abs(angles).max() < arm.link.limit
+        assert bearable_payload(arm, angles) >= USUAL_PAYLOAD
+    ends = {path[:3, -1].tobytes() for path in paths.values()}
+    assert len(ends) == DRAWN  # no path twice
+
+
+def test_the_measured_arm_says_which_paths_it_takes() -> None:
+    arm = RedundantManipulator.measured()
+    with pytest.raises(ValueError, match=r"end at 20\.1 degrees .* take reference = 'drawn'"):
+        gym.make(NAME, plant=arm)
+    gym.make(NAME, plant=arm, reference="drawn").reset(seed=0)
+
+
+def test_a_payload_that_is_not_borne_names_pose_joint_and_torques() -> None:
+    said = (
+        r"path_3, pose 40: with 0.05 kg of payload joint 2 needs 1.58 N m at -27.8 degrees and "
+        r"its muscles exert 1.49 N m there at most; give it a payload of 0.0367 kg or less"
+    )
+    with pytest.raises(UnbearableLoad, match=said):
+        make(reference="path_3", payload=0.05)
+    with pytest.raises(UnbearableLoad, match=r"with 0.05 kg"):
+        make(reference="paths", payload=[0.0, 0.03], payload_change=0.02)
+    with pytest.raises(UnbearableLoad, match=r"with 0.05 kg"):  # nor is it hidden by another plan
+        make(reference="path_3", payload=0.05, weighted=False)
+    make(reference="path_1", payload=0.05, payload_change=0.05)
+    with pytest.raises(UnbearableLoad, match="nor is it borne without a payload"):
+        make(plant=RedundantManipulator.paper(chain=SerialChain.uniform(mass=0.3)))
+
+
+def test_any_payload_means_any_that_the_paths_bear() -> None:
+    env = make(reference="path_3", payload=None, payload_change=0.01)
+    drawn = {env.reset(seed=seed)[1]["state/payload"] for seed in range(40)}
+    plan = paths_for(PLANT, "path_3", weighted=True)["path_3"][6:].T
+    assert len(drawn) == 6
+    assert max(drawn) == pytest.approx(bearable_payload(PLANT, plan) - 0.01, abs=1e-12)
+
+
+def test_rates_are_of_the_sensed_angles() -> None:
+    env, twin = make(plant=PLANT.without_noise()), make()
+    observation, _ = env.reset(seed=0)
+    twin.reset(seed=0)
+    smooth, last, noise, shown = np.zeros(6), None, [], []
+    for k in range(60):
+        action = np.full(6, 0.02 * min(k, 12), np.float32)
+        observation, *_, info = env.step(action)
+        angles, rates = vector(info, "sensor/angle"), vector(info, "sensor/rate")
+        if last is not None:
+            smooth = smooth + 0.01 / 0.04 * ((angles - last) / 0.01 - smooth)
+            assert np.allclose(rates, smooth, atol=1e-9)
+        else:
+            smooth = rates
+        shown = [float(env.signals.decode(observation, f"rate_{k}")) for k in range(6)]
+        assert np.allclose(shown, rates, atol=1e-5)
+        noise.append(vector(twin.step(action)[4], "sensor/rate") - rates)
+        last = angles
+    single = PLANT.angle.noise * math.sqrt(2.0) / 0.01  # of the difference of two readings
+    assert 0.1 * single < np.std(noise[10:]) < 0.3 * single
+
+
+def test_resting_says_when_the_path_rests() -> None:
+    env = make(path_seconds=0.3, rest_seconds=0.2)
+    infos = follow(env, 1.2)
+    places = np.array([pose(info, "reference_") for info in infos])
+    still = np.array([info["state/resting"] for info in infos])
+    assert set(still) == {0.0, 1.0}
+    moved = np.abs(np.diff(places, axis=0)).max(axis=1) > 0.0
+    assert not (moved & (still[1:] == 1.0) & (still[:-1] == 1.0)).any()
+    assert moved[(still[1:] == 0.0)].all()

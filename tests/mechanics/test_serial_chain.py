@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pam_envs.kernels import COMPILED, build, interpreted, kernel
-from pam_envs.mechanics.serial_chain import STANDARD_GRAVITY, SerialChain
+from pam_envs.mechanics.serial_chain import FORM, STANDARD_GRAVITY, SerialChain
 from pam_envs.mechanics.serial_chain_dynamics import chain_solve, chain_terms
 from pam_envs.mechanics.serial_chain_kinematics import place_chain
 from pam_envs.mechanics.serial_chain_rows import (
@@ -118,10 +118,28 @@ def test_equations_of_motion_are_lagrange_s(chain: SerialChain) -> None:
     np.testing.assert_allclose(at_rest, potential, atol=1e-8)
 
 
+@CHAINS
+def test_weights_of_many_poses_are_those_of_each(chain: SerialChain) -> None:
+    poses = np.stack([drawn(chain, seed)[0] for seed in range(6)]).reshape(2, 3, -1)
+    masses = np.array([[0.0, 0.1, 0.5], [1.0, 0.2, 0.3]])
+    together = chain.gravity_torque(poses, masses)
+    for k in np.ndindex(2, 3):
+        np.testing.assert_allclose(
+            together[k], chain.gravity_torque(poses[k], masses[k]), atol=1e-12
+        )
+    twice = chain.heavier(2.0)
+    np.testing.assert_allclose(
+        twice.gravity_torque(poses), 2.0 * chain.gravity_torque(poses), atol=1e-12
+    )
+    np.testing.assert_allclose(
+        twice.mass_matrix(poses[0, 0]), 2.0 * chain.mass_matrix(poses[0, 0]), atol=1e-12
+    )
+
+
 def test_a_hanging_arm_comes_back_and_a_lying_one_sags() -> None:
     bent = np.array([0.2, 0, 0, 0, 0, 0])
     torque = PAPER.gravity_torque(bent)[0]
-    weight = 6 * 0.5 * STANDARD_GRAVITY
+    weight = 6 * FORM.mass * STANDARD_GRAVITY
     assert torque == pytest.approx(weight * 0.75 * np.sin(0.2), rel=1e-12)
     lying = dataclasses.replace(PAPER, gravity=(0.0, -STANDARD_GRAVITY, 0.0))
     assert lying.gravity_torque(np.zeros(6))[0] == pytest.approx(-weight * 0.75, rel=1e-12)

@@ -44,8 +44,27 @@ def test_straight_poses_are_straight() -> None:
     np.testing.assert_allclose(turns, turns[0], atol=1e-14)
 
 
-def test_every_figure_passes() -> None:
-    found = [f for group in figures.GROUPS if group is not figures.rate for f in group()]
-    assert [f.name for f in found if f.passed is False] == []
-    assert len([f for f in found if f.passed]) == 15
-    assert figures.rate()[0].passed is None  # a speed is reported, not asserted
+def test_calibrated_paths_are_inputs_and_the_known_one_is_judged() -> None:
+    found = {f.name: f for group in figures.GROUPS for f in group()}
+    assert [name for name, f in found.items() if f.passed is False] == []
+    given = {name for name, f in found.items() if f.given}
+    assert len(given) == 6
+    assert all(name.startswith(("path_1", "path_2")) for name in given)
+    assert all(found[name].verdict == "input" for name in given)
+    assert {n for n, f in found.items() if f.passed and "median iterations" in n} == {
+        f"path_{k}: median iterations" for k in (1, 2, 3)
+    }
+    judged = [n for n, f in found.items() if f.passed and "largest angle" in n]
+    assert judged == ["path_3, unweighted: largest angle", "path_3, weighted: largest angle"]
+
+
+def test_of_freely_drawn_paths_a_ninth_crosses_the_limit_and_with_the_weight_none() -> None:
+    found = figures.held_out()
+    assert found.paths == 500
+    assert found.crossed == pytest.approx(0.112)
+    assert found.crossed_weighted == 0.0
+    assert found.leapt < found.leapt_weighted == pytest.approx(0.26)
+    assert found.iterations <= 16
+    other = figures.held_out(number=100, seed=1)
+    assert 0.0 < other.crossed < 0.25
+    assert other.crossed_weighted == 0.0

@@ -260,7 +260,7 @@ def test_the_assumed_stretch_says_so() -> None:
     [
         ({"link__stop": 0.64, "lever__l_u": 0.12, "lever__l_o": 0.12}, "lever arm"),
         ({"link__limit": 0.6, "link__stop": 0.55}, "limit"),
-        ({"link__inertia": 1e-4}, "sub-steps"),
+        ({"link__gyration": 0.018}, "sub-steps"),
         ({"muscle__area": 1.0}, "outside its bounds"),
         ({"nothing__here": 1.0}, "no parameter"),
     ],

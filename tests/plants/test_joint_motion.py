@@ -171,6 +171,30 @@ def test_energy_is_lost_in_free_motion() -> None:
     assert abs(made["angle"][-1]) < 0.02 * DEGREE
 
 
+def test_a_slow_push_and_back_loses_work_to_the_memory() -> None:
+    """Viscosity takes work in proportion to the speed, friction the same however slow it is."""
+    dry, viscous = {}, {}
+    for kind in KINDS:
+        lost = []
+        for periods in (400, 800):
+            shoves = 3.0 * np.sin(2.0 * np.pi * np.arange(2 * periods) / periods)
+            plant = AntagonisticJoint.paper(kind)
+            angle = simulate_joint(plant, np.zeros(2 * periods), disturbance=shoves)["angle"]
+            mean = 0.5 * (shoves[periods:] + shoves[periods - 1 : -1])
+            lost.append(float(mean @ np.diff(angle[periods - 1 :])))
+        dry[kind], viscous[kind] = 2.0 * lost[1] - lost[0], 2.0 * (lost[0] - lost[1])
+    assert min(viscous.values()) > 0.0
+    assert abs(dry["none"]) < 0.05 * viscous["none"]
+    assert dry["maxwell_slip"] > 0.5 * viscous["none"]
+    assert dry["preisach"] == pytest.approx(dry["maxwell_slip"], rel=0.05)
+
+
+def test_a_heavier_link_keeps_its_form() -> None:
+    light, heavy = (AntagonisticJoint.paper(link__mass=m).link for m in (0.2, 0.4))
+    assert heavy.inertia == pytest.approx(2.0 * light.inertia)
+    assert AntagonisticJoint.paper().link.inertia == pytest.approx(0.3 * 0.25**2 / 3.0)
+
+
 def test_a_slack_muscle_has_no_force_and_is_reported() -> None:
     plant = AntagonisticJoint.paper()
     made = simulate_joint(plant, np.zeros(60), pressures=(np.full(60, 6e5), np.zeros(60)))

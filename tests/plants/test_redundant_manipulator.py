@@ -57,7 +57,7 @@ def test_torques_are_those_of_forces_and_levers() -> None:
 
 
 def test_without_gravity_the_feed_forward_has_gain_one() -> None:
-    chain = SerialChain.uniform(mass=0.1, gravity=(0.0, 0.0, 0.0))
+    chain = SerialChain.uniform(gravity=(0.0, 0.0, 0.0))
     plant = RedundantManipulator.paper("none", chain)
     made = simulate_manipulator(plant, np.tile(POSE, (2, 1)))
     assert np.allclose(made["angle"][-1], POSE, atol=1e-9)
@@ -157,6 +157,24 @@ def test_sub_steps_converge_at_second_order(kind) -> None:  # type: ignore[no-un
     assert np.abs(angles(4) - fine).max() < 0.02 * DEGREE
 
 
+def test_common_factors_are_those_of_all_links_and_of_all_joints() -> None:
+    """A factor of all masses is a heavier chain; the payload has none."""
+    commands, factor = steps(40, 20.0 * DEGREE), 1.3
+    plain = RedundantManipulator.paper("maxwell_slip", link__damping=0.1)
+    drawn = plain.replace({"arm.mass_factor": factor, "arm.damping_factor": 0.6})
+    heavy = RedundantManipulator.paper("maxwell_slip", plain.chain.heavier(factor))
+    damping = tuple(0.6 * d for d in plain.joint_damping)
+    heavy = dataclasses.replace(heavy.replace({"link.damping": 0.1}), joint_damping=damping)
+    assert np.allclose(drawn.chain.rows(), heavy.chain.rows(), rtol=1e-15)
+    assert drawn.joint_damping == plain.joint_damping
+    one, other, light = (
+        simulate_manipulator(arm, commands, payload=0.1)["angle"] for arm in (drawn, heavy, plain)
+    )
+    assert np.abs(one - other).max() < 1e-9
+    assert np.abs(one - light).max() > 0.5 * DEGREE
+    assert np.array_equal(drawn.gravity_shift(POSE, 0.1), heavy.gravity_shift(POSE, 0.1))
+
+
 def test_joints_are_coupled() -> None:
     plant = RedundantManipulator.paper("none")
     commands = np.zeros((30, 6))
@@ -172,7 +190,7 @@ def test_the_measured_arm_is_limited_by_its_base() -> None:
     assert math.degrees(limit) == pytest.approx(20.1, abs=0.05)
     assert limit < AntagonisticJoint.measured().link.limit
     assert plant.reachable_angle(payload=0.1) < limit
-    floating = SerialChain.uniform(mass=0.1, gravity=(0.0, 0.0, 0.0))
+    floating = SerialChain.uniform(gravity=(0.0, 0.0, 0.0))
     assert RedundantManipulator.measured("none", floating).link.limit > limit
 
 
@@ -201,6 +219,7 @@ def test_the_column_is_parameters_memory_damping_chain() -> None:
         assert column[M.place(name)] == plant.value(name)
     assert tuple(column[M.JOINT_DAMPING : M.JOINT_DAMPING + 6]) == plant.joint_damping
     assert np.array_equal(column[M.CHAIN :], plant.chain.rows())
+    assert plant.chain == SerialChain.uniform()
     assert plant.stage().rest_angles([0.1])[0] == plant.rest_angles([0.1])[0]
 
 

@@ -19,6 +19,7 @@ LIMIT = np.deg2rad(30.0)
 
 def test_presets_are_lines_of_six_joints_within_their_limits() -> None:
     assert [path.name for path in PATHS] == ["path_1", "path_2", "path_3"]
+    assert [path.calibrated for path in PATHS] == [True, True, False]
     for path in PATHS:
         angles = path.angles()
         assert angles.shape == (POINTS, 6)

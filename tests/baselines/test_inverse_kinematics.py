@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.redundancy import POSE, PoseFollower, compare
+from baselines.redundancy import POSE, InverseKinematics, compare
 from pam_envs.mechanics.redundancy import LIMIT, UnreachablePose, resolve
 from pam_envs.mechanics.serial_chain import SerialChain
 from pam_envs.parameters import Signal, Signals
@@ -34,7 +34,7 @@ def test_set_points_are_those_of_the_plan() -> None:
     line = PATH.angles()
     poses = ARM.pose(line)
     planned = resolve(ARM, poses, start=line[0])
-    follower, state = PoseFollower(ARM, SIGNALS, ACTIONS), None
+    follower, state = InverseKinematics(ARM, SIGNALS, ACTIONS), None
     for k in range(40):
         seen = observation(line[0], poses[k], poses[k + 1])
         action, state = follower.predict(seen, state)
@@ -47,7 +47,7 @@ def test_previews_are_aimed_at() -> None:
     line = PATH.angles()
     poses = ARM.pose(line[:2])
     seen = observation(line[0], poses[0], poses[1])
-    action, _ = PoseFollower(ARM, SIGNALS, ACTIONS, ahead=1).predict(seen)
+    action, _ = InverseKinematics(ARM, SIGNALS, ACTIONS, ahead=1).predict(seen)
     wanted = resolve(ARM, poses[1:], start=line[0]).angles[0]
     np.testing.assert_allclose(set_points(action), wanted, atol=1e-6)
 
@@ -55,7 +55,7 @@ def test_previews_are_aimed_at() -> None:
 def test_rows_of_a_batch_are_on_their_own() -> None:
     lines = [path.angles() for path in PATHS]
     poses = [ARM.pose(line) for line in lines]
-    follower = PoseFollower(ARM, SIGNALS, ACTIONS, weighted=False)
+    follower = InverseKinematics(ARM, SIGNALS, ACTIONS, weighted=False)
     state, alone = None, [None] * 3
     for k in range(4):
         rows = [observation(q[0], p[k], p[k]) for q, p in zip(lines, poses, strict=True)]
@@ -69,7 +69,7 @@ def test_rows_of_a_batch_are_on_their_own() -> None:
 def test_a_pose_out_of_reach_leaves_the_set_points_and_is_counted() -> None:
     line = PATH.angles()
     good, far = ARM.pose(line[0]), np.array([0.0, 0.0, 1.7, 0.0, 0.0, 1.0])
-    follower = PoseFollower(ARM, SIGNALS, ACTIONS)
+    follower = InverseKinematics(ARM, SIGNALS, ACTIONS)
     first, state = follower.predict(observation(line[0], good, good))
     held, state = follower.predict(observation(line[0], far, far), state)
     np.testing.assert_array_equal(held, first)
