@@ -97,10 +97,12 @@ def _preset(chain: SerialChain, limit: float, name: str, weighted: bool) -> Arra
     try:
         return planned(chain, poses_of(chain, line), limit, weighted)
     except UnreachablePose as error:
-        raise ValueError(
-            f"reference: {name} is out of reach of this arm, whose joints end at "
-            f"{np.degrees(limit):.1f} degrees ({error}); take reference = 'drawn', whose paths "
-            "are made for the arm, or give poses"
+        hint = (
+            f"; reference {name!r} is not for this arm: take 'drawn', whose paths are made for it, "
+            "or give poses"
+        )
+        raise UnreachablePose(
+            error.index, error.pose, error.distance, error.turn, limit, hint
         ) from error
 
 

@@ -20,13 +20,16 @@ def draw_payload(
     rows: Any, key_a: int, key_b: int, stream: int, payloads: Any, number: int, change: float,
     seconds: float, told: int, payload: int, j: int,
 ) -> None:  # fmt: skip
-    """Draw the payload [kg] of lane ``j``, and when and by how much it changes: up or down."""
+    """Draw the payload [kg] of lane ``j``, and when and by how much it changes.
+
+    Up or down as likely, but up where there is less than the change.
+    """
     mass = payloads[int(uniform(key_a, key_b, stream, 0) * number)]
     rows[told][j] = rows[payload][j] = mass
     when = EARLIEST + (LATEST - EARLIEST) * uniform(key_a, key_b, stream, 1)
     rows[told + 1][j] = seconds * when
-    down = uniform(key_a, key_b, stream, 2) < 0.5
-    rows[told + 2][j] = max(-mass, -change) if down else change
+    down = uniform(key_a, key_b, stream, 2) < 0.5 and mass >= change
+    rows[told + 2][j] = -change if down else change
 
 
 @kernel

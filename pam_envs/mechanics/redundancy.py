@@ -46,7 +46,9 @@ class UnreachablePose(ValueError):
         From the pose's direction to that of the nearest one found [rad].
     """
 
-    def __init__(self, index: int, pose: Array, distance: float, turn: float, limit: float) -> None:
+    def __init__(
+        self, index: int, pose: Array, distance: float, turn: float, limit: float, hint: str = ""
+    ) -> None:
         self.index, self.pose, self.distance, self.turn = index, pose, distance, turn
         where = ", ".join(f"{v:.4g}" for v in pose[:3])
         along = ", ".join(f"{v:.4g}" for v in pose[3:])
@@ -59,7 +61,7 @@ class UnreachablePose(ValueError):
                 f"and {np.rad2deg(turn):.2f} degrees away; bring the path nearer to the middle of "
                 "the workspace, or turn its direction along the bent arm"
             )
-        super().__init__(f"pose {index} at ({where}) m, pointing along ({along}), {answer}")
+        super().__init__(f"pose {index} at ({where}) m, pointing along ({along}), {answer}{hint}")
 
 
 @dataclass(frozen=True)

@@ -141,6 +141,18 @@ def test_a_payload_is_told_and_its_change_is_not() -> None:
     assert 120 <= at <= 281
 
 
+@pytest.mark.parametrize(("payload", "ends"), [(0.0, {0.25}), (0.1, {0.35}), (0.5, {0.25, 0.75})])
+def test_less_than_the_change_can_only_become_more(payload: float, ends: set[float]) -> None:
+    env = make(payload=payload, payload_change=0.25, episode_seconds=1.0)
+    found = set()
+    for seed in range(12):
+        env.reset(seed=seed)
+        for _ in range(100):
+            info = env.step(np.zeros(1, np.float32))[4]
+        found.add(round(info["state/payload"], 12))
+    assert found == ends
+
+
 def test_a_payload_hangs_down() -> None:
     bare, loaded = (run(make(payload=p), [0.3], 2.0)["output"][-1] for p in (0.0, 1.0))
     assert 0.0 < loaded < bare - 0.01
