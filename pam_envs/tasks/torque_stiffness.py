@@ -47,7 +47,7 @@ class TorqueStiffness:
         0.0,
         1e3,
         "assumed",
-        "an error of 1 N m/rad costs as much as one of 0.2 N m: the torque that it is off by 0.2 rad "
+        "1 N m/rad costs as much as 0.2 N m: the torque that it is off by 0.2 rad "
         "away, the angle of the headline of the tracks",
     )
     stiffness_scale: float = parameter(
