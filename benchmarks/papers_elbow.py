@@ -239,7 +239,7 @@ def loop_share(plant: Any, pressure: float) -> float:
 
 
 def small_motions() -> list[Figure]:
-    """What a hand meets over a degree, where the threads stick, beside the stiffness by the law."""
+    """Stiffness over a degree, where the threads stick, beside that of the law."""
     where, lines = f"{SOURCE}, Eq. (22)", list[Figure]()
     text = note("predicted", "from the angle of the last turn", "the law's is with no memory")
     for kind in ("none", "maxwell_slip", "preisach"):

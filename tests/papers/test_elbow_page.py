@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pytest
 
+import pam_envs  # noqa: F401 (registers)
+from baselines.catalogue import make_controller
 from benchmarks import papers_elbow as figures
+from benchmarks.rollout import run
 from tests.test_readme import run_snippets
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -77,6 +82,20 @@ def test_what_a_hand_meets_in_a_small_motion() -> None:
         met = figures.stiffness_of_a_degree(kind, 2e5, np.radians(57.0))
         assert row(first) == [f"{met:.1f} N m/rad"]
         assert f"{met:.1f}" in other
+
+
+@pytest.mark.parametrize("name", ["elbow_pid", "elbow_pid_memory", "elbow_allocation"])
+def test_the_table_of_the_environments_page_roughly(name: str) -> None:
+    """One of the four episodes that a cell is the mean of."""
+    env: Any = gym.make("PAM/ElbowOrthosis-v0", reference="free", motion="sines",
+                        episode_seconds=6.0).unwrapped  # fmt: skip
+    controller = make_controller(name, env.plant, env.signals, env.action_signals)
+    signals = run(env, controller, 801).signals
+    error = (np.asarray(signals["output"]) - np.asarray(signals["reference"]))[100:]
+    other = (DOCS / "envs" / "elbow_orthosis.md").read_text()
+    line = re.findall(rf"^\| `{name}` \|(.*)\|$", other, re.MULTILINE)[1]
+    told = float(line.split("|")[2].split(",")[0])
+    assert float(np.sqrt(np.mean(error**2))) == pytest.approx(told, rel=0.3)
 
 
 def test_what_does_not_reproduce() -> None:
