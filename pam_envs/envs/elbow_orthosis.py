@@ -25,7 +25,7 @@ Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=F
 | then | stiffness_reference_1 .., along the intended motion | N m/rad | 0 .. 15 |
 
 More muscles than three and seven can do more: torque and stiffness then reach further, up to what
-full bundles do (:func:`signal_ranges`).
+full bundles do (:func:`~pam_envs.envs.elbow_ranges.signal_ranges`).
 
 Action: pressure_a_set_point and pressure_b_set_point, 0 .. 6e5 Pa; with on/off valves pulse_a and
 pulse_b, -0.05 .. 0.05 s, of which one in 50 ms is taken, positive to fill; or torque and stiffness.
@@ -54,10 +54,11 @@ from numpy.typing import NDArray
 from pam_envs.envs import elbow_layout as L
 from pam_envs.envs.arguments import common, plant_of, reference_of, spread_of, task_of
 from pam_envs.envs.elbow_kernels import kernels_for
+from pam_envs.envs.elbow_ranges import largest_errors, signal_ranges
 from pam_envs.envs.plant_env import PlantEnv
 from pam_envs.envs.setup import Setup, check_choice, check_number, compose
 from pam_envs.envs.vector_env import PlantVectorEnv
-from pam_envs.parameters import Signal, Signals, declarations
+from pam_envs.parameters import Signal, Signals
 from pam_envs.plants import elbow_orthosis_rows as R
 from pam_envs.plants.elbow_orthosis import MAKES, ElbowOrthosis, Valves
 from pam_envs.plants.memory import Kind
@@ -65,9 +66,6 @@ from pam_envs.references.reaches import MOTIONS
 from pam_envs.tasks.torque_stiffness import MIXED, OBJECTS, WEIGHT, TorqueStiffness
 
 ANGLES, RATES = (-0.2, 2.4), (-10.0, 10.0)
-LEAST_RANGES, ROUND = (30.0, 15.0), 5.0
-"""Torque [N m] and stiffness [N m/rad] that the signals reach at least, and a multiple of which
-they do."""
 MARGIN = math.radians(5.0)
 """References of motion stay this far [rad] within the range, or more."""
 NOT_DRAWN = (
@@ -151,19 +149,6 @@ def _commands(plant: ElbowOrthosis) -> tuple[str, str, float, float]:
     return "set_point", "Pa", 0.0, plant.full_pressure
 
 
-def signal_ranges(plant: ElbowOrthosis) -> tuple[float, float]:
-    """Return the largest torque [N m] and stiffness [N m/rad] that signals can show.
-
-    The largest at any corner of the pressures, rounded up: nothing that the nominal bundles can do
-    is cut off.
-    """
-    corners = plant.corners(np.linspace(*plant.hard_limits, 49))
-    return tuple(  # type: ignore[return-value]
-        max(least, ROUND * math.ceil(float(np.abs(values).max()) / ROUND))
-        for values, least in zip(corners, LEAST_RANGES, strict=True)
-    )
-
-
 def _spans(plant: ElbowOrthosis) -> tuple[tuple[float, float], tuple[float, float]]:
     torque, stiffness = signal_ranges(plant)
     return (-torque, torque), (0.0, stiffness)
@@ -206,17 +191,6 @@ def _signals(plant: ElbowOrthosis, preview: int, spacing: float, normalize: bool
         Signal(name, unit, low, high, i, normalize, ahead)
         for i, (name, unit, (low, high), ahead) in enumerate(parts)
     )
-
-
-def largest_errors(plant: ElbowOrthosis) -> tuple[float, float]:
-    """Return more than torque [N m] and stiffness [N m/rad] can ever be off.
-
-    References lie between the corners of the nominal bundles; true ones can be stronger by the
-    largest gain that is allowed.
-    """
-    torques, stiffnesses = plant.corners(np.linspace(*plant.hard_limits, 49))
-    strongest = declarations(plant.bundle_a)["gain"].high
-    return strongest * float(np.ptp(torques)), strongest * float(stiffnesses.max())
 
 
 def _span(plant: ElbowOrthosis, span: Any) -> tuple[float, float]:

@@ -198,7 +198,7 @@ def test_the_estimate_with_friction_is_the_torque_of_the_bundles():
     state, off = friction.initial(1), []
     for _ in range(299):
         seen = view.read(observation)
-        taken, state = friction.taken(seen, state)
+        state = friction.taken(seen, state)[1]
         observation, *_, info = env.step(action)
         off.append([info["sensor/torque"] - info["output"], 0.0])
         seen = view.read(observation)

@@ -11,8 +11,9 @@ import pytest
 import pam_envs  # noqa: F401 (registers)
 from baselines.catalogue import make_controller
 from benchmarks.metrics_elbow import NEAR
-from pam_envs.envs.elbow_orthosis import largest_errors, model_row, signal_ranges
+from pam_envs.envs.elbow_orthosis import model_row
 from pam_envs.envs.elbow_program import estimate, pressures_for, within_reach
+from pam_envs.envs.elbow_ranges import largest_errors, signal_ranges
 from pam_envs.mechanics.hanging_mass import GRAVITY
 from pam_envs.plants.elbow_orthosis import ElbowOrthosis
 from pam_envs.tasks.torque_stiffness import TorqueStiffness
