@@ -5,7 +5,7 @@ JOBS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
-EXTRAS := plot,baselines,agents,bench,dev
+EXTRAS := plot,baselines,agents,bench,cluster,dev
 INSTALL := $(BIN)/python -m pip --disable-pip-version-check --no-input install -qq
 PLAIN := $(wildcard tests/hysteresis tests/test_kernels.py tests/envs/test_bits.py)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,11 +14,14 @@ from rich.console import Console
 from agents import configs
 from agents.settings import SettingsError
 
+Algo = Literal["ppo", "sac", "tqc", "recurrent_ppo"]
+
 
 def train(
     env: Annotated[str, tyro.conf.Positional] = "PAM/MusclePositioning-v0",
     /,
-    algo: Literal["ppo", "sac"] = "ppo",
+    algo: Algo = "ppo",
+    variant: str = "",
     steps: int | None = None,
     seed: int = 0,
     out: Path | None = None,
@@ -33,6 +37,8 @@ def train(
         Environment id.
     algo
         Algorithm.
+    variant
+        Of the preset, for example "residual": a policy that corrects a classical controller.
     steps
         Control periods of all rows together; default: the preset's.
     seed
@@ -48,7 +54,7 @@ def train(
     """
     from agents import train as training
 
-    wanted = configs.read(config) if config else configs.preset(env, algo)
+    wanted = configs.read(config) if config else configs.preset(env, algo, variant)
     if (wanted.env, wanted.algo) != (env, algo):
         raise SettingsError(
             f"{config} is for {wanted.env} with {wanted.algo}; say so: {wanted.env} --algo "
@@ -56,7 +62,7 @@ def train(
         )
     changes = [*set, *([] if steps is None else [f"steps={steps}"])]
     wanted = configs.changed(wanted, changes)
-    folder = out or training.default_folder(wanted, seed)
+    folder = out or training.default_folder(wanted, seed, variant)
     console = Console(stderr=True)
     if resume:
         _refuse_other_settings(config, set)
@@ -78,6 +84,74 @@ def _refuse_other_settings(config: Path | None, assignments: tuple[str, ...]) ->
         )
 
 
+def sweep(
+    env: Annotated[tuple[str, ...], tyro.conf.Positional] = ("PAM/MusclePositioning-v0",),
+    /,
+    algo: Algo = "ppo",
+    variant: str = "",
+    seeds: int = 5,
+    first_seed: int = 0,
+    steps: int | None = None,
+    set: tuple[str, ...] = (),
+    jobs: int = os.cpu_count() or 1,
+    backend: Literal["loky", "dask"] = "loky",
+    address: str = "",
+    out: Path = Path("runs"),
+    dry_run: bool = False,
+) -> int:
+    """Train several seeds side by side; an interrupted sweep goes on.
+
+    Exit code 0 if every policy is there, 1 if one is missing.
+
+    Parameters
+    ----------
+    env
+        Environment ids.
+    algo
+        Algorithm.
+    variant
+        Of the preset.
+    seeds
+        How many training seeds.
+    first_seed
+        The first of them.
+    steps
+        Control periods of all rows together; default: the preset's.
+    set
+        Single settings, for example: --set ppo.gamma=0.95
+    jobs
+        Trainings at a time on this machine.
+    backend
+        Processes of this machine, or a running Dask cluster.
+    address
+        Of the Dask scheduler, like tcp://host:8786.
+    out
+        Folder of the runs.
+    dry_run
+        List the trainings and whether their policies are there, and stop.
+    """
+    from agents import sweep as sweeping
+    from sweeps.engine import Cluster
+    from sweeps.progress import progress
+
+    cluster = Cluster(jobs, backend, address)
+    changes = [*set, *([] if steps is None else [f"steps={steps}"])]
+    wanted = [configs.changed(configs.preset(name, algo, variant), changes) for name in env]
+    kind = f"{algo}-{variant}" if variant else algo
+    trainings = sweeping.trainings(wanted, range(first_seed, first_seed + seeds), out, kind)
+    if dry_run:
+        for training in trainings:
+            print(f"{'there ' if training.finished() else 'to run'}  {training.folder}")
+        return 0
+    with progress("trainings") as start:
+        report = sweeping.run(trainings, cluster, start)
+    for place in (*report.found, *report.trained):
+        print(place)
+    for line in report.missing:
+        print(f"MISSING {line}", file=sys.stderr)
+    return 1 if report.missing else 0
+
+
 def show(policy: Annotated[Path, tyro.conf.Positional], /) -> None:
     """Print the card of a policy file, after the checks that loading it makes."""
     from agents.policy import OnnxPolicy
@@ -86,10 +160,86 @@ def show(policy: Annotated[Path, tyro.conf.Positional], /) -> None:
     print(json.dumps({**made.card, "digest": made.digest()}, indent=1, sort_keys=True))
 
 
+def tune(
+    env: Annotated[str, tyro.conf.Positional],
+    /,
+    algo: Algo = "ppo",
+    variant: str = "",
+    trials: int = 30,
+    steps: int | None = None,
+    seed: int = 0,
+    storage: Path | None = None,
+    write: bool = False,
+) -> None:
+    """Search settings on tuning seeds; killed, the same command goes on.
+
+    Parameters
+    ----------
+    env
+        Environment id.
+    algo
+        Algorithm.
+    variant
+        Of the preset.
+    trials
+        Settings to try, those that the storage holds counted in.
+    steps
+        Control periods of each trial; default: a tenth of the preset's.
+    seed
+        Of the search.
+    storage
+        SQLite file; default: runs/tune/ENV.ALGO.db. Several processes may share it.
+    write
+        Put the best settings and the budget into the preset's file.
+    """
+    from agents import tune as tuning
+
+    path = configs.preset_path(env, algo, variant)
+    config = configs.read(path)
+    place = storage or Path("runs/tune") / f"{path.stem}.db"
+    job = tuning.Job(config, trials, steps or max(config.steps // 10, 1), seed, place)
+    study = tuning.search(job, Console(stderr=True))
+    print(json.dumps({"value": study.best_value, **study.best_params}, indent=1))
+    if write:
+        tuning.write(job, study, path)
+        print(path)
+
+
+def classical(
+    env: Annotated[str, tyro.conf.Positional],
+    /,
+    algo: Algo = "ppo",
+    variant: str = "residual",
+) -> None:
+    """Evaluate the classical controllers of an environment on tuning seeds, the best first.
+
+    Which one a residual corrects is chosen by this, never by the board.
+
+    Parameters
+    ----------
+    env
+        Environment id.
+    algo
+        Algorithm of the preset that says on which plants and references.
+    variant
+        Of that preset.
+    """
+    from agents.controllers import names_for
+    from agents.evaluation import evaluate
+
+    config = configs.preset(env, algo, variant)
+    scores = {name: evaluate(name, config) for name in names_for(env)}
+    for name in sorted(scores, key=lambda name: scores[name].rms):
+        made = scores[name]
+        print(f"{made.rms:.5g}  {name}  failures {made.failures}, travel {made.travel:.4g} Pa")
+
+
 def presets() -> None:
     """List the presets."""
-    for env, algo in configs.presets():
-        print(f"{env}  {algo}  {configs.preset(env, algo).steps:,} steps")
+    for env, algo, variant in configs.presets():
+        wanted = configs.preset(env, algo, variant)
+        kind = f"{algo} --variant {variant}" if variant else algo
+        print(f"{env}  {kind}  {wanted.steps:,} steps, {wanted.search.trials} trials of search")
 
 
 def speed(seconds: float = 20.0) -> None:
@@ -101,16 +251,29 @@ def speed(seconds: float = 20.0) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    commands: dict[str, Any] = {"train": train, "show": show, "presets": presets, "speed": speed}
+    commands: dict[str, Any] = {
+        "train": train,
+        "sweep": sweep,
+        "tune": tune,
+        "classical": classical,
+        "show": show,
+        "presets": presets,
+        "speed": speed,
+    }
     try:
-        tyro.extras.subcommand_cli_from_dict(commands, prog="python -m agents", args=arguments)
+        status = tyro.extras.subcommand_cli_from_dict(
+            commands, prog="python -m agents", args=arguments
+        )
     except ValueError as error:  # settings, checkpoints and policy files say what to do
         print(f"error: {error}", file=sys.stderr)
         return 2
     except ModuleNotFoundError as error:
         print(f"error: training needs {error.name}; install the extra 'agents'", file=sys.stderr)
         return 2
-    return 0
+    except KeyboardInterrupt:
+        print("interrupted; what was done is kept: a sweep goes on where it was", file=sys.stderr)
+        return 130
+    return int(status or 0)
 
 
 if __name__ == "__main__":

@@ -20,6 +20,10 @@ MOST_NUMBERS = 100_000
 CARD = "pam_policy"
 SCHEMA = 1
 INPUT, OUTPUT = "observation", "action"
+CONTROLLER = "controller"
+"""Input of a policy that corrects a controller: the controller's action."""
+STATE, START, AFTER = "state", "start", "state_after"
+"""Inputs and output of a policy that remembers: numbers a row, and 1 where an episode begins."""
 OPERATORS = frozenset(
     (
         *("Abs", "Add", "Cast", "Clip", "Concat", "Constant", "Div", "Elu", "Exp", "Flatten"),
@@ -29,7 +33,8 @@ OPERATORS = frozenset(
         *("Transpose", "Unsqueeze"),
     )
 )
-"""Operators of feed-forward policies: none loops, and none can make a tensor from a size."""
+"""Operators of policies: none loops, and none can make a tensor from a size. A policy that
+remembers does so from call to call, by what it is given back."""
 
 
 class PolicyFileError(ValueError):
@@ -50,7 +55,7 @@ def read(path: str | Path) -> PolicyFile:
     Raises
     ------
     PolicyFileError
-        If it is anything but a small feed-forward ONNX policy with its card.
+        If it is anything but a small ONNX policy of plain arithmetic with its card.
     """
     path = Path(path)
     try:

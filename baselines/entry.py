@@ -31,6 +31,10 @@ class Entry:
         Environment ids that it is for.
     kind : str
         "classical": a row of results is verified by running it again.
+    tuning : str
+        How its numbers were chosen.
+    trials : int
+        How many settings were tried in simulation to choose them.
     """
 
     summary: str
@@ -40,3 +44,5 @@ class Entry:
     citation: str = ""
     envs: tuple[str, ...] = POSITIONING
     kind: str = "classical"
+    tuning: str = "by rule or as published"
+    trials: int = 0

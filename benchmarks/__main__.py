@@ -4,38 +4,16 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
 
 import tyro
 
 from benchmarks import controllers, rows, scenarios
+from sweeps.progress import progress
 
 Positional = tyro.conf.Positional
-
-
-@contextmanager
-def _progress(title: str) -> Iterator[Callable[[int], Callable[[], None]]]:
-    """Show a bar with the time left, and hand out what starts and advances it."""
-    from rich import progress as bars
-
-    columns = (
-        bars.TextColumn("{task.description}"),
-        bars.BarColumn(),
-        bars.MofNCompleteColumn(),
-        bars.TimeElapsedColumn(),
-        bars.TextColumn("left"),
-        bars.TimeRemainingColumn(),
-    )
-    with bars.Progress(*columns) as shown:
-
-        def start(total: int) -> Callable[[], None]:
-            task = shown.add_task(title, total=total)
-            return lambda: shown.advance(task)
-
-        yield start
 
 
 def _choose(names: tuple[str, ...], known: dict[str, Any], what: str) -> list[Any]:
@@ -72,52 +50,77 @@ def run(
         env: Id of an environment; all by default.
         controller: Names of controllers; all by default.
         track: Names of scenario files; all by default.
-        jobs: Processes.
+        jobs: Processes of this machine.
         force: Compute again what is there already.
         out: Folder of the rows.
         cells: Folder of the cells, the checkpoint.
         backend: Processes of this machine, or a running Dask cluster.
-        address: Of the Dask scheduler.
+        address: Of the Dask scheduler, like tcp://host:8786.
         dry_run: List the cells and whether they are there, and stop.
     """
-    from benchmarks import runner
-    from benchmarks.cells import cells_of
-    from benchmarks.store import Store
+    from benchmarks import runner, telling
 
     folder = runner.CELLS if cells is None else cells
+    options = runner.Options(jobs, force, out, folder, backend, address)
     chosen = _choose(controller, controllers.available(), "controller")
     pairs = runner.pairs_of(chosen, _tracks(env, track))
     if not pairs:
         raise ValueError("no controller runs in these environments")
     if dry_run:
-        for cell in (cell for pair in pairs for cell in cells_of(*pair)):
-            there = "there" if Store(folder).path(cell.key).exists() else "to run"
-            print(f"{there}  {cell.entrant.name}  {cell.track.name}/{cell.scenario.name}")
+        planned = list(runner.planned(pairs, options))
+        for cell, there in planned:
+            print(f"{'there ' if there else 'to run'}  {runner.title(cell)}")
+        print(f"{len(planned)} cells, {sum(not there for _, there in planned)} to run")
         return 0
-    options = runner.Options(jobs, force, out, folder, backend, address)
-    with _progress("cells") as start:
+    with progress("cells") as start:
         report = runner.run(pairs, options, start)
-    return _tell(report)
+    return telling.run(report)
 
 
-def _tell(report: Any) -> int:
-    print(f"{report.computed} cells computed, {report.found} were there already")
-    for name in report.quarantined:
-        print(f"corrupt, set aside and computed again: {name}")
-    if report.swept:
-        print(f"{report.swept} half-written files removed")
-    for path in report.rows:
-        row = rows.load(path)
-        head, failures = row["aggregate"]["rms_error"], row["failures"]
-        unit, factor = rows.shown(row["scenarios"]["content"])
-        mean, low, high = (factor * head[name] for name in ("mean", "low", "high"))
-        print(
-            f"{path.stem}: RMS {mean:.3f} {unit} [{low:.3f}, {high:.3f}]"
-            + (f", {failures} of {len(row['episodes'])} episodes failed" if failures else "")
-        )
-    for line in report.missing:
-        print(f"MISSING {line}", file=sys.stderr)
-    return 1 if report.missing else 0
+def audit(
+    row: Positional[tuple[str, ...]] = (),
+    jobs: int = os.cpu_count() or 1,
+    all: bool = False,
+    out: Path = rows.RESULTS,
+    cells: Path | None = None,
+) -> int:
+    """Draw the salt of committed controllers, once, and score them on the seeds it gives.
+
+    Args:
+        row: Names of rows, TRACK--CONTROLLER.
+        jobs: Processes.
+        all: Every row of the folder of rows.
+        out: Folder of the rows.
+        cells: Folder of the cells, the checkpoint.
+    """
+    from benchmarks import audit as auditing
+    from benchmarks import runner, telling
+
+    names = [Path(name).stem for name in row]
+    names += [path.stem for path in sorted(out.glob("*--*.json"))] if all else []
+    if not names:
+        raise ValueError("name a row, or give --all")
+    pairs = [rows.pair_of(name) for name in names]
+    for entrant, track in pairs:
+        drawn = auditing.draw(entrant, track)
+        print(f"{rows.row_name(track.name, entrant.name)}: salt {drawn.salt} of {drawn.drawn}")
+    options = runner.Options(jobs, out=out, cells=runner.CELLS if cells is None else cells)
+    with progress("cells") as start:
+        report = runner.run(pairs, options, start)
+    return telling.run(report)
+
+
+def cite(row: Positional[tuple[str, ...]]) -> int:
+    """Print BibTeX of rows, of this package and of the methods in them.
+
+    Args:
+        row: Files or names of rows.
+    """
+    from benchmarks.cite import bibtex
+
+    for name in row:
+        print(bibtex(rows.load(_row_path(name))))
+    return 0
 
 
 def board(results: Path = rows.RESULTS, out: Path | None = None) -> int:
@@ -134,6 +137,20 @@ def board(results: Path = rows.RESULTS, out: Path | None = None) -> int:
     return 0
 
 
+def site(results: Path = rows.RESULTS, out: Path | None = None) -> int:
+    """Write the page of the rows: one folder, no server and no network.
+
+    Args:
+        results: Folder of the rows.
+        out: Folder of the page, benchmarks/site by default.
+    """
+    from benchmarks import site_build
+
+    written = site_build.build(results, site_build.OUT if out is None else out)
+    print(f"{len(written)} files; open {written[0]}")
+    return 0
+
+
 def verify(
     row: Positional[tuple[str, ...]] = (), jobs: int = os.cpu_count() or 1, all: bool = False
 ) -> int:
@@ -144,27 +161,19 @@ def verify(
         jobs: Processes.
         all: Every row of benchmarks/results.
     """
+    from benchmarks import telling
     from benchmarks import verify as checking
 
     paths = [_row_path(name) for name in row]
     paths += sorted(rows.RESULTS.glob("*--*.json")) if all else []
     if not paths:
         raise ValueError("name a row, or give --all")
-    verdicts = [checking.verify(path, jobs) for path in paths]
-    for verdict in verdicts:
-        print(f"{verdict.row}: {'holds' if verdict.holds else 'DRIFTED'}")
-        for line in verdict.drifted[:40]:
-            print(f"  {line}")
-        if len(verdict.drifted) > 40:
-            print(f"  and {len(verdict.drifted) - 40} fields more")
-        for line in verdict.notes:
-            print(f"  note: {line}")
-    return 0 if all_hold(verdicts) else 1
-
-
-def all_hold(verdicts: list[Any]) -> bool:
-    """Return whether no row has drifted."""
-    return all(verdict.holds for verdict in verdicts)
+    drifted = 0
+    for path in paths:
+        found = checking.verify(path, jobs)
+        telling.verdict(found)
+        drifted += not found.holds
+    return 1 if drifted else 0
 
 
 def _row_path(name: str) -> Path:
@@ -207,7 +216,7 @@ def speed(
     from benchmarks import speed as measuring
     from benchmarks.store import write_record
 
-    with _progress("groups") as start:
+    with progress("groups") as start:
         results = measuring.measure(only, rounds, start)
     print(measuring.table(results))
     if json:
@@ -285,6 +294,8 @@ def diagnosis(
     timed: bool = False,
     cells: Path | None = None,
     out: Path | None = None,
+    backend: Literal["loky", "dask"] = "loky",
+    address: str = "",
 ) -> int:
     """Diagnose rigs that hide an effect and score what is found; an interrupted run goes on.
 
@@ -304,6 +315,8 @@ def diagnosis(
         cells: Folder of the records, the checkpoint.
         out: Folder of the page, of its numbers and of its figure. By default benchmarks/results for
             the whole of the final set, otherwise beside the records.
+        backend: Processes of this machine, or a running Dask cluster.
+        address: Of the Dask scheduler, like tcp://host:8786.
     """
     from benchmarks import diagnosis as running
     from benchmarks import diagnosis_report as telling
@@ -312,8 +325,9 @@ def diagnosis(
     from pam_envs.diagnosis.readings import diagnose_readings
 
     folder = running.FOLDER if cells is None else cells
+    cluster = (backend, address)
     options = running.Options(
-        chosen, offset, fraction, kind, name, limit, loops, next, jobs, force, folder
+        chosen, offset, fraction, kind, name, limit, loops, next, jobs, force, folder, *cluster
     )
     if retell:
         records = running.retold(options)
@@ -321,7 +335,7 @@ def diagnosis(
         for path in telling.write(records, out or folder / "pages" / "retold", "--retell"):
             print(path)
         return 0
-    with _progress("cases") as start:
+    with progress("cases") as start:
         report = running.run(options, start)
     print(f"{report.computed} computed, {report.found} were there already")
     for line in report.quarantined:
@@ -343,7 +357,10 @@ def diagnosis(
 COMMANDS: dict[str, Callable[..., int]] = {
     "run": run,
     "board": board,
+    "site": site,
     "verify": verify,
+    "audit": audit,
+    "cite": cite,
     "papers": papers,
     "speed": speed,
     "show": show,
@@ -362,6 +379,9 @@ def main(arguments: list[str] | None = None) -> int:
     except ValueError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print("interrupted; what was done is kept: the same command goes on", file=sys.stderr)
+        return 130
 
 
 if __name__ == "__main__":

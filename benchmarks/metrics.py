@@ -42,6 +42,11 @@ def of_track(content: Mapping[str, Any]) -> dict[str, str]:
     return units
 
 
+def headline_of(content: Mapping[str, Any]) -> str:
+    """Return the metric that ranks the rows of a track, from the content of its scenario file."""
+    return str(content.get("headline", HEADLINE))
+
+
 def rms(error: Array) -> float:
     """Return the root mean square of an error, shape (n,)."""
     return float(np.sqrt(np.mean(np.square(error))))

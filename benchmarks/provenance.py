@@ -10,7 +10,7 @@ import subprocess
 from functools import lru_cache
 from pathlib import Path
 
-from benchmarks.canonical import sources_digest
+from benchmarks.canonical import SOURCES, sources_digest
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("numpy", "scipy", "numba", "gymnasium", "onnxruntime")
@@ -21,8 +21,13 @@ SCORING = (
     "metrics.py",
     "metrics_knee.py",
     "rollout.py",
+    "artefacts.py",
+    "knowledge.py",
+    "making.py",
+    "source_code.py",
+    "traces.py",
 )
-"""Pages of this package that a score depends on."""
+"""Pages of this package that the record of a score depends on."""
 
 
 @lru_cache(maxsize=1)
@@ -38,20 +43,31 @@ def packages() -> dict[str, str]:
 
 
 @lru_cache(maxsize=8)
-def sources(package: str) -> dict[str, str]:
+def sources(package: str, code_only: bool = False) -> dict[str, str]:
     """Return digests of the code and data that a score of a controller depends on.
 
     Parameters
     ----------
     package : str
         The controller's own package.
+    code_only : bool
+        Leave the package's data out: policies, whose own files are named one by one.
     """
     here = Path(__file__).parent
+    kinds = {".py"} if code_only else SOURCES
     return {
         "pam_envs": sources_digest([ROOT / "pam_envs"]),
-        package: sources_digest([ROOT / package]),
+        package: sources_digest([ROOT / package], kinds),
         "benchmarks": sources_digest([here / name for name in SCORING]),
     }
+
+
+@lru_cache(maxsize=1)
+def cpu() -> str:
+    """Return the kind of processor that numerical libraries choose their code by."""
+    import llvmlite.binding
+
+    return str(llvmlite.binding.get_host_cpu_name())
 
 
 @lru_cache(maxsize=1)

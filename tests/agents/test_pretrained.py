@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -12,9 +13,15 @@ from short_runs import ID
 
 from agents import catalogue, configs
 from agents.policy import OnnxPolicy
+from agents.residual import ResidualPolicy, with_controller
+from baselines import catalogue as baselines
 from benchmarks import rows
 
-NAMES = sorted(catalogue.PRETRAINED)
+FILES = [path for entry in catalogue.CONTROLLERS.values() for path in entry.files().values()]
+RECORDED = {
+    *("steps", "seconds", "cpu_seconds", "frames_per_second", "hardware", "seed"),
+    *("first_env_seed", "tuning_seeds", "tuning_trials", "command"),
+}
 
 
 def rms(controller: object, reference: str, hysteresis: str, load: float) -> float:
@@ -52,29 +59,65 @@ class FeedForward:
         return self.action.encode(pressure)[:, None], None
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_the_file_is_small_and_its_training_is_recorded(name: str) -> None:
-    path = Path(catalogue.PRETRAINED[name])
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_the_file_is_small_and_its_training_is_recorded(path: Path) -> None:
     assert path.stat().st_size < 100_000
     card = json.loads(path.with_suffix(".json").read_text())
+    occasion = card.pop("training", {})
+    assert set(occasion) <= RECORDED
     assert OnnxPolicy.load(path).card == card
     assert f"--steps {card['config']['steps']} --seed {card['seed']}" in card["command"]
     assert configs.from_mapping(card["config"]).as_dict() == card["config"]
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_the_recorded_preset_is_the_one_that_ships(name: str) -> None:
-    card = OnnxPolicy.load(catalogue.PRETRAINED[name]).card
-    assert configs.preset(card["env"], card["algo"]).as_dict() == card["config"]
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_the_recorded_preset_is_the_one_that_ships(path: Path) -> None:
+    card = OnnxPolicy.load(path).card
+    variant = "residual" if "baseline" in card else ""
+    preset = configs.preset(card["env"], card["algo"], variant)
+    assert preset.decisive() == configs.from_mapping(card["config"]).decisive()
     assert "--config" not in card["command"]
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_it_was_trained_on_the_plant_that_ships(name: str) -> None:
-    policy = OnnxPolicy.load(catalogue.PRETRAINED[name])
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_it_was_trained_on_the_plant_that_ships(path: Path) -> None:
+    policy = OnnxPolicy.load(path)
     env = gym.make(policy.card["env"], **policy.card["env_kwargs"]).unwrapped
     policy.check(env.signals, env.action_signals)
+    with_controller(policy, env.plant)
     assert env.plant.digest() == policy.card["plant"], "the plant has changed: train it anew"
+
+
+def test_several_trainings_of_one_policy_are_told_apart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = Path(catalogue.PRETRAINED["ppo"])
+    for name in ("X.s2.onnx", "X.s11.onnx", "X.s1.json", "X.sx.onnx", "X.onnx"):
+        (tmp_path / name).write_bytes(source.read_bytes())
+    monkeypatch.setattr(catalogue, "FOLDER", tmp_path)
+    entry = dataclasses.replace(catalogue.CONTROLLERS["ppo"], file="X.s{seed}.onnx")
+    assert {seed: path.name for seed, path in entry.files().items()} == {
+        0: "X.onnx",
+        2: "X.s2.onnx",
+        11: "X.s11.onnx",
+    }
+    (tmp_path / "X.s0.onnx").write_bytes(source.read_bytes())
+    assert entry.files()[0].name == "X.s0.onnx"
+    monkeypatch.setitem(catalogue.CONTROLLERS, "x", entry)
+    assert catalogue.load_pretrained("x", training_seed=11).name == "X.s11.onnx"
+    assert catalogue.load_pretrained("x").name == "X.s0.onnx"
+    with pytest.raises(ValueError, match=r"no training seed 5; there are: \[0, 2, 11\]"):
+        catalogue.load_pretrained("x", training_seed=5)
+
+
+def test_a_residual_is_told_what_its_controller_is_told() -> None:
+    for entry in catalogue.OFFERED.values():
+        if entry.baseline:
+            corrected = baselines.CONTROLLERS[entry.baseline]
+            assert entry.knowledge == corrected.knowledge
+            assert set(entry.envs) <= set(corrected.envs)
+            variant = configs.preset(entry.envs[0], "ppo", "residual").residual
+            assert variant.controller == entry.baseline
 
 
 @pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach"])
@@ -94,7 +137,11 @@ def test_benchmarks_find_it_among_the_controllers() -> None:
         env = gym.make(*entry.envs).unwrapped
         made = catalogue.make_controller(name, env.plant, env.signals, env.action_signals, seed=0)
         assert entry.envs == (made.card["env"],)
-        assert made.digest() == catalogue.load_pretrained(name).digest()
+        policy = catalogue.load_pretrained(name)
+        inside = made.policy if isinstance(made, ResidualPolicy) else made
+        assert inside.digest() == policy.digest()
+        assert policy.corrects == entry.baseline
+        assert (entry.kind == "residual") == bool(entry.baseline)
     with pytest.raises(ValueError, match="no policy named 'pppo'; did you mean 'ppo'"):
         catalogue.load_pretrained("pppo")
 

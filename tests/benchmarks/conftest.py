@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from benchmarks import controllers, scenarios
+from benchmarks import audit, controllers, scenarios
 
 CONTENT = {
     "schema": 1,
@@ -41,6 +41,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Folder with the scenario file ``short``; the fake controllers are the only ones."""
     (tmp_path / "short.yaml").write_text(yaml.safe_dump(CONTENT))
     monkeypatch.setattr(controllers, "SOURCES", (("bench_fakes", "bench_fakes", "classical"),))
+    monkeypatch.setattr(audit, "FILE", tmp_path / "salts.json")
     return tmp_path
 
 

@@ -1,0 +1,95 @@
+"""From settings to the environment and the untrained model."""
+
+from __future__ import annotations
+
+import functools
+import random
+from typing import Any
+
+import torch
+from sb3_contrib import TQC, RecurrentPPO
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
+
+from agents import controllers, inputs, seeds
+from agents.configs import ON_POLICY, Config
+from agents.history_vec_env import HistoryVecEnv
+from agents.mixed_vec_env import MixedVecEnv
+from agents.networks import policy_arguments, silence
+from agents.residual_vec_env import ResidualVecEnv
+from agents.sb3_vec_env import make_batch_vec_env
+
+ALGORITHMS: dict[str, type[BaseAlgorithm]] = {
+    "ppo": PPO,
+    "sac": SAC,
+    "tqc": TQC,
+    "recurrent_ppo": RecurrentPPO,
+}
+OWN = ("learning_rate", "lstm_size", "critic_lstm")
+"""Settings that are not handed to the algorithm as they stand."""
+
+
+def make_env(config: Config) -> VecEnv:
+    """Return the environment of a run: batched, monitored, corrected, with history, normalised."""
+    kinds = config.kinds()
+    rows = config.num_envs // len(kinds)
+    batches = [make_batch_vec_env(config.env, rows, **kind) for kind in kinds]
+    env: VecEnv = VecMonitor(batches[0] if len(batches) == 1 else MixedVecEnv(batches))
+    signals, actions = signals_of(env)
+    wanted = config.residual
+    if wanted.controller:
+        make = functools.partial(_controller, wanted.controller, signals, actions)
+        env = ResidualVecEnv(env, wanted.controller, make, wanted.scale)
+    if config.history.frames:
+        env = HistoryVecEnv(env, inputs.kept(config, signals, actions), config.history.frames)
+    return _normalized(env, config)
+
+
+def _controller(name: str, signals: Any, actions: Any, plant: Any) -> Any:
+    return controllers.make(name, plant, signals, actions)
+
+
+def _normalized(env: VecEnv, config: Config) -> VecEnv:
+    wanted = config.normalize
+    if not (wanted.observation or wanted.reward):
+        return env
+    return VecNormalize(
+        env,
+        norm_obs=wanted.observation,
+        norm_reward=wanted.reward,
+        clip_obs=wanted.clip_observation,
+        clip_reward=wanted.clip_reward,
+        gamma=config.chosen.gamma,
+    )
+
+
+def make_model(config: Config, seed: int, env: VecEnv) -> BaseAlgorithm:
+    """Return the untrained model of a run, with all random numbers seeded."""
+    torch.set_num_threads(1)
+    random.seed(seed)
+    chosen = config.chosen
+    arguments = {k: v for k, v in vars(chosen).items() if k not in OWN}
+    arguments |= policy_arguments(config, *signals_of(env))
+    start, end = chosen.learning_rate
+    model = ALGORITHMS[config.algo](
+        env=env,
+        learning_rate=lambda remaining: end + (start - end) * remaining,
+        seed=seed,
+        device="cpu",
+        **arguments,
+    )
+    if config.residual.controller:
+        silence(model.policy)
+    env.seed(seeds.first_training(seed))
+    return model
+
+
+def signals_of(env: VecEnv) -> tuple[Any, Any]:
+    """Return the signals of the environment's observation and action."""
+    return env.get_attr("signals")[0], env.get_attr("action_signals")[0]
+
+
+def logs_each_rollout(config: Config) -> bool:
+    """Return whether a rollout is long enough for a line in the log."""
+    return config.algo in ON_POLICY
