@@ -13,9 +13,11 @@ from typing import Any, TypeVar
 
 from baselines.contraction_tables import LOADS
 from baselines.controller import Controller, reader
+from baselines.elbow_catalogue import ELBOW_CONTROLLERS, ELBOW_MAKERS
 from baselines.entry import POSITIONING, Entry
 from baselines.inverse import make_inverse
 from baselines.inverse_pid import make_inverse_pid
+from baselines.joint_catalogue import ARM, JOINT_CONTROLLERS, JOINT_MAKERS
 from baselines.knee_catalogue import KNEE, KNEE_CONTROLLERS, KNEE_MAKERS, SIMC
 from baselines.pid import make_pid
 from baselines.plc_polynomial import make_one_cubic, make_plc_as_printed, make_plc_refitted
@@ -23,7 +25,11 @@ from baselines.table_inverse import make_table_inverse
 from baselines.trivial import Constant, Line, Random
 from pam_envs.data.tables import load_contraction_table
 from pam_envs.parameters import Signals
+from pam_envs.plants.antagonistic_joint import AntagonisticJoint
+from pam_envs.plants.elbow_orthosis import ElbowOrthosis
 from pam_envs.plants.knee_orthosis import KneeOrthosis
+from pam_envs.plants.plant import Plant
+from pam_envs.plants.redundant_manipulator import RedundantManipulator
 from pam_envs.plants.single_muscle import SingleMuscle
 
 SEED_003 = "Seed 003: Studies regarding the Use of Pneumatic Muscles in Precise Positioning Systems"
@@ -89,6 +95,8 @@ CONTROLLERS: dict[str, Entry] = {
         citation=f"{KREJCI}; {SIMC}",
     ),
     **KNEE_CONTROLLERS,
+    **ELBOW_CONTROLLERS,
+    **JOINT_CONTROLLERS,
 }
 
 
@@ -106,7 +114,7 @@ def make_linear(signals: Signals, action_signals: Signals) -> Line:
 
 def make_controller(
     name: str,
-    plant: SingleMuscle | KneeOrthosis,
+    plant: Plant,
     signals: Signals,
     action_signals: Signals,
     seed: int = 0,
@@ -117,7 +125,7 @@ def make_controller(
     ----------
     name : str
         One of ``CONTROLLERS``.
-    plant : SingleMuscle or KneeOrthosis
+    plant : Plant
         Nominal plant: what the controller is told of the muscle. Controllers that know nothing or
         tables do not look at it.
     signals, action_signals : Signals
@@ -134,6 +142,13 @@ def make_controller(
     if name in KNEE_MAKERS:
         made: Controller = KNEE_MAKERS[name](_as(KneeOrthosis, plant, name), *told)
         return made
+    if name in ELBOW_MAKERS:
+        seeded = {"seed": seed} if name == "elbow_random" else {}
+        bending: Controller = ELBOW_MAKERS[name](_as(ElbowOrthosis, plant, name), *told, **seeded)
+        return bending
+    if name in JOINT_MAKERS:
+        following: Controller = JOINT_MAKERS[name](_joint(plant, name), *told)
+        return following
 
     def muscle() -> SingleMuscle:
         return _as(SingleMuscle, plant, name)
@@ -156,6 +171,12 @@ def make_controller(
         raise ValueError(f"no controller named {name!r}; there are: {', '.join(CONTROLLERS)}")
     built: Controller = makers[name]()
     return built
+
+
+def _joint(plant: Any, name: str) -> AntagonisticJoint | RedundantManipulator:
+    if isinstance(plant, RedundantManipulator) or JOINT_CONTROLLERS[name].envs == ARM:
+        return _as(RedundantManipulator, plant, name)
+    return _as(AntagonisticJoint, plant, name)
 
 
 def _as(family: type[P], plant: Any, name: str) -> P:

@@ -1,10 +1,7 @@
 """PI control of the knee's tension, tuned by a rule from the nominal plant.
 
-Tuning rule: SIMC for a lag with dead time (S. Skogestad, J. Process Control 13 (2003) 291-309),
-
-    K_c = tau_1 / (K (tau_c + theta)),  tau_I = min(tau_1, 4 (tau_c + theta)),  tau_c = theta
-
-with K the steepest tension per pressure of the nominal orthosis at rest. For a regulator that lags,
+Tuning rule: SIMC for a lag with dead time (:mod:`baselines.simc`) and ``tau_c = theta``, with K the
+steepest tension per pressure of the nominal orthosis at rest. For a regulator that lags,
 tau_1 is its time constant and theta one and a half control periods. For the published dynamics,
 whose 0.3 s are spread over seven poles, the rule's half rule gives half of their sum to each.
 
@@ -22,6 +19,7 @@ from baselines.knee_nominal import KneeNominal
 from baselines.knee_published import printed_plant
 from baselines.knee_view import Eyes, make_eyes
 from baselines.pid import Gains, PidState, pid_start, pid_step
+from baselines.simc import WAIT, simc_rule
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.knee_orthosis import KneeOrthosis
 
@@ -29,12 +27,11 @@ from pam_envs.plants.knee_orthosis import KneeOrthosis
 def simc_tension(plant: KneeOrthosis) -> Gains:
     """Return the gains [Pa/N] of the SIMC rule for a nominal orthosis; see the module."""
     period = plant.control_period
-    theta, tau = 1.5 * period, plant.regulator.time_constant
+    theta, tau = WAIT * period, plant.regulator.time_constant
     if plant.dynamics == "measured":
         tau = 0.5 * _sum_of_lags()
         theta = theta + tau
-    gain = tau / (KneeNominal(plant).steepest_gain * 2.0 * theta)
-    reset = min(tau, 8.0 * theta)
+    gain, reset, _ = simc_rule(KneeNominal(plant).steepest_gain, tau, 0.0, theta)
     return Gains(
         proportional=gain,
         integral=gain / reset,

@@ -1,16 +1,12 @@
 """PID control of the contraction, tuned by a rule from the nominal plant.
 
-Tuning rule: SIMC for a second-order plant with dead time (S. Skogestad, "Simple analytic rules for
-model reduction and PID controller tuning", J. Process Control 13 (2003) 291-309), cascade form
-
-    K_c = tau_1 / (K (tau_c + theta)),  tau_I = min(tau_1, 4 (tau_c + theta)),  tau_D = tau_2
-
-with K the steepest static gain of the nominal muscle over its stroke (so that the loop is stable
-where the muscle is most willing), tau_1 the regulator's lag, tau_2 the lag of the mass, and theta
-the dead time, half a control period of the hold, and one of computing. The rule's one choice is
-tau_c = theta ("fast, with good robustness"), made longer only where the loop would otherwise come
-within a factor of ``SWING`` of the natural frequency of the load on the muscle, which the rule's
-real lags do not describe. :func:`simc` is a pure function of the plant.
+Tuning rule: SIMC for a second-order plant with dead time (:mod:`baselines.simc`), with K the
+steepest static gain of the nominal muscle over its stroke (so that the loop is stable where the
+muscle is most willing), tau_1 the regulator's lag, tau_2 the lag of the mass, and theta the
+regulator's dead time, half a control period of the hold, and one of computing. The rule's one
+choice is tau_c = theta, made longer only where the loop would otherwise come within a factor of
+``SWING`` of the natural frequency of the load on the muscle, which the rule's real lags do not
+describe. :func:`simc` is a pure function of the plant.
 
 The regulator's slew limit winds an integral up as its range does. So the set-point is held within
 reach of the *measured* pressure: ``REACH`` times the least lead that keeps the nominal regulator
@@ -28,6 +24,7 @@ from numpy.typing import ArrayLike
 
 from baselines.controller import Answer, Array, Reader, answer, beginning, choose, reader
 from baselines.nominal import Nominal
+from baselines.simc import WAIT, simc_rule
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.single_muscle import SingleMuscle
 
@@ -77,17 +74,16 @@ def simc(plant: SingleMuscle, closed_loop_time: float | None = None) -> Gains:
         ``tau_c`` [s]; default: see this module's page.
     """
     nominal, period = Nominal(plant), plant.control_period
-    theta = plant.regulator.dead_time + 1.5 * period
+    theta = plant.regulator.dead_time + WAIT * period
     tau_1, tau_2 = plant.regulator.time_constant, nominal.mechanical_lag
     tau_c = max(theta, SWING / nominal.slowest_swing - theta)
     if closed_loop_time is not None:
         tau_c = closed_loop_time
-    gain = tau_1 / (nominal.steepest_gain * (tau_c + theta))
-    reset = min(tau_1, 4.0 * (tau_c + theta))
+    gain, reset, rate = simc_rule(nominal.steepest_gain, tau_1, tau_2, theta, tau_c)
     return Gains(
-        proportional=gain * (1.0 + tau_2 / reset),
+        proportional=gain * (1.0 + rate / reset),
         integral=gain / reset,
-        derivative=gain * tau_2,
+        derivative=gain * rate,
         filter_time=max(tau_2 / FILTER, 0.5 * period),
         tracking_time=reset,
     )

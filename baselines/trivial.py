@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from baselines.controller import Answer, Array, Reader, answer, beginning, choose
-from pam_envs.parameters import Signal
+from pam_envs.parameters import Signal, Signals
 
 
 @dataclass(frozen=True)
@@ -77,6 +77,42 @@ class Random:
         signal = self.action_signal
         value = signal.low + (signal.high - signal.low) * share
         return answer(signal, value, observation), RandomState(now.draw + np.uint64(1))
+
+
+@dataclass(frozen=True)
+class RandomEach:
+    """:class:`Random` for actions of several numbers, each with a seed of its own.
+
+    Attributes
+    ----------
+    draws : tuple of Random
+        In the order of the action.
+    """
+
+    draws: tuple[Random, ...]
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: tuple[RandomState, ...] | None = None,
+        episode_start: ArrayLike | None = None,
+        deterministic: bool = True,
+    ) -> Answer:
+        """Return the next draws; see :class:`~baselines.controller.Controller`."""
+        rows = np.atleast_2d(np.asarray(observation))
+        made = [
+            draw.predict(rows, state and state[k], episode_start)
+            for k, draw in enumerate(self.draws)
+        ]
+        actions = np.concatenate([action for action, _ in made], axis=1)
+        answered = actions if np.ndim(observation) == 2 else actions[0]
+        return answered, tuple(after for _, after in made)
+
+
+def random_each(action_signals: Signals, seed: int = 0) -> RandomEach:
+    """Return the controller for all numbers of an action."""
+    each = list(action_signals)
+    return RandomEach(tuple(Random(s, len(each) * seed + k) for k, s in enumerate(each)))
 
 
 def _uniform(seed: np.uint64, row: NDArray[np.uint64], draw: NDArray[np.uint64]) -> Array:

@@ -236,6 +236,7 @@ def _scores(
             content.get("metrics") or (),
             content.get("activity", ""),
             content.get("half_range"),
+            content.get("tool_length"),
         )
     except ValueError:  # nothing left to score after settling
         if not episode.failed:

@@ -39,12 +39,48 @@ GAIT: tuple[Column, ...] = (
 )
 """Metric, heading and factor from SI of the columns after the headline, of a gait."""
 
+DEGREES = float(np.degrees(1.0))
+MODEL: Column = ("model_rms_error", "error to its own model, RMS [deg]", DEGREES)
+OUT_OF_REACH: Column = ("saturated_time", "out of reach [%]", 100.0)
+
+ELBOW: tuple[Column, ...] = (
+    ("rms_error", "torque RMS [N m]", 1.0),
+    ("stiffness_rms", "stiffness RMS [N m/rad]", 1.0),
+    ("p95_error", "p95 [N m]", 1.0),
+    ("max_error", "max [N m]", 1.0),
+    ("sensed_rms_error", "estimated RMS [N m]", 1.0),
+    ("felt_rms", "felt beside the object, RMS [N m]", 1.0),
+    *EFFORT,
+    ("switchings", "switchings [1/s]", 1.0),
+    OUT_OF_REACH,
+)
+"""Of the elbow orthosis."""
+
+CHAIN: tuple[Column, ...] = (
+    ("rms_error", "tip RMS [mm]", 1e3),
+    ("pointing_rms", "pointing RMS [deg]", DEGREES),
+    ("p95_error", "p95 [mm]", 1e3),
+    ("max_error", "max [mm]", 1e3),
+    ("steady_state_error", "steady [mm]", 1e3),
+    ("sensed_rms_error", "sensed RMS [mm]", 1e3),
+    ("joint_rms", "joints RMS [deg]", DEGREES),
+    ("largest_angle", "largest joint angle [deg]", DEGREES),
+    MODEL,
+    *EFFORT,
+    OUT_OF_REACH,
+)
+"""Of a chain of joints whose tool follows a path."""
+
 
 def columns_of(content: Mapping[str, Any]) -> tuple[Column, ...]:
     """Return the columns after the headline of a track, from the content of its file."""
     groups = content.get("metrics") or ()
     if "gait" in groups:
         return GAIT
+    if "elbow" in groups:
+        return ELBOW
+    if "chain" in groups:
+        return CHAIN
     unit, factor = shown(content)
     errors: tuple[Column, ...] = (
         ("p95_error", f"p95 [{unit}]", factor),
@@ -55,6 +91,9 @@ def columns_of(content: Mapping[str, Any]) -> tuple[Column, ...]:
     if "range" in groups:
         errors = (("rms_percent", "RMS [% of half-range]", 1.0), *errors[:2], errors[3])
         return (*errors, *EFFORT, SATURATED)
+    if "joint" in groups:
+        errors = (("rms_percent", "RMS [% of half-range]", 1.0), *errors, MODEL)
+        return (*errors, *EFFORT, OUT_OF_REACH)
     return (*errors, *EFFORT, ("constraint_cost", "constraint cost", 1.0))
 
 
@@ -94,6 +133,13 @@ PREFACE = """\
   measured on what it does.
 - Steady-state errors are of references that rest. Constraint cost 1 is one millimetre (or one bar)
   over a soft limit all the time.
+- Of the elbow, the headline is of torque and stiffness together: the error of the torque, RMS over
+  two angles, 0.2 rad on either side of the present one, from the torque here and the stiffness.
+  *Torque* is the error at the present angle alone, against what the pressures can give there (as
+  are p95 and max); *estimated* is the torque as computed from the sensors, without friction. *Felt
+  beside the object* is the torque that the orthosis puts on the wearer less that of the object he
+  is to feel, whether it can be given or not: in free motion, all that he feels. *Out of reach*:
+  more torque or stiffness was asked for than there is.
 - Of a gait, the tension is scored while the heel bears weight and the angle while it does not, and
   neither in the few periods in which the sensed phase is not the true one. *Error at the switch* is
   what swing leaves of the tension's error in the first period of stance; *excess* is by how much it
@@ -109,6 +155,11 @@ PREFACE = """\
   helped. *Fitted, B* is no score: it takes activity to grow as the square of torque, so that a
   valve that is simply open has 0.77 in walking, where the EMG ratio is 1.14 and A 1.66.
 - *True pressure at capacity* is time above 4.45 bar in the muscle, of whatever the valve was told.
+- Of a chain, the headline is of the whole tool, which has a place and a direction: RMS over the tip
+  and the point one link behind it along the tool. *Tip* is how far the tip alone is off its path
+  (as are p95, max, steady and sensed), and *pointing* is of the direction; *joints* are compared
+  with the planned angles, of which the tool knows nothing. *Error to its own model* is of
+  controllers that follow a model: the true angle less the model's.
 - A controller's name leads to its row, where every metric of every episode stands.
 - Times per step are in [results/TIMES.md](results/TIMES.md), since no two runs give the same.
 """

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks import metrics_knee
+from benchmarks import metrics_elbow, metrics_joint, metrics_knee
 
 Array = NDArray[np.float64]
 
@@ -26,10 +26,16 @@ METRICS: dict[str, str] = {
     "air_use": "kg/s",
     "constraint_cost": "1",
 }
-"""The scored quantities and their units, the headline first. Less is better for all of them."""
+"""The scored quantities and their units, the usual headline first. Less is better for all."""
 
 HEADLINE = "rms_error"
-GROUPS: dict[str, dict[str, str]] = {"range": metrics_knee.RANGE, "gait": metrics_knee.GAIT}
+GROUPS: dict[str, dict[str, str]] = {
+    "range": metrics_knee.RANGE,
+    "gait": metrics_knee.GAIT,
+    "elbow": metrics_elbow.ELBOW,
+    "joint": metrics_joint.JOINT,
+    "chain": metrics_joint.CHAIN,
+}
 """What a track may be scored by beside ``METRICS``, by the names that its file gives."""
 
 
@@ -112,6 +118,7 @@ def score(
     groups: Sequence[str] = (),
     activity: str = "",
     half_range: float | None = None,
+    tool_length: float | None = None,
 ) -> dict[str, float]:
     """Return every metric of one finished episode.
 
@@ -135,6 +142,8 @@ def score(
         Of a gait.
     half_range : float, optional
         What an error in percent refers to; half of what the reference went through if not given.
+    tool_length : float, optional
+        Of a chain's tool, see ``metrics_joint`` [m].
 
     Raises
     ------
@@ -159,12 +168,13 @@ def score(
             f"{' and '.join(gate)} are never 1 together: lengthen the episode or choose"
             " another gate"
         )
-    seconds = float(window.sum()) * period
+    seconds, hold = float(window.sum()) * period, round(hold_seconds / period)
+    path = metrics_joint.way(signals)[tracked] if "chain" in groups else reference
     scores = {
         "rms_error": rms(error),
         "p95_error": percentile_95(error),
         "max_error": float(np.abs(error).max()),
-        "steady_state_error": steady_state_error(error, reference, round(hold_seconds / period)),
+        "steady_state_error": steady_state_error(error, path, hold),
         "sensed_rms_error": rms(sensed),
         "pressure_travel": float(np.sum(signals["effort/pressure_travel"][window])) / seconds,
         "air_use": float(np.sum(signals["effort/air"][window])) / seconds,
@@ -174,6 +184,14 @@ def score(
         scores |= metrics_knee.of_range(signals, window, tracked, half_range)
     if "gait" in groups:
         scores |= metrics_knee.of_gait(signals, window, tracked, period, activity)
+    if "elbow" in groups:
+        scores |= metrics_elbow.of_elbow(signals, window, period)
+    if "joint" in groups:
+        scores |= metrics_joint.of_joint(signals, window)
+    if "chain" in groups:
+        if tool_length is None:
+            raise ValueError("a chain's score needs tool_length [m] in its scenario file")
+        scores |= metrics_joint.of_chain(signals, window, tool_length)
     return scores
 
 

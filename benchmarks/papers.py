@@ -41,6 +41,10 @@ class Figure:
         Computed beforehand from the paper's own equations by another program.
     at_most, at_least : float, optional
         Bounds on ours.
+    given : bool
+        Whether ours was chosen to be so: an input, which is shown and never judged.
+    why : str
+        Of one that is out of tolerance and known to be: the reason.
     """
 
     name: str
@@ -53,11 +57,13 @@ class Figure:
     expected: float | None = None
     at_most: float | None = None
     at_least: float | None = None
+    given: bool = False
+    why: str = ""
 
     @property
     def passed(self) -> bool | None:
         """Whether ours is within tolerance and bounds; ``None`` if it is not judged."""
-        if self.ours is None:
+        if self.ours is None or self.given:
             return None
         checks = list[bool]()
         if self.tolerance is not None:
@@ -72,6 +78,8 @@ class Figure:
     @property
     def judged_by(self) -> str:
         """The tolerance and the bounds, as the table shows them."""
+        if self.given:
+            return ""
         words = [] if self.tolerance is None else [f"+-{self.tolerance:.2g}"]
         words += [] if self.at_least is None else [f">= {self.at_least:.4g}"]
         words += [] if self.at_most is None else [f"<= {self.at_most:.4g}"]
@@ -82,8 +90,16 @@ class Figure:
         """What the table says of it."""
         if self.ours is None:
             return "not computed"
-        missed = "MISSED" if self.tolerance is None else "FAIL"
+        if self.given:
+            return "input"
+        missed = "MISSED" if self.tolerance is None or self.why else "FAIL"
         return {True: "pass", False: missed, None: "reported"}[self.passed]
+
+    @property
+    def remark(self) -> str:
+        """The note, and behind it the reason where it is missed."""
+        reason = f"does not reproduce: {self.why}" if self.passed is False and self.why else ""
+        return "; ".join(text for text in (self.note, reason) if text)
 
     def record(self) -> dict[str, Any]:
         """Return the figure as plain data."""
@@ -203,9 +219,19 @@ GROUPS: tuple[Callable[[], list[Figure]], ...] = (
 
 def groups() -> tuple[Callable[[], list[Figure]], ...]:
     """Return the groups of all papers."""
-    from benchmarks import papers_gait, papers_knee, papers_knee_envs  # they import Figure
+    from benchmarks import (
+        papers_elbow,
+        papers_gait,
+        papers_joint,
+        papers_joint_steps,
+        papers_knee,
+        papers_knee_envs,
+        papers_manipulator,
+    )
 
-    return GROUPS + papers_knee.GROUPS + papers_gait.GROUPS + papers_knee_envs.GROUPS
+    knee = papers_knee.GROUPS + papers_gait.GROUPS + papers_knee_envs.GROUPS  # they import Figure
+    joint = papers_joint.GROUPS + papers_joint_steps.GROUPS
+    return GROUPS + knee + papers_elbow.GROUPS + joint + papers_manipulator.GROUPS
 
 
 def all_figures() -> list[Figure]:
@@ -235,7 +261,7 @@ def table(figures: Sequence[Figure]) -> str:
                 figure.unit,
                 figure.judged_by,
                 figure.verdict,
-                figure.note,
+                figure.remark,
             )
         )
     widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]

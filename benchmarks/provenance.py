@@ -19,6 +19,8 @@ SCORING = (
     "cells.py",
     "controllers.py",
     "metrics.py",
+    "metrics_elbow.py",
+    "metrics_joint.py",
     "metrics_knee.py",
     "rollout.py",
     "artefacts.py",

@@ -27,7 +27,8 @@ class Episode:
     Attributes
     ----------
     signals : mapping of (n,) array
-        Every entry of ``info``, SI.
+        Every entry of ``info``, SI; and ``model/0``, ``model/1``, ... where the controller has a
+        model to follow: what it says that each output of the model is then.
     observations : (n, n_obs) array
         What the controller was given at each step.
     actions : (n, n_act) array
@@ -76,8 +77,9 @@ def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None)
     observation, first = env.reset(seed=seed)
     keys = tuple(first)
     infos: list[tuple[float, ...]] = []
-    observations, actions, seconds = [], [], []
+    observations, actions, seconds, models = [], [], [], []
     state, start, failure, clock = None, True, "", time.perf_counter
+    told = getattr(controller, "model_output", None)
     over = False
     if watch:
         watch(env)
@@ -101,14 +103,20 @@ def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None)
         actions.append(action)
         seconds.append(spent)
         infos.append(tuple([info[key] for key in keys]))
+        if told:
+            models.append(np.ravel(told(state)).tolist())
         observation, over = after, terminated or truncated
         if terminated:
             failure = f"a limit ended the episode at {info['time']:g} s"
         if watch:
             watch(env)
     table = np.array(infos, np.float64).reshape(-1, len(keys))
+    followed = np.array(models, np.float64).T
     return Episode(
-        signals={key: np.ascontiguousarray(table[:, i]) for i, key in enumerate(keys)},
+        signals={
+            **{key: np.ascontiguousarray(table[:, i]) for i, key in enumerate(keys)},
+            **{f"model/{k}": series.copy() for k, series in enumerate(followed)},
+        },
         observations=np.array(observations),
         actions=np.array(actions),
         seconds=np.array(seconds),

@@ -16,7 +16,7 @@ from typing import Any
 import yaml
 
 from benchmarks.canonical import digest, plain
-from benchmarks.metrics import GROUPS, of_track
+from benchmarks.metrics import GROUPS, headline_of, of_track
 
 FOLDER = Path(__file__).parent / "scenarios"
 _KEYS = {
@@ -39,6 +39,8 @@ _KEYS = {
     "metrics",
     "gate",
     "half_range",
+    "headline",
+    "tool_length",
     "activity",
     "unit",
     "shown",
@@ -51,11 +53,13 @@ _OPTIONAL = {
     "metrics",
     "gate",
     "half_range",
+    "headline",
+    "tool_length",
     "activity",
     "unit",
     "shown",
 }
-_UNITS = {"load": "kg", "mismatch": "N", "pace": "s"}
+_UNITS = {"load": "kg", "mismatch": "N", "pace": "s", "payload": "kg"}
 """Of the axes of a grid, for the scenarios' names."""
 
 
@@ -108,6 +112,11 @@ class ScenarioSet:
                 f"{name}: no metrics {sorted(unknown)}; choose from {', '.join(GROUPS)}"
             )
         wanted = of_track(self.content)
+        headline = headline_of(self.content)
+        if headline not in wanted:
+            raise ValueError(f"{name}: no headline {headline!r}; choose from {', '.join(wanted)}")
+        if "chain" in (self.content.get("metrics") or ()) and "tool_length" not in given:
+            raise ValueError(f"{name}: the metrics of a chain need tool_length [m]")
         if set(self.content["worst_case"]) != set(wanted):
             raise ValueError(f"{name}: worst_case needs a value for each of {', '.join(wanted)}")
         seeds = self.content["seeds"]

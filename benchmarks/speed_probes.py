@@ -17,11 +17,14 @@ import numpy as np
 
 from benchmarks.speed import Chunk, Measurement, Missing, interleaved, median, ratio
 from benchmarks.speed_diagnosis import diagnosing
+from benchmarks.speed_planning import planning
 
 ENV = "PAM/MusclePositioning-v0"
 KNEE = "PAM/KneeWalk-v0"
+ELBOW = "PAM/ElbowOrthosis-v0"
 ROOT = Path(__file__).resolve().parent.parent
-PENDULUM, CARTPOLE = "InvertedPendulum-v5", "CartPole-v1"
+JOINT, ARM = "PAM/AntagonisticJoint-v0", "PAM/RedundantManipulator-v0"
+PENDULUM, CARTPOLE, HOPPER = "InvertedPendulum-v5", "CartPole-v1", "Hopper-v5"
 
 
 def stepping(env: Any, steps: int) -> Chunk:
@@ -96,6 +99,32 @@ def single(rounds: int) -> list[Measurement]:
     knee = ratio(rates["KneeWalk"], rates[PENDULUM]) if PENDULUM in rates else None
     note, title = notes.get(PENDULUM, ""), f"KneeWalk / {PENDULUM}"
     return [*results, Measurement("single", title, knee, "x", 5.0, 10.0, note=note)]
+
+
+def single_joints(rounds: int) -> list[Measurement]:
+    """Elbow with either make of valves, one joint, and an arm of six, beside MuJoCo's hopper."""
+    gym = _gym()
+    subjects = {
+        "elbow": stepping(gym.make(ELBOW), 5000),
+        "elbow, on/off valves": stepping(gym.make(ELBOW, valves="on_off"), 5000),
+        "joint": stepping(gym.make(JOINT), 5000),
+        "arm": stepping(gym.make(ARM), 2000),
+    }
+    note = ""
+    try:
+        subjects[HOPPER] = stepping(gym.make(HOPPER), 1000)
+    except (ImportError, gym.error.DependencyNotInstalled) as error:
+        note = f"not installed: {error}"
+    rates = interleaved(subjects, rounds)
+    results = [
+        Measurement("single", f"{name}, steps per CPU second", median(rates[name]), "1/s")
+        for name in subjects
+    ]
+    for name, env, floor in (("elbow", ELBOW, 8.0), ("joint", JOINT, 8.0), ("arm", ARM, 2.0)):
+        value = ratio(rates[name], rates[HOPPER]) if HOPPER in rates else None
+        title = f"{env[4:-3]} / {HOPPER}"
+        results.append(Measurement("single", title, value, "x", floor, 2 * floor, note=note))
+    return results
 
 
 # --- batches ----------------------------------------------------------------------------------
@@ -364,8 +393,9 @@ def learning(rounds: int) -> list[Measurement]:
 
 
 GROUPS: dict[str, tuple[Callable[[int], list[Measurement]], ...]] = {
-    "single": (single,),
+    "single": (single, single_joints),
     "batch": (batch, variants, growth, cores, processes),
+    "planning": (planning,),
     "plain": (uncompiled, jacobian),
     "start": (start_up,),
     "learning": (learning,),

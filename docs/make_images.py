@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from baselines.catalogue import make_controller  # noqa: E402
-from benchmarks import knee_studies, plots_knee  # noqa: E402
+from benchmarks import knee_studies, papers_elbow, plots_joint, plots_knee  # noqa: E402
 
 
 def save(env: gym.Env, path: Path) -> None:
@@ -46,8 +46,8 @@ def muscle_frame(path: Path, seconds: float = 21.0, seed: int = 7) -> None:
     save(env, path)
 
 
-def knee_frame(name: str, path: Path, seconds: float, **arguments: object) -> None:
-    """Run the inverse of the orthosis and write the picture after ``seconds``."""
+def frame(name: str, path: Path, seconds: float, **arguments: object) -> None:
+    """Run what moves a plant in films and write the picture after ``seconds``."""
     env = gym.make(name, render_mode="rgb_array", episode_seconds=60.0, **arguments)
     inner = env.unwrapped
     observation, _ = env.reset(seed=0)
@@ -72,6 +72,14 @@ def stride(path: Path, mismatch: float = 10.0) -> None:
 if __name__ == "__main__":
     images = ROOT / "docs" / "images"
     muscle_frame(images / "muscle_positioning_frame.png")
-    knee_frame("PAM/KneeTension-v0", images / "knee_tension_frame.png", 14.0, start="paper")
-    knee_frame("PAM/KneeWalk-v0", images / "knee_walk_frame.png", 10.6, start="heel_contact")
+    frame("PAM/KneeTension-v0", images / "knee_tension_frame.png", 14.0, start="paper")
+    frame("PAM/KneeWalk-v0", images / "knee_walk_frame.png", 10.6, start="heel_contact")
+    elbow = images / "elbow_orthosis_frame.png"
+    frame("PAM/ElbowOrthosis-v0", elbow, 6.6, reference="weight", motion="sines")
+    papers_elbow.bundle_figure().savefig(images / "elbow_bundles.png", dpi=100)
+    joint = images / "antagonistic_joint_frame.png"
+    frame("PAM/AntagonisticJoint-v0", joint, 8.9, reference="sine", payload=0.5, disturbance=1.5)
+    arm = images / "redundant_manipulator_frame.png"
+    frame("PAM/RedundantManipulator-v0", arm, 4.2, reference="path_3")
     stride(images / "knee_stride.png")
+    plots_joint.step_figure().savefig(images / "joint_step.png", dpi=100)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -124,9 +126,12 @@ def list_environments() -> None:
 
 
 def _names(signals: Signals) -> str:
-    """Return names and units; of references to come (``reference_1`` and on), how many."""
-    coming = sum(s.ahead > 0.0 for s in signals)
-    names = [f"{s.name} ({s.unit})" for s in signals if s.ahead == 0.0]
+    """Return names and units, first and last of what each joint has, and how many are to come."""
+    coming, names = sum(s.ahead > 0.0 for s in signals), []
+    now = [s for s in signals if s.ahead == 0.0]
+    for _, alike in itertools.groupby(now, lambda s: (re.sub(r"\d+[ab]?", "#", s.name), s.unit)):
+        first, *rest = alike
+        names.append(" .. ".join([first.name, *(s.name for s in rest[-1:])]) + f" ({first.unit})")
     return ", ".join([*names, f"{coming} references to come"] if coming else names)
 
 

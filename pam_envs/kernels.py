@@ -30,8 +30,9 @@ F = TypeVar("F", bound=Callable[..., Any])
 COMPILED: bool = os.environ.get("PAM_ENVS_COMPILE", "1").lower() not in {"0", "false", "no", "off"}
 """Whether kernels are compiled (``PAM_ENVS_COMPILE=0`` runs them as plain Python)."""
 
-LANES = 32
-"""Environments that one tile of a batch advances together."""
+LANES = 32 if COMPILED else 4
+"""Environments that one tile of a batch advances together. Plain Python computes them one by one,
+those that fill up the last tile too."""
 
 WITHOUT_KERNELS = ("data", "diagnosis", "__main__.py")
 """Parts of the package that compiled code does not depend on."""

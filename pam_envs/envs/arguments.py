@@ -148,6 +148,26 @@ def reference_of(
     return len(families), np.ascontiguousarray(shaped.T)
 
 
+def payloads_of(payload: Any, most: float) -> NDArray[np.float64]:
+    """Return the payloads [kg] that episodes draw from, shape (1, n).
+
+    Parameters
+    ----------
+    payload : float, sequence of float or None
+        As given by the user; None is any up to ``most``.
+    most : float
+        Largest payload [kg].
+    """
+    if payload is None:
+        return np.array([np.linspace(0.0, most, 6)])
+    given = payload if isinstance(payload, (Sequence, np.ndarray)) else [payload]
+    if isinstance(payload, str) or not len(given):
+        raise ValueError(
+            f"payload = {payload!r} must be a mass [kg], several of them, or None for any"
+        )
+    return np.array([[check_number("payload", mass, 0.0, most, "kg") for mass in given]])
+
+
 def task_of(kind: type[T], changes: Any) -> T:
     """Return a task with some of its weights, scales and limits changed."""
     known = tuple(declarations(kind))

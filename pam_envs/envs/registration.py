@@ -11,6 +11,9 @@ ENVIRONMENTS = {
     "PAM/KneeWalk-v0": "knee_gait:KneeWalk",
     "PAM/KneeStairsUp-v0": "knee_gait:KneeStairsUp",
     "PAM/KneeStairsDown-v0": "knee_gait:KneeStairsDown",
+    "PAM/ElbowOrthosis-v0": "elbow_orthosis:ElbowOrthosis",
+    "PAM/AntagonisticJoint-v0": "antagonistic_joint:AntagonisticJoint",
+    "PAM/RedundantManipulator-v0": "redundant_manipulator:RedundantManipulator",
 }
 """Module in this folder, and what stands before ``Env`` and ``VectorEnv`` in its classes' names."""
 

@@ -11,14 +11,14 @@ import importlib
 import math
 import os
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.envs.rendering_scene import (
-    GRID,
     INK,
     MUTED,
     OUTPUT,
@@ -30,8 +30,7 @@ from pam_envs.envs.rendering_scene import (
     Point,
     Strip,
     View,
-    blend,
-    full_bar,
+    pressure_loop,
 )
 
 SIZE = (800, 600)
@@ -44,6 +43,9 @@ VIEWS = {
     "knee_tension": "rendering_knee",
     "knee_stiffness": "rendering_knee",
     "knee_gait": "rendering_knee",
+    "elbow_orthosis": "rendering_elbow",
+    "antagonistic_joint": "rendering_joint",
+    **{f"redundant_manipulator_{n}": "rendering_manipulator" for n in range(1, 9)},
 }
 """Module whose ``VIEWS`` hold what is shown of an environment, by the view in its setup."""
 
@@ -106,6 +108,13 @@ class Canvas:
             self.surface, color, [v * SCALE for v in box], border_radius=round_ * SCALE
         )
 
+    @contextmanager
+    def within(self, box: tuple[int, int, int, int]) -> Iterator[None]:
+        """Draw nothing outside of a box given by left, top, width and height."""
+        self.surface.set_clip(self.pygame.Rect([v * SCALE for v in box]))
+        yield
+        self.surface.set_clip(None)
+
     def disc(self, centre: Point, radius: float, color: Color) -> None:
         """Fill a circle."""
         middle = (centre[0] * SCALE, centre[1] * SCALE)
@@ -147,9 +156,8 @@ class Renderer:
         self.strip: deque[tuple[float, ...]] = deque(
             maxlen=round(STRIP_SECONDS / env.control_period) + 1
         )
-        self.loop: deque[Point] = deque(maxlen=LOOP_SAMPLES)
+        self.loop: deque[tuple[float, ...]] = deque(maxlen=LOOP_SAMPLES)
         self.info: Any = None
-        self._full = full_bar(plant)
         self._spans = [(strip.span(plant), tuple(strip.ticks(plant))) for strip in strips]
         self._window: Any = None
         self._clock: Any = None
@@ -162,23 +170,24 @@ class Renderer:
             self.loop.clear()
         self.info = info
         self.strip.append(tuple([info[key] for key in self._keys]))
-        self.loop.append((info["state/pressure"], info["output"]))
+        self.loop.append(self.view.trace(info))
 
     def _draw(self) -> Any:
         self.canvas.clear()
         self.view.scene(self.canvas, self.env, self.info)
         self._draw_numbers()
-        self._draw_loop()
+        self._draw_panel()
         self._draw_strips()
         return self.canvas.picture()
 
     def _draw_numbers(self) -> None:
         info, text, first = self.info, self.canvas.text, self.view.strips[0]
         error = first.scale * (info["output"] - info["reference"])
+        what, unit, number = self.view.number
         for x, name, value, color in (
             (360, "time", f"{info['time']:.2f} s", INK),
             (475, "error", f"{error:+.2f} {first.unit}", INK),
-            (600, "pressure", f"{1e-5 * info['state/pressure']:.2f} bar", PRESSURE),
+            (600, what, f"{number(info):.2f} {unit}", PRESSURE),
         ):
             text(name, (x, 14), MUTED, 11)
             text(value, (x, 29), color, 16)
@@ -186,18 +195,12 @@ class Renderer:
             text("action", (770, 14), REFERENCE, 11, "right")
             text("clipped", (770, 29), REFERENCE, 16, "right")
 
-    def _draw_loop(self) -> None:
-        first, (span, across) = self.view.strips[0], self._spans[0]
-        axes = Axes(self.canvas, (360, 88, 410, 200), (0.0, self._full), span)
-        ticks = np.arange(0.0, self._full + 0.01, max(1.0, round(self._full / 6)))
-        axes.frame(ticks, across, "pressure [bar]", f"{first.name} [{first.unit}]")
-        points = [axes.at(1e-5 * p, first.scale * x) for p, x in self.loop]
-        step = 12
-        for i in range(0, len(points) - 1, step):
-            age = i / len(points)
-            self.canvas.line(points[i : i + step + 1], blend(GRID, OUTPUT, 0.15 + 0.85 * age), 2)
-        if points:
-            self.canvas.disc(points[-1], 4.5, OUTPUT)
+    def _draw_panel(self) -> None:
+        points = list(self.loop)
+        if self.view.panel is None:
+            pressure_loop(self.canvas, self.env.plant, self.view.strips[0], points)
+        else:
+            self.view.panel(self.canvas, self.env, self.info, points)
 
     def _draw_strips(self) -> None:
         first = max(0.0, self.strip[-1][0] - STRIP_SECONDS)

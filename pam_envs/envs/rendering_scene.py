@@ -6,7 +6,7 @@ the plant and ``info`` and change neither; they draw in the left 320 pixels.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -59,6 +59,10 @@ class Strip:
     ticks: Callable[[Any], Iterable[float]]
 
 
+Trace = Sequence[tuple[float, ...]]
+Panel = Callable[["Canvas", Any, Any, Trace], None]
+
+
 @dataclass(frozen=True)
 class View:
     """What the pictures of a family of environments show.
@@ -68,11 +72,28 @@ class View:
     scene : callable
         ``draw(canvas, env, info)``: the plant at work.
     strips : tuple of Strip
-        From top to bottom; the first one holds output and reference, and gives the loop its axis.
+        From top to bottom; the first one holds output and reference.
+    number : tuple of str, str, callable
+        Name, unit and value (from ``info``) of what stands beside time and error.
+    trace : callable
+        ``trace(info)``: what a step adds to the panel.
+    panel : callable, optional
+        ``panel(canvas, env, info, points)``: the plot above the strips, from all that was traced;
+        default: the loop of the output over the pressure.
     """
 
     scene: Callable[[Canvas, Any, Any], None]
     strips: tuple[Strip, ...]
+    number: tuple[str, str, Callable[[Any], float]] = (
+        "pressure",
+        "bar",
+        lambda info: 1e-5 * info["state/pressure"],
+    )
+    trace: Callable[[Any], tuple[float, ...]] = lambda info: (
+        1e-5 * info["state/pressure"],
+        info["output"],
+    )
+    panel: Panel | None = None
 
 
 def full_bar(plant: Any) -> float:
@@ -92,6 +113,35 @@ def pressure_strip(top: int, height: int) -> Strip:
         lambda plant: (0.0, full_bar(plant)),
         lambda plant: (0.0, 0.5 * full_bar(plant), full_bar(plant)),
     )
+
+
+PANEL: Box = (360, 88, 410, 200)
+"""Where the plot above the strips stands."""
+
+
+def draw_loop(
+    canvas: Canvas,
+    points: Trace,
+    axes: Axes,
+    scale: float,
+) -> None:
+    """Draw a path of points whose second coordinate is SI: old ones pale, a disc at the present."""
+    places, step = [axes.at(x, scale * y) for x, y in points], 12
+    for i in range(0, len(places) - 1, step):
+        age = i / len(places)
+        canvas.line(places[i : i + step + 1], blend(GRID, OUTPUT, 0.15 + 0.85 * age), 2)
+    if places:
+        canvas.disc(places[-1], 4.5, OUTPUT)
+
+
+def pressure_loop(canvas: Canvas, plant: Any, first: Strip, points: Trace) -> None:
+    """Draw the output, as the first strip has it, over the pressure [bar]."""
+    full = full_bar(plant)
+    axes = Axes(canvas, PANEL, (0.0, full), first.span(plant))
+    ticks = range(0, int(full) + 1, max(1, round(full / 6)))
+    across = tuple(first.ticks(plant))
+    axes.frame(ticks, across, "pressure [bar]", f"{first.name} [{first.unit}]")
+    draw_loop(canvas, points, axes, first.scale)
 
 
 class Axes:

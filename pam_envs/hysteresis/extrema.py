@@ -138,6 +138,27 @@ def preisach_step(
 
 
 @kernel
+def preisach_peek(
+    x: float, stack: Any, sums: Any, count: Any, lane: int, table: Any, low: float,
+    inverse_cell: float,
+) -> float:  # fmt: skip
+    """Return the output that :func:`preisach_step` would give, and leave the memory alone."""
+    x = _held(x, low, low + (len(table) - 1) / inverse_cell)
+    n = count[lane]
+    last, start = stack[n - 1][lane], stack[0][lane]
+    goes_up = last > stack[max(n - 2, 0)][lane]
+    rising = _rises(x, last, goes_up)
+    n = _branch(n, rising, goes_up)
+    while n > 1 and _passes(x, stack[n - 2][lane], rising):
+        n -= 2
+    n = _room(_base(n, x, start, start, low), len(stack))
+    k = max(n - 1, 0)
+    turn, output, part = _origin(n, x, stack[k][lane], sums[k][lane], start, low)
+    change = everett((x - low) * inverse_cell, (turn - low) * inverse_cell, table)
+    return output + part * change
+
+
+@kernel
 def _halved(i: int, k: int, upper: bool) -> tuple[int, int]:
     middle = (i + k) // 2
     return (middle, k) if upper else (i, middle)

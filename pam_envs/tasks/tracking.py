@@ -48,6 +48,17 @@ def effort_reward(change: float, full: float, weight: float) -> float:
 
 
 @kernel
+def ended_reward(ended: float, time: float, seconds: float, period: float, worst: float) -> float:
+    """Return the reward of a period in which a limit may have ended the episode, 0 if none has.
+
+    As if this period and all that are left of ``seconds`` had cost ``worst``, the most that one
+    can: to go on is never worse, at no discount up to 1.
+    """
+    left = max(0.0, seconds - time) / period + 1.0
+    return -worst * left if ended > 0.0 else 0.0
+
+
+@kernel
 def excess(value: float, limit: float) -> float:
     """Return by how much ``value`` exceeds ``limit``."""
     return max(0.0, value - limit)

@@ -9,7 +9,10 @@ import numpy as np
 
 import pam_envs  # noqa: F401 (registers)
 from pam_envs.kernels import COMPILED
+from pam_envs.mechanics.serial_chain import SerialChain
+from pam_envs.plants.antagonistic_joint import AntagonisticJoint
 from pam_envs.plants.knee_orthosis import KneeOrthosis
+from pam_envs.plants.redundant_manipulator import RedundantManipulator
 from pam_envs.plants.single_muscle import SingleMuscle
 
 IDS = sorted(name for name in gym.registry if name.startswith("PAM/"))
@@ -71,6 +74,10 @@ COMMON: dict[str, dict[str, Any]] = {
 PREISACH = {"hysteresis": "preisach", "randomize": True, "preview": 0}
 NONE = {"hysteresis": "none", "normalize": False}
 
+BENT = RedundantManipulator.paper().chain
+LINE = np.linspace(0.1, 0.25, 9)[:, None] * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
+"""Poses of a path along which all joints turn."""
+
 OWN: dict[str, dict[str, dict[str, Any]]] = {
     "PAM/MusclePositioning-v0": {
         "preisach": {"hysteresis": "preisach"},
@@ -101,8 +108,68 @@ OWN: dict[str, dict[str, dict[str, Any]]] = {
         "demand": {"reference": "demand", "start": "heel_contact", "preview": 0},
         "samples": {"reference": [0.1 * (k % 100) for k in range(300)], "preview": 20},
     },
+    "PAM/ElbowOrthosis-v0": {
+        "pulses": {
+            "valves": "on_off",
+            "hysteresis": "preisach",
+            "randomize": True,
+            "motion": "sines",
+            "reference": "wall",
+            "preview": 3,
+        },
+        "by_torque": {
+            **NONE,
+            "action": "torque_stiffness",
+            "reference": "weight",
+            "motion": "mixed",
+            "start": "random",
+        },
+        "samples": {
+            "reference": [[0.05 * (k % 200) - 5.0, 0.01 * (k % 900)] for k in range(300)],
+            "bear": False,
+            "span": (0.4, 1.2),
+            "preview": 1,
+        },
+    },
+    "PAM/AntagonisticJoint-v0": {
+        "pressures": {
+            "action": "pressures",
+            "reference": "mixed",
+            "payload": None,
+            "payload_change": 0.5,
+            "disturbance": 3.0,
+        },
+        "stiffness": {
+            "action": "angle_stiffness",
+            "hysteresis": "preisach",
+            "randomize": True,
+            "reference": "sine",
+            "preview": 0,
+        },
+        "reduced": {"plant": AntagonisticJoint.reduced(), "reference": "step"},
+        "measured": {
+            "plant": AntagonisticJoint.measured(),
+            "reference": [0.001 * (k // 20 % 300) for k in range(300)],
+            "normalize": False,
+        },
+    },
+    "PAM/RedundantManipulator-v0": {
+        "pressures": {
+            "action": "pressures",
+            "reference": "path_3",
+            "payload": [0.0, 0.01, 0.02],
+            "payload_change": 0.01,
+            "plan": False,
+            "preview": 0,
+        },
+        "poses": {"reference": BENT.pose(LINE).tolist(), "normalize": False, "preview": 1},
+    },
 }
 """Arguments of its own that reach further branches of an environment."""
+
+SHORT = SerialChain.uniform("xyxyz", length=0.2, mass=0.1)
+SHORT_PATH = SHORT.pose(0.15 + LINE[:, :5]).tolist()
+"""An arm of five joints, the last of which turns the tool about itself, and a path for it."""
 
 PLAIN: dict[str, dict[str, dict[str, Any]]] = {
     "PAM/KneeTension-v0": {"none": NONE},
@@ -110,11 +177,28 @@ PLAIN: dict[str, dict[str, dict[str, Any]]] = {
     "PAM/KneeWalk-v0": {"preisach_random": PREISACH, "none": NONE},
     "PAM/KneeStairsUp-v0": {"preisach_random": PREISACH},
     "PAM/KneeStairsDown-v0": {"none": NONE},
+    "PAM/ElbowOrthosis-v0": {
+        "preisach_random": PREISACH,
+        "pulses_plays": {"valves": "on_off", "motion": "mixed", "randomize": True},
+        "pulses_none": {"valves": "on_off", "hysteresis": "none", "reference": "wall"},
+    },
+    "PAM/AntagonisticJoint-v0": {
+        "reduced_preisach": {"plant": AntagonisticJoint.reduced("preisach"), "randomize": True},
+        "none": {"hysteresis": "none", "start": "straight"},
+    },
+    "PAM/RedundantManipulator-v0": {
+        "preisach": {"hysteresis": "preisach", "weighted": False, "reference": "path_1"},
+        "short": {"plant": RedundantManipulator.paper("none", SHORT), "reference": SHORT_PATH},
+    },
 }
 """What runs uncompiled only: each memory, mounting and regulator is machine code of its own, half a
 minute to make, and a mounting is compiled with another memory already."""
 
-LIVELY: dict[str, dict[str, Any]] = {"PAM/MusclePositioning-v0": {"load": None}}
+LIVELY: dict[str, dict[str, Any]] = {
+    "PAM/MusclePositioning-v0": {"load": None},
+    "PAM/AntagonisticJoint-v0": {"payload": None},
+    "PAM/RedundantManipulator-v0": {"payload": None},
+}
 """Arguments under which no entry of the observation stays the same over episodes."""
 
 ALWAYS = {name: {**COMMON, **OWN.get(name, {})} for name in IDS}

@@ -11,6 +11,9 @@ FAMILIES = {
     "KneeWalk": "gait",
     "KneeStairsUp": "gait",
     "KneeStairsDown": "gait",
+    "ElbowOrthosis": "elbow",
+    "AntagonisticJoint": "joint",
+    "RedundantManipulator": "manipulator",
 }
 """Environments with machine code in common."""
 

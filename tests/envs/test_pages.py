@@ -10,11 +10,25 @@ from pathlib import Path
 import gymnasium as gym
 import pytest
 
-from pam_envs.envs import knee_brace, knee_gait, muscle_positioning
+from pam_envs.envs import (
+    antagonistic_joint,
+    elbow_orthosis,
+    knee_brace,
+    knee_gait,
+    muscle_positioning,
+    redundant_manipulator,
+)
 from tests.envs.cases import IDS
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "envs"
-MODULES = {"muscle_positioning": muscle_positioning, "knee_brace": knee_brace, "knee_gait": knee_gait}  # fmt: skip  # noqa: E501
+MODULES = {
+    "muscle_positioning": muscle_positioning,
+    "knee_brace": knee_brace,
+    "knee_gait": knee_gait,
+    "elbow_orthosis": elbow_orthosis,
+    "antagonistic_joint": antagonistic_joint,
+    "redundant_manipulator": redundant_manipulator,
+}
 FIXED_BY_THE_ID = {"self", "activity", "quantity", "mounting"}
 EVERY = pytest.mark.parametrize("name", IDS)
 
@@ -36,6 +50,11 @@ def quoted(cell: str) -> list[str]:
     return re.findall(r"`([^`]+)`", cell)
 
 
+def told(cell: str) -> list[str]:
+    """Return the signals of a row: those in quotes at its beginning, or its first word."""
+    return quoted(re.match(r"(`\w+`,? ?)*", cell)[0]) or [re.split(r"[ ,:;]", cell)[0]]
+
+
 @EVERY
 def test_spaces(name: str) -> None:
     text = (DOCS / f"{page(name)}.md").read_text()
@@ -47,25 +66,26 @@ def test_spaces(name: str) -> None:
 @EVERY
 def test_signals_stand_in_their_order(name: str) -> None:
     env = gym.make(name, preview=0).unwrapped
-    first = [re.split(r"[ ,:;]", row[1])[0] for row in table(name, "Observation")]
-    listed = [word for word in first if not word.endswith("_1")]
-    assert [n for n in listed if n] == list(env.signals.names())
-    (action,) = table(name, "Action")
-    assert action[1] == env.action_signals[0].name
-    assert [float(action[3]), float(action[4])] == [
-        env.action_signals[0].low,
-        env.action_signals[0].high,
-    ]
+    first = [word for row in table(name, "Observation") for word in told(row[1])]
+    coming = {s.name for s in gym.make(name, preview=1).unwrapped.signals if s.ahead > 0.0}
+    assert [n for n in first if n and n not in coming] == list(env.signals.names())
+    rows = table(name, "Action")
+    assert [word for row in rows for word in told(row[1])] == list(env.action_signals.names())
+    for row in rows:
+        for word in told(row[1]):
+            action = env.action_signals[word]
+            assert (float(row[3]), float(row[4]), row[2]) == (action.low, action.high, action.unit)
 
 
 @EVERY
 def test_ranges_of_signals(name: str) -> None:
     env = gym.make(name, preview=0).unwrapped
     for row in table(name, "Observation"):
-        word = re.split(r"[ ,:;]", row[1])[0]
-        if word in env.signals.names() and " or " not in row[3] + row[4]:
-            signal = env.signals[word]
-            assert (float(row[3]), float(row[4]), row[2]) == (signal.low, signal.high, signal.unit)
+        for word in told(row[1]):
+            if word in env.signals.names() and " or " not in row[3] + row[4]:
+                signal = env.signals[word]
+                said = (float(row[3]), float(row[4]), row[2])
+                assert said == (signal.low, signal.high, signal.unit)
 
 
 @EVERY

@@ -1,0 +1,72 @@
+"""The classical controllers of the elbow orthosis by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from baselines.elbow_allocation import make_elbow_allocation
+from baselines.elbow_pid import make_elbow_pid
+from baselines.elbow_trivial import make_elbow_random, make_held, make_limp
+from baselines.entry import Entry
+from baselines.knee_catalogue import SIMC
+
+ELBOW = ("PAM/ElbowOrthosis-v0",)
+SEED_001 = (
+    "D. Chakarov, I. Veneva, M. Tsveov, P. Venev, Powered upper limb orthosis actuation system "
+    "based on pneumatic artificial muscles, J. Theoretical and Applied Mechanics 48 (2018)"
+)
+MODEL = "nominal model"
+
+ELBOW_CONTROLLERS: dict[str, Entry] = {
+    "elbow_limp": Entry("no pressure, ever; on/off valves let the air out", "nothing", envs=ELBOW),
+    "elbow_random": Entry(
+        "commands drawn evenly from the whole range, seeded", "nothing", envs=ELBOW
+    ),
+    "elbow_hold": Entry("3 bar in both bundles always", MODEL, feedback=True, envs=ELBOW),
+    "elbow_pid": Entry(
+        "PI of the torque as estimated from 1.2 bar in both, SIMC tuning; stiffness as it comes",
+        MODEL,
+        feedback=True,
+        citation=SIMC,
+        envs=ELBOW,
+    ),
+    "elbow_allocation": Entry(
+        "exact allocation of torque and stiffness, loops around both pressures",
+        MODEL,
+        feedback=True,
+        citation=SEED_001,
+        envs=ELBOW,
+    ),
+    "elbow_allocation_memory": Entry(
+        "elbow_allocation, with the bundles' friction undone",
+        MODEL,
+        feedback=True,
+        citation=SEED_001,
+        envs=ELBOW,
+    ),
+    "elbow_allocation_early": Entry(
+        "elbow_allocation_memory within the pressures of the valves' next step: torque first",
+        MODEL,
+        feedback=True,
+        citation=SEED_001,
+        envs=ELBOW,
+    ),
+}
+
+Maker = Callable[..., Any]
+
+ELBOW_MAKERS: Mapping[str, Maker] = {
+    "elbow_limp": make_limp,
+    "elbow_random": make_elbow_random,
+    "elbow_hold": make_held,
+    "elbow_pid": make_elbow_pid,
+    "elbow_allocation": make_elbow_allocation,
+    "elbow_allocation_memory": lambda plant, signals, actions: make_elbow_allocation(
+        plant, signals, actions, memory=True
+    ),
+    "elbow_allocation_early": lambda plant, signals, actions: make_elbow_allocation(
+        plant, signals, actions, memory=True, early=True
+    ),
+}
+"""From nominal plant, signals and action signals to the controller."""

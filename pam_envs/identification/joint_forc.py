@@ -1,0 +1,196 @@
+"""The memory of a joint, measured on a rig: Everett map, symmetry and congruency with a verdict.
+
+Seed 002 (section 3.2) drives the joint along the ascending branch, turns at chosen set-points and
+lets it fall to negative saturation: first-order descending curves, which give the Everett map
+``E(alpha, beta) = f_alpha - f_alphabeta`` (3.2). The printed rule for the other half,
+``f_alphabeta = -f_betaalpha``, is wrong; it is ``E(beta, alpha) = -E(alpha, beta)``.
+
+Whether a Preisach operator may be read off at all is measured in the same test:
+
+- *symmetry*, ``mu(a, b) = mu(-b, -a)``: the descending branches are the ascending ones turned by
+  half a turn. Two equal muscles against each other have it, a single muscle has not.
+- *congruency*: loops between the same two inputs are equal, whatever came before.
+- *wiping out*: a closed loop returns to where it began.
+
+The last two are necessary and sufficient (I. D. Mayergoyz, "Mathematical Models of Hysteresis",
+Springer 1991, section 1.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.hysteresis import everett as maps
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.identification.preisach_forc import (
+    congruency_error,
+    curve_inputs,
+    descending_curves,
+    preisach_from_curves,
+)
+
+Array = NDArray[np.float64]
+Rig = Callable[[Array], Array]
+"""From a series of inputs, shape (T,), to the outputs at rest after each, shape (T,)."""
+
+SYMMETRY, CONGRUENCY, WIPING_OUT = 0.03, 0.1, 0.03
+"""Largest errors with which a memory counts as a symmetric Preisach operator."""
+LOOPS = ((-1.0, 0.0), (-0.5, 0.5), (0.0, 1.0), (-0.25, 0.25))
+"""Ends of the minor loops that are compared, shares of 70 % of the half-range."""
+INSIDE = 0.7
+
+
+@dataclass(frozen=True)
+class JointMemory:
+    """What the test gives.
+
+    Attributes
+    ----------
+    model : Preisach
+        Operator of the map: of a symmetric one made exactly so, starting virgin; of any other as
+        measured, starting at the low end.
+    symmetry : float
+        Largest ``abs(E(a, b) - E(-b, -a))`` over the largest entry of the map.
+    congruency : float
+        Largest difference of two loops between the same inputs, over the height of a loop.
+    wiping_out : float
+        Largest distance of a closed loop's end from its beginning, over its height.
+    clipped : float
+        Weight of the relays that came out negative, as a part of all weight.
+    """
+
+    model: Preisach
+    symmetry: float
+    congruency: float
+    wiping_out: float
+    clipped: float
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the map counts as symmetric."""
+        return self.symmetry <= SYMMETRY
+
+    @property
+    def preisach(self) -> bool:
+        """Whether congruency and wiping out allow a Preisach operator."""
+        return self.congruency <= CONGRUENCY and self.wiping_out <= WIPING_OUT
+
+    @property
+    def verdict(self) -> str:
+        """A sentence on what the memory is and what to do about it."""
+        found = (
+            f"symmetry {self.symmetry:.3f} (bound {SYMMETRY:g}), congruency {self.congruency:.3f}"
+            f" (bound {CONGRUENCY:g}), wiping out {self.wiping_out:.3f} (bound {WIPING_OUT:g})"
+        )
+        if not self.preisach:
+            return f"fails as a Preisach operator: {found}; its minor loops need another model"
+        if not self.symmetric:
+            return f"fails the symmetry: {found}; use the map as measured, from the low end only"
+        return f"passes as a symmetric Preisach operator: {found}"
+
+    @property
+    def gain(self) -> float:
+        """Output over input between the tips of the major loop."""
+        return float(self.model.everett[-1, 0]) / (self.model.high - self.model.low)
+
+
+def measure_joint(rig: Rig, amplitude: float, levels: int = 21) -> JointMemory:
+    """Return the memory of a joint between ``-amplitude`` and ``amplitude`` [rad].
+
+    Parameters
+    ----------
+    rig : callable
+        From set-points [rad] to angles at rest [rad], each of shape (T,).
+    amplitude : float
+        [rad].
+    levels : int
+        Levels of the grid.
+    """
+    return measure_memory(rig, -amplitude, amplitude, levels)
+
+
+def measure_memory(rig: Rig, low: float, high: float, levels: int = 21) -> JointMemory:
+    """Return the memory of a rig, in units of its input and output; see this module's page.
+
+    Parameters
+    ----------
+    rig : callable
+        From inputs to outputs, shape (T,); every call begins in the rig's own start state.
+    low, high : float
+        Range of the input.
+    levels : int
+        Levels of the grid.
+
+    Raises
+    ------
+    ValueError
+        If the range is empty, or the rig answers with other than one finite number an input.
+    """
+    if not low < high or levels < 3:
+        raise ValueError(
+            f"low is {low}, high {high} and levels {levels}; low must be below high and levels at"
+            " least 3: widen the range"
+        )
+    sweep = _sweep(low, high, levels)
+    outputs = _answers(rig, sweep)
+    curves = descending_curves(sweep, outputs)
+    first = float(outputs[2 * (levels - 1)])
+    fit = preisach_from_curves(curves, low, high, levels, start_output=first)
+    symmetry = maps.symmetry_error(fit.model.everett)
+    congruency, wiping_out = _loops(rig, low, high, levels)
+    model = symmetrised(fit.model) if symmetry <= SYMMETRY else fit.model
+    return JointMemory(model, symmetry, congruency, wiping_out, fit.clipped)
+
+
+def symmetrised(model: Preisach) -> Preisach:
+    """Return the operator with each relay's weight the mean of its own and its mirror image's.
+
+    Its input and output are counted from mid-range, and it starts virgin.
+    """
+    weights = model.weights
+    mean = np.tril(0.5 * (weights + weights[::-1, ::-1].T))
+    half = 0.5 * (model.high - model.low)
+    return Preisach.from_weights(mean, -half, half, model.depth, "virgin")
+
+
+def _sweep(low: float, high: float, levels: int) -> Array:
+    """Return inputs up and down the major loop, then the first-order curves."""
+    up = np.linspace(low, high, levels)
+    return np.concatenate([up, up[-2::-1], curve_inputs(low, high, levels)[1:]])
+
+
+def _answers(rig: Rig, inputs: Array) -> Array:
+    outputs = np.asarray(rig(inputs), float)
+    if outputs.shape != inputs.shape or not np.all(np.isfinite(outputs)):
+        raise ValueError(
+            f"the rig answered {inputs.shape} inputs with outputs of shape {outputs.shape}; it must"
+            " give one finite number for each: let it settle after every input"
+        )
+    return outputs
+
+
+def _loops(rig: Rig, low: float, high: float, levels: int) -> tuple[float, float]:
+    """Return the errors of congruency and wiping out over minor loops."""
+    middle, half, cell = 0.5 * (low + high), 0.5 * INSIDE * (high - low), (high - low) / levels
+    congruency, wiping_out = 0.0, 0.0
+    for ends in LOOPS:
+        a, b = (middle + half * end for end in ends)
+        records = [_loop(rig, path, cell) for path in ((low, b, a, b, a), (low, high, a, b, a))]
+        congruency = max(congruency, congruency_error(records))
+        for _, outputs in records:
+            wiping_out = max(wiping_out, abs(outputs[-1] - outputs[0]) / float(np.ptp(outputs)))
+    return congruency, wiping_out
+
+
+def _loop(rig: Rig, turns: tuple[float, ...], cell: float) -> tuple[Array, Array]:
+    """Return the last two legs of a path through turns."""
+    legs = [np.linspace(a, b, 2 + round(abs(b - a) / cell))[1:] for a, b in pairwise(turns)]
+    inputs = np.concatenate([[turns[0]], *legs])
+    outputs = _answers(rig, inputs)
+    kept = len(legs[-1]) + len(legs[-2]) + 1
+    return inputs[-kept:], outputs[-kept:]

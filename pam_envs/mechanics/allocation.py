@@ -1,0 +1,106 @@
+"""From torque and stiffness of a joint to the two bundles that pull it, exactly, and what is left.
+
+A bundle's force is ``P = X phi(C)`` and its slope over the contraction ``dP/dC = X psi(C)``, with
+``phi = (L_n - C)(C_max - C)``, ``psi = 2 C - L_n - C_max`` and the *factor* ``X = k_0 + k_1 p``
+linear in the pressure (seed 001, Eqs. 4, 5, 7). Over a pulley of radius ``r`` bundle b bends the
+joint and bundle a straightens it (Eqs. 16, 22 of seed 001), so that torque ``Q`` and stiffness
+``S = -dQ/dq`` are linear in both factors:
+
+    Q / r     = -phi_a X_a + phi_b X_b
+    -S / r^2  =  psi_a X_a + psi_b X_b,       determinant -(phi_a psi_b + phi_b psi_a) > 0
+
+for contractions below ``C_max``. What the pressures can give is therefore a parallelogram. A wish
+outside is answered *torque first*: the torque is held within its range, then the stiffness within
+what the pressures leave at that torque. This is the solution of the box-constrained least squares
+in the limit of a weight on the torque alone. The paper searches for the same pressures by an
+optimisation (its reference 14); none is needed.
+"""
+
+from __future__ import annotations
+
+from pam_envs.kernels import kernel
+
+LEAST_SHAPE = 1e-9
+"""Smallest ``phi`` [m^2] that is divided by: bundles contracted to ``C_max`` give no force."""
+
+
+@kernel
+def determinant(phi_a: float, phi_b: float, psi_a: float, psi_b: float) -> float:
+    """Return the determinant [m^3] of the linear map from factors to ``(Q / r, -S / r^2)``."""
+    return -(phi_a * psi_b + phi_b * psi_a)
+
+
+@kernel
+def torque_of(x_a: float, x_b: float, radius: float, phi_a: float, phi_b: float) -> float:
+    """Return the torque [N m] of both factors [N/m^2], bending positive."""
+    return radius * (phi_b * x_b - phi_a * x_a)
+
+
+@kernel
+def stiffness_of(x_a: float, x_b: float, radius: float, psi_a: float, psi_b: float) -> float:
+    """Return the stiffness ``-dQ/dq`` [N m/rad] of both factors [N/m^2]."""
+    return -radius * radius * (psi_a * x_a + psi_b * x_b)
+
+
+@kernel
+def factors_for(
+    torque: float,
+    stiffness: float,
+    radius: float,
+    phi_a: float,
+    phi_b: float,
+    psi_a: float,
+    psi_b: float,
+) -> tuple[float, float]:
+    """Return the factors [N/m^2] that give torque and stiffness, whatever pressures they take.
+
+    Parameters
+    ----------
+    torque, stiffness : float
+        [N m], bending positive, and [N m/rad].
+    radius : float
+        Of the pulley [m].
+    phi_a, phi_b : float
+        Of the bundles [m^2].
+    psi_a, psi_b : float
+        Of the bundles [m].
+    """
+    pull, slope = torque / radius, -stiffness / (radius * radius)
+    over = 1.0 / determinant(phi_a, phi_b, psi_a, psi_b)
+    return (psi_b * pull - phi_b * slope) * over, -(psi_a * pull + phi_a * slope) * over
+
+
+@kernel
+def allocate(
+    torque: float,
+    stiffness: float,
+    radius: float,
+    phi_a: float,
+    phi_b: float,
+    psi_a: float,
+    psi_b: float,
+    low_a: float,
+    high_a: float,
+    low_b: float,
+    high_b: float,
+) -> tuple[float, float]:
+    """Return the factors [N/m^2] within their limits for torque and stiffness, torque first.
+
+    Parameters
+    ----------
+    low_a, high_a, low_b, high_b : float
+        Factors at the lowest and the highest pressure [N/m^2]; the others as in
+        :func:`factors_for`.
+    """
+    a, b = max(phi_a, LEAST_SHAPE), max(phi_b, LEAST_SHAPE)
+    x_a, x_b = factors_for(torque, stiffness, radius, a, b, psi_a, psi_b)
+    if low_a <= x_a <= high_a and low_b <= x_b <= high_b:
+        return x_a, x_b
+    lowest, highest = torque_of(high_a, low_b, radius, a, b), torque_of(low_a, high_b, radius, a, b)
+    held = max(lowest, min(highest, torque))
+    pull = held / radius
+    x_a, _ = factors_for(held, stiffness, radius, a, b, psi_a, psi_b)
+    # along a line of equal torque the stiffness grows with both factors
+    x_a = max(x_a, low_a, (b * low_b - pull) / a)
+    x_a = max(low_a, min(x_a, high_a, (b * high_b - pull) / a))
+    return x_a, max(low_b, min(high_b, (pull + a * x_a) / b))

@@ -1,0 +1,225 @@
+"""Joint angles for the poses of a redundant chain: the smallest ones, away from their limits.
+
+    minimise f(q)  with  g(q) = x,      f = sum_i 4 q_i^2 - ln(1 - (q_i / q_max)^2)         (2.1)
+
+Seed 002, section 2. The weight grows without bound towards the limits, so that an optimum within
+them is found wherever there is one nearby; the unweighted variant minimises ``q'q`` and knows no
+limits. The iteration is in ``redundancy_newton``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.kernels import COMPILED, build
+from pam_envs.mechanics.redundancy_equations import TASK
+from pam_envs.mechanics.redundancy_newton import resolve_path
+from pam_envs.mechanics.serial_chain import SerialChain
+from pam_envs.mechanics.serial_chain_rows import work_rows
+
+Array = NDArray[np.float64]
+
+LIMIT = float(np.deg2rad(30.0))
+"""Largest angle of a joint [rad] (seed 002, section 2)."""
+UNIT_TOLERANCE = 1e-6
+REACHED = 1e-5
+"""Distance [m] and turn [rad] from which the nearest pose is the one that is wanted."""
+
+
+class UnreachablePose(ValueError):
+    """A pose for which no joint angles within the limits were found.
+
+    Attributes
+    ----------
+    index : int
+        Number of the pose in the path.
+    pose : ndarray, shape (6,)
+    distance : float
+        From the pose's position to the nearest one found [m].
+    turn : float
+        From the pose's direction to that of the nearest one found [rad].
+    """
+
+    def __init__(
+        self, index: int, pose: Array, distance: float, turn: float, limit: float, hint: str = ""
+    ) -> None:
+        self.index, self.pose, self.distance, self.turn = index, pose, distance, turn
+        where = ", ".join(f"{v:.4g}" for v in pose[:3])
+        along = ", ".join(f"{v:.4g}" for v in pose[3:])
+        joints = f"joints of +-{np.rad2deg(limit):.4g} degrees"
+        if distance < REACHED and turn < REACHED:
+            answer = f"was not found with {joints}, though within reach; give start angles near it"
+        else:
+            answer = (
+                f"is out of reach with {joints}: the nearest pose found is {1e3 * distance:.4g} mm "
+                f"and {np.rad2deg(turn):.2f} degrees away; bring the path nearer to the middle of "
+                "the workspace, or turn its direction along the bent arm"
+            )
+        super().__init__(f"pose {index} at ({where}) m, pointing along ({along}), {answer}{hint}")
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """Joint angles for the poses of a path.
+
+    Attributes
+    ----------
+    angles : ndarray, shape (m, n)
+        [rad].
+    multipliers : ndarray, shape (m, 5)
+        Lagrange multipliers of (2.2), with which a later path may go on.
+    iterations : ndarray of int, shape (m,)
+        Newton iterations that each pose took.
+    limit : float
+        Largest angle of a joint [rad].
+    """
+
+    angles: Array
+    multipliers: Array
+    iterations: NDArray[np.int64]
+    limit: float
+
+    @property
+    def peak(self) -> float:
+        """Return the largest angle of a joint in the path [rad]."""
+        return float(np.max(np.abs(self.angles)))
+
+    @property
+    def within_limits(self) -> bool:
+        """Return whether no joint goes past its limit."""
+        return self.peak < self.limit
+
+    @property
+    def longest_step(self) -> float:
+        """Return the largest change of a joint from pose to pose [rad]: large where it jumps."""
+        return float(np.max(np.abs(np.diff(self.angles, axis=0)), initial=0.0))
+
+
+def resolve(
+    chain: SerialChain,
+    poses: ArrayLike,
+    limit: float = LIMIT,
+    weighted: bool = True,
+    start: ArrayLike | None = None,
+    multipliers: ArrayLike | None = None,
+) -> Resolution:
+    """Return joint angles for the poses of a path, each found from those of the pose before.
+
+    Parameters
+    ----------
+    chain : SerialChain
+        At least as many joints as a pose has degrees of freedom.
+    poses : array_like, shape (m, 6)
+        Position of the tip [m] and direction of the last link (its length does not count).
+    limit : float
+        Largest angle of a joint [rad].
+    weighted : bool
+        Whether the weight (2.1) is minimised, or ``q'q``, which lets joints go past the limit.
+    start : array_like, shape (n,), optional
+        Angles near the first pose [rad]; without them, bent poses are tried and the best result
+        is taken. So they are where ``start`` is straight.
+    multipliers : array_like, shape (5,), optional
+        Of the solution in ``start``.
+
+    Raises
+    ------
+    UnreachablePose
+        Naming the first pose without a solution, and how near the arm comes.
+    ValueError
+        If shapes or values do not make sense.
+    """
+    given = _checked_poses(chain, poses, limit)
+    n, m = chain.stages, len(given)
+    q, known = np.zeros((n, 1)), start is not None
+    if start is not None:
+        q[:, 0] = _checked_start(start, n, limit, weighted)
+    forces = np.zeros(TASK) if multipliers is None else np.array(multipliers, float)
+    angles, found, iterations = np.zeros((m, n)), np.zeros((m, TASK)), np.zeros(m, np.int64)
+    sizes = ((work_rows(n), 1), (n + TASK, n + TASK + 1), (n, n), (n + TASK,))
+    arrays = [given, q, forces, chain.rows()[:, None].copy(), *map(np.zeros, sizes)]
+    done = _call(_built(n), arrays, (limit, weighted, known), [angles, found, iterations])
+    if done < m:
+        raise UnreachablePose(done, given[done], *nearest(chain, given[done], limit), limit)
+    return Resolution(angles, found, iterations, limit)
+
+
+def nearest(chain: SerialChain, pose: ArrayLike, limit: float = LIMIT) -> tuple[float, float]:
+    """Return how near the arm comes to a pose within its limits: distance [m] and turn [rad]."""
+    from scipy.optimize import least_squares
+
+    wanted, best, least = np.asarray(pose, float), (np.inf, np.inf), np.inf
+    bound = np.full(chain.stages, limit)
+
+    def off(angles: Array) -> Array:
+        return chain.pose(angles) - wanted
+
+    for amplitude in (0.5, -0.5):
+        for period in (1, 2):  # bent, then in an S
+            signs = np.where(np.arange(chain.stages) * period // chain.stages % 2, -1.0, 1.0)
+            found = least_squares(
+                off,
+                amplitude * limit * signs,
+                chain.jacobian,
+                bounds=(-bound, bound),
+            )
+            if found.cost < least:
+                left, least = chain.pose(found.x), found.cost
+                cosine = float(np.clip(left[3:] @ wanted[3:], -1.0, 1.0))
+                best = (float(np.linalg.norm(left[:3] - wanted[:3])), float(np.arccos(cosine)))
+    return best
+
+
+@lru_cache(maxsize=16)
+def _built(stages: int) -> Callable[..., Any]:
+    return build(resolve_path, f"resolve_path_{stages}", N_STAGES=stages, LANES=1)
+
+
+def _call(
+    function: Callable[..., Any], arrays: list[Any], values: tuple[Any, ...], outputs: list[Any]
+) -> int:
+    """Call a kernel that fills ``outputs``, with lists where it is not compiled."""
+    if COMPILED:
+        return int(function(*arrays, *values, *outputs))
+    lists = [array.tolist() for array in outputs]
+    done = int(function(*(array.tolist() for array in arrays), *values, *lists))
+    for array, filled in zip(outputs, lists, strict=True):
+        array[...] = filled
+    return done
+
+
+def _checked_poses(chain: SerialChain, poses: ArrayLike, limit: float) -> Array:
+    given = np.array(poses, float)
+    if chain.stages < TASK:
+        raise ValueError(
+            f"a chain of {chain.stages} joints has no joint to spare for {TASK} degrees of "
+            f"freedom; give it {TASK} or more"
+        )
+    if given.ndim != 2 or given.shape[1] != TASK + 1 or not np.all(np.isfinite(given)):
+        raise ValueError(
+            f"poses of shape {given.shape} must be finite, of shape (m, 6): position [m], direction"
+        )
+    if not 0.0 < limit <= np.pi:
+        raise ValueError(f"limit = {limit!r} rad is outside (0, pi]; give an angle in radians")
+    size = np.linalg.norm(given[:, 3:], axis=1)
+    if np.any(size < UNIT_TOLERANCE):
+        k = int(np.argmin(size))
+        raise ValueError(f"pose {k} has the direction 0; give a vector along the last link")
+    given[:, 3:] /= size[:, None]
+    return given
+
+
+def _checked_start(start: ArrayLike, n: int, limit: float, weighted: bool) -> Array:
+    given = np.asarray(start, float)
+    if given.shape != (n,) or not np.all(np.isfinite(given)):
+        raise ValueError(f"start of shape {given.shape} must be {n} finite joint angles [rad]")
+    if weighted and np.any(np.abs(given) >= limit):
+        raise ValueError(
+            f"start = {given!r} rad has an angle beyond +-{limit:.4g} rad; begin between the limits"
+        )
+    return given

@@ -1,0 +1,297 @@
+"""Newton's method on the Lagrangian of a redundant chain, pose after pose of a path.
+
+The pose is no linear function of the angles, so the problem is not convex (seed 002 says it is):
+the method needs a start nearby, steps that stay between the limits, and an arm that is not
+straight, where the Jacobian loses rank. A path is followed from each pose to the next; where that
+leads nowhere, and at its beginning, bent poses are tried. The equations are in
+``redundancy_equations``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pam_envs.kernels import kernel, routine
+from pam_envs.mechanics.redundancy_equations import (
+    TASK,
+    merit,
+    set_curvature,
+    set_equations,
+    weight_of,
+)
+from pam_envs.mechanics.serial_chain_kinematics import N_STAGES
+from pam_envs.mechanics.serial_chain_rows import GRAVITY_ROWS, LINK_ROWS
+
+MOST_ITERATIONS = 150
+TOLERANCE = 1e-10
+"""Largest change of an angle [rad] in the last iteration."""
+CLOSE = 1e-9
+"""Largest error of position [m] and direction [1] that counts as reached."""
+LONGEST_STEP = 0.5
+"""Largest change of an angle [rad] in an iteration."""
+KEPT = 0.9
+"""Share of the way to a limit that an iteration may go."""
+STARTS = 16
+"""Bent poses from which a search begins; as many again, bent less, where those lead nowhere."""
+BEND, STRAIGHT = 0.35, 1e-3
+"""Angle [rad] of the bent poses, and below which all joints count as straight."""
+WARM = 0.05
+"""Change of an angle [rad] below which the constraint's curvature is let in after a cold start."""
+MOST_HALVINGS = 12
+LOST = 1e6
+"""Change of an angle [rad] from which an iteration has failed."""
+MUCH = 1e7
+"""Weight of the constraint where convexity is looked at."""
+SMALLEST_PIVOT = 1e-13
+SMALLEST_ROOM = 1e-9
+"""Share of the limit that an angle has to keep from it."""
+
+
+@routine
+def solve_equations(system: Any, size: int) -> None:
+    """Solve in place, by elimination with row exchange; the last column becomes the solution."""
+    for k in range(size):
+        best = k
+        for i in range(k + 1, size):
+            if abs(system[i][k]) > abs(system[best][k]):
+                best = i
+        if best != k:
+            for c in range(k, size + 1):
+                system[k][c], system[best][c] = system[best][c], system[k][c]
+        pivot = system[k][k]
+        if abs(pivot) < SMALLEST_PIVOT:
+            pivot = SMALLEST_PIVOT
+        for i in range(k + 1, size):
+            factor = system[i][k] / pivot
+            if factor != 0.0:
+                for c in range(k + 1, size + 1):
+                    system[i][c] = system[i][c] - factor * system[k][c]
+        system[k][k] = pivot
+    for n in range(size):
+        k = size - 1 - n
+        total = system[k][size]
+        for c in range(k + 1, size):
+            total = total - system[k][c] * system[c][size]
+        system[k][size] = total / system[k][k]
+
+
+@kernel
+def share_of_step(q: Any, system: Any, limit: float, weighted: bool) -> tuple[float, float]:
+    """Return how much of a step may be gone, and its largest change of an angle [rad]."""
+    last, share, largest = N_STAGES + TASK, 1.0, 0.0
+    for k in range(N_STAGES):
+        change = system[k][last]
+        largest = max(largest, abs(change))
+        if weighted:
+            gap = limit - q[k][0] if change > 0.0 else limit + q[k][0]
+            if abs(change) > KEPT * gap:
+                share = min(share, KEPT * gap / abs(change))
+    if largest > LONGEST_STEP:
+        share = min(share, LONGEST_STEP / largest)
+    return share, largest
+
+
+@kernel
+def change_angles(q: Any, system: Any, share: float) -> None:
+    """Go a share of the step."""
+    for k in range(N_STAGES):
+        q[k][0] = q[k][0] + share * system[k][N_STAGES + TASK]
+
+
+@routine
+def shortened(
+    q: Any, fixed: Any, work: Any, system: Any, pose: Any, limit: float, weighted: bool,
+    share: float,
+) -> float:  # fmt: skip
+    """Go the share of the step that lessens weight and errors together; return it."""
+    penalty = 1.0
+    for r in range(TASK):
+        penalty = max(penalty, 2.0 * abs(system[N_STAGES + r][N_STAGES + TASK]))
+    before = merit(q, fixed, work, pose, limit, weighted, penalty)
+    change_angles(q, system, share)
+    for _ in range(MOST_HALVINGS):
+        if merit(q, fixed, work, pose, limit, weighted, penalty) < before:
+            break
+        change_angles(q, system, -0.5 * share)
+        share = 0.5 * share
+    return share
+
+
+@routine
+def bends_upwards(system: Any, trial: Any) -> bool:
+    """Return whether the Lagrangian is convex along all that leaves the pose as it is.
+
+    It is if its second derivative plus much of ``J_g' J_g`` has positive pivots (Debreu's lemma).
+    """
+    for i in range(N_STAGES):
+        for k in range(i + 1):
+            total = 0.0
+            for r in range(TASK):
+                total = total + system[N_STAGES + r][i] * system[N_STAGES + r][k]
+            trial[i][k] = system[i][k] + MUCH * total
+    for k in range(N_STAGES):
+        if not trial[k][k] > 0.0:
+            return False
+        for i in range(k + 1, N_STAGES):
+            factor = trial[i][k] / trial[k][k]
+            for c in range(k + 1, i + 1):
+                trial[i][c] = trial[i][c] - factor * trial[c][k]
+    return True
+
+
+@routine
+def iterate(
+    q: Any, multipliers: Any, fixed: Any, work: Any, system: Any, trial: Any, pose: Any,
+    limit: float, weighted: bool, warm: bool,
+) -> int:  # fmt: skip
+    """Go to the nearby minimum for a pose; return the iterations taken, or 0 without success.
+
+    Where the Lagrangian is not convex, and after a cold start until the steps are small, the
+    constraint's curvature is left out and the step shortened until weight and errors get less:
+    so it is a minimum that comes near, and no saddle.
+    """
+    near, last = warm, N_STAGES + TASK
+    for iteration in range(MOST_ITERATIONS):
+        error = set_equations(q, fixed, work, system, pose, limit, weighted)
+        curved = near
+        if near:
+            set_curvature(multipliers, work, system, pose)
+            curved = bends_upwards(system, trial)
+            if not curved:
+                error = set_equations(q, fixed, work, system, pose, limit, weighted)
+        solve_equations(system, last)
+        share, largest = share_of_step(q, system, limit, weighted)
+        if not largest < LOST:
+            return 0
+        if curved:
+            change_angles(q, system, share)
+        else:
+            share = shortened(q, fixed, work, system, pose, limit, weighted, share)
+        if weighted and room_of(q, limit) < SMALLEST_ROOM * limit:
+            return 0
+        for r in range(TASK):
+            old = multipliers[r]
+            multipliers[r] = old + share * (system[N_STAGES + r][last] - old)
+        if curved and largest < TOLERANCE and error < CLOSE:
+            return iteration + 1
+        near = near or (largest < WARM and error < WARM)
+    return 0
+
+
+@kernel
+def room_of(q: Any, limit: float) -> float:
+    """Return the smallest distance of a joint from its limit [rad]."""
+    room = limit
+    for k in range(N_STAGES):
+        room = min(room, limit - abs(q[k][0]))
+    return room
+
+
+@routine
+def bend(q: Any, fixed: Any, start: int, limit: float) -> None:
+    """Bend the chain one way or in an S, for each axis: ``start`` counts the ways."""
+    size = min(BEND, 0.5 * limit)
+    if start >= STARTS:
+        size = 0.4 * size
+    for axis in range(3):
+        count, seen = 0.0, 0.0
+        for k in range(N_STAGES):
+            count = count + fixed[GRAVITY_ROWS + LINK_ROWS * k + axis][0]
+        code = start
+        if axis == 1:
+            code = start // 4
+        sign = 1.0 - 2.0 * (code % 2)
+        half = (code // 2) % 2
+        for k in range(N_STAGES):
+            if fixed[GRAVITY_ROWS + LINK_ROWS * k + axis][0] > 0.5:
+                turn = -1.0 if half == 1 and seen >= 0.5 * count else 1.0
+                q[k][0] = sign * turn * size * (1.0 + 0.1 * seen)
+                seen = seen + 1.0
+
+
+@routine
+def search(
+    q: Any, best: Any, multipliers: Any, fixed: Any, work: Any, system: Any, trial: Any,
+    pose: Any, limit: float, weighted: bool,
+) -> int:  # fmt: skip
+    """Go to the best optimum found from bent poses; return its iterations, or 0 without any."""
+    taken, least = 0, 0.0
+    for start in range(2 * STARTS):
+        if start >= STARTS and taken > 0:
+            break
+        bend(q, fixed, start, limit)
+        for r in range(TASK):
+            multipliers[r] = 0.0
+        count = iterate(q, multipliers, fixed, work, system, trial, pose, limit, weighted, False)
+        if count > 0:
+            value = weight_of(q, limit, weighted)
+            if taken == 0 or value < least - CLOSE:
+                taken, least = count, value
+                for k in range(N_STAGES):
+                    best[k] = q[k][0]
+                for r in range(TASK):
+                    best[N_STAGES + r] = multipliers[r]
+    if taken > 0:
+        for k in range(N_STAGES):
+            q[k][0] = best[k]
+        for r in range(TASK):
+            multipliers[r] = best[N_STAGES + r]
+    return taken
+
+
+@kernel
+def nearly_straight(q: Any) -> bool:
+    """Return whether all joints are straight: there the Jacobian has lost rank."""
+    largest = 0.0
+    for k in range(N_STAGES):
+        largest = max(largest, abs(q[k][0]))
+    return largest < STRAIGHT
+
+
+@kernel
+def resolve_path(
+    poses: Any, q: Any, multipliers: Any, fixed: Any, work: Any, system: Any, trial: Any, best: Any,
+    limit: float, weighted: bool, known: bool, angles: Any, found: Any, iterations: Any,
+) -> int:  # fmt: skip
+    """Find the angles for poses one after the other, each from those of the pose before.
+
+    Parameters
+    ----------
+    poses : rows, (m, 6)
+        Position [m] and direction.
+    q, multipliers : rows (n, 1), (5,)
+        Where to begin [rad]; ``known`` says whether they are near the first pose.
+    fixed, work, system, trial, best : rows
+        ``SerialChain.rows()`` in one lane; scratch: ``work_rows(n)`` rows of one lane,
+        (n + 5) x (n + 6), n x n, and n + 5.
+    limit : float
+        Largest angle [rad].
+    weighted : bool
+        Whether the weight (2.1) or the squares of the angles are minimised.
+    angles, found, iterations : rows (m, n), (m, 5), (m,)
+        Take angles, multipliers and iterations.
+
+    Returns
+    -------
+    int
+        How many poses were resolved: all, or the number of the first that was not.
+    """
+    near = known
+    for i in range(len(poses)):
+        count = 0
+        if near and not nearly_straight(q):
+            count = iterate(
+                q, multipliers, fixed, work, system, trial, poses[i], limit, weighted, True
+            )
+        if count == 0:
+            count = search(
+                q, best, multipliers, fixed, work, system, trial, poses[i], limit, weighted
+            )
+        if count == 0:
+            return i
+        iterations[i], near = count, True
+        for k in range(N_STAGES):
+            angles[i][k] = q[k][0]
+        for r in range(TASK):
+            found[i][r] = multipliers[r]
+    return len(poses)

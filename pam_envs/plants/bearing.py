@@ -1,0 +1,86 @@
+"""Whether muscles bear the weights at the angles of a plan, without memory and at rest."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+SMALLEST_ARM = 1e-12
+
+
+class Bearer(Protocol):
+    """What these functions need of a plant with n joints."""
+
+    def weight_torque(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
+        """Return the torques [N m] that hold plant and payload [kg] at angles (..., n) [rad]."""
+
+    def torque_range(self, angles: ArrayLike, by_pressure: bool = False) -> tuple[Array, Array]:
+        """Return the least and the largest torque [N m] at angles [rad]."""
+
+
+class UnbearableLoad(ValueError):
+    """The muscles cannot hold the weight at an angle of the plan."""
+
+
+def bearable_payload(plant: Bearer, angles: ArrayLike, by_pressure: bool = False) -> float:
+    """Return the largest payload [kg] that is borne at all angles; below 0 where none is.
+
+    Parameters
+    ----------
+    plant : AntagonisticJoint or RedundantManipulator
+    angles : array_like, shape (k, n)
+        [rad].
+    by_pressure : bool
+        Whether pressures are set, and not angles, whose set-points are limited.
+    """
+    low, high = plant.torque_range(angles, by_pressure)
+    empty = plant.weight_torque(angles)
+    each = plant.weight_torque(angles, 1.0) - empty
+    if np.any(empty > high) or np.any(empty < low):
+        return -1.0
+    room = np.where(each > 0.0, high - empty, empty - low)
+    return float(np.min(room / np.maximum(np.abs(each), SMALLEST_ARM)))
+
+
+def check_borne(
+    plant: Bearer, angles: ArrayLike, payload: float, where: str, by_pressure: bool = False
+) -> None:
+    """Raise if the weight at one of a plan's angles is more than the muscles exert there.
+
+    Parameters
+    ----------
+    plant, angles, by_pressure
+        As of :func:`bearable_payload`.
+    payload : float
+        The heaviest [kg].
+    where : str
+        What the plan is of, for the error's sentence.
+
+    Raises
+    ------
+    UnbearableLoad
+        Naming pose, joint, the torque that is needed and the torque there is.
+    """
+    low, high = plant.torque_range(angles, by_pressure)
+    wanted = plant.weight_torque(angles, payload)
+    short = np.maximum(wanted - high, low - wanted)
+    pose, joint = np.unravel_index(int(np.argmax(short)), short.shape)
+    if short[pose, joint] <= 0.0:
+        return
+    needed = float(wanted[pose, joint])
+    there = float((high if needed > high[pose, joint] else low)[pose, joint])
+    most = bearable_payload(plant, angles, by_pressure)
+    remedy = (
+        f"give it a payload of {most:.3g} kg or less, payload_change included"
+        if most >= 0.0
+        else "nor is it borne without a payload: take lighter links, or smaller angles"
+    )
+    raise UnbearableLoad(
+        f"{where}, pose {pose}: with {payload:g} kg of payload joint {joint} needs "
+        f"{abs(needed):.3g} N m at {np.degrees(np.asarray(angles)[pose, joint]):.1f} degrees and "
+        f"its muscles exert {np.sign(needed) * there + 0.0:.3g} N m there at most; {remedy}"
+    )

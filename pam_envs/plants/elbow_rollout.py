@@ -1,0 +1,178 @@
+"""Whole records of the elbow orthosis, parameter sets side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.kernels import COMPILED, LANES, build, kernel, prange, scratch, tile_view
+from pam_envs.plants import elbow_orthosis_rows as K
+from pam_envs.plants.elbow_orthosis import ElbowOrthosis
+from pam_envs.plants.elbow_orthosis_kernels import (
+    MEMORY_ROWS,
+    N_WORK,
+    advance,
+    begin_lane,
+    replacements,
+    start_memory,
+)
+from pam_envs.plants.elbow_orthosis_rows import N_COUNTS, N_PARAMETERS
+
+OUTPUTS = {
+    "angle": K.ANGLE,
+    "velocity": K.VELOCITY,
+    "pressure_a": K.PRESSURE_A,
+    "pressure_b": K.PRESSURE_B,
+    "force_a": K.FORCE_A,
+    "force_b": K.FORCE_B,
+    "contraction_a": K.CONTRACTION_A,
+    "contraction_b": K.CONTRACTION_B,
+    "lag": K.LAG,
+    "torque": K.TORQUE,
+    "stiffness": K.STIFFNESS,
+    "felt": K.FELT,
+    "wearer": K.WEARER,
+    "slack": K.SLACK,
+    "air_a": K.AIR_A,
+    "air_b": K.AIR_B,
+    "used": K.USED,
+    "switches": K.SWITCHES,
+}
+"""Every signal of a record (SI) and its row of state."""
+DRIVEN = (K.COMMAND_A, K.COMMAND_B, K.INTENT, K.INTENT_RATE, K.INTENT_ACCELERATION, K.DISTURBANCE)
+"""Rows that drive a record, in the order of its channels."""
+_ROWS = tuple(OUTPUTS.values())
+WIDTH = LANES if COMPILED else 1
+"""Plants that one tile holds; plain Python gains nothing from lanes."""
+N_ROWS = 0  # a placeholder, filled in for each memory
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def run_elbow(
+    all_rows: Any, all_fixed: Any, all_counts: Any, table: Any, drives: Any, start: Any,
+    outputs: Any, elements: int, substeps: int, period: float,
+) -> None:  # fmt: skip
+    """Run tiles of plants from rest at the pressures ``start`` through all control periods."""
+    for tile in prange(len(all_rows)):
+        rows = tile_view(all_rows, tile, N_ROWS, LANES)
+        fixed = tile_view(all_fixed, tile, N_PARAMETERS, LANES)
+        counts = tile_view(all_counts, tile, N_COUNTS, LANES)
+        work = scratch(N_WORK, LANES)
+        first = tile * LANES
+        lanes = min(LANES, len(outputs[0][0]) - first)
+        last = len(drives[0][0]) - 1
+        for j in range(LANES):
+            column = min(first + j, last)
+            rows[K.INTENT][j] = drives[2][0][column]
+            rows[K.DISTURBANCE][j] = drives[5][0][column]
+            start_memory(rows, counts, K.END, j)
+            begin_lane(
+                rows, fixed, counts, table, K.END, elements, j, start[0][column], start[1][column]
+            )
+        for step in range(len(drives[0])):
+            for j in range(LANES):
+                counts[K.STEP][j] = step
+                for k in range(len(DRIVEN)):
+                    rows[DRIVEN[k]][j] = drives[k][step][min(first + j, last)]
+            advance(rows, fixed, counts, table, K.END, elements, substeps, period, work)
+            for k in range(len(_ROWS)):
+                for j in range(lanes):
+                    outputs[k][step][first + j] = rows[_ROWS[k]][j]
+
+
+@lru_cache(maxsize=12)
+def _runner(kind: str, valves: str) -> Callable[..., Any]:
+    return build(run_elbow, f"run_elbow_{kind}_{valves}", **kernel_names(kind, valves))
+
+
+def kernel_names(kind: str, valves: str, lanes: int = WIDTH) -> dict[str, Any]:
+    """Return what takes the place of the placeholders of :func:`run_elbow`."""
+    sizes = {"N_ROWS": K.END + MEMORY_ROWS[kind], "LANES": lanes}
+    return replacements(kind, valves) | sizes
+
+
+def arrays_for(
+    plants: Sequence[ElbowOrthosis],
+    drives: Sequence[ArrayLike],
+    start: Sequence[ArrayLike],
+    lanes: int = WIDTH,
+) -> list[Any]:
+    """Return the arrays that :func:`run_elbow` takes, the outputs last, shape (signals, T, n)."""
+    channels = [np.asarray(d, np.float64) for d in drives]
+    periods = max(len(c) if c.ndim else 1 for c in channels)
+    columns = max(c.shape[1] if c.ndim == 2 else 1 for c in channels)
+    shaped = [c[:, None] if c.ndim == 1 else c for c in channels]
+    filled = np.array([np.broadcast_to(c, (periods, columns)) for c in shaped])
+    n = len(plants) if len(plants) > 1 else columns
+    tiles = -(-n // lanes)
+    rows = np.array([plant.parameter_rows() for plant in plants])
+    rows = rows[np.minimum(np.arange(tiles * lanes), len(plants) - 1)]
+    return [
+        np.zeros((tiles, K.END + MEMORY_ROWS[plants[0].memory.kind], lanes)),
+        np.ascontiguousarray(rows.T.reshape(-1, tiles, lanes).transpose(1, 0, 2)),
+        np.zeros((tiles, N_COUNTS, lanes), np.int64),
+        plants[0].memory_tables()[:1],
+        filled,
+        np.array([np.broadcast_to(np.asarray(s, float), (columns,)) for s in start]),
+        np.empty((len(OUTPUTS), periods, n)),
+    ]
+
+
+def simulate_elbow(
+    plants: ElbowOrthosis | Sequence[ElbowOrthosis],
+    commands: ArrayLike,
+    *,
+    intent: ArrayLike | tuple[ArrayLike, ArrayLike, ArrayLike] = 1.0,
+    disturbance: ArrayLike = 0.0,
+    pressures: tuple[ArrayLike, ArrayLike] | None = None,
+) -> dict[str, Array]:
+    """Simulate one orthosis, or several of one make, from rest.
+
+    Parameters
+    ----------
+    plants : ElbowOrthosis or sequence of them
+        Of one memory, of one make of valves, and with the same sub-steps. A memory's map is the
+        first's.
+    commands : array_like, shape (T, 2) or (T, n, 2)
+        For bundles a and b, one a control period: set-points [Pa]; of on/off valves pulse widths
+        [s], filling above 0, looked at where a cycle begins.
+    intent : array_like or tuple of three
+        Where the wearer intends to be at the end of each period [rad]: a constant angle, or angle,
+        rate [rad/s] and acceleration [rad/s2], each (T,) or (T, n). The first is where he begins.
+    disturbance : array_like
+        Torque on the forearm [N m]; a number, (T,) or (T, n).
+    pressures : tuple of array_like, optional
+        Pressures [Pa] of bundles a and b at the start. Default: the first set-points; of on/off
+        valves 0.
+
+    Returns
+    -------
+    dict
+        Each signal of ``OUTPUTS`` at the end of each control period, free of noise, shape (T,) for
+        one plant and (T, n) for several.
+    """
+    several = [plants] if isinstance(plants, ElbowOrthosis) else list(plants)
+    first = several[0]
+    makes = {(p.memory.kind, p.valves, p.substeps) for p in several}
+    if len(makes) != 1:
+        raise ValueError(f"plants that are simulated together need to be of one make, got {makes}")
+    command = np.asarray(commands, np.float64)
+    motion = intent if isinstance(intent, tuple) else (intent, 0.0, 0.0)
+    if pressures is None:
+        pulsed = first.valves == "on_off"
+        pressures = (0.0, 0.0) if pulsed else (command[0, ..., 0], command[0, ..., 1])
+    drives = (command[..., 0], command[..., 1], *motion, disturbance)
+    arrays = arrays_for(several, drives, pressures)
+    if not COMPILED:
+        arrays = [a.tolist() for a in arrays]
+    run = _runner(first.memory.kind, first.valves)
+    run(*arrays, first.elements, first.substeps, first.control_period)
+    made = np.asarray(arrays[-1])
+    single = made.shape[2] == 1 and command.ndim == 2 and isinstance(plants, ElbowOrthosis)
+    return {name: made[k, :, 0] if single else made[k] for k, name in enumerate(OUTPUTS)}

@@ -1,0 +1,35 @@
+"""The proportional regulator of a bundle: a first-order lag with a limited rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pam_envs.parameters import parameter
+
+
+@dataclass(frozen=True)
+class BundleRegulator:
+    """A closed-loop pressure regulator in the place of the paper's valves."""
+
+    max_pressure: float = parameter(
+        6e5, "Pa", 1e4, 1.2e6, "published", "600 kPa at most: seed 001, section 2"
+    )
+    time_constant: float = parameter(
+        0.05,
+        "s",
+        0.002,
+        2.0,
+        "assumed",
+        "of its class; see the regulator of seed 003",
+        spread=(0.035, 0.12),
+    )
+    slew_rate: float = parameter(
+        1.5e6,
+        "Pa/s",
+        1e4,
+        1e9,
+        "assumed",
+        "some 200 l/min into the 0.23 l of seven muscles",
+        neutral=1e9,
+        spread=(0.8e6, 3e6),
+    )

@@ -1,0 +1,28 @@
+"""The pressure regulators of an antagonistic joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pam_envs.parameters import parameter
+
+
+@dataclass(frozen=True)
+class JointRegulator:
+    """A proportional regulator for each muscle: a first-order lag with a limited rate."""
+
+    max_pressure: float = parameter(
+        6.5e5, "Pa", 1e4, 1.2e6, "assumed", "the highest pressure of the measured force map"
+    )
+    time_constant: float = parameter(
+        1.0 / 23.0,
+        "s",
+        0.002,
+        2.0,
+        "derived",
+        "one of the two poles at 23 rad/s of seed 002, Fig. 12",
+        spread=(0.03, 0.06),
+    )
+    slew_rate: float = parameter(
+        1e9, "Pa/s", 1e4, 1e9, "assumed", "not published; no limit", neutral=1e9
+    )

@@ -1,0 +1,78 @@
+"""Tracking with joints of antagonistic muscles: what a step is worth, what it costs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from pam_envs.kernels import kernel
+from pam_envs.parameters import parameter
+
+
+@dataclass(frozen=True)
+class JointTracking:
+    """Weights and limits of one joint.
+
+    ``reward = reward/tracking + reward/effort + reward/ended``.
+    """
+
+    tracking_weight: float = parameter(
+        1.0, "1", 0.0, 1e3, "assumed", "reward per control period at an error of error_scale"
+    )
+    error_scale: float = parameter(
+        0.01745, "rad", 1e-5, 3.0, "assumed", "an error of 1 degree costs tracking_weight"
+    )
+    effort_weight: float = parameter(
+        0.2, "1", 0.0, 1e3, "assumed", "cost of moving both pressures over their whole range"
+    )
+    soft_share: float = parameter(
+        0.95, "1", 0.1, 1.0, "assumed", "share of the joint limit from where on the angle costs"
+    )
+    soft_pressure: float = parameter(
+        6.4e5, "Pa", 0.0, 1e7, "assumed", "just below the largest pressure of 6.5 bar"
+    )
+
+    def worst(self, largest_error: float) -> float:
+        """Return the most that a control period can cost at an error of at most this [rad]."""
+        return self.tracking_weight * largest_error / self.error_scale + self.effort_weight
+
+
+@dataclass(frozen=True)
+class PathTracking:
+    """Weights and limits of a chain of joints whose tool follows a path.
+
+    ``reward = reward/position + reward/pointing + reward/effort + reward/ended``.
+    """
+
+    position_weight: float = parameter(
+        1.0, "1", 0.0, 1e3, "assumed", "reward per control period at position_scale"
+    )
+    position_scale: float = parameter(
+        0.02, "m", 1e-5, 10.0, "assumed", "the tool 2 cm off its path costs position_weight"
+    )
+    pointing_weight: float = parameter(
+        0.5, "1", 0.0, 1e3, "assumed", "reward per control period at pointing_scale"
+    )
+    pointing_scale: float = parameter(
+        0.03491, "1", 1e-5, 3.0, "assumed", "a tool 2 degrees aside costs pointing_weight"
+    )
+    effort_weight: float = parameter(
+        0.2, "1", 0.0, 1e3, "assumed", "cost of moving all pressures over their whole range"
+    )
+    soft_share: float = parameter(
+        0.95, "1", 0.1, 1.0, "assumed", "share of the joint limit from where on angles cost"
+    )
+    soft_pressure: float = parameter(
+        6.4e5, "Pa", 0.0, 1e7, "assumed", "just below the largest pressure of 6.5 bar"
+    )
+
+    def worst(self, reach: float) -> float:
+        """Return the most that a control period can cost an arm of this length [m]."""
+        off = self.position_weight * 2.0 * reach / self.position_scale
+        return off + self.pointing_weight * 2.0 / self.pointing_scale + self.effort_weight
+
+
+@kernel
+def distance(x: float, y: float, z: float) -> float:
+    """Return the length of a vector."""
+    return math.sqrt(x * x + y * y + z * z)

@@ -1,0 +1,140 @@
+"""Torque and stiffness at once: virtual objects in a wearer's hand, and what a step is worth.
+
+The orthosis makes objects felt that are not there. Each is a torque and a stiffness for every angle
+of the elbow; bending is positive, the upper arm hangs.
+
+* a *weight* in the hand pulls the forearm down, ``Q = -m g l sin(q)``, at a moderate stiffness;
+* a *wall* is not felt before an angle and is a stiff spring beyond it;
+* *free* motion: no torque, and as little stiffness as is asked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pam_envs.kernels import kernel, sine_of_turns
+from pam_envs.parameters import parameter
+
+OBJECTS = ("weight", "wall", "free", "mixed")
+WEIGHT, WALL, FREE, MIXED = range(len(OBJECTS))
+PER_TURN = 0.15915494309189535
+
+
+@dataclass(frozen=True)
+class TorqueStiffness:
+    """Weights, limits and objects.
+
+    ``reward = reward/torque + reward/stiffness + reward/effort + reward/ended``.
+    """
+
+    torque_weight: float = parameter(
+        1.0, "1", 0.0, 1e3, "assumed", "reward per control period at an error of torque_scale"
+    )
+    torque_scale: float = parameter(
+        0.5, "N m", 1e-4, 1e3, "assumed", "a torque off by 0.5 N m costs torque_weight"
+    )
+    stiffness_weight: float = parameter(
+        0.5, "1", 0.0, 1e3, "assumed", "reward per control period at an error of stiffness_scale"
+    )
+    stiffness_scale: float = parameter(
+        0.5, "N m/rad", 1e-4, 1e3, "assumed", "a stiffness off by 0.5 costs stiffness_weight"
+    )
+    effort_weight: float = parameter(
+        0.2,
+        "1",
+        0.0,
+        1e3,
+        "assumed",
+        "cost of moving both set-points over their range, or of coils that are always on",
+    )
+    soft_pressure: float = parameter(
+        5.9e5, "Pa", 0.0, 1e7, "assumed", "just below the supply of 600 kPa, seed 001"
+    )
+    lightest: float = parameter(
+        0.3, "kg", 0.0, 10.0, "assumed", "lightest weight that is drawn: a cup"
+    )
+    heaviest: float = parameter(
+        1.5, "kg", 0.0, 10.0, "assumed", "heaviest: 3 bundle muscles carry 2.2 kg at 60 degrees"
+    )
+    softest_free: float = parameter(
+        2.0, "N m/rad", 0.0, 50.0, "assumed", "near the least that pressures reach at no torque"
+    )
+    stiffest_free: float = parameter(
+        3.5, "N m/rad", 0.0, 50.0, "assumed", "free motion is to be soft"
+    )
+    softest_held: float = parameter(
+        3.0, "N m/rad", 0.0, 50.0, "assumed", "under a weight; at times less than can be reached"
+    )
+    stiffest_held: float = parameter(
+        5.0, "N m/rad", 0.0, 50.0, "assumed", "within reach under a weight but for straight arms"
+    )
+    nearest_wall: float = parameter(
+        0.8, "rad", 0.0, 3.0, "assumed", "bent by 46 degrees; straighter arms cannot be stiff"
+    )
+    farthest_wall: float = parameter(
+        1.3, "rad", 0.0, 3.0, "assumed", "bent by 74 degrees, so that reaches come to it"
+    )
+    softest_wall: float = parameter(
+        5.0, "N m/rad", 0.0, 50.0, "assumed", "twice as stiff as what is free"
+    )
+    stiffest_wall: float = parameter(
+        7.0, "N m/rad", 0.0, 50.0, "assumed", "nearly the stiffest that the bundles can be there"
+    )
+    wall_depth: float = parameter(
+        0.05, "rad", 1e-3, 1.0, "assumed", "over which the stiffness grows to that of the wall"
+    )
+
+    def worst(self, torque: float, stiffness: float) -> float:
+        """Return what a control period costs at most.
+
+        Parameters
+        ----------
+        torque, stiffness : float
+            Largest errors that there can be [N m], [N m/rad].
+        """
+        off = self.torque_weight * torque / self.torque_scale
+        return off + self.stiffness_weight * stiffness / self.stiffness_scale + self.effort_weight
+
+
+@kernel
+def object_torque(kind: float, angle: float, place: float, strength: float) -> float:
+    """Return the torque [N m] of an object at an angle [rad].
+
+    Parameters
+    ----------
+    kind : float
+        ``WEIGHT``, ``WALL`` or ``FREE``.
+    place : float
+        Angle of a wall [rad].
+    strength : float
+        Largest torque of a weight [N m], or stiffness of a wall [N m/rad].
+    """
+    if kind == WEIGHT:
+        return -strength * sine_of_turns(angle * PER_TURN)
+    if kind == WALL:
+        return -strength * max(0.0, angle - place)
+    return 0.0
+
+
+@kernel
+def object_stiffness(
+    kind: float, angle: float, place: float, strength: float, level: float, depth: float
+) -> float:
+    """Return the stiffness [N m/rad] of an object at an angle [rad].
+
+    Parameters
+    ----------
+    level : float
+        Stiffness where there is no wall [N m/rad].
+    depth : float
+        Over which it grows to that of the wall [rad]; the others as in :func:`object_torque`.
+    """
+    if kind == WALL:
+        return level + (strength - level) * max(0.0, min(1.0, (angle - place) / depth))
+    return level
+
+
+@kernel
+def error_reward(error: float, scale: float, weight: float) -> float:
+    """Return the reward for an error: linear, 0 at best."""
+    return -weight * abs(error) / scale

@@ -1,0 +1,89 @@
+"""Poses followed online, and both plans of a path side by side."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baselines.redundancy import POSE, InverseKinematics, compare
+from pam_envs.mechanics.redundancy import LIMIT, UnreachablePose, resolve
+from pam_envs.mechanics.serial_chain import SerialChain
+from pam_envs.parameters import Signal, Signals
+from pam_envs.references.path import PATHS
+
+ARM = SerialChain.uniform()
+PATH = PATHS[-1]
+NAMES = [*(f"angle_{k}" for k in range(6)), *(f"reference_{p}" for p in POSE)]
+AHEAD = [f"reference_{p}_1" for p in POSE]
+SIGNALS = Signals(
+    Signal(name, "1", -2.0, 2.0, i, i % 2 == 0) for i, name in enumerate(NAMES + AHEAD)
+)
+ACTIONS = Signals(Signal(f"angle_set_point_{k}", "rad", -LIMIT, LIMIT, k) for k in range(6))
+
+
+def observation(angles: np.ndarray, pose: np.ndarray, ahead: np.ndarray) -> np.ndarray:
+    values = np.concatenate([angles, pose, ahead])
+    return np.array([s.encode(v) for s, v in zip(SIGNALS, values, strict=True)])
+
+
+def set_points(action: np.ndarray) -> np.ndarray:
+    return np.array([ACTIONS[k].decode(action) for k in range(6)])
+
+
+def test_set_points_are_those_of_the_plan() -> None:
+    line = PATH.angles()
+    poses = ARM.pose(line)
+    planned = resolve(ARM, poses, start=line[0])
+    follower, state = InverseKinematics(ARM, SIGNALS, ACTIONS), None
+    for k in range(40):
+        seen = observation(line[0], poses[k], poses[k + 1])
+        action, state = follower.predict(seen, state)
+        assert action.shape == (6,) and action.dtype == np.float32
+        np.testing.assert_allclose(set_points(action), planned.angles[k], atol=1e-6)
+    assert state is not None and state.missed[0] == 0
+
+
+def test_previews_are_aimed_at() -> None:
+    line = PATH.angles()
+    poses = ARM.pose(line[:2])
+    seen = observation(line[0], poses[0], poses[1])
+    action, _ = InverseKinematics(ARM, SIGNALS, ACTIONS, ahead=1).predict(seen)
+    wanted = resolve(ARM, poses[1:], start=line[0]).angles[0]
+    np.testing.assert_allclose(set_points(action), wanted, atol=1e-6)
+
+
+def test_rows_of_a_batch_are_on_their_own() -> None:
+    lines = [path.angles() for path in PATHS]
+    poses = [ARM.pose(line) for line in lines]
+    follower = InverseKinematics(ARM, SIGNALS, ACTIONS, weighted=False)
+    state, alone = None, [None] * 3
+    for k in range(4):
+        rows = [observation(q[0], p[k], p[k]) for q, p in zip(lines, poses, strict=True)]
+        start = np.array([k == 0, k in (0, 2), k == 0])  # row 1 begins anew at k = 2
+        actions, state = follower.predict(np.array(rows), state, start)
+        for i, row in enumerate(rows):
+            action, alone[i] = follower.predict(row, alone[i], np.array([start[i]]))
+            np.testing.assert_array_equal(action, actions[i])
+
+
+def test_a_pose_out_of_reach_leaves_the_set_points_and_is_counted() -> None:
+    line = PATH.angles()
+    good, far = ARM.pose(line[0]), np.array([0.0, 0.0, 1.7, 0.0, 0.0, 1.0])
+    follower = InverseKinematics(ARM, SIGNALS, ACTIONS)
+    first, state = follower.predict(observation(line[0], good, good))
+    held, state = follower.predict(observation(line[0], far, far), state)
+    np.testing.assert_array_equal(held, first)
+    assert state.missed[0] == 1
+    again, state = follower.predict(observation(line[0], good, good), state)
+    np.testing.assert_allclose(again, first, atol=1e-6)
+    assert state.missed[0] == 1
+
+
+def test_both_plans_of_a_path() -> None:
+    line = PATH.angles()
+    both = compare(ARM, ARM.pose(line), start=line[0])
+    assert both.unweighted.peak > LIMIT > both.weighted.peak
+    squares = [np.sum(plan.angles[-1] ** 2) for plan in (both.weighted, both.unweighted)]
+    assert both.price == pytest.approx(squares[0] / squares[1]) and both.price > 1.0
+    with pytest.raises(UnreachablePose):
+        compare(ARM, [[0.0, 0.0, 1.7, 0.0, 0.0, 1.0]])

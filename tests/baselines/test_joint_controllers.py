@@ -1,0 +1,221 @@
+"""The joints' controllers: contract of a predictor, one joint and many, limits, starts."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+
+from baselines.catalogue import CONTROLLERS, make_controller
+from baselines.joint_catalogue import ARM, JOINT, JOINT_CONTROLLERS, JOINT_MAKERS
+from baselines.joint_gravity import Gravity
+from baselines.joint_poles import FREQUENCIES, phase
+from baselines.joint_view import make_joint_signal_map
+from benchmarks.joint_studies import (
+    ACTIONS,
+    DEGREE,
+    RANGE,
+    SIGNALS,
+    ReducedRig,
+    controller,
+    run,
+)
+from pam_envs.envs import antagonistic_joint, redundant_manipulator
+from pam_envs.parameters import Signal, Signals
+from pam_envs.plants.antagonistic_joint import AntagonisticJoint
+from pam_envs.plants.redundant_manipulator import RedundantManipulator
+
+BOUND = [n for n in JOINT_CONTROLLERS if n.endswith(("_gravity", "_ahead", "_kinematics"))]
+"""Need a plant that knows its weight, or its chain."""
+NAMES = [name for name in JOINT_CONTROLLERS if name not in BOUND]
+RIG = ReducedRig()
+
+
+def _signals(names, normalized=False):
+    return Signals(Signal(n, "rad", -RANGE, RANGE, k, normalized) for k, n in enumerate(names))
+
+
+def _two(name):
+    names = ["angle_0", "angle_1", "set_point_0", "set_point_1"]
+    names += ["joint_reference_0", "joint_reference_1"]
+    actions = _signals(["angle_set_point_0", "angle_set_point_1"], True)
+    made = JOINT_MAKERS[name](RIG, _signals(names), actions)
+    return made, actions
+
+
+def _observations(rows=3, steps=40):
+    draw = np.random.default_rng(1)
+    return RANGE * draw.uniform(-1.0, 1.0, (steps, rows, 3))
+
+
+def _arrays(state):
+    if isinstance(state, tuple):
+        return [a for part in state for a in _arrays(part)]
+    return [] if state is None else [state]
+
+
+def test_catalogue_and_makers_name_the_same():
+    assert set(JOINT_CONTROLLERS) == set(JOINT_MAKERS)
+    for name, entry in JOINT_CONTROLLERS.items():
+        assert CONTROLLERS[name] is entry
+        assert entry.envs == (ARM if name == "joint_inverse_kinematics" else JOINT)
+        assert entry.summary
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_rows_of_a_batch_are_single_runs(name):
+    made, seen = controller(name, RIG), _observations()
+    together, state = [], None
+    for batch in seen:
+        action, state = made.predict(batch, state)
+        assert action.shape == (3, 1) and action.dtype == np.float32
+        assert np.all(np.abs(action) <= np.float32(RANGE))
+        together.append(action[:, 0])
+    rows = (0,) if name == "joint_random" else range(3)
+    for row in rows:
+        state = None
+        for k, batch in enumerate(seen):
+            action, state = made.predict(batch[row], state)
+            assert action.shape == (1,)
+            assert action[0] == together[k][row]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_row_that_begins_anew_forgets_and_the_callers_state_stays(name):
+    made, seen, state = controller(name, RIG), _observations(), None
+    for batch in seen[:20]:
+        _, state = made.predict(batch, state)
+    before = copy.deepcopy(_arrays(state))
+    action, _ = made.predict(seen[20], state, np.array([False, True, False]))
+    kept, _ = made.predict(seen[20], state)
+    fresh, _ = made.predict(seen[20])
+    np.testing.assert_array_equal(action[[0, 2]], kept[[0, 2]])
+    assert action[1] == fresh[1]
+    for old, now in zip(before, _arrays(state), strict=True):
+        np.testing.assert_array_equal(old, now)
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if n != "joint_random"])
+def test_two_joints_are_two_single_ones(name):
+    pair, actions = _two(name)
+    one, seen = controller(name, RIG), _observations(rows=2)
+    states, state = [None, None], None
+    for batch in seen:
+        both, state = pair.predict(batch.T.ravel(), state)
+        for k in range(2):
+            action, states[k] = one.predict(batch[k], states[k])
+            assert actions[k].decode(both) == pytest.approx(float(action[0]), abs=1e-6)
+
+
+SETUPS = {
+    JOINT[0]: (AntagonisticJoint.paper, antagonistic_joint.make_setup),
+    JOINT[1]: (RedundantManipulator.paper, redundant_manipulator.make_setup),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "env"), [(n, e) for n in BOUND for e in JOINT_CONTROLLERS[n].envs]
+)
+def test_rows_are_single_runs_on_the_plants_themselves_whatever_is_observed(name, env):
+    plant, setup = SETUPS[env][0](), SETUPS[env][1]()
+    made = make_controller(name, plant, setup.signals, setup.action_signals)
+    seen = np.random.default_rng(3).uniform(-1.0, 1.0, (6, 2, len(setup.signals))).astype("f4")
+    state, alone = None, [None, None]
+    for batch in seen:
+        actions, state = made.predict(batch, state)
+        assert actions.shape == (2, plant.stages) and np.all(np.abs(actions) <= 1.0)
+        for i, row in enumerate(batch):
+            action, alone[i] = made.predict(row, alone[i])
+            np.testing.assert_array_equal(action, actions[i])
+
+
+def test_joint_without_a_chain_has_no_inverse_kinematics():
+    setup = antagonistic_joint.make_setup()
+    with pytest.raises(ValueError, match="is for a RedundantManipulator"):
+        told = (setup.signals, setup.action_signals)
+        make_controller("joint_inverse_kinematics", AntagonisticJoint.paper(), *told)
+
+
+def test_arm_without_a_plan_is_refused_and_the_remedy_named():
+    setup = redundant_manipulator.make_setup(plan=False)
+    with pytest.raises(ValueError, match="make the environment with plan=True"):
+        make_joint_signal_map(setup.signals, setup.action_signals)
+
+
+def test_inverse_kinematics_needs_no_plan():
+    setup = redundant_manipulator.make_setup(plan=False)
+    told = (setup.signals, setup.action_signals)
+    made = make_controller("joint_inverse_kinematics", RedundantManipulator.paper(), *told)
+    assert made.limit == RedundantManipulator.paper().angle_range[1]
+    nowhere = np.zeros(len(setup.signals), np.float32)  # a pose without a direction
+    action, state = made.predict(nowhere)
+    np.testing.assert_array_equal(action, np.zeros(6))
+    assert state.missed[0] == 1
+
+
+def test_other_actions_are_refused():
+    actions = Signals([Signal("pressure_a_set_point", "Pa", 0.0, 6e5, 0)])
+    with pytest.raises(ValueError, match="action='angle'"):
+        make_joint_signal_map(SIGNALS, actions)
+
+
+def test_co_contraction_is_held_where_it_is():
+    names = ("angle", "set_point", "reference", "prestress")
+    signals = Signals(Signal(n, "", -1.0, 99.0, k, False) for k, n in enumerate(names))
+    low, high = 20.0, 120.0
+    actions = Signals([ACTIONS[0], Signal("prestress", "N", low, high, 1)])
+    made = make_joint_signal_map(signals, actions)
+    action = made.write(np.array([[0.1]]), np.array([0.0, 0.0, 0.0, 45.0]))
+    assert actions[1].decode(action) == pytest.approx(45.0)
+
+
+@pytest.mark.parametrize("name", ["joint_pi", "joint_pid", "joint_mfc_mu", "joint_mfc_hinf"])
+def test_joint_held_off_limits_comes_back_without_windup(name):
+    reference = np.concatenate([np.full(300, 1.3 * RANGE), np.full(200, 5.0 * DEGREE)])
+    found = run(controller(name, RIG), reference, RIG)
+    at_limit = found.set_point[299]
+    assert at_limit == pytest.approx(RANGE, abs=1e-6)
+    fallen = found.angle[3600:]  # 0.6 s after the reference has come back into reach
+    assert np.max(np.abs(fallen - 5.0 * DEGREE)) < 1.0 * DEGREE
+
+
+@pytest.mark.parametrize(
+    "name", ["joint_pi", "joint_pi_slow", "joint_pid", "joint_pid_smooth", "joint_mfc_mu"]
+)
+def test_start_at_rest_elsewhere_has_no_bump(name):
+    made, command = controller(name, RIG), 12.0 * DEGREE
+    rest = float(RIG.rest_angles(np.array([command]))[0])
+    seen, state = np.array([rest, command, rest]), None
+    for _ in range(5):
+        action, state = made.predict(seen, state)
+        assert float(action[0]) == pytest.approx(command, abs=1e-3 * DEGREE)
+
+
+def test_joint_with_the_models_memory_is_the_model():
+    found = run(controller("joint_mfc_mu", ReducedRig(0.0)), np.full(100, 0.1), ReducedRig(0.0))
+    np.testing.assert_allclose(found.angle[9::10], found.model, atol=1e-6)
+
+
+def test_feedback_removes_a_standing_error():
+    for name in ("joint_pi", "joint_pi_slow", "joint_pid", "joint_mfc_mu", "joint_mfc_mu_wrong"):
+        found = run(
+            controller(name, RIG), np.full(400, 7.0 * DEGREE), RIG, lambda t: 0.02 + 0.0 * t
+        )
+        assert abs(found.angle[-1] - 7.0 * DEGREE) < 0.02 * DEGREE
+
+
+def test_gravity_is_carried_as_the_plant_says():
+    plant = AntagonisticJoint.paper()
+    angles, payload = np.array([[0.3], [-0.2], [0.05]]), np.array([0.0, 0.1, 0.2])
+    found = Gravity(plant).shift(angles, payload)
+    np.testing.assert_allclose(found, plant.gravity_shift(angles, payload), atol=2e-3)
+    assert np.all(Gravity().shift(angles, payload) == 0.0)
+    assert np.abs(found).max() > 5e-3
+
+
+def test_phase_of_a_double_lag_is_a_quarter_turn_at_its_pole():
+    time = 0.01 * np.arange(1, 400)
+    angle = 1.0 - np.exp(-6.0 * time) * (1.0 + 6.0 * time)
+    found = phase(np.diff(np.append(0.0, angle)), 0.01)
+    assert np.interp(6.0, FREQUENCIES, found) == pytest.approx(-0.5 * np.pi, abs=0.01)

@@ -1,0 +1,135 @@
+"""The frozen disturbance loops reach what they were synthesised for."""
+
+from __future__ import annotations
+
+import importlib.util
+
+import numpy as np
+import pytest
+
+from baselines import joint_synthesis as synthesis
+from baselines.linear import LinearSystem
+from baselines.reduction import residualised, split, with_integrator, without_fast
+from baselines.robust import frozen, frozen_loop, robust_controller
+from baselines.robust_design import FREQUENCIES, RobustDesign, sensitivity
+
+DESIGN = RobustDesign()
+
+
+def _loop(kind, stage="reduced"):
+    controller = robust_controller(kind, stage)
+    return DESIGN.plant.response(FREQUENCIES) * controller.response(FREQUENCIES)
+
+
+def test_numbers_are_those_of_the_committed_script():
+    assert frozen()["digest"] == synthesis.digest()
+
+
+@pytest.mark.parametrize("stage", ["full", "reduced"])
+def test_mu_loop_is_robust_and_the_h_infinity_loop_is_not_quite(stage):
+    value = {kind: DESIGN.structured_value(_loop(kind, stage)).max() for kind in ("mu", "hinf")}
+    assert value["mu"] < 1.0 < value["hinf"] < 1.1
+    assert frozen()["mu"][f"mu_{stage}"] == pytest.approx(value["mu"], rel=1e-6)
+
+
+def test_bound_of_slicot_is_the_exact_value():
+    for kind in ("mu", "hinf"):
+        exact = DESIGN.structured_value(_loop(kind)).max()
+        assert frozen()[kind]["mu_bound_ab13md"] == pytest.approx(exact, rel=1e-6)
+
+
+@pytest.mark.parametrize(("frequency", "size"), [(0.1, 0.013), (1.0, 0.126), (4.0, 0.443)])
+def test_sensitivity(frequency, size):
+    found = np.interp(frequency, FREQUENCIES, sensitivity(_loop("mu")))
+    assert found == pytest.approx(size, rel=0.02)
+    assert sensitivity(_loop("mu")).max() < 1.07
+
+
+def test_performance_holds_for_every_gain_of_the_sector():
+    performance = np.abs(DESIGN.performance.response(FREQUENCIES))
+    for gain in np.linspace(0.65, 1.35, 15):
+        assert np.max(performance * sensitivity(gain * _loop("mu"))) < 1.0
+
+
+def test_structured_value_is_where_the_worst_plant_breaks_the_bound():
+    loop, k = _loop("mu"), 230
+    value = DESIGN.structured_value(loop)[k]
+    asked = abs(DESIGN.performance.response(FREQUENCIES[k]))
+    neglected = abs(DESIGN.neglected.response(FREQUENCIES[k]) * loop[k])
+
+    def worst(size):
+        gains = 1.0 + DESIGN.gain_spread * size * np.linspace(-1.0, 1.0, 2001)
+        return size * asked / (np.min(np.abs(1.0 + gains * loop[k])) - size * neglected)
+
+    assert worst(0.999 / value) < 1.0 < worst(1.001 / value)
+    assert value <= DESIGN.complex_value(loop)[k] + 1e-12
+
+
+def test_sampled_loops_are_stable_over_the_sector():
+    for kind in ("mu", "hinf"):
+        controller, plant = frozen_loop(kind), DESIGN.plant.discrete(0.01, "zoh")
+        for gain in (0.65, 1.0, 1.35):
+            loop = np.block(
+                [
+                    [plant.a - gain * controller.d * np.outer(plant.b, plant.c),
+                     gain * np.outer(plant.b, controller.c)],
+                    [-np.outer(controller.b, plant.c), controller.a],
+                ]
+            )  # fmt: skip
+            assert np.max(np.abs(np.linalg.eigvals(loop))) < 1.0
+
+
+def test_frozen_discrete_numbers_are_the_bilinear_ones():
+    made, kept = robust_controller("mu").discrete(0.01), frozen_loop("mu")
+    w = np.geomspace(0.1, 300.0, 40)
+    np.testing.assert_allclose(made.response(w), kept.response(w), rtol=1e-9)
+
+
+def test_a_slower_joint_has_the_same_loop_in_its_own_time():
+    fast, slow = robust_controller("mu"), robust_controller("mu", pole=11.5)
+    w = np.geomspace(0.1, 100.0, 20)
+    np.testing.assert_allclose(slow.response(0.5 * w), fast.response(w), rtol=1e-9)
+
+
+def test_reduction_keeps_the_gain_at_rest_and_its_bound():
+    system = LinearSystem.from_roots([-4.0, -40.0], [-1.0, -5.0, -30.0, -200.0], 2.0)
+    small, sizes = residualised(system, 2)
+    w = np.geomspace(1e-3, 1e4, 200)
+    assert small.static_gain == pytest.approx(2.0, rel=1e-9)
+    error = np.abs(small.response(w) - system.response(w))
+    assert 0.0 < error.max() <= 2.0 * sizes[2:].sum() * (1.0 + 1e-6)
+    with pytest.raises(ValueError, match="order is 5 of 4"):
+        residualised(system, 5)
+
+
+def test_split_parts_add_up():
+    system = LinearSystem.from_roots([-4.0], [-0.01, -5.0, -6.0, -3e4], 1.0)
+    within, beyond = split(system, 0.1)
+    w = np.geomspace(1e-3, 1e5, 50)
+    both = within.response(w) + beyond.response(w)
+    np.testing.assert_allclose(both, system.response(w), rtol=1e-9)
+    assert without_fast(system, 1e3).order == 3
+    joined = with_integrator(2.0, beyond).response(w)
+    np.testing.assert_allclose(joined, 2.0 / (1j * w) + beyond.response(w), rtol=1e-9)
+    with pytest.raises(ValueError, match="parts them"):
+        split(system, 1e6)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("slycot") is None, reason="the extra is not there")
+@pytest.mark.filterwarnings("ignore")
+def test_synthesis_gives_the_frozen_loops_again():
+    hinf, mu, rounds = synthesis.d_k_iteration(DESIGN)
+    np.testing.assert_allclose(rounds, frozen()["mu_by_round"], rtol=1e-4)
+    for kind, controller in (("hinf", hinf), ("mu", mu)):
+        made = DESIGN.structured_value(synthesis.loop_of(DESIGN, controller)).max()
+        assert made == pytest.approx(frozen()[kind]["mu_full"], rel=1e-4)
+
+
+def test_scale_is_fitted_and_its_inverse_stable():
+    wanted = np.abs(
+        LinearSystem.from_roots([-3.0, -90.0], [-12.0, -40.0], 1.5).response(FREQUENCIES)
+    )
+    made = synthesis.fit_scale(wanted)
+    assert np.max(made.poles.real) < 0.0 and np.max(made.zeros.real) < 0.0
+    fitted = np.abs(made.response(FREQUENCIES[synthesis.FITTED]))
+    np.testing.assert_allclose(fitted, wanted[synthesis.FITTED], rtol=1e-3)

@@ -1,0 +1,25 @@
+"""What controllers are built on says so if the memory is not what they take it for."""
+
+from __future__ import annotations
+
+import warnings
+
+import pytest
+
+from baselines.joint_model import joint_model
+from pam_envs.plants.antagonistic_joint import AntagonisticJoint
+
+
+def test_a_memory_that_fails_the_symmetry_is_warned_of_with_value_and_bound() -> None:
+    joint = AntagonisticJoint.paper(muscle__imbalance=0.08)
+    with pytest.warns(UserWarning, match=r"fails the symmetry: symmetry 0\.0\d\d \(bound 0.03\)"):
+        model = joint_model(joint)
+    assert model.memory is not None and model.memory.start == "low"
+
+
+@pytest.mark.parametrize("preset", ["paper", "measured", "reduced"])
+def test_presets_are_taken_without_a_word(preset: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model = joint_model(getattr(AntagonisticJoint, preset)())
+    assert model.memory is not None and model.memory.start == "virgin"

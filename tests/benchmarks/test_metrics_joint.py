@@ -1,0 +1,222 @@
+"""Metrics of joints and arms, on records whose scores are known and on episodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import pam_envs  # noqa: F401 (registers)
+from benchmarks import metrics, metrics_joint, rollout, rows
+from benchmarks.cells import make_env
+from benchmarks.leaderboard import columns_of, tracks
+from benchmarks.scenarios import ScenarioSet, available
+
+PERIOD = 0.01
+N = 1000
+TIME = PERIOD * np.arange(1, N + 1)
+JOINT, CHAIN = "PAM/AntagonisticJoint-v0", "PAM/RedundantManipulator-v0"
+EFFORT = ("effort/pressure_travel", "effort/air", "cost/angle", "cost/pressure")
+TRACKS = {n: t for n, t in available().items() if t.env in (JOINT, CHAIN)}
+
+
+def joint(**changes: Any) -> dict[str, np.ndarray]:
+    """Return a record of a joint that is where it should be."""
+    reference = 0.2 * np.sin(2.0 * np.pi * TIME)
+    made = {key: reference.copy() for key in ("reference", "output", "sensed", "state/angle")}
+    made |= {key: np.zeros(N) for key in (*EFFORT, "saturated", "state/slack")}
+    return {"time": TIME, **made, **changes}
+
+
+def chain(**changes: Any) -> dict[str, np.ndarray]:
+    """Return a record of an arm of two joints whose tip is 3 mm off."""
+    made = {key: np.zeros(N) for key in (*EFFORT, "reference", "saturated", "state/slack")}
+    made |= {"output": np.full(N, 3e-3), "sensed": np.full(N, 4e-3)}
+    made |= {"state/pointing_error": np.full(N, 0.02), "state/joint_error": np.full(N, 0.01)}
+    for key in (*metrics_joint.POSITION, *metrics_joint.DIRECTION):
+        made[f"state/{key}"] = made[f"state/reference_{key}"] = np.zeros(N)
+    for k in range(2):
+        made[f"state/angle_{k}"] = made[f"state/joint_reference_{k}"] = np.full(N, -0.3 * k)
+    return {"time": TIME, **made, **changes}
+
+
+def score(record: dict[str, np.ndarray], group: str) -> dict[str, float]:
+    costs = {"cost/angle": 0.01}
+    return metrics.score(record, PERIOD, 2.0, 0.5, costs, groups=(group,), tool_length=0.25)
+
+
+def test_the_error_is_over_half_the_range() -> None:
+    reference = joint()["reference"]
+    scores = score(joint(output=reference + 0.02), "joint")
+    assert scores["rms_error"] == pytest.approx(0.02)
+    assert scores["rms_percent"] == pytest.approx(10.0)
+    assert set(scores) == set(metrics.of_track({"metrics": ["joint"]}))
+
+
+def test_the_sensed_error_and_that_to_the_model_stand_beside_the_headline() -> None:
+    angle = joint()["state/angle"]
+    scores = score(joint(sensed=angle + 0.01), "joint")
+    assert scores["rms_error"] == 0.0
+    assert scores["sensed_rms_error"] == pytest.approx(0.01)
+    assert np.isnan(scores["model_rms_error"])
+    told = score(joint(**{"model/0": angle - 0.03}), "joint")
+    assert told["rms_error"] == 0.0
+    assert told["model_rms_error"] == pytest.approx(0.03)
+
+
+def test_shares_of_time_are_of_the_window_after_settling() -> None:
+    short = (TIME <= 6.0).astype(float)
+    scores = score(joint(saturated=short, **{"state/slack": 2.0 * short}), "joint")
+    assert scores["saturated_time"] == pytest.approx(0.5)
+    assert scores["slack_time"] == pytest.approx(0.5)
+
+
+def test_of_a_chain_tip_pointing_joints_and_model_are_scored_apart() -> None:
+    models = {"model/0": np.full(N, 0.04), "model/1": np.full(N, -0.3)}
+    scores = score(chain(**models), "chain")
+    assert set(scores) == set(metrics.of_track({"metrics": ["chain"]}))
+    assert scores["rms_error"] == pytest.approx(3e-3)
+    assert scores["sensed_rms_error"] == pytest.approx(4e-3)
+    assert scores["pointing_rms"] == pytest.approx(0.02)
+    assert scores["joint_rms"] == pytest.approx(0.01)
+    assert scores["largest_angle"] == pytest.approx(0.3)
+    assert scores["model_rms_error"] == pytest.approx(0.04 / np.sqrt(2.0))
+    one = score(chain(**{"model/0": np.zeros(N)}), "chain")
+    assert np.isnan(one["model_rms_error"])  # a model of one joint is no model of the arm
+
+
+def test_a_tip_that_is_off_moves_the_tool_as_a_whole() -> None:
+    scores = score(chain(**{"state/x": np.full(N, 3e-3)}), "chain")
+    assert scores["tool_rms_error"] == pytest.approx(3e-3)
+
+
+def test_a_direction_given_up_for_the_tip_counts_by_half_of_what_it_moves() -> None:
+    turned = {"state/point_y": np.full(N, 0.04)}  # the tip is right, the other point 10 mm off
+    scores = score(chain(output=np.zeros(N), **turned), "chain")
+    assert scores["rms_error"] == 0.0
+    assert scores["tool_rms_error"] == pytest.approx(10e-3 / np.sqrt(2.0))
+    # about the other point: it is right and the tip is off
+    about = {**turned, "state/y": np.full(N, 0.01)}
+    assert score(chain(**about), "chain")["tool_rms_error"] == pytest.approx(10e-3 / np.sqrt(2.0))
+    # about the middle between both: each is off by half
+    about["state/y"] = np.full(N, 0.005)
+    assert score(chain(**about), "chain")["tool_rms_error"] == pytest.approx(5e-3)
+
+
+def test_the_tool_is_scored_after_settling_only() -> None:
+    early = {"state/z": np.where(TIME <= 2.0, 0.1, 0.0)}
+    assert score(chain(**early), "chain")["tool_rms_error"] == 0.0
+
+
+def test_the_tip_is_steady_where_its_path_has_rested() -> None:
+    moving = np.clip(TIME - 3.0, 0.0, 2.0)  # 3 s to 5 s; it counts as at rest from 5.5 s on
+    off = np.where((TIME > 2.5) & (TIME < 5.5), 0.02, 1e-3)
+    record = chain(output=off, **{f"state/{r}point_x": moving for r in ("", "reference_")})
+    scores = score(record, "chain")
+    assert scores["max_error"] == 0.02
+    assert scores["steady_state_error"] == pytest.approx((1e-3 * 451 + 0.02 * 50) / 501, rel=0.02)
+    still = metrics_joint.way(record)
+    assert np.all(np.diff(still)[:298] == 0.0) and np.all(np.diff(still)[500:] == 0.0)
+    assert still[-1] == pytest.approx(2.0)
+
+
+def test_a_chain_is_ranked_by_its_whole_tool() -> None:
+    arm, one = TRACKS["manipulator_nominal"].content, TRACKS["joint_nominal"].content
+    assert metrics.headline_of(arm) == "tool_rms_error"
+    assert metrics.headline_of(one) == metrics.HEADLINE == "rms_error"
+    for key, value in (("headline", "air"), ("tool_length", None)):
+        changed = {k: v for k, v in (arm | {key: value}).items() if v is not None}
+        with pytest.raises(ValueError, match=key):
+            ScenarioSet(changed)
+    ordered = tracks([_row(arm, "tip", 1e-3, 9e-3), _row(arm, "tool", 2e-3, 3e-3)])
+    names = [row["controller"]["name"] for row in ordered["manipulator_nominal"]]
+    assert names == ["tool", "tip"]
+
+
+def _row(content: Any, name: str, tip: float, tool: float) -> dict[str, Any]:
+    values = {"rms_error": tip, "tool_rms_error": tool}
+    return {
+        "controller": {"name": name},
+        "env": {"id": CHAIN},
+        "scenarios": {"name": content["name"], "content": content},
+        "aggregate": {k: {"mean": v, "low": v, "high": v} for k, v in values.items()},
+    }
+
+
+def test_the_breakdown_is_of_the_headline() -> None:
+    track = TRACKS["manipulator_nominal"]
+    episodes = [
+        {"scenario": s.name, "scores": {"rms_error": 9.0, "tool_rms_error": 1.0 + i}}
+        for i, s in enumerate(track.scenarios())
+    ]
+    found = rows.breakdown(track, episodes)["reference"]
+    assert np.mean(list(found.values())) == pytest.approx(3.5)
+
+
+@dataclass(frozen=True)
+class Follower:
+    """Asks for an angle of 0.1 and says what its model does."""
+
+    joints: int
+    models: bool = True
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        count = 0 if state is None or episode_start else state + 1
+        return np.full(self.joints, 0.1, np.float32), count
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "model_output" and self.models:
+            return lambda state: np.full((1, self.joints), 0.001 * state)
+        raise AttributeError(name)
+
+
+@pytest.mark.parametrize(("name", "joints"), [(JOINT, 1), (CHAIN, 6)])
+def test_an_episode_records_what_a_model_does_at_the_same_instants(name: str, joints: int) -> None:
+    env = gym.make(name, episode_seconds=0.2)
+    episode = rollout.run(env, Follower(joints), 0)
+    for k in range(joints):
+        assert np.allclose(episode.signals[f"model/{k}"], 0.001 * np.arange(20))
+    assert len(episode.signals["time"]) == 20
+    plain = rollout.run(env, Follower(joints, models=False), 0)
+    assert not any(key.startswith("model/") for key in plain.signals)
+    assert np.array_equal(plain.signals["output"], episode.signals["output"])
+
+
+@pytest.mark.parametrize("name", sorted(TRACKS))
+def test_tracks_name_signals_that_there_are(name: str) -> None:
+    track: ScenarioSet = TRACKS[name]
+    keys = gym.make(track.env).unwrapped.setup.info_keys
+    assert track.content["sensed"] in keys
+    assert set(track.content["cost_scales"]) <= set(keys)
+    wanted = metrics.of_track(track.content)
+    assert {metric for metric, _, _ in columns_of(track.content)} <= set(wanted)
+    assert wanted["rms_error"] == wanted[metrics.headline_of(track.content)]
+    assert wanted["rms_error"] == track.content["unit"]
+    assert {f"state/{k}" for k in metrics_joint.POSITION} <= set(keys) or track.env == JOINT
+
+
+@pytest.mark.parametrize("name", sorted(TRACKS))
+def test_the_environments_of_all_scenarios_are_made(name: str) -> None:
+    """Payloads and references of the tracks are what the muscles bear."""
+    for scenario in TRACKS[name].scenarios():
+        env = make_env(TRACKS[name].env, scenario.kwargs)
+        lengths = getattr(getattr(env.unwrapped.plant, "chain", None), "lengths", (0.25,))
+        assert TRACKS[name].content.get("tool_length", 0.25) == lengths[-1]
+
+
+def test_each_kind_of_track_is_there_for_both() -> None:
+    for word in ("joint", "manipulator"):
+        assert {f"{word}_nominal", f"{word}_payload", f"{word}_wrong_model"} <= set(TRACKS)
+    assert {"joint_disturbed", "joint_reduced"} <= set(TRACKS)
+
+
+def test_a_run_that_the_stop_ends_counts_at_the_worst_case() -> None:
+    content = TRACKS["joint_nominal"].content
+    scores = score(joint(), "joint")
+    worst = metrics.worst_of(scores, content["worst_case"])
+    assert worst["rms_error"] == 1.0
+    assert worst["max_error"] == 1.0
+    assert worst["rms_percent"] == 500.0

@@ -1,0 +1,19 @@
+"""The probe of planning misses below 2,000 poses in a second, whatever this machine does."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks import speed, speed_planning
+
+
+@pytest.mark.parametrize(("rate", "verdict"), [(1999.0, "MISSED"), (2001.0, "pass"), (3e4, "aim")])
+def test_planning_has_a_floor(monkeypatch, rate: float, verdict: str) -> None:
+    def timed(subjects, rounds):
+        assert subjects["poses"]() == 3 * 2 * 41 * speed_planning.REPEATS
+        return {"poses": [rate] * rounds}
+
+    monkeypatch.setattr(speed_planning, "interleaved", timed)
+    (found,) = speed.measure(["planning"], rounds=3)
+    assert (found.value, found.verdict) == (rate, verdict)
+    assert "MISSED" not in speed.table([found]) or rate < 2000.0

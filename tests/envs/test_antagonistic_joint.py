@@ -1,0 +1,224 @@
+"""One antagonistic joint: what its actions do, what pushes it, where it ends."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from pam_envs.plants.antagonistic_joint import AntagonisticJoint
+from pam_envs.plants.bearing import UnbearableLoad
+
+NAME = "PAM/AntagonisticJoint-v0"
+STILL: dict[str, Any] = {
+    "normalize": False,
+    "reference": [0.0],
+    "start": "straight",
+    "episode_seconds": 60.0,
+}
+IDEAL = AntagonisticJoint.paper(memory__width=0.0, link__gravity=0.0)
+"""Without memory and weight: what the inverse of the static laws is exact for."""
+
+
+def make(**arguments: Any) -> Any:
+    return gym.make(NAME, **{**STILL, **arguments}).unwrapped
+
+
+def run(env: Any, action: list[float], seconds: float) -> dict[str, np.ndarray]:
+    """Return ``info`` as arrays under a held action, from the reset on."""
+    _, info = env.reset(seed=0)
+    infos = [dict(info)]
+    for _ in range(round(100 * seconds)):
+        infos.append(dict(env.step(np.array(action, np.float32))[4]))
+    return {k: np.array([i[k] for i in infos]) for k in infos[0]}
+
+
+def test_a_set_point_is_the_angle_at_rest_without_memory_weight_and_load() -> None:
+    for angle in (-0.45, -0.1, 0.3):
+        info = run(make(plant=IDEAL), [angle], 2.0)
+        assert info["output"][-1] == pytest.approx(angle, abs=1e-4)
+        assert info["state/prestress"][-1] == IDEAL.prestress
+        assert np.mean([info["state/force_a"][-1], info["state/force_b"][-1]]) == pytest.approx(
+            IDEAL.prestress, rel=1e-3
+        )
+
+
+def test_memory_makes_the_angle_depend_on_the_way() -> None:
+    env = make()
+    env.reset(seed=0)
+    rests = []
+    for target in (0.25, 0.0, -0.25, 0.0):
+        for _ in range(200):
+            *_, info = env.step(np.array([target], np.float32))
+        rests.append(info["output"])
+    assert rests[1] > 0.005
+    assert rests[3] < -0.005
+    assert rests[3] == pytest.approx(-rests[1], abs=2e-3)  # the joint's loop is symmetric
+
+
+def test_stiffness_is_an_action() -> None:
+    stiff = {}
+    for prestress in (20.0, 120.0):
+        info = run(make(plant=IDEAL, action="angle_stiffness"), [0.1, prestress], 2.0)
+        assert info["output"][-1] == pytest.approx(0.1, abs=1e-4)
+        stiff[prestress] = info["state/stiffness"][-1]
+        wanted = IDEAL.stiffness_at(0.1, prestress)
+        assert stiff[prestress] == pytest.approx(float(wanted), rel=1e-3)
+    assert stiff[20.0] / stiff[120.0] > 1.2  # the lever buckles under co-contraction
+
+
+def test_pressures_are_actions() -> None:
+    info = run(make(plant=IDEAL, action="pressures"), [4e5, 2e5], 2.0)
+    assert info["state/pressure_a"][-1] == pytest.approx(4e5, rel=1e-6)
+    assert info["state/pressure_b"][-1] == pytest.approx(2e5, rel=1e-6)
+    angle = info["output"][-1]
+    assert angle > 0.05
+    assert float(IDEAL.torque(angle, 4e5, 2e5)) == pytest.approx(0.0, abs=1e-3)
+
+
+def test_the_reduced_plant_has_no_pressures_to_set() -> None:
+    with pytest.raises(ValueError, match="needs the muscles"):
+        make(plant=AntagonisticJoint.reduced(), action="pressures")
+
+
+def test_the_measured_plant_reaches_less() -> None:
+    paper, measured = make(), make(plant=AntagonisticJoint.measured())
+    spans = [env.action_signals["angle_set_point"].high for env in (paper, measured)]
+    assert spans[0] == pytest.approx(math.radians(30.0))
+    assert math.radians(15.0) < spans[1] < math.radians(25.0)
+    with pytest.raises(ValueError, match=r"samples are in rad, at most 0\.38"):
+        make(plant=AntagonisticJoint.measured(), reference=[0.5])
+
+
+def test_a_prestress_that_takes_too_much_pressure_gives_way_to_the_angle() -> None:
+    info = run(make(plant=IDEAL, action="angle_stiffness"), [0.49, 120.0], 2.0)
+    assert info["output"][-1] == pytest.approx(0.49, abs=2e-3)
+    assert info["saturated"][-1] == 0.0
+    mean = 0.5 * (info["state/force_a"][-1] + info["state/force_b"][-1])
+    assert mean < 80.0
+
+
+def test_a_set_point_out_of_reach_is_reported() -> None:
+    far = make(plant=AntagonisticJoint.paper(link__limit=0.58))
+    held, short = run(far, [0.4], 0.1), run(far, [0.575], 0.1)
+    assert not held["saturated"].any()
+    assert short["saturated"][1:].all()
+    assert not short["saturated"][0]
+
+
+def test_pulses_push_the_joint_once_in_five_seconds() -> None:
+    env = make(plant=IDEAL, disturbance=1.0)
+    info = run(env, [0.0], 20.0)
+    pushed = info["state/disturbance"][1:].reshape(4, 500)
+    assert (np.count_nonzero(pushed, axis=1) == 100).all()
+    sizes = np.abs(pushed).max(axis=1)
+    assert ((sizes >= 0.5) & (sizes <= 1.0)).all()
+    assert len(set(sizes)) == 4
+    stiffness = float(IDEAL.stiffness_at(0.0))
+    for window, at in enumerate(np.argmax(np.abs(pushed) > 0.0, axis=1)):
+        last = 1 + 500 * window + at + 99
+        torque = info["state/disturbance"][last]
+        assert info["output"][last] == pytest.approx(torque / stiffness, rel=0.05)
+
+
+def test_a_payload_is_told_and_its_change_is_not() -> None:
+    env = make(payload=0.5, payload_change=0.25, episode_seconds=4.0)
+    observation, first = env.reset(seed=3)
+    told, true = [float(env.signals.decode(observation, "payload"))], [first["state/payload"]]
+    while True:
+        observation, _, _, over, info = env.step(np.array([0.2], np.float32))
+        told.append(float(env.signals.decode(observation, "payload")))
+        true.append(info["state/payload"])
+        if over:
+            break
+    assert set(told) == {0.5}
+    assert true[0] == 0.5
+    assert abs(true[-1] - 0.5) == 0.25
+    at = int(np.argmax(np.array(true) != 0.5))
+    assert 120 <= at <= 281
+
+
+@pytest.mark.parametrize(("payload", "ends"), [(0.0, {0.25}), (0.1, {0.35}), (0.5, {0.25, 0.75})])
+def test_less_than_the_change_can_only_become_more(payload: float, ends: set[float]) -> None:
+    env = make(payload=payload, payload_change=0.25, episode_seconds=1.0)
+    found = set()
+    for seed in range(12):
+        env.reset(seed=seed)
+        for _ in range(100):
+            info = env.step(np.zeros(1, np.float32))[4]
+        found.add(round(info["state/payload"], 12))
+    assert found == ends
+
+
+def test_a_payload_hangs_down() -> None:
+    bare, loaded = (run(make(payload=p), [0.3], 2.0)["output"][-1] for p in (0.0, 1.0))
+    assert 0.0 < loaded < bare - 0.01
+
+
+def test_the_mechanical_stop_ends_the_episode() -> None:
+    env = make(disturbance=80.0)
+    env.reset(seed=0)
+    for _ in range(600):
+        _, _, ended, _, info = env.step(np.zeros(1, np.float32))
+        assert ended == (abs(info["output"]) > math.radians(35.0))
+        assert ended == (info["margin/angle"] < 0.0)
+        if ended:
+            break
+    assert ended
+
+
+def test_angles_that_the_weight_does_not_allow_are_refused_when_it_is_made() -> None:
+    with pytest.raises(UnbearableLoad, match=r"needs 0.184 N m at -30.0 degrees .* exert 0 N m"):
+        make(reference="sine", amplitude=math.radians(30.0))
+    make(reference="sine", amplitude=math.radians(29.0))
+    with pytest.raises(UnbearableLoad, match=r"with 2 kg of payload .* payload of 1.01 kg or"):
+        make(reference=[math.radians(28.0)], payload=[0.0, 1.0], payload_change=1.0)
+    make(reference=[math.radians(28.0)], payload=0.5)
+
+
+def test_references_that_are_the_joints_own() -> None:
+    sine = run(make(reference="sine", amplitude=0.2, frequency=0.5), [0.0], 2.0)
+    wanted = 0.2 * np.sin(np.pi * sine["time"])
+    assert np.allclose(sine["reference"], wanted, atol=1e-12)
+    step = run(make(reference="step", amplitude=0.1), [0.0], 2.0)
+    assert np.array_equal(step["reference"], np.where(step["time"] < 1.0, 0.0, 0.1))
+    assert run(make(reference="steps"), [0.0], 6.0)["reference"].max() <= math.radians(20.0)
+
+
+def test_the_scored_error_is_of_the_true_angle() -> None:
+    info = run(make(reference="sine"), [0.1], 3.0)
+    assert np.array_equal(info["output"], info["state/angle"])
+    assert not np.array_equal(info["output"], info["sensor/angle"])
+    error = np.abs(info["output"] - info["reference"])
+    assert np.allclose(info["reward/tracking"], -error / 0.01745)
+    assert np.std(info["sensor/angle"] - info["output"]) < 2e-3
+
+
+def test_set_points_stand_for_the_command() -> None:
+    info = run(make(), [0.2], 0.5)
+    a, b, short = AntagonisticJoint.paper().pressures_for(np.float32(0.2))
+    assert not short
+    assert info["state/set_point_a"][-1] == pytest.approx(float(a), rel=1e-9)
+    assert info["state/set_point_b"][-1] == pytest.approx(float(b), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"action": "torque"}, "action = 'torque' is not known"),
+        ({"start": "middle"}, "start = 'middle'"),
+        ({"amplitude": 1.0}, "amplitude = 1.0 must be a number from 0 to 0.523599 rad"),
+        ({"frequency": 0.0}, "frequency = 0.0"),
+        ({"payload": "heavy"}, "payload = 'heavy'"),
+        ({"payload": 3.0}, "from 0 to 2 kg"),
+        ({"payload_change": -1.0}, "payload_change"),
+        ({"disturbance": float("inf")}, "disturbance"),
+        ({"randomize": {"link.limit": (0.4, 0.5)}}, "can be drawn"),
+    ],
+)
+def test_bad_arguments(arguments: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        gym.make(NAME, **arguments)

@@ -1,0 +1,250 @@
+"""The elbow: what is asked for, what of it can be had, what the program knows, when pulses act."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import pam_envs  # noqa: F401 (registers)
+from baselines.catalogue import make_controller
+from pam_envs.envs.elbow_orthosis import largest_errors, model_row
+from pam_envs.envs.elbow_program import estimate, pressures_for, within_reach
+from pam_envs.mechanics.hanging_mass import GRAVITY
+from pam_envs.plants.elbow_orthosis import ElbowOrthosis
+from pam_envs.tasks.torque_stiffness import TorqueStiffness
+
+ID = "PAM/ElbowOrthosis-v0"
+PLANT = ElbowOrthosis.paper()
+QUIET = ElbowOrthosis.paper("none").without_noise()
+MODEL = model_row(PLANT).tolist()
+
+
+def made(**arguments: Any) -> Any:
+    return gym.make(ID, disable_env_checker=True, **arguments).unwrapped
+
+
+def driven(env: Any, action: Any, steps: int, seed: int = 0) -> dict[str, np.ndarray]:
+    """Return ``info`` as arrays, and the observations, under one action."""
+    observation, info = env.reset(seed=seed)
+    infos, seen = [dict(info)], [observation]
+    for _ in range(steps):
+        observation, *_, info = env.step(np.asarray(action, np.float32))
+        infos.append(dict(info))
+        seen.append(observation)
+    record = {key: np.array([row[key] for row in infos]) for key in infos[0]}
+    return record | {"seen": np.array(seen)}
+
+
+def test_the_program_knows_the_nominal_bundles() -> None:
+    random = np.random.default_rng(1)
+    for angle, a, b in random.uniform((0.0, 0.0, 0.0), (2.09, 6e5, 6e5), (50, 3)).tolist():
+        torque, stiffness = estimate(MODEL, angle, a, b)
+        assert torque == pytest.approx(float(PLANT.torque(angle, a, b)), abs=1e-9)
+        assert stiffness == pytest.approx(float(PLANT.stiffness(angle, a, b)), abs=1e-9)
+        assert pressures_for(MODEL, angle, torque, stiffness) == pytest.approx((a, b), abs=1e-3)
+
+
+def test_other_bundles_are_known_as_well() -> None:
+    plant = ElbowOrthosis.paper(bundle_a__muscles=5.0, pulley__highest=1.8)
+    torque, stiffness = estimate(model_row(plant).tolist(), 0.9, 1e5, 2e5)
+    assert torque == pytest.approx(float(plant.torque(0.9, 1e5, 2e5)), abs=1e-9)
+    assert stiffness == pytest.approx(float(plant.stiffness(0.9, 1e5, 2e5)), abs=1e-9)
+
+
+def test_what_can_be_had_is_the_parallelogram_of_the_corners() -> None:
+    for angle in np.linspace(0.0, 2.09, 8).tolist():
+        torques, stiffnesses = PLANT.corners(angle)
+        assert within_reach(MODEL, angle, 99.0, 5.0)[0] == pytest.approx(torques.max())
+        assert within_reach(MODEL, angle, -99.0, 5.0)[0] == pytest.approx(torques.min())
+        for torque, stiffness in zip(torques.tolist(), stiffnesses.tolist(), strict=True):
+            assert within_reach(MODEL, angle, torque, stiffness) == pytest.approx(
+                (torque, stiffness), abs=1e-9
+            )
+
+
+@pytest.mark.parametrize("bear", [True, False])
+def test_a_weight_is_asked_for_at_the_hand(bear: bool) -> None:
+    env = made(reference="weight", weight=0.8, bear=bear)
+    info = driven(env, [0.0, -0.5], 250)
+    assert np.ptp(info["state/angle"]) > 0.1
+    pulled = -0.8 * GRAVITY * env.plant.wearer.handle * np.sin(info["state/angle"])
+    assert np.allclose(info["state/object_torque"], pulled, atol=1e-9)
+    borne = env.plant.weight_torque(info["state/angle"]) if bear else 0.0
+    asked = info["reference"] + info["state/torque_clipped"]
+    assert np.allclose(asked, pulled + borne, atol=1e-9)
+
+
+def test_a_wall_is_a_spring_beyond_its_place_and_nothing_before() -> None:
+    env = made(reference="wall", bear=False, motion="sines", pace=1.0)
+    info = driven(env, [-0.3, -0.5], 900)
+    torque, angle = info["state/object_torque"], info["state/angle"]
+    inside = torque < 0.0
+    assert 50 < inside.sum() < 850
+    slope, place = np.polyfit(angle[inside], torque[inside], 1)
+    assert 5.0 <= -slope <= 7.0
+    assert 0.8 <= -place / slope <= 1.3
+    assert (torque[angle < -place / slope - 1e-9] == 0.0).all()
+    asked = info["state/stiffness_reference"] + info["state/stiffness_clipped"]
+    deep = angle > -place / slope + 0.05
+    assert np.allclose(asked[deep], -slope)
+    assert np.ptp(asked[~inside]) < 1e-12
+
+
+def test_more_than_there_is_is_clipped_torque_first_and_said() -> None:
+    samples = [[40.0, 14.0]] * 20 + [[-30.0, 1.0]] * 20
+    env = made(reference=samples, motion="still")
+    info = driven(env, [0.0, 0.0], 39)
+    torques, stiffnesses = env.plant.corners(info["state/angle"])
+    late = np.arange(40) >= 20
+    wanted = np.where(late, torques.min(axis=1), torques.max(axis=1))
+    assert np.allclose(info["reference"], wanted)
+    corner = np.where(late, stiffnesses[:, 1], stiffnesses[:, 3])
+    assert np.allclose(info["state/stiffness_reference"], corner)
+    asked = np.where(late, -30.0, 40.0)
+    assert np.allclose(info["state/torque_clipped"], asked - wanted)
+    assert (info["saturated"] == 0.0).all()  # nobody was told to do it
+
+
+def test_torque_and_stiffness_as_actions() -> None:
+    env = made(plant=QUIET, action="torque_stiffness", motion="still", normalize=False)
+    env.reset(seed=3)
+    for _ in range(60):
+        *_, info = env.step(np.array([1.0, 4.0], np.float32))
+    assert info["saturated"] == 0.0
+    assert info["state/torque"] == pytest.approx(1.0, abs=2e-3)
+    assert info["state/stiffness"] == pytest.approx(4.0, abs=2e-3)
+    *_, info = env.step(np.array([1.0, 14.0], np.float32))
+    assert info["saturated"] == 1.0
+    full = env.plant.full_pressure
+    assert max(info["state/command_a"], info["state/command_b"]) == pytest.approx(full)
+
+
+def test_the_references_observed_are_those_at_the_angle_as_sensed() -> None:
+    env = made(reference="weight", weight=1.0, bear=False)
+    info = driven(env, [0.0, -0.5], 100)
+    seen = env.signals.decode(info["seen"], "reference")
+    handle = env.plant.wearer.handle
+    wanted = -GRAVITY * handle * np.sin(info["sensor/angle"])
+    reached = np.abs(info["state/torque_clipped"]) < 1e-12
+    assert reached.sum() > 50
+    assert np.allclose(seen[reached], wanted[reached], atol=1e-5)
+    assert not np.allclose(seen, info["reference"], atol=1e-5)
+
+
+def test_previews_are_along_the_intended_motion() -> None:
+    env = made(reference="weight", weight=1.0, bear=False, preview=2, preview_stride=5)
+    info = driven(env, [0.0, -0.5], 120)
+    ahead = env.signals.decode(info["seen"], "reference_2")[:-10]
+    intended = info["state/intent"][10:]
+    wanted = -GRAVITY * env.plant.wearer.handle * np.sin(intended)
+    lowest = np.array([env.plant.corners(q)[0].min() for q in intended])
+    assert np.allclose(ahead, np.maximum(wanted, lowest), atol=1e-5)
+
+
+def test_pulses_are_taken_once_in_a_cycle() -> None:
+    def pressures(actions: list[list[float]]) -> list[float]:
+        env = made(valves="on_off", motion="still")
+        observation, _ = env.reset(seed=0)
+        waits, found = [], []
+        for action in actions:
+            waits.append(float(env.signals.decode(observation, "to_pulse")))
+            observation, *_, info = env.step(np.array(action, np.float32))
+            found.append(info["state/pressure_b"])
+        assert waits[:6] == pytest.approx([0.0, 0.04, 0.03, 0.02, 0.01, 0.0], abs=1e-6)
+        return found
+
+    pulse, rest = [0.0, 0.8], [0.0, 0.0]
+    once = pressures([pulse] + [rest] * 9)
+    assert once == pressures([pulse, *[[0.9, -0.9]] * 4] + [rest] * 5)
+    never = pressures([rest] * 10)
+    assert once[4] > never[4] + 1e3
+    assert pressures([rest, pulse, pulse, *[rest] * 7]) == never
+
+
+def test_pulses_are_shown_and_paid_for_until_the_next_ones() -> None:
+    env = made(valves="on_off", motion="still")
+    env.reset(seed=0)
+    seen, paid = [], []
+    for action in [[0.5, -1.0], *[[1.0, 1.0]] * 4, [0.0, 0.0]]:
+        observation, *_, info = env.step(np.array(action, np.float32))
+        seen.append([float(env.signals.decode(observation, f"pulse_{k}")) for k in "ab"])
+        paid.append(info["reward/effort"])
+    assert np.allclose(seen[:5], [0.025, -0.05], atol=1e-6)
+    assert np.allclose(seen[5], 0.0, atol=1e-6)
+    assert np.allclose(paid, [-0.2 * 0.75] * 5 + [0.0], atol=1e-6)
+
+
+FLIMSY = ElbowOrthosis.paper(pulley__stop_stiffness=10.0, wearer__stiffness=4.0, link__gravity=0.0)
+"""Stops that the bundles break against a wearer who hardly holds on; the preset's they cannot."""
+
+
+def rewards(policy: Any, seed: int) -> tuple[np.ndarray, dict[str, Any]]:
+    """Return the rewards of an episode, and its last info."""
+    env = made(plant=FLIMSY, reference="free", episode_seconds=4.0)
+    if isinstance(policy, str):
+        policy = make_controller(policy, env.plant, env.signals, env.action_signals)
+    observation, _ = env.reset(seed=seed)
+    found, state, over = [], None, False
+    while not over:
+        if isinstance(policy, list):
+            action = np.array(policy, np.float32)
+        else:
+            action, state = policy.predict(observation, state, state is None)
+        observation, reward, terminated, truncated, info = env.step(action)
+        found.append(reward)
+        over = terminated or truncated
+    return np.array(found), info | {"terminated": terminated}
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_to_break_a_stop_never_pays(seed: int) -> None:
+    crash, info = rewards([-1.0, 1.0], seed)
+    assert info["terminated"]
+    assert len(crash) < 100
+    held, allocated = (rewards(f"elbow_{name}", seed)[0] for name in ("hold", "allocation"))
+    assert len(held) == len(allocated) == 400
+    for discount in (1.0, 0.97):
+        values = [float(r @ discount ** np.arange(len(r))) for r in (crash, held, allocated)]
+        assert values == sorted(values)
+    left = 400 - len(crash) + 1
+    per_period = -info["reward/ended"] / left
+    assert per_period > -2.0 * min(held.min(), crash[:-1].min())  # no period costs as much
+
+
+def test_no_period_costs_as_much_as_one_that_is_left() -> None:
+    torque, stiffness = largest_errors(PLANT)
+    angles = np.linspace(*PLANT.hard_limits, 25)
+    torques, stiffnesses = PLANT.corners(angles)
+    assert torque > 1.4 * np.ptp(torques, axis=1).max()
+    assert stiffness > 1.4 * np.ptp(stiffnesses, axis=1).max()
+    env = made(randomize=True, motion="sines", span=(0.1, 2.0), pace=1.0, start="random")
+    worst = TorqueStiffness().worst(torque, stiffness)
+    random = np.random.default_rng(0)
+    for seed in range(3):
+        env.reset(seed=seed)
+        for _ in range(150):
+            _, reward, terminated, *_ = env.step(random.choice([-1.0, 1.0], 2).astype(np.float32))
+            assert not terminated
+            assert reward > -0.7 * worst
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"valves": "on_off", "action": "torque_stiffness"}, "on/off valves have none"),
+        ({"valves": "on_off", "plant": PLANT}, "the plant's are 'proportional'"),
+        ({"span": (1.2, 0.4)}, "swap them"),
+        ({"span": 1.0}, "must be two angles"),
+        ({"span": (0.5, 3.0)}, "span = 3.0 must be a number"),
+        ({"motion": "run"}, "motion = 'run'"),
+        ({"reference": [[1.0, 2.0, 3.0]]}, "give 2 numbers"),
+        ({"pace": 0.0}, "pace = 0.0 must be a number"),
+        ({"weight": -1.0}, "weight = -1.0"),
+    ],
+)
+def test_wrong_arguments_are_named(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        made(**arguments)

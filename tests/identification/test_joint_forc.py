@@ -1,0 +1,92 @@
+"""First-order curves of a joint: what passes as a symmetric Preisach operator, and what fails."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baselines.nominal import LoadedMuscle
+from benchmarks.joint_inverses import inhomogeneous, inverse_error
+from benchmarks.joint_studies import RANGE, assumed_memory
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.identification.everett_series import series_inverse
+from pam_envs.identification.joint_forc import measure_joint, measure_memory, symmetrised
+from pam_envs.plants.single_muscle import SingleMuscle
+
+
+def _rig(model):
+    return lambda inputs: model.simulate(inputs)[0]
+
+
+def test_symmetric_operator_passes_and_is_given_back():
+    model = assumed_memory()
+    found = measure_joint(_rig(model), RANGE, levels=len(model.table))
+    assert found.verdict.startswith("passes")
+    assert found.symmetry < 1e-12 and found.congruency < 1e-12 and found.wiping_out < 1e-12
+    np.testing.assert_allclose(found.model.everett, model.everett, atol=1e-12)
+    assert found.model.start == "virgin"
+    assert found.gain == pytest.approx(1.0, abs=1e-12)
+
+
+def test_single_muscle_fails_the_symmetry():
+    muscle = LoadedMuscle(SingleMuscle.mas10("maxwell_slip"), 0.0)
+
+    def rig(pressures):
+        state, outputs = muscle.memory.initial(1), []
+        for pressure in pressures:
+            drive, state = muscle.felt(np.array([pressure]), state)
+            outputs.append(float(muscle.contraction_at(drive)[0]))
+        return np.array(outputs)
+
+    found = measure_memory(rig, 0.0, 6e5)
+    assert not found.symmetric and found.symmetry > 0.1
+    assert found.verdict.startswith("fails")
+    assert found.model.start == "low"
+
+
+def test_asymmetric_preisach_operator_fails_the_symmetry_alone():
+    weights = assumed_memory().weights * np.linspace(0.5, 1.5, 60)[:, None]
+    model = Preisach.from_weights(weights, -RANGE, RANGE)
+    found = measure_joint(_rig(model), RANGE)
+    assert found.preisach and not found.symmetric
+    assert "fails the symmetry" in found.verdict
+    made = symmetrised(model)
+    np.testing.assert_allclose(made.weights, made.weights[::-1, ::-1].T, atol=1e-15)
+
+
+def test_output_behind_a_bent_curve_is_not_congruent():
+    memory = assumed_memory()
+    found = measure_joint(lambda u: np.exp(6.0 * memory.simulate(u)[0]), RANGE)
+    assert found.congruency > 0.1
+    assert found.verdict.startswith("fails as a Preisach operator")
+
+
+def test_output_that_creeps_does_not_wipe_out():
+    memory = assumed_memory()
+
+    def rig(inputs):
+        outputs = memory.simulate(inputs)[0]
+        return outputs + 1e-3 * np.arange(len(outputs))
+
+    assert measure_joint(rig, RANGE).wiping_out > 0.03
+
+
+@pytest.mark.parametrize("answer", [np.zeros(3), None])
+def test_rig_that_gives_something_else_is_refused(answer):
+    with pytest.raises(ValueError, match="one finite number"):
+        measure_joint(lambda u: np.full_like(u, np.nan) if answer is None else answer, RANGE)
+
+
+def test_recursion_is_exact_and_the_printed_sum_is_not():
+    exact, series = inverse_error()
+    assert exact < 1e-12
+    assert 1e-3 < series < 1e-2
+
+
+def test_printed_sum_is_exact_up_to_the_first_turn_and_for_plays():
+    mild, homogeneous = inhomogeneous(), assumed_memory()
+    plays = Preisach.from_weights(homogeneous.weights, -RANGE, RANGE)
+    for model, shares in ((mild, (0.2, 0.7, 0.4)), (plays, (0.8, 0.3, 0.6, 0.45, 0.9))):
+        outputs = float(model.everett[-1, 0]) * np.array(shares)
+        reached = model.simulate(series_inverse(model, outputs))[0]
+        np.testing.assert_allclose(reached, outputs, atol=1e-9)

@@ -1,0 +1,77 @@
+"""The static law of the joint's muscles: the measured map, its inverse, its work."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from pam_envs.identification.joint_static import FITTED, fit_force_map, measured_map
+from pam_envs.muscle.force_map import FULL_PRESSURE, ForceMap, force_terms, paper_stretch
+
+LAWS = (ForceMap(), ForceMap(stretch=paper_stretch()))
+CONTRACTIONS = np.linspace(-0.02, 0.25, 28)
+
+
+def test_the_law_meets_the_measured_map() -> None:
+    data = measured_map()
+    assert len(data.force) == 85 and data.force.max() == pytest.approx(542.5)
+    errors = data.residuals(ForceMap())
+    assert np.sqrt(np.mean(errors**2)) < 1.42
+    assert np.abs(errors).max() < 8.3
+    assert np.abs(errors[data.pressure > 1.5e5]).max() < 2.5
+
+
+def test_its_numbers_are_the_least_squares_fit() -> None:
+    start = dataclasses.replace(
+        ForceMap(), **{name: 0.8 * getattr(ForceMap(), name) for name in FITTED}
+    )
+    found = fit_force_map(measured_map(), start)
+    for name in FITTED:
+        assert getattr(found, name) == pytest.approx(getattr(ForceMap(), name), rel=2e-4), name
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_inverse_is_exact(law: ForceMap) -> None:
+    forces = np.linspace(0.0, 400.0, 9)[:, None]
+    pressures = law.pressure(forces, CONTRACTIONS)
+    assert law.law(pressures, CONTRACTIONS) == pytest.approx(
+        np.broadcast_to(forces, pressures.shape), abs=1e-9
+    )
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_force_rises_with_pressure_and_falls_with_contraction(law: ForceMap) -> None:
+    pressures = np.linspace(0.0, FULL_PRESSURE, 14)[:, None]
+    values = law.law(pressures, CONTRACTIONS)
+    assert np.all(np.diff(values, axis=0) > 0.0)
+    assert np.all(np.diff(values, axis=1) < 0.0)
+    assert np.all(law.force(pressures, CONTRACTIONS) >= 0.0)
+
+
+def test_the_presets_end_where_they_should() -> None:
+    assert ForceMap().longest_contraction() == pytest.approx(0.209, abs=1e-3)
+    stretched = ForceMap(stretch=paper_stretch())
+    assert stretched.longest_contraction() == pytest.approx(0.25, abs=1e-9)
+    assert stretched.force(3e5, 0.0) == ForceMap().force(3e5, 0.0)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_pressure_does_its_work_on_the_volume(law: ForceMap) -> None:
+    """The share of the force that is proportional to the pressure is -dV/dL."""
+    h = 1e-6
+    slope = (law.volume(CONTRACTIONS + h) - law.volume(CONTRACTIONS - h)) / (2 * h)
+    assert slope / law.rest_length == pytest.approx(law.area_at(CONTRACTIONS), rel=1e-8)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_kernel_is_the_law(law: ForceMap) -> None:
+    numbers = (law.area, law.taper, law.threshold, law.braid_force, law.braid_strain, law.stiffness)
+    for x in CONTRACTIONS:
+        area, passive, less, more = force_terms(float(x), *numbers, 1.0 / law.stretch)
+        assert area == pytest.approx(float(law.area_at(x)), rel=1e-13)
+        assert passive == pytest.approx(float(law.passive(x)), abs=1e-9)
+        h = 1e-6
+        slope = float(law.law(4e5, x + h) - law.law(4e5, x - h)) / (2 * h)
+        assert 4e5 * less + more == pytest.approx(-slope, rel=1e-7)

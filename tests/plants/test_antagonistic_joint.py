@@ -1,0 +1,285 @@
+"""The antagonistic joint at rest: virtual work, symmetry, feed-forward, reach, loops, files."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.identification.joint_static import fit_angle_plays
+from pam_envs.plants import antagonistic_joint_rows as K
+from pam_envs.plants.antagonistic_joint import AntagonisticJoint
+from pam_envs.plants.antagonistic_pair import feed_forward
+from pam_envs.plants.joint_memory import contraction_plays, joint_memory
+from pam_envs.plants.joint_rollout import simulate_joint
+from pam_envs.plants.memory import KINDS
+
+PRESETS = ("paper", "measured", "reduced")
+ANGLES = np.radians(np.linspace(-28.0, 28.0, 29))
+MADE = (AntagonisticJoint.paper("none"), AntagonisticJoint.measured("none"))
+
+
+def half_gap(plant: AntagonisticJoint, degrees: float) -> float:
+    """Half the height of a settled loop at set-point 0, over its amplitude."""
+    phase = np.linspace(0.0, 4.5 * np.pi, 181)
+    rests = np.degrees(plant.rest_angles(np.radians(degrees) * np.sin(phase)))
+    up, down = rests[[80, 160]].mean(), rests[120]  # half way up twice, half way down between
+    return float(down - up) / 2.0 / degrees
+
+
+def muscle_under_load(plant: AntagonisticJoint, pressures: np.ndarray) -> np.ndarray:
+    """Contractions of one muscle that carries 100 N, at rest after each pressure [Pa]."""
+    plays, memory = contraction_plays(), plant.memory
+    start = float(plant.lever.contraction(0.0, plant.muscle.rest_length)[0])
+    state, made = plays.initial_state(), []
+    for p in pressures:
+        low, high = -0.1, 0.4
+        for _ in range(45):
+            x = 0.5 * (low + high)
+            felt, after = plays.step(x - start, state)
+            friction = (memory.base + memory.rate * p) * (x - start - float(felt))
+            if float(plant.muscle.law(p, x)) - friction > 100.0:
+                low = x
+            else:
+                high = x
+        state = after
+        made.append(x)
+    return np.array(made)
+
+
+# --- forces and work ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("plant", MADE)
+def test_the_torque_is_minus_the_slope_of_the_muscles_work(plant: AntagonisticJoint) -> None:
+    """Work at held pressures, integrated over the lengths, with no formula of the torque."""
+    p_a, p_b, fine = 4.1e5, 2.3e5, np.radians(np.linspace(-25.0, 25.0, 20001))
+    x = plant.lever.contraction(fine, plant.muscle.rest_length)
+    forces = plant.muscle.force(np.array([p_a, p_b]), x)
+    steps = 0.5 * (forces[1:] + forces[:-1]) * np.diff(plant.lever.length(fine), axis=0)
+    energy = np.concatenate([[0.0], np.cumsum(steps.sum(axis=1))])
+    slope = np.gradient(energy, fine)[1:-1]
+    torque = plant.torque(fine[1:-1], p_a, p_b)
+    # a muscle that slackens in between leaves a kink, which the difference quotient rounds off
+    assert np.abs(torque + slope).max() < 1e-4 * np.abs(torque).max()
+    assert np.median(np.abs(torque + slope)) < 1e-7
+
+
+@pytest.mark.parametrize("plant", MADE)
+def test_exchanging_the_pressures_mirrors_the_joint(plant: AntagonisticJoint) -> None:
+    there, back = plant.torque(ANGLES, 5e5, 2e5), plant.torque(-ANGLES, 2e5, 5e5)
+    assert np.allclose(there, -back, atol=1e-12)
+    assert plant.torque(0.0, 3e5, 3e5) == pytest.approx(0.0, abs=1e-14)
+
+
+@pytest.mark.parametrize("plant", MADE)
+def test_forces_have_the_co_contraction_and_the_torque_that_were_asked_for(
+    plant: AntagonisticJoint,
+) -> None:
+    angles, torques = ANGLES[:, None] * 0.7, np.array([-0.5, 0.0, 0.8])
+    a, b = plant.forces_for(angles, 50.0, torques)
+    assert np.allclose(a + b, 100.0)
+    p_a, p_b, short = plant.pressures_for(angles, 50.0, torques)
+    assert not short.any()
+    assert np.allclose(plant.torque(angles, p_a, p_b), np.broadcast_to(torques, a.shape), atol=1e-9)
+
+
+# --- feed-forward and reach ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("plant", MADE)
+def test_the_feed_forward_has_gain_one_without_memory_and_load(plant: AntagonisticJoint) -> None:
+    low, high = plant.angle_range
+    commands = np.linspace(low, high, 21)
+    for prestress in (20.0, 50.0, 100.0):
+        assert np.allclose(plant.rest_angles(commands, prestress), commands, atol=1e-9)
+
+
+@pytest.mark.parametrize("plant", MADE)
+def test_the_kernel_feeds_forward_what_the_plant_says(plant: AntagonisticJoint) -> None:
+    fixed = plant.parameter_rows()[:, None].tolist()
+    for angle in np.linspace(*plant.angle_range, 13):
+        for prestress in (20.0, 50.0, 120.0):
+            p_a, p_b, short = feed_forward(fixed, 0, float(angle), prestress)
+            wanted = plant.pressures_for(angle, prestress)
+            assert (p_a, p_b) == pytest.approx((float(wanted[0]), float(wanted[1])), rel=1e-9)
+            assert bool(short) == bool(wanted[2]) is False
+
+
+def test_a_set_point_out_of_reach_is_told() -> None:
+    plant = AntagonisticJoint.measured("none", link__limit=0.5)
+    fixed = plant.parameter_rows()[:, None].tolist()
+    assert feed_forward(fixed, 0, 0.49, 50.0)[2] == 1.0  # no force is left at 28 degrees
+    assert bool(plant.pressures_for(0.49)[2])
+    assert feed_forward(fixed, 0, 0.51, 50.0)[2] == 1.0  # beyond the limit
+    assert feed_forward(fixed, 0, 0.3, 50.0)[2] == 0.0
+
+
+def test_full_pressure_reaches_thirty_degrees_only_with_the_stretched_map() -> None:
+    paper, measured = MADE
+    floating = {"link.gravity": 0.0}
+    assert math.degrees(paper.replace(floating).reachable_angle(0.0)) == pytest.approx(
+        30.0, abs=0.1
+    )
+    found = math.degrees(measured.replace(floating).reachable_angle(0.0))
+    assert found == pytest.approx(24.0, abs=0.1)
+
+
+def test_the_measured_joint_is_limited_by_preload_weight_and_pressure() -> None:
+    plant = AntagonisticJoint.measured("none")
+    assert plant.link.limit == pytest.approx(plant.reachable_angle())
+    assert math.degrees(plant.link.limit) == pytest.approx(21.9, abs=0.05)
+    assert plant.reachable_angle(80.0) < plant.link.limit
+    assert plant.reachable_angle(payload=0.5) < plant.link.limit
+    low = plant.replace({"regulator.max_pressure": 5e5})
+    assert low.reachable_angle() < plant.link.limit
+    angle = plant.link.limit
+    a, b = plant.forces_for(angle, 50.0, plant.weight_torque(angle))
+    x = plant.lever.contraction(angle, plant.muscle.rest_length)
+    assert max(plant.muscle.pressure(np.array([a, b]), x)) == pytest.approx(6.5e5, rel=1e-9)
+
+
+def test_weights_are_borne_after_the_shift() -> None:
+    plant = AntagonisticJoint.paper("none")
+    angles = np.radians([[-20.0], [5.0], [18.0]])
+    commands = angles + plant.gravity_shift(angles, np.array([0.0, 0.5, 0.2]))
+    for angle, command, payload in zip(angles, commands, (0.0, 0.5, 0.2), strict=True):
+        rests = simulate_joint(plant, command, payload=payload, quasi_static=True)["angle"]
+        assert float(rests[0]) == pytest.approx(float(angle[0]), abs=1e-9)
+
+
+def test_more_co_contraction_makes_this_lever_softer() -> None:
+    """The muscles' lengths do not add up to a constant: equal forces buckle the joint."""
+    stiffness = [float(AntagonisticJoint.paper("none").stiffness_at(0.0, f)) for f in (20, 50, 120)]
+    assert stiffness == pytest.approx([16.1, 14.8, 11.6], abs=0.05)
+    assert AntagonisticJoint().nominal.stiffness == pytest.approx(stiffness[1], abs=0.05)
+
+
+# --- memory -------------------------------------------------------------------------------------
+
+
+def test_loops_have_a_half_gap_of_a_tenth() -> None:
+    plant = AntagonisticJoint.paper("maxwell_slip")
+    assert [half_gap(plant, a) for a in (15.0, 20.0)] == pytest.approx([0.1, 0.1], abs=0.005)
+    assert [half_gap(plant, a) for a in (10.0, 29.0)] == pytest.approx([0.08, 0.08], abs=0.01)
+    assert half_gap(AntagonisticJoint.paper("none"), 15.0) < 1e-9
+    assert half_gap(AntagonisticJoint.paper(memory__width=0.5), 15.0) < 0.07
+
+
+def test_the_gain_after_a_turn_is_that_of_the_published_uncertainty() -> None:
+    """35 % less than the nominal one."""
+    rests = AntagonisticJoint.paper().rest_angles(
+        np.radians([20.0, -20.0, 20.0, -20.0, 20.0, 19.0])
+    )
+    assert np.degrees(rests[-2] - rests[-1]) == pytest.approx(0.65, abs=0.02)
+
+
+def test_both_memories_have_the_same_loops() -> None:
+    commands = np.radians(np.concatenate([a * np.sin(np.linspace(0, 6, 60)) for a in (25, 12, 5)]))
+    for preset in ("paper", "reduced"):
+        first, second = (
+            getattr(AntagonisticJoint, preset)(kind).rest_angles(commands)
+            for kind in ("maxwell_slip", "preisach")
+        )
+        assert np.degrees(np.abs(first - second).max()) < 0.1
+        assert np.degrees(np.abs(first - commands).max()) > 1.0
+
+
+def test_the_joints_loop_is_symmetric_and_a_muscles_is_not() -> None:
+    plant = AntagonisticJoint.paper()
+    commands = np.radians(20.0) * np.sin(np.linspace(0.0, 9.0, 90))
+    assert np.allclose(plant.rest_angles(-commands), -plant.rest_angles(commands), atol=1e-12)
+    swings = 2.5e5 * np.sin(np.linspace(0.0, 4.5 * np.pi, 145))
+    there, back = (muscle_under_load(plant, 3.5e5 + s * swings)[64:] for s in (1.0, -1.0))
+    middle = there.max() + there.min()
+    assert np.abs(there + back - middle).max() > 0.2 * (there.max() - there.min())
+
+
+def test_friction_takes_at_most_the_hysteresis_of_the_data_sheet() -> None:
+    """3 % of the nominal length at constant force (seed 002, section 1.1), at any pressure."""
+    plant, plays = AntagonisticJoint.paper(), contraction_plays()
+    lag = sum(w * t for w, t in zip(plays.weights, plays.thresholds, strict=True))
+    pressures, h = np.linspace(0.5e5, 6.5e5, 13), 1e-5
+    for x in np.linspace(0.0, 0.24, 25):
+        pulling = pressures[plant.muscle.law(pressures, x) > 0.0]
+        friction = (plant.memory.base + plant.memory.rate * pulling) * lag
+        slope = (plant.muscle.law(pulling, x - h) - plant.muscle.law(pulling, x + h)) / (2 * h)
+        assert np.all(2.0 * friction / slope < 0.03)
+
+
+def test_the_reduced_memory_is_identified_on_the_plant_with_muscles() -> None:
+    found, error = fit_angle_plays(AntagonisticJoint.paper())
+    made = joint_memory("maxwell_slip", True).operator
+    assert isinstance(made, PlayOperator)
+    assert np.allclose(found.weights, made.weights, atol=1e-3)
+    assert math.degrees(error) < 0.17
+
+
+# --- files, rows, bad values --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("preset", PRESETS)
+def test_files_hold_the_whole_plant(tmp_path: Path, kind, preset: str) -> None:  # type: ignore[no-untyped-def]
+    plant = getattr(AntagonisticJoint, preset)(kind, muscle__viscosity=1e-4)
+    plant.to_yaml(tmp_path / "plant.yaml")
+    read = AntagonisticJoint.from_yaml(tmp_path / "plant.yaml")
+    assert read == plant
+    assert read.digest() == plant.digest()
+
+
+def test_the_digest_tells_plants_apart() -> None:
+    plants = [getattr(AntagonisticJoint, p)(kind) for p in PRESETS for kind in KINDS]
+    plants.append(AntagonisticJoint.paper(link__mass=0.4))
+    assert len({plant.digest() for plant in plants}) == len(plants)
+
+
+def test_rows_stand_where_their_names_say() -> None:
+    plant = AntagonisticJoint.paper()
+    column = plant.parameter_rows()
+    assert len(column) == K.N_PARAMETERS
+    for name in K.NAMES:
+        assert column[K.place(name)] == plant.value(name)
+    assert column[K.MAX_PRESSURE] == 6.5e5 and column[K.PAYLOAD_ARM] == plant.link.length
+    quiet = plant.without_noise()
+    assert quiet.angle.noise == quiet.pressure.resolution == 0.0
+
+
+def test_the_assumed_stretch_says_so() -> None:
+    assert AntagonisticJoint.paper().provenance["muscle.stretch"][0] == "assumed"
+    assert AntagonisticJoint.measured().muscle.stretch == 1.0
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ({"link__stop": 0.64, "lever__l_u": 0.12, "lever__l_o": 0.12}, "lever arm"),
+        ({"link__limit": 0.6, "link__stop": 0.55}, "limit"),
+        ({"link__gyration": 0.018}, "sub-steps"),
+        ({"muscle__area": 1.0}, "outside its bounds"),
+        ({"nothing__here": 1.0}, "no parameter"),
+    ],
+)
+def test_bad_values_are_refused(change: dict[str, float], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        AntagonisticJoint.paper("none", **change)
+
+
+def test_memories_that_cannot_be_simulated_are_refused() -> None:
+    plant = AntagonisticJoint.paper()
+    steep = PlayOperator((0.01,), (0.5,), 0.7)
+    many = PlayOperator(tuple(np.linspace(0.001, 0.03, 9)), (0.1,) * 9, 0.1)
+    low = Preisach.from_play(contraction_plays(), 0.0, 0.3)
+    for operator, words in ((steep, "slope"), (many, "plays"), (low, "virgin")):
+        memory = dataclasses.replace(plant.memory, operator=operator)
+        with pytest.raises(ValueError, match=words):
+            dataclasses.replace(plant, memory=memory)
+    with pytest.raises(ValueError, match="dynamics"):
+        AntagonisticJoint(dynamics="else")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="choose"):
+        joint_memory("else")  # type: ignore[arg-type]

@@ -1,0 +1,241 @@
+"""The elbow orthosis at rest: published torques, stiffness, allocation, memory, files."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pam_envs.mechanics import allocation
+from pam_envs.plants import elbow_orthosis_rows as K
+from pam_envs.plants.elbow_bundles import (
+    contraction_at,
+    factors_of,
+    friction_of,
+    shape_of,
+    travel_at,
+    volume_of,
+    weight_of,
+)
+from pam_envs.plants.elbow_memory import elbow_memory, travel_plays
+from pam_envs.plants.elbow_orthosis import MAKES, ElbowOrthosis
+from pam_envs.plants.memory import KINDS
+
+FULL = 6e5
+ANGLES = np.radians([0.0, 60.0, 120.0])
+RANGE = np.linspace(0.0, np.radians(120.0), 49)
+COUNTS = ((1, 1), (1, 6), (3, 7), (5, 2), (8, 12))
+
+
+def orthosis(a: int = 3, b: int = 7, **changes: float) -> ElbowOrthosis:
+    return ElbowOrthosis.paper("none", bundle_a__muscles=a, bundle_b__muscles=b, **changes)
+
+
+@pytest.mark.parametrize(
+    ("pressure_a", "pressure_b", "torques"),
+    [
+        (FULL, FULL, (23.79, 10.17, -2.63)),
+        (FULL, 0.0, (-0.89, -5.60, -10.75)),
+        (0.0, FULL, (27.23, 16.87, 7.85)),
+    ],
+)
+def test_the_torque_table(pressure_a: float, pressure_b: float, torques: tuple[float, ...]) -> None:
+    made = orthosis().torque(ANGLES, pressure_a, pressure_b)
+    assert made == pytest.approx(torques, abs=0.02)
+
+
+def test_the_stiffness_table() -> None:
+    plant = orthosis()
+    assert plant.stiffness(ANGLES, FULL, FULL) == pytest.approx((13.39, 12.61, 11.84), abs=6e-3)
+    assert plant.stiffness(ANGLES, 0.0, 0.0) == pytest.approx((1.43, 1.35, 1.26), abs=6e-3)
+
+
+@pytest.mark.parametrize("counts", COUNTS)
+@pytest.mark.parametrize("pressures", [(0.0, 0.0), (FULL, 1e5), (2e5, 5e5)])
+def test_the_stiffness_is_a_finite_difference_of_the_torque(
+    counts: tuple[int, int], pressures: tuple[float, float]
+) -> None:
+    plant, h = orthosis(*counts), 1e-4
+    rise = plant.torque(RANGE + h, *pressures) - plant.torque(RANGE - h, *pressures)
+    assert np.abs(plant.stiffness(RANGE, *pressures) + rise / (2.0 * h)).max() < 1e-6
+
+
+@pytest.mark.parametrize("counts", COUNTS)
+def test_the_determinant_is_positive_over_the_whole_range(counts: tuple[int, int]) -> None:
+    assert orthosis(*counts).determinant(RANGE).min() > 0.0
+
+
+@pytest.mark.parametrize("counts", COUNTS)
+def test_torque_and_stiffness_are_met_exactly(counts: tuple[int, int]) -> None:
+    plant, drawn = orthosis(*counts), np.random.default_rng(1)
+    q = drawn.uniform(RANGE[0], RANGE[-1], 200)
+    p_a, p_b = drawn.uniform(0.0, FULL, (2, 200))
+    made = plant.allocate(q, plant.torque(q, p_a, p_b), plant.stiffness(q, p_a, p_b))
+    assert np.abs(np.array(made) - (p_a, p_b)).max() < 1e-9 * FULL
+    wanted = drawn.uniform(-20.0, 20.0, 200), drawn.uniform(1.0, 15.0, 200)
+    x_a, x_b = plant.coefficients(*plant.allocate(q, *wanted))
+    shape_a, shape_b, slope_a, slope_b = plant.geometry(q)
+    radius = plant.pulley.radius
+    assert np.abs(radius * (shape_b * x_b - shape_a * x_a) - wanted[0]).max() < 1e-9
+    assert np.abs(-(radius**2) * (slope_a * x_a + slope_b * x_b) - wanted[1]).max() < 1e-9
+
+
+def test_the_numpy_face_is_that_of_the_allocation() -> None:
+    plant, q = orthosis(), 0.9
+    phi_a, phi_b, psi_a, psi_b = (float(v) for v in plant.geometry(q))
+    radius = plant.pulley.radius
+    factors = allocation.factors_for(4.0, 6.0, radius, phi_a, phi_b, psi_a, psi_b)
+    made = [float(p) for p in plant.allocate(q, 4.0, 6.0)]
+    assert made == pytest.approx([float(p) for p in plant.pressures_of(*factors)], rel=1e-9)
+    area = radius**3 * allocation.determinant(phi_a, phi_b, psi_a, psi_b)
+    assert float(plant.determinant(q)) == pytest.approx(area, rel=1e-12)
+
+
+def test_what_is_feasible_is_a_parallelogram() -> None:
+    plant = orthosis()
+    torque, stiffness = plant.corners(np.radians([20.0, 60.0, 100.0]))
+    assert torque[:, 0] + torque[:, 2] == pytest.approx(torque[:, 1] + torque[:, 3], abs=1e-9)
+    assert stiffness[:, 0] + stiffness[:, 2] == pytest.approx(stiffness[:, 1] + stiffness[:, 3])
+
+
+@pytest.mark.parametrize(("share", "area"), [(0.28, 105.0), (0.33, 138.0)])
+def test_the_area_of_the_feasible_set(share: float, area: float) -> None:
+    """The 137 to 139 N2 m2/rad that were reckoned beforehand belong to C_max = 0.33 L_n."""
+    ends = {f"bundle_{b}__largest_contraction": share for b in "ab"}
+    torque, stiffness = orthosis(**ends).corners(np.radians([20.0, 60.0, 100.0]))
+    side_a, side_b = torque[:, 1] - torque[:, 0], torque[:, 3] - torque[:, 0]
+    up_a, up_b = stiffness[:, 1] - stiffness[:, 0], stiffness[:, 3] - stiffness[:, 0]
+    assert side_b * up_a - side_a * up_b == pytest.approx([area] * 3, abs=1.1)
+
+
+def test_equal_full_pressures_balance_near_107_degrees() -> None:
+    plant, q = orthosis(), np.radians(np.linspace(90.0, 120.0, 3001))
+    zero = q[np.argmin(np.abs(plant.torque(q, FULL, FULL)))]
+    assert np.degrees(zero) == pytest.approx(107.0, abs=0.6)
+
+
+@pytest.mark.parametrize("hysteresis", KINDS)
+def test_the_kernels_are_the_numpy_face(hysteresis: str) -> None:
+    plant = ElbowOrthosis.paper(hysteresis, bundle_a__gain=1.1, link__mass=0.7)  # type: ignore[arg-type]
+    fixed = plant.parameter_rows()[:, None].tolist()
+    angle, lag = 0.7, 1.3e-3
+    shapes, slopes = plant.geometry(angle)[:2], plant.geometry(angle)[2:]
+    frictions = plant.friction(lag)
+    for side, bundle in enumerate((plant.bundle_a, plant.bundle_b)):
+        c = contraction_at(fixed, 0, side, angle)
+        assert c == pytest.approx(float(plant.pulley.contractions(angle)[side]))
+        made = shape_of(fixed, 0, side, c)
+        assert made == pytest.approx((float(shapes[side]), float(slopes[side])))
+        factors = (bundle.passive_factor, bundle.pressure_factor)
+        assert factors_of(fixed, 0, side) == pytest.approx(factors)
+        assert volume_of(fixed, 0, side, c) == pytest.approx(float(bundle.volume(c)), rel=1e-12)
+        assert friction_of(fixed, 0, side, lag) == pytest.approx(float(frictions[side]))
+    assert travel_at(fixed, 0, angle) == pytest.approx(float(plant.pulley.travel(angle)))
+    assert weight_of(fixed, 0, angle) == pytest.approx(float(plant.weight_torque(angle)))
+
+
+def test_names_and_rows_agree() -> None:
+    plant = ElbowOrthosis.paper()
+    column = plant.parameter_rows()
+    assert len(column) == K.N_PARAMETERS
+    assert column[K.place("bundle_b.muscles")] == 7.0
+    assert column[K.BUNDLE + K.BUNDLE_ROWS + K.MUSCLES] == 7.0
+    assert column[K.RADIUS] == plant.pulley.radius
+    assert column[K.PRESSURE_BIAS] == column[K.place("pressure.bias")]
+    assert column[K.HANDLE] == plant.wearer.handle
+
+
+# --- memory ---------------------------------------------------------------------------------------
+
+
+def forces_over_loop(plant: ElbowOrthosis, pressure: float) -> tuple[np.ndarray, np.ndarray]:
+    """Force of bundle b over two sweeps of the whole range, and its contraction."""
+    q = np.concatenate([RANGE, RANGE[::-1], RANGE, RANGE[::-1]])
+    operator, travel = plant.memory.operator, plant.pulley.travel(q)
+    lag = travel - operator.simulate(travel)[0] if operator else np.zeros_like(q)
+    contraction = plant.pulley.contractions(q)[1]
+    shape = plant.bundle_b.shape(contraction) - plant.friction(lag)[1]
+    n = 2 * len(RANGE)
+    return (plant.bundle_b.factor(pressure) * shape)[n:], contraction[n:]
+
+
+@pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach"])
+@pytest.mark.parametrize("pressure", [0.0, 5e5])
+def test_loading_and_unloading_differ_by_the_published_share(
+    hysteresis: str, pressure: float
+) -> None:
+    plant = ElbowOrthosis.paper(hysteresis)  # type: ignore[arg-type]
+    force, contraction = forces_over_loop(plant, pressure)
+    n = len(RANGE)
+    shortening, lengthening = force[:n], force[n:][::-1]
+    assert contraction[:n] == pytest.approx(contraction[n:][::-1])
+    gap = lengthening - shortening
+    assert gap.min() > -1e-9  # friction takes work
+    full = float(plant.bundle_b.law(pressure, 0.0))
+    assert 100.0 * gap.max() / full == pytest.approx(7.5, abs=0.01)
+
+
+def test_both_memories_have_the_same_loops() -> None:
+    path = 0.033 * np.sin(np.linspace(0.0, 40.0, 900)) * np.linspace(1.0, 0.2, 900)
+    outputs = [elbow_memory(k).operator.simulate(path)[0] for k in ("maxwell_slip", "preisach")]  # type: ignore[union-attr]
+    assert np.abs(outputs[0] - outputs[1]).max() < 0.03 * elbow_memory("maxwell_slip").largest_lag
+    lags = [elbow_memory(k).largest_lag for k in ("maxwell_slip", "preisach")]
+    assert lags[0] == pytest.approx(lags[1], rel=1e-9)
+
+
+# --- bad values, files ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"bundle_a__muscles": 2.5}, "whole number"),
+        ({"bundle_b__muscles": 0.0}, "outside its bounds"),
+        ({"pulley__radius": 0.06}, "smaller radius"),
+        ({"pulley__highest": 0.2, "pulley__lowest": 0.3}, "swap"),
+        ({"link__inertia": 1e-4, "wearer__inertia": 5e-3, "wearer__damping": 20.0}, "too fast"),
+    ],
+)
+def test_bad_values_are_refused_with_a_remedy(changes: dict[str, float], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        ElbowOrthosis.paper(**changes)  # type: ignore[arg-type]
+
+
+def test_bad_makes_and_memories_are_refused() -> None:
+    with pytest.raises(ValueError, match="valves = 'pulsed'"):
+        ElbowOrthosis.paper(valves="pulsed")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="hysteresis = 'dahl'"):
+        ElbowOrthosis.paper("dahl")  # type: ignore[arg-type]
+    plays = travel_plays()
+    steep = dataclasses.replace(plays, linear=0.5)
+    many = dataclasses.replace(
+        plays, thresholds=tuple(0.001 * k for k in range(1, 11)), weights=(0.08,) * 10
+    )
+    for operator, words in ((steep, "total slope"), (many, "at most 8")):
+        with pytest.raises(ValueError, match=words):
+            ElbowOrthosis.paper().replace({"memory.operator": operator})
+    relays = elbow_memory("preisach").operator
+    with pytest.raises(ValueError, match="virgin"):
+        ElbowOrthosis.paper().replace(
+            {"memory.operator": dataclasses.replace(relays, start="low")}  # type: ignore[type-var]
+        )
+
+
+@pytest.mark.parametrize("hysteresis", KINDS)
+@pytest.mark.parametrize("valves", MAKES)
+def test_a_plant_comes_back_from_its_file(hysteresis: str, valves: str, tmp_path: Path) -> None:
+    plant = ElbowOrthosis.paper(hysteresis, valves, bundle_a__muscles=4)  # type: ignore[arg-type]
+    plant.to_yaml(tmp_path / "plant.yaml")
+    again = ElbowOrthosis.from_yaml(tmp_path / "plant.yaml")
+    assert again == plant
+    assert again.digest() == plant.digest()
+    assert plant.digest() != ElbowOrthosis.paper(hysteresis, valves).digest()  # type: ignore[arg-type]
+
+
+def test_sensors_without_noise_and_valve_cycle() -> None:
+    plant = ElbowOrthosis.paper().without_noise()
+    assert plant.angle.noise == plant.pressure.resolution == 0.0
+    assert plant.cycle_periods == 5
+    assert ElbowOrthosis.paper(valves="on_off", valve__supply_pressure=5e5).full_pressure == 5e5

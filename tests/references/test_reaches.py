@@ -1,0 +1,89 @@
+"""Intended motions: smooth, within their range, the same from the same key."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pam_envs.kernels import entry, seed_words
+from pam_envs.references.path import least_jerk
+from pam_envs.references.reaches import (
+    KIND,
+    MIXED,
+    MOTIONS,
+    REACHES,
+    ROWS,
+    SINES,
+    STILL,
+    WINDOW,
+    draw_motion,
+    least_jerk_bend,
+    least_jerk_rate,
+    motion_at,
+)
+
+LOW, HIGH, SECONDS = 0.3, 1.8, 2.5
+at, draw = entry(motion_at), entry(draw_motion)
+
+
+def drawn(seed: int, kind: int) -> np.ndarray:
+    rows = np.zeros((ROWS, 1))
+    draw(rows, 0, 0, *seed_words(seed), kind, LOW, HIGH, SECONDS)
+    return rows
+
+
+def course(rows: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return angle, rate and acceleration, shape (3, n)."""
+    return np.array([at(rows, 0, 0, float(t)) for t in times]).T
+
+
+@pytest.mark.parametrize("kind", [REACHES, SINES, STILL])
+def test_motions_stay_in_their_range_and_begin_at_rest(kind: int) -> None:
+    times = np.arange(0.0, 20.0, 0.05)
+    for seed in range(5):
+        angle, rate, _ = course(drawn(seed, kind), times)
+        assert angle.min() >= LOW - 1e-12 and angle.max() <= HIGH + 1e-12
+        assert rate[0] == pytest.approx(0.0, abs=1e-12)
+        assert (np.ptp(angle) > 0.3) == (kind != STILL)
+
+
+@pytest.mark.parametrize("kind", [REACHES, SINES])
+def test_rate_and_acceleration_are_the_slopes(kind: int) -> None:
+    h, times = 1e-5, np.arange(0.1, 12.0, 0.013)
+    rows = drawn(3, kind)
+    slopes = (course(rows, times + h) - course(rows, times - h)) / (2.0 * h)
+    assert np.allclose(slopes[:2], course(rows, times)[1:], atol=1e-4)
+
+
+def test_reaches_join_and_rest_between() -> None:
+    rows = drawn(1, REACHES)
+    for window in range(1, 6):
+        before, after = (at(rows, 0, 0, SECONDS * window + d) for d in (-1e-9, 1e-9))
+        assert before[0] == pytest.approx(after[0], abs=1e-9)
+        assert before[1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_course_is_the_one_of_least_jerk() -> None:
+    """Fifth order, symmetric, with neither speed nor acceleration at its ends."""
+    u = np.linspace(0.0, 1.0, 41)
+    s = np.array([least_jerk(float(x)) for x in u])
+    assert (s[0], s[-1], s[20]) == (0.0, 1.0, 0.5)
+    assert np.allclose(s + s[::-1], 1.0)
+    assert np.allclose(np.diff(s, 6), 0.0, atol=1e-12)  # no sixth derivative
+    assert np.abs(np.diff(s, 5)).min() > 1e-8
+    v = np.array([least_jerk_rate(float(x)) for x in u])
+    assert v[0] == v[-1] == 0.0
+    assert v.max() == pytest.approx(1.875)
+    assert v[1] < 0.02  # grows with the square of the time
+    bend = np.array([least_jerk_bend(float(x)) for x in u])
+    assert np.allclose(bend[1:-1], (v[2:] - v[:-2]) * 20.0, atol=0.05)
+
+
+def test_mixed_draws_each_and_keys_tell_motions_apart() -> None:
+    kinds = {int(drawn(seed, MIXED)[KIND, 0]) for seed in range(40)}
+    assert kinds == set(range(len(MOTIONS) - 1))
+    times = np.arange(0.0, 8.0, 0.1)
+    one, other = (course(drawn(seed, REACHES), times)[0] for seed in (7, 8))
+    assert np.array_equal(one, course(drawn(7, REACHES), times)[0])
+    assert np.abs(one - other).max() > 0.1
+    assert drawn(7, REACHES)[WINDOW, 0] == SECONDS
