@@ -110,6 +110,9 @@ SUFFIXES: dict[str, str] = {
     "KneeWalk-v0": "_knee_walk",
     "KneeStairsUp-v0": "_knee_stairs_up",
     "KneeStairsDown-v0": "_knee_stairs_down",
+    "AntagonisticJoint-v0": "_joint",
+    "RedundantManipulator-v0": "_manipulator",
+    "ElbowOrthosis-v0": "_elbow",
 }
 """What names of controllers end with, by environment."""
 WHERE: dict[str, str] = {
@@ -125,6 +128,9 @@ CORRECTED: dict[str, str] = {
     "KneeWalk-v0": "knee_inverse_ahead_ltr",
     "KneeStairsUp-v0": "knee_inverse_ahead_ltr",
     "KneeStairsDown-v0": "knee_inverse_ahead_ltr",
+    "AntagonisticJoint-v0": "joint_mfc_mu_ahead",
+    "RedundantManipulator-v0": "joint_pid_smooth_ahead",
+    "ElbowOrthosis-v0": "elbow_allocation_early",
 }
 """Controllers that residuals correct. On the tuning seeds (``python -m agents classical``) they
 have the least error, or move the set-point less than others within a tenth of it."""
