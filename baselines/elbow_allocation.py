@@ -14,18 +14,17 @@ on the way as well.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.controller import Answer, Array, beginning, choose
+from baselines.controller import Answer, beginning, choose
+from baselines.elbow_friction import ElbowFriction, make_elbow_friction
 from baselines.elbow_valves import PressureLoop, make_pressure_loop
-from baselines.elbow_view import ElbowSignalMap, ElbowView, make_elbow_signal_map
-from baselines.nominal import MemoryRows, MemoryState, NoMemory, PlayRows, PreisachRows
+from baselines.elbow_view import ElbowSignalMap, make_elbow_signal_map
+from baselines.nominal import MemoryState
 from baselines.torque_stiffness import Allocation
-from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.parameters import Signals
 from pam_envs.plants.elbow_orthosis import ElbowOrthosis
 
@@ -45,8 +44,8 @@ class ElbowAllocation:
     allocation : Allocation
     signals : ElbowSignalMap
     loop : PressureLoop
-    memory : MemoryRows
-        That is undone; none is if it never lags.
+    friction : ElbowFriction
+        That is undone; none is if its memory never lags.
     early : bool
         Whether the pressures are chosen among those of the next step.
     """
@@ -54,7 +53,7 @@ class ElbowAllocation:
     allocation: Allocation
     signals: ElbowSignalMap
     loop: PressureLoop
-    memory: MemoryRows
+    friction: ElbowFriction
     early: bool = False
 
     def predict(
@@ -68,30 +67,15 @@ class ElbowAllocation:
         view = self.signals.read(observation)
         begin = beginning(state, episode_start, len(view.angle))
         if state is None or begin.any():
-            fresh = AllocationState(self.memory.initial(len(view.angle)))
+            fresh = AllocationState(self.friction.initial(len(view.angle)))
             state = choose(begin, fresh, state)
-        friction, memory = self._friction(view, state.memory)
+        friction, memory = self.friction.taken(view, state.memory)
         limits = self.loop.reach(view) if self.early else None
         wanted = self.allocation.pressures(
             view.angle, view.wanted, view.stiffness, friction, limits
         )
         commands = self.loop.commands(view, np.array(wanted))
         return self.signals.write(commands, observation), AllocationState(memory)
-
-    def _friction(
-        self, view: ElbowView, state: MemoryState
-    ) -> tuple[tuple[Array, Array], MemoryState]:
-        """Return what friction takes of both bundles' shapes [m^2], and the memory after it."""
-        plant = self.allocation.plant
-        travel = plant.pulley.travel(view.angle)
-        follows, after = self.memory.forward(travel, state)
-        return plant.friction(travel - follows), after
-
-
-def _rows(operator: Any) -> MemoryRows:
-    if isinstance(operator, PlayOperator):
-        return PlayRows(operator)
-    return PreisachRows(operator) if isinstance(operator, Preisach) else NoMemory()
 
 
 def make_elbow_allocation(
@@ -116,6 +100,6 @@ def make_elbow_allocation(
         Allocation(plant),
         make_elbow_signal_map(signals, action_signals, plant.control_period),
         make_pressure_loop(plant),
-        _rows(plant.memory.operator if memory else None),
+        make_elbow_friction(plant, known=memory),
         early,
     )

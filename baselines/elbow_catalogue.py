@@ -25,7 +25,15 @@ ELBOW_CONTROLLERS: dict[str, Entry] = {
     ),
     "elbow_hold": Entry("3 bar in both bundles always", MODEL, feedback=True, envs=ELBOW),
     "elbow_pid": Entry(
-        "PI of the torque as estimated from 1.2 bar in both, SIMC tuning; stiffness as it comes",
+        "PI of the torque as estimated from 1.2 bar in both, SIMC tuning (for on/off valves of a "
+        "made-up lag); stiffness as it comes",
+        MODEL,
+        feedback=True,
+        citation=SIMC,
+        envs=ELBOW,
+    ),
+    "elbow_pid_memory": Entry(
+        "elbow_pid, with the bundles' friction in its estimate of the torque",
         MODEL,
         feedback=True,
         citation=SIMC,
@@ -61,6 +69,9 @@ ELBOW_MAKERS: Mapping[str, Maker] = {
     "elbow_random": make_elbow_random,
     "elbow_hold": make_held,
     "elbow_pid": make_elbow_pid,
+    "elbow_pid_memory": lambda plant, signals, actions: make_elbow_pid(
+        plant, signals, actions, memory=True
+    ),
     "elbow_allocation": make_elbow_allocation,
     "elbow_allocation_memory": lambda plant, signals, actions: make_elbow_allocation(
         plant, signals, actions, memory=True

@@ -5,20 +5,25 @@ torque that is fed back is the estimate from angle and pressures, since there is
 The pressure that both start from, a fifth of the largest, gives a stiffness amid those that the
 tasks ask for; friction grows with it, so that a higher one makes the torque worse.
 Tuning: SIMC for a lag (S. Skogestad, J. Process Control 13 (2003) 291-309) with the steepest torque
-per pressure over the range, and the regulator's lag, or for on/off valves one cycle of theirs. The
-dead time is half of what a command is held for, and a control period for a computer to work it out.
+per pressure over the range, and the regulator's lag. On/off valves are no lag but a rate, of 3 bar
+in 3 s: the rule is shown a plant with one cycle for its lag, which is a choice and no tuning by
+rule. The dead time is half of what a command is held for, and a control period for a computer to
+work it out.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.controller import Answer, beginning, choose
+from baselines.elbow_friction import ElbowFriction, make_elbow_friction
 from baselines.elbow_valves import PressureLoop, make_pressure_loop
 from baselines.elbow_view import ElbowSignalMap, make_elbow_signal_map
+from baselines.nominal import MemoryState
 from baselines.pid import Gains, PidState, pid_start, pid_step
 from pam_envs.parameters import Signals
 from pam_envs.plants.elbow_orthosis import ElbowOrthosis
@@ -47,6 +52,13 @@ def simc_torque(plant: ElbowOrthosis) -> Gains:
     )
 
 
+class ElbowPidState(NamedTuple):
+    """The PI's state and the nominal memory, first axis n_env."""
+
+    pid: PidState
+    memory: MemoryState
+
+
 @dataclass(frozen=True)
 class ElbowPid:
     """PI on the torque as estimated; see this module's page.
@@ -61,6 +73,8 @@ class ElbowPid:
         Pressure [Pa] that both start from, and the largest.
     period : float
         Control period [s].
+    friction : ElbowFriction
+        That is added to the estimate; none is if its memory never lags.
     """
 
     gains: Gains
@@ -69,11 +83,12 @@ class ElbowPid:
     middle: float
     full: float
     period: float
+    friction: ElbowFriction
 
     def predict(
         self,
         observation: ArrayLike,
-        state: PidState | None = None,
+        state: ElbowPidState | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
     ) -> Answer:
@@ -81,20 +96,36 @@ class ElbowPid:
         view = self.signals.read(observation)
         begin = beginning(state, episode_start, len(view.angle))
         if state is None or begin.any():
-            state = choose(
-                begin, pid_start(0.5 * np.diff(view.pressure, axis=0)[0], view.torque), state
-            )
-        error, most = view.wanted - view.torque, self.full
-        shift, after = pid_step(self.gains, state, error, view.torque, -most, most, self.period)
+            at_rest = pid_start(0.5 * np.diff(view.pressure, axis=0)[0], view.torque)
+            fresh = ElbowPidState(at_rest, self.friction.initial(len(begin)))
+            state = choose(begin, fresh, state)
+        taken, memory = self.friction.taken(view, state.memory)
+        torque, most = view.torque + self.friction.torque(view, taken), self.full
+        error = view.wanted - torque
+        shift, after = pid_step(self.gains, state.pid, error, torque, -most, most, self.period)
         wanted = np.clip(self.middle + np.array([-shift, shift]), 0.0, most)
         commands = wanted if self.loop is None else self.loop.commands(view, wanted)
-        return self.signals.write(commands, observation), after
+        return self.signals.write(commands, observation), ElbowPidState(after, memory)
 
 
 def make_elbow_pid(
-    plant: ElbowOrthosis, signals: Signals, action_signals: Signals, gains: Gains | None = None
+    plant: ElbowOrthosis,
+    signals: Signals,
+    action_signals: Signals,
+    gains: Gains | None = None,
+    memory: bool = False,
 ) -> ElbowPid:
-    """Return the controller, with the gains of :func:`simc_torque` unless others are given."""
+    """Return the controller for a nominal plant.
+
+    Parameters
+    ----------
+    plant : ElbowOrthosis
+    signals, action_signals : Signals
+    gains : Gains, optional
+        Default: those of :func:`simc_torque`.
+    memory : bool
+        Whether the nominal memory's friction is added to the estimate of the torque.
+    """
     full = plant.full_pressure
     return ElbowPid(
         simc_torque(plant) if gains is None else gains,
@@ -103,4 +134,5 @@ def make_elbow_pid(
         SHARE * full,
         full,
         plant.control_period,
+        make_elbow_friction(plant, known=memory),
     )

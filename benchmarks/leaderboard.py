@@ -50,6 +50,7 @@ ELBOW: tuple[Column, ...] = (
     ("max_error", "max [N m]", 1.0),
     ("sensed_rms_error", "estimated RMS [N m]", 1.0),
     ("felt_rms", "felt beside the object, RMS [N m]", 1.0),
+    ("free_felt_rms", "felt in free motion, RMS [N m]", 1.0),
     *EFFORT,
     ("switchings", "switchings [1/s]", 1.0),
     OUT_OF_REACH,
@@ -138,7 +139,8 @@ PREFACE = """\
   *Torque* is the error at the present angle alone, against what the pressures can give there (as
   are p95 and max); *estimated* is the torque as computed from the sensors, without friction. *Felt
   beside the object* is the torque that the orthosis puts on the wearer less that of the object he
-  is to feel, whether it can be given or not: in free motion, all that he feels. *Out of reach*:
+  is to feel, whether it can be given or not; *felt in free motion* is the same of the episodes in
+  which he is to feel nothing: what the orthosis fails to be transparent by. *Out of reach*:
   more torque or stiffness was asked for than there is.
 - Of a gait, the tension is scored while the heel bears weight and the angle while it does not, and
   neither in the few periods in which the sensed phase is not the true one. *Error at the switch* is

@@ -14,6 +14,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.tasks.torque_stiffness import FREE
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -21,6 +23,7 @@ ELBOW: dict[str, str] = {
     "impedance_rms": "N m",
     "stiffness_rms": "N m/rad",
     "felt_rms": "N m",
+    "free_felt_rms": "N m",
     "switchings": "1/s",
     "saturated_time": "1",
     "torque_clipped": "N m",
@@ -29,7 +32,8 @@ ELBOW: dict[str, str] = {
 }
 """RMS error of the torque over two angles, ``NEAR`` on either side of the present one, from torque
 and stiffness. RMS error of the stiffness. RMS of the torque that the orthosis puts on the wearer
-less that of the object he is to feel: in free motion, all that he feels (transparency). Coils
+less that of the object he is to feel. The same of free motion alone, where it is all that he feels
+(transparency), and NaN where there is none. Coils
 switched on. Share of time in which torque or stiffness were asked for that no pressures give, and
 by how much, RMS. Share of time with a slack bundle."""
 NEAR = 0.2
@@ -59,6 +63,7 @@ def of_elbow(signals: Mapping[str, Array], window: Mask, period: float) -> dict[
             "stiffness",
             "stiffness_reference",
             "felt",
+            "object",
             "object_torque",
             "torque_clipped",
             "stiffness_clipped",
@@ -69,11 +74,13 @@ def of_elbow(signals: Mapping[str, Array], window: Mask, period: float) -> dict[
     beyond = (np.abs(torque) > LEAST) | (np.abs(stiffness) > LEAST)
     seconds = float(window.sum()) * period
     wrong = np.asarray(signals["output"])[window] - np.asarray(signals["reference"])[window]
+    free, felt = seen["object"] == FREE, seen["felt"] - seen["object_torque"]
     soft = seen["stiffness"] - seen["stiffness_reference"]
     return {
         "impedance_rms": rms(np.array([wrong + NEAR * soft, wrong - NEAR * soft])),
         "stiffness_rms": rms(soft),
-        "felt_rms": rms(seen["felt"] - seen["object_torque"]),
+        "felt_rms": rms(felt),
+        "free_felt_rms": rms(felt[free]) if free.any() else float("nan"),
         "switchings": float(np.sum(signals["effort/switchings"][window])) / seconds,
         "saturated_time": float(np.mean(beyond)),
         "torque_clipped": rms(torque),

@@ -238,6 +238,42 @@ def loop_share(plant: Any, pressure: float) -> float:
     return float(np.max(force[201:][::-1] - force[:201])) / float(muscles.law(pressure, 0.0))
 
 
+def small_motions() -> list[Figure]:
+    """Stiffness over a degree, where the threads stick, beside that of the law."""
+    where, lines = f"{SOURCE}, Eq. (22)", list[Figure]()
+    text = note("predicted", "from the angle of the last turn", "the law's is with no memory")
+    for kind in ("none", "maxwell_slip", "preisach"):
+        name = f"stiffness over a degree at 200 kPa and 57 degrees, memory {kind}"
+        ours = stiffness_of_a_degree(kind, 2e5, np.radians(57.0))
+        lines.append(bounded(name, where, "N m/rad", ours, text))
+    return lines
+
+
+def stiffness_of_a_degree(kind: Any, pressure: float, angle: float) -> float:
+    """Return the torque over the angle [N m/rad] that a first degree back takes.
+
+    Parameters
+    ----------
+    kind : {"none", "maxwell_slip", "preisach"}
+        Memory.
+    pressure : float
+        In both bundles [Pa].
+    angle : float
+        At which a bend of half a radian turns [rad].
+    """
+    from pam_envs.plants.elbow_orthosis import ElbowOrthosis
+
+    plant = ElbowOrthosis.paper(kind)
+    q = np.append(np.linspace(angle - 0.5, angle, 201), angle - np.radians(1.0))
+    travel, operator = plant.pulley.travel(q), plant.memory.operator
+    lag = travel - operator.simulate(travel)[0] if operator is not None else 0.0 * q
+    taken, shapes = plant.friction(lag), plant.geometry(q)[:2]
+    factors = plant.coefficients(pressure, pressure)
+    forces = [x * (shape - s) for x, shape, s in zip(factors, shapes, taken, strict=True)]
+    torque = plant.pulley.torque(*forces)
+    return float((torque[-2] - torque[-1]) / (q[-1] - q[-2]))
+
+
 def filling() -> list[Figure]:
     """How long bundles take to fill through the valve that the paper names."""
     where, lines = f"{SOURCE}, Fig. 2", list[Figure]()
@@ -310,5 +346,6 @@ GROUPS: tuple[Callable[[], list[Figure]], ...] = (
     feasible_set,
     force_law,
     hysteresis,
+    small_motions,
     filling,
 )

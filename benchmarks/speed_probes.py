@@ -120,9 +120,15 @@ def single_joints(rounds: int) -> list[Measurement]:
         Measurement("single", f"{name}, steps per CPU second", median(rates[name]), "1/s")
         for name in subjects
     ]
-    for name, env, floor in (("elbow", ELBOW, 8.0), ("joint", JOINT, 8.0), ("arm", ARM, 2.0)):
+    for name, env, floor in (
+        ("elbow", ELBOW, 8.0),
+        ("elbow, on/off valves", ELBOW, 8.0),
+        ("joint", JOINT, 8.0),
+        ("arm", ARM, 2.0),
+    ):
         value = ratio(rates[name], rates[HOPPER]) if HOPPER in rates else None
-        title = f"{env[4:-3]} / {HOPPER}"
+        _, _, make = name.partition(", ")
+        title = f"{env[4:-3]}{make and ', ' + make} / {HOPPER}"
         results.append(Measurement("single", title, value, "x", floor, 2 * floor, note=note))
     return results
 

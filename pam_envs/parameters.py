@@ -90,9 +90,10 @@ def check(component: Any, where: str = "") -> None:
                 f"give a value between {declared.low:g} and {declared.high:g}"
             )
         if not math.isfinite(value) or not declared.low <= value <= declared.high:
+            unit = "" if declared.unit == "1" else f" {declared.unit}"
             raise ValueError(
-                f"{prefix}{name} = {value:g} {declared.unit} is outside its bounds "
-                f"[{declared.low:g}, {declared.high:g}] {declared.unit}; "
+                f"{prefix}{name} = {value:g}{unit} is outside its bounds "
+                f"[{declared.low:g}, {declared.high:g}]{unit}; "
                 "check the unit (all parameters are SI) or move the value inside the bounds"
             )
 

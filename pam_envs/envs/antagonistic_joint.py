@@ -65,6 +65,18 @@ NUMBERS = {len(K.REFERENCES): SAMPLES, len(FAMILIES): K.SINE, len(FAMILIES) + 1:
 """Of references, by their place among those that the environment takes."""
 NOT_DRAWN = ("regulator.max_pressure", "link.limit", "link.stop", "nominal.prestress")
 """Parameters that ``randomize`` may not draw: they scale the action or enter derived numbers."""
+CORNER = {
+    "link.mass": min,
+    "link.gyration": min,
+    "link.damping": max,
+    "link.stop_stiffness": max,
+    "muscle.gain": max,
+    "lever.r_u": min,
+    "lever.r_o": min,
+    "lever.l_u": max,
+    "lever.l_o": max,
+}
+"""Which end of a range makes the motion faster, or brings the lever's toggle nearer."""
 
 
 @lru_cache(maxsize=8)
@@ -230,7 +242,7 @@ def make_setup(
             NOT_DRAWN,
             randomize,
             "{'regulator.time_constant': (0.03, 0.06)}",
-            {},
+            CORNER,
         ),
         drawn=randomize is not False,
     )

@@ -98,7 +98,7 @@ def reference_of(
     reference: Any,
     families: Sequence[str],
     unit: str,
-    largest: float,
+    largest: float | Sequence[float],
     channels: int = 1,
 ) -> tuple[int, NDArray[np.float64]]:
     """Return the number of the reference's family, and its samples where it is given as such.
@@ -110,9 +110,9 @@ def reference_of(
     families : sequence of str
         Those there are; ``len(families)`` is the number of given samples.
     unit : str
-        Of the samples.
-    largest : float
-        Largest size of a sample.
+        Of the samples; of several channels with a comma between them.
+    largest : float or sequence of float
+        Largest size of a sample, of each channel.
     channels : int
         References that are tracked at once.
 
@@ -140,11 +140,10 @@ def reference_of(
         raise ValueError(
             f"reference has shape {samples.shape}; give {channels} numbers for each control period"
         )
-    if np.abs(shaped).max() > largest:
-        raise ValueError(
-            f"reference reaches {np.abs(shaped).max():g} {unit}; samples are in {unit}, at most "
-            f"{largest:g}"
-        )
+    sizes, bounds = np.abs(shaped).max(axis=0), np.broadcast_to(largest, channels)
+    for size, bound, own in zip(sizes, bounds, unit.split(", "), strict=True):
+        if size > bound:
+            raise ValueError(f"reference reaches {size:g} {own}; at most {bound:g} {own} is taken")
     return len(families), np.ascontiguousarray(shaped.T)
 
 

@@ -374,6 +374,8 @@ def begin_elbow(
     if config[START_SHARE] > 0.0:
         a = config[START_SHARE] * uniform(key_a, key_b, START, 0)
         b = config[START_SHARE] * uniform(key_a, key_b, START, 1)
+    if choices[PULSED] > 0:
+        a, b = min(a, fixed[K.SUPPLY_PRESSURE][j]), min(b, fixed[K.SUPPLY_PRESSURE][j])
     start_memory(rows, counts, MEMORY, j)
     begin_lane(rows, fixed, counts, tables, MEMORY, choices[N_ELEMENTS], j, a, b)
     rows[ACTION][j], rows[ACTION + 1][j] = rows[K.COMMAND_A][j], rows[K.COMMAND_B][j]

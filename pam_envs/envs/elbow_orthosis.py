@@ -24,10 +24,13 @@ Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=F
 | then | stiffness_reference, at the angle as sensed | N m/rad | 0 .. 15 |
 | then | stiffness_reference_1 .., along the intended motion | N m/rad | 0 .. 15 |
 
+More muscles than three and seven can do more: torque and stiffness then reach further, up to what
+full bundles do (:func:`~pam_envs.envs.elbow_ranges.signal_ranges`).
+
 Action: pressure_a_set_point and pressure_b_set_point, 0 .. 6e5 Pa; with on/off valves pulse_a and
 pulse_b, -0.05 .. 0.05 s, of which one in 50 ms is taken, positive to fill; or torque and stiffness.
 
-Reward, each control period: ``- |torque error| / 0.5 N m - 0.5 |stiffness error| / 0.5 N m/rad
+Reward, each control period: ``- |torque error| / 0.5 N m - 0.2 |stiffness error| / 0.5 N m/rad
 - 0.2 (change of both set-points) / 12 bar`` (on/off valves: the widths of the pulses that were last
 taken / 0.1 s); where a stop ends the episode, the worst that a period can cost for each one that is
 left as well, so that it never pays.
@@ -51,20 +54,18 @@ from numpy.typing import NDArray
 from pam_envs.envs import elbow_layout as L
 from pam_envs.envs.arguments import common, plant_of, reference_of, spread_of, task_of
 from pam_envs.envs.elbow_kernels import kernels_for
+from pam_envs.envs.elbow_ranges import largest_errors, signal_ranges
 from pam_envs.envs.plant_env import PlantEnv
 from pam_envs.envs.setup import Setup, check_choice, check_number, compose
 from pam_envs.envs.vector_env import PlantVectorEnv
-from pam_envs.parameters import Signal, Signals, declarations
+from pam_envs.parameters import Signal, Signals
 from pam_envs.plants import elbow_orthosis_rows as R
 from pam_envs.plants.elbow_orthosis import MAKES, ElbowOrthosis, Valves
 from pam_envs.plants.memory import Kind
 from pam_envs.references.reaches import MOTIONS
-from pam_envs.tasks.torque_stiffness import OBJECTS, TorqueStiffness
+from pam_envs.tasks.torque_stiffness import MIXED, OBJECTS, WEIGHT, TorqueStiffness
 
 ANGLES, RATES = (-0.2, 2.4), (-10.0, 10.0)
-TORQUES, STIFFNESSES = (-30.0, 30.0), (0.0, 15.0)
-"""Ranges of the signals."""
-LARGEST_SAMPLE = 60.0
 MARGIN = math.radians(5.0)
 """References of motion stay this far [rad] within the range, or more."""
 NOT_DRAWN = (
@@ -75,8 +76,20 @@ NOT_DRAWN = (
     "pulley.highest",
     "bundle_a.muscles",
     "bundle_b.muscles",
+    "wearer.handle",
 )
 """Parameters that ``randomize`` may not draw: they scale the action or the references."""
+CORNER = {
+    "link.inertia": min,
+    "link.damping": max,
+    "wearer.inertia": min,
+    "wearer.damping": max,
+    "wearer.stiffness": max,
+    "pulley.stop_stiffness": max,
+    "bundle_a.gain": max,
+    "bundle_b.gain": max,
+}
+"""Which end of a range makes the motion faster."""
 
 
 @lru_cache(maxsize=8)
@@ -136,20 +149,25 @@ def _commands(plant: ElbowOrthosis) -> tuple[str, str, float, float]:
     return "set_point", "Pa", 0.0, plant.full_pressure
 
 
+def _spans(plant: ElbowOrthosis) -> tuple[tuple[float, float], tuple[float, float]]:
+    torque, stiffness = signal_ranges(plant)
+    return (-torque, torque), (0.0, stiffness)
+
+
 def _actions(plant: ElbowOrthosis, action: str, normalize: bool) -> Signals:
     word, unit, low, high = _commands(plant)
     form = "pulse_{}" if word == "pulse" else "pressure_{}_set_point"
     parts = [(form.format(bundle), unit, low, high) for bundle in "ab"]
     if action == "torque_stiffness":
         parts = [
-            ("torque_set_point", "N m", *TORQUES),
-            ("stiffness_set_point", "N m/rad", *STIFFNESSES),
+            ("torque_set_point", "N m", *_spans(plant)[0]),
+            ("stiffness_set_point", "N m/rad", *_spans(plant)[1]),
         ]
     return Signals(Signal(*part, i, normalize) for i, part in enumerate(parts))
 
 
 def _signals(plant: ElbowOrthosis, preview: int, spacing: float, normalize: bool) -> Signals:
-    pressures = (0.0, plant.full_pressure)
+    pressures, (torques, stiffnesses) = (0.0, plant.full_pressure), _spans(plant)
     word, unit, low, high = _commands(plant)
     parts: list[tuple[str, str, tuple[float, float], float]] = [
         ("angle", "rad", ANGLES, 0.0),
@@ -158,14 +176,14 @@ def _signals(plant: ElbowOrthosis, preview: int, spacing: float, normalize: bool
         ("pressure_b", "Pa", pressures, 0.0),
         (f"{word}_a", unit, (low, high), 0.0),
         (f"{word}_b", unit, (low, high), 0.0),
-        ("torque", "N m", TORQUES, 0.0),
-        ("stiffness", "N m/rad", STIFFNESSES, 0.0),
+        ("torque", "N m", torques, 0.0),
+        ("stiffness", "N m/rad", stiffnesses, 0.0),
     ]
     if word == "pulse":
         parts.append(("to_pulse", "s", (0.0, plant.cycle), 0.0))
     for name, its_unit, span in (
-        ("reference", "N m", TORQUES),
-        ("stiffness_reference", "N m/rad", STIFFNESSES),
+        ("reference", "N m", torques),
+        ("stiffness_reference", "N m/rad", stiffnesses),
     ):
         parts.append((name, its_unit, span, 0.0))
         parts += [(f"{name}_{i + 1}", its_unit, span, (i + 1) * spacing) for i in range(preview)]
@@ -173,17 +191,6 @@ def _signals(plant: ElbowOrthosis, preview: int, spacing: float, normalize: bool
         Signal(name, unit, low, high, i, normalize, ahead)
         for i, (name, unit, (low, high), ahead) in enumerate(parts)
     )
-
-
-def largest_errors(plant: ElbowOrthosis) -> tuple[float, float]:
-    """Return more than torque [N m] and stiffness [N m/rad] can ever be off.
-
-    References lie between the corners of the nominal bundles; true ones can be stronger by the
-    largest gain that is allowed.
-    """
-    torques, stiffnesses = plant.corners(np.linspace(*plant.hard_limits, 49))
-    strongest = declarations(plant.bundle_a)["gain"].high
-    return strongest * float(np.ptp(torques)), strongest * float(stiffnesses.max())
 
 
 def _span(plant: ElbowOrthosis, span: Any) -> tuple[float, float]:
@@ -202,10 +209,26 @@ def _span(plant: ElbowOrthosis, span: Any) -> tuple[float, float]:
     return a, b
 
 
-def _weights(task: TorqueStiffness, weight: Any) -> tuple[float, float]:
+def _reference(plant: ElbowOrthosis, reference: Any) -> tuple[int, NDArray[np.float64]]:
+    """Return the object's number, and torque and stiffness where they are given as samples."""
+    most = tuple(2.0 * largest for largest in signal_ranges(plant))
+    kind, samples = reference_of(reference, OBJECTS, "N m, N m/rad", most, channels=L.CHANNELS)
+    if samples.min(axis=1)[1] < 0.0:
+        raise ValueError(
+            f"reference has a stiffness of {samples.min(axis=1)[1]:g} N m/rad; give 0 or more"
+        )
+    return kind, samples
+
+
+def _weights(task: TorqueStiffness, weight: Any, kind: int) -> tuple[float, float]:
     """Return the lightest and the heaviest weight [kg] that is drawn."""
     if weight is None:
         return task.lightest, task.heaviest
+    if kind not in (WEIGHT, MIXED):
+        raise ValueError(
+            f"weight = {weight!r} but no weight is to be felt; leave it out, or take reference = "
+            "'weight' or 'mixed'"
+        )
     kilograms = check_number("weight", weight, 0.0, 20.0, "kg")
     return kilograms, kilograms
 
@@ -267,7 +290,7 @@ def make_setup(
     pace : float
         Duration [s] of a reach with its rest; a sine takes two of them or more.
     weight : float, optional
-        Of the weight in the hand [kg]. Default: each episode draws one.
+        Of the weight in the hand [kg], where one is to be felt. Default: each episode draws one.
     bear : bool
         Whether the orthosis is to bear its own weight.
     start : {"ready", "random"}
@@ -281,9 +304,7 @@ def make_setup(
         Naming the argument, its value, the bounds and the remedy.
     """
     made = _plant(plant, hysteresis, valves)
-    kind, samples = reference_of(
-        reference, OBJECTS, "N m, N m/rad", LARGEST_SAMPLE, channels=L.CHANNELS
-    )
+    kind, samples = _reference(made, reference)
     given = common(preview, preview_stride, episode_seconds, normalize, render_mode)
     check_choice("action", action, L.ACTIONS)
     check_choice("motion", motion, MOTIONS)
@@ -304,7 +325,7 @@ def make_setup(
         task.stiffness_scale,
         task.effort_weight,
         task.soft_pressure,
-        *_weights(task, weight),
+        *_weights(task, weight, kind),
         made.wearer.handle,
         task.softest_free,
         task.stiffest_free,
@@ -345,7 +366,7 @@ def make_setup(
         own=_own(made, samples),
         samples=samples,
         tables=made.memory_tables(),
-        spread=spread_of(made, R.PARAMETERS, NOT_DRAWN, randomize, example, {}),
+        spread=spread_of(made, R.PARAMETERS, NOT_DRAWN, randomize, example, CORNER),
         drawn=randomize is not False,
     )
 

@@ -66,6 +66,13 @@ MOST_PAYLOAD = 0.1
 """Largest payload [kg]. Some paths bear less, which is checked."""
 NOT_DRAWN = ("regulator.max_pressure", "link.limit", "link.stop", "nominal.prestress")
 """Parameters that ``randomize`` may not draw: they scale the action or enter derived numbers."""
+CORNER = {
+    "lever.r_u": min,
+    "lever.r_o": min,
+    "lever.l_u": max,
+    "lever.l_o": max,
+}
+"""Which end of a range brings the lever's toggle nearer."""
 
 Part = tuple[str, str, float, float]
 
@@ -246,7 +253,7 @@ def make_setup(
         own=payloads,
         samples=np.concatenate(list(paths.values())),
         tables=made.memory_tables(),
-        spread=spread_of(made, R.PARAMETERS, NOT_DRAWN, randomize, example, {}),
+        spread=spread_of(made, R.PARAMETERS, NOT_DRAWN, randomize, example, CORNER),
         drawn=randomize is not False,
         view=f"{made.family}_{made.stages}",
     )

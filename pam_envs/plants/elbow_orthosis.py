@@ -161,7 +161,7 @@ class ElbowOrthosis(Plant):
         Parameters
         ----------
         hysteresis : {"maxwell_slip", "preisach", "none"}
-            Which memory; both operators have the same loops.
+            Which memory: two different ones, the widest loops of which are alike.
         valves : {"proportional", "on_off"}
             See the class.
         **changes : float

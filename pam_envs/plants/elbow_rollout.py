@@ -124,6 +124,28 @@ def arrays_for(
     ]
 
 
+def _check_shapes(plants: Sequence[ElbowOrthosis], command: Array, motion: Sequence[Any]) -> None:
+    """Refuse commands and intentions that are not of as many periods and plants."""
+    if command.ndim not in (2, 3) or command.shape[-1] != 2 or not command.size:
+        raise ValueError(
+            f"commands have shape {command.shape}; give (T, 2) or (T, n, 2), one or more periods "
+            "and two bundles"
+        )
+    if not np.isfinite(command).all():
+        raise ValueError("commands are not finite throughout; give numbers")
+    columns = command.shape[1] if command.ndim == 3 else 1
+    if len(plants) > 1 and columns not in (1, len(plants)):
+        raise ValueError(f"commands are for {columns} plants and {len(plants)} are given")
+    for part in map(np.asarray, motion):
+        if part.ndim > 2 or (part.ndim and len(part) not in (1, len(command))):
+            raise ValueError(
+                f"intent has shape {part.shape} and the commands {len(command)} periods; give a "
+                "number or one row for each period"
+            )
+        if part.ndim == 2 and part.shape[1] not in (1, columns, len(plants)):
+            raise ValueError(f"intent has shape {part.shape}; give a column for each plant")
+
+
 def simulate_elbow(
     plants: ElbowOrthosis | Sequence[ElbowOrthosis],
     commands: ArrayLike,
@@ -156,14 +178,22 @@ def simulate_elbow(
     dict
         Each signal of ``OUTPUTS`` at the end of each control period, free of noise, shape (T,) for
         one plant and (T, n) for several.
+
+    Raises
+    ------
+    ValueError
+        If the plants are not of one make, or a shape or a value does not fit.
     """
     several = [plants] if isinstance(plants, ElbowOrthosis) else list(plants)
+    if not several:
+        raise ValueError("no plants are given; give one or more")
     first = several[0]
     makes = {(p.memory.kind, p.valves, p.substeps) for p in several}
     if len(makes) != 1:
         raise ValueError(f"plants that are simulated together need to be of one make, got {makes}")
     command = np.asarray(commands, np.float64)
     motion = intent if isinstance(intent, tuple) else (intent, 0.0, 0.0)
+    _check_shapes(several, command, motion)
     if pressures is None:
         pulsed = first.valves == "on_off"
         pressures = (0.0, 0.0) if pulsed else (command[0, ..., 0], command[0, ..., 1])

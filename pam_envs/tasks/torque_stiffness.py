@@ -17,6 +17,14 @@ from pam_envs.parameters import parameter
 
 OBJECTS = ("weight", "wall", "free", "mixed")
 WEIGHT, WALL, FREE, MIXED = range(len(OBJECTS))
+RANGES = (
+    ("lightest", "heaviest"),
+    ("softest_free", "stiffest_free"),
+    ("softest_held", "stiffest_held"),
+    ("nearest_wall", "farthest_wall"),
+    ("softest_wall", "stiffest_wall"),
+)
+"""Parameters between which an episode's object is drawn."""
 PER_TURN = 0.15915494309189535
 
 
@@ -34,7 +42,13 @@ class TorqueStiffness:
         0.5, "N m", 1e-4, 1e3, "assumed", "a torque off by 0.5 N m costs torque_weight"
     )
     stiffness_weight: float = parameter(
-        0.5, "1", 0.0, 1e3, "assumed", "reward per control period at an error of stiffness_scale"
+        0.2,
+        "1",
+        0.0,
+        1e3,
+        "assumed",
+        "1 N m/rad costs as much as 0.2 N m: the torque that it is off by 0.2 rad "
+        "away, the angle of the headline of the tracks",
     )
     stiffness_scale: float = parameter(
         0.5, "N m/rad", 1e-4, 1e3, "assumed", "a stiffness off by 0.5 costs stiffness_weight"
@@ -83,6 +97,15 @@ class TorqueStiffness:
     wall_depth: float = parameter(
         0.05, "rad", 1e-3, 1.0, "assumed", "over which the stiffness grows to that of the wall"
     )
+
+    def __post_init__(self) -> None:
+        """Refuse ranges of the objects that are the wrong way round."""
+        for low, high in RANGES:
+            first, last = getattr(self, low), getattr(self, high)
+            if first > last:
+                raise ValueError(
+                    f"reward: {low} = {first:g} is above {high} = {last:g}; swap them, or give both"
+                )
 
     def worst(self, torque: float, stiffness: float) -> float:
         """Return what a control period costs at most.

@@ -11,6 +11,7 @@ import pytest
 import pam_envs  # noqa: F401  registers the ids
 from baselines.catalogue import CONTROLLERS, make_controller
 from baselines.elbow_catalogue import ELBOW, ELBOW_CONTROLLERS, ELBOW_MAKERS
+from baselines.elbow_friction import make_elbow_friction
 from baselines.elbow_valves import make_pressure_loop
 from baselines.elbow_view import make_elbow_signal_map
 from baselines.torque_stiffness import Allocation
@@ -175,6 +176,37 @@ def test_pid_follows_the_torque_and_leaves_the_stiffness():
     )
     assert rms(pid) < 0.2 * rms(limp)
     assert rms(pid, "stiffness") > 10.0 * rms(both, "stiffness")
+
+
+@pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach"])
+def test_friction_in_the_estimate_is_most_of_what_a_pid_leaves(hysteresis):
+    env = make_env(plant=quiet(hysteresis), reference="free", motion="sines",
+                   episode_seconds=5.0)  # fmt: skip
+    plain, known = (rms(run(env, built(n, env))) for n in ("elbow_pid", "elbow_pid_memory"))
+    assert known < 0.4 * plain
+    bare = make_env(plant=quiet("none"), reference="free", motion="sines", episode_seconds=1.0)
+    records = [run(bare, built(n, bare)) for n in ("elbow_pid", "elbow_pid_memory")]
+    assert np.array_equal(records[0]["output"], records[1]["output"])
+
+
+def test_the_estimate_with_friction_is_the_torque_of_the_bundles():
+    """Where the nominal memory is the true one and nothing is noisy."""
+    env = make_env(plant=quiet(), motion="sines", episode_seconds=3.0, normalize=False)
+    view = make_elbow_signal_map(env.signals, env.action_signals, env.control_period)
+    friction, action = make_elbow_friction(env.plant, known=True), np.array([1e5, 2e5], np.float32)
+    observation, _ = env.reset(seed=4)
+    state, off = friction.initial(1), []
+    for _ in range(299):
+        seen = view.read(observation)
+        state = friction.taken(seen, state)[1]
+        observation, *_, info = env.step(action)
+        off.append([info["sensor/torque"] - info["output"], 0.0])
+        seen = view.read(observation)
+        off[-1][1] = float((seen.torque + friction.torque(seen, friction.taken(seen, state)[0]))[0])
+        off[-1][1] -= info["output"]
+    plain, known = np.abs(np.array(off)[50:]).max(axis=0)
+    assert plain > 0.3
+    assert known < 0.02
 
 
 @pytest.mark.parametrize("valves", VALVES)

@@ -28,6 +28,7 @@ def signals(**changes: Any) -> dict[str, np.ndarray]:
         "state/stiffness_reference": 4.0 + WAVE,
         "state/felt": -WAVE,
         "state/object_torque": -WAVE,
+        "state/object": np.full(N, 2.0),
         "state/torque_clipped": np.zeros(N),
         "state/stiffness_clipped": np.zeros(N),
         "state/slack": np.zeros(N),
@@ -46,7 +47,7 @@ def score(**changes: Any) -> dict[str, float]:
     return metrics.score(record, PERIOD, 0.0, 0.5, {"cost/pressure": 1e5}, groups=("elbow",))
 
 
-OWN = ("stiffness", "felt", "slack", "torque_clipped", "stiffness_clipped")
+OWN = ("stiffness", "felt", "object", "slack", "torque_clipped", "stiffness_clipped")
 
 
 def test_a_perfect_record_scores_nothing() -> None:
@@ -62,6 +63,8 @@ def test_each_metric_sees_what_it_is_of() -> None:
     both = score(output=WAVE + 0.3, stiffness=2.0 + WAVE)
     assert both["impedance_rms"] == pytest.approx(np.hypot(0.3, 2.0 * NEAR))
     assert score(felt=-WAVE + 0.2)["felt_rms"] == pytest.approx(0.2)
+    assert score(felt=-WAVE + 0.2)["free_felt_rms"] == pytest.approx(0.2)
+    assert np.isnan(score(felt=-WAVE + 0.2, object=np.zeros(N))["free_felt_rms"])
     quarter = np.where(np.arange(N) < N // 4, 2.0, 0.0)
     beyond = score(torque_clipped=-quarter)
     assert beyond["saturated_time"] == 0.25

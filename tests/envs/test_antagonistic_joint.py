@@ -217,6 +217,16 @@ def test_set_points_stand_for_the_command() -> None:
         ({"payload_change": -1.0}, "payload_change"),
         ({"disturbance": float("inf")}, "disturbance"),
         ({"randomize": {"link.limit": (0.4, 0.5)}}, "can be drawn"),
+        (
+            {
+                "randomize": {
+                    "link.mass": (0.02, 0.3),
+                    "link.gyration": (0.03, 0.14),
+                    "link.damping": (0.05, 5.0),
+                }
+            },
+            "too fast",
+        ),
     ],
 )
 def test_bad_arguments(arguments: dict[str, Any], said: str) -> None:

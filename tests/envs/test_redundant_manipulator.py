@@ -186,6 +186,10 @@ def test_a_joint_at_its_stop_ends_the_episode() -> None:
     assert ended
 
 
+SHORT = (0.0308, 0.0362)
+"""Lever arms [m]; one of them may be short."""
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -198,6 +202,7 @@ def test_a_joint_at_its_stop_ends_the_episode() -> None:
         ({"reference": np.zeros((4, 5))}, r"shape \(4, 5\); give from 2 to 10000 finite poses"),
         ({"reference": np.zeros((1, 6))}, "from 2 to"),
         ({"randomize": {"link.stop": (0.6, 0.61)}}, "can be drawn"),
+        ({"randomize": {"lever.r_u": SHORT, "lever.r_o": SHORT}}, "loses its lever arm"),
     ],
 )
 def test_bad_arguments(arguments: dict[str, Any], said: str) -> None:

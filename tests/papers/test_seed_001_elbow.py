@@ -12,7 +12,7 @@ from benchmarks import papers_elbow as figures
 
 MISSED = {"softest without torque at 20 degrees"}
 """2.71 N m/rad against 2.75: not a figure of the paper's."""
-INPUTS = (figures.filling, figures.hysteresis)
+INPUTS = (figures.filling, figures.hysteresis, figures.small_motions)
 
 
 @pytest.mark.parametrize("group", figures.GROUPS, ids=lambda group: group.__name__)

@@ -262,14 +262,38 @@ def test_regulators_reach_their_set_points_and_count_what_they_fill() -> None:
 
 
 def test_an_orthosis_that_bears_itself_is_not_felt() -> None:
-    """Without weight, friction and pull the intended motion is carried out, but for the inertia."""
-    plant = ElbowOrthosis.paper("none", link__gravity=0.0, link__damping=0.0, link__inertia=1e-4)
-    plant = plant.replace({"bundle_a.gain": 0.5, "bundle_b.gain": 0.5})
-    p_a, p_b = plant.allocate(1.0, 0.0, 2.0)
-    made = simulate_elbow(plant, np.tile([float(p_a), float(p_b)], (1, 1)), intent=1.0)
-    assert made["angle"][0] == pytest.approx(1.0, abs=1e-6)
-    assert made["felt"][0] == pytest.approx(0.0, abs=1e-6)
-    assert made["torque"][0] == pytest.approx(0.0, abs=1e-6)
+    """Pressures that bear it at every angle: the intended motion is carried out."""
+    plant = ElbowOrthosis.paper(
+        "none", link__damping=0.0, link__inertia=1e-4, regulator__time_constant=2e-3,
+        regulator__slew_rate=1e9,
+    )  # fmt: skip
+    intent = reach(200)
+    pressures = np.array(plant.allocate(intent[0], plant.weight_torque(intent[0]), 4.0)).T
+    borne = simulate_elbow(plant, pressures, intent=intent)
+    held = simulate_elbow(plant, np.tile(pressures[0], (200, 1)), intent=intent)
+    assert np.ptp(borne["angle"]) > 0.5
+    assert np.abs(borne["angle"] - intent[0])[5:].max() < 0.01
+    assert np.abs(borne["felt"])[5:].max() < 0.2
+    assert np.abs(held["felt"]).max() > 1.0
+
+
+@pytest.mark.parametrize(
+    ("plants", "commands", "how", "words"),
+    [
+        (1, np.zeros(5), {}, "commands have shape"),
+        (1, np.zeros((5, 3)), {}, "commands have shape"),
+        (1, np.zeros((0, 2)), {}, "one or more periods"),
+        (1, np.full((5, 2), np.nan), {}, "not finite"),
+        (0, np.zeros((5, 2)), {}, "no plants"),
+        (2, np.zeros((5, 3, 2)), {}, "for 3 plants and 2"),
+        (1, np.zeros((5, 2)), {"intent": np.ones(4)}, "intent has shape"),
+    ],
+)
+def test_shapes_that_do_not_fit_are_refused(
+    plants: int, commands: np.ndarray, how: dict[str, np.ndarray], words: str
+) -> None:
+    with pytest.raises(ValueError, match=words):
+        simulate_elbow([ElbowOrthosis.paper()] * plants, commands, **how)  # type: ignore[arg-type]
 
 
 def test_what_is_felt_balances_the_wearer() -> None:

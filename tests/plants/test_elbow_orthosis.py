@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.mechanics import allocation
 from pam_envs.plants import elbow_orthosis_rows as K
 from pam_envs.plants.elbow_bundles import (
@@ -19,7 +20,7 @@ from pam_envs.plants.elbow_bundles import (
     volume_of,
     weight_of,
 )
-from pam_envs.plants.elbow_memory import elbow_memory, travel_plays
+from pam_envs.plants.elbow_memory import ElbowMemory, elbow_memory, travel_plays
 from pam_envs.plants.elbow_orthosis import MAKES, ElbowOrthosis
 from pam_envs.plants.memory import KINDS
 
@@ -177,12 +178,40 @@ def test_loading_and_unloading_differ_by_the_published_share(
     assert 100.0 * gap.max() / full == pytest.approx(7.5, abs=0.01)
 
 
-def test_both_memories_have_the_same_loops() -> None:
-    path = 0.033 * np.sin(np.linspace(0.0, 40.0, 900)) * np.linspace(1.0, 0.2, 900)
-    outputs = [elbow_memory(k).operator.simulate(path)[0] for k in ("maxwell_slip", "preisach")]  # type: ignore[union-attr]
-    assert np.abs(outputs[0] - outputs[1]).max() < 0.03 * elbow_memory("maxwell_slip").largest_lag
-    lags = [elbow_memory(k).largest_lag for k in ("maxwell_slip", "preisach")]
-    assert lags[0] == pytest.approx(lags[1], rel=1e-9)
+def width(kind: str, middle: float, swing: float) -> float:
+    """Widest gap of a loop of the travel, over that of the widest loop there is."""
+    memory = elbow_memory(kind)  # type: ignore[arg-type]
+    up = middle + np.linspace(-swing, swing, 201)
+    output = memory.operator.simulate(np.concatenate([up, up[::-1]] * 3))[0]  # type: ignore[union-attr]
+    rise, fall = output[-402:-201], output[-201:][::-1]
+    return float(np.abs(fall - rise).max()) / (2.0 * memory.largest_lag)
+
+
+def test_the_memories_are_alike_in_their_widest_loop_only() -> None:
+    for kind in ("maxwell_slip", "preisach"):
+        assert width(kind, 0.0, 0.033) == pytest.approx(1.0, abs=1e-3)
+    plays = [width("maxwell_slip", place, 0.01) for place in (0.0, 0.02)]
+    relays = [width("preisach", place, 0.01) for place in (0.0, 0.02)]
+    assert plays[0] == pytest.approx(plays[1], rel=1e-6)  # plays know nothing of where they are
+    assert relays[0] < 0.5 * relays[1]
+    assert relays[0] < 0.5 * plays[0]
+
+
+def test_one_way_the_relays_go_with_the_travel() -> None:
+    """Their slope is 1 on the mean of both branches, so that the lag is the same either way."""
+    relays = elbow_memory("preisach").operator
+    x = np.linspace(-0.033, 0.033, 67)
+    around = np.concatenate([x, x[::-1], x, x[::-1]])
+    output = relays.simulate(around)[0]  # type: ignore[union-attr]
+    rise, fall = output[134:201], output[201:][::-1]
+    inside = np.abs(x) < 0.017  # where all relays have come over
+    assert 0.5 * (rise + fall)[inside] == pytest.approx(x[inside], abs=2e-4)
+
+
+def test_of_plays_as_relays_the_largest_lag_is_the_same() -> None:
+    wide = Preisach.from_play(travel_plays(), -0.06, 0.06, 121, start="virgin")
+    lag = elbow_memory("maxwell_slip").largest_lag
+    assert ElbowMemory(wide).largest_lag == pytest.approx(lag, rel=1e-9)
 
 
 # --- bad values, files ----------------------------------------------------------------------------

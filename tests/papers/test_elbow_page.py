@@ -1,0 +1,104 @@
+"""The page on the elbow says what the code computes."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import pam_envs  # noqa: F401 (registers)
+from baselines.catalogue import make_controller
+from benchmarks import papers_elbow as figures
+from benchmarks.rollout import run
+from tests.test_readme import run_snippets
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = DOCS / "elbow_orthosis.md"
+TEXT = PAGE.read_text()
+FLAT = " ".join(TEXT.replace("**", "").split())
+
+
+def row(first: str) -> list[str]:
+    """Return the cells of the table's line that begins so, without the first one."""
+    (line,) = re.findall(rf"^\| {re.escape(first)} \|(.*)\|$", TEXT, re.MULTILINE)
+    return [cell.strip() for cell in line.split("|")]
+
+
+def test_the_snippet_gives_what_was_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    run_snippets(PAGE)
+    assert "2.000000 N m and 4.000000 N m/rad" in capsys.readouterr().out
+
+
+def test_the_law_as_printed_and_as_read() -> None:
+    for n in (1, 2, 3, 4):
+        made = [figures.printed_bundle(n), figures.bundle(n, 0.33)]
+        assert row(str(n)) == [f"{float(m.law(4e5, 0.0)):.0f} N" for m in made]
+    one, shares = figures.bundle(1), (8.0, 13.0, 19.0, 24.0, 28.0, 32.0)
+    forces = [float(one.law(5e5, 0.01 * s * one.nominal_length)) + 0.0 for s in shares]
+    assert row("one muscle, 500 kPa") == [f"{f:.1f} N".replace("-0.0", "0.0") for f in forces]
+    assert row("contraction") == [f"{s:g} %" for s in shares]
+    braid = figures.force_law()[-1].ours
+    assert f"that ends at 28 % has {braid:.2f} N/(m2 kPa)" in FLAT
+
+
+def test_torque_and_stiffness() -> None:
+    plant, q = figures.orthosis(), np.radians(figures.DEGREES)
+    full = figures.FULL
+    for a, b in figures.TORQUES:
+        made = [f"{t:.2f}" for t in plant.torque(q, a, b)]
+        assert row(f"{1e-3 * a:g}/{1e-3 * b:g} kPa") == made
+    for a, b in figures.STIFFNESSES:
+        made = [f"{s:.2f}" for s in plant.stiffness(q, a, b)]
+        assert row(f"{1e-3 * a:g}/{1e-3 * b:g} kPa, stiffness") == made
+    share = 100.0 * plant.pulley.stroke / plant.bundle_a.nominal_length
+    assert f"they travel {plant.pulley.stroke:.4f} m, {share:.2f} % of their length" in FLAT
+    fine = np.radians(np.linspace(90.0, 120.0, 3001))
+    even = np.degrees(fine[np.argmin(np.abs(plant.torque(fine, full, full)))])
+    assert f"no torque at {even:.0f} degrees only" in FLAT
+
+
+def test_what_can_be_had() -> None:
+    wide, plant = figures.orthosis(0.33), figures.orthosis()
+    for degrees in figures.RANGES:
+        ends = figures.stiffness_range(wide, np.radians(degrees))
+        assert row(f"{degrees:g} degrees") == [f"{s:.2f} N m/rad" for s in ends]
+    areas = [figures.feasible_area(p, np.radians(60.0)) for p in (wide, plant)]
+    assert f"area is {areas[0]:.0f} N2 m2/rad with 0.33, and {areas[1]:.0f} with the 0.28" in FLAT
+    assert 0.7 < areas[1] / areas[0] < 0.8  # a quarter less
+    difference, positive, trip = (f.ours for f in figures.exactness())
+    assert difference < 1e-6
+    assert positive == 100.0
+    assert trip < 1e-9
+
+
+def test_what_a_hand_meets_in_a_small_motion() -> None:
+    other = (DOCS / "envs" / "elbow_orthosis.md").read_text()
+    names = {"none: the law": "none", "Maxwell-slip": "maxwell_slip", "Preisach": "preisach"}
+    for first, kind in names.items():
+        met = figures.stiffness_of_a_degree(kind, 2e5, np.radians(57.0))
+        assert row(first) == [f"{met:.1f} N m/rad"]
+        assert f"{met:.1f}" in other
+
+
+@pytest.mark.parametrize("name", ["elbow_pid", "elbow_pid_memory", "elbow_allocation"])
+def test_the_table_of_the_environments_page_roughly(name: str) -> None:
+    """One of the four episodes that a cell is the mean of."""
+    env: Any = gym.make("PAM/ElbowOrthosis-v0", reference="free", motion="sines",
+                        episode_seconds=6.0).unwrapped  # fmt: skip
+    controller = make_controller(name, env.plant, env.signals, env.action_signals)
+    signals = run(env, controller, 801).signals
+    error = (np.asarray(signals["output"]) - np.asarray(signals["reference"]))[100:]
+    other = (DOCS / "envs" / "elbow_orthosis.md").read_text()
+    line = re.findall(rf"^\| `{name}` \|(.*)\|$", other, re.MULTILINE)[1]
+    told = float(line.split("|")[2].split(",")[0])
+    assert float(np.sqrt(np.mean(error**2))) == pytest.approx(told, rel=0.3)
+
+
+def test_what_does_not_reproduce() -> None:
+    missed = [f for group in (figures.feasible_set, figures.force_law) for f in group()]
+    (miss,) = [f for f in missed if f.verdict == "MISSED"]
+    assert row(miss.name)[:2] == ["2.75 N m/rad", f"{miss.ours:.2f} N m/rad"]
