@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks import metrics_elbow, metrics_joint, metrics_knee
+from benchmarks.errors import rms
 
 Array = NDArray[np.float64]
 
@@ -51,11 +52,6 @@ def of_track(content: Mapping[str, Any]) -> dict[str, str]:
 def headline_of(content: Mapping[str, Any]) -> str:
     """Return the metric that ranks the rows of a track, from the content of its scenario file."""
     return str(content.get("headline", HEADLINE))
-
-
-def rms(error: Array) -> float:
-    """Return the root mean square of an error, shape (n,)."""
-    return float(np.sqrt(np.mean(np.square(error))))
 
 
 def percentile_95(error: Array) -> float:

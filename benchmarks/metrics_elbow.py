@@ -14,6 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.errors import rms
 from pam_envs.tasks.torque_stiffness import FREE
 
 Array = NDArray[np.float64]
@@ -40,11 +41,6 @@ NEAR = 0.2
 """Angle [rad] at which an error of the stiffness counts: 11 degrees."""
 LEAST = 1e-6
 """Smallest clipping [N m], [N m/rad] that counts as one."""
-
-
-def rms(error: Array) -> float:
-    """Return the root mean square of an error, shape (n,)."""
-    return float(np.sqrt(np.mean(np.square(error))))
 
 
 def of_elbow(signals: Mapping[str, Array], window: Mask, period: float) -> dict[str, float]:

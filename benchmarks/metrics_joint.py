@@ -16,6 +16,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.errors import rms
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -36,11 +38,6 @@ joint angles, the largest angle of a joint, and what is common."""
 POSITION, DIRECTION = ("x", "y", "z"), ("point_x", "point_y", "point_z")
 MODEL = "model/"
 """What the keys of a controller's model begin with: ``model/0`` is of the first joint."""
-
-
-def rms(error: Array) -> float:
-    """Return the root mean square of an error of any shape, NaN of none."""
-    return float(np.sqrt(np.mean(np.square(error)))) if error.size else float("nan")
 
 
 def _common(signals: Mapping[str, Array], window: Mask, angles: list[str]) -> dict[str, float]:

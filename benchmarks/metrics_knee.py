@@ -14,6 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.errors import rms
 from pam_envs.muscle.emg import EmgProxy, Reading, calibration, emg_proxy
 
 Array = NDArray[np.float64]
@@ -61,11 +62,6 @@ def half_range(reference: Array) -> float:
     """Return half the range of a reference; NaN where it does not move."""
     half = 0.5 * float(np.ptp(reference)) if len(reference) else 0.0
     return half if half > 0.0 else float("nan")
-
-
-def rms(error: Array) -> float:
-    """Return the root mean square of an error, NaN of none."""
-    return float(np.sqrt(np.mean(np.square(error)))) if len(error) else float("nan")
 
 
 def landings(stance: Array, period: float) -> NDArray[np.int64]:

@@ -18,6 +18,7 @@ SCORING = (
     "canonical.py",
     "cells.py",
     "controllers.py",
+    "errors.py",
     "metrics.py",
     "metrics_elbow.py",
     "metrics_joint.py",

@@ -22,6 +22,7 @@ from pam_envs.plants.antagonistic_joint_kernels import (
     start_memory,
 )
 from pam_envs.plants.antagonistic_joint_rows import N_COUNTS, N_PARAMETERS
+from pam_envs.plants.tiles import drives_of, in_tiles
 
 OUTPUTS = {
     "angle": K.ANGLE,
@@ -117,19 +118,14 @@ def arrays_for(
     plants: Sequence[AntagonisticJoint], drives: Sequence[ArrayLike], lanes: int = WIDTH
 ) -> list[Any]:
     """Return the arrays that :func:`run_joint` takes, the outputs last, shape (signals, T, n)."""
-    channels = [np.asarray(d, np.float64) for d in drives]
-    periods = max(len(c) if c.ndim else 1 for c in channels)
-    columns = max(c.shape[1] if c.ndim == 2 else 1 for c in channels)
-    shaped = [c[:, None] if c.ndim == 1 else c for c in channels]
-    filled = np.array([np.broadcast_to(c, (periods, columns)) for c in shaped])
+    filled = drives_of(drives)
+    _, periods, columns = filled.shape
     n = len(plants) if len(plants) > 1 else columns
-    tiles = -(-n // lanes)
-    rows = np.array([plant.parameter_rows() for plant in plants])
-    rows = rows[np.minimum(np.arange(tiles * lanes), len(plants) - 1)]
+    fixed = in_tiles([plant.parameter_rows() for plant in plants], n, lanes)
     return [
-        np.zeros((tiles, K.END + MEMORY_ROWS[plants[0].memory.kind], lanes)),
-        np.ascontiguousarray(rows.T.reshape(-1, tiles, lanes).transpose(1, 0, 2)),
-        np.zeros((tiles, N_COUNTS, lanes), np.int64),
+        np.zeros((len(fixed), K.END + MEMORY_ROWS[plants[0].memory.kind], lanes)),
+        fixed,
+        np.zeros((len(fixed), N_COUNTS, lanes), np.int64),
         plants[0].memory_tables()[:1],
         filled,
         np.empty((len(OUTPUTS), periods, n)),

@@ -21,6 +21,7 @@ from pam_envs.plants.knee_orthosis_kernels import (
     start_memory,
 )
 from pam_envs.plants.knee_orthosis_rows import N_COUNTS, N_PARAMETERS
+from pam_envs.plants.tiles import in_tiles
 
 OUTPUTS = {
     "angle": K.ANGLE,
@@ -106,13 +107,11 @@ def arrays_for(
     commands = np.asarray(set_points, np.float64)
     commands = np.ascontiguousarray(commands.reshape(len(commands), -1))
     n = len(plants) if len(plants) > 1 else commands.shape[1]
-    tiles = -(-n // lanes)
-    columns = np.array([plant.parameter_rows() for plant in plants])
-    columns = columns[np.minimum(np.arange(tiles * lanes), len(plants) - 1)]
+    fixed = in_tiles([plant.parameter_rows() for plant in plants], n, lanes)
     return [
-        np.zeros((tiles, K.END + MEMORY_ROWS[plants[0].memory.kind], lanes)),
-        np.ascontiguousarray(columns.T.reshape(-1, tiles, lanes).transpose(1, 0, 2)),
-        np.zeros((tiles, N_COUNTS, lanes), np.int64),
+        np.zeros((len(fixed), K.END + MEMORY_ROWS[plants[0].memory.kind], lanes)),
+        fixed,
+        np.zeros((len(fixed), N_COUNTS, lanes), np.int64),
         plants[0].memory_tables()[:1],
         plants[0].gait_table(),
         commands,

@@ -20,6 +20,7 @@ from pam_envs.plants.single_muscle_kernels import (
     rest_contraction,
 )
 from pam_envs.plants.single_muscle_rows import N_COUNTS, N_PARAMETERS
+from pam_envs.plants.tiles import in_tiles
 
 OUTPUTS = ("contraction", "velocity", "pressure", "drive")
 N_ROWS = 0
@@ -93,12 +94,9 @@ def simulate_rows(
     kind, n = plant.memory.kind, len(parameters)
     commands = np.asarray(set_points, np.float64)
     commands = np.ascontiguousarray(commands.reshape(len(commands), -1))
-    tiles = -(-n // LANES)
-    rows = np.zeros((tiles, R.END + MEMORY_ROWS[kind], LANES))
-    column = np.minimum(np.arange(tiles * LANES), n - 1)
-    laid = parameters[column].T.reshape(-1, tiles, LANES).transpose(1, 0, 2)
-    fixed = np.ascontiguousarray(laid)
-    counts = np.zeros((tiles, N_COUNTS, LANES), np.int64)
+    fixed = in_tiles(parameters, n, LANES)
+    rows = np.zeros((len(fixed), R.END + MEMORY_ROWS[kind], LANES))
+    counts = np.zeros((len(fixed), N_COUNTS, LANES), np.int64)
     outputs = np.empty((len(OUTPUTS), len(commands), n))
     arrays: list[Any] = [rows, fixed, counts, plant.everett_tables()[:1], commands, outputs]
     if not COMPILED:

@@ -1,0 +1,38 @@
+"""How parameter sets and what drives them are laid out for kernels that run tiles of plants."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def in_tiles(parameters: ArrayLike, plants: int, lanes: int) -> Array:
+    """Return parameter sets as tiles hold them, shape (tiles, n_parameters, lanes).
+
+    Parameters
+    ----------
+    parameters : array_like, shape (n, n_parameters)
+        The last set fills up what it takes to ``plants``, and the last tile.
+    plants : int
+        How many run side by side, at least n.
+    lanes : int
+        Plants that one tile holds.
+    """
+    columns: NDArray[Any] = np.asarray(parameters, np.float64)
+    tiles = -(-plants // lanes)
+    columns = columns[np.minimum(np.arange(tiles * lanes), len(columns) - 1)]
+    return np.ascontiguousarray(columns.T.reshape(-1, tiles, lanes).transpose(1, 0, 2))
+
+
+def drives_of(channels: Sequence[ArrayLike]) -> Array:
+    """Return channels side by side, shape (channels, T, n); each is (), (T,) or (T, n)."""
+    given = [np.asarray(channel, np.float64) for channel in channels]
+    periods = max(len(c) if c.ndim else 1 for c in given)
+    columns = max(c.shape[1] if c.ndim == 2 else 1 for c in given)
+    shaped = [c[:, None] if c.ndim == 1 else c for c in given]
+    return np.array([np.broadcast_to(c, (periods, columns)) for c in shaped])
