@@ -71,7 +71,7 @@ def _round(client: Client, act: Act, tasks: Mapping[str, Task]) -> Iterator[Done
             yield Done(key, error=_sentence(error), lost=isinstance(error, KilledWorker))
         else:
             raise ValueError(
-                f"the Dask scheduler at {client.scheduler.address} went away; what was done is "
+                "the Dask scheduler went away; what was done is "
                 "kept: start again when it is back"
             )
 
