@@ -27,6 +27,7 @@ class _PackageLocator(caching._CacheLocator):
     def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
         self._folder = kernels.cache_folder() / kernels.source_digest()
         self._line = py_func.__code__.co_firstlineno  # type: ignore[attr-defined]
+        self._py_file = py_file  # numba names it where it cannot keep what it compiled
 
     def get_cache_path(self) -> str:
         """Return the folder."""
