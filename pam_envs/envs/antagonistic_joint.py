@@ -42,7 +42,15 @@ from typing import Any
 import numpy as np
 
 from pam_envs.envs import joint_layout as K
-from pam_envs.envs.arguments import common, payloads_of, plant_of, reference_of, spread_of, task_of
+from pam_envs.envs.arguments import (
+    common,
+    named_arguments,
+    payloads_of,
+    plant_of,
+    reference_of,
+    spread_of,
+    task_of,
+)
 from pam_envs.envs.joint_kernels import kernels_for
 from pam_envs.envs.plant_env import PlantEnv
 from pam_envs.envs.setup import Setup, check_choice, check_number, compose
@@ -119,6 +127,7 @@ def _signals(
     )
 
 
+@named_arguments
 def make_setup(
     hysteresis: Kind | None = None,
     plant: AntagonisticJoint | str | Path | None = None,

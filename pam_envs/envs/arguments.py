@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
+import functools
+import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +22,28 @@ from pam_envs.plants.memory import KINDS
 T = TypeVar("T")
 
 RENDER_MODES = (None, "rgb_array", "human")
+
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def named_arguments(make: F) -> F:
+    """Let a function of keyword arguments say, of one that it does not have, which it has."""
+    parameters = inspect.signature(make).parameters
+    known = [name for name, p in parameters.items() if p.default is not p.empty]
+
+    @functools.wraps(make)
+    def made(*given: Any, **arguments: Any) -> Any:
+        for name in arguments:
+            if name not in parameters:
+                close = difflib.get_close_matches(name, known, n=1)
+                hint = f", but {close[0]!r}" if close else ""
+                raise TypeError(
+                    f"there is no argument {name!r}{hint}; the arguments are {', '.join(known)}"
+                )
+        return make(*given, **arguments)
+
+    return made  # type: ignore[return-value]
 
 
 @dataclass(frozen=True)

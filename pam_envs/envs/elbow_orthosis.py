@@ -52,7 +52,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.envs import elbow_layout as L
-from pam_envs.envs.arguments import common, plant_of, reference_of, spread_of, task_of
+from pam_envs.envs.arguments import (
+    common,
+    named_arguments,
+    plant_of,
+    reference_of,
+    spread_of,
+    task_of,
+)
 from pam_envs.envs.elbow_kernels import kernels_for
 from pam_envs.envs.elbow_ranges import largest_errors, signal_ranges
 from pam_envs.envs.plant_env import PlantEnv
@@ -233,6 +240,7 @@ def _weights(task: TorqueStiffness, weight: Any, kind: int) -> tuple[float, floa
     return kilograms, kilograms
 
 
+@named_arguments
 def make_setup(
     hysteresis: Kind | None = None,
     plant: ElbowOrthosis | str | Path | None = None,

@@ -34,7 +34,14 @@ from pathlib import Path
 from typing import Any
 
 from pam_envs.envs import brace_kernels as K
-from pam_envs.envs.arguments import common, plant_of, reference_of, spread_of, task_of
+from pam_envs.envs.arguments import (
+    common,
+    named_arguments,
+    plant_of,
+    reference_of,
+    spread_of,
+    task_of,
+)
 from pam_envs.envs.plant_env import PlantEnv
 from pam_envs.envs.setup import Setup, check_choice, check_number, compose
 from pam_envs.envs.vector_env import PlantVectorEnv
@@ -86,6 +93,7 @@ def _signals(quantity: int, full: float, preview: int, spacing: float, normalize
     )
 
 
+@named_arguments
 def make_setup(
     quantity: int,
     mounting: str,

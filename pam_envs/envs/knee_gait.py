@@ -44,7 +44,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from pam_envs.envs.arguments import common, plant_of, reference_of, spread_of, task_of
+from pam_envs.envs.arguments import (
+    common,
+    named_arguments,
+    plant_of,
+    reference_of,
+    spread_of,
+    task_of,
+)
 from pam_envs.envs.gait_kernels import kernels_for
 from pam_envs.envs.gait_layout import SOURCES
 from pam_envs.envs.plant_env import PlantEnv
@@ -120,6 +127,7 @@ def _signals(full: float, preview: int, spacing: float, normalize: bool) -> Sign
     )
 
 
+@named_arguments
 def make_setup(
     activity: Activity,
     hysteresis: Kind | None = None,

@@ -35,7 +35,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.envs import positioning_kernels as K
-from pam_envs.envs.arguments import common, plant_of, reference_of, spread_of, task_of
+from pam_envs.envs.arguments import (
+    common,
+    named_arguments,
+    plant_of,
+    reference_of,
+    spread_of,
+    task_of,
+)
 from pam_envs.envs.plant_env import PlantEnv
 from pam_envs.envs.setup import Setup, check_choice, check_number, compose
 from pam_envs.envs.vector_env import PlantVectorEnv
@@ -102,6 +109,7 @@ def _signals(
     )
 
 
+@named_arguments
 def make_setup(
     hysteresis: Kind | None = None,
     plant: SingleMuscle | str | Path | None = None,

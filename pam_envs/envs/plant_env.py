@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from pam_envs.envs.info import Info
 from pam_envs.envs.setup import (
     BEGIN,
-    STATE_KEYS,
     STEP,
     Setup,
     check_seed,
@@ -250,16 +249,20 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         ValueError
             If the state is of another kind of environment; nothing has changed then.
         """
-        check_state(state, self.setup.state(1, 1))
-        for to, name in zip(self._all, STATE_KEYS, strict=True):
-            for i, value in enumerate(np.asarray(state[name])[0].tolist()):
+        parts = check_state(state, self.setup.state(1, 1))
+        try:
+            steps = int(state["steps"])
+            seed = int(np.asarray(state["seed"], np.uint8).tobytes().decode())
+            infos = np.asarray(state["infos"], np.float64)[:, :, 0].tolist()
+        except (KeyError, ValueError, TypeError, IndexError) as error:
+            raise ValueError(f"the state was not made by get_state: {error!r}") from error
+        for to, part in zip(self._all, parts, strict=True):
+            for i, value in enumerate(part[0].tolist()):
                 to[0][i][0] = value[0]
-        if "infos" in state:  # the last report, for a picture of the present
-            for k, row in enumerate(np.asarray(state["infos"])[0].tolist()):
-                self._infos[0][k][0] = row[0]
-        self._steps = int(state["steps"])
-        seed = int(np.asarray(state["seed"], np.uint8).tobytes().decode())
-        self._seed = None if seed < 0 else seed
+        for to, values in zip(self._infos, infos, strict=False):  # the last report, for a picture
+            for k, number in enumerate(values[: len(to)]):
+                to[k][0] = number
+        self._steps, self._seed = steps, None if seed < 0 else seed
 
     def __getstate__(self) -> dict[str, Any]:
         """Pickle and deepcopy through :meth:`get_state`."""

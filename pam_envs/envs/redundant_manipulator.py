@@ -44,7 +44,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.envs.arguments import common, payloads_of, plant_of, spread_of, task_of
+from pam_envs.envs.arguments import (
+    common,
+    named_arguments,
+    payloads_of,
+    plant_of,
+    spread_of,
+    task_of,
+)
 from pam_envs.envs.manipulator_kernels import kernels_for
 from pam_envs.envs.manipulator_layout import MODES, POSE, joint_names, muscle_names
 from pam_envs.envs.manipulator_paths import paths_for
@@ -145,6 +152,7 @@ def _payloads(
     return payloads
 
 
+@named_arguments
 def make_setup(
     hysteresis: Kind | None = None,
     plant: RedundantManipulator | str | Path | None = None,

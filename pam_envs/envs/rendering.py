@@ -147,9 +147,9 @@ class Canvas:
 class Renderer:
     """Keeps the recent past of one environment and draws it."""
 
-    def __init__(self, env: Any) -> None:
+    def __init__(self, env: Any, canvas: Canvas | None = None) -> None:
         self.env = env
-        self.canvas = Canvas()
+        self.canvas = Canvas() if canvas is None else canvas
         self.view = view_of(env.setup.view)
         plant, strips = env.plant, self.view.strips
         self._keys = ("time", *dict.fromkeys(key for strip in strips for key, _, _ in strip.lines))
@@ -259,6 +259,9 @@ class Renderer:
             self._window = None
 
 
-def make_renderer(env: Any) -> Renderer:
-    """Return a renderer for an environment (see ``PlantEnv.render``)."""
-    return Renderer(env)
+def make_renderer(env: Any, canvas: Canvas | None = None) -> Renderer:
+    """Return a renderer for an environment (see ``PlantEnv.render``).
+
+    Those of a batch may share the ``canvas`` of one of them: a picture is a copy.
+    """
+    return Renderer(env, canvas)

@@ -235,8 +235,15 @@ def saved(parts: tuple[Any, ...]) -> dict[str, NDArray[Any]]:
     }
 
 
-def check_state(state: Any, wanted: tuple[NDArray[Any], ...]) -> None:
-    """Raise if a saved state does not fit: missing parts, or shapes of other arguments."""
+def check_state(state: Any, wanted: tuple[NDArray[Any], ...]) -> list[NDArray[Any]]:
+    """Return the parts of a saved state as new arrays.
+
+    Raises
+    ------
+    ValueError
+        If a part is missing, has the shape of other arguments, or holds what no state holds.
+    """
+    parts = []
     for name, like in zip(STATE_KEYS, wanted, strict=True):
         if name not in state:
             raise ValueError(f"the state has no {name!r}: it was not made by get_state")
@@ -246,3 +253,14 @@ def check_state(state: Any, wanted: tuple[NDArray[Any], ...]) -> None:
                 f"the state's {name!r} has shape {shape}, this environment {like.shape}: it was "
                 "taken with other arguments"
             )
+        try:
+            part = np.array(state[name], like.dtype)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise ValueError(f"the state's {name!r} are not numbers: {error}") from error
+        wrong = part < 0 if name == "counts" else ~np.isfinite(part)
+        if wrong.any():
+            raise ValueError(
+                f"the state's {name!r} hold {part[wrong][0]}, which no state of get_state does"
+            )
+        parts.append(part)
+    return parts

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from pam_envs.envs.plant_env import fresh_seed, space_of
 from pam_envs.envs.setup import (
     BEGIN,
-    STATE_KEYS,
     STEP_AND_RESTART,
     Setup,
+    check_choice,
     check_seed,
     check_state,
     check_whole,
@@ -59,12 +59,17 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
         self, setup: Setup, num_envs: int, info: bool = True, threads: int | None = None
     ) -> None:
         self.num_envs = check_whole("num_envs", num_envs, 1, 2**24)
+        check_choice("a batch's render_mode", setup.render_mode, (None, "rgb_array"))
+        if setup.render_mode is not None and not info:
+            raise ValueError("render_mode = 'rgb_array' draws what steps report; leave info=True")
         self.setup = setup
         self.plant = setup.plant
         self.signals = setup.signals
         self.action_signals = setup.action_signals
         self.render_mode = setup.render_mode
+        self.control_period = setup.control_period
         self.with_info = bool(info)
+        self._renderers: list[Any] = []
         self.single_observation_space = space_of(setup.signals)
         self.single_action_space = space_of(setup.action_signals)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -101,6 +106,7 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
         self._call(np.zeros((self.num_envs, len(self.action_signals))), outputs, BEGIN)
         self._seeded = True
         self._last_observation = observations[0].copy()
+        self._record(infos[0], mask, mask)
         return observations[0], self._infos(infos[0])
 
     def _seed_rows(self, seeds: list[int | None] | None, mask: NDArray[np.bool_]) -> None:
@@ -176,6 +182,7 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
         self._last_observation = observations[0].copy()
         infos = self._infos(reports[0])
         ended = flags[0] | flags[1]
+        self._record(reports[0], np.ones_like(ended), ended)
         if ended.any():
             self._add_final(infos, ended, observations[1], reports[1])
         return observations[0], reports[0, 0], flags[0], flags[1], infos
@@ -217,6 +224,36 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
             infos["final_info"] = self._infos(values)
             infos["_final_info"] = ended
 
+    def _record(
+        self, report: NDArray[np.float64], rows: NDArray[np.bool_], starts: NDArray[np.bool_]
+    ) -> None:
+        """Keep what the pictures of some rows need; ``starts`` tells which begin an episode."""
+        if self.render_mode is None:
+            return
+        if not self._renderers:
+            from pam_envs.envs.rendering import make_renderer
+
+            first = make_renderer(self)
+            others = [make_renderer(self, first.canvas) for _ in range(self.num_envs - 1)]
+            self._renderers = [first, *others]
+        for row in np.flatnonzero(rows).tolist():
+            info = dict(zip(self.setup.info_keys, report[1:, row].tolist(), strict=True))
+            self._renderers[row].record(self._last_observation[row], info, bool(starts[row]))
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Return a picture of every row, each of shape (height, width, 3)."""
+        if self.render_mode is None:
+            gym.logger.warn("render() needs render_mode='rgb_array' in gym.make_vec")
+            return None
+        drawn = [renderer for renderer in self._renderers if renderer.info is not None]
+        if len(drawn) < self.num_envs:
+            raise gym.error.ResetNeeded("call reset() (after set_state: step()) before render()")
+        return tuple(renderer.picture() for renderer in drawn)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Forget the pictures."""
+        self._renderers = []
+
     def get_state(self) -> dict[str, NDArray[Any]]:
         """Return everything that the future depends on, as arrays that own their data."""
         return {
@@ -233,11 +270,12 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
         ValueError
             If the state is of another kind of batch; nothing has changed then.
         """
-        wanted = self.setup.state(tiles_for(self.num_envs), LANES)
-        check_state(state, wanted)
-        self._all = tuple(
-            for_kernels(np.array(state[name], like.dtype))
-            for name, like in zip(STATE_KEYS, wanted, strict=True)
-        )
-        self._seeded = bool(state["seeded"])
-        self._last_observation = np.array(state["last"], np.float32)
+        parts = check_state(state, self.setup.state(tiles_for(self.num_envs), LANES))
+        try:
+            last = np.array(state["last"], np.float32).reshape(self._last_observation.shape)
+            seeded = bool(state["seeded"])
+        except (KeyError, ValueError, TypeError) as error:
+            raise ValueError(f"the state was not made by get_state: {error!r}") from error
+        self._all = tuple(map(for_kernels, parts))
+        self._last_observation, self._seeded = last, seeded
+        self._renderers = []

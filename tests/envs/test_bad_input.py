@@ -180,6 +180,15 @@ def test_bad_arguments_of_muscle_positioning(arguments: dict[str, Any], said: st
         gym.make("PAM/MusclePositioning-v0", **arguments)
 
 
+@EVERY
+def test_an_unknown_argument_names_the_known_ones(name: str) -> None:
+    said = "no argument 'previev', but 'preview'; the arguments are .*episode_seconds"
+    with pytest.raises(TypeError, match=said):
+        gym.make(name, previev=3)
+    with pytest.raises(TypeError, match=said):
+        gym.make_vec(name, 2, vectorization_mode="vector_entry_point", previev=3)
+
+
 def test_a_plant_with_another_memory_is_refused() -> None:
     plant = SingleMuscle.mas10("preisach")
     with pytest.raises(ValueError, match="the plant's memory is 'preisach'"):

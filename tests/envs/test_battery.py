@@ -161,6 +161,15 @@ def test_a_state_of_other_arguments_is_refused(name: str) -> None:
         env.set_state(other.get_state())
     with pytest.raises(ValueError, match="has no 'rows'"):
         env.set_state({})
+    for part, value, message in (
+        ("rows", np.nan, "'rows' hold nan"),
+        ("counts", -1, "'counts' hold -1"),
+        ("seed", None, "not made by get_state"),
+    ):
+        spoilt = env.get_state()
+        spoilt[part] = None if value is None else np.full_like(spoilt[part], value)
+        with pytest.raises(ValueError, match=message):
+            env.set_state(spoilt)
     assert all(np.array_equal(v, before[k]) for k, v in env.get_state().items())
 
 

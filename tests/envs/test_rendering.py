@@ -131,6 +131,36 @@ def test_a_copy_and_a_closed_environment_draw_the_present(name: str) -> None:
     assert np.array_equal(env.render(), picture)
 
 
+@EVERY
+def test_rows_of_a_batch_are_drawn_as_single_environments(name: str) -> None:
+    arguments = {"episode_seconds": 0.2, "render_mode": "rgb_array"}
+    batch = gym.make_vec(name, 2, vectorization_mode="vector_entry_point", **arguments)
+    with pytest.raises(gym.error.ResetNeeded):
+        batch.render()
+    single = gym.make(name, **arguments)
+    batch.reset(seed=6)
+    single.reset(seed=7)
+    for action in actions_for(single.action_space, 30):  # through the end of an episode
+        batch.step(np.stack([0.5 * action, action]))
+        _, _, terminated, truncated, _ = single.step(action)
+        if terminated or truncated:
+            single.reset()
+    first, second = batch.render()
+    assert np.array_equal(second, single.render())
+    assert not np.array_equal(first, second)
+    batch.close()
+
+
+def test_a_batch_has_no_window_and_needs_info_for_its_pictures() -> None:
+    name = "PAM/MusclePositioning-v0"
+    with pytest.raises(ValueError, match="'human' is not known"):
+        gym.make_vec(name, 2, vectorization_mode="vector_entry_point", render_mode="human")
+    with pytest.raises(ValueError, match="leave info=True"):
+        gym.make_vec(
+            name, 2, vectorization_mode="vector_entry_point", render_mode="rgb_array", info=False
+        )
+
+
 @pytest.mark.parametrize("load", [0.0, 0.3, 5.0])
 def test_every_load_can_be_drawn(load: float) -> None:
     pictures = []
