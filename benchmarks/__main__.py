@@ -78,33 +78,39 @@ def run(
 
 
 def audit(
-    row: Positional[tuple[str, ...]] = (),
+    track: Positional[tuple[str, ...]] = (),
     jobs: int = os.cpu_count() or 1,
     all: bool = False,
     out: Path = rows.RESULTS,
     cells: Path | None = None,
+    backend: Literal["loky", "dask"] = "loky",
+    address: str = "",
 ) -> int:
-    """Draw the salt of committed controllers, once, and score them on the seeds it gives.
+    """Draw a round of seeds for all controllers of a track, and score them on it.
+
+    Where nothing has changed since the last round, none is drawn.
 
     Args:
-        row: Names of rows, TRACK--CONTROLLER.
-        jobs: Processes.
-        all: Every row of the folder of rows.
+        track: Names of scenario files.
+        jobs: Processes of this machine.
+        all: Every track.
         out: Folder of the rows.
         cells: Folder of the cells, the checkpoint.
+        backend: Processes of this machine, or a running Dask cluster.
+        address: Of the Dask scheduler, like tcp://host:8786.
     """
     from benchmarks import audit as auditing
     from benchmarks import runner, telling
 
-    names = [Path(name).stem for name in row]
-    names += [path.stem for path in sorted(out.glob("*--*.json"))] if all else []
-    if not names:
-        raise ValueError("name a row, or give --all")
-    pairs = [rows.pair_of(name) for name in names]
-    for entrant, track in pairs:
-        drawn = auditing.draw(entrant, track)
-        print(f"{rows.row_name(track.name, entrant.name)}: salt {drawn.salt} of {drawn.drawn}")
-    options = runner.Options(jobs, out=out, cells=runner.CELLS if cells is None else cells)
+    if bool(track) == all:
+        raise ValueError("name tracks, or give --all")
+    tracks = _choose(track, scenarios.available(), "track")
+    folder = runner.CELLS if cells is None else cells
+    options = runner.Options(jobs, False, out, folder, backend, address)
+    pairs = runner.pairs_of(controllers.available().values(), tracks)
+    for chosen in tracks:
+        drawn = auditing.draw(chosen, [entrant for entrant, other in pairs if other is chosen])
+        print(f"{chosen.name}: {telling.round_in_words(drawn)}", flush=True)
     with progress("cells") as start:
         report = runner.run(pairs, options, start)
     return telling.run(report)
@@ -152,17 +158,28 @@ def site(results: Path = rows.RESULTS, out: Path | None = None) -> int:
 
 
 def verify(
-    row: Positional[tuple[str, ...]] = (), jobs: int = os.cpu_count() or 1, all: bool = False
+    row: Positional[tuple[str, ...]] = (),
+    jobs: int = os.cpu_count() or 1,
+    all: bool = False,
+    elsewhere: bool = False,
+    backend: Literal["loky", "dask"] = "loky",
+    address: str = "",
 ) -> int:
     """Run rows again from their own record; exit code 1 if one has drifted.
 
+    What holds is noted in verified.json beside the rows.
+
     Args:
         row: Files or names of rows.
-        jobs: Processes.
+        jobs: Processes of this machine.
         all: Every row of benchmarks/results.
+        elsewhere: Allow for last digits that differ with packages or processor.
+        backend: Processes of this machine, or a running Dask cluster.
+        address: Of the Dask scheduler, like tcp://host:8786.
     """
-    from benchmarks import telling
+    from benchmarks import telling, verified
     from benchmarks import verify as checking
+    from sweeps.engine import Cluster
 
     paths = [_row_path(name) for name in row]
     paths += sorted(rows.RESULTS.glob("*--*.json")) if all else []
@@ -170,15 +187,54 @@ def verify(
         raise ValueError("name a row, or give --all")
     drifted = 0
     for path in paths:
-        found = checking.verify(path, jobs)
+        found = checking.verify(path, Cluster(jobs, backend, address), elsewhere)
+        verified.note(path, found.checksum if found.holds else "", found.mode)
         telling.verdict(found)
         drifted += not found.holds
     return 1 if drifted else 0
 
 
 def _row_path(name: str) -> Path:
-    path = Path(name)
-    return path if path.exists() else rows.RESULTS / f"{path.stem}.json"
+    """Return the file of a row by its path or its name."""
+    given = Path(name)
+    path = given if given.is_file() else rows.RESULTS / f"{given.stem}.json"
+    if not path.is_file():
+        raise ValueError(f"there is no row {name!r}; {given.stem} would be {path}")
+    return path
+
+
+def tune(
+    controller: Positional[str],
+    env: str = "",
+    trials: int = 20,
+    seed: int = 0,
+    episodes: int = 30,
+    write: bool = False,
+    storage: Path | None = None,
+) -> int:
+    """Search the free numbers of a paper's controller on tuning seeds; interrupted, it goes on.
+
+    Args:
+        controller: Name of a controller with knobs.
+        env: Id of the environment, where the controller runs in several.
+        trials: Settings to try, those of earlier calls counted in.
+        seed: Of the sampler.
+        episodes: Of each trial at least.
+        write: Put what is found into baselines/tuned.yaml, which the catalogue reads.
+        storage: SQLite file of the trials, runs/tuning.db by default.
+    """
+    from benchmarks import tuning
+
+    more = {} if storage is None else {"storage": storage}
+    job = tuning.job_of(controller, env, trials=trials, seed=seed, episodes=episodes, **more)
+    course = tuning.Course(controller, tuning.nominal_track(job.env), episodes)
+    with progress("trials") as start:
+        found = tuning.search(job, course.measure, start)
+    print(tuning.sentence(found))
+    if write:
+        tuning.write(found)
+        print(tuning.tuned.FILE)
+    return 0
 
 
 def papers(json: Path | None = None) -> int:
@@ -361,6 +417,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "verify": verify,
     "audit": audit,
     "cite": cite,
+    "tune": tune,
     "papers": papers,
     "speed": speed,
     "show": show,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import importlib
 import inspect
-import json
 import subprocess
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -13,10 +12,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from benchmarks import controllers
+from benchmarks import controllers, provenance, tasks
 from benchmarks.canonical import classes_in, digest
 from benchmarks.controllers import Entrant
-from benchmarks.making import make_env, model_of
 from benchmarks.scenarios import ScenarioSet
 from benchmarks.source_code import code_digest, needed
 
@@ -34,16 +32,23 @@ class Artefact:
     digest : str
         SHA-256 of the policy files, of all numbers that the controllers hold, and of their code
         where they are more than policy files.
+    code : tuple of str
+        Digests of the code alone, which are the same on every machine.
     files : tuple of mapping
         Name, sha256, bytes and training_seed of each policy file.
     """
 
     digest: str
+    code: tuple[str, ...]
     files: tuple[Mapping[str, Any], ...]
 
     def record(self) -> dict[str, Any]:
         """Return the artefact as a row holds it."""
-        return {"digest": self.digest, "files": [dict(file) for file in self.files]}
+        return {
+            "digest": self.digest,
+            "code": list(self.code),
+            "files": [dict(file) for file in self.files],
+        }
 
 
 def located(path: Path) -> Path:
@@ -79,45 +84,38 @@ def combine(entrant: Entrant, parameters: Iterable[str], code: Iterable[str]) ->
         "parameters": sorted(set(parameters)),
         "code": sorted(set(code)),
     }
-    return Artefact(digest(said), files)
+    return Artefact(digest(said), tuple(said["code"]), files)
 
 
-_known: dict[str, Artefact] = {}
+def of(entrant: Entrant, track: ScenarioSet) -> Artefact:
+    """Return the artefact of a controller in a track, without running it."""
+    return _built(entrant, track, _bytes_of(entrant))[0]
 
 
-def of(entrant: Entrant, track: ScenarioSet, task: str = "") -> Artefact:
-    """Return the artefact of a controller in a track, without running it.
-
-    Parameters
-    ----------
-    entrant : Entrant
-    track : ScenarioSet
-    task : str, optional
-        Digest of the task; given, controllers that were built before in this process are not
-        built again.
-    """
-    files = [file_record(path, seed) for seed, path in entrant.files]
-    key = digest([entrant.source, entrant.name, files, task])
-    if not task or key not in _known:
-        _known[key] = _built(entrant, track)
-    return _known[key]
+def files_of(entrant: Entrant, track: ScenarioSet) -> frozenset[Path]:
+    """Return every file that the artefact is: policies, and code with what lists it."""
+    return _built(entrant, track, _bytes_of(entrant))[1]
 
 
-def _built(entrant: Entrant, track: ScenarioSet) -> Artefact:
-    built: dict[Any, tuple[str, str]] = {}
-    for scenario in track.scenarios():
-        env = make_env(track.env, scenario.kwargs)
-        model = model_of(track.env, scenario, env)
-        base = env.unwrapped
-        told = (model.digest(), *base.signals, *base.action_signals)
+def _bytes_of(entrant: Entrant) -> tuple[str, ...]:
+    return tuple(file_record(path, seed)["sha256"] for seed, path in entrant.files)
+
+
+@lru_cache(maxsize=1024)
+def _built(
+    entrant: Entrant, track: ScenarioSet, policies: tuple[str, ...]
+) -> tuple[Artefact, frozenset[Path]]:
+    """Build a controller for each plant and set of signals, once in a process."""
+    listing = Path(inspect.getfile(importlib.import_module(entrant.source))).resolve()
+    found = {located(path) for _, path in entrant.files} or {listing}
+    numbers, code = [], []
+    for model, env in tasks.built(track).told:
         for seed in entrant.training_seeds:
-            if (seed, *told) not in built:
-                made = controllers.make(entrant, model, env, training_seed=seed)
-                numbers = controllers.parameters_digest(made)
-                built[(seed, *told)] = numbers, controller_code(entrant, made)
-        env.close()
-    numbers, code = zip(*built.values(), strict=True)
-    return combine(entrant, numbers, code)
+            made = controllers.make(entrant, model, env, training_seed=seed)
+            numbers.append(controllers.parameters_digest(made))
+            code.append(controller_code(entrant, made))
+            found |= needed(*code_files(entrant, made))
+    return combine(entrant, numbers, code), frozenset(found)
 
 
 def controller_code(entrant: Entrant, controller: Any) -> str:
@@ -149,21 +147,6 @@ def _code_digest(files: frozenset[Path], root: Path) -> str:
     return code_digest(needed(files, root), root)
 
 
-def files_of(entrant: Entrant, track: ScenarioSet) -> set[Path]:
-    """Return every file that the artefact is: policies, and code with what lists it."""
-    found = {located(path) for _, path in entrant.files}
-    if not found:
-        found.add(Path(inspect.getfile(importlib.import_module(entrant.source))).resolve())
-    for scenario in track.scenarios():
-        env = make_env(track.env, scenario.kwargs)
-        model = model_of(track.env, scenario, env)
-        made = controllers.make(entrant, model, env, training_seed=entrant.training_seeds[0])
-        files, root = code_files(entrant, made)
-        found |= needed(files, root)
-        env.close()
-    return found
-
-
 def uncommitted(files: Iterable[Path]) -> list[Path]:
     """Return the files whose bytes are not those of the checkout's last commit.
 
@@ -184,35 +167,24 @@ def committed_bytes(file: Path) -> bytes | None:
         If it is not in a git checkout, or there is no git.
     """
     try:
-        top = _git(file.parent, "rev-parse", "--show-toplevel").decode().strip()
+        top = top_of(file.parent)
     except (OSError, subprocess.SubprocessError) as error:
         raise ValueError(
             f"{file} is not in a git checkout: an audit needs to know that the artefact was "
             "committed before the salt was drawn; clone the repository and commit it there"
         ) from error
-    name = file.resolve().relative_to(Path(top).resolve()).as_posix()
+    return bytes_at("HEAD", file, top)
+
+
+def top_of(folder: Path) -> Path:
+    """Return the top of the git checkout that a folder is in."""
+    return Path(provenance.git("rev-parse", "--show-toplevel", folder=folder)).resolve()
+
+
+def bytes_at(commit: str, file: Path, top: Path) -> bytes | None:
+    """Return a file of a checkout as it is in a commit, ``None`` if it is not there."""
+    name = file.resolve().relative_to(top).as_posix()
     try:
-        return _git(file.parent, "cat-file", "blob", f"HEAD:{name}")
+        return provenance.git_bytes("cat-file", "blob", f"{commit}:{name}", folder=top)
     except subprocess.CalledProcessError:
         return None
-
-
-def _git(folder: Path, *arguments: str) -> bytes:
-    command = ["git", "-C", str(folder), *arguments]
-    return subprocess.run(command, check=True, capture_output=True, timeout=20).stdout
-
-
-def training_of(entrant: Entrant) -> list[dict[str, Any]] | None:
-    """Return the training of each policy file as the card beside it says, ``None`` without any."""
-    if not entrant.files:
-        return None
-    return [{"training_seed": seed, **_training(path)} for seed, path in entrant.files]
-
-
-def _training(policy: Path) -> dict[str, Any]:
-    card = located(policy).with_suffix(".json")
-    if not card.is_file():
-        return {}
-    said = json.loads(card.read_text(encoding="utf-8"))
-    known = {key: said[key] for key in ("command", "steps") if key in said}
-    return known | dict(said.get("training") or {})

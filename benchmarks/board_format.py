@@ -10,8 +10,9 @@ import numpy as np
 from benchmarks.statistics import Interval
 
 LEFT = {
-    *("controller", "environment", "track", "knows", "verdict", "kind", "tuning", "hardware"),
+    *("controller", "environment", "track", "knows", "verdict", "kind", "state", "episodes"),
     *("best paper controller", "best learned", "first here", "largest fall", "largest rise"),
+    *("tuning", "hardware"),
 }
 """Columns of words."""
 
@@ -45,6 +46,13 @@ def signed(interval: Interval | None, factor: float = 1.0) -> str:
 def _signed(value: float) -> str:
     text = number(value)
     return text if text.startswith("-") or text == "0" else f"+{text}"
+
+
+def chance(interval: Interval | None) -> str:
+    """Return a probability with its interval, or a dash."""
+    if interval is None:
+        return "-"
+    return f"{interval.value:.2f} [{interval.low:.2f}, {interval.high:.2f}]"
 
 
 def duration(seconds: float | None) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from benchmarks import claims, standings, views
-from benchmarks.board_format import bounded, duration, folded, millions, number, table
+from benchmarks.board_format import bounded, chance, duration, folded, millions, number, table
 from benchmarks.claims import Claim
 from benchmarks.rows import Row, shown
 from benchmarks.standings import Changes, Track
@@ -36,6 +36,13 @@ class Winner:
     claim: Claim | None
 
     @property
+    def split(self) -> str:
+        """Which episodes the two are compared on."""
+        if self.claim is not None:
+            return self.claim.split
+        return "" if self.paper is None else views.published_split(self.paper)
+
+    @property
     def silence(self) -> str:
         """What is said where nothing can be claimed."""
         if self.paper is None:
@@ -57,29 +64,33 @@ def _winner(track: str, rows: Sequence[Row]) -> Winner:
 
 def winners(tracks: Tracks) -> list[str]:
     """Return the table of the nominal tracks: best paper controller, best learned one, verdict."""
-    heading = ["environment", "best paper controller", "RMS [95 %]", "best learned", "RMS [95 %]"]
-    heading += ["P(improvement) [95 %]", "largest cost", "verdict"]
+    heading = ["environment", "episodes", "best paper controller", "RMS [95 %]"]
+    heading += ["best learned", "RMS [95 %]", "P(improvement) [95 %]", "largest cost", "verdict"]
     return table(heading, [_winner_line(found) for found in nominal(tracks).values()])
 
 
 def _winner_line(found: Winner) -> list[str]:
-    line = [f"`{found.env}`", *_named(found.paper)]
+    line = [f"`{found.env}`", found.split or "-", *_named(found.paper, found.split)]
     if found.claim is None:
-        return [*line, *_named(None), "-", "-", found.silence]
+        return [*line, *_named(None, ""), "-", "-", found.silence]
     best = found.claim
-    chance = best.probability
-    words = f"{chance.value:.2f} [{chance.low:.2f}, {chance.high:.2f}]"
     verdict = plain_verdict(best)
     bold = f"**{verdict}**" if best.verdict == claims.BETTER else verdict
-    return [*line, *_named(best.row), words, largest_cost(best), bold]
+    learned = _named(best.row, best.split)
+    return [*line, *learned, chance(best.probability), largest_cost(best), bold]
 
 
-def _named(row: Row | None) -> list[str]:
+def _named(row: Row | None, split: str) -> list[str]:
     """Return a controller's name and its score."""
+    return ["none" if row is None else f"`{views.name_of(row)}`", score_words(row, split)]
+
+
+def score_words(row: Row | None, split: str) -> str:
+    """Return the score of a row over the episodes of a split, with its interval and unit."""
     if row is None:
-        return ["none", "-"]
+        return "-"
     unit, factor = shown(views.content_of(row))
-    return [f"`{views.name_of(row)}`", f"{bounded(views.interval(row), factor)} {unit}"]
+    return f"{bounded(views.interval(row, split=split), factor)} {unit}"
 
 
 def largest_cost(entry: Claim) -> str:
@@ -100,7 +111,7 @@ def rank_changes(tracks: Tracks) -> list[str]:
     if not found:
         return ["No environment has been run on more than one track.", ""]
     heading = ["environment", "track", "first here", "was", "largest fall", "largest rise"]
-    heading += ["same order (Kendall's tau)"]
+    heading += ["same order (Kendall's tau)", "episodes"]
     lines = [change_line(entry, k) for entry in found for k in range(1, len(entry.tracks))]
     places = [part for entry in found for part in (f"`{entry.env}`", "", *_places(entry), "")]
     return [*table(heading, lines), "", *folded("All places", places)]
@@ -119,6 +130,7 @@ def change_line(found: Changes, k: int) -> list[str]:
         _step(found, fall, k) if moves[fall] < 0 else "-",
         _step(found, rise, k) if moves[rise] > 0 else "-",
         f"{found.agreement[k]:.2f}",
+        " / ".join(dict.fromkeys((found.splits[0], found.splits[k]))),
     ]
 
 
@@ -151,9 +163,32 @@ def _moved(by: int, place: str) -> str:
     return place if not by else f"{place} ({'▼' if by > 0 else '▲'}{abs(by)})"
 
 
+COSTS = """\
+As stated by its maker, not verified: `verify` runs controllers, it does not train them again.
+"""
+
+
 def costs(rows: Sequence[Row]) -> list[str]:
-    """Return the table of what each controller cost to make."""
+    """Return what each controller cost to make: a table, and how equal the tuning was."""
     entries = {views.name_of(row): row for row in sorted(rows, key=lambda row: row["row"])}
+    return [COSTS.rstrip() + _budgets(list(entries.values())), "", *_cost_table(entries)]
+
+
+def _budgets(rows: Sequence[Row]) -> str:
+    """Return a sentence on the tuning trials of classical and learned controllers."""
+    trials: dict[bool, int] = {}
+    for row in rows:
+        learned = row["controller"]["kind"] != "classical"
+        trials[learned] = max(trials.get(learned, 0), views.cost_of(row).trials or 0)
+    if len(trials) < 2 or trials[True] == trials[False]:
+        return ""
+    return (
+        f" Tuning budgets are not equal: up to {trials[True]} trials of a learned controller, up "
+        f"to {trials[False]} of a classical one."
+    )
+
+
+def _cost_table(entries: Mapping[str, Row]) -> list[str]:
     heading = ["controller", "kind", "tuning", "tuning trials", "training seeds", "steps a seed"]
     heading += ["time a seed", "hardware"]
     return table(heading, [_cost_line(entries[name]) for name in sorted(entries)])

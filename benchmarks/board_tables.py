@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from benchmarks import claims, standings, statistics, views
-from benchmarks.board_format import bounded, folded, linked, number, signed, table
+from benchmarks import claims, standings, views
+from benchmarks.board_format import bounded, chance, folded, linked, number, signed, table
 from benchmarks.board_summary import plain_verdict
+from benchmarks.claims import Claim
 from benchmarks.metrics import headline_of
 from benchmarks.rows import Row, shown
 from benchmarks.standings import Listing
@@ -37,15 +38,16 @@ def track_page(rows: Sequence[Row], columns: Sequence[Column], figure: str | Non
         Path of the track's picture.
     """
     listing, best_first = standings.listing(rows), standings.ordered(rows)
-    paper = claims.best_paper(best_first)
-    lines = [*_title(best_first), *_verdict_line(best_first, paper)]
-    lines += _main(listing, paper, columns)
+    made = claims.learned_claims(best_first)
+    lines = [*_title(best_first), *_round_line(listing), *_verdict_line(best_first, made)]
+    lines += _main(listing, made, columns)
     if figure:
         lines += [f"![error, effort and profiles]({figure})", ""]
-    wide = [table(*_all_columns(best_first, columns)), table(*_pairs(best_first))]
+    inside = standings.ordered(listing.inside)
+    wide = [table(*_all_columns(inside, columns)), table(*_pairs(inside))]
     titles = ["Every metric", "Interquartile means, and each row against the one above"]
     if any(point for point in views.by_setting(best_first[0])):
-        wide.append(table(*_settings(best_first)))
+        wide.append(table(*_settings(inside)))
         titles.append("By setting")
     for title, content in zip(titles, wide, strict=True):
         lines += folded(title, content)
@@ -54,73 +56,95 @@ def track_page(rows: Sequence[Row], columns: Sequence[Column], figure: str | Non
 
 def _title(best_first: Sequence[Row]) -> list[str]:
     first = best_first[0]
-    content = views.content_of(first)
+    return [f"### {views.content_of(first)['title']}", "", about(first), ""]
+
+
+def about(row: Row) -> str:
+    """Return a sentence on the track of a row: environment, scenarios, what is scored."""
+    content, scenarios = views.content_of(row), len(row["plants"])
     unit, factor = shown(content)
-    lines = [
-        f"### {content['title']}",
-        "",
-        f"`{first['env']['id']}`, scenarios `{views.track_of(first)}` version "
-        f"{content['version']} (`{first['scenarios']['digest'][:12]}`), {len(first['plants'])} "
-        f"scenarios x {len(first['seeds'])} public seeds, settling window "
-        f"{content['settle_seconds']:g} s, worst case "
-        f"{factor * content['worst_case'][headline_of(content)]:g} {unit}.",
-        "",
-    ]
-    if len({(row["scenarios"]["digest"], row.get("task")) for row in best_first}) > 1:
-        lines += ["**These rows are not of one scenario file: run the track again.**", ""]
-    return lines
+    public = len(views.pairs_of(row, views.PUBLIC))
+    return (
+        f"`{row['env']['id']}`, scenarios `{views.track_of(row)}` version {content['version']} "
+        f"(`{row['scenarios']['digest'][:12]}`): {scenarios} scenarios, {public} public episodes, "
+        f"settling window {content['settle_seconds']:g} s, worst case "
+        f"{factor * content['worst_case'][headline_of(content)]:g} {unit}."
+    )
 
 
-def _verdict_line(best_first: Sequence[Row], paper: Row | None) -> list[str]:
+def round_words(listing: Listing) -> str:
+    """Return which audit round the scores of a track are of, and who is in it."""
+    first = listing.inside[0]
+    if not views.is_audited(first):
+        return "Self-reported: no audit round yet, all of it is of the public episodes."
+    found, total = views.round_of(first), len(listing.inside) + len(listing.outside)
+    episodes = len(views.pairs_of(first, views.AUDIT))
+    words = (
+        f"Audit round {found['round']}, drawn {found['drawn']}: {episodes} episodes that nobody "
+        f"could tune to, {len(listing.inside)} of {total} rows."
+    )
+    if listing.missing:
+        words += f" In the round and without a row: {', '.join(listing.missing)}."
+    return words
+
+
+def _round_line(listing: Listing) -> list[str]:
+    return [f"**{round_words(listing)}**", ""]
+
+
+def _verdict_line(best_first: Sequence[Row], made: Sequence[Claim]) -> list[str]:
+    paper = claims.best_paper(best_first)
     if paper is None:
         return []
     words = f"Best paper controller: `{views.name_of(paper)}`."
-    for entry in claims.learned_claims(best_first):
+    for entry in made:
         words += f" `{views.name_of(entry.row)}`: {plain_verdict(entry)}."
     return [words, ""]
 
 
-def _main(listing: Listing, paper: Row | None, columns: Sequence[Column]) -> list[str]:
-    ranked = listing.ranked
-    places = [str(place) for place in standings.ranks(ranked)]
+def _main(listing: Listing, made: Sequence[Claim], columns: Sequence[Column]) -> list[str]:
+    found = {views.name_of(entry.row): entry for entry in made}
+    places = [str(place) for place in standings.ranks(listing.ranked)]
     lines: list[str] = []
-    if not listing.audited and listing.reported:
-        lines += ["Self-reported: no row of this track has been audited yet.", ""]
-    if ranked:
-        lines += [*_short_table(ranked, places, paper, columns), ""]
-    if listing.audited and listing.reported:
-        lines += ["Self-reported, without an audit, not ranked:", ""]
-        unranked = ["-"] * len(listing.reported)
-        lines += [*_short_table(listing.reported, unranked, paper, columns), ""]
-    if listing.few:
-        lines += [f"Not ranked, fewer than {views.LISTED_SEEDS} training seeds:", ""]
-        lines += [*_short_table(listing.few, ["-"] * len(listing.few), paper, columns), ""]
+    if listing.ranked:
+        lines += [*_short_table(listing.ranked, places, found, columns), ""]
+    for title, rows in (
+        (f"Not ranked, fewer than {views.LISTED_SEEDS} training seeds:", listing.few),
+        ("Not in the audit round, not ranked; scores of the public episodes:", listing.outside),
+    ):
+        if rows:
+            lines += [title, "", *_short_table(rows, ["-"] * len(rows), found, columns), ""]
     return lines
 
 
 def _short_table(
-    rows: Sequence[Row], places: Sequence[str], paper: Row | None, columns: Sequence[Column]
+    rows: Sequence[Row],
+    places: Sequence[str],
+    made: Mapping[str, Claim],
+    columns: Sequence[Column],
 ) -> list[str]:
     unit, _ = shown(views.content_of(rows[0]))
     costs = [column for column in columns if column[0] in claims.COSTS]
+    audited, split = views.is_audited(rows[0]), views.published_split(rows[0])
     smooth = any(views.smooth(row) for row in rows)
-    heading = ["rank", "controller", "kind", "knows", "preview", f"RMS [{unit}] [95 %]"]
-    heading += [f"audit - public [{unit}]"] * any(views.is_audited(row) for row in rows)
+    heading = ["rank", "controller", "kind", "knows", "preview", f"{split} RMS [{unit}] [95 %]"]
+    heading += [f"IQM [{unit}]"]
+    heading += [f"public RMS [{unit}]", f"audit - public [{unit}]"] * audited
     heading += [f"smooth references [{unit}]"] * smooth
-    heading += ["P(improvement)", *(title for _, title, _ in costs), "failures"]
+    heading += [f"P(improvement), {split} episodes", *(title for _, title, _ in costs)]
+    heading += ["failures", "state"]
     lines = [
-        _short_line(row, place, paper, costs, heading)
+        _short_line(row, place, made.get(views.name_of(row)), costs, smooth)
         for row, place in zip(rows, places, strict=True)
     ]
     return table(heading, lines)
 
 
 def _short_line(
-    row: Row, place: str, paper: Row | None, costs: Sequence[Column], heading: Sequence[str]
+    row: Row, place: str, claim: Claim | None, costs: Sequence[Column], smooth: bool
 ) -> list[str]:
     controller, factor = row["controller"], views.factor_of(row)
-    head = views.interval(row)
-    value, _, bounds = bounded(head, factor).partition(" ")
+    value, _, bounds = bounded(views.interval(row), factor).partition(" ")
     failed, total = views.failures_of(row)
     line = [
         place,
@@ -129,25 +153,27 @@ def _short_line(
         controller["knowledge"],
         f"{controller['preview_seconds']:g} s" if controller["preview_seconds"] else "none",
         f"**{value}** {bounds}",
+        number(factor * views.middle(row).value),
     ]
-    if any(name.startswith("audit") for name in heading):
-        line.append(_gap_words(row))
-    if any(name.startswith("smooth") for name in heading):
+    if views.is_audited(row):
+        public = number(factor * views.mean_of(row, split=views.PUBLIC))
+        line += [public, _gap_words(row)]
+    if smooth:
         line.append(bounded(views.smooth(row), factor))
-    line.append(_probability(row, paper))
+    line.append(chance(claim.probability if claim else None))
     line += [number(f * views.mean_of(row, metric)) for metric, _, f in costs]
-    return [*line, f"{failed} of {total}"]
+    return [*line, f"{failed} of {total}", views.verified_words(row)]
 
 
 def _gap_words(row: Row) -> str:
-    """Return the gap, bold where it is one, with the number of the salt where it is not the first.
+    """Return the gap, bold where it is one, with the number of the artefact if not the first.
 
-    Whoever changes an artefact gets a new salt: a number of many says that the gap was looked at.
+    Whoever changes an artefact is audited anew: a number of many says that the gap was looked at.
     """
     words = signed(views.gap(row), views.factor_of(row))
     marked = f"**{words}**" if views.is_worse_unseen(row) else words
-    drawn = views.salts_drawn(row)
-    return f"{marked} (salt {drawn})" if drawn > 1 else marked
+    audited = views.artefacts_audited(row)
+    return f"{marked} (artefact {audited})" if audited > 1 else marked
 
 
 def kind_of(row: Row) -> str:
@@ -156,13 +182,6 @@ def kind_of(row: Row) -> str:
     return (
         f"{row['controller']['kind']}, {seeds} seed{'s' * (seeds != 1)}" if seeds else "classical"
     )
-
-
-def _probability(row: Row, paper: Row | None) -> str:
-    if paper is None or row is paper or row["controller"]["kind"] == "classical":
-        return "-"
-    found = standings.improvement(row, paper)
-    return "-" if found is None else f"{found.value:.2f} [{found.low:.2f}, {found.high:.2f}]"
 
 
 def _all_columns(
@@ -191,10 +210,7 @@ def _pairs(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
 
 def _pair_line(row: Row, above: Row | None) -> list[str]:
     factor = views.factor_of(row)
-    middle = views.table_interval(
-        views.scores(row, split=views.published_split(row)), statistics.interquartile_mean
-    )
-    line = [f"`{views.name_of(row)}`", bounded(middle, factor)]
+    line = [f"`{views.name_of(row)}`", bounded(views.middle(row), factor)]
     gap = None if above is None else standings.difference(row, above)
     share = None if above is None else standings.improvement(row, above)
     if gap is None or share is None:

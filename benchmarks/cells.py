@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,23 +14,27 @@ from numpy.typing import NDArray
 
 from benchmarks import (
     artefacts,
-    audit,
     controllers,
     knowledge,
     metrics,
     provenance,
     rollout,
     traces,
+    trainings,
 )
+from benchmarks.audit import Audit
 from benchmarks.canonical import arrays_digest, digest
 from benchmarks.controllers import Entrant
-from benchmarks.making import make_env, model_of
+from benchmarks.making import make_env, model_of, plant_digests
 from benchmarks.scenarios import Scenario, ScenarioSet
+from sweeps.worker import wanted
 
 SCHEMA = 2
 PUBLIC, AUDIT = "public", "audit"
 PROBED_STEPS = 250
 """Steps of the episode on which the use of the preview is measured."""
+MOST_ACTIONS = 10_000_000
+"""Numbers that the recorded actions of an episode may be."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +75,10 @@ class Cell:
                 "policy": self._policy(),
                 "track": {k: v for k, v in self.track.content.items() if k not in grid},
                 "scenario": [self.scenario.name, self.scenario.kwargs, self.scenario.rests],
+                "plants": plant_digests(self.scenario),
                 "episodes": [self.split, self.training_seed, self.seeds, self.probe, self.drawn],
                 "packages": provenance.packages(),
+                "cpu": provenance.cpu(),
                 "sources": sources(self.entrant),
             }
         )[:32]
@@ -100,27 +107,27 @@ def sources(entrant: Entrant) -> dict[str, str]:
     return found
 
 
-def cells_of(entrant: Entrant, track: ScenarioSet) -> list[Cell]:
+def cells_of(entrant: Entrant, track: ScenarioSet, found: Audit | None = None) -> list[Cell]:
     """Return the cells of a row, public ones first, by training seed and scenario.
 
-    The audit's are among them once a salt was drawn for the controller as it is.
+    Parameters
+    ----------
+    entrant : Entrant
+    track : ScenarioSet
+    found : Audit, optional
+        Whose episodes are run as well.
     """
-    scenarios = track.scenarios()
+    scenarios, public = track.scenarios(), track.seeds
     probed = next((s.name for s in scenarios if not s.rests), scenarios[0].name)
-    seeds = entrant.training_seeds
-    public = [
-        Cell(entrant, track, s, seed, PUBLIC, track.seeds, (seed, s.name) == (seeds[0], probed))
-        for seed in seeds
-        for s in scenarios
+    runs = [(seed, s) for seed in entrant.training_seeds for s in scenarios]
+    first = (entrant.training_seeds[0], probed)
+    cells = [
+        Cell(entrant, track, s, seed, PUBLIC, public[s.name], (seed, s.name) == first)
+        for seed, s in runs
     ]
-    found = audit.find(entrant, track)
-    if found is None:
-        return public
-    return public + [
-        Cell(entrant, track, s, seed, AUDIT, found.seeds[s.name])
-        for seed in seeds
-        for s in scenarios
-    ]
+    if found is not None:
+        cells += [Cell(entrant, track, s, seed, AUDIT, found.seeds[s.name]) for seed, s in runs]
+    return cells
 
 
 def compute(cell: Cell) -> dict[str, Any]:
@@ -143,10 +150,14 @@ def compute(cell: Cell) -> dict[str, Any]:
         "knows_plant": knowledge.knows_plant(cell.entrant, controller, model, env),
         "episodes": [],
     }
+    if cell.entrant.files:
+        record["card"] = trainings.card_record(controller)
     if cell.probe and cell.entrant.knowledge in knowledge.IGNORANT:
         record["uses_model"] = knowledge.uses_model(cell.entrant, model, env, cell.training_seed)
     spent = []
     for seed in cell.seeds:
+        if not wanted():
+            raise RuntimeError("nobody waits for it any more")
         episode = rollout.run(env, controller, seed)
         record["episodes"].append(episode_record(cell, seed, episode))
         spent.append(episode.seconds)
@@ -252,6 +263,22 @@ def pack(actions: NDArray[Any]) -> dict[str, Any]:
 
 
 def unpack(packed: Mapping[str, Any]) -> NDArray[Any]:
-    """Return the actions that :func:`pack` wrote."""
-    raw = zlib.decompress(base64.b85decode(packed["data"]))
-    return np.frombuffer(raw, np.dtype(packed["dtype"])).reshape(packed["shape"]).copy()
+    """Return the actions that :func:`pack` wrote.
+
+    Raises
+    ------
+    ValueError
+        If they are not of the size that they say, or too many: the text may be a stranger's.
+    """
+    kind, shape = np.dtype(str(packed["dtype"])), [int(n) for n in packed["shape"]]
+    size = math.prod(shape)
+    if kind.kind != "f" or min(shape, default=0) < 0 or size > MOST_ACTIONS:
+        raise ValueError(f"recorded actions of type {kind} and shape {shape} are none")
+    try:
+        expected = size * kind.itemsize
+        raw = zlib.decompressobj().decompress(base64.b85decode(packed["data"]), expected + 1)
+    except zlib.error as error:
+        raise ValueError(f"recorded actions are damaged: {error}") from error
+    if len(raw) != expected:
+        raise ValueError(f"recorded actions are not of shape {shape}; run the row again")
+    return np.frombuffer(raw, kind).reshape(shape).copy()

@@ -9,7 +9,11 @@ from typing import Any
 
 import yaml
 
+from benchmarks import views
+from benchmarks.board_format import bounded
 from benchmarks.provenance import ROOT
+from benchmarks.rows import shown
+from benchmarks.store import CHECKSUM
 
 REFERENCES = Path(__file__).resolve().parent / "references.yaml"
 """Entries by key: type, and BibTeX's fields. Braces and commands in a value are BibTeX's own."""
@@ -110,28 +114,41 @@ def package() -> str:
     return entry("pam_envs", fields | {name: text for name, text in optional.items() if text})
 
 
+AUTHORS = "The pam-envs authors"
+"""Of a row whose controller names none."""
+
+
 def _row_entry(row: Mapping[str, Any]) -> str:
-    """Return the entry of the row: what runs it again and what it must come out as."""
-    env, about = row["env"], row["controller"]
-    audited = row["audit"]
+    """Return the entry of the row: what it scored, on what, and what runs it again."""
+    env, about, found = row["env"], row["controller"], row["audit"]
+    unit, factor = shown(row["scenarios"]["content"])
+    score = bounded(views.interval(row), factor)
+    split = views.published_split(row)
     said = [
+        f"RMS {score} {unit} (mean and 95 % interval over {split} episodes)",
+        f"audit round {found['round']}, salt {found['salt']}" if found else "not audited",
         f"environment {env['id']}",
         f"scenarios {row['scenarios']['name']} version {row['scenarios']['version']}",
         f"task {row['task'][:16]}",
         f"artefact {about['artefact']['digest'][:16]}",
-        f"audit salt {audited['salt']}" if audited else "public seeds only",
         f"commit {row['made_with']['commit']}",
+        f"SHA-256 of the row {row[CHECKSUM]}",
     ]
     title = f"{about['name']} in {row['scenarios']['content']['title']}"
     fields = {
         "type": "misc",
-        "author": "{The pam-envs authors}",
+        "author": f"{{{_unbraced(about.get('author') or AUTHORS)}}}",
         "title": f"Leaderboard row {row['row']}: {title}",
-        "year": str(row["volatile"]["date"])[:4],
-        "note": ", ".join(said),
+        "year": (found["drawn"] if found else str(row["volatile"]["date"]))[:4],
+        "note": ", ".join(map(_unbraced, said)),
         "howpublished": f"python -m benchmarks verify {row['row']}",
     }
-    return entry(_key(row["row"]), fields)
+    return entry(f"{_key(row['row'])}-{about['artefact']['digest'][:8]}", fields)
+
+
+def _unbraced(text: str) -> str:
+    """Return a maker's words without what BibTeX would read as its own."""
+    return "".join(letter for letter in text if letter not in "{}\\")
 
 
 def _key(name: str) -> str:

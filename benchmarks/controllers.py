@@ -50,6 +50,8 @@ class Entrant:
         Settings that were tried out to choose a classical controller's numbers.
     tuning : str
         How they were chosen.
+    author : str
+        Who made it, as BibTeX wants it; empty for the authors of this package.
     """
 
     name: str
@@ -62,6 +64,7 @@ class Entrant:
     files: tuple[tuple[int, Path], ...] = ()
     trials: int = 0
     tuning: str = BY_RULE
+    author: str = ""
 
     @property
     def training_seeds(self) -> tuple[int | None, ...]:
@@ -109,6 +112,7 @@ def _entrant(name: str, entry: Any, module: str, kind: str) -> Entrant | None:
         files=files,
         trials=int(getattr(entry, "trials", 0)),
         tuning=str(getattr(entry, "tuning", BY_RULE)),
+        author=str(getattr(entry, "author", "")),
     )
 
 

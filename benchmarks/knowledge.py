@@ -38,16 +38,18 @@ def uses_model(entrant: Entrant, model: Any, env: Any, seed: int | None) -> bool
 def knows_plant(entrant: Entrant, controller: Any, model: Any, env: Any) -> bool:
     """Return whether all that a controller was told is of the plant that is simulated.
 
-    A policy was told the plant of its training, as its card says; a residual one both.
+    A policy was told the plants of its training, as its card says; a residual one was built from
+    the model as well.
     """
     base = env.unwrapped
     card = getattr(controller, "card", None)
     trained = isinstance(card, Mapping)
-    told = set() if trained and entrant.kind == "learned" else {model.digest()}
+    knows = (trained and entrant.kind == "learned") or model.digest() == base.plant.digest()
     if isinstance(card, Mapping):
         varied = (card.get("env_kwargs") or {}).get("randomize")
-        told.add("drawn anew" if varied else str(card.get("plant")))
-    return not base.setup.drawn and told == {base.plant.digest()}
+        told = card.get("plants", [card.get("plant")])
+        knows = knows and not varied and base.plant.digest() in told
+    return knows and not base.setup.drawn
 
 
 def label(claimed: str, cells: Sequence[Mapping[str, Any]]) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import board_summary, plots, rows, standings
+from benchmarks import audit, board_summary, plots, rows, standings, verified, views
 from benchmarks.board_format import number, table
 from benchmarks.board_tables import Column, track_page, with_costs
 from benchmarks.rows import Row, shown
@@ -107,26 +107,33 @@ page of the same rows, with trajectories; `python -m benchmarks cite ROW` prints
 columns mean stands [at the end](#how-to-read-this).
 """
 
+NO_ROWS = "There are no rows yet: run `python -m benchmarks run`."
+
 PREFACE = """\
 - **RMS** is the headline: true output minus the external reference, without noise, after the
   settling window; the mean over episodes with its 95 % interval (stratified bootstrap over training
-  seeds and, within scenarios, over seeds). Everything but the sensed error is noise-free.
-- Of an audited row it is the mean over the **audit** episodes, whose seeds come from the task, the
-  artefact and a salt that was drawn after the artefact was committed; *audit - public* is the gap
-  to the public seeds, bold where the row does worse on episodes that it could not be tuned to. A
-  changed artefact gets a new salt, and *salt 2* says that an earlier one of this name was audited.
-  Rows without an audit are self-reported, and listed apart where there are others.
-- **Ranks** are by the public episodes, which all rows share: a row shares the place of the first of
-  its group (`=`) where the 95 % interval of their paired difference holds zero. A learned row needs
-  five training seeds to be ranked.
-- **Best paper controller**: the lowest mean over the public episodes among classical controllers
-  with a source, that is, a paper's method or a textbook rule.
+  seeds and, within scenarios, over seeds). *IQM* is the mean of the middle half of all episodes:
+  it leaves out failures, so it never leads. Everything but the sensed error is noise-free.
+- **Audit round**: scores, ranks, P(improvement), costs, failures and claims are of episodes whose
+  seeds come from the task, all artefacts of the round and a salt that was drawn after they were
+  committed. All rows of a round have the same episodes. *audit - public* is the gap to the public
+  seeds, paired by training seed, bold where the row does worse on episodes that it could not be
+  tuned to. *artefact 2* says that another artefact of this name was in an earlier round.
+- A track without a round is **self-reported**: all of it is of the public episodes, which a maker
+  can try as often as he likes, and nothing is claimed. Rows outside of the round of a track that
+  has one are listed apart with their public scores.
+- **Ranks**: a row shares the place of the first of its group (`=`) where the 95 % interval of their
+  paired difference holds zero. A learned row needs five training seeds to be ranked.
+- **Best paper controller**: the lowest mean among classical controllers with a source, that is, a
+  paper's method or a textbook rule.
 - **P(improvement)**: how likely a training seed's error is below the best paper controller's in
   the same episode, ties half, with its interval over training seeds, scenarios and seeds. *Better*
-  needs more than 0.95 with a lower bound above 0.5, ten training seeds, an audit that says the
-  same, no more failures, and pressure travel, air, constraint cost and (of a gait) EMG ratio of at
-  most 1.1 times the paper controller's, each; with a higher cost it is called *better error, higher
-  cost*. A constraint cost below a thousandth counts as none.
+  needs more than 0.95 with a lower bound above 0.5 and a lower mean, ten training seeds, an audit
+  of both in one round, no more failures, and pressure travel, air, constraint cost and (of a gait)
+  EMG ratio of at most 1.1 times the paper controller's, each; with a higher cost it is called
+  *better error, higher cost*. A constraint cost below a thousandth counts as none.
+- **state**: the day on which `verify` ran the row again and found every number; *elsewhere*: on
+  another machine, where the last digits of a policy differ.
 - *Smooth references*: RMS without steps and staircases, whose edges no controller can follow.
 - A run that a limit ended counts at the worst-case value and shows under *failures*; none is left
   out.
@@ -163,7 +170,8 @@ PREFACE = """\
   with the planned angles, of which the tool knows nothing. *Error to its own model* is of
   controllers that follow a model: the true angle less the model's.
 - A controller's name leads to its row, where every metric of every episode stands.
-- Times per step are in [results/TIMES.md](results/TIMES.md), since no two runs give the same.
+- Times per step are in [results/TIMES.md](results/TIMES.md): as stated by who ran the row, not
+  verified, since no two runs give the same.
 """
 
 
@@ -178,6 +186,8 @@ def board_text(all_rows: Sequence[Row], figures: Mapping[str, str] | None = None
         Pictures to show, relative to the board.
     """
     tracks = standings.tracks(all_rows)
+    if not tracks:
+        return f"{INTRODUCTION}\n{NO_ROWS}\n"
     lines = [*INTRODUCTION.splitlines(), "", "## Nominal tracks", ""]
     lines += [*board_summary.winners(tracks), "", "## Rank changes between tracks", ""]
     lines += [*RANK_CHANGES.splitlines(), "", *board_summary.rank_changes(tracks)]
@@ -194,7 +204,7 @@ def board_text(all_rows: Sequence[Row], figures: Mapping[str, str] | None = None
 RANK_CHANGES = """\
 Each track against the nominal one of its environment, among the controllers that have run in all of
 them: does what wins on the plant it was designed for still win on another? ▼ and ▲: places lost and
-gained.
+gained. *Episodes*: which ones the places are of, of both tracks where they differ.
 """
 
 
@@ -203,8 +213,8 @@ def times_text(all_rows: Sequence[Row]) -> str:
     lines = [
         "# Compute time per step",
         "",
-        "Of `predict` alone, Python included, as measured when the row was run: median over the",
-        "scenarios of the median and of the 99th percentile. Machines and their load differ.",
+        "Of `predict` alone, Python included, as stated by who ran the row, not verified: median",
+        "over the scenarios of the median and of the 99th percentile. Machines and loads differ.",
         "",
     ]
     heading = ["controller", "median [us]", "p99 [us]", "machine", "date"]
@@ -224,11 +234,30 @@ def _time_line(row: Row) -> list[str]:
     ]
 
 
+def load(folder: Path) -> list[Row]:
+    """Return the rows of a folder as they stand: with their verifications, and in a round or not.
+
+    Raises
+    ------
+    ValueError
+        If there is no such folder, or a row of it is refused.
+    """
+    if not folder.is_dir():
+        raise ValueError(f"{folder}: no such folder of rows; run `python -m benchmarks run` first")
+    found = verified.read(folder)
+    return [_standing(row, verified.of(row, found)) for row in rows.load_all(folder)]
+
+
+def _standing(row: Row, verification: Mapping[str, Any] | None) -> Row:
+    """Return a row with its verification; the audit of another than the last round is none."""
+    last = audit.last(views.track_of(row)) if audit.in_last_round(row) else None
+    held = {**row["audit"], "entrants": last.entrants} if last else None
+    return {**row, "audit": held, views.VERIFIED: verification}
+
+
 def write(folder: Path = rows.RESULTS, board: Path = BOARD) -> list[Path]:
     """Write the board, its figures and the times, and return the paths."""
-    all_rows = rows.load_all(folder)
-    if not all_rows:
-        raise ValueError(f"no rows in {folder}; run `python -m benchmarks run` first")
+    all_rows = load(folder)
     written, figures = [], {}
     for name, ordered in standings.tracks(all_rows).items():
         path = folder / f"{name}.svg"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import profiles, views
+from benchmarks import profiles, standings, views
 from benchmarks.rows import Row, shown
 
 _FIXED: dict[str, Any] = {
@@ -27,6 +27,8 @@ DRAWN = 8
 def track_figure(ordered: Sequence[Row]) -> str:
     """Return an SVG of a track: error against effort, and performance profiles.
 
+    Of the rows that are compared with each other, over the episodes that they are compared on.
+
     The same bytes for equal rows.
 
     Parameters
@@ -43,6 +45,7 @@ def track_figure(ordered: Sequence[Row]) -> str:
         effort, share = figure.subplots(1, 2)
         _draw_effort(effort, drawn)
         _draw_profiles(share, drawn)
+        effort.set_title(f"{views.published_split(drawn[0])} episodes", loc="left", fontsize=8.0)
         figure.legend(*share.get_legend_handles_labels(), loc="outside right center", frameon=False)
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
@@ -51,8 +54,9 @@ def track_figure(ordered: Sequence[Row]) -> str:
 
 def drawn_rows(ordered: Sequence[Row]) -> list[Row]:
     """Return the rows of a track that are drawn, best first."""
-    classical = [row for row in ordered if row["controller"]["kind"] == "classical"][:DRAWN]
-    return [row for row in ordered if row["controller"]["kind"] != "classical" or row in classical]
+    inside = standings.ordered(standings.listing(ordered).inside)
+    best = [r["row"] for r in inside if r["controller"]["kind"] == "classical"][:DRAWN]
+    return [r for r in inside if r["controller"]["kind"] != "classical" or r["row"] in best]
 
 
 def _style(number: int, row: Row) -> dict[str, Any]:
@@ -83,12 +87,14 @@ def _draw_profiles(axes: Any, drawn: Sequence[Row]) -> None:
     unit, factor = shown(drawn[0]["scenarios"]["content"])
     errors = profiles.thresholds(drawn)
     for number, row in enumerate(drawn):
-        shares = 100.0 * profiles.profile(row, errors)
-        label = row["controller"]["name"]
-        axes.plot(factor * errors, shares, linewidth=1.1, label=label, **_style(number, row))
+        shares, band = profiles.profile(row, errors)
+        label, style = row["controller"]["name"], _style(number, row)
+        axes.plot(factor * errors, 100.0 * shares, linewidth=1.1, label=label, **style)
+        bounds = {"facecolor": style["color"], "alpha": 0.12, "linewidth": 0.0}
+        axes.fill_between(factor * errors, *(100.0 * band), **bounds)
     _plain_log(axes.xaxis)
     axes.set_xlabel(f"RMS of an episode [{unit}]")
-    axes.set_ylabel("episodes with at most this RMS [%]")
+    axes.set_ylabel("episodes with at most this RMS [%], 95 % band")
 
 
 def _plain_log(axis: Any) -> None:

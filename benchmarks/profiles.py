@@ -24,8 +24,8 @@ def thresholds(rows: Sequence[Row], points: int = POINTS) -> Array:
     return np.geomspace(positive.min(), positive.max(), points)
 
 
-def profile(row: Row, errors: Array) -> Array:
-    """Return the share of the public episodes, of all training seeds, that is at most each error.
+def profile(row: Row, errors: Array) -> tuple[Array, Array]:
+    """Return the share of the published episodes that is at most each error.
 
     Parameters
     ----------
@@ -34,6 +34,9 @@ def profile(row: Row, errors: Array) -> Array:
 
     Returns
     -------
-    (m,) array
+    (m,) array, (2, m) array
+        The shares, of all training seeds, and their pointwise 95 % band.
     """
-    return statistics.performance_profile(views.scores(row).table, errors)
+    found = views.scores(row)
+    shares = statistics.performance_profile(found.table, errors)
+    return shares, statistics.profile_band(found.table, found.strata, errors)

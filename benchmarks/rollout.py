@@ -88,6 +88,7 @@ def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None)
             begin = clock()
             action, state = controller.predict(observation, state, start, True)
             spent = clock() - begin
+            followed = np.ravel(told(state)).tolist() if told else []
         except Exception as error:
             failure = _sentence(error)
             break
@@ -103,19 +104,17 @@ def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None)
         actions.append(action)
         seconds.append(spent)
         infos.append(tuple([info[key] for key in keys]))
-        if told:
-            models.append(np.ravel(told(state)).tolist())
+        models.append(followed)
         observation, over = after, terminated or truncated
         if terminated:
             failure = f"a limit ended the episode at {info['time']:g} s"
         if watch:
             watch(env)
     table = np.array(infos, np.float64).reshape(-1, len(keys))
-    followed = np.array(models, np.float64).T
     return Episode(
         signals={
             **{key: np.ascontiguousarray(table[:, i]) for i, key in enumerate(keys)},
-            **{f"model/{k}": series.copy() for k, series in enumerate(followed)},
+            **{f"model/{k}": one.copy() for k, one in enumerate(np.array(models, np.float64).T)},
         },
         observations=np.array(observations),
         actions=np.array(actions),

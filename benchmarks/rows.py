@@ -2,22 +2,53 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks import artefacts, audit, knowledge, provenance, scenarios, statistics, tasks
+from benchmarks import (
+    artefacts,
+    knowledge,
+    provenance,
+    scenarios,
+    statistics,
+    tasks,
+    trainings,
+)
+from benchmarks.audit import Audit
 from benchmarks.canonical import digest
 from benchmarks.cells import AUDIT, PUBLIC, Cell, cells_of, sources
-from benchmarks.controllers import Entrant, find
+from benchmarks.controllers import Entrant
 from benchmarks.metrics import METRICS, headline_of, of_track
 from benchmarks.scenarios import ScenarioSet
 from benchmarks.store import read_record, write_record
 
-SCHEMA = 2
+SCHEMA = 3
 RESULTS = Path(__file__).parent / "results"
+KEYS: dict[str, tuple[str, ...]] = {
+    "row": (),
+    "env": ("id", "version", "digest"),
+    "task": (),
+    "controller": ("name", "kind", "digest", "parameters", "artefact"),
+    "scenarios": ("name", "version", "digest", "content"),
+    "plants": (),
+    "models": (),
+    "seeds": (),
+    "training_seeds": (),
+    "made_with": (),
+    "episodes": (),
+    "failures": (),
+    "aggregate": (),
+    "by": (),
+    "audit": (),
+    "traces": (),
+    "volatile": (),
+}
+"""What a row has, and what is in it that others look up by name."""
+_NAME = re.compile(r"[A-Za-z0-9_]+")
 
 Row = dict[str, Any]
 SHOWN: dict[str, Any] = {"unit": "mm", "factor": 1e3}
@@ -38,28 +69,9 @@ def row_name(track: str, controller: str) -> str:
 Record = Mapping[str, Any]
 
 
-def pair_of(name: str) -> tuple[Entrant, ScenarioSet]:
-    """Return controller and scenarios of a row's name.
-
-    Raises
-    ------
-    ValueError
-        If there is no such track or controller, or they do not go together.
-    """
-    track, _, controller = name.partition("--")
-    known = scenarios.available()
-    if track not in known:
-        raise ValueError(
-            f"{name}: no track {track!r}; a row is TRACK--CONTROLLER with a track of "
-            f"{', '.join(known)}"
-        )
-    entrant = find(controller)
-    if not entrant.runs_in(known[track].env):
-        raise ValueError(f"{name}: {controller} is not for {known[track].env}")
-    return entrant, known[track]
-
-
-def assemble(entrant: Entrant, track: ScenarioSet, cells: Sequence[Record]) -> Row:
+def assemble(
+    entrant: Entrant, track: ScenarioSet, cells: Sequence[Record], found: Audit | None = None
+) -> Row:
     """Return the row of a controller from its cells, in the order of :func:`cells.cells_of`.
 
     Parameters
@@ -67,29 +79,33 @@ def assemble(entrant: Entrant, track: ScenarioSet, cells: Sequence[Record]) -> R
     entrant : Entrant
     track : ScenarioSet
     cells : sequence of mapping
-        The record of every cell; none may be missing, none of another environment version.
+        The record of every cell; none may be missing, none of another environment.
+    found : Audit, optional
+        With which the cells were listed.
     """
-    _check_complete(entrant, track, cells)
+    built = tasks.built(track)
+    _check_complete(entrant, track, cells, found)
+    _check_plants(entrant, built, cells)
+    trainings.check_cells(entrant, cells)
     public = [cell for cell in cells if cell["split"] == PUBLIC]
-    plants = {cell["scenario"]: cell["plant_digest"] for cell in public}
-    about = _controller(entrant, public)
     episodes = [episode for cell in cells for episode in cell["episodes"]]
     scored = [episode for episode in episodes if episode["split"] == PUBLIC]
+    unseen = [episode for episode in episodes if episode["split"] == AUDIT]
     row: Row = {
         "schema": SCHEMA,
         "row": row_name(track.name, entrant.name),
-        "env": tasks.describe_env(track.env),
-        "task": tasks.task_digest(track, plants),
-        "controller": about,
+        "env": built.env,
+        "task": tasks.task_digest(track),
+        "controller": _controller(entrant, public),
         "scenarios": {
             "name": track.name,
             "version": track.content["version"],
             "digest": track.digest,
             "content": track.content,
         },
-        "plants": plants,
-        "models": {cell["scenario"]: cell["model_digest"] for cell in public},
-        "seeds": list(track.seeds),
+        "plants": built.plants,
+        "models": built.models,
+        "seeds": {name: list(seeds) for name, seeds in track.seeds.items()},
         "training_seeds": [seed for seed, _ in entrant.files],
         "made_with": {
             "packages": provenance.packages(),
@@ -108,20 +124,27 @@ def assemble(entrant: Entrant, track: ScenarioSet, cells: Sequence[Record]) -> R
             "predict_us": _median_times([cell["volatile"]["predict_us"] for cell in cells]),
         },
     }
-    if len(scored) < len(episodes):
-        row["audit"] = _audited(row, track)
+    if found is not None:
+        scores = aggregate(unseen, of_track(track.content))
+        row["audit"] = found.record() | {
+            "failures": failures(unseen),
+            "aggregate": scores,
+            "gap": gap(scores, row["aggregate"]),
+        }
     if entrant.files:
         row["actions"] = {c["scenario"]: c["actions"] for c in public if "actions" in c}
     return row
 
 
-def _check_complete(entrant: Entrant, track: ScenarioSet, cells: Sequence[Record]) -> None:
+def _check_complete(
+    entrant: Entrant, track: ScenarioSet, cells: Sequence[Record], found: Audit | None
+) -> None:
     """Raise unless the records are those of the row's cells."""
 
     def place(cell: Cell) -> tuple[Any, ...]:
         return cell.split, cell.training_seed, cell.scenario.name
 
-    wanted = [place(cell) for cell in cells_of(entrant, track)]
+    wanted = [place(cell) for cell in cells_of(entrant, track, found)]
     if [(c["split"], c["training_seed"], c["scenario"]) for c in cells] != wanted:
         raise ValueError(f"{entrant.name}: the cells are not those of {track.name}")
     others = sorted({str(cell["env"]) for cell in cells} - {track.env})
@@ -130,6 +153,17 @@ def _check_complete(entrant: Entrant, track: ScenarioSet, cells: Sequence[Record
             f"{entrant.name}: cells of {', '.join(others)} among those of {track.env}; results of "
             "different versions are not mixed: run it again with --force"
         )
+
+
+def _check_plants(entrant: Entrant, built: tasks.Built, cells: Sequence[Record]) -> None:
+    """Raise unless the cells are of the plants and models that the track has now."""
+    for cell in cells:
+        name = cell["scenario"]
+        if (cell["plant_digest"], cell["model_digest"]) != (built.plants[name], built.models[name]):
+            raise ValueError(
+                f"{entrant.name}: a cell of {name} is of another plant or model; run it again with "
+                "--force"
+            )
 
 
 def _controller(entrant: Entrant, cells: Sequence[Record]) -> dict[str, Any]:
@@ -143,38 +177,20 @@ def _controller(entrant: Entrant, cells: Sequence[Record]) -> dict[str, Any]:
         "summary": entrant.summary,
         "knowledge": knowledge.label(entrant.knowledge, cells),
         "claimed": entrant.knowledge,
+        "author": entrant.author,
         "citation": entrant.citation,
         "digest": digest(parameters)[:16],
         "parameters": parameters,
         "preview_seconds": max(cell.get("preview_used", 0.0) for cell in cells),
         "tuning": None if trained else {"trials": entrant.trials, "how": entrant.tuning},
         "artefact": artefacts.combine(entrant, parameters.values(), code).record(),
-        "training": artefacts.training_of(entrant),
+        "training": trainings.of(entrant),
     }
 
 
 def _place(cell: Record) -> str:
     seed = cell["training_seed"]
     return str(cell["scenario"]) + ("" if seed is None else f"#s{seed}")
-
-
-def _audited(row: Row, track: ScenarioSet) -> dict[str, Any]:
-    """Return salt, seeds and scores of the audit of a row that has such episodes."""
-    artefact = row["controller"]["artefact"]["digest"]
-    found = audit.of(audit.entries(), row["task"], artefact, track)
-    if found is None:
-        raise ValueError(f"{row['row']}: audit episodes, and no salt for this task and artefact")
-    episodes = episodes_of(row, AUDIT)
-    scores = aggregate(episodes, of_track(track.content))
-    return {
-        "salt": found.salt,
-        "drawn": found.drawn,
-        "draw": found.draw,
-        "seeds": {name: list(seeds) for name, seeds in found.seeds.items()},
-        "failures": failures(episodes),
-        "aggregate": scores,
-        "gap": gap(scores, row["aggregate"]),
-    }
 
 
 def gap(audited: Record, public: Record) -> dict[str, float]:
@@ -190,12 +206,6 @@ def failures(episodes: Sequence[Record]) -> int:
 def episodes_of(row: Record, split: str = PUBLIC) -> list[Record]:
     """Return the public or the audit episodes of a row."""
     return [episode for episode in row["episodes"] if episode["split"] == split]
-
-
-def published(row: Record) -> tuple[Mapping[str, Any], str]:
-    """Return the scores that the board prints, and of which episodes: the audit's if any."""
-    found = row["audit"]
-    return (row["aggregate"], PUBLIC) if found is None else (found["aggregate"], AUDIT)
 
 
 def _median_times(times: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:
@@ -218,17 +228,20 @@ def aggregate(
 ) -> dict[str, Any]:
     """Return mean and interquartile mean of every metric with their intervals.
 
-    The mean leads: an interquartile mean would drop failures.
+    The mean leads: an interquartile mean would drop failures. An episode in which a metric does
+    not apply to one training seed counts for none.
     """
     strata = [episode["scenario"] for episode in episodes]
     runs = [episode["training_seed"] for episode in episodes]
     pairs = [(episode["scenario"], episode["seed"]) for episode in episodes]
-    crossed: dict[str, Any] = {"runs": runs, "pairs": pairs} if len(set(runs)) > 1 else {}
     table: dict[str, Any] = {}
     for metric in metrics:
         values = scores_of(episodes, metric)
-        middle = statistics.bootstrap(values, strata, **crossed)
-        inner = statistics.bootstrap(values, strata, statistics.interquartile_mean, **crossed)
+        middle, inner = (
+            statistics.bootstrap(values, strata, statistic, runs=runs, pairs=pairs)
+            for statistic in (statistics.mean, statistics.interquartile_mean)
+        )
+        applies, _ = statistics.crossed(np.isfinite(values), runs, pairs)
         table[metric] = {
             "mean": middle.value,
             "low": middle.low,
@@ -236,7 +249,7 @@ def aggregate(
             "iqm": inner.value,
             "iqm_low": inner.low,
             "iqm_high": inner.high,
-            "episodes": int(np.isfinite(values).sum()),
+            "episodes": int(applies.all(axis=0).sum()) * len(applies),
         }
     return table
 
@@ -266,7 +279,7 @@ def load(path: Path) -> Row:
     Raises
     ------
     ValueError
-        If the file is damaged, altered or of another schema.
+        If the file is damaged, altered, of another schema, or not named as what it holds.
     """
     row = read_record(path)
     check_schema(row, path)
@@ -274,13 +287,37 @@ def load(path: Path) -> Row:
 
 
 def check_schema(row: Record, path: Path) -> None:
-    """Raise unless a record is a row as this version writes it."""
-    found = row.get("schema")
-    if found != SCHEMA or "aggregate" not in row:
+    """Raise unless a record is a row as this version writes it, and named as its file.
+
+    Names become names of files and commands, so that nothing but plain ones may be in them.
+    """
+    again = f"run it again: {command(path.stem)}"
+    if row.get("schema") != SCHEMA:
         raise ValueError(
-            f"{path}: not a row of schema {SCHEMA}, but of {found!r}; run it again: "
-            f"{command(path.stem)}"
+            f"{path}: not a row of schema {SCHEMA}, but of {row.get('schema')!r}; {again}"
         )
+    missing = [key for key in KEYS if key not in row]
+    for key, inner in KEYS.items():
+        held = row.get(key)
+        missing += [f"{key}.{name}" for name in inner if name not in _mapping(held)]
+    if missing:
+        raise ValueError(f"{path}: a row without {', '.join(missing)}; {again}")
+    track, controller = str(row["scenarios"]["name"]), str(row["controller"]["name"])
+    names = {str(row["row"]), path.stem, row_name(track, controller)}
+    plain = all(_NAME.fullmatch(name) for name in (track, controller))
+    if len(names) > 1 or not plain:
+        raise ValueError(
+            f"{path}: holds {row['row']!r}, of {controller!r} in {track!r}; file, row, track and "
+            f"controller have to agree, in letters, digits and _: {again}"
+        )
+    if track not in scenarios.names():
+        raise ValueError(
+            f"{path}: this checkout has no track {track!r}; check out the row's commit"
+        )
+
+
+def _mapping(value: Any) -> Mapping[str, Any]:
+    return value if isinstance(value, Mapping) else {}
 
 
 def command(name: str) -> str:
@@ -306,22 +343,37 @@ def load_all(folder: Path = RESULTS) -> list[Row]:
 
 
 def check_together(found: Sequence[Record]) -> None:
-    """Raise unless the rows of each track are of one environment version and one task.
+    """Raise unless the rows of each track are of one environment, one task and one code.
 
     Raises
     ------
     ValueError
-        Naming the versions and a row of each.
+        Naming what differs and a row of each, or a row that is there twice.
     """
     first: dict[str, Record] = {}
+    names: set[str] = set()
     for row in found:
-        other = first.setdefault(row["scenarios"]["name"], row)
-        for what, ours, theirs in (
-            ("environment", row["env"]["id"], other["env"]["id"]),
-            ("task", row["task"][:12], other["task"][:12]),
-        ):
+        if row["row"] in names:
+            raise ValueError(f"{row['row']} is there twice; take one of them out")
+        names.add(row["row"])
+        track = row["scenarios"]["name"]
+        other = first.setdefault(track, row)
+        for what, ours in _shared(row).items():
+            theirs = _shared(other)[what]
             if ours != theirs:
                 raise ValueError(
                     f"{row['row']} is of {what} {ours} and {other['row']} of {theirs}: their "
-                    f"results are not compared; run the older one again: {command(row['row'])}"
+                    "results are not compared; run the older ones again: "
+                    f"python -m benchmarks run --track {track}"
                 )
+
+
+def _shared(row: Record) -> dict[str, str]:
+    """Return what the rows of a track have to have in common, in words."""
+    made = row["made_with"].get("sources") or {}
+    return {
+        "environment": str(row["env"]["id"]),
+        "task": str(row["task"])[:12],
+        "pam_envs": str(made.get("pam_envs")),
+        "benchmarks": str(made.get("benchmarks")),
+    }

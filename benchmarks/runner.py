@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from benchmarks import audit, rows
 from benchmarks import cells as cells_module
-from benchmarks import rows
+from benchmarks.audit import Audit
 from benchmarks.cells import Cell, cells_of
 from benchmarks.controllers import Entrant
 from benchmarks.scenarios import ScenarioSet
@@ -18,6 +19,33 @@ CELLS = Path(__file__).parent / ".cells"
 
 Advance = Callable[[], None]
 Pair = tuple[Entrant, ScenarioSet]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A row to be made.
+
+    Attributes
+    ----------
+    entrant : Entrant
+    track : ScenarioSet
+    found : Audit, optional
+        Where the controller as it is now is in the last round of the track.
+    """
+
+    entrant: Entrant
+    track: ScenarioSet
+    found: Audit | None
+
+    @property
+    def cells(self) -> list[Cell]:
+        """All cells of the row."""
+        return cells_of(self.entrant, self.track, self.found)
+
+
+def plans(pairs: Iterable[Pair]) -> list[Plan]:
+    """Return what has to be run for rows."""
+    return [Plan(*pair, audit.find(*pair)) for pair in pairs]
 
 
 @dataclass
@@ -35,7 +63,7 @@ class Report:
     rows : list of Path
         Rows that were written.
     missing : list of str
-        Cells that could not be computed, with the reason.
+        Cells that could not be computed, and rows that could not be made, with the reason.
     """
 
     computed: int = 0
@@ -95,17 +123,18 @@ def run(
     cluster, store = options.cluster, Store(options.cells)
     report = Report(swept=store.sweep() + sweep(options.out))
     before = set(store.quarantined())
-    wanted = {cell.key: cell for pair in pairs for cell in cells_of(*pair)}
+    chosen = [(plan, {cell.key: cell for cell in plan.cells}) for plan in plans(pairs)]
+    wanted = {key: cell for _, cells in chosen for key, cell in cells.items()}
     if options.force:
         for key in wanted:
             store.path(key).unlink(missing_ok=True)
     missing = {key: cell for key, cell in wanted.items() if store.load(key) is None}
     report.found = len(wanted) - len(missing)
     errors = _compute(missing.values(), store, cluster, start(len(missing)))
-    for pair in pairs:
-        _finish(pair, store, options, report, errors)
+    for plan, cells in chosen:
+        _finish(plan, list(cells), store, options, report, errors)
     report.computed = sum(key not in errors for key in missing)
-    report.missing = [f"{title(wanted[key])}: {text}" for key, text in errors.items()]
+    report.missing += [f"{title(wanted[key])}: {text}" for key, text in errors.items()]
     report.quarantined = sorted(set(store.quarantined()) - before)
     return report
 
@@ -113,18 +142,27 @@ def run(
 def planned(pairs: Sequence[Pair], options: Options) -> Iterator[tuple[Cell, bool]]:
     """Return the cells of rows, and whether each is there already; nothing is changed."""
     store = Store(options.cells)
-    for cell in (cell for pair in pairs for cell in cells_of(*pair)):
+    for cell in (cell for plan in plans(pairs) for cell in plan.cells):
         yield cell, not options.force and store.sound(cell.key)
 
 
 def _finish(
-    pair: Pair, store: Store, options: Options, report: Report, errors: dict[str, str]
+    plan: Plan,
+    keys: Sequence[str],
+    store: Store,
+    options: Options,
+    report: Report,
+    errors: dict[str, str],
 ) -> None:
     """Write a row whose cells are all there."""
-    loaded = {cell.key: store.load(cell.key) for cell in cells_of(*pair)}
+    loaded = {key: store.load(key) for key in keys}
     records = [record for record in loaded.values() if record is not None]
     if len(records) == len(loaded):
-        report.rows.append(rows.save(rows.assemble(*pair, records), options.out))
+        try:
+            row = rows.assemble(plan.entrant, plan.track, records, plan.found)
+            report.rows.append(rows.save(row, options.out))
+        except ValueError as error:
+            report.missing.append(f"{rows.row_name(plan.track.name, plan.entrant.name)}: {error}")
     for key in (key for key, record in loaded.items() if record is None):
         errors.setdefault(key, "its file has been removed meanwhile; run it again")
 

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import plots, rows, site_data, standings
+from benchmarks import leaderboard, plots, rows, site_data, standings
 from benchmarks.canonical import plain
 from benchmarks.rows import Row
 from benchmarks.store import write_text
 
 ASSETS = Path(__file__).parent / "site_assets"
 OUT = Path(__file__).parent / "site"
-_OWNED = ("data/*.js", "data/traces/*.js", "figures/*.svg")
+_OWNED = ("data/*.js", "data/traces/*.js", "figures/*.svg", "rows/*.json")
 
 
 def build(results: Path = rows.RESULTS, out: Path = OUT) -> list[Path]:
@@ -35,12 +35,13 @@ def build(results: Path = rows.RESULTS, out: Path = OUT) -> list[Path]:
     Raises
     ------
     ValueError
-        If there is no row.
+        If there is no such folder, or a row of it is refused.
     """
-    all_rows = rows.load_all(results)
-    if not all_rows:
-        raise ValueError(f"no rows in {results}; run `python -m benchmarks run` first")
+    all_rows = leaderboard.load(results)
     texts = page(all_rows)
+    for row in all_rows:
+        name = f"{row['row']}.json"
+        texts[f"rows/{name}"] = (results / name).read_text(encoding="utf-8")
     stale = {path for pattern in _OWNED for path in out.glob(pattern)}
     written = [out / name for name in texts]
     for path, text in zip(written, texts.values(), strict=True):

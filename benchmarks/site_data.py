@@ -7,20 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import board_summary, cite, claims, standings, views
-from benchmarks.board_format import bounded
+from benchmarks import board_summary, board_tables, cite, claims, standings, views
 from benchmarks.board_tables import Column, with_costs
+from benchmarks.claims import Claim
 from benchmarks.leaderboard import columns_of
-from benchmarks.metrics import headline_of
 from benchmarks.rows import Row, shown
 from benchmarks.standings import Changes, Listing, Track
 from benchmarks.statistics import Interval
+from benchmarks.store import CHECKSUM
 
 GROUPS = {
-    "audited": "Audited: the score is of episodes that nobody could tune to",
-    "self-reported": "Self-reported: without an audit, the score is of the public episodes",
+    "ranked": "",
     "few": f"Not ranked: fewer than {views.LISTED_SEEDS} training seeds",
+    "outside": "Not ranked, not in the audit round: all numbers are of the public episodes",
 }
+"""Parts of a track's table with their titles; that of the first is the track's round."""
 
 
 def board(rows: Sequence[Row]) -> dict[str, Any]:
@@ -63,12 +64,9 @@ def _track(name: str, ordered: Track) -> dict[str, Any]:
         "name": name,
         "title": str(content["title"]),
         "env": str(first["env"]["id"]),
-        "about": (
-            f"{first['env']['id']}, {name} version {content['version']}: {len(first['plants'])} "
-            f"scenarios x {len(first['seeds'])} public seeds, settling window "
-            f"{content['settle_seconds']:g} s, worst case "
-            f"{factor * content['worst_case'][headline_of(content)]:g} {unit}."
-        ),
+        "about": board_tables.about(first).replace("`", ""),
+        "round": board_tables.round_words(listing),
+        "split": listing.split,
         "digest": first["scenarios"]["digest"],
         "unit": unit,
         "factor": factor,
@@ -77,35 +75,36 @@ def _track(name: str, ordered: Track) -> dict[str, Any]:
         "columns": [title for _, title, _ in columns],
         "costs": [k for k, (metric, _, _) in enumerate(columns) if metric in claims.COSTS],
         "settings": [f"{axis} {point}" for axis, point in views.by_setting(first)],
-        "rows": _rows(listing, columns, paper),
+        "rows": _rows(listing, columns, claims.learned_claims(ordered)),
     }
 
 
-def _rows(listing: Listing, columns: Sequence[Column], paper: Row | None) -> list[dict[str, Any]]:
+def _rows(
+    listing: Listing, columns: Sequence[Column], made: Sequence[Claim]
+) -> list[dict[str, Any]]:
+    found = {views.name_of(entry.row): entry for entry in made}
     places = dict(
         zip(map(views.name_of, listing.ranked), standings.ranks(listing.ranked), strict=True)
     )
-    groups = (listing.audited, listing.reported, listing.few)
-    made = []
-    for group, rows in zip(GROUPS, groups, strict=True):
+    shown_rows = []
+    for group, rows in zip(GROUPS, (listing.ranked, listing.few, listing.outside), strict=True):
         for row in rows:
             place = places.get(views.name_of(row))
-            made.append(
+            shown_rows.append(
                 {
                     "group": group,
                     "rank": "-" if place is None else str(place),
                     "place": None if place is None else place.first,
-                    **_row(row, columns, paper),
+                    **_row(row, columns, found.get(views.name_of(row))),
                 }
             )
-    return made
+    return shown_rows
 
 
-def _row(row: Row, columns: Sequence[Column], paper: Row | None) -> dict[str, Any]:
+def _row(row: Row, columns: Sequence[Column], against: Claim | None) -> dict[str, Any]:
     controller, factor = row["controller"], views.factor_of(row)
-    learned = controller["kind"] != "classical"
-    against = claims.claim(row, paper) if learned and paper is not None else None
     times = row["volatile"].get("predict_us") or {}
+    split = views.published_split(row)
     return {
         "row": row["row"],
         "controller": controller["name"],
@@ -113,8 +112,12 @@ def _row(row: Row, columns: Sequence[Column], paper: Row | None) -> dict[str, An
         "seeds": views.training_seeds(row),
         "knows": controller["knowledge"],
         "state": "audited" if views.is_audited(row) else "self-reported",
+        "verified": views.verified_words(row),
+        "split": split,
         "preview": rounded(controller["preview_seconds"]),
         "score": _numbers(views.interval(row), factor),
+        "iqm": _numbers(views.middle(row), factor),
+        "public": _numbers(views.interval(row, split=views.PUBLIC), factor),
         "gap": _numbers(views.gap(row), factor),
         "worse": views.is_worse_unseen(row),
         "smooth": _numbers(views.smooth(row), factor),
@@ -122,6 +125,10 @@ def _row(row: Row, columns: Sequence[Column], paper: Row | None) -> dict[str, An
         "claim": board_summary.plain_verdict(against) if against else "",
         "metrics": [rounded(f * views.mean_of(row, metric)) for metric, _, f in columns],
         "settings": [rounded(factor * value) for value in views.by_setting(row).values()],
+        "trainings": {
+            str(seed): rounded(factor * value)
+            for seed, value in views.by_training_seed(row).items()
+        },
         "failures": list(views.failures_of(row)),
         "step_us": [rounded(times.get("median")), rounded(times.get("p99"))],
         "traces": bool(row.get("traces")),
@@ -146,6 +153,7 @@ def _origin(row: Row) -> dict[str, Any]:
         "audit": _audit_words(row),
         "task": row.get("task", ""),
         "artefact": (controller.get("artefact") or {}).get("digest", ""),
+        "checksum": row.get(CHECKSUM, ""),
         "made_with": ", ".join(f"{name} {v}" for name, v in sorted(made["packages"].items())),
         "commit": made["commit"],
         "again": again(row, cost),
@@ -156,8 +164,11 @@ def _origin(row: Row) -> dict[str, Any]:
 def _audit_words(row: Row) -> str:
     if not views.is_audited(row):
         return ""
-    salt, drawn = row["audit"]["salt"], row["audit"]["drawn"]
-    return f"salt {salt}, drawn {drawn}, number {views.salts_drawn(row)} of this name in this task"
+    found = views.round_of(row)
+    return (
+        f"round {found['round']}, drawn {found['drawn']}, salt {found['salt']}; artefact number "
+        f"{views.artefacts_audited(row)} of this name in the rounds of this track"
+    )
 
 
 def again(row: Row, cost: views.Cost) -> list[str]:
@@ -175,22 +186,16 @@ def _winner(found: board_summary.Winner) -> dict[str, Any]:
     return {
         "env": found.env,
         "track": found.track,
+        "split": found.split,
         "paper": views.name_of(paper) if paper else "none",
-        "paper_score": _score(paper),
+        "paper_score": board_summary.score_words(paper, found.split),
         "learned": views.name_of(entry.row) if entry else "none",
-        "learned_score": _score(entry.row if entry else None),
+        "learned_score": board_summary.score_words(entry.row if entry else None, found.split),
         "chance": _numbers(entry.probability) if entry else None,
         "cost": board_summary.largest_cost(entry) if entry else "-",
         "verdict": board_summary.plain_verdict(entry) if entry else found.silence,
         "better": entry is not None and entry.verdict == claims.BETTER,
     }
-
-
-def _score(row: Row | None) -> str:
-    if row is None:
-        return "-"
-    unit, factor = shown(views.content_of(row))
-    return f"{bounded(views.interval(row), factor)} {unit}"
 
 
 def _change(found: Changes, kinds: Mapping[str, str]) -> dict[str, Any]:

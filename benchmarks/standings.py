@@ -37,23 +37,33 @@ class Place:
 
 @dataclass(frozen=True)
 class Listing:
-    """The rows of a track.
+    """The rows of a track, the lowest error first.
 
     Attributes
     ----------
-    audited, reported, few : list of rows
-        With a published score on audit episodes; without; and with too few training seeds. Each
-        by its mean over the public episodes, the lowest first.
+    ranked, few : list of rows
+        In the audit round of the track; those with too few training seeds for a rank apart. All
+        rows where there has been no round yet.
+    outside : list of rows
+        Not in the round of a track that has one.
+    missing : tuple of str
+        Controllers that are in the round and have no row.
     """
 
-    audited: Track
-    reported: Track
+    ranked: Track
     few: Track
+    outside: Track
+    missing: tuple[str, ...]
 
     @property
-    def ranked(self) -> Track:
-        """The rows that ranks and claims are of: the audited ones, all where none is audited."""
-        return self.audited or self.reported
+    def inside(self) -> Track:
+        """The rows that are compared with each other."""
+        return [*self.ranked, *self.few]
+
+    @property
+    def split(self) -> str:
+        """Which episodes they are compared on."""
+        return views.published_split(self.inside[0])
 
 
 def tracks(rows: Sequence[Row]) -> dict[str, Track]:
@@ -72,43 +82,53 @@ def _family(row: Row) -> str:
 
 
 def ordered(rows: Sequence[Row]) -> Track:
-    """Return rows by the mean of their headline over the public episodes, the lowest first."""
-    keys = {id(row): (views.mean_of(row, split=views.PUBLIC), views.name_of(row)) for row in rows}
-    return sorted(rows, key=lambda row: keys[id(row)])
+    """Return the rows of a track by the mean of their headline, the lowest first.
+
+    Rows of the audit round by its episodes; after them the others, by the public ones.
+    """
+    return sorted(rows, key=_order)
+
+
+def _order(row: Row) -> tuple[bool, float, str]:
+    mean = views.mean_of(row)
+    return not views.is_audited(row), np.inf if np.isnan(mean) else mean, views.name_of(row)
 
 
 def listing(rows: Sequence[Row]) -> Listing:
-    """Return which rows of a track are audited, self-reported, or of too few training seeds."""
+    """Return which rows of a track are compared, and which are listed apart."""
     best_first = ordered(rows)
-    few = [row for row in best_first if not views.is_listed(row)]
-    kept = [row for row in best_first if views.is_listed(row)]
-    audited = [row for row in kept if views.is_audited(row)]
-    return Listing(audited, [row for row in kept if not views.is_audited(row)], few)
+    audited = [row for row in best_first if views.is_audited(row)]
+    inside = audited or best_first
+    present = {views.name_of(row) for row in inside}
+    entrants = views.round_of(audited[0])["entrants"] if audited else ()
+    return Listing(
+        ranked=[row for row in inside if views.is_listed(row)],
+        few=[row for row in inside if not views.is_listed(row)],
+        outside=best_first[len(inside) :],
+        missing=tuple(sorted(set(entrants) - present)),
+    )
 
 
 def difference(first: Row, second: Row) -> Interval | None:
-    """Return the headline of ``first`` less that of ``second`` over the public episodes, paired.
+    """Return the headline of ``first`` less that of ``second``, paired by episode.
 
-    ``None`` if they have not run the same episodes.
+    Over the audit episodes where both have them, else over the public ones; ``None`` if they have
+    not run the same.
     """
-    if not views.same_episodes(first, second):
+    split = views.common_split(first, second)
+    if split is None:
         return None
-    a, b = views.scores(first), views.scores(second)
-    return statistics.difference_of_tables(a.table, _arranged(b, a), a.strata)
-
-
-def _arranged(given: views.Scores, like: views.Scores) -> statistics.Array:
-    """Return the table with its columns in the order of another's."""
-    place = {pair: k for k, pair in enumerate(given.pairs)}
-    return given.table[:, [place[pair] for pair in like.pairs]]
+    a, b = (views.scores(row, split=split) for row in (first, second))
+    return statistics.difference_of_tables(a.table, b.table, a.strata)
 
 
 def improvement(first: Row, second: Row) -> Interval | None:
     """Return how likely ``first`` has the smaller headline, over training seeds and episodes."""
-    if not views.same_episodes(first, second):
+    split = views.common_split(first, second)
+    if split is None:
         return None
-    a, b = views.scores(first), views.scores(second)
-    return statistics.probability_of_improvement(a.table, _arranged(b, a), a.strata)
+    a, b = (views.scores(row, split=split) for row in (first, second))
+    return statistics.probability_of_improvement(a.table, b.table, a.strata)
 
 
 def ranks(best_first: Sequence[Row]) -> list[Place]:
@@ -146,6 +166,8 @@ class Changes:
     env : str
     tracks : tuple of str
         The nominal one first.
+    splits : tuple of str
+        Which episodes the places of each track are of.
     places : mapping from controller to a place a track
         In the order of the first track.
     agreement : tuple of float
@@ -154,14 +176,9 @@ class Changes:
 
     env: str
     tracks: tuple[str, ...]
+    splits: tuple[str, ...]
     places: Mapping[str, tuple[Place, ...]]
     agreement: tuple[float, ...]
-
-    def largest(self, controller: str) -> int:
-        """Return the largest change of place against the first track; below zero: it does worse."""
-        first, *others = self.places[controller]
-        moves = [first.first - place.first for place in others]
-        return max(moves, key=abs, default=0)
 
 
 def changes(by_track: Mapping[str, Sequence[Row]]) -> list[Changes]:
@@ -186,14 +203,12 @@ def _changes(env: str, names: list[str], by_track: Mapping[str, Sequence[Row]]) 
         n: dict(zip(map(views.name_of, rows), ranks(rows), strict=True)) for n, rows in kept.items()
     }
     order = [views.name_of(row) for row in kept[names[0]]]
-    means = {
-        n: {views.name_of(r): views.mean_of(r, split=views.PUBLIC) for r in rows}
-        for n, rows in kept.items()
-    }
+    means = {n: {views.name_of(r): views.mean_of(r) for r in rows} for n, rows in kept.items()}
     first = [means[names[0]][c] for c in order]
     agreement = [_tau(first, [means[n][c] for c in order]) for n in names]
     places = {c: tuple(placed[n][c] for n in names) for c in order}
-    return Changes(env, tuple(names), places, tuple(agreement))
+    splits = tuple(views.published_split(by_track[n][0]) for n in names)
+    return Changes(env, tuple(names), splits, places, tuple(agreement))
 
 
 def _tau(first: Sequence[float], second: Sequence[float]) -> float:

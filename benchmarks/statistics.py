@@ -6,26 +6,25 @@ runs are training seeds, tasks are paired episodes, and less is better.
 
 Episodes are drawn again within their scenario (stratified), with a fixed seed, so that the same
 scores give the same interval to the last bit. Training seeds are drawn as wholes, since one policy
-answers in all scenarios. A group of n is resampled by n - 1 draws: with n draws the interval would
-be too narrow by sqrt((n - 1) / n), a tenth for five seeds (J. N. K. Rao and C. F. J. Wu,
-"Resampling inference with complex survey data", Journal of the American Statistical Association 83
-(1988) 231).
+answers in all scenarios. Episodes of two scenarios have to be independent, so no seed may stand in
+both. How it is drawn stands in :mod:`benchmarks.draws`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
+from benchmarks.draws import counts, draw_clusters, resample_indices
+
 BOOTSTRAP_SEED = 20_000_003
 RESAMPLES = 5000
-CONFIDENCE = 0.95
+_BOUNDS = (0.025, 0.975)
 _LARGEST = 4_000_000
 """Numbers that resamples may hold at once."""
 
@@ -41,9 +40,9 @@ class Interval:
     low: float
     high: float
 
-    def overlaps(self, other: Interval) -> bool:
-        """Return whether the two intervals have a point in common."""
-        return self.low <= other.high and other.low <= self.high
+
+NOTHING = Interval(float("nan"), float("nan"), float("nan"))
+"""The estimate of a quantity that no episode has."""
 
 
 def mean(samples: Array) -> Array:
@@ -52,76 +51,19 @@ def mean(samples: Array) -> Array:
 
 
 def interquartile_mean(samples: Array) -> Array:
-    """Return the mean of the middle half over the last axis, shape (..., n) to (...)."""
+    """Return the mean of the middle half over the last axis, shape (..., n) to (...).
+
+    A quarter of n, rounded down, is left out at either end. A resample of s strata has n - s
+    episodes, so that with few episodes a stratum the middle that it keeps is another share: of two
+    scenarios with five episodes each, 4 of 8 where the estimate keeps 6 of 10.
+    """
     return np.asarray(stats.trim_mean(samples, 0.25, axis=-1))
-
-
-def resample_indices(strata: ArrayLike, resamples: int, seed: int) -> NDArray[np.int64]:
-    """Return row numbers of stratified resamples, shape (resamples, n - number of strata).
-
-    Parameters
-    ----------
-    strata : (n,) array
-        Label of each sample's stratum. A stratum of one sample keeps it in every resample.
-    resamples : int
-    seed : int
-    """
-    return _indices(tuple(np.asarray(strata).tolist()), resamples, seed)
-
-
-@lru_cache(maxsize=16)  # all rows of a track ask for the same
-def _indices(strata: tuple[Hashable, ...], resamples: int, seed: int) -> NDArray[np.int64]:
-    members: dict[Hashable, list[int]] = {}
-    for place, label in enumerate(strata):
-        members.setdefault(label, []).append(place)
-    generator = np.random.Generator(np.random.PCG64(seed))
-    parts = []
-    for rows in map(np.array, members.values()):
-        draws = max(1, len(rows) - 1)
-        parts.append(rows[generator.integers(0, len(rows), (resamples, draws))])
-    drawn = np.concatenate(parts, axis=1)
-    drawn.setflags(write=False)
-    return drawn
-
-
-def draw_clusters(strata: ArrayLike, resamples: int, seed: int) -> NDArray[np.int64]:
-    """Return row numbers of resamples of whole strata, and of the samples within each drawn one.
-
-    Parameters
-    ----------
-    strata : (n,) array
-        Label of each sample's stratum; all of one size.
-    resamples : int
-    seed : int
-
-    Returns
-    -------
-    (resamples, m) array
-    """
-    return _clusters(tuple(np.asarray(strata).tolist()), resamples, seed)
-
-
-@lru_cache(maxsize=8)
-def _clusters(strata: tuple[Hashable, ...], resamples: int, seed: int) -> NDArray[np.int64]:
-    members: dict[Hashable, list[int]] = {}
-    for place, label in enumerate(strata):
-        members.setdefault(label, []).append(place)
-    sizes = {len(group) for group in members.values()}
-    if len(sizes) != 1:
-        raise ValueError(f"strata of {sorted(sizes)} samples: run all of them with the same seeds")
-    rows, size = np.array(list(members.values())), sizes.pop()
-    generator = np.random.Generator(np.random.PCG64(seed))
-    chosen = generator.integers(0, len(rows), (resamples, max(1, len(rows) - 1)))
-    within = generator.integers(0, size, (*chosen.shape, max(1, size - 1)))
-    drawn = np.asarray(rows[chosen[..., None], within].reshape(resamples, -1))
-    drawn.setflags(write=False)
-    return drawn
 
 
 def crossed(
     samples: ArrayLike, runs: Sequence[Hashable], pairs: Sequence[Hashable]
 ) -> tuple[Array, list[Any]]:
-    """Return samples as a table of runs by pairs, and the pairs in order of their first mention.
+    """Return samples as a table of runs by pairs, and the pairs; both in ascending order.
 
     Parameters
     ----------
@@ -138,23 +80,33 @@ def crossed(
     ValueError
         If an episode of a run is missing or there twice.
     """
-    rows = {run: i for i, run in enumerate(dict.fromkeys(runs))}
-    columns = {pair: k for k, pair in enumerate(dict.fromkeys(pairs))}
+    rows = _places(runs)
+    columns = _places(pairs)
     values = np.asarray(samples, float)
-    places = {(rows[run], columns[pair]) for run, pair in zip(runs, pairs, strict=True)}
-    if len(places) != len(values) or len(values) != len(rows) * len(columns):
+    table = np.empty((len(rows), len(columns)))
+    filled = np.zeros(table.shape, int)
+    for run, pair, value in zip(runs, pairs, values, strict=True):
+        table[rows[run], columns[pair]] = value
+        filled[rows[run], columns[pair]] += 1
+    if (filled != 1).any():
         raise ValueError(
             f"{len(values)} episodes of {len(rows)} training seeds and {len(columns)} scenarios x "
             "seeds: every training seed must be run in every episode, once"
         )
-    table = np.empty((len(rows), len(columns)))
-    for run, pair, value in zip(runs, pairs, values, strict=True):
-        table[rows[run], columns[pair]] = value
     return table, list(columns)
 
 
+def _places(labels: Sequence[Any]) -> dict[Any, int]:
+    return {label: k for k, label in enumerate(sorted(set(labels)))}
+
+
 def resampled(
-    table: Array, strata: ArrayLike, statistic: Statistic, resamples: int, seed: int
+    table: Array,
+    strata: ArrayLike,
+    statistic: Statistic,
+    resamples: int,
+    seed: int,
+    run_seed: int | None = None,
 ) -> Array:
     """Return a statistic of resamples of a table: of its runs, and of episodes within strata.
 
@@ -163,6 +115,9 @@ def resampled(
     table : (runs, n) array
     strata : (n,) array
         Of the columns. With one run the draws are those of the columns alone.
+    run_seed : int, optional
+        Of the draws of runs, ``seed + 1`` if not given. Tables of the same runs that share it are
+        resampled with the same runs.
 
     Returns
     -------
@@ -171,7 +126,8 @@ def resampled(
     columns = resample_indices(strata, resamples, seed)
     if len(table) == 1:
         return np.asarray(statistic(table[0][columns]))
-    rows = resample_indices(np.zeros(len(table)), resamples, seed + 1)
+    run_seed = seed + 1 if run_seed is None else run_seed
+    rows = resample_indices(np.zeros(len(table)), resamples, run_seed)
     chunk = max(1, _LARGEST // (rows.shape[1] * columns.shape[1]))
     parts = []
     for first in range(0, resamples, chunk):
@@ -190,7 +146,6 @@ def bootstrap(
     pairs: Sequence[Hashable] | None = None,
     resamples: int = RESAMPLES,
     seed: int = BOOTSTRAP_SEED,
-    confidence: float = CONFIDENCE,
 ) -> Interval:
     """Return a statistic with its percentile bootstrap interval, stratified.
 
@@ -204,52 +159,65 @@ def bootstrap(
     statistic : callable
         From (..., n) to (...).
     runs, pairs : sequence of n, optional
-        Training seed of each episode, and what is the same of one episode in all of them. Left
-        out where there is no training. An episode that does not apply in one of the runs is left
-        out in all.
+        Training seed of each episode, and what is the same of one episode in all of them: then
+        the order of the episodes does not matter. Both or none.
 
     Returns
     -------
     Interval
         NaN throughout if no sample applies.
     """
+    if (runs is None) != (pairs is None):
+        raise ValueError("samples of training seeds need `runs` and `pairs` to say which belong")
     labels = np.asarray(strata)
-    several = runs is not None and len(set(runs)) > 1
-    if several and pairs is None:
-        raise ValueError("samples of several training seeds need `pairs` to say which belong")
-    if several:
-        table, order = crossed(samples, runs or (), pairs or ())
-        of_pair = dict(zip(pairs or (), labels.tolist(), strict=True))
-        labels = np.array([of_pair[pair] for pair in order])
-    else:
+    if runs is None or pairs is None:
         table = np.asarray(samples, float)[None, :]
-    applies = np.isfinite(table).all(axis=0)
-    table, labels = table[:, applies], labels[applies]
-    if not table.size:
-        return Interval(float("nan"), float("nan"), float("nan"))
-    drawn = resampled(table, labels, statistic, resamples, seed)
-    return between(float(statistic(table.ravel())), drawn, confidence)
+    else:
+        table, order = crossed(samples, runs, pairs)
+        of_pair = dict(zip(pairs, labels.tolist(), strict=True))
+        labels = np.array([of_pair[pair] for pair in order])
+    return of_table(table, labels, statistic, resamples=resamples, seed=seed)
 
 
-def between(value: float, drawn: Array, confidence: float = CONFIDENCE) -> Interval:
-    """Return an estimate with the quantiles of its resamples."""
-    low, high = np.quantile(drawn, [0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence])
-    return Interval(value, float(low), float(high))
+def applying(table: Array) -> NDArray[np.bool_]:
+    """Return the columns that count, shape (n,): an episode has to apply in every run."""
+    return np.asarray(np.isfinite(table).all(axis=0))
 
 
-def paired_difference(
-    first: ArrayLike, second: ArrayLike, strata: ArrayLike, **options: Any
+def of_table(
+    table: Array,
+    strata: ArrayLike,
+    statistic: Statistic = mean,
+    *,
+    resamples: int = RESAMPLES,
+    seed: int = BOOTSTRAP_SEED,
 ) -> Interval:
-    """Return the mean of ``first - second`` with its interval, episode by episode.
+    """Return a statistic of a table of runs by episodes with its interval.
 
     Parameters
     ----------
-    first, second : (n,) array
-        Scores of two controllers in the same episodes, in the same order.
+    table : (runs, n) array
+        NaN where an episode does not apply, which leaves it out in all runs.
     strata : (n,) array
+        Scenario of each column.
+
+    Returns
+    -------
+    Interval
+        NaN throughout if no episode applies.
     """
-    difference = np.asarray(first, float) - np.asarray(second, float)
-    return bootstrap(difference, strata, **options)
+    counts = applying(table)
+    kept = table[:, counts]
+    if not kept.size:
+        return NOTHING
+    drawn = resampled(kept, np.asarray(strata)[counts], statistic, resamples, seed)
+    return between(float(statistic(kept.ravel())), drawn)
+
+
+def between(value: float, drawn: Array) -> Interval:
+    """Return an estimate with the quantiles of its resamples."""
+    low, high = np.quantile(drawn, _BOUNDS)
+    return Interval(value, float(low), float(high))
 
 
 def difference_of_tables(
@@ -271,15 +239,42 @@ def difference_of_tables(
         Scenario of each column.
     """
     if len(first) == len(second) == 1:
-        return paired_difference(first[0], second[0], strata, resamples=resamples, seed=seed)
+        return of_table(first - second, strata, resamples=resamples, seed=seed)
     columns = resample_indices(strata, resamples, seed)
     averages = []
     for number, table in enumerate((first, second)):
         rows = resample_indices(np.zeros(len(table)), resamples, seed + 1 + number)
-        shares = _counts(rows, len(table)) / rows.shape[1]
+        shares = counts(rows, len(table)) / rows.shape[1]
         averages.append(np.einsum("rt,tk->rk", shares, table))
     drawn = np.take_along_axis(averages[0] - averages[1], columns, axis=1).mean(axis=1)
     return between(float(np.mean(first.mean(axis=0) - second.mean(axis=0))), drawn)
+
+
+def difference_of_splits(
+    first: Array,
+    first_strata: ArrayLike,
+    second: Array,
+    second_strata: ArrayLike,
+    *,
+    resamples: int = RESAMPLES,
+    seed: int = BOOTSTRAP_SEED,
+) -> Interval:
+    """Return by how much the same runs have a larger mean in one set of episodes than in another.
+
+    Runs are paired, so that the scatter between policies cancels; episodes are not.
+
+    Parameters
+    ----------
+    first, second : (runs, n), (runs, m) array
+        A row a training seed, in the same order in both.
+    first_strata, second_strata : (n,), (m,) array
+        Scenario of each column.
+    """
+    drawn = [
+        resampled(table, strata, mean, resamples, own, seed + 1)
+        for table, strata, own in ((first, first_strata, seed), (second, second_strata, seed + 2))
+    ]
+    return between(float(first.mean() - second.mean()), drawn[0] - drawn[1])
 
 
 def probability_of_improvement(
@@ -308,7 +303,7 @@ def probability_of_improvement(
     columns = draw_clusters(strata, resamples, seed)
     # counts and halves: every sum is exact, so that its order does not matter
     ours, theirs = (
-        _counts(resample_indices(np.zeros(len(table)), resamples, seed + 1 + number), len(table))
+        counts(resample_indices(np.zeros(len(table)), resamples, seed + 1 + number), len(table))
         for number, table in enumerate((a, b))
     )
     hits = np.einsum("ra,rb,abk->rk", ours, theirs, below, optimize=True)
@@ -334,17 +329,32 @@ def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Array:
     return np.searchsorted(ordered, np.asarray(thresholds, float), side="right") / len(ordered)
 
 
-def _counts(draws: NDArray[np.int64], size: int) -> Array:
-    """Return how often each of ``size`` was drawn, shape (resamples, size)."""
-    table = np.zeros((len(draws), size))
-    np.add.at(table, (np.arange(len(draws))[:, None], draws), 1.0)
-    return table
+def profile_band(
+    scores: Array,
+    strata: ArrayLike,
+    thresholds: ArrayLike,
+    *,
+    resamples: int = 1000,
+    seed: int = BOOTSTRAP_SEED,
+) -> Array:
+    """Return the pointwise 95 % band of a performance profile.
 
+    Parameters
+    ----------
+    scores : (runs, n) array
+    strata : (n,) array
+        Scenario of each column.
+    thresholds : (m,) array
 
-def share_better(first: ArrayLike, second: ArrayLike) -> float:
-    """Return the share of paired episodes in which ``first`` is below ``second``, ties half."""
-    a, b = np.asarray(first, float), np.asarray(second, float)
-    both = np.isfinite(a) & np.isfinite(b)
-    if not both.any():
-        return float("nan")
-    return float(np.mean(np.where(a < b, 1.0, np.where(a == b, 0.5, 0.0))[both]))
+    Returns
+    -------
+    (2, m) array
+        Lower and upper bounds.
+    """
+    below = (scores[:, :, None] <= np.asarray(thresholds, float)).astype(float)
+    columns = counts(resample_indices(strata, resamples, seed), scores.shape[1])
+    rows = counts(resample_indices(np.zeros(len(scores)), resamples, seed + 1), len(scores))
+    hits = np.zeros((resamples, below.shape[2]))
+    for weights, of_run in zip(rows.T, below, strict=True):
+        hits += weights[:, None] * (columns @ of_run)
+    return np.quantile(hits / (rows[0].sum() * columns[0].sum()), _BOUNDS, axis=0)

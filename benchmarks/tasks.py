@@ -1,19 +1,46 @@
-"""What a score is of: environment, scenarios, plants and metrics, in one digest."""
+"""What a score is of: environment, scenarios, plants, models and metrics, in one digest."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 
 from benchmarks.canonical import digest
-from benchmarks.making import make_env
+from benchmarks.making import make_env, model_of
+from benchmarks.provenance import HERE, METRICS
 from benchmarks.scenarios import ScenarioSet
 from benchmarks.source_code import code_digest
 
-HERE = Path(__file__).resolve().parent
+GROUPS_OF = {
+    "metrics_knee.py": {"range", "gait"},
+    "metrics_elbow.py": {"elbow"},
+    "metrics_joint.py": {"joint", "chain"},
+}
+"""Pages of metrics that only tracks with one of these groups are scored by."""
+
+
+@dataclass(frozen=True)
+class Built:
+    """What is known of a track once its environments were built.
+
+    Attributes
+    ----------
+    env : dict
+        Id, version and digest.
+    plants, models : dict of str
+        Digest of each scenario's plant, and of the model that controllers are told.
+    told : tuple of (model, gymnasium.Env)
+        What controllers are built from, each model and set of signals once.
+    """
+
+    env: dict[str, Any]
+    plants: dict[str, str]
+    models: dict[str, str]
+    told: tuple[tuple[Any, Any], ...]
 
 
 def env_version(env: str) -> int:
@@ -64,36 +91,37 @@ def describe_env(env: str) -> dict[str, Any]:
     return {"id": env, "version": env_version(env), "digest": digest(about)}
 
 
-def plants_of(track: ScenarioSet) -> dict[str, str]:
-    """Return the digest of each scenario's plant."""
-    found = {}
+@lru_cache(maxsize=64)
+def built(track: ScenarioSet) -> Built:
+    """Return what the environments of a track are; they are built once in a process."""
+    plants, models = {}, {}
+    told: dict[Any, tuple[Any, Any]] = {}
     for scenario in track.scenarios():
         env = make_env(track.env, scenario.kwargs)
-        found[scenario.name] = env.unwrapped.plant.digest()
+        model, base = model_of(track.env, scenario, env), env.unwrapped
+        plants[scenario.name], models[scenario.name] = base.plant.digest(), model.digest()
+        told.setdefault((model.digest(), *base.signals, *base.action_signals), (model, env))
         env.close()
-    return found
+    return Built(describe_env(track.env), plants, models, tuple(told.values()))
 
 
-@lru_cache(maxsize=1)
-def metrics_digest() -> str:
-    """Return the digest of what the metrics' code says."""
-    return code_digest(HERE.glob("metrics*.py"), HERE)
+@lru_cache(maxsize=16)
+def metrics_digest(groups: frozenset[str]) -> str:
+    """Return the digest of what the code says that scores tracks of these groups."""
+    unused = {name for name, own in GROUPS_OF.items() if not own & groups}
+    return code_digest([HERE / name for name in {"errors.py", *METRICS} - unused], HERE)
 
 
-def task_digest(track: ScenarioSet, plants: dict[str, str] | None = None) -> str:
-    """Return the SHA-256 of environment, scenarios, metrics and plants.
-
-    Parameters
-    ----------
-    track : ScenarioSet
-    plants : mapping of str, optional
-        Digest of each scenario's plant, where it is known.
-    """
+def task_digest(track: ScenarioSet) -> str:
+    """Return the SHA-256 of environment, scenarios, metrics, plants and models."""
+    found = built(track)
+    groups: Iterable[str] = track.content.get("metrics") or ()
     return digest(
         {
-            "env": [track.env, env_version(track.env)],
+            "env": found.env,
             "scenarios": track.content,
-            "metrics": metrics_digest(),
-            "plants": plants_of(track) if plants is None else plants,
+            "metrics": metrics_digest(frozenset(groups)),
+            "plants": found.plants,
+            "models": found.models,
         }
     )

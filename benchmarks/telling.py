@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from benchmarks import rows
+from benchmarks.audit import Round
 from benchmarks.metrics import headline_of
 from benchmarks.runner import Report
 from benchmarks.verify import Verdict
@@ -47,8 +48,16 @@ def _score(path: Path) -> str:
     return said
 
 
+def round_in_words(found: Round) -> str:
+    """Return number, size, salt and day of a round."""
+    return (
+        f"round {found.number}, {len(found.entrants)} controllers, salt {found.salt} of "
+        f"{found.drawn}"
+    )
+
+
 def verdict(found: Verdict) -> None:
-    """Print whether a row holds, and what has drifted."""
+    """Print whether a row holds, what has drifted, and what to do about it."""
     print(f"{found.row}: {'holds' if found.holds else 'DRIFTED'}", flush=True)
     for line in found.drifted[:LINES]:
         print(f"  {line}")
@@ -56,3 +65,6 @@ def verdict(found: Verdict) -> None:
         print(f"  and {len(found.drifted) - LINES} fields more")
     for line in found.notes:
         print(f"  note: {line}")
+    command = rows.command(found.row)
+    if not found.holds and not any(command in line for line in found.drifted):
+        print(f"  if this checkout is right, run the row again: {command}")

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from benchmarks import statistics
+from benchmarks import rows, statistics
+from benchmarks.cells import AUDIT, PUBLIC
 from benchmarks.metrics import headline_of
-from benchmarks.rows import Row, scores_of, shown
+from benchmarks.rows import Row, episodes_of, scores_of, shown
 from benchmarks.scenarios import ScenarioSet
 from benchmarks.statistics import Array, Interval
 
-PUBLIC, AUDIT = "public", "audit"
 LISTED_SEEDS = 5
 """Training seeds that a learned row needs to be ranked."""
+VERIFIED = "verified"
+"""Key under which :func:`benchmarks.leaderboard.load` puts a row's verification."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,14 @@ class Scores:
     table : (runs, n) array
         A row a training seed (one for a classical controller), a column an episode.
     pairs : tuple of (scenario, seed)
-        Of each column.
+        Of each column, ascending.
+    runs : tuple of int or None
+        Training seed of each row, ascending.
     """
 
     table: Array
     pairs: tuple[tuple[str, int], ...]
+    runs: tuple[int | None, ...] = (None,)
 
     @property
     def strata(self) -> list[str]:
@@ -60,18 +63,18 @@ def factor_of(row: Mapping[str, Any]) -> float:
     return shown(content_of(row))[1]
 
 
-def episodes_of(row: Mapping[str, Any], split: str = PUBLIC) -> list[Mapping[str, Any]]:
-    """Return the public or the audit episodes of a row."""
-    return [episode for episode in row["episodes"] if episode.get("split", PUBLIC) == split]
-
-
 def is_audited(row: Mapping[str, Any]) -> bool:
-    """Return whether the row's published score is of audit episodes."""
-    return bool(row.get("audit")) and bool(episodes_of(row, AUDIT))
+    """Return whether the row is in the audit round of its track."""
+    return row["audit"] is not None
+
+
+def round_of(row: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the audit round that a row is in: number, salt, day, and its entrants' names."""
+    return dict(row["audit"])
 
 
 def published_split(row: Mapping[str, Any]) -> str:
-    """Return which episodes the published score is of."""
+    """Return which episodes the row's score is of: the audit's if it is in the round."""
     return AUDIT if is_audited(row) else PUBLIC
 
 
@@ -87,67 +90,62 @@ def is_listed(row: Mapping[str, Any]) -> bool:
     return row["controller"]["kind"] == "classical" or training_seeds(row) >= LISTED_SEEDS
 
 
-def scores(row: Mapping[str, Any], metric: str = "", split: str = PUBLIC) -> Scores:
-    """Return a metric of all episodes of a row, the headline where none is named."""
-    return of_episodes(episodes_of(row, split), metric or headline_of(content_of(row)))
+def scores(row: Mapping[str, Any], metric: str = "", split: str = "") -> Scores:
+    """Return a metric of the episodes of a row: a table of training seeds by paired episodes.
 
-
-def of_episodes(episodes: list[Mapping[str, Any]], metric: str) -> Scores:
-    """Return a metric of episodes as a table of training seeds by paired episodes."""
-    runs: list[Hashable] = [episode.get("training_seed") for episode in episodes]
+    Parameters
+    ----------
+    row : Row
+    metric : str
+        The headline if none is named.
+    split : str
+        The published one if none is named.
+    """
+    episodes = episodes_of(row, split or published_split(row))
+    values = scores_of(episodes, metric or headline_of(content_of(row)))
+    runs = [episode["training_seed"] for episode in episodes]
     pairs = [(str(episode["scenario"]), int(episode["seed"])) for episode in episodes]
-    table, order = statistics.crossed(scores_of(episodes, metric), runs, pairs)
-    place = {name: i for i, name in enumerate(dict.fromkeys(scenario for scenario, _ in order))}
-    ordered = sorted(range(len(order)), key=lambda k: (place[order[k][0]], order[k][1]))
-    return Scores(table[:, ordered], tuple(order[k] for k in ordered))
+    table, order = statistics.crossed(values, runs, pairs)
+    return Scores(table, tuple(order), tuple(sorted(set(runs))))
 
 
-def mean_of(row: Mapping[str, Any], metric: str = "", split: str | None = None) -> float:
+def mean_of(row: Mapping[str, Any], metric: str = "", split: str = "") -> float:
     """Return the mean of a metric over the published episodes, NaN where it never applies."""
-    metric = metric or headline_of(content_of(row))
-    values = scores_of(episodes_of(row, split or published_split(row)), metric)
-    return (
-        float(np.mean(values[np.isfinite(values)])) if np.isfinite(values).any() else float("nan")
-    )
+    table = scores(row, metric, split).table
+    kept = table[:, statistics.applying(table)]
+    return float(kept.mean()) if kept.size else float("nan")
 
 
-def interval(row: Mapping[str, Any], metric: str = "", split: str | None = None) -> Interval:
+def interval(row: Mapping[str, Any], metric: str = "", split: str = "") -> Interval:
     """Return the mean of a metric over the published episodes with its 95 % interval."""
-    found = scores(row, metric, split or published_split(row))
-    return table_interval(found)
+    found = scores(row, metric, split)
+    return statistics.of_table(found.table, found.strata)
 
 
-def table_interval(found: Scores, statistic: statistics.Statistic = statistics.mean) -> Interval:
-    """Return a statistic of scores with its 95 % interval, over training seeds and seeds."""
-    applies = np.isfinite(found.table).all(axis=0)
-    table, strata = found.table[:, applies], found.strata
-    if not table.size:
-        return Interval(float("nan"), float("nan"), float("nan"))
-    labels = [strata[k] for k in np.flatnonzero(applies)]
-    drawn = statistics.resampled(
-        table, labels, statistic, statistics.RESAMPLES, statistics.BOOTSTRAP_SEED
-    )
-    return statistics.between(float(statistic(table.ravel())), drawn)
+def middle(row: Mapping[str, Any]) -> Interval:
+    """Return the interquartile mean of the headline over the published episodes."""
+    found = scores(row)
+    return statistics.of_table(found.table, found.strata, statistics.interquartile_mean)
+
+
+def by_training_seed(row: Mapping[str, Any], split: str = "") -> dict[int, float]:
+    """Return the headline's mean of each training seed, nothing for a classical controller."""
+    found = scores(row, split=split)
+    means = found.table.mean(axis=1).tolist()
+    return {run: mean for run, mean in zip(found.runs, means, strict=True) if run is not None}
 
 
 def gap(row: Mapping[str, Any]) -> Interval | None:
     """Return the headline's audit mean less its public mean, ``None`` where there is no audit."""
     if not is_audited(row):
         return None
-    public, audit = scores(row), scores(row, split=AUDIT)
-    drawn = [
-        statistics.resampled(found.table, found.strata, statistics.mean, statistics.RESAMPLES, seed)
-        for found, seed in ((audit, statistics.BOOTSTRAP_SEED), (public, _OTHER_SEED))
-    ]
-    return statistics.between(float(audit.table.mean() - public.table.mean()), drawn[0] - drawn[1])
+    audit, public = scores(row, split=AUDIT), scores(row, split=PUBLIC)
+    return statistics.difference_of_splits(audit.table, audit.strata, public.table, public.strata)
 
 
-_OTHER_SEED = statistics.BOOTSTRAP_SEED + 1_000
-
-
-def salts_drawn(row: Mapping[str, Any]) -> int:
-    """Return how many salts the controller's name has had in this task, 0 without an audit."""
-    return int(row["audit"].get("draw", 1)) if is_audited(row) else 0
+def artefacts_audited(row: Mapping[str, Any]) -> int:
+    """Return how many artefacts of this name the rounds of the track have had, 0 without one."""
+    return int(row["audit"]["entry"]) if is_audited(row) else 0
 
 
 def is_worse_unseen(row: Mapping[str, Any]) -> bool:
@@ -156,10 +154,18 @@ def is_worse_unseen(row: Mapping[str, Any]) -> bool:
     return found is not None and found.low > 0.0
 
 
-def failures_of(row: Mapping[str, Any]) -> tuple[int, int]:
+def failures_of(row: Mapping[str, Any], split: str = "") -> tuple[int, int]:
     """Return how many of the published episodes failed, and their number."""
-    episodes = episodes_of(row, published_split(row))
+    episodes = episodes_of(row, split or published_split(row))
     return sum(bool(episode["failed"]) for episode in episodes), len(episodes)
+
+
+def verified_words(row: Mapping[str, Any]) -> str:
+    """Return whether and when the row, as it is, was run again and came out the same."""
+    found = row.get(VERIFIED)
+    if not found:
+        return "not verified yet"
+    return f"verified {found['date']}" + (" elsewhere" if found["mode"] == "elsewhere" else "")
 
 
 JUMPING = ("steps", "staircase")
@@ -178,28 +184,31 @@ def smooth(row: Mapping[str, Any]) -> Interval | None:
     kept = {name for name, family in families.items() if family not in JUMPING}
     if len(kept) in (0, len(families)):
         return None
-    found = scores(row, split=published_split(row))
-    columns = [k for k, (scenario, _) in enumerate(found.pairs) if scenario in kept]
-    return table_interval(Scores(found.table[:, columns], tuple(found.pairs[k] for k in columns)))
+    found = scores(row)
+    columns = [k for k, scenario in enumerate(found.strata) if scenario in kept]
+    return statistics.of_table(found.table[:, columns], [found.strata[k] for k in columns])
 
 
 def by_setting(row: Mapping[str, Any]) -> dict[tuple[str, str], float]:
     """Return the headline's mean for each value of each axis of the grid."""
-    made = {s.name: s.kwargs for s in ScenarioSet(content_of(row)).scenarios()}
-    found = scores(row, split=published_split(row))
-    means = found.table.mean(axis=0)
-    table: dict[tuple[str, str], float] = {}
-    for axis, points in (content_of(row).get("grid") or {}).items():
-        for point in points:
-            chosen = [made[scenario][axis] == point for scenario in found.strata]
-            table[axis, str(point)] = float(means[chosen].mean())
-    return table
+    episodes = episodes_of(row, published_split(row))
+    found = rows.breakdown(ScenarioSet(content_of(row)), episodes)
+    return {(axis, point): value for axis, of in found.items() for point, value in of.items()}
 
 
-def same_episodes(first: Row, second: Row) -> bool:
-    """Return whether two rows are of the same public episodes of the same task."""
-    tasks = {row.get("task") for row in (first, second)}
-    return len(tasks) == 1 and set(scores(first).pairs) == set(scores(second).pairs)
+def pairs_of(row: Mapping[str, Any], split: str) -> frozenset[tuple[str, int]]:
+    """Return scenario and seed of the episodes of a split, the same for all training seeds."""
+    return frozenset((e["scenario"], e["seed"]) for e in episodes_of(row, split))
+
+
+def common_split(first: Row, second: Row) -> str | None:
+    """Return which episodes two rows are compared on, ``None`` if they have not run the same.
+
+    The audit's if both are in the round, the public ones otherwise.
+    """
+    split = AUDIT if is_audited(first) and is_audited(second) else PUBLIC
+    same = first["task"] == second["task"] and pairs_of(first, split) == pairs_of(second, split)
+    return split if same else None
 
 
 @dataclass(frozen=True)
@@ -234,7 +243,7 @@ def cost_of(row: Mapping[str, Any]) -> Cost:
     trials = [r["tuning_trials"] for r in records if r.get("tuning_trials") is not None]
     hardware = dict.fromkeys(str(r["hardware"]) for r in records if r.get("hardware"))
     return Cost(
-        tuning=str(tuning.get("how", "search" if trials else "")),
+        tuning=str(tuning.get("how", "search" if trials else "by hand" if records else "")),
         trials=max(trials) if trials else tuning.get("trials"),
         steps=_average(records, "steps"),
         seconds=_average(records, "seconds"),
@@ -243,6 +252,6 @@ def cost_of(row: Mapping[str, Any]) -> Cost:
     )
 
 
-def _average(records: list[Mapping[str, Any]], name: str) -> float | None:
+def _average(records: Sequence[Mapping[str, Any]], name: str) -> float | None:
     known = [float(record[name]) for record in records if record.get(name) is not None]
     return sum(known) / len(known) if known else None

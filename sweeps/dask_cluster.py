@@ -71,8 +71,7 @@ def _round(client: Client, act: Act, tasks: Mapping[str, Task]) -> Iterator[Done
             yield Done(key, error=_sentence(error), lost=isinstance(error, KilledWorker))
         else:
             raise ValueError(
-                "the Dask scheduler went away; what was done is "
-                "kept: start again when it is back"
+                "the Dask scheduler went away; what was done is kept: start again when it is back"
             )
 
 

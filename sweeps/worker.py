@@ -19,14 +19,16 @@ _alone = threading.Lock()
 def do(act: Act, task: Task, key: str) -> Done:
     """Do a task; an exception is returned as a sentence.
 
-    A worker that has other sources or packages than the caller would give another result. It has
-    another key for the task, and gives none.
+    A worker that has other sources or packages than the caller, or another kind of processor where
+    that is part of a task's key, would give another result. It has another key for the task, and
+    gives none.
     """
     try:
         if task.key != key:
             raise ValueError(
-                "this worker has other sources or package versions than the one that asks; give "
-                "both the same checkout and packages, start the workers anew, and the sweep again"
+                "this worker has other sources, package versions or another processor than the one "
+                "that asks; give both the same checkout, packages and kind of processor, start the "
+                "workers anew, and the sweep again"
             )
         return Done(key, act(task))
     except Exception as error:

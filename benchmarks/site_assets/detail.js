@@ -2,13 +2,20 @@
 // What opens below a row: trajectories, the plant's loop, and all that runs the row again.
 
 const traces = {};
-const waiting = {};
+const loading = {};
 
 // Called by the files in data/traces.
 function loadTraces(row, found) {
   traces[row] = found.map((trace) => ({ ...trace, values: unpackAll(trace.signals) }));
-  (waiting[row] ?? []).forEach((act) => act());
-  delete waiting[row];
+}
+
+function loaded(row) {
+  return (loading[row] ??= new Promise((done, fail) => {
+    const src = `data/traces/${encodeURIComponent(row)}.js`, script = make("script", { src });
+    script.addEventListener("load", done);
+    script.addEventListener("error", () => fail(new Error(`${src} cannot be read; build the page again.`)));
+    document.head.append(script);
+  }));
 }
 
 function unpack({ low, high, data }) {
@@ -22,16 +29,6 @@ function unpack({ low, high, data }) {
 
 function unpackAll(signals) {
   return Object.fromEntries(Object.entries(signals).map(([name, packed]) => [name, unpack(packed)]));
-}
-
-function withTraces(rows, act) {
-  const missing = rows.filter((row) => !(row in traces));
-  if (!missing.length) { act(); return; }
-  for (const row of missing) {
-    const first = !(row in waiting);
-    (waiting[row] ??= []).push(() => withTraces(rows, act));
-    if (first) document.head.append(make("script", { src: `data/traces/${encodeURIComponent(row)}.js` }));
-  }
 }
 
 function pictures(track, row, paper, number) {
@@ -80,7 +77,7 @@ function tracesPart(track, row, paper) {
   const part = make("div", { class: "traces" });
   if (!row.traces) { part.append(make("p", { class: "note" }, "No trajectories in this row.")); return part; }
   const rows = [row.row, ...(paper?.traces ? [paper.row] : [])];
-  withTraces(rows, () => {
+  Promise.all(rows.map(loaded)).then(() => {
     const holder = make("div", {}), choice = make("select", { class: "episode" });
     traces[row.row].forEach((trace, k) => {
       const trained = trace.training_seed === null ? "" : `, training seed ${trace.training_seed}`;
@@ -88,9 +85,9 @@ function tracesPart(track, row, paper) {
     });
     const draw = () => holder.replaceChildren(pictures(track, row, paper?.traces ? paper : null, Number(choice.value)));
     choice.addEventListener("change", draw);
-    part.replaceChildren(make("label", {}, "Episode ", choice), holder);
+    part.replaceChildren(make("label", {}, "Episode (public) ", choice), holder);
     draw();
-  });
+  }).catch((fault) => part.replaceChildren(make("p", { class: "note" }, fault.message)));
   return part;
 }
 
@@ -122,12 +119,22 @@ function detail(track, row, paper) {
   part.append(tracesPart(track, row, paper));
   part.append(make("h3", {}, "Every metric"), values(track.columns, row.metrics));
   if (track.settings.length) part.append(make("h3", {}, `RMS [${track.unit}] by setting`), values(track.settings, row.settings));
-  part.append(make("h3", {}, "Made by"), facts([
-    ["claim", row.claim], ["gap", row.gap && `${bounded(row.gap)} ${track.unit}, audit minus public`],
-    ["smooth references", row.smooth && `${bounded(row.smooth)} ${track.unit}`], ["cost", costText(row.cost)], ["audit", row.audit],
-    ["task", row.task], ["artefact", row.artefact], ["scenarios", track.digest],
+  const trained = Object.keys(row.trainings), unit = track.unit;
+  if (trained.length) {
+    part.append(make("h3", {}, `RMS [${unit}] by training seed, ${row.split} episodes`));
+    part.append(values(trained.map((seed) => `seed ${seed}`), Object.values(row.trainings)));
+  }
+  part.append(make("h3", {}, "Its score and its record"), facts([
+    ["claim", row.claim], ["IQM", `${bounded(row.iqm)} ${unit}, ${row.split} episodes`],
+    ["public RMS", row.gap && `${bounded(row.public)} ${unit}`], ["audit - public", row.gap && `${bounded(row.gap)} ${unit}`],
+    ["smooth references", row.smooth && `${bounded(row.smooth)} ${unit}`], ["audit", row.audit], ["state", row.verified],
+    ["task", row.task], ["artefact", row.artefact], ["scenarios", track.digest], ["row", row.checksum],
     ["made with", row.made_with], ["commit", row.commit],
   ]));
+  part.append(make("h3", {}, "As stated by its maker, not verified"), facts([
+    ["cost", costText(row.cost)], ["one answer", row.step_us[0] === null ? "" : `${number(row.step_us[0])} µs (median), ${number(row.step_us[1])} µs (p99)`],
+  ]));
+  part.append(make("p", {}, make("a", { class: "raw", href: `rows/${encodeURIComponent(row.row)}.json` }, "All of this row as JSON")));
   part.append(make("h3", {}, "Run it again"), make("pre", { class: "again" }, row.again.join("\n")));
   part.append(make("h3", {}, "Cite it"), make("pre", { class: "bibtex" }, row.bibtex));
   return part;

@@ -1,7 +1,7 @@
 "use strict";
 // Tables, filters, sorting. What is shown stands in the address, so that it can be linked to.
 
-const START = { track: BOARD.tracks[0].name, knows: "", kind: "", state: "", query: "", sort: "", down: "", row: "", env: "" };
+const START = { track: BOARD.tracks[0]?.name ?? "", knows: "", kind: "", state: "", query: "", sort: "", down: "", row: "", env: "" };
 const ALL = { knows: "anything", kind: "any", state: "any" };
 const state = { ...START };
 
@@ -25,29 +25,33 @@ function go(changes) {
 // Columns of the track's table: heading, what is shown, what is sorted by.
 function columns(track) {
   const some = (name) => track.rows.some((row) => row[name]);
-  const paper = track.rows.find((row) => row.controller === track.paper)?.score[0];
-  const lows = track.rows.map((row) => row.score[1]).filter((value) => value > 0);
-  const lowest = Math.min(1e9, ...lows), highest = Math.max(...track.rows.map((row) => row.score[2]));
+  const paper = track.rows.find((row) => row.controller === track.paper)?.score?.[0];
+  const scores = track.rows.map((row) => row.score).filter(Boolean);
+  const lows = scores.map(([, low]) => low).filter((value) => value > 0);
+  const lowest = Math.min(1e9, ...lows), highest = Math.max(0, ...scores.map(([, , high]) => high));
   const range = [lowest, Math.max(Math.min(highest, 10 * (paper || lowest)), 2 * lowest)];
   const step = (row) => row.step_us?.[0] ?? null;
   return [
     { key: "rank", title: "rank", value: (r) => r.place ?? 999, show: (r) => r.rank, number: true },
     { key: "controller", title: "controller", value: (r) => r.controller, show: (r) => r.controller, kind: "name" },
-    { key: "kind", title: "kind", value: (r) => r.kind + r.seeds, show: (r) => (r.seeds ? `${r.kind}, ${r.seeds} seed${r.seeds === 1 ? "" : "s"}` : r.kind), kind: "short" },
+    { key: "kind", title: "kind", value: (r) => r.kind + String(r.seeds).padStart(4, "0"), show: (r) => (r.seeds ? `${r.kind}, ${r.seeds} seed${r.seeds === 1 ? "" : "s"}` : r.kind), kind: "short" },
     { key: "knows", title: "knows", value: (r) => r.knows, show: (r) => r.knows, kind: "short" },
-    { key: "preview", title: "preview [s]", value: (r) => r.preview, show: (r) => (r.preview ? number(r.preview) : "none"), number: true },
-    { key: "score", title: `RMS [${track.unit}] [95 %]`, value: (r) => r.score[0], show: (r) => bounded(r.score), number: true },
-    { key: "picture", title: "", value: (r) => r.score[0], show: (r) => intervalPicture(r.score, range, paper) },
-    some("gap") && { key: "gap", title: `gap [${track.unit}]`, value: (r) => r.gap?.[0] ?? null, show: (r) => signed(r.gap?.[0]), number: true, flag: (r) => r.worse && "worse" },
+    { key: "score", title: `${track.split} RMS [${track.unit}] [95 %]`, value: (r) => r.score?.[0] ?? null, show: (r) => bounded(r.score), number: true },
+    { key: "picture", title: "", show: (r) => (r.score ? intervalPicture(r.score, range, paper) : "–") },
+    some("chance") && { key: "chance", title: `P(improvement), ${track.split} episodes`, value: (r) => r.chance?.[0] ?? null, show: (r) => chance(r.chance), number: true },
+    { key: "iqm", title: `IQM [${track.unit}]`, value: (r) => r.iqm?.[0] ?? null, show: (r) => number(r.iqm?.[0]), number: true },
+    some("gap") && { key: "public", title: `public RMS [${track.unit}]`, value: (r) => r.public?.[0] ?? null, show: (r) => number(r.public?.[0]), number: true },
+    some("gap") && { key: "gap", title: `audit - public [${track.unit}]`, value: (r) => r.gap?.[0] ?? null, show: (r) => signed(r.gap?.[0]), number: true, flag: (r) => r.worse && "worse" },
     some("smooth") && { key: "smooth", title: `smooth [${track.unit}]`, value: (r) => r.smooth?.[0] ?? null, show: (r) => number(r.smooth?.[0]), number: true },
-    some("chance") && { key: "chance", title: "P(improvement)", value: (r) => r.chance?.[0] ?? null, show: (r) => chance(r.chance), number: true },
+    { key: "preview", title: "preview [s]", value: (r) => r.preview, show: (r) => (r.preview ? number(r.preview) : "none"), number: true },
     ...track.costs.map((index) => ({
       key: `m${index}`, title: track.columns[index], value: (r) => r.metrics[index], show: (r) => number(r.metrics[index]), number: true,
     })),
-    { key: "step", title: "step [µs]", value: step, show: (r) => number(step(r)), number: true },
-    { key: "trained", title: "trained [steps]", value: (r) => r.cost.steps, show: (r) => millions(r.cost.steps), number: true },
-    { key: "trials", title: "tuning trials", value: (r) => r.cost.trials, show: (r) => (r.cost.trials === null ? "–" : String(r.cost.trials)), number: true },
     { key: "failures", title: "failures", value: (r) => r.failures[0] / r.failures[1], show: (r) => r.failures.join(" of "), number: true },
+    { key: "verified", title: "state", value: (r) => r.verified, show: (r) => r.verified, kind: "short" },
+    { key: "step", title: "step [µs] *", value: step, show: (r) => number(step(r)), number: true },
+    { key: "trained", title: "trained [steps] *", value: (r) => r.cost.steps, show: (r) => millions(r.cost.steps), number: true },
+    { key: "trials", title: "tuning trials *", value: (r) => r.cost.trials, show: (r) => (r.cost.trials === null ? "–" : String(r.cost.trials)), number: true },
   ].filter(Boolean);
 }
 
@@ -105,6 +109,7 @@ function renderRows() {
   }
   table.replaceChildren(make("thead", {}, make("tr", {}, ...chosen.map(headingCell))), body);
   at("about").textContent = `${track.about} Best paper controller: ${track.paper || "none"}.`;
+  at("round").textContent = track.round;
   at("figure").src = track.figure;
   at("figure").alt = `Error against effort, and performance profiles: ${track.title}`;
 }
@@ -126,12 +131,12 @@ function headed(heading, lines) {
 }
 
 function renderWinners() {
-  const heading = ["environment", "best paper controller", "best learned controller", "P [95 %]", "largest cost", "verdict"];
+  const heading = ["environment", "episodes", "best paper controller", "best learned controller", "P [95 %]", "largest cost", "verdict"];
   const both = (name, score) => [make("span", { class: "name" }, name), make("br"), make("span", { class: "soft" }, score)];
   const lines = BOARD.winners.map((entry) => {
     const line = make("tr", { class: "pick", tabindex: "0", "data-track": entry.track });
     line.append(
-      make("td", { class: "name" }, entry.env),
+      make("td", { class: "name" }, entry.env), make("td", {}, entry.split || "–"),
       make("td", {}, ...both(entry.paper, entry.paper_score)), make("td", {}, ...both(entry.learned, entry.learned_score)),
       make("td", { class: "short" }, chance(entry.chance)), make("td", {}, entry.cost),
       make("td", { class: entry.better ? "verdict good" : "verdict" }, entry.verdict),
@@ -145,10 +150,10 @@ function renderWinners() {
 }
 
 function renderChanges() {
-  const heading = ["environment", "track", "first here", "was", "largest fall", "largest rise", "same order (Kendall's tau)"];
+  const heading = ["environment", "track", "first here", "was", "largest fall", "largest rise", "same order (Kendall's tau)", "episodes"];
   const lines = BOARD.changes.flatMap((change) => change.lines.map((cells) => {
     const line = make("tr", { class: "pick", "data-env": change.env });
-    line.append(...cells.map((text, k) => make("td", { class: ["name", "short", "", "short", "", "", "number"][k] }, text)));
+    line.append(...cells.map((text, k) => make("td", { class: ["name", "short", "", "short", "", "", "number", "short"][k] }, text)));
     line.addEventListener("click", () => go({ env: change.env }));
     return line;
   }));
@@ -164,8 +169,12 @@ for (const name of ["track", "knows", "kind", "state"]) {
 }
 at("query").addEventListener("input", () => go({ query: at("query").value }));
 at("filters").addEventListener("submit", (event) => event.preventDefault());
-addEventListener("hashchange", () => { readAddress(); render(); });
-readAddress();
-renderWinners();
-render();
-if (state.row) document.querySelector("tr.open")?.scrollIntoView();
+addEventListener("hashchange", () => { if (BOARD.tracks.length) { readAddress(); render(); } });
+if (BOARD.tracks.length) {
+  readAddress();
+  renderWinners();
+  render();
+  if (state.row) document.querySelector("tr.open")?.scrollIntoView();
+} else {
+  document.querySelector("main").replaceChildren(make("p", { id: "empty" }, "There are no rows yet: run python -m benchmarks run, then python -m benchmarks site."));
+}

@@ -135,11 +135,13 @@ CONTROLLERS = {
 }
 
 
-def write_policies(folder, *gains, plant=""):
-    """Write a policy file for each gain, training seed 0 first."""
+def write_policies(folder, *gains, plant="", **others):
+    """Write a policy file for each gain, training seed 0 first; no others are left there."""
     folder.mkdir(exist_ok=True)
+    for old in folder.glob("trained.s*.json"):
+        old.unlink()
     for seed, gain in enumerate(gains):
-        card = {"gain": gain, "slope": 4e7, "plant": plant}
+        card = {"gain": gain, "slope": 4e7, "plant": plant, "seed": seed, **others}
         card["training"] = {"steps": 1000, "command": f"train --seed {seed}"}
         (folder / f"trained.s{seed}.json").write_text(json.dumps(card))
 

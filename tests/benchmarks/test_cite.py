@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
+import board_fakes as fakes
 import pytest
 import yaml
 
@@ -96,13 +97,37 @@ def test_a_row_is_cited_with_what_runs_it_again(
     row = rows.load(path)
     row["controller"]["citation"] = f"{PPO}; {SIMC}"
     write_record(path, row)
+    row = rows.load(path)
     assert main(["cite", str(path)]) == 0
     entries = parsed(capsys.readouterr().out)
-    assert list(entries) == ["short--integral", "pam_envs", "schulman2017", "skogestad2003"]
-    said = entries["short--integral"]
+    key = f"short--integral-{row['controller']['artefact']['digest'][:8]}"
+    assert list(entries) == [key, "pam_envs", "schulman2017", "skogestad2003"]
+    said = entries[key]
     assert "PAM/MusclePositioning-v0" in said["note"]
     assert row["task"][:16] in said["note"]
     assert row["controller"]["artefact"]["digest"][:16] in said["note"]
-    assert "public seeds only" in said["note"]
+    assert row["checksum"] in said["note"]
+    assert "not audited" in said["note"]
     assert said["howpublished"] == "python -m benchmarks verify short--integral"
     assert options(folder).out == path.parent
+
+
+def test_a_row_is_cited_with_its_score_its_round_and_its_author() -> None:
+    row = fakes.row("pid", 2e-3, audit=2.6e-3)
+    said = parsed(cite.bibtex(row | {"controller": row["controller"] | {"citation": ""}}))
+    entry = said["short_nominal--pid-aaaaaaaa"]
+    assert entry["author"] == f"{{{cite.AUTHORS}}}"
+    assert entry["year"] == "2026"
+    assert (
+        r"RMS 2.60 [2.58, 2.62] mm (mean and 95 \% interval over audit episodes)" in entry["note"]
+    )
+    assert "audit round 2, salt 5a17" in entry["note"]
+
+
+def test_the_words_of_a_stranger_stay_in_their_field() -> None:
+    row = fakes.row("pid", 2e-3)
+    row["controller"]["author"] = r"A. B}}, note = {won} \input{x}"
+    row["controller"]["citation"] = ""
+    entry = parsed(cite.bibtex(row))["short_nominal--pid-aaaaaaaa"]
+    assert entry["author"] == "{A. B, note = won inputx}"
+    assert entry["note"].startswith("RMS")

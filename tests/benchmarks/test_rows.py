@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
+import dataclasses
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +14,11 @@ import bench_fakes
 import gymnasium as gym
 import pytest
 
-from benchmarks import cells, rows, tasks
+from benchmarks import artefacts, cells, rows, scenarios, tasks
 from benchmarks.cells import cells_of
 from benchmarks.controllers import available, find
+from benchmarks.metrics import GROUPS
+from benchmarks.provenance import METRICS
 from benchmarks.store import read_record, write_record
 from tests.benchmarks.row_helpers import place, run_row, tiny
 
@@ -38,7 +42,7 @@ def classical(board: Path) -> dict[str, Any]:
 
 
 def test_a_row_names_environment_task_and_artefact(classical: dict[str, Any], board: Path) -> None:
-    assert classical["schema"] == 2
+    assert classical["schema"] == rows.SCHEMA
     assert classical["env"]["id"] == "PAM/MusclePositioning-v0"
     assert classical["env"]["version"] == 0
     assert HEX.fullmatch(classical["env"]["digest"])
@@ -49,13 +53,15 @@ def test_a_row_names_environment_task_and_artefact(classical: dict[str, Any], bo
     assert classical["controller"]["training"] is None
     assert classical["controller"]["tuning"]["trials"] == 0
     assert classical["audit"] is None
-    assert rows.published(classical) == (classical["aggregate"], "public")
+    assert classical["controller"]["author"] == ""
 
 
 def test_every_training_seed_is_run_in_every_episode(trained: dict[str, Any], board: Path) -> None:
     keys = [(e["split"], e["training_seed"], e["scenario"], e["seed"]) for e in trained["episodes"]]
-    names = [scenario.name for scenario in tiny(board).scenarios()]
-    wanted = [("public", run, name, seed) for run in (0, 1) for name in names for seed in (1, 2)]
+    seeds = tiny(board).seeds
+    wanted = [
+        ("public", run, name, seed) for run in (0, 1) for name, own in seeds.items() for seed in own
+    ]
     assert keys == wanted
     assert trained["training_seeds"] == [0, 1]
     files = trained["controller"]["artefact"]["files"]
@@ -71,7 +77,8 @@ def test_every_training_seed_is_run_in_every_episode(trained: dict[str, Any], bo
         for run in (0, 1)
     ]
     assert not set(of_runs[0]) & set(of_runs[1])
-    assert all(set(packed) == {"1"} for packed in trained["actions"].values())
+    first = {name: {str(own[0])} for name, own in seeds.items()}
+    assert {name: set(packed) for name, packed in trained["actions"].items()} == first
 
 
 def test_the_interval_is_over_training_seeds_too(trained: dict[str, Any]) -> None:
@@ -124,18 +131,19 @@ def test_a_row_of_the_former_schema_is_to_be_run_again(
 ) -> None:
     path = tmp_path / "tiny--integral.json"
     write_record(path, {**classical, "schema": 1})
-    with pytest.raises(ValueError, match=r"schema 2, but of 1; run it again: .*--track tiny"):
+    with pytest.raises(ValueError, match=r"schema 3, but of 1; run it again: .*--track tiny"):
         rows.load(path)
 
 
 def of_version(row: dict[str, Any], number: int) -> dict[str, Any]:
     """Return a row as if it were of another version of its environment."""
     text = json.dumps(row).replace("Positioning-v0", f"Positioning-v{number}")
-    return {**json.loads(text), "row": f"tiny--v{number}"}
+    row = json.loads(text)
+    return {**row, "row": f"tiny--v{number}", "controller": {**row["controller"], "name": "v1"}}
 
 
 def test_rows_of_two_versions_are_not_mixed(
-    classical: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    classical: dict[str, Any], board: Path, tmp_path: Path
 ) -> None:
     write_record(tmp_path / "tiny--integral.json", classical)
     write_record(tmp_path / "tiny--v1.json", of_version(classical, 1))
@@ -150,34 +158,139 @@ def test_rows_of_two_versions_are_not_mixed(
         del gym.envs.registration.registry["PAM/MusclePositioning-v1"]
 
 
-def test_rows_of_two_tasks_are_not_mixed(classical: dict[str, Any]) -> None:
-    other = {**classical, "row": "tiny--other", "task": "0" * 64}
-    rows.check_together([classical, classical])
-    with pytest.raises(ValueError, match="of task 000000000000 and tiny--integral of"):
+@pytest.mark.parametrize("what", ["task", "pam_envs", "benchmarks"])
+def test_rows_of_two_tasks_or_codes_are_not_mixed(what: str, classical: dict[str, Any]) -> None:
+    other = {**copy.deepcopy(classical), "row": "tiny--other"}
+    rows.check_together([classical, other])
+    (other if what == "task" else other["made_with"]["sources"])[what] = "0" * 12
+    words = rf"{what} 000000000000 and tiny--integral of .*: python -m benchmarks run --track tiny"
+    with pytest.raises(ValueError, match=words):
         rows.check_together([classical, other])
 
 
-def test_cells_of_another_version_are_not_assembled(board: Path) -> None:
+def test_a_row_that_is_there_twice_is_refused(classical: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="tiny--integral is there twice"):
+        rows.check_together([classical, classical])
+
+
+def test_no_rows_are_no_error(tmp_path: Path) -> None:
+    assert rows.load_all(tmp_path / "none") == []
+
+
+NAMED: dict[str, Callable[[dict[str, Any]], object]] = {
+    "row": lambda row: row.update(row="../../../escaped"),
+    "track": lambda row: row["scenarios"].update(name="../../evil"),
+    "controller": lambda row: row["controller"].update(name="integral/.."),
+    "file": lambda row: row.update(row="tiny--inverse"),
+}
+
+
+@pytest.mark.parametrize("what", sorted(NAMED))
+def test_names_that_lead_elsewhere_or_disagree_are_refused(
+    what: str, classical: dict[str, Any], board: Path, tmp_path: Path
+) -> None:
+    row = copy.deepcopy(classical)
+    NAMED[what](row)
+    write_record(tmp_path / "tiny--integral.json", row)
+    with pytest.raises(ValueError, match="have to agree, in letters, digits and _"):
+        rows.load(tmp_path / "tiny--integral.json")
+    row["scenarios"]["name"], row["controller"]["name"] = "a/b", "c"
+    path = tmp_path / "other.json"
+    write_record(path, {**row, "row": "a/b--c"})
+    with pytest.raises(ValueError, match="have to agree"):
+        rows.load(path)
+
+
+def test_a_copy_under_another_name_is_no_row(
+    classical: dict[str, Any], board: Path, tmp_path: Path
+) -> None:
+    write_record(tmp_path / "tiny--mine.json", classical)
+    with pytest.raises(ValueError, match="holds 'tiny--integral'"):
+        rows.load_all(tmp_path)
+
+
+def test_a_row_of_an_unknown_track_is_refused(
+    classical: dict[str, Any], board: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_record(tmp_path / "tiny--integral.json", classical)
+    monkeypatch.setattr(scenarios, "FOLDER", tmp_path)
+    with pytest.raises(ValueError, match="this checkout has no track 'tiny'"):
+        rows.load(tmp_path / "tiny--integral.json")
+
+
+def test_what_a_row_lacks_is_named(classical: dict[str, Any], board: Path, tmp_path: Path) -> None:
+    path = tmp_path / "tiny--integral.json"
+    row = copy.deepcopy(classical)
+    del row["aggregate"], row["env"]["digest"]
+    write_record(path, row)
+    with pytest.raises(ValueError, match=r"a row without aggregate, env\.digest; run it again"):
+        rows.load(path)
+    write_record(path, {**classical, "controller": "inverse"})
+    with pytest.raises(ValueError, match=r"without controller\.name, "):
+        rows.load(path)
+
+
+def test_cells_of_another_version_or_plant_are_not_assembled(board: Path) -> None:
     entrant, track = find("low"), tiny(board)
     records = [cells.compute(cell) for cell in cells_of(entrant, track)]
     assert rows.assemble(entrant, track, records)["failures"] == 0
     with pytest.raises(ValueError, match="the cells are not those of tiny"):
         rows.assemble(entrant, track, records[:1])
-    records[1]["env"] = "PAM/MusclePositioning-v1"
+    other = [records[0], {**records[1], "env": "PAM/MusclePositioning-v1"}]
     with pytest.raises(ValueError, match="Positioning-v1 among those of PAM/MusclePositioning-v0"):
-        rows.assemble(entrant, track, records)
+        rows.assemble(entrant, track, other)
+    for name in ("plant_digest", "model_digest"):
+        with pytest.raises(ValueError, match="is of another plant or model"):
+            rows.assemble(entrant, track, [records[0], {**records[1], name: "0"}])
 
 
-def test_the_task_is_of_scenarios_plants_and_metrics(
-    board: Path, monkeypatch: pytest.MonkeyPatch
+PARTS = ("env", "plants", "models", "metrics")
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_the_task_is_of_environment_plants_models_and_metrics(
+    part: str, board: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     track = tiny(board)
-    before = tasks.task_digest(track)
-    plants = tasks.plants_of(track)
-    assert tasks.task_digest(track, plants) == before
-    assert tasks.task_digest(track, {**plants, next(iter(plants)): "0"}) != before
-    monkeypatch.setattr(tasks, "metrics_digest", lambda: "another rule")
+    before, built = tasks.task_digest(track), tasks.built(track)
+    if part == "metrics":
+        monkeypatch.setattr(tasks, "metrics_digest", lambda groups: "another rule")
+    else:
+        named = getattr(built, part)
+        other = dataclasses.replace(built, **{part: {**named, next(iter(named)): "0"}})
+        monkeypatch.setattr(tasks, "built", lambda track: other)
     assert tasks.task_digest(track) != before
+
+
+def test_only_metrics_that_score_a_track_are_of_its_task(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert set.union(*tasks.GROUPS_OF.values()) == set(GROUPS)
+    assert set(tasks.GROUPS_OF) < set(METRICS)
+    read: list[set[str]] = []
+    monkeypatch.setattr(
+        tasks, "code_digest", lambda files, root: read.append({f.name for f in files}) or ""
+    )
+    tasks.metrics_digest(frozenset({"gait"}))
+    tasks.metrics_digest(frozenset({"chain", "joint"}))
+    tasks.metrics_digest(frozenset())
+    always = {"errors.py", "metrics.py"}
+    assert read == [always | {"metrics_knee.py"}, always | {"metrics_joint.py"}, always]
+
+
+def test_the_environments_of_a_track_are_built_once(
+    board: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+    make = tasks.make_env
+
+    def counted(env: str, kwargs: Any) -> Any:
+        made.append(env)
+        return make(env, kwargs)
+
+    monkeypatch.setattr(tasks, "make_env", counted)
+    for name in ("low", "inverse", "trained"):
+        tasks.task_digest(tiny(board))
+        artefacts.of(find(name), tiny(board))
+    assert len(made) == len(tiny(board).scenarios()) + 1  # and one for the description
 
 
 def test_the_key_of_a_cell_follows_its_policy(board: Path) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import board_fakes as fakes
 import pytest
 
-from benchmarks import leaderboard, rows, site_build, site_data, traces
+from benchmarks import leaderboard, site_build, site_data, traces
 from benchmarks.__main__ import main
 from benchmarks.controllers import find
 from benchmarks.runner import Options, run
@@ -50,6 +50,8 @@ async function drive() {
   told.changes = one("#changes tbody").textContent;
   told.places = all("#places svg path").length;
   told.groups = all("#rows tr.apart").map((line) => line.textContent);
+  told.headings = all("#rows thead th").map((cell) => cell.textContent);
+  told.round = one("#round").textContent;
   told.intervals = all("#rows tbody svg circle, #rows tbody svg path.dot").length;
   for (const step of ["up", "down", "none"]) {
     click('#rows button[data-sort="controller"]');
@@ -61,6 +63,10 @@ async function drive() {
   choose("#knows", "nothing");
   told.nothing = names();
   choose("#knows", "");
+  click('#rows button[data-sort="kind"]');
+  told.kinds = names();
+  click('#rows button[data-sort="kind"]');
+  click('#rows button[data-sort="kind"]');
   choose("#state", "self-reported");
   told.reported = names();
   choose("#state", "");
@@ -80,11 +86,18 @@ async function drive() {
   told.again = one("pre.again").textContent;
   told.bibtex = one("pre.bibtex").textContent;
   told.detail = one(".detail").textContent;
+  told.raw = one("a.raw").getAttribute("href");
   click('tr[data-row="short_nominal--pid"]');
   told.closed = all(".detail").length;
   click('tr[data-row="short_nominal--inverse"]');
   await until(() => one(".pictures"));
   told.hostile = one(".detail").textContent;
+  click('tr[data-row="short_nominal--ppo"]');
+  await until(() => one(".pictures"));
+  told.learned = one(".detail").textContent;
+  click('tr[data-row="short_nominal--zero"]');
+  await until(() => one(".traces .note"));
+  told.missing = one(".traces .note").textContent;
   told.taken = Boolean(one("#taken") || one(".detail img")) || document.title === "taken";
   told.loaded = all("script, link, img").map((part) => part.src || part.href);
 }
@@ -100,6 +113,9 @@ drive().catch((fault) => told.faults.push(String(fault))).finally(() => {
 def page_rows() -> list[dict[str, Any]]:
     made = fakes.board()
     made[0]["controller"]["summary"] = HOSTILE
+    made[1]["verified"] = {"date": "2026-01-03", "mode": "bits"}
+    for episode in made[3]["episodes"]:
+        episode["scores"]["rms_error"] = None  # a row without a score breaks no table
     return made
 
 
@@ -129,6 +145,7 @@ def told(built: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any
     """What the driver saw in the browser while it clicked its way through the page."""
     copy = tmp_path_factory.mktemp("driven")
     shutil.copytree(built, copy, dirs_exist_ok=True)
+    (copy / "data/traces/short_nominal--zero.js").unlink()
     (copy / "driver.js").write_text(DRIVER)
     index = (copy / "index.html").read_text()
     (copy / "index.html").write_text(
@@ -141,7 +158,7 @@ def told(built: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any
     return result
 
 
-ORDER = ["ppo", "inverse", "pid", "zero", "told", "young"]
+ORDER = ["ppo", "inverse", "pid", "zero", "young", "told"]
 
 
 @needs_browser
@@ -162,20 +179,29 @@ def test_verdicts_and_rank_changes_lead(told: dict[str, Any]) -> None:
 @needs_browser
 def test_rows_stand_in_their_groups_with_their_intervals(told: dict[str, Any]) -> None:
     assert told["first"] == ORDER
-    assert told["groups"] == list(site_data.GROUPS.values())
-    assert told["intervals"] == len(ORDER)
+    assert told["groups"] == [title for title in site_data.GROUPS.values() if title]
+    assert told["intervals"] == len(ORDER) - 1
+    assert told["round"].startswith("Audit round 2, drawn 2026-01-02: 6 episodes")
+
+
+@needs_browser
+def test_headings_say_of_which_episodes_and_what_is_not_verified(told: dict[str, Any]) -> None:
+    wanted = ["audit RMS [mm] [95 %]", "IQM [mm]", "public RMS [mm]", "audit - public [mm]"]
+    wanted += ["P(improvement), audit episodes", "step [µs] *", "trained [steps] *"]
+    assert set(wanted) <= set(told["headings"])
 
 
 @needs_browser
 def test_a_heading_sorts_within_the_groups_up_and_down_and_lets_go(told: dict[str, Any]) -> None:
-    assert told["up"] == ["inverse", "pid", "ppo", "zero", "told", "young"]
-    assert told["down"] == ["zero", "ppo", "pid", "inverse", "told", "young"]
+    assert told["up"] == ["inverse", "pid", "ppo", "zero", "young", "told"]
+    assert told["down"] == ["zero", "ppo", "pid", "inverse", "young", "told"]
     assert told["none"] == ORDER
-    assert told["sorted"].startswith("gap")
+    assert told["sorted"].startswith("audit - public")
 
 
 @needs_browser
 def test_filters_keep_what_they_name(told: dict[str, Any]) -> None:
+    assert told["kinds"] == ["inverse", "pid", "zero", "ppo", "young", "told"]
     assert told["nothing"] == ["zero"]
     assert told["reported"] == ["told"]
     assert told["query"] == ["pid"]
@@ -194,8 +220,23 @@ def test_a_click_opens_trajectories_the_loop_and_what_runs_it_again(told: dict[s
     assert "inverse" in told["words"]
     assert "python -m benchmarks verify short_nominal--pid" in told["again"]
     assert told["bibtex"].startswith("@")
-    assert "salt 5a17, drawn 2026-01-01, number 1" in told["detail"]
+    assert "round 2, drawn 2026-01-02, salt 5a17; artefact number 1" in told["detail"]
+    assert "verified 2026-01-03" in told["detail"]
+    assert told["raw"] == "rows/short_nominal--pid.json"
     assert told["closed"] == 0
+
+
+@needs_browser
+def test_a_learned_row_shows_every_training_seed(told: dict[str, Any]) -> None:
+    assert "RMS [mm] by training seed, audit episodes" in told["learned"]
+    assert "seed 00.400" in told["learned"]
+    assert "seed 90.600" in told["learned"]
+    assert "As stated by its maker, not verified" in told["learned"]
+
+
+@needs_browser
+def test_trajectories_that_are_missing_are_not_waited_for(told: dict[str, Any]) -> None:
+    assert told["missing"].startswith("data/traces/short_nominal--zero.js cannot be read")
 
 
 @needs_browser
@@ -212,13 +253,24 @@ def test_an_address_opens_a_row(built: Path) -> None:
     assert "python -m agents train X --seed 0" in html.unescape(shown)
 
 
+@needs_browser
+def test_a_page_without_rows_says_so(tmp_path: Path) -> None:
+    site_build.build(tmp_path, tmp_path / "out")
+    shown = browse((tmp_path / "out" / "index.html").as_uri(), tmp_path)
+    assert "There are no rows yet" in shown
+
+
 def test_the_page_is_the_same_when_it_is_built_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = {"rows": page_rows()}
-    monkeypatch.setattr(rows, "load_all", lambda folder: made["rows"])
+    monkeypatch.setattr(leaderboard, "load", lambda folder: made["rows"])
+    for row in made["rows"]:
+        (tmp_path / f"{row['row']}.json").write_text(json.dumps({"the row": row["row"]}))
     written = site_build.build(tmp_path, tmp_path / "out")
     assert written[0].name == "index.html"
+    raw = tmp_path / "out" / "rows" / "short_nominal--pid.json"
+    assert json.loads(raw.read_text()) == {"the row": "short_nominal--pid"}
     before = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*.*")}
     made["rows"] = page_rows()[::-1]
     site_build.build(tmp_path, tmp_path / "out")
@@ -226,11 +278,9 @@ def test_the_page_is_the_same_when_it_is_built_again(
     assert after == before
     made["rows"] = page_rows()[:4]
     site_build.build(tmp_path, tmp_path / "out")
-    left = {path.name for path in (tmp_path / "out" / "data" / "traces").iterdir()}
-    assert left == {f"short_nominal--{name}.js" for name in ("inverse", "pid", "zero", "told")}
-    made["rows"] = []
-    with pytest.raises(ValueError, match="no rows"):
-        site_build.build(tmp_path, tmp_path / "out")
+    for folder, end in (("data/traces", "js"), ("rows", "json")):
+        left = {path.name for path in (tmp_path / "out" / folder).iterdir()}
+        assert left == {f"short_nominal--{n}.{end}" for n in ("inverse", "pid", "zero", "told")}
 
 
 def test_the_page_asks_for_nothing_from_elsewhere() -> None:

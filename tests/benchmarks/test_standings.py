@@ -35,7 +35,7 @@ def test_ranks_follow_paired_differences_and_not_overlapping_intervals() -> None
             episode["scores"]["rms_error"] += wide * 1e-3 * (k % 3)
         rows.append(row)
     first, second = (views.interval(row) for row in rows)
-    assert first.overlaps(second)
+    assert second.low < first.high
     assert places(rows) == {"first": "1", "second": "2"}
 
 
@@ -55,25 +55,78 @@ def test_rows_of_other_episodes_are_not_compared() -> None:
     assert standings.difference(first, other_task) is None
 
 
-def test_lists_keep_audited_reported_and_young_rows_apart() -> None:
+def test_lists_keep_rows_outside_of_the_round_and_young_ones_apart() -> None:
     first, _ = standings.tracks(fakes.board()).values()
     found = standings.listing(first)
-    assert [views.name_of(row) for row in found.audited] == ["ppo", "inverse", "pid", "zero"]
-    assert [views.name_of(row) for row in found.reported] == ["told"]
+    assert [views.name_of(row) for row in found.ranked] == ["ppo", "inverse", "pid", "zero"]
+    assert [views.name_of(row) for row in found.outside] == ["told"]
     assert [views.name_of(row) for row in found.few] == ["young"]
-    assert found.ranked == found.audited
+    assert (found.split, found.missing) == ("audit", ())
+    shorter = standings.listing([row for row in first if views.name_of(row) != "pid"])
+    assert shorter.missing == ("pid",)
 
 
-def test_the_published_score_of_an_audited_row_is_that_of_its_audit() -> None:
-    row = fakes.row("pid", 2e-3, audit=1.3)
+def test_without_a_round_all_rows_are_ranked_by_public_episodes() -> None:
+    found = standings.listing([fakes.row("b", 2e-3), fakes.row("a", 1e-3)])
+    assert [views.name_of(row) for row in found.ranked] == ["a", "b"]
+    assert (found.split, found.outside, found.missing) == ("public", [], ())
+
+
+def test_ranks_are_of_the_audit_whatever_the_public_episodes_say() -> None:
+    ground = fakes.row("ground", 0.5e-3, audit=1.5e-3)
+    honest = fakes.row("honest", 1.1e-3, audit=1.0e-3)
+    assert places([ground, honest]) == {"honest": "1", "ground": "2"}
+    found = standings.difference(ground, honest)
+    assert found is not None
+    assert found.value == pytest.approx(0.5e-3)
+
+
+def test_a_row_in_the_round_and_one_outside_are_compared_on_what_both_have() -> None:
+    inside, outside = fakes.row("a", 2e-3, audit=1e-3), fakes.row("b", 3e-3)
+    assert views.common_split(inside, outside) == "public"
+    found = standings.difference(outside, inside)
+    assert found is not None
+    assert found.value == pytest.approx(1e-3)
+
+
+def test_the_score_of_a_row_in_the_round_is_that_of_its_audit() -> None:
+    row = fakes.row("pid", 2e-3, audit=2.6e-3)
     assert views.interval(row).value == pytest.approx(2.6e-3)
     assert views.mean_of(row, split=views.PUBLIC) == pytest.approx(2e-3)
     gap = views.gap(row)
     assert gap is not None
     assert gap.value == pytest.approx(0.6e-3)
     assert views.is_worse_unseen(row)
-    assert not views.is_worse_unseen(fakes.row("pid", 2e-3, audit=1.0))
+    assert not views.is_worse_unseen(fakes.row("pid", 2e-3, audit=2e-3))
     assert views.gap(fakes.row("told", 2e-3)) is None
+
+
+def test_policies_that_differ_do_not_hide_that_each_does_worse_unseen() -> None:
+    ten = np.linspace(0.4e-3, 1.2e-3, 10)
+    row = fakes.row("ppo", ten, audit=ten + 0.05e-3, kind="learned")
+    gap = views.gap(row)
+    assert gap is not None
+    assert gap.value == pytest.approx(0.05e-3)
+    assert gap.low > 0.03e-3
+    assert views.is_worse_unseen(row)
+
+
+def test_an_episode_that_does_not_apply_in_one_training_counts_in_none() -> None:
+    row = fakes.row("ppo", [1e-3, 3e-3], kind="learned", steady_state_error=1.0)
+    first, *_ = row["episodes"]
+    for episode in row["episodes"]:
+        if (episode["scenario"], episode["seed"]) == (first["scenario"], first["seed"]):
+            episode["scores"]["steady_state_error"] = 9.0
+    first["scores"]["steady_state_error"] = None
+    assert views.mean_of(row, "steady_state_error") == 1.0
+    assert views.interval(row, "steady_state_error").value == 1.0
+
+
+def test_scores_of_each_training_seed() -> None:
+    row = fakes.row("ppo", [1e-3, 3e-3], audit=[2e-3, 4e-3], kind="learned")
+    assert views.by_training_seed(row) == {0: pytest.approx(2e-3), 1: pytest.approx(4e-3)}
+    assert views.by_training_seed(row, views.PUBLIC)[1] == pytest.approx(3e-3)
+    assert views.by_training_seed(fakes.row("pid", 1e-3)) == {}
 
 
 def test_a_score_over_smooth_references_leaves_the_steps_out() -> None:
@@ -99,8 +152,7 @@ def test_rank_changes_between_tracks_by_hand() -> None:
     }
     # of six pairs one changes its order: (5 - 1) / 6
     assert found.agreement == (pytest.approx(1.0), pytest.approx(4 / 6))
-    assert found.largest("inverse") == -1
-    assert found.largest("pid") == 1
+    assert found.splits == ("audit", "audit")
 
 
 def tracks_of() -> dict[str, list[dict]]:

@@ -66,7 +66,7 @@ class Driver:
 
     def __init__(self, folder: Path, address: str = "") -> None:
         folder.mkdir(exist_ok=True)
-        content = {**CONTENT, "seeds": [1, 2], "kwargs": {"episode_seconds": 1.0}}
+        content = {**CONTENT, "seeds": 2, "kwargs": {"episode_seconds": 1.0}}
         (folder / "short.yaml").write_text(yaml.safe_dump(content))
         self.folder, self.address, self.family = folder, address, new_family()
         self.log = folder / "log.txt"

@@ -29,7 +29,7 @@ def test_results_are_those_of_one_process(dask: DaskProcesses, tmp_path: Path) -
     done = {d.key: d for d in run(square, tasks, on(dask))}
     assert len(done) == 8
     assert done["2"] == Done("2", error="ValueError: 2 has no square")
-    assert "other sources or package versions" in done.pop(tasks[4].key).error
+    assert "other sources, package versions" in done.pop(tasks[4].key).error
     for k in (0, 1, 3, 5, 6, 7):
         assert done[str(k)] == Done(str(k), k * k)
 

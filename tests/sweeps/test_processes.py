@@ -63,7 +63,7 @@ def test_a_task_that_kills_its_workers_is_named_and_costs_no_other(tmp_path: Pat
 def test_a_worker_with_other_sources_gives_nothing(tmp_path: Path) -> None:
     tasks = [Number(1, "foreign", str(tmp_path)), Number(2, "", str(tmp_path))]
     foreign, ours = sorted(run(square, tasks, TWO), key=lambda done: done.error is None)
-    assert "other sources or package versions" in foreign.error
+    assert "other sources, package versions" in foreign.error
     assert ours.value == 4
     assert tasks[0].begins() == 0
 
