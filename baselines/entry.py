@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
+
+from baselines.knobs import Bounds
 
 Knowledge = Literal["nothing", "tables", "nominal model", "true model"]
 
@@ -35,6 +37,8 @@ class Entry:
         How its numbers were chosen.
     trials : int
         How many settings were tried in simulation to choose them.
+    knobs : mapping
+        What a search may turn, with lowest and highest factor; see :mod:`baselines.knobs`.
     """
 
     summary: str
@@ -46,3 +50,4 @@ class Entry:
     kind: str = "classical"
     tuning: str = "by rule or as published"
     trials: int = 0
+    knobs: Bounds = field(default_factory=dict, hash=False)
