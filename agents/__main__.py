@@ -15,15 +15,17 @@ from agents import configs
 from agents.settings import SettingsError
 
 Algo = Literal["ppo", "sac", "tqc", "recurrent_ppo"]
+DEFAULT_ENV = "PAM/MusclePositioning-v0"
+LOOKS = ("value", "rms", "return", "travel", "failures")
 
 
 def train(
-    env: Annotated[str, tyro.conf.Positional] = "PAM/MusclePositioning-v0",
+    env: Annotated[str | None, tyro.conf.Positional] = None,
     /,
-    algo: Algo = "ppo",
+    algo: Algo | None = None,
     variant: str = "",
     steps: int | None = None,
-    seed: int = 0,
+    seed: int | None = None,
     out: Path | None = None,
     resume: bool = False,
     config: Path | None = None,
@@ -34,15 +36,15 @@ def train(
     Parameters
     ----------
     env
-        Environment id.
+        Environment id; default: PAM/MusclePositioning-v0.
     algo
-        Algorithm.
+        Algorithm; default: ppo.
     variant
         Of the preset, for example "residual": a policy that corrects a classical controller.
     steps
         Control periods of all rows together; default: the preset's.
     seed
-        Of weights, exploration and episodes.
+        Of weights, exploration and episodes; default: 0.
     out
         Folder of the run; default: runs/ENV/ALGO-seedSEED.
     resume
@@ -54,30 +56,42 @@ def train(
     """
     from agents import train as training
 
-    wanted = configs.read(config) if config else configs.preset(env, algo, variant)
-    if (wanted.env, wanted.algo) != (env, algo):
-        raise SettingsError(
-            f"{config} is for {wanted.env} with {wanted.algo}; say so: {wanted.env} --algo "
-            f"{wanted.algo}"
-        )
-    changes = [*set, *([] if steps is None else [f"steps={steps}"])]
-    wanted = configs.changed(wanted, changes)
-    folder = out or training.default_folder(wanted, seed, variant)
     console = Console(stderr=True)
+    name, kind, number = env or DEFAULT_ENV, algo or "ppo", seed or 0
     if resume:
-        _refuse_other_settings(config, set)
+        folder = out or training.default_folder(name, kind, number, variant)
         run = training.saved_run(folder, steps)
+        _refuse_other_settings(config, set)
+        for given, own in ((env, run.config.env), (algo, run.config.algo), (seed, run.seed)):
+            if given not in (None, own):
+                raise SettingsError(f"{folder} holds a run of {own}, not of {given}; leave it out")
         model = training.resume(run)
         console.print(f"going on at {model.num_timesteps:,} of {run.config.steps:,} steps")
     else:
-        run = training.Run(wanted, seed, folder)
+        wanted = _wanted(name, kind, variant, config)
+        changes = [*set, *([] if steps is None else [f"steps={steps}"])]
+        wanted = configs.changed(wanted, changes)
+        folder = out or training.default_folder(name, kind, number, variant)
+        run = training.Run(wanted, number, folder)
         model = training.start(run)
-    place = training.train(run, model, console)
-    print(place)
+    print(training.train(run, model, console))
 
 
-def _refuse_other_settings(config: Path | None, assignments: tuple[str, ...]) -> None:
-    if config is not None or assignments:
+def _wanted(env: str, algo: str, variant: str, file: Path | None) -> configs.Config:
+    """Return the settings of a preset, or of a file for the same environment and algorithm."""
+    if file is None:
+        return configs.preset(env, algo, variant)
+    wanted = configs.read(file)
+    if (wanted.env, wanted.algo) != (env, algo):
+        raise SettingsError(
+            f"{file} is for {wanted.env} with {wanted.algo}; say so: {wanted.env} --algo "
+            f"{wanted.algo}"
+        )
+    return wanted
+
+
+def _refuse_other_settings(file: Path | None, assignments: tuple[str, ...]) -> None:
+    if file is not None or assignments:
         raise SettingsError(
             "--resume keeps the settings of the run (only --steps may change); leave --config and "
             "--set out, or start a new run with another --out"
@@ -85,7 +99,7 @@ def _refuse_other_settings(config: Path | None, assignments: tuple[str, ...]) ->
 
 
 def sweep(
-    env: Annotated[tuple[str, ...], tyro.conf.Positional] = ("PAM/MusclePositioning-v0",),
+    env: Annotated[tuple[str, ...], tyro.conf.Positional] = (DEFAULT_ENV,),
     /,
     algo: Algo = "ppo",
     variant: str = "",
@@ -160,6 +174,27 @@ def show(policy: Annotated[Path, tyro.conf.Positional], /) -> None:
     print(json.dumps({**made.card, "digest": made.digest()}, indent=1, sort_keys=True))
 
 
+def looks(policies: Annotated[tuple[Path, ...], tyro.conf.Positional], /) -> None:
+    """Print what was found on tuning seeds while policies were trained, and which was shipped.
+
+    ``value`` is what policies are chosen by; ``kinds`` are the RMS of the kinds of rows as
+    multiples of the first evaluation's, which is the controller's where a policy corrects one.
+    """
+    from agents.policy import OnnxPolicy
+
+    for place in policies:
+        card = OnnxPolicy.load(place).card
+        found, chosen = card.get("evaluation", []), card.get("chosen", {})
+        print(f"{place}: {len(found)} evaluations")
+        for entry in found:
+            first = found[0].get("kinds", [])
+            pairs = zip(entry.get("kinds", []), first, strict=True)
+            kinds = " ".join(f"{rms / was:.3f}" if rms and was else "-" for rms, was in pairs)
+            mark = " <- shipped" if entry["steps"] == chosen.get("steps") else ""
+            told = [f"{n} {entry[n]:.5g}" for n in LOOKS if entry.get(n) is not None]
+            print(f"{entry['steps']:>12,}  {', '.join(told)}, kinds {kinds}{mark}")
+
+
 def tune(
     env: Annotated[str, tyro.conf.Positional],
     /,
@@ -184,7 +219,7 @@ def tune(
     trials
         Settings to try, those that the storage holds counted in.
     steps
-        Control periods of each trial; default: a tenth of the preset's.
+        Control periods of each of a trial's two trainings; default: a tenth of the preset's.
     seed
         Of the search.
     storage
@@ -213,7 +248,8 @@ def classical(
 ) -> None:
     """Evaluate the classical controllers of an environment on tuning seeds, the best first.
 
-    Which one a residual corrects is chosen by this, never by the board.
+    Which one a residual corrects is chosen by this, never by the board. The first number is what
+    the preset's evaluation.objective goes by.
 
     Parameters
     ----------
@@ -225,13 +261,17 @@ def classical(
         Of that preset.
     """
     from agents.controllers import names_for
-    from agents.evaluation import evaluate
+    from agents.evaluation import evaluate, value_of
 
     config = configs.preset(env, algo, variant)
     scores = {name: evaluate(name, config) for name in names_for(env)}
-    for name in sorted(scores, key=lambda name: scores[name].rms):
+    values = {name: value_of(score, config) for name, score in scores.items()}
+    for name in sorted(values, key=lambda name: values[name]):
         made = scores[name]
-        print(f"{made.rms:.5g}  {name}  failures {made.failures}, travel {made.travel:.4g} Pa")
+        print(
+            f"{values[name]:.5g}  {name}  RMS {made.rms:.5g}, return {made.mean_return:.5g}, "
+            f"failures {made.failures}, travel {made.travel:.4g} Pa"
+        )
 
 
 def presets() -> None:
@@ -239,7 +279,9 @@ def presets() -> None:
     for env, algo, variant in configs.presets():
         wanted = configs.preset(env, algo, variant)
         kind = f"{algo} --variant {variant}" if variant else algo
-        print(f"{env}  {kind}  {wanted.steps:,} steps, {wanted.search.trials} trials of search")
+        trials = wanted.search.trials
+        how = wanted.search.note if trials is None else f"{trials} trials of search"
+        print(f"{env}  {kind}  {wanted.steps:,} steps, {how}")
 
 
 def speed(seconds: float = 20.0) -> None:
@@ -257,6 +299,7 @@ def main(arguments: list[str] | None = None) -> int:
         "tune": tune,
         "classical": classical,
         "show": show,
+        "looks": looks,
         "presets": presets,
         "speed": speed,
     }

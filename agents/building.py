@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import random
+from collections.abc import Callable
 from typing import Any
 
 import torch
@@ -19,6 +20,7 @@ from agents.mixed_vec_env import MixedVecEnv
 from agents.networks import policy_arguments, silence
 from agents.residual_vec_env import ResidualVecEnv
 from agents.sb3_vec_env import make_batch_vec_env
+from agents.settings import SettingsError
 
 ALGORITHMS: dict[str, type[BaseAlgorithm]] = {
     "ppo": PPO,
@@ -26,7 +28,7 @@ ALGORITHMS: dict[str, type[BaseAlgorithm]] = {
     "tqc": TQC,
     "recurrent_ppo": RecurrentPPO,
 }
-OWN = ("learning_rate", "lstm_size", "critic_lstm")
+OWN = ("learning_rate", "lstm_size", "critic_lstm", "warm_up")
 """Settings that are not handed to the algorithm as they stand."""
 
 
@@ -71,10 +73,9 @@ def make_model(config: Config, seed: int, env: VecEnv) -> BaseAlgorithm:
     chosen = config.chosen
     arguments = {k: v for k, v in vars(chosen).items() if k not in OWN}
     arguments |= policy_arguments(config, *signals_of(env))
-    start, end = chosen.learning_rate
     model = ALGORITHMS[config.algo](
         env=env,
-        learning_rate=lambda remaining: end + (start - end) * remaining,
+        learning_rate=learning_rate(config),
         seed=seed,
         device="cpu",
         **arguments,
@@ -83,6 +84,36 @@ def make_model(config: Config, seed: int, env: VecEnv) -> BaseAlgorithm:
         silence(model.policy)
     env.seed(seeds.first_training(seed))
     return model
+
+
+def warm_up_steps(config: Config) -> int:
+    """Return how many control periods the critic learns alone."""
+    chosen = config.chosen
+    return chosen.warm_up * chosen.n_steps * config.num_envs if config.algo in ON_POLICY else 0
+
+
+def learning_rate(config: Config) -> Callable[[float], float]:
+    """Return the learning rate as a function of the share of the training that is left.
+
+    Raises
+    ------
+    SettingsError
+        If the critic would learn alone to the end.
+    """
+    start, end = config.chosen.learning_rate
+    alone = warm_up_steps(config)
+    if alone >= config.steps:
+        raise SettingsError(
+            f"{config.algo}.warm_up = {config.chosen.warm_up} rollouts are {alone} steps of "
+            f"{config.steps}: nothing else would be learnt; choose fewer, or more steps"
+        )
+
+    def rate(remaining: float) -> float:
+        usual = end + (start - end) * remaining
+        done = round((1.0 - remaining) * config.steps)
+        return usual * min((done - alone) / alone, 1.0) if done > alone > 0 else usual
+
+    return rate
 
 
 def signals_of(env: VecEnv) -> tuple[Any, Any]:

@@ -1,19 +1,52 @@
-"""What happens now and then during a training: evaluations on tuning seeds, checkpoints."""
+"""What happens now and then in a training: the critic's lead, evaluations, checkpoints."""
 
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
 from stable_baselines3.common.callbacks import BaseCallback
 
-from agents import checkpoint, snapshot
+from agents import checkpoint, snapshot, sources
+from agents.best import Best
+from agents.building import warm_up_steps
 from agents.configs import Config
-from agents.evaluation import Score, evaluate
-from agents.export import facts, policy_bytes
+from agents.evaluation import Score, evaluate, value_of
+from agents.export import facts, plants_of, policy_bytes
+from agents.networks import critic_alone
 from agents.policy import OnnxPolicy
 from agents.record import Clock
+
+PARTS, PASSES = 16, 10
+"""The critic's lead: into so many smaller batches a batch is cut, and so often each is used."""
+SMALLEST = 32
+
+
+class WarmUp(BaseCallback):
+    """Lets the critic alone learn in a training's first rollouts, thoroughly.
+
+    What it does follows from the number of steps alone, so that a resumed training does the same.
+    """
+
+    def __init__(self, config: Config) -> None:
+        super().__init__()
+        self.config = config
+
+    def _on_rollout_start(self) -> None:
+        usual, until = self.config.chosen, warm_up_steps(self.config)
+        if not until:
+            return
+        alone = self.model.num_timesteps < until
+        model: Any = self.model
+        critic_alone(model.policy, alone)
+        small = min(max(usual.batch_size // PARTS, SMALLEST), usual.batch_size)
+        model.batch_size = small if alone else usual.batch_size
+        model.n_epochs = PASSES if alone else usual.n_epochs
+
+    def _on_step(self) -> bool:
+        return True
 
 
 class Now(BaseCallback):
@@ -53,13 +86,15 @@ class Evaluations(Now):
     ----------
     found : list of dict
         Entries of the card so far.
+    best : Best
+        The best of them, which is shipped.
     """
 
-    def __init__(self, config: Config, seed: int, found: list[dict[str, Any]]) -> None:
+    def __init__(self, config: Config, found: list[dict[str, Any]], best: Best) -> None:
         super().__init__(config.evaluation.interval if config.evaluation.episodes else 0)
         self.config = config
-        self.seed = seed
         self.found = found
+        self.best = best
 
     def _on_training_start(self) -> None:
         super()._on_training_start()
@@ -69,8 +104,12 @@ class Evaluations(Now):
     def act(self) -> None:
         """Evaluate now."""
         score = score_of(self.model, self.config)
-        self.found.append(score.as_dict(self.model.num_timesteps))
-        for name in ("rms", "return", "failures", "travel"):
+        corrects = self.config.residual.controller and self.found
+        value = value_of(score, self.config, self.found[0]["travel"] if corrects else None)
+        self.best.offer(self.model, value)
+        known = value if math.isfinite(value) else None
+        self.found.append({**score.as_dict(self.model.num_timesteps), "value": known})
+        for name in ("rms", "return", "failures", "travel", "value"):
             if self.found[-1][name] is not None:
                 self.logger.record(f"tuning/{name}", self.found[-1][name])
 
@@ -115,11 +154,12 @@ class Checkpoints(Now):
         """Write the checkpoint now."""
         env = self.model.get_env()
         assert env is not None
-        settings = {**self.settings, "plant": env.get_attr("plant")[0].digest()}
+        trained_with = {"plants": plants_of(env), "sources": sources.digests()}
         content = {
-            "settings": json.dumps(settings),
+            "settings": json.dumps({**self.settings, **trained_with}),
             "spent": self.clock.spent(),
             "evaluations": self.evaluations.found,
+            "best": vars(self.evaluations.best),
             "snapshot": snapshot.take(self.model),
         }
         checkpoint.save(self.path, content)

@@ -10,9 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from agents import configs
+from agents.onnx_file import PolicyFileError
 from agents.policy import OnnxPolicy
 from agents.residual import ResidualPolicy, with_controller
 from agents.settings import nearest
+from baselines.catalogue import CONTROLLERS as CLASSICAL
 from pam_envs.parameters import Signals
 
 FOLDER = Path(__file__).resolve().parent / "pretrained"
@@ -35,6 +38,8 @@ class Entry:
     kind : {"learned", "residual"}
     baseline : str
         Name of the controller that a residual corrects.
+    author : str
+        Who trained it, as BibTeX wants it; empty for the authors of this package.
     """
 
     file: str
@@ -44,6 +49,7 @@ class Entry:
     envs: tuple[str, ...]
     kind: str = "learned"
     baseline: str = ""
+    author: str = ""
 
     def files(self) -> dict[int, Path]:
         """Return the files that are there by training seed."""
@@ -77,32 +83,33 @@ MODEL = "nominal model"
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of training of which every environment may have a preset.
+    """A kind of training of which an environment may have a preset.
 
     Attributes
     ----------
-    preset : str
-        Algorithm and variant as in the preset's file name.
+    name : str
+        What names of controllers begin with.
     summary, citation : str
     """
 
-    preset: str
+    name: str
     summary: str
     citation: str
 
 
 KINDS: dict[str, Kind] = {
     "ppo": Kind("ppo", "PPO, two layers beside a linear path; no memory", PPO),
-    "history": Kind("ppo-history", "PPO that sees the last control periods", PPO),
-    "randomized": Kind(
-        "ppo-randomized", "PPO that sees the last control periods, trained on drawn plants", PPO
+    "ppo-history": Kind("history", "PPO that sees the last control periods", PPO),
+    "ppo-randomized": Kind(
+        "randomized", "PPO that sees the last control periods, trained on drawn plants", PPO
     ),
-    "recurrent": Kind(
-        "recurrent_ppo", "PPO with a long short-term memory, inputs beside it", f"{PPO}; {LSTM}"
+    "recurrent_ppo": Kind(
+        "recurrent", "PPO with a long short-term memory, inputs beside it", f"{PPO}; {LSTM}"
     ),
     "sac": Kind("sac", "SAC, two layers; no memory", SAC),
     "tqc": Kind("tqc", "TQC, two layers; no memory", TQC),
 }
+"""By algorithm and variant, as in a preset's file name. Residuals are beside these."""
 SUFFIXES: dict[str, str] = {
     "MusclePositioning-v0": "",
     "KneeTension-v0": "_knee_tension",
@@ -121,24 +128,26 @@ WHERE: dict[str, str] = {
     "KneeStairsUp-v0": "; trained at the paper's pace",
     "KneeStairsDown-v0": "; trained at the paper's pace",
 }
-CORRECTED: dict[str, str] = {
-    "MusclePositioning-v0": "inverse",
-    "KneeTension-v0": "knee_inverse_ahead_ltr",
-    "KneeStiffness-v0": "knee_inverse_ahead",
-    "KneeWalk-v0": "knee_inverse_ahead_ltr",
-    "KneeStairsUp-v0": "knee_inverse_ahead_ltr",
-    "KneeStairsDown-v0": "knee_inverse_ahead_ltr",
-    "AntagonisticJoint-v0": "joint_mfc_mu_ahead",
-    "RedundantManipulator-v0": "joint_pid_smooth_ahead",
-    "ElbowOrthosis-v0": "elbow_allocation_early",
-}
-"""Controllers that residuals correct. On the tuning seeds (``python -m agents classical``) they
-have the least error, or move the set-point less than others within a tenth of it."""
 
 
-def _learned(env: str, kind: Kind) -> Entry:
+def _offered() -> dict[str, Entry]:
+    """Return an entry for every preset of a known kind, and for every residual."""
+    made = {}
+    for env_id, algo, variant in configs.presets():
+        env = env_id.removeprefix("PAM/")
+        preset = f"{algo}-{variant}" if variant else algo
+        if preset.startswith("ppo-residual"):
+            corrected = configs.preset(env_id, algo, variant).residual.controller
+            made[variant + SUFFIXES[env]] = _residual(env, preset, corrected)
+        elif preset in KINDS:
+            made[KINDS[preset].name + SUFFIXES[env]] = _learned(env, preset)
+    return made
+
+
+def _learned(env: str, preset: str) -> Entry:
+    kind = KINDS[preset]
     return Entry(
-        file=f"{env}.{kind.preset}.s{{seed}}.onnx",
+        file=f"{env}.{preset}.s{{seed}}.onnx",
         summary=f"{kind.summary}{WHERE.get(env, '')}",
         knowledge=MODEL,
         citation=kind.citation,
@@ -146,11 +155,11 @@ def _learned(env: str, kind: Kind) -> Entry:
     )
 
 
-def _residual(env: str, baseline: str) -> Entry:
+def _residual(env: str, preset: str, baseline: str) -> Entry:
     return Entry(
-        file=f"{env}.ppo-residual.s{{seed}}.onnx",
+        file=f"{env}.{preset}.s{{seed}}.onnx",
         summary=f"{baseline} corrected by a PPO policy, which sees its action{WHERE.get(env, '')}",
-        knowledge=MODEL,
+        knowledge=CLASSICAL[baseline].knowledge,
         citation=f"{PPO}; {RESIDUAL}",
         envs=(f"PAM/{env}",),
         kind="residual",
@@ -158,14 +167,7 @@ def _residual(env: str, baseline: str) -> Entry:
     )
 
 
-OFFERED: dict[str, Entry] = {
-    **{
-        f"{name}{suffix}": _learned(env, kind)
-        for env, suffix in SUFFIXES.items()
-        for name, kind in KINDS.items()
-    },
-    **{f"residual{SUFFIXES[env]}": _residual(env, baseline) for env, baseline in CORRECTED.items()},
-}
+OFFERED: dict[str, Entry] = _offered()
 """All policies that the board would take, trained or not."""
 CONTROLLERS: dict[str, Entry] = {n: entry for n, entry in OFFERED.items() if entry.files()}
 """Those of which files are there."""
@@ -195,7 +197,8 @@ def load_pretrained(
     Raises
     ------
     ValueError
-        If there is no such policy or training, or the signals differ.
+        If there is no such policy or training, the signals differ, or the file is of another
+        environment, algorithm or training seed than its name says.
     """
     if name not in CONTROLLERS:
         raise ValueError(f"no policy named {name!r}{nearest(name, list(CONTROLLERS))}")
@@ -203,7 +206,23 @@ def load_pretrained(
     seed = min(files) if training_seed is None else training_seed
     if seed not in files:
         raise ValueError(f"{name} has no training seed {seed}; there are: {list(files)}")
-    return OnnxPolicy.load(files[seed], signals, action_signals)
+    policy = OnnxPolicy.load(files[seed], signals, action_signals)
+    _check_name(policy, CONTROLLERS[name], seed)
+    return policy
+
+
+def _check_name(policy: OnnxPolicy, entry: Entry, seed: int) -> None:
+    """Raise unless a policy is the one that its file's name says."""
+    card = policy.card
+    said = (card["env"], card["algo"], card["seed"], policy.corrects)
+    algo = entry.file.split(".")[1].partition("-")[0]
+    wanted = (entry.envs[0], algo, seed, entry.baseline)
+    for what, is_, should in zip(("env", "algo", "seed", "baseline"), said, wanted, strict=True):
+        if is_ != should:
+            raise PolicyFileError(
+                f"{policy.name} is by its card of {what} {is_!r}, and should be of {should!r}; "
+                "name files as they were trained"
+            )
 
 
 def make_controller(

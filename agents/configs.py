@@ -1,7 +1,8 @@
 """Training presets, one YAML file per environment and algorithm, with a checked schema.
 
 A file is named ``ENV.ALGO.yaml`` or ``ENV.ALGO-VARIANT.yaml``. With ``extends: ENV.ALGO`` it
-states only what differs from another preset; the other's algorithm is left behind.
+states only what differs from another preset; the other's search is left behind, and its algorithm
+where that differs.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import yaml
 
+import pam_envs  # noqa: F401  (registers the environments)
 from agents import parts
 from agents.parts import Evaluation, History, Network, Normalize, Plants, Residual, Search
 from agents.settings import SettingsError, build, choice, nearest, number
@@ -27,6 +30,8 @@ ON_POLICY = ("ppo", "recurrent_ppo")
 OPTIONAL = ("share", "per_reference", "history", "residual", "plants", "evaluation", "search")
 """Parts that are left out of the plain form where they hold their defaults."""
 NAME = re.compile(r"[A-Za-z0-9]+-v[0-9]+\.[a-z_]+(-[a-z_]+)?")
+ENV = re.compile(r"PAM/[A-Za-z0-9]+-v[0-9]+")
+"""Ids of environments here. In ``module:id`` Gymnasium imports the module, which runs its code."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +41,7 @@ class Config:
     Attributes
     ----------
     env : str
-        Environment id.
+        Id of a registered environment of this package.
     algo : {"ppo", "sac", "tqc", "recurrent_ppo"}
     steps : int
         Control periods of all rows together.
@@ -82,7 +87,8 @@ class Config:
     schema: int = number(1, 1, 1)
 
     def __post_init__(self) -> None:
-        """Refuse combinations that cannot train."""
+        """Refuse foreign environments and combinations that cannot train."""
+        check_env(self.env)
         self._check_rollout()
         network = self.network
         if network.hold and not network.linear:
@@ -146,8 +152,9 @@ class Config:
         return getattr(self, self.algo)
 
     def decisive(self) -> Config:
-        """Return the settings that decide what is learnt: looking at it changes nothing."""
-        return dataclasses.replace(self, evaluation=Evaluation(), search=Search())
+        """Return the settings that decide which policy is shipped: also how it is looked at."""
+        usual: Any = Config.checkpoint_steps
+        return dataclasses.replace(self, search=Search(), checkpoint_steps=usual)
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values, without the other algorithms' parts and those left at rest."""
@@ -158,6 +165,19 @@ class Config:
             del plain[name]
         made: dict[str, Any] = plain
         return made
+
+
+def check_env(name: str) -> None:
+    """Raise unless a name is that of an environment of this package.
+
+    Raises
+    ------
+    SettingsError
+        Naming the nearest.
+    """
+    if not (ENV.fullmatch(name) and name in gym.registry):
+        known = [env for env in gym.registry if ENV.fullmatch(env)]
+        raise SettingsError(f"env = {name!r} is no environment here{nearest(name, known)}")
 
 
 def _fresh(name: str) -> Any:
@@ -228,7 +248,7 @@ def _mapping(path: Path) -> Any:
     try:
         text = path.read_text(encoding="utf-8")
         return json.loads(text) if path.suffix == ".json" else yaml.safe_load(text)
-    except (OSError, ValueError, yaml.YAMLError) as error:
+    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         raise SettingsError(f"{path.name} cannot be read as YAML: {error}") from error
 
 
@@ -245,22 +265,39 @@ def from_mapping(given: Any) -> Config:
     return made
 
 
-def _extended(given: Mapping[str, Any]) -> Any:
-    """Return a mapping laid over the preset that it extends."""
+def _extended(given: Mapping[str, Any], above: tuple[str, ...] = ()) -> Any:
+    """Return a mapping laid over the preset that it extends, whose search is not its own.
+
+    Parameters
+    ----------
+    given : mapping
+    above : tuple of str
+        Presets that lead here, each extending the next.
+    """
     name = given["extends"]
+    under = _mapping(_extendable(name, above))
+    own = {key: value for key, value in given.items() if key != "extends"}
+    if "extends" in under:
+        under = _extended(under, (*above, name))
+    foreign = ["search"]
+    if own.get("algo", under.get("algo")) != under.get("algo"):
+        foreign += ALGORITHMS
+    under = {key: value for key, value in under.items() if key not in foreign}
+    return _laid_over(under, own)
+
+
+def _extendable(name: Any, above: tuple[str, ...]) -> Path:
+    """Return the file of a preset that another extends."""
     if not isinstance(name, str) or not NAME.fullmatch(name):
         raise SettingsError(f"extends = {name!r} must name a preset, for example KneeWalk-v0.ppo")
+    if name in above:
+        circle = " -> ".join((*above[above.index(name) :], name))
+        raise SettingsError(f"extends = {name!r} goes in a circle ({circle}); take one out")
     path = FOLDER / f"{name}.yaml"
     if not path.is_file():
         names = [p.stem for p in presets().values()]
         raise SettingsError(f"extends = {name!r} is no preset{nearest(name, names)}")
-    under = _mapping(path)
-    own = {key: value for key, value in given.items() if key != "extends"}
-    if "extends" in under:
-        under = _extended(under)
-    if own.get("algo", under.get("algo")) != under.get("algo"):
-        under = {key: value for key, value in under.items() if key not in ALGORITHMS}
-    return _laid_over(under, own)
+    return path
 
 
 def _laid_over(under: Any, over: Any) -> Any:

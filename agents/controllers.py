@@ -13,11 +13,8 @@ from agents.settings import SettingsError, nearest
 from baselines import catalogue
 from pam_envs.parameters import Signals
 
-PROBES = 16
 MOST_NUMBERS = 64
 """Larger arrays stand on a card by their shape alone."""
-SAME = 1e-3
-"""Answers to the probe that differ by more, of a range of 2, are another controller's."""
 
 
 def make(name: str, plant: Any, signals: Signals, actions: Signals) -> Any:
@@ -37,24 +34,6 @@ def make(name: str, plant: Any, signals: Signals, actions: Signals) -> Any:
 def names_for(env: str) -> list[str]:
     """Return the classical controllers of an environment."""
     return [name for name, entry in catalogue.CONTROLLERS.items() if env in entry.envs]
-
-
-def probe(controller: Any, width: int) -> list[list[float]]:
-    """Return the controller's answers to a fixed sequence of observations.
-
-    Parameters
-    ----------
-    controller : Controller
-    width : int
-        Numbers in an observation, taken to lie in [-1, 1].
-    """
-    seen = np.random.default_rng(0).uniform(-1.0, 1.0, width)
-    answers, state = [], None
-    for step in range(PROBES):
-        observation = (0.9 * np.sin(seen * (step + 1))).astype(np.float32)
-        action, state = controller.predict(observation, state, step == 0)
-        answers.append([float(a) for a in action])
-    return answers
 
 
 def parameters(thing: Any, depth: int = 4) -> Any:

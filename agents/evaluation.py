@@ -1,4 +1,4 @@
-"""How well a policy tracks on tuning seeds: what settings are chosen by, never a score.
+"""How well a policy tracks on tuning seeds: what it is chosen by, and settings; never a score.
 
 The policy is looked at as it will be shipped: exported, run by onnxruntime, with its controller.
 """
@@ -6,6 +6,7 @@ The policy is looked at as it will be shipped: exported, run by onnxruntime, wit
 from __future__ import annotations
 
 import math
+import statistics
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +22,8 @@ from agents.residual import with_controller
 
 Array = NDArray[np.float64]
 TRAVEL = "effort/pressure_travel"
+MORE_TRAVEL = 1.05
+"""Up to this many times as much travel as a controller's, its correction is as good as for free."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,32 @@ def _known(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
+def value_of(score: Score, config: Config, travel: float | None = None) -> float:
+    """Return what is to be small, as ``evaluation.objective`` says; infinite if unknown.
+
+    A number to choose by, no error: every episode that a limit ended adds the whole error again
+    (in a return it shows as it is), and a residual that moves the set-point more than its
+    controller pays in proportion.
+
+    Parameters
+    ----------
+    score : Score
+    config : Config
+    travel : float, optional
+        The travel [Pa] of the controller that a residual corrects.
+    """
+    objective = config.evaluation.objective
+    if objective == "return":
+        worth = -score.mean_return
+    else:
+        error = statistics.geometric_mean(score.kinds) if objective == "geometric" else score.rms
+        worth = error * (1.0 + score.failures)
+    if not math.isfinite(worth):
+        return math.inf
+    dearer = score.travel / (MORE_TRAVEL * travel) if travel else 1.0
+    return worth * dearer if dearer > 1.0 and worth > 0.0 else worth
+
+
 def evaluate(policy: OnnxPolicy | str, config: Config, episodes: int | None = None) -> Score:
     """Return the score of a policy on the tuning seeds, on the plants that it is trained on.
 
@@ -74,16 +103,14 @@ def evaluate(policy: OnnxPolicy | str, config: Config, episodes: int | None = No
     config : Config
         Whose ``evaluation`` says what is counted.
     episodes : int, optional
-        How many; default: as ``evaluation`` says.
+        How many, shared out evenly among the kinds of rows (one each at least), which have the
+        same seeds; default: as ``evaluation`` says.
     """
     wanted = config.evaluation
     count = wanted.episodes if episodes is None else episodes
     kinds = config.kinds()
-    parts = [
-        _Part(policy, config, {**kind, **wanted.env_kwargs}, chosen)
-        for kind, chosen in zip(kinds, _shared(seeds.tuning(count), len(kinds)), strict=True)
-        if chosen
-    ]
+    chosen = seeds.tuning(max(count // len(kinds), 1))
+    parts = [_Part(policy, config, {**kind, **wanted.env_kwargs}, chosen) for kind in kinds]
     for part in parts:
         part.run()
     counted = sum(part.counted for part in parts)
@@ -95,10 +122,6 @@ def evaluate(policy: OnnxPolicy | str, config: Config, episodes: int | None = No
         kinds=tuple(part.rms for part in parts),
         travel=sum(part.travel for part in parts) / counted if counted else math.nan,
     )
-
-
-def _shared(chosen: list[int], kinds: int) -> list[list[int]]:
-    return [chosen[i::kinds] for i in range(kinds)]
 
 
 class _Part:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
@@ -19,7 +19,7 @@ from stable_baselines3.common.torch_layers import FlattenExtractor
 from torch import nn
 
 import pam_envs
-from agents import controllers
+from agents import controllers, probe
 from agents.checkpoint import write_atomically
 from agents.graph import Graph, array
 from agents.history_vec_env import HistoryVecEnv
@@ -34,6 +34,8 @@ ALGORITHMS: dict[type[BaseAlgorithm], str] = {
     TQC: "tqc",
     RecurrentPPO: "recurrent_ppo",
 }
+OWN = ("info", "num_envs", "vectorization_mode", "threads")
+"""Arguments of the batch, which decide nothing that is learned."""
 L = TypeVar("L")
 
 
@@ -44,6 +46,8 @@ def export_policy(
     beside: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Write the model's deterministic action as a policy file, and its card beside it.
+
+    The card is written first, so that a policy that is there has one, whenever a process is killed.
 
     Parameters
     ----------
@@ -65,14 +69,15 @@ def export_policy(
     Raises
     ------
     ValueError
-        If the model has layers that have no counterpart here.
+        If the model has layers that have no counterpart here, or corrects a controller that is
+        mostly at a limit.
     """
     path = Path(path)
     full = {**facts(model), **(card or {})}
     data = policy_bytes(model, full)
-    write_atomically(path, data)
     text = json.dumps({**full, **(beside or {})}, indent=1, sort_keys=True) + "\n"
     write_atomically(path.with_suffix(".json"), text.encode())
+    write_atomically(path, data)
     return full
 
 
@@ -115,14 +120,13 @@ def facts(model: BaseAlgorithm) -> dict[str, Any]:
     env = model.get_env()
     if env is None:
         raise ValueError("the model has no environment; call model.set_env(env) first")
-    spec, plant = env.get_attr("spec")[0], env.get_attr("plant")[0]
-    own = {"info", "num_envs", "vectorization_mode", "threads"}
+    spec = env.get_attr("spec")[0]
     names = ("torch", "stable_baselines3", "sb3_contrib", "gymnasium", "numpy", "onnx")
     made = {
         "schema": SCHEMA,
         "env": spec.id,
-        "env_kwargs": {k: _plain(v) for k, v in spec.kwargs.items() if k not in own},
-        "plant": plant.digest(),
+        "env_kwargs": _in_common([kind for kind, _ in _kinds(env)]),
+        "plants": plants_of(env),
         "signals": describe(env.get_attr("signals")[0]),
         "action_signals": describe(env.get_attr("action_signals")[0]),
         "algo": ALGORITHMS.get(type(model), type(model).__name__.lower()),
@@ -135,20 +139,51 @@ def facts(model: BaseAlgorithm) -> dict[str, Any]:
         },
     }
     corrects = _layer(env, ResidualVecEnv)
-    return made if corrects is None else {**made, "baseline": _baseline(corrects, plant)}
+    return made if corrects is None else {**made, "baseline": _baseline(corrects, spec.id)}
 
 
-def _baseline(layer: ResidualVecEnv, plant: Any) -> dict[str, Any]:
-    """Return what the card says of the controller that the policy corrects."""
-    _, controller = layer.controllers[0]
-    width = layer.venv.observation_space.shape[0]  # type: ignore[index]
+def plants_of(env: Any) -> list[str]:
+    """Return the digests of the nominal plants that the rows are on, each once."""
+    return list(dict.fromkeys(plant.digest() for _, plant in _kinds(env)))
+
+
+def _kinds(env: Any) -> Iterator[tuple[dict[str, Any], Any]]:
+    """Yield the environment's arguments and the nominal plant of each kind of row."""
+    base = env.unwrapped
+    for batch in getattr(base, "batches", (base,)):
+        given = batch.get_attr("spec")[0].kwargs
+        kind = {name: value for name, value in given.items() if name not in OWN}
+        yield kind, batch.get_attr("plant")[0]
+
+
+def _in_common(kinds: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the arguments that all kinds have alike."""
+    first, *others = ({name: _plain(value) for name, value in kind.items()} for kind in kinds)
     return {
-        "name": layer.name,
-        "scale": float(layer.scale),
-        "plant": plant.digest(),
-        "parameters": controllers.parameters(controller),
-        "probe": controllers.probe(controller, width),
+        name: value
+        for name, value in first.items()
+        if all(name in other and other[name] == value for other in others)
     }
+
+
+def _baseline(layer: ResidualVecEnv, env: str) -> dict[str, Any]:
+    """Return what the card says of the controller that the policy corrects."""
+    kinds: dict[str, list[dict[str, Any]]] = {}
+    for kind, plant in _kinds(layer):
+        kinds.setdefault(plant.digest(), []).append(kind)
+    made = {_plant_at(layer, rows): controller for rows, controller in layer.controllers}
+    told = []
+    for digest, controller in made.items():
+        found = probe.record(env, kinds[digest], controller, layer.name)
+        parameters = controllers.parameters(controller)
+        told.append({"plant": digest, "parameters": parameters, "probe": found.as_dict()})
+    return {"name": layer.name, "scale": float(layer.scale), "told": told}
+
+
+def _plant_at(layer: ResidualVecEnv, rows: slice) -> str:
+    """Return the digest of the plant of some rows, which is the same for all of them."""
+    digest: str = layer.get_attr("plant", [rows.start or 0])[0].digest()
+    return digest
 
 
 def _plain(value: Any) -> Any:

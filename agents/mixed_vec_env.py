@@ -76,8 +76,10 @@ class MixedVecEnv(VecEnv):
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Set an attribute of all batches; see :meth:`BatchVecEnv.set_attr`."""
+        if indices is not None:
+            raise ValueError(f"set_attr({attr_name!r}) acts on all rows; leave indices out")
         for batch in self.batches:
-            batch.set_attr(attr_name, value, None if indices is None else [])
+            batch.set_attr(attr_name, value)
 
     def env_method(
         self,

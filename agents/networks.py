@@ -24,6 +24,8 @@ from pam_envs.parameters import Signals
 
 ACTIVATIONS: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU, "elu": nn.ELU}
 Matrix = tuple[tuple[float, ...], ...]
+CRITIC = ("value_net.", "mlp_extractor.value_net.", "lstm_critic.", "critic.")
+"""What names of the critic's parameters begin with, in policies of stable-baselines3."""
 
 
 def input_matrix(network: Network, names: tuple[str, ...]) -> Matrix:
@@ -196,6 +198,12 @@ def silence(policy: Any) -> None:
     with torch.no_grad():
         last.weight.zero_()
         last.bias.zero_()
+
+
+def critic_alone(policy: Any, alone: bool) -> None:
+    """Let the critic of an actor-critic learn alone, or both again."""
+    for name, parameter in policy.named_parameters():
+        parameter.requires_grad_(not alone or name.startswith(CRITIC))
 
 
 def policy_arguments(config: Config, signals: Signals, actions: Signals) -> dict[str, Any]:

@@ -77,6 +77,24 @@ def read(path: str | Path) -> PolicyFile:
         raise PolicyFileError(f"{path.name}: {error}") from error
 
 
+def finished(path: str | Path) -> dict[str, Any] | None:
+    """Return the card of a policy that is there whole, None where a file is missing or older.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the policy; its card lies beside it, with what the training cost.
+    """
+    path = Path(path)
+    try:
+        beside = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+        inside = read(path).card
+    except (OSError, ValueError):
+        return None
+    known = isinstance(beside, dict) and {key: beside.get(key) for key in inside} == inside
+    return inside if known else None
+
+
 def _refuse_code(name: str, data: bytes) -> None:
     """Refuse files that run code when they are opened, before anything looks inside."""
     kinds = {b"PK": "a zip file (as of stable-baselines3 or torch)", b"\x80": "a pickle"}
@@ -148,7 +166,7 @@ def _card(model: onnx.ModelProto) -> dict[str, Any]:
         )
     try:
         card = json.loads(texts[CARD])
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise PolicyFileError(f"its card is not JSON: {error}") from error
     if not isinstance(card, dict) or card.get("schema") != SCHEMA:
         raise PolicyFileError(f"its card is not of schema {SCHEMA}; export it with this version")

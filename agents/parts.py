@@ -57,7 +57,14 @@ class Normalize:
 class PPO:
     """Proximal policy optimisation (Schulman et al. 2017), names as in stable-baselines3.
 
-    ``learning_rate`` runs linearly from the first value to the second over the training.
+    Attributes
+    ----------
+    learning_rate : tuple of float
+        Runs linearly from the first value to the second over the training.
+    warm_up : int
+        Rollouts at the beginning in which the critic alone learns, so that a policy that starts
+        as a controller is not led away by an untrained critic (Silver et al., Residual policy
+        learning, arXiv:1812.06298, 2018). In as many rollouts after them the rate rises from 0.
     """
 
     n_steps: int = number(32, 2, 100_000)
@@ -71,6 +78,7 @@ class PPO:
     vf_coef: float = number(0.5, 0.0, 100.0)
     max_grad_norm: float = number(0.5, 1e-3, 1e3)
     target_kl: float | None = number(None, 1e-6, 10.0)
+    warm_up: int = number(0, 0, 10_000)
 
 
 @dataclass(frozen=True)
@@ -98,6 +106,7 @@ class RecurrentPPO:
     vf_coef: float = number(0.5, 0.0, 100.0)
     max_grad_norm: float = number(0.5, 1e-3, 1e3)
     target_kl: float | None = number(None, 1e-6, 10.0)
+    warm_up: int = number(0, 0, 10_000)
 
 
 @dataclass(frozen=True)
@@ -187,16 +196,17 @@ class Evaluation:
     Attributes
     ----------
     interval : int
-        Control periods of training between evaluations; 0 for none but the last.
+        Control periods of training between evaluations; 0 for none but the first and the last.
     episodes : int
-        Episodes each time; 0 for no evaluation at all.
+        Episodes each time, as many for each kind of row and on the same seeds; 0 for no evaluation
+        at all: then the last policy is shipped, otherwise the best that was looked at.
     settle_seconds : float
         Start [s] of each episode that is not counted.
     gate : tuple of str
         Entries of ``info`` that are all 1 where the output is tracked; everywhere without.
     objective : {"rms", "geometric", "return"}
-        What a search of settings goes by: the error's RMS, the geometric mean of the kinds' RMS
-        (each counts by its ratio), or the return where a task is more than one error.
+        What policies and settings are chosen by: the error's RMS, the geometric mean of the kinds'
+        RMS (each counts by its ratio), or the return where a task is more than one error.
     env_kwargs : dict
         Arguments of the environment that differ from the training's.
     """
@@ -215,17 +225,17 @@ class Search:
 
     Attributes
     ----------
-    trials : int
-        Settings that were tried; 0 where the values were set by hand.
+    trials : int or None
+        Settings that were tried; None where they were set by hand, and nobody counted.
     steps : int
-        Control periods of each.
+        Control periods of each training of a trial.
     seed : int
         Of the sampler.
     note : str
         What was searched, and on what.
     """
 
-    trials: int = number(0, 0, 10**6)
+    trials: int | None = number(None, 0, 10**6)
     steps: int = number(0, 0, 10**12)
     seed: int = number(0, 0, 2**31)
-    note: str = ""
+    note: str = "by hand"

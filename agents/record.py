@@ -52,8 +52,16 @@ def hardware() -> str:
     return f"{model} ({platform.machine()}), {cores} cores, one used"
 
 
-def training(config: Config, seed: int, command: str, spent: dict[str, float]) -> dict[str, Any]:
+def training(
+    config: Config,
+    seed: int,
+    command: str,
+    spent: dict[str, float],
+    steps: int | None = None,
+) -> dict[str, Any]:
     """Return what stands under ``training`` in the file beside a policy.
+
+    ``tuning_trials`` is None for settings that were chosen by hand, which nobody counted.
 
     Parameters
     ----------
@@ -64,12 +72,15 @@ def training(config: Config, seed: int, command: str, spent: dict[str, float]) -
         That starts this training again.
     spent : mapping
         Of :meth:`Clock.spent`.
+    steps : int, optional
+        That were done, whole rollouts; default: those that were asked for.
     """
+    done = config.steps if steps is None else steps
     return {
-        "steps": config.steps,
+        "steps": done,
         "seconds": round(spent["wall"], 1),
         "cpu_seconds": round(spent["cpu"], 1),
-        "frames_per_second": round(config.steps / max(spent["wall"], 1e-9)),
+        "frames_per_second": round(done / max(spent["wall"], 1e-9)),
         "hardware": hardware(),
         "seed": seed,
         "first_env_seed": seeds.first_training(seed),

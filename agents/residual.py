@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents import controllers
+from agents import controllers, probe
 from agents.onnx_file import PolicyFileError
 from agents.policy import OnnxPolicy
 
@@ -57,6 +58,12 @@ class ResidualPolicy:
         action, memory = self.policy.answer(observation, memory, episode_start, given)
         return action, ResidualState(inner, memory)
 
+    @property
+    def model_output(self) -> Callable[[ResidualState], Any]:
+        """What the controller's model should do, from the state; there if the controller has it."""
+        told = self.controller.model_output
+        return lambda state: told(state.controller)
+
 
 def with_controller(policy: OnnxPolicy, plant: Any) -> OnnxPolicy | ResidualPolicy:
     """Return the policy, with the controller that it corrects if it does.
@@ -70,22 +77,43 @@ def with_controller(policy: OnnxPolicy, plant: Any) -> OnnxPolicy | ResidualPoli
     Raises
     ------
     PolicyFileError
-        If the controller answers otherwise than in training although it is told the same plant.
+        If the controller has other numbers than in training, or answers otherwise, although it is
+        told the same plant.
     """
     if not policy.corrects:
         return policy
     controller = controllers.make(policy.corrects, plant, policy.signals, policy.action_signals)
-    known = policy.card["baseline"]
-    if plant.digest() == known.get("plant"):
-        _check_answers(policy, controller, known)
+    told = _told(policy)
+    if plant.digest() in told:
+        _check(policy, controller, told[plant.digest()])
     return ResidualPolicy(policy, controller)
 
 
-def _check_answers(policy: OnnxPolicy, controller: Any, known: Any) -> None:
-    now = np.array(controllers.probe(controller, len(policy.signals)))
-    then = np.array(known.get("probe", ()))
-    if then.shape != now.shape or not np.abs(now - then).max() <= controllers.SAME:
+def _told(policy: OnnxPolicy) -> dict[str, Any]:
+    """Return what the card says of the controller by the plant that it was told."""
+    try:
+        return {entry["plant"]: entry for entry in policy.card["baseline"]["told"]}
+    except (KeyError, TypeError) as error:
         raise PolicyFileError(
-            f"{policy.name} was trained on the controller {policy.corrects!r}, which answers "
-            "otherwise now; train it anew, or go back to the version of baselines on its card"
+            f"{policy.name}: its card does not say how the controller {policy.corrects!r} answered "
+            "in training; export it with this version"
+        ) from error
+
+
+def _check(policy: OnnxPolicy, controller: Any, known: Any) -> None:
+    """Raise unless a controller is the one of the training, told the same plant."""
+    try:
+        then = probe.Probe.of(known["probe"], len(policy.signals))
+        parameters, scale = known["parameters"], float(policy.card["baseline"]["scale"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise PolicyFileError(
+            f"{policy.name}: its card has no sound record of the controller {policy.corrects!r} "
+            f"({error}); export it with this version"
+        ) from error
+    changed = probe.difference(parameters, controllers.parameters(controller))
+    if changed or not probe.answers_alike(then, controller, scale):
+        raise PolicyFileError(
+            f"{policy.name} was trained on the controller {policy.corrects!r}, which is another "
+            f"one now: {changed or 'it answers otherwise'}; train it anew, or go back to the "
+            "version of baselines that it was trained with"
         )

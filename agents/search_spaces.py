@@ -8,9 +8,6 @@ from typing import Any
 
 from agents.configs import Config, from_mapping, put
 
-LAST_RATE = 0.05
-"""The learning rate's last value as a share of its first."""
-
 
 @dataclass(frozen=True)
 class Range:
@@ -26,6 +23,11 @@ class Range:
         if self.whole:
             return int(trial.suggest_int(name, int(self.low), int(self.high), log=self.log))
         return float(trial.suggest_float(name, self.low, self.high, log=self.log))
+
+    @property
+    def common(self) -> float:
+        """Any value, the same for all: what is searched does not matter."""
+        return int(self.low) if self.whole else self.low
 
     def nearest(self, value: Any) -> Any:
         """Return the value, or the end of the range that is nearer."""
@@ -44,6 +46,11 @@ class Choice:
         texts = [str(value) for value in self.values]
         return self.values[texts.index(trial.suggest_categorical(name, texts))]
 
+    @property
+    def common(self) -> Any:
+        """Any value, the same for all: what is searched does not matter."""
+        return self.values[0]
+
     def nearest(self, value: Any) -> str:
         """Return the text of the value, or of the first one."""
         texts = [str(entry) for entry in self.values]
@@ -52,16 +59,18 @@ class Choice:
 
 Space = Mapping[str, Range | Choice]
 
-_RATE = Range(1e-4, 3e-3, log=True)
+_RATE = Range(3e-5, 3e-3, log=True)
 _HORIZON = Range(10.0, 200.0, log=True)
 _WIDTHS = Choice(([32, 32], [64, 64], [128, 128]))
+_WIDTH = Choice(([32], [64], [128]))
+"""Of the layer behind a memory."""
 _PPO: Space = {
     "learning_rate": _RATE,
     "horizon": _HORIZON,
     "gae_lambda": Range(0.8, 0.99),
     "clip_range": Range(0.1, 0.3),
     "n_epochs": Range(2, 8, whole=True),
-    "network.log_std_init": Range(-3.0, -0.5),
+    "network.log_std_init": Range(-4.5, -0.5),
     "network.gain": Range(5.0, 50.0, log=True),
 }
 _OFF_POLICY: Space = {
@@ -74,19 +83,20 @@ _OFF_POLICY: Space = {
 }
 SPACES: Mapping[str, Space] = {
     "ppo": {**_PPO, "network.hidden": _WIDTHS},
-    "recurrent_ppo": {**_PPO, "lstm_size": Choice((16, 32, 64))},
+    "recurrent_ppo": {**_PPO, "network.hidden": _WIDTH, "lstm_size": Choice((16, 32, 64))},
     "sac": _OFF_POLICY,
     "tqc": {**_OFF_POLICY, "top_quantiles_to_drop_per_net": Range(0, 5, whole=True)},
 }
 """Names without a dot are of the algorithm's part. ``horizon`` is ``1 / (1 - gamma)``, in control
-periods; ``learning_rate`` is the first of the two, the last is ``LAST_RATE`` of it."""
+periods; ``learning_rate`` is the first of the two, and the last stays the share of it that it is
+in the preset."""
 
 
 def space_of(config: Config) -> dict[str, Range | Choice]:
     """Return what a search chooses for a preset."""
     space = dict(SPACES[config.algo])
     if config.residual.controller:
-        space["residual.scale"] = Range(0.02, 0.5, log=True)
+        space["residual.scale"] = Range(0.003, 0.3, log=True)
     if config.history.frames:
         space["history.frames"] = Range(2, 32, log=True, whole=True)
     return space
@@ -99,8 +109,9 @@ def as_settings(config: Config, values: Mapping[str, Any]) -> dict[str, Any]:
         if name == "horizon":
             made[f"{config.algo}.gamma"] = round(1.0 - 1.0 / value, 5)
         elif name == "learning_rate":
-            rates = [_short(value), _short(LAST_RATE * value)]
-            made[f"{config.algo}.learning_rate"] = rates
+            first, last = config.chosen.learning_rate
+            share = last / first if first else 1.0
+            made[f"{config.algo}.learning_rate"] = [_short(value), _short(share * _short(value))]
         else:
             place = name if "." in name else f"{config.algo}.{name}"
             made[place] = _short(value) if isinstance(value, float) else value

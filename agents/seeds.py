@@ -1,9 +1,9 @@
 """Which environment seeds are for training, which for tuning; those of benchmarks are neither.
 
-Benchmarks use seeds below 10,000, and for audits numbers that nobody can choose. What is trained
-here starts at ``TRAINING``; what is looked at while settings are chosen (networks, rates, how far
-a policy looks back or ahead) are the seeds from ``TUNING`` on, and no others. So no scored episode
-is ever trained on, and none decides a setting.
+Benchmarks use seeds below ``TUNING``, and for audits numbers that nobody can choose. What is
+trained here starts at ``TRAINING``; what is looked at while settings are chosen (networks, rates,
+how far a policy looks back or ahead) are the seeds from ``TUNING`` on, and no others. So no scored
+episode is ever trained on, and none decides a setting.
 """
 
 from __future__ import annotations

@@ -17,8 +17,9 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from agents import configs
+from agents import configs, sources
 from agents.configs import Config
+from agents.onnx_file import finished
 from agents.settings import SettingsError
 from sweeps import engine
 from sweeps.worker import LOOK, wanted
@@ -28,7 +29,10 @@ POLICY, CARD = "policy.onnx", "policy.json"
 LOG = "log.txt"
 ATTEMPTS = 3
 """How often the process of a training may be killed."""
-PACKAGES = ("numpy", "numba", "torch", "stable_baselines3", "sb3_contrib", "onnx")
+PACKAGES = (
+    *("numpy", "scipy", "numba", "gymnasium"),
+    *("torch", "stable_baselines3", "sb3_contrib", "onnx"),
+)
 
 
 @dataclass(frozen=True)
@@ -49,23 +53,23 @@ class Training:
 
     @property
     def key(self) -> str:
-        """Digest of what decides the policy: settings, seed and package versions."""
-        parts = [self.config.as_dict(), self.seed, str(self.folder), versions()]
+        """Digest of what decides the policy: settings, seed, sources and package versions."""
+        code = sources.digests()
+        parts = [self.config.as_dict(), self.seed, str(self.folder), versions(), code]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:32]
 
     def finished(self) -> bool:
-        """Return whether the policy is there.
+        """Return whether the policy is there, with its card.
 
         Raises
         ------
         SettingsError
             If the folder holds a policy of other settings.
         """
-        card = self.folder / CARD
-        if not (card.is_file() and (self.folder / POLICY).is_file()):
+        card = finished(self.folder / POLICY)
+        if card is None:
             return False
-        seed = json.loads(card.read_text(encoding="utf-8")).get("seed")
-        if configs.read(card) != self.config or seed != self.seed:
+        if configs.from_mapping(card.get("config")) != self.config or card["seed"] != self.seed:
             raise SettingsError(
                 f"{self.folder} holds a policy of other settings; give another --out"
             )
@@ -151,14 +155,14 @@ def run(
 
 
 def _keep(folder: Path, files: dict[str, bytes]) -> None:
-    """Write a policy that was made where this folder is not seen."""
-    if all((folder / name).is_file() for name in files):
+    """Write a policy that was made where this folder is not seen, its card first."""
+    if finished(folder / POLICY) is not None:
         return
     from agents.checkpoint import write_atomically
 
     folder.mkdir(parents=True, exist_ok=True)
-    for name, content in files.items():
-        write_atomically(folder / name, content)
+    for name in (CARD, POLICY):
+        write_atomically(folder / name, files[name])
 
 
 def train(training: Training) -> dict[str, bytes]:

@@ -3,6 +3,9 @@
 The folder holds ``checkpoint.pt`` (everything the future depends on, see
 :mod:`agents.snapshot`), ``tensorboard/``, and at the end ``policy.onnx`` with ``policy.json``.
 
+What is shipped is the best policy of those that were evaluated (:mod:`agents.best`), or the last
+one where none was.
+
 Exactness. Checkpoints are taken at the start of a rollout, where nothing is half done. A run that
 was killed and resumed ends with the same bits, and the same ``policy.onnx``, as one that was not:
 for every algorithm, with memory, history and controller, with the same package versions on the
@@ -25,12 +28,14 @@ from rich.console import Console
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import configure
 
-from agents import checkpoint, configs, snapshot
+from agents import checkpoint, configs, snapshot, sources
+from agents.best import Best
 from agents.building import logs_each_rollout, make_env, make_model
-from agents.callbacks import Checkpoints, Evaluations
+from agents.callbacks import Checkpoints, Evaluations, WarmUp
 from agents.checkpoint import CheckpointError
 from agents.configs import Config
-from agents.export import export_policy
+from agents.export import export_policy, facts, plants_of
+from agents.onnx_file import finished
 from agents.progress import TrainingProgress
 from agents.record import Clock, training
 
@@ -77,16 +82,16 @@ class Run:
         for env, algo, variant in configs.presets():
             if (env, algo) == (config.env, config.algo):
                 preset = configs.preset(env, algo, variant)
-                same_length = dataclasses.replace(preset, steps=config.steps)
-                if same_length.decisive() == config.decisive():
+                own = {"steps": config.steps, "search": config.search}
+                if dataclasses.replace(preset, **own) == config:
                     return variant
         return None
 
 
-def default_folder(config: Config, seed: int, variant: str = "") -> Path:
+def default_folder(env: str, algo: str, seed: int, variant: str = "") -> Path:
     """Return ``runs/<environment>/<algo>[-<variant>]-seed<seed>``."""
-    kind = f"{config.algo}-{variant}" if variant else config.algo
-    return Path("runs") / config.env.replace("/", "-") / f"{kind}-seed{seed}"
+    kind = f"{algo}-{variant}" if variant else algo
+    return Path("runs") / env.replace("/", "-") / f"{kind}-seed{seed}"
 
 
 def start(run: Run) -> BaseAlgorithm:
@@ -96,6 +101,8 @@ def start(run: Run) -> BaseAlgorithm:
     ------
     CheckpointError
         If the folder already holds a run.
+    ValueError
+        If the policy could not be exported in the end.
     """
     if run.checkpoint.exists():
         raise CheckpointError(
@@ -103,7 +110,10 @@ def start(run: Run) -> BaseAlgorithm:
         )
     run.folder.mkdir(parents=True, exist_ok=True)
     checkpoint.sweep(run.folder)
-    return make_model(run.config, run.seed, make_env(run.config))
+    model = make_model(run.config, run.seed, make_env(run.config))
+    if run.config.residual.controller:
+        facts(model)
+    return model
 
 
 def saved_run(folder: Path, steps: int | None = None) -> Run:
@@ -118,7 +128,7 @@ def saved_run(folder: Path, steps: int | None = None) -> Run:
 def _settings(content: dict[str, Any]) -> dict[str, Any]:
     try:
         settings: dict[str, Any] = json.loads(content["settings"])
-        return {key: settings[key] for key in ("config", "seed", "plant")}
+        return {key: settings[key] for key in ("config", "seed", "plants", "sources")}
     except (KeyError, TypeError, ValueError) as error:
         raise CheckpointError("the checkpoint does not say how it was trained") from error
 
@@ -129,16 +139,12 @@ def resume(run: Run) -> BaseAlgorithm:
     Raises
     ------
     CheckpointError
-        If there is no sound checkpoint, or the plant has changed since.
+        If there is no sound checkpoint, or plants or sources have changed since.
     """
     checkpoint.sweep(run.folder)
     content = checkpoint.load(run.checkpoint)
     env = make_env(run.config)
-    was, now = _settings(content)["plant"], env.get_attr("plant")[0].digest()
-    if was != now:
-        raise CheckpointError(
-            f"the run was trained on the plant {was}, which is now {now}; train anew"
-        )
+    _check_unchanged(_settings(content), plants_of(env))
     model = make_model(run.config, run.seed, env)
     model.ep_info_buffer = None
     try:
@@ -150,18 +156,38 @@ def resume(run: Run) -> BaseAlgorithm:
     return model
 
 
+def _check_unchanged(settings: dict[str, Any], plants: list[str]) -> None:
+    """Raise if a run would go on with other plants or sources than it began with."""
+    if settings["plants"] != plants:
+        raise CheckpointError(
+            f"the run was trained on the plants {settings['plants']}, which are now {plants}; "
+            "train anew"
+        )
+    then, now = settings["sources"], sources.digests()
+    other = sorted(name for name in {*then, *now} if then.get(name) != now.get(name))
+    if other:
+        raise CheckpointError(
+            f"the sources of {', '.join(other)} have changed since the run began, so that it would "
+            "end as no other; train anew, or go back to them"
+        )
+
+
 def train(run: Run, model: BaseAlgorithm, console: Console) -> Path:
     """Train to the end of the run and write its policy; return the policy's place."""
     sinks = ["tensorboard"] if find_spec("tensorboard") else []
     model.set_logger(configure(str(run.folder / "tensorboard"), sinks))
-    clock, found = _so_far(run) if model.num_timesteps else (Clock(), [])
-    evaluations = Evaluations(run.config, run.seed, found)
+    clock, evaluations = _so_far(run, model.num_timesteps)
     checkpoints = Checkpoints(run.checkpoint, run.config, run.seed, clock, evaluations)
     left = run.config.steps - model.num_timesteps
     if left > 0:
         model.learn(
             left,
-            callback=[evaluations, checkpoints, TrainingProgress(run.config.steps, console)],
+            callback=[
+                WarmUp(run.config),
+                evaluations,
+                checkpoints,
+                TrainingProgress(run.config.steps, console),
+            ],
             reset_num_timesteps=model.num_timesteps == 0,
             log_interval=1 if logs_each_rollout(run.config) else 100,
         )
@@ -170,7 +196,9 @@ def train(run: Run, model: BaseAlgorithm, console: Console) -> Path:
     card = {"seed": run.seed, "command": run.command(), "config": run.config.as_dict()}
     if evaluations.found:
         card["evaluation"] = evaluations.found
-    beside = training(run.config, run.seed, run.command(), clock.spent())
+        card["chosen"] = evaluations.best.chosen(len(evaluations.found))
+        evaluations.best.put_into(model)
+    beside = training(run.config, run.seed, run.command(), clock.spent(), steps=model.num_timesteps)
     export_policy(model, run.folder / POLICY, card, {"training": beside})
     return run.folder / POLICY
 
@@ -190,11 +218,18 @@ def train_to_the_end(run: Run, console: Console) -> Path:
             f"{run.folder} holds a training with other settings; give another --out"
         )
     done = run.folder / POLICY
-    return done if done.is_file() else train(run, resume(run), console)
+    return done if finished(done) else train(run, resume(run), console)
 
 
-def _so_far(run: Run) -> tuple[Clock, list[dict[str, Any]]]:
+def _so_far(run: Run, steps: int) -> tuple[Clock, Evaluations]:
     """Return the time spent and the evaluations made until the checkpoint."""
+    if not steps:
+        return Clock(), Evaluations(run.config, [], Best())
     content = checkpoint.load(run.checkpoint)
-    spent = content.get("spent", {"wall": 0.0, "cpu": 0.0})
-    return Clock(spent["wall"], spent["cpu"]), list(content.get("evaluations", []))
+    try:
+        spent, best = content["spent"], Best(**content["best"])
+        best.moments = {name: moment.numpy() for name, moment in best.moments.items()}
+        evaluations = Evaluations(run.config, list(content["evaluations"]), best)
+        return Clock(spent["wall"], spent["cpu"]), evaluations
+    except (KeyError, TypeError, AttributeError) as error:
+        raise CheckpointError(f"{run.checkpoint.name} lacks what was evaluated: {error}") from error

@@ -1,17 +1,19 @@
 """Search for settings: Optuna on tuning seeds, resumable, its budget written into the preset.
 
-Each trial trains for a while and is scored as :mod:`agents.evaluation` does; trials that lag
-behind the median of the others are stopped. The first trial is the preset as it stands, so that
-what comes out is not worse where it was looked at. What a trial proposes depends on the finished
-trials and the seed alone: a search that was killed and resumed goes the same way.
+Each trial trains for a while with two seeds, which no policy that is reported has, and is scored
+as :mod:`agents.evaluation` does, by the best policy of each training, as it would be shipped;
+trials that lag behind the median of the others are stopped. The first trial is the preset as it
+stands, so that what comes out is not worse where it was looked at. What a trial proposes depends
+on the finished trials, its number and the seed alone: a search that was killed and resumed goes
+the same way, and searches side by side propose different settings.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import math
+import hashlib
+import json
 import statistics
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,9 +27,9 @@ from stable_baselines3.common.logger import Logger
 
 from agents import configs, preset_text
 from agents.building import make_env, make_model
-from agents.callbacks import Now, score_of
+from agents.callbacks import Now, WarmUp, score_of
 from agents.configs import Config
-from agents.evaluation import Score
+from agents.evaluation import value_of
 from agents.parts import Search
 from agents.search_spaces import as_settings, from_settings, space_of, with_settings
 from agents.settings import SettingsError
@@ -36,9 +38,10 @@ HEARTBEAT = 60
 """Seconds between the signs of life of a trial; after three without, it is given to another."""
 RETRIES = 2
 REPORTS = 5
-"""How often a trial is looked at before its end."""
+"""How often a training is looked at before its end."""
 DONE = (TrialState.COMPLETE, TrialState.PRUNED)
-TRAINING_SEED = 0
+TRAINING_SEEDS = (10_000, 10_001)
+"""Far from those that are reported: settings that suit one seed's luck win nothing there."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class Job:
     trials : int
         Settings to try, those of earlier calls counted in.
     steps : int
-        Control periods of each.
+        Control periods of each training.
     seed : int
         Of the sampler.
     storage : Path
@@ -70,7 +73,18 @@ class Job:
         """Name of the study: of everything that decides what a value means."""
         config = self.config
         kind = f"{config.algo}-{config.residual.controller}" if config.residual.controller else ""
-        return f"{config.env} {kind or config.algo} {self.steps} steps, seed {self.seed}"
+        what = f"{config.env} {kind or config.algo} {self.steps} steps, seed {self.seed}"
+        return f"{what}, {self.fixed()}"
+
+    def fixed(self) -> str:
+        """Return a digest of the settings that are not searched."""
+        common = {name: range_.common for name, range_ in space_of(self.config).items()}
+        plain = with_settings(self.config, as_settings(self.config, common)).as_dict()
+        for name in ("steps", "checkpoint_steps", "search"):
+            plain.pop(name, None)
+        first, last = plain[self.config.algo].pop("learning_rate")
+        plain["last_rate"] = f"{last / first:.1g}"
+        return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()[:12]
 
 
 def search(job: Job, console: Console) -> optuna.Study:
@@ -86,9 +100,13 @@ def search(job: Job, console: Console) -> optuna.Study:
             "evaluation.episodes = 0: a search needs episodes on tuning seeds; set it above 0"
         )
     study = open_study(job)
-    while (done := finished(study)) < job.trials:
-        study.sampler = TPESampler(seed=1000 * job.seed + done, n_startup_trials=8)
-        study.optimize(lambda trial: objective(job, trial), n_trials=1)
+
+    def one(trial: optuna.Trial) -> float:
+        study.sampler = TPESampler(seed=1000 * job.seed + trial.number, n_startup_trials=8)
+        return objective(job, trial)
+
+    while finished(study) < job.trials:
+        study.optimize(one, n_trials=1)
         console.print(f"{finished(study)} of {job.trials} trials, best {_best(study)}")
     return study
 
@@ -131,44 +149,63 @@ def objective(job: Job, trial: optuna.Trial) -> float:
     config = dataclasses.replace(
         with_settings(job.config, as_settings(job.config, values)), steps=job.steps
     )
+    worth = []
+    for turn, seed in enumerate(TRAINING_SEEDS):
+        reports = Reports(config, trial, turn * job.steps)
+        worth.append(_trained(config, seed, reports))
+    return statistics.fmean(worth)
+
+
+def _trained(config: Config, seed: int, reports: Reports) -> float:
+    """Train and return what the best policy that was looked at is worth."""
     env = make_env(config)
-    model = make_model(config, TRAINING_SEED, env)
+    model = make_model(config, seed, env)
     model.set_logger(Logger(None, []))
-    model.learn(job.steps, callback=Reports(config, trial.report, trial.should_prune))
-    worth = value_of(score_of(model, config), config)
+    model.learn(config.steps, callback=[WarmUp(config), reports])
+    reports.look()
     env.close()
-    return worth
-
-
-def value_of(score: Score, config: Config) -> float:
-    """Return what is to be small, as ``evaluation.objective`` says; infinite if unknown.
-
-    Every episode that a limit ended adds the whole error again; in a return it shows as it is.
-    """
-    objective = config.evaluation.objective
-    if objective == "return":
-        return -score.mean_return if math.isfinite(score.mean_return) else math.inf
-    worth = statistics.geometric_mean(score.kinds) if objective == "geometric" else score.rms
-    worth *= 1.0 + score.failures
-    return worth if math.isfinite(worth) else math.inf
+    return min(reports.values)
 
 
 class Reports(Now):
-    """Tells the search how a trial does, and stops it if it is told to."""
+    """Tells the search how a trial does, and stops it if it is told to.
 
-    def __init__(
-        self, config: Config, report: Callable[[float, int], None], stop: Callable[[], bool]
-    ) -> None:
+    Parameters
+    ----------
+    config : Config
+    trial : optuna.Trial
+    before : int
+        Control periods of the trial's trainings before this one.
+
+    Attributes
+    ----------
+    values : list of float
+        What the policies were worth that were looked at.
+    """
+
+    def __init__(self, config: Config, trial: optuna.Trial, before: int) -> None:
         super().__init__(max(config.steps // REPORTS, 1))
         self.config = config
-        self.report = report
-        self.stop = stop
+        self.trial = trial
+        self.before = before
+        self.values: list[float] = []
+        self.travel: float | None = None
+
+    def _on_training_start(self) -> None:
+        super()._on_training_start()
+        if self.config.residual.controller:
+            self.travel = score_of(self.model, self.config).travel
+
+    def look(self) -> None:
+        """Evaluate now."""
+        score = score_of(self.model, self.config)
+        self.values.append(value_of(score, self.config, self.travel))
 
     def act(self) -> None:
         """Evaluate and report now."""
-        worth = value_of(score_of(self.model, self.config), self.config)
-        self.report(worth, self.model.num_timesteps)
-        if self.stop():
+        self.look()
+        self.trial.report(self.values[-1], self.before + self.model.num_timesteps)
+        if self.trial.should_prune():
             raise optuna.TrialPruned
 
 
@@ -184,7 +221,8 @@ def write(job: Job, study: optuna.Study, path: Path) -> Config:
         trials=finished(study),
         steps=job.steps,
         seed=job.seed,
-        note=f"Optuna TPE, {job.config.evaluation.episodes} episodes on tuning seeds",
+        note=f"Optuna TPE, {len(TRAINING_SEEDS)} trainings a trial, each looked at in "
+        f"{job.config.evaluation.episodes} episodes on tuning seeds",
     )
     best = as_settings(job.config, _chosen(job, study))
     changes: dict[str, Any] = {**best}

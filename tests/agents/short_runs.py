@@ -32,12 +32,17 @@ KINDS: dict[str, tuple[str, dict[str, Any]]] = {
             "network": {"hidden": [16], "linear": True},
             "residual": {"controller": "inverse_pid", "scale": 0.3},
             "plants": MIXED,
-            "evaluation": LOOK,
+            "ppo": {"warm_up": 5},
         },
     ),
     "residual_sac": (
         "sac",
-        {"network": NARROW, "residual": {"controller": "pid"}, "history": PAST},
+        {
+            "network": NARROW,
+            "residual": {"controller": "pid"},
+            "history": PAST,
+            "normalize": {"observation": False, "reward": True},
+        },
     ),
     "residual_recurrent": (
         "recurrent_ppo",
@@ -46,6 +51,7 @@ KINDS: dict[str, tuple[str, dict[str, Any]]] = {
             "residual": {"controller": "inverse"},
             "history": PAST,
             "normalize": {"observation": True, "reward": True},
+            "recurrent_ppo": {"warm_up": 5},
         },
     ),
 }
@@ -62,8 +68,10 @@ def tiny(algo: str = "ppo", **changes: Any) -> configs.Config:
         plain[algo] |= {"learning_starts": 256, "gradient_steps": 1, "buffer_size": 600}
     if algo == "recurrent_ppo":
         plain[algo] |= {"lstm_size": 8, "n_epochs": 1}
-    plain.pop("evaluation", None)
-    return configs.from_mapping({**plain, **changes})
+    for name in ("evaluation", "plants"):
+        plain.pop(name, None)
+    own = {**plain[algo], **changes.get(algo, {})}
+    return configs.from_mapping({**plain, **changes, algo: own})
 
 
 def kind(name: str, **changes: Any) -> configs.Config:

@@ -11,7 +11,7 @@ from short_runs import ID
 
 from agents import configs, evaluation, inputs, seeds
 from agents.networks import input_matrix
-from agents.parts import TQC, Network
+from agents.parts import TQC, Network, Search
 from agents.settings import SettingsError
 
 TWO = {"hysteresis": ["maxwell_slip", "preisach"]}
@@ -66,6 +66,10 @@ def test_every_environment_has_a_preset_of_every_kind() -> None:
         ({"env": ID, "share": {"reference": "sines"}}, "must be a list"),
         ({"env": ID, "per_reference": {"sines": {}}}, "which share.reference lacks"),
         ([1], "must be a mapping"),
+        ({"env": "PAM/MusclePositoning-v0"}, "did you mean 'PAM/MusclePositioning-v0'"),
+        ({"env": f"evil:{ID}"}, "is no environment here"),
+        ({"env": f"{ID}\n"}, "is no environment here"),
+        ({"env": "CartPole-v1"}, "is no environment here; there are: PAM/"),
     ],
 )
 def test_a_mistake_is_named(given: object, message: str) -> None:
@@ -92,6 +96,33 @@ def test_only_presets_can_be_extended(name: object) -> None:
         configs.from_mapping({"extends": name})
 
 
+def test_presets_that_extend_each_other_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for own, other in (("A-v0.ppo", "B-v0.ppo"), ("B-v0.ppo", "A-v0.ppo")):
+        (tmp_path / f"{own}.yaml").write_text(f"extends: {other}\n")
+    monkeypatch.setattr(configs, "FOLDER", tmp_path)
+    with pytest.raises(SettingsError, match=r"circle \(B-v0.ppo -> A-v0.ppo -> B-v0.ppo\)"):
+        configs.read(tmp_path / "A-v0.ppo.yaml")
+
+
+def test_a_search_is_of_its_own_preset(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    searched = f"env: {ID}\nsearch: {{trials: 40, steps: 1000}}\nppo: {{gamma: 0.9}}\n"
+    (tmp_path / "A-v0.ppo.yaml").write_text(searched)
+    monkeypatch.setattr(configs, "FOLDER", tmp_path)
+    made = configs.from_text("extends: A-v0.ppo\nsteps: 7")
+    assert (made.ppo.gamma, made.steps, made.search) == (0.9, 7, Search())
+    assert configs.read(tmp_path / "A-v0.ppo.yaml").search.trials == 40
+
+
+def test_what_decides_which_policy_is_shipped() -> None:
+    config = configs.preset(ID, "ppo")
+    idle = configs.changed(config, ["search.trials=40", "checkpoint_steps=123"])
+    assert idle.decisive() == config.decisive()
+    for change in ("evaluation.episodes=3", "steps=7", "ppo.gamma=0.5"):
+        assert configs.changed(config, [change]).decisive() != config.decisive()
+
+
 def test_rows_are_shared_out_among_all_combinations() -> None:
     made = configs.from_mapping(
         {
@@ -110,7 +141,10 @@ def test_rows_are_shared_out_among_all_combinations() -> None:
     weighted = dataclasses.replace(made, per_reference={"sines": {"reward": {"error_scale": 1e-5}}})
     weight = {"error_scale": 1e-5}
     assert [kind.get("reward") for kind in weighted.kinds()] == [weight, None, weight, None]
-    assert configs.preset(ID, "ppo").kinds() == ({"reference": "mixed", "load": None},)
+    plain = {"reference": "mixed", "load": None}
+    assert configs.preset(ID, "ppo").kinds() == tuple(
+        {**plain, "hysteresis": law} for law in TWO["hysteresis"]
+    )
 
 
 def test_settings_survive_their_plain_form() -> None:
@@ -142,6 +176,9 @@ def test_yaml_cannot_run_code(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="cannot be read as YAML"):
         configs.read(file)
     assert not marker.exists()
+    file.write_text("[" * 5_000)
+    with pytest.raises(SettingsError, match="cannot be read as YAML"):
+        configs.read(file)
 
 
 def test_an_unknown_environment_is_answered_with_the_nearest() -> None:

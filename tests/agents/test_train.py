@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
 import os
@@ -22,10 +23,11 @@ from rich.console import Console
 from short_runs import ID, KINDS, kind, tiny, trained
 from stable_baselines3.common.evaluation import evaluate_policy
 
-from agents import checkpoint, configs, seeds, train
+from agents import checkpoint, configs, seeds, sources, train
 from agents.__main__ import main
 from agents.building import make_env, make_model
 from agents.checkpoint import MARK, CheckpointError
+from agents.parts import Evaluation
 from agents.policy import OnnxPolicy
 from agents.sb3_vec_env import make_batch_vec_env
 from benchmarks import scenarios
@@ -196,8 +198,39 @@ def test_a_changed_plant_is_not_trained_on_unnoticed(ppo: tuple[Any, Path], tmp_
     digest = ppo[0].get_env().get_attr("plant")[0].digest()
     content["settings"] = content["settings"].replace(digest, "0123456789abcdef")
     checkpoint.save(tmp_path / checkpoint.NAME, content)
-    with pytest.raises(CheckpointError, match="train anew"):
+    with pytest.raises(CheckpointError, match=r"trained on the plants .*train anew"):
         train.resume(train.saved_run(tmp_path))
+
+
+def test_changed_sources_are_not_trained_with_unnoticed(
+    ppo: tuple[Any, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = sources.digests()
+    monkeypatch.setattr(sources, "digests", lambda: {**now, "pam_envs": "0123456789abcdef"})
+    with pytest.raises(CheckpointError, match="the sources of pam_envs have changed"):
+        train.resume(train.saved_run(ppo[1]))
+
+
+@pytest.mark.parametrize(
+    "given", [["PAM/KneeWalk-v0"], [ID, "--algo", "sac"], [ID, "--seed", "4"]], ids=str
+)
+def test_a_run_is_not_resumed_as_another(
+    given: list[str], ppo: tuple[Any, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["train", *given, "--out", str(ppo[1]), "--resume"]) == 2
+    assert f"not of {given[-1]}; leave it out" in capsys.readouterr().err
+
+
+def test_a_training_that_lost_its_card_is_finished_again(
+    tmp_path: Path, short_run: Callable[[str], tuple[Any, Path]]
+) -> None:
+    _, folder = short_run("ppo")
+    run = train.Run(kind("ppo"), 3, tmp_path)
+    for name in (checkpoint.NAME, "policy.onnx"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    assert train.train_to_the_end(run, QUIET) == tmp_path / "policy.onnx"
+    assert (tmp_path / "policy.onnx").read_bytes() == (folder / "policy.onnx").read_bytes()
+    assert (tmp_path / "policy.json").is_file()
 
 
 def test_the_log_and_the_card_are_written(ppo: tuple[Any, Path]) -> None:
@@ -207,7 +240,7 @@ def test_the_log_and_the_card_are_written(ppo: tuple[Any, Path]) -> None:
     assert card["steps"] == 1024
     assert card["seed"] == 3
     assert card["command"].startswith(f"python -m agents train {ID} --algo ppo --steps 1024")
-    assert card["plant"] == ppo[0].get_env().get_attr("plant")[0].digest()
+    assert card["plants"] == [ppo[0].get_env().get_attr("plant")[0].digest()]
     assert configs.read(folder / "policy.json") == tiny()
     text = (folder / "policy.json").read_text()
     assert str(folder) not in text
@@ -219,7 +252,8 @@ def test_training_episodes_are_far_from_those_that_are_scored() -> None:
     env = make_env(config)
     make_model(config, 0, env)
     assert env.unwrapped._seeds == list(range(seeds.TRAINING, seeds.TRAINING + 8))
-    scored = {seed for track in scenarios.available().values() for seed in track.seeds}
+    tracks = scenarios.available().values()
+    scored = {seed for track in tracks for own in track.seeds.values() for seed in own}
     tuned = set(seeds.tuning(seeds.MOST_TUNING))
     assert not scored & tuned
     assert max(scored | tuned) < seeds.first_training(0)
@@ -239,7 +273,7 @@ def test_what_a_training_cost_stands_beside_the_policy(
     assert "cores" in cost["hardware"]
     assert (cost["seed"], cost["first_env_seed"]) == (3, seeds.first_training(3))
     assert cost["tuning_seeds"] == [seeds.TUNING, 4]
-    assert cost["tuning_trials"] == 0
+    assert cost["tuning_trials"] is None
     assert cost["command"] == card["command"]
     assert [entry["steps"] for entry in card["evaluation"]] == [0, 512, 1024]
     assert all(entry["rms"] > 0.0 for entry in card["evaluation"])
@@ -247,14 +281,16 @@ def test_what_a_training_cost_stands_beside_the_policy(
     assert b"tuning/rms" in log
 
 
-def test_looking_at_a_policy_does_not_change_it(
+def test_looking_at_a_policy_does_not_change_the_training(
     tmp_path: Path, short_run: Callable[[str], tuple[Any, Path]]
 ) -> None:
-    watched, _ = short_run("history")
-    unwatched = trained(tmp_path, kind("history").decisive())
-    mine, theirs = unwatched.policy.state_dict(), watched.policy.state_dict()
+    _, watched = short_run("history")
+    trained(tmp_path, dataclasses.replace(kind("history"), evaluation=Evaluation()))
+    ends = [checkpoint.load(folder / checkpoint.NAME) for folder in (watched, tmp_path)]
+    mine, theirs = (end["snapshot"]["parameters"]["policy"] for end in ends)
     assert all(torch.equal(mine[name], theirs[name]) for name in theirs)
-    assert "evaluation" not in OnnxPolicy.load(tmp_path / "policy.onnx").card
+    card = OnnxPolicy.load(tmp_path / "policy.onnx").card
+    assert not {"evaluation", "chosen"} & set(card)
 
 
 def test_a_finished_run_is_left_and_a_foreign_one_refused(

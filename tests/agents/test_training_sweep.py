@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.metadata
+import json
 import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
@@ -12,7 +15,7 @@ import yaml
 from rich.console import Console
 from short_runs import ID, tiny
 
-from agents import configs, sweep, train
+from agents import configs, export, sources, sweep, train
 from agents.__main__ import main
 from agents.settings import SettingsError
 from sweeps.engine import Cluster
@@ -146,6 +149,74 @@ def test_other_settings_are_not_mixed_up(tmp_path: Path, ppo: tuple[object, Path
     for other in (training(tiny(steps=2048), 3), training(tiny(), 4)):
         with pytest.raises(SettingsError, match="give another --out"):
             other.finished()
+
+
+def test_a_policy_without_its_own_card_is_made_again(
+    tmp_path: Path, whole: dict[int, bytes]
+) -> None:
+    """A process may be killed between the two files."""
+    run = train.Run(CONFIG, 3, tmp_path / "there")
+    train.train_to_the_end(run, Console(quiet=True))
+    training = sweep.Training(CONFIG, 3, run.folder)
+    card, policy = run.folder / "policy.json", run.folder / "policy.onnx"
+    good = card.read_text()
+    assert training.finished()
+    card.write_text(json.dumps({**json.loads(good), "steps": 7}))
+    assert not training.finished()
+    for spoil in (card.unlink, policy.unlink):
+        spoil()
+        assert not training.finished()
+        report = sweep.run([training], Cluster())
+        assert (report.trained, report.missing) == ([policy], [])
+        assert training.finished()
+    assert policy.read_bytes() == whole[3]
+
+
+def test_the_card_is_written_before_the_policy(
+    ppo: tuple[Any, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written: list[str] = []
+    monkeypatch.setattr(export, "write_atomically", lambda path, _: written.append(path.name))
+    export.export_policy(ppo[0], tmp_path / "policy.onnx")
+    assert written == ["policy.json", "policy.onnx"]
+
+
+@pytest.mark.parametrize("package", ["agents", "baselines", "pam_envs"])
+def test_other_sources_are_another_training(
+    package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A worker that computes another key than the driver's refuses the task."""
+    training = sweep.Training(CONFIG, 3, tmp_path)
+    key, digests = training.key, sources.digests()
+    assert sweep.Training(CONFIG, 3, tmp_path).key == key
+    assert set(digests) == {"agents", "baselines", "pam_envs"}
+    monkeypatch.setattr(sources, "digests", lambda: {**digests, package: "0"})
+    assert training.key != key
+
+
+@pytest.mark.parametrize("package", ["gymnasium", "scipy", "torch", "stable_baselines3"])
+def test_other_versions_are_another_training(
+    package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    training = sweep.Training(CONFIG, 3, tmp_path)
+    key, known = training.key, importlib.metadata.version
+
+    def other(name: str) -> str:
+        return "0.0" if name == package else known(name)
+
+    monkeypatch.setattr(importlib.metadata, "version", other)
+    assert training.key != key
+
+
+def test_sources_are_every_python_file_of_a_package(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("1")
+    first = sources.digest_of(tmp_path)
+    (tmp_path / "notes.txt").write_text("x")
+    assert sources.digest_of(tmp_path) == first
+    (tmp_path / "a.py").write_text("2")
+    second = sources.digest_of(tmp_path)
+    (tmp_path / "a.py").rename(tmp_path / "b.py")
+    assert len({first, second, sources.digest_of(tmp_path)}) == 3
 
 
 def test_a_training_that_fails_is_missing_and_says_why(tmp_path: Path) -> None:

@@ -19,7 +19,8 @@ from short_runs import ID, KINDS, kind, tiny
 
 from agents import configs, preset_text, tune
 from agents.configs import Config
-from agents.evaluation import Score
+from agents.evaluation import Score, value_of
+from agents.parts import Plants, Search
 from agents.search_spaces import as_settings, from_settings, space_of, with_settings
 from agents.settings import SettingsError
 
@@ -124,6 +125,8 @@ def test_the_budget_and_the_best_settings_are_written(tmp_path: Path) -> None:
     assert after.ppo.gamma != 0.0
     best = study.best_params["learning_rate"]
     assert after.ppo.learning_rate[0] == pytest.approx(best, rel=5e-3)
+    again = dataclasses.replace(wanted, config=after)
+    assert again.name == wanted.name
     text = path.read_text()
     assert text.startswith("# why\n")
     assert "# untrained, it keeps the last set-point" in text
@@ -154,13 +157,67 @@ def _chosen(config: Config) -> dict[str, Any]:
 
 def test_a_failed_episode_makes_a_trial_worse() -> None:
     good, bad = Score(0.1, -1.0, 0), Score(0.1, -1.0, 2)
-    assert tune.value_of(bad, small()) > 2 * tune.value_of(good, small())
-    assert tune.value_of(Score(float("nan"), 0.0, 0), small()) == float("inf")
+    assert value_of(bad, small()) > 2 * value_of(good, small())
+    assert value_of(Score(float("nan"), 0.0, 0), small()) == float("inf")
     by_return = tiny(evaluation={**LOOK, "objective": "return"})
-    assert tune.value_of(Score(0.1, -3.0, 0), by_return) == 3.0
+    assert value_of(Score(0.1, -3.0, 0), by_return) == 3.0
     by_ratio = tiny(evaluation={**LOOK, "objective": "geometric"})
     score = Score(0.1, -3.0, 0, kinds=(0.01, 0.04))
-    assert tune.value_of(score, by_ratio) == pytest.approx(0.02)
+    assert value_of(score, by_ratio) == pytest.approx(0.02)
+
+
+def test_a_correction_pays_for_moving_the_set_point_more_than_its_controller() -> None:
+    assert value_of(Score(0.1, 0.0, 0, travel=105.0), small(), 100.0) == pytest.approx(0.1)
+    assert value_of(Score(0.1, 0.0, 0, travel=210.0), small(), 100.0) == pytest.approx(0.2)
+    assert value_of(Score(0.1, 0.0, 0, travel=210.0), small()) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("names", sorted(configs.presets()))
+def test_the_first_trial_is_the_preset_itself(names: tuple[str, str, str]) -> None:
+    config = configs.preset(*names)
+    assert with_settings(config, as_settings(config, _chosen(config))) == config
+
+
+def test_a_study_is_of_settings_whose_values_mean_the_same(tmp_path: Path) -> None:
+    one = job(tmp_path)
+
+    def named(**changes: Any) -> str:
+        return dataclasses.replace(one, config=dataclasses.replace(one.config, **changes)).name
+
+    same = dataclasses.replace(one.config.ppo, gamma=0.9, learning_rate=(2e-4, 1e-5), n_epochs=3)
+    assert named(ppo=same, steps=99, search=Search(trials=7)) == one.name
+    evaluation = dataclasses.replace(one.config.evaluation, objective="geometric")
+    others = (
+        named(evaluation=evaluation),
+        named(ppo=dataclasses.replace(one.config.ppo, target_kl=0.1)),
+        named(plants=Plants(randomize=True)),
+        named(env_kwargs={}),
+    )
+    assert len({one.name, *others}) == 5
+
+
+@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
+def test_searches_side_by_side_propose_different_settings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    proposed = {}
+
+    def objective(made: tune.Job, trial: optuna.Trial) -> float:
+        space = space_of(made.config).items()
+        proposed[trial.number] = {name: range_.suggest(trial, name) for name, range_ in space}
+        if trial.number == 1:  # while another process does the rest
+            tune.search(job(tmp_path, 2), QUIET)
+        return 1.0
+
+    monkeypatch.setattr(tune, "objective", objective)
+    tune.search(job(tmp_path, 2), QUIET)
+    assert list(proposed) == [0, 1, 2]
+    assert proposed[1] != proposed[2]
+
+
+def test_a_search_trains_with_seeds_that_no_reported_policy_has() -> None:
+    assert min(tune.TRAINING_SEEDS) >= 10_000
+    assert len(set(tune.TRAINING_SEEDS)) == 2
 
 
 def test_a_search_needs_something_to_look_at(tmp_path: Path) -> None:
