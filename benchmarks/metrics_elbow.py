@@ -76,7 +76,7 @@ def of_elbow(signals: Mapping[str, Array], window: Mask, period: float) -> dict[
         "impedance_rms": rms(np.array([wrong + NEAR * soft, wrong - NEAR * soft])),
         "stiffness_rms": rms(soft),
         "felt_rms": rms(felt),
-        "free_felt_rms": rms(felt[free]) if free.any() else float("nan"),
+        "free_felt_rms": rms(felt[free]),
         "switchings": float(np.sum(signals["effort/switchings"][window])) / seconds,
         "saturated_time": float(np.mean(beyond)),
         "torque_clipped": rms(torque),

@@ -166,9 +166,10 @@ def _actions(plant: ElbowOrthosis, action: str, normalize: bool) -> Signals:
     form = "pulse_{}" if word == "pulse" else "pressure_{}_set_point"
     parts = [(form.format(bundle), unit, low, high) for bundle in "ab"]
     if action == "torque_stiffness":
+        torques, stiffnesses = _spans(plant)
         parts = [
-            ("torque_set_point", "N m", *_spans(plant)[0]),
-            ("stiffness_set_point", "N m/rad", *_spans(plant)[1]),
+            ("torque_set_point", "N m", *torques),
+            ("stiffness_set_point", "N m/rad", *stiffnesses),
         ]
     return Signals(Signal(*part, i, normalize) for i, part in enumerate(parts))
 

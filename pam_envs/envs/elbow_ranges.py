@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pam_envs.parameters import declarations
 from pam_envs.plants.elbow_orthosis import ElbowOrthosis
@@ -14,16 +15,20 @@ LEAST_RANGES, ROUND = (30.0, 15.0), 5.0
 they do."""
 
 
+def _corners(plant: ElbowOrthosis) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return torque and stiffness at the corners of the pressures, over all angles."""
+    return plant.corners(np.linspace(*plant.hard_limits, 49))
+
+
 def signal_ranges(plant: ElbowOrthosis) -> tuple[float, float]:
     """Return the largest torque [N m] and stiffness [N m/rad] that signals can show.
 
     The largest at any corner of the pressures, rounded up: nothing that the nominal bundles can do
     is cut off.
     """
-    corners = plant.corners(np.linspace(*plant.hard_limits, 49))
     return tuple(  # type: ignore[return-value]
         max(least, ROUND * math.ceil(float(np.abs(values).max()) / ROUND))
-        for values, least in zip(corners, LEAST_RANGES, strict=True)
+        for values, least in zip(_corners(plant), LEAST_RANGES, strict=True)
     )
 
 
@@ -33,6 +38,6 @@ def largest_errors(plant: ElbowOrthosis) -> tuple[float, float]:
     References lie between the corners of the nominal bundles; true ones can be stronger by the
     largest gain that is allowed.
     """
-    torques, stiffnesses = plant.corners(np.linspace(*plant.hard_limits, 49))
+    torques, stiffnesses = _corners(plant)
     strongest = declarations(plant.bundle_a)["gain"].high
     return strongest * float(np.ptp(torques)), strongest * float(stiffnesses.max())

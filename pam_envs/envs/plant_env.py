@@ -115,7 +115,7 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._steps = 0
         observation, info, _, _, _ = self._read()
         if self.render_mode is not None:
-            self._draw(observation, info, start=True)
+            self._draw(info, start=True)
         return observation, info
 
     def step(
@@ -135,7 +135,7 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._steps += 1
         observation, info, reward, terminated, truncated = self._read()
         if self.render_mode is not None:
-            self._draw(observation, info)
+            self._draw(info)
         return observation, reward, terminated, truncated, info
 
     def _take(self, action: Any) -> None:
@@ -200,13 +200,13 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         info = Info(self._keys, values[0], np.array(values).tobytes())
         return observation, info, reward, ended[0], ended[1]
 
-    def _draw(self, observation: NDArray[np.float32], info: Info, start: bool = False) -> None:
+    def _draw(self, info: Info, start: bool = False) -> None:
         """Keep what a picture needs, and show it at once in the ``human`` mode."""
         if self._renderer is None:
             from pam_envs.envs.rendering import make_renderer
 
             self._renderer = make_renderer(self)
-        self._renderer.record(observation, info, start)
+        self._renderer.record(info, start)
         if self.render_mode == "human":
             self._renderer.show()
 
@@ -218,8 +218,7 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._steps < 0:
             raise gym.error.ResetNeeded("call reset() before render()")
         if self._renderer is None:  # a copy, or closed in between: the past is not known
-            observation, info, *_ = self._read()
-            self._draw(observation, info, start=True)
+            self._draw(self._read()[1], start=True)
         if self.render_mode == "human":
             return None
         picture: NDArray[np.uint8] = self._renderer.picture()
@@ -253,15 +252,15 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         try:
             steps = int(state["steps"])
             seed = int(np.asarray(state["seed"], np.uint8).tobytes().decode())
-            infos = np.asarray(state["infos"], np.float64)[:, :, 0].tolist()
-        except (KeyError, ValueError, TypeError, IndexError) as error:
+            infos = np.asarray(state["infos"], np.float64).reshape(np.shape(self._infos))
+        except (KeyError, ValueError, TypeError) as error:
             raise ValueError(f"the state was not made by get_state: {error!r}") from error
         for to, part in zip(self._all, parts, strict=True):
             for i, value in enumerate(part[0].tolist()):
                 to[0][i][0] = value[0]
-        for to, values in zip(self._infos, infos, strict=False):  # the last report, for a picture
-            for k, number in enumerate(values[: len(to)]):
-                to[k][0] = number
+        for to, part in zip(self._infos, infos, strict=True):  # the last report, for a picture
+            for k, value in enumerate(part.tolist()):
+                to[k][0] = value[0]
         self._steps, self._seed = steps, None if seed < 0 else seed
 
     def __getstate__(self) -> dict[str, Any]:

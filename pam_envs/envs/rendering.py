@@ -163,7 +163,7 @@ class Renderer:
         self._clock: Any = None
         self._dismissed = False
 
-    def record(self, observation: NDArray[np.float32], info: Any, start: bool) -> None:
+    def record(self, info: Any, start: bool) -> None:
         """Take note of a step (or, at the start of an episode, forget the one before)."""
         if start:
             self.strip.clear()

@@ -106,7 +106,8 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
         self._call(np.zeros((self.num_envs, len(self.action_signals))), outputs, BEGIN)
         self._seeded = True
         self._last_observation = observations[0].copy()
-        self._record(infos[0], mask, mask)
+        if self.render_mode is not None:
+            self._record(infos[0], np.flatnonzero(mask), mask)
         return observations[0], self._infos(infos[0])
 
     def _seed_rows(self, seeds: list[int | None] | None, mask: NDArray[np.bool_]) -> None:
@@ -182,7 +183,8 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
         self._last_observation = observations[0].copy()
         infos = self._infos(reports[0])
         ended = flags[0] | flags[1]
-        self._record(reports[0], np.ones_like(ended), ended)
+        if self.render_mode is not None:
+            self._record(reports[0], np.arange(self.num_envs), ended)
         if ended.any():
             self._add_final(infos, ended, observations[1], reports[1])
         return observations[0], reports[0, 0], flags[0], flags[1], infos
@@ -225,20 +227,18 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
             infos["_final_info"] = ended
 
     def _record(
-        self, report: NDArray[np.float64], rows: NDArray[np.bool_], starts: NDArray[np.bool_]
+        self, report: NDArray[np.float64], rows: NDArray[np.int64], starts: NDArray[np.bool_]
     ) -> None:
         """Keep what the pictures of some rows need; ``starts`` tells which begin an episode."""
-        if self.render_mode is None:
-            return
         if not self._renderers:
             from pam_envs.envs.rendering import make_renderer
 
             first = make_renderer(self)
             others = [make_renderer(self, first.canvas) for _ in range(self.num_envs - 1)]
             self._renderers = [first, *others]
-        for row in np.flatnonzero(rows).tolist():
+        for row in rows.tolist():
             info = dict(zip(self.setup.info_keys, report[1:, row].tolist(), strict=True))
-            self._renderers[row].record(self._last_observation[row], info, bool(starts[row]))
+            self._renderers[row].record(info, bool(starts[row]))
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """Return a picture of every row, each of shape (height, width, 3)."""

@@ -89,7 +89,7 @@ def test_the_measured_plant_reaches_less() -> None:
     spans = [env.action_signals["angle_set_point"].high for env in (paper, measured)]
     assert spans[0] == pytest.approx(math.radians(30.0))
     assert math.radians(15.0) < spans[1] < math.radians(25.0)
-    with pytest.raises(ValueError, match=r"samples are in rad, at most 0\.38"):
+    with pytest.raises(ValueError, match=r"reference reaches 0\.5 rad; at most 0\.38"):
         make(plant=AntagonisticJoint.measured(), reference=[0.5])
 
 
