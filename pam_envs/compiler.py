@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import tempfile
 from collections.abc import Callable
 from typing import Any, ClassVar
@@ -15,6 +16,8 @@ from numba.np.arrayobj import make_array, populate_array
 from pam_envs import kernels
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": False}
+_CALLEE: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Nobody but kernels calls a callee: what Python would need for it is not made."""
 
 
 class _PackageLocator(caching._CacheLocator):
@@ -161,17 +164,26 @@ _REPLACED: dict[str, Any] = {
     "array_at": _array_at,
 }
 __all__ = ["compiled", "get_num_threads"]
-_BUILT: dict[Any, dict[Any, Any]] = {}
+_DONE: dict[Any, Any] = {}
 
 
-def _finish(made: Callable[..., Any], original: Any, name: str) -> Callable[..., Any]:
-    """Compile a callee, under a name that says what it was built for.
+def _finish(made: Callable[..., Any], original: Any, bound: kernels.Bound) -> Callable[..., Any]:
+    """Compile a callee, under a name that says what is bound in it.
 
     Code from the disk links by name. Callees with other placeholders in them would otherwise pass
     for one another where they were compiled in different processes.
     """
-    made.__qualname__ = made.__name__ = f"{original.__name__}_for_{name}"
-    return njit(forceinline=original.__pam_kernel__, **_OPTIONS)(made)  # type: ignore[no-any-return]
+    said = ",".join(sorted(f"{name}={_said(value)}" for name, value in bound))
+    suffix = hashlib.sha256(said.encode()).hexdigest()[:8]
+    made.__qualname__ = made.__name__ = f"{original.__name__}_with_{suffix}"
+    return njit(forceinline=original.__pam_kernel__, **_CALLEE)(made)  # type: ignore[no-any-return]
+
+
+def _said(value: Any) -> str:
+    """Return a value of a name so that it reads the same in every process."""
+    if isinstance(value, int | float | bool):
+        return repr(value)
+    return f"{value.__module__}.{value.__qualname__}"
 
 
 def compiled(
@@ -179,20 +191,19 @@ def compiled(
 ) -> Callable[..., Any]:
     """Return a dispatcher for a kernel with replaced names (see ``kernels.build``)."""
     names = {"prange": prange if parallel else range, **_REPLACED, **names}
-    key = tuple(sorted((k, v if isinstance(v, int) else id(v)) for k, v in names.items()))
-    done = dict(_BUILT.setdefault(key, {}))
-    done.pop(function, None)
 
-    def finish(made: Callable[..., Any], original: Any) -> Callable[..., Any]:
+    def finish(made: Callable[..., Any], original: Any, bound: kernels.Bound) -> Callable[..., Any]:
         if original is not function:
-            return _finish(made, original, name)
+            return _finish(made, original, bound)
         made.__qualname__ = made.__name__ = name
         dispatcher = njit(parallel=parallel, **_OPTIONS)(made)
         with contextlib.suppress(RuntimeError):  # without a place to write: compile in memory
             dispatcher._cache = _Cache(made)
         return dispatcher  # type: ignore[no-any-return]
 
+    key = (function, kernels.bound(function, names, {}))
+    done = {k: v for k, v in _DONE.items() if k != key}
     dispatcher = kernels.rebind(function, names, finish, done)
-    del done[function]
-    _BUILT[key].update(done)
+    del done[key]
+    _DONE.update(done)
     return dispatcher

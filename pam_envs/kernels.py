@@ -26,6 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 F = TypeVar("F", bound=Callable[..., Any])
+Bound = frozenset[tuple[str, Any]]
+"""Global names of a call graph and what stands for them."""
 
 COMPILED: bool = os.environ.get("PAM_ENVS_COMPILE", "1").lower() not in {"0", "false", "no", "off"}
 """Whether kernels are compiled (``PAM_ENVS_COMPILE=0`` runs them as plain Python)."""
@@ -146,26 +148,41 @@ def build(
 
 def interpreted(function: Callable[..., Any], names: dict[str, Any]) -> Callable[..., Any]:
     """Return ``function`` as plain Python, with some global names of its call graph replaced."""
-    return rebind(function, names, lambda made, _: made, {}) if names else function
+    return rebind(function, names, lambda made, *_: made, {}) if names else function
 
 
 def rebind(
     function: Callable[..., Any],
     names: dict[str, Any],
-    finish: Callable[[Callable[..., Any], Any], Callable[..., Any]],
+    finish: Callable[[Callable[..., Any], Any, Bound], Callable[..., Any]],
     done: dict[Any, Callable[..., Any]],
+    known: dict[Any, Bound] | None = None,
 ) -> Callable[..., Any]:
     """Return a copy of a kernel whose callees are copies too, each passed through ``finish``.
 
-    ``finish`` gets the copy and the original; ``done`` remembers what was copied.
+    Parameters
+    ----------
+    function : callable
+        A kernel.
+    names : dict
+        Values for global names, wherever the call graph uses them.
+    finish : callable
+        Gets the copy, the original, and the names and values that are bound in its call graph.
+    done : dict
+        The copies so far, by original and what is bound in it: callees that use none of the names,
+        or the same values, are made once. It can serve several calls with other names.
+    known : dict, optional
+        What is bound in each function with these ``names``.
     """
-    if function in done:
-        return done[function]
+    known = {} if known is None else known
+    key = (function, bound(function, names, known))
+    if key in done:
+        return done[key]
     scope = dict(function.__globals__)  # type: ignore[attr-defined]
     for used in function.__code__.co_names:  # type: ignore[attr-defined]
         value: Any = names.get(used, scope.get(used))
         if hasattr(value, "__pam_kernel__"):
-            value = rebind(value, names, finish, done)
+            value = rebind(value, names, finish, done, known)
         if used in scope:
             scope[used] = value
     made = types.FunctionType(
@@ -176,8 +193,23 @@ def rebind(
     )
     made.__qualname__ = function.__qualname__
     made.__module__ = function.__module__
-    done[function] = finish(made, function)
-    return done[function]
+    done[key] = finish(made, function, key[1])
+    return done[key]
+
+
+def bound(function: Callable[..., Any], names: dict[str, Any], known: dict[Any, Bound]) -> Bound:
+    """Return those of ``names`` that the call graph of a kernel uses, with their values."""
+    if function not in known:
+        scope = function.__globals__  # type: ignore[attr-defined]
+        found: set[tuple[str, Any]] = set()
+        for used in function.__code__.co_names:  # type: ignore[attr-defined]
+            value: Any = names.get(used, scope.get(used))
+            if used in names and used in scope:
+                found.add((used, value))
+            if hasattr(value, "__pam_kernel__"):
+                found |= bound(value, names, known)
+        known[function] = frozenset(found)
+    return known[function]
 
 
 @lru_cache(maxsize=1)

@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -145,6 +146,43 @@ def test_build_replaces_names_through_the_call_graph() -> None:
     moved = kernels.build(_outer, "moved_for_test", OFFSET=10)
     assert (plain(1.0), moved(1.0), _outer(1.0)) == (4.0, 22.0, 4.0)
     assert kernels.interpreted(_outer, {"OFFSET": 5})(1.0) == 12.0
+
+
+@kernels.kernel
+def _doubled(x: float) -> float:
+    return x + x
+
+
+@kernels.kernel
+def _both(x: float) -> float:
+    return _inner(x) + _doubled(x)
+
+
+def test_what_uses_no_replaced_name_is_made_once() -> None:
+    made: list[tuple[str, set[tuple[str, object]]]] = []
+
+    def finish(copy: Any, original: Any, bound: kernels.Bound) -> Any:
+        made.append((original.__name__, set(bound)))
+        return copy
+
+    done: dict[Any, Any] = {}
+    first, again, other = (
+        kernels.rebind(_both, {"OFFSET": offset, "unused": unused}, finish, done)
+        for offset, unused in ((10, 1), (10, 2), (20, 1))
+    )
+    assert first is again
+    assert (first(1.0), other(1.0)) == (13.0, 23.0)
+    ten, twenty = {("OFFSET", 10)}, {("OFFSET", 20)}
+    assert sorted(made, key=str) == sorted(
+        [
+            ("_inner", ten),
+            ("_doubled", set()),
+            ("_both", ten),
+            ("_inner", twenty),
+            ("_both", twenty),
+        ],
+        key=str,
+    )
 
 
 def test_compiled_code_is_kept_on_disk_and_dropped_when_a_source_changes(tmp_path: Path) -> None:
