@@ -173,10 +173,14 @@ def _finish(made: Callable[..., Any], original: Any, bound: kernels.Bound) -> Ca
     Code from the disk links by name. Callees with other placeholders in them would otherwise pass
     for one another where they were compiled in different processes.
     """
-    said = ",".join(sorted(f"{name}={_said(value)}" for name, value in bound))
-    suffix = hashlib.sha256(said.encode()).hexdigest()[:8]
-    made.__qualname__ = made.__name__ = f"{original.__name__}_with_{suffix}"
+    made.__qualname__ = made.__name__ = _told_apart(original.__name__, bound)
     return njit(forceinline=original.__pam_kernel__, **_CALLEE)(made)  # type: ignore[no-any-return]
+
+
+def _told_apart(name: str, bound: kernels.Bound) -> str:
+    """Return a name with a digest of what is bound, the same in every process."""
+    said = ",".join(sorted(f"{used}={_said(value)}" for used, value in bound))
+    return f"{name}_with_{hashlib.sha256(said.encode()).hexdigest()[:8]}"
 
 
 def _said(value: Any) -> str:
@@ -195,7 +199,7 @@ def compiled(
     def finish(made: Callable[..., Any], original: Any, bound: kernels.Bound) -> Callable[..., Any]:
         if original is not function:
             return _finish(made, original, bound)
-        made.__qualname__ = made.__name__ = name
+        made.__qualname__ = made.__name__ = _told_apart(name, bound)  # its file's name, too
         dispatcher = njit(parallel=parallel, **_OPTIONS)(made)
         with contextlib.suppress(RuntimeError):  # without a place to write: compile in memory
             dispatcher._cache = _Cache(made)

@@ -15,7 +15,7 @@ import pytest
 from scipy import stats
 
 from pam_envs import kernels
-from pam_envs.kernels import WITHOUT_KERNELS
+from pam_envs.kernels import WITHOUT_KERNELS, prange
 from pam_envs.mechanics.hanging_mass import damped_motion, oscillator
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -185,6 +185,14 @@ def test_what_uses_no_replaced_name_is_made_once() -> None:
     )
 
 
+@kernels.kernel
+def _spread(n: int) -> float:
+    total = 0.0
+    for k in prange(n):
+        total += _inner(1.0 * k)
+    return total
+
+
 def test_compiled_code_is_kept_on_disk_and_dropped_when_a_source_changes(tmp_path: Path) -> None:
     code = "import tests.test_kernels as t; t.kernels.build(t._outer, 'kept')(1.0)"
     variables = {
@@ -264,3 +272,21 @@ def test_kernels_that_were_compiled_apart_run_side_by_side(tmp_path: Path) -> No
     one, two = run("one"), run("two")
     assert one != two
     assert run("one", "two") == [*one, *two]
+
+
+@pytest.mark.skipif(not kernels.COMPILED, reason="nothing is kept on disk")
+def test_one_name_with_other_values_or_on_both_cores_is_another_file(tmp_path: Path) -> None:
+    code = """
+import tests.test_kernels as t
+for parallel, offset in ((False, 1), (True, 1), (False, 5)):
+    print(t.kernels.build(t._spread, "spread", parallel, OFFSET=offset)(3))
+"""
+    variables = {**os.environ, "PYTHONPATH": str(ROOT), "PAM_ENVS_CACHE": str(tmp_path)}
+    command = [sys.executable, "-c", code]
+    for _ in range(2):  # compiled, then from the disk
+        done = subprocess.run(
+            command, env=variables, cwd=ROOT, check=True, capture_output=True, text=True
+        )
+        assert done.stdout.split() == ["6.0", "6.0", "18.0"]
+    folder = tmp_path / kernels.source_digest()
+    assert sum(path.suffix == ".nbi" for path in folder.iterdir()) == 3
