@@ -5,7 +5,7 @@ JOBS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
-EXTRAS := plot,baselines,agents,bench,dev
+EXTRAS := plot,baselines,agents,bench,cluster,dev
 INSTALL := $(BIN)/python -m pip --disable-pip-version-check --no-input install -qq
 PLAIN := $(wildcard tests/hysteresis tests/test_kernels.py tests/envs/test_bits.py)
 
@@ -54,7 +54,7 @@ format: $(READY) ## Mend style and format
 	$(BIN)/ruff format .
 
 types: $(READY) ## Check types
-	$(BIN)/mypy pam_envs
+	$(BIN)/mypy pam_envs sweeps
 
 layers: $(READY) ## Check which way imports run
 	$(BIN)/lint-imports --no-logo

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,13 +14,18 @@ from rich.console import Console
 from agents import configs
 from agents.settings import SettingsError
 
+Algo = Literal["ppo", "sac", "tqc", "recurrent_ppo"]
+DEFAULT_ENV = "PAM/MusclePositioning-v0"
+LOOKS = ("value", "rms", "return", "travel", "failures")
+
 
 def train(
-    env: Annotated[str, tyro.conf.Positional] = "PAM/MusclePositioning-v0",
+    env: Annotated[str | None, tyro.conf.Positional] = None,
     /,
-    algo: Literal["ppo", "sac"] = "ppo",
+    algo: Algo | None = None,
+    variant: str = "",
     steps: int | None = None,
-    seed: int = 0,
+    seed: int | None = None,
     out: Path | None = None,
     resume: bool = False,
     config: Path | None = None,
@@ -30,13 +36,15 @@ def train(
     Parameters
     ----------
     env
-        Environment id.
+        Environment id; default: PAM/MusclePositioning-v0.
     algo
-        Algorithm.
+        Algorithm; default: ppo.
+    variant
+        Of the preset, for example "residual": a policy that corrects a classical controller.
     steps
         Control periods of all rows together; default: the preset's.
     seed
-        Of weights, exploration and episodes.
+        Of weights, exploration and episodes; default: 0.
     out
         Folder of the run; default: runs/ENV/ALGO-seedSEED.
     resume
@@ -48,34 +56,114 @@ def train(
     """
     from agents import train as training
 
-    wanted = configs.read(config) if config else configs.preset(env, algo)
-    if (wanted.env, wanted.algo) != (env, algo):
-        raise SettingsError(
-            f"{config} is for {wanted.env} with {wanted.algo}; say so: {wanted.env} --algo "
-            f"{wanted.algo}"
-        )
-    changes = [*set, *([] if steps is None else [f"steps={steps}"])]
-    wanted = configs.changed(wanted, changes)
-    folder = out or training.default_folder(wanted, seed)
     console = Console(stderr=True)
+    name, kind, number = env or DEFAULT_ENV, algo or "ppo", seed or 0
     if resume:
-        _refuse_other_settings(config, set)
+        folder = out or training.default_folder(name, kind, number, variant)
         run = training.saved_run(folder, steps)
+        _refuse_other_settings(config, set)
+        for given, own in ((env, run.config.env), (algo, run.config.algo), (seed, run.seed)):
+            if given not in (None, own):
+                raise SettingsError(f"{folder} holds a run of {own}, not of {given}; leave it out")
         model = training.resume(run)
         console.print(f"going on at {model.num_timesteps:,} of {run.config.steps:,} steps")
     else:
-        run = training.Run(wanted, seed, folder)
+        wanted = _wanted(name, kind, variant, config)
+        changes = [*set, *([] if steps is None else [f"steps={steps}"])]
+        wanted = configs.changed(wanted, changes)
+        folder = out or training.default_folder(name, kind, number, variant)
+        run = training.Run(wanted, number, folder)
         model = training.start(run)
-    place = training.train(run, model, console)
-    print(place)
+    print(training.train(run, model, console))
 
 
-def _refuse_other_settings(config: Path | None, assignments: tuple[str, ...]) -> None:
-    if config is not None or assignments:
+def _wanted(env: str, algo: str, variant: str, file: Path | None) -> configs.Config:
+    """Return the settings of a preset, or of a file for the same environment and algorithm."""
+    if file is None:
+        return configs.preset(env, algo, variant)
+    wanted = configs.read(file)
+    if (wanted.env, wanted.algo) != (env, algo):
+        raise SettingsError(
+            f"{file} is for {wanted.env} with {wanted.algo}; say so: {wanted.env} --algo "
+            f"{wanted.algo}"
+        )
+    return wanted
+
+
+def _refuse_other_settings(file: Path | None, assignments: tuple[str, ...]) -> None:
+    if file is not None or assignments:
         raise SettingsError(
             "--resume keeps the settings of the run (only --steps may change); leave --config and "
             "--set out, or start a new run with another --out"
         )
+
+
+def sweep(
+    env: Annotated[tuple[str, ...], tyro.conf.Positional] = (DEFAULT_ENV,),
+    /,
+    algo: Algo = "ppo",
+    variant: str = "",
+    seeds: int = 5,
+    first_seed: int = 0,
+    steps: int | None = None,
+    set: tuple[str, ...] = (),
+    jobs: int = os.cpu_count() or 1,
+    backend: Literal["loky", "dask"] = "loky",
+    address: str = "",
+    out: Path = Path("runs"),
+    dry_run: bool = False,
+) -> int:
+    """Train several seeds side by side; an interrupted sweep goes on.
+
+    Exit code 0 if every policy is there, 1 if one is missing.
+
+    Parameters
+    ----------
+    env
+        Environment ids.
+    algo
+        Algorithm.
+    variant
+        Of the preset.
+    seeds
+        How many training seeds.
+    first_seed
+        The first of them.
+    steps
+        Control periods of all rows together; default: the preset's.
+    set
+        Single settings, for example: --set ppo.gamma=0.95
+    jobs
+        Trainings at a time on this machine.
+    backend
+        Processes of this machine, or a running Dask cluster.
+    address
+        Of the Dask scheduler, like tcp://host:8786.
+    out
+        Folder of the runs.
+    dry_run
+        List the trainings and whether their policies are there, and stop.
+    """
+    from agents import sweep as sweeping
+    from sweeps.engine import Cluster
+    from sweeps.progress import progress
+
+    cluster = Cluster(jobs, backend, address)
+    changes = [*set, *([] if steps is None else [f"steps={steps}"])]
+    wanted = [configs.changed(configs.preset(name, algo, variant), changes) for name in env]
+    kind = f"{algo}-{variant}" if variant else algo
+    trainings = sweeping.trainings(wanted, range(first_seed, first_seed + seeds), out, kind)
+    if dry_run:
+        for training in trainings:
+            print(f"{'there ' if training.finished() else 'to run'}  {training.folder}")
+        return 0
+    with progress("trainings") as start:
+        report = sweeping.run(trainings, cluster, start)
+    for place in (*report.found, *report.trained):
+        print(place)
+    for line in report.missing:
+        print(f"MISSING {line}", file=sys.stderr)
+    return 1 if report.missing else 0
 
 
 def show(policy: Annotated[Path, tyro.conf.Positional], /) -> None:
@@ -86,10 +174,114 @@ def show(policy: Annotated[Path, tyro.conf.Positional], /) -> None:
     print(json.dumps({**made.card, "digest": made.digest()}, indent=1, sort_keys=True))
 
 
+def looks(policies: Annotated[tuple[Path, ...], tyro.conf.Positional], /) -> None:
+    """Print what was found on tuning seeds while policies were trained, and which was shipped.
+
+    ``value`` is what policies are chosen by; ``kinds`` are the RMS of the kinds of rows as
+    multiples of the first evaluation's, which is the controller's where a policy corrects one.
+    """
+    from agents.policy import OnnxPolicy
+
+    for place in policies:
+        card = OnnxPolicy.load(place).card
+        found, chosen = card.get("evaluation", []), card.get("chosen", {})
+        print(f"{place}: {len(found)} evaluations")
+        for entry in found:
+            first = found[0].get("kinds", [])
+            pairs = zip(entry.get("kinds", []), first, strict=True)
+            kinds = " ".join(f"{rms / was:.3f}" if rms and was else "-" for rms, was in pairs)
+            mark = " <- shipped" if entry["steps"] == chosen.get("steps") else ""
+            told = [f"{n} {entry[n]:.5g}" for n in LOOKS if entry.get(n) is not None]
+            print(f"{entry['steps']:>12,}  {', '.join(told)}, kinds {kinds}{mark}")
+
+
+def tune(
+    env: Annotated[str, tyro.conf.Positional],
+    /,
+    algo: Algo = "ppo",
+    variant: str = "",
+    trials: int = 30,
+    steps: int | None = None,
+    seed: int = 0,
+    storage: Path | None = None,
+    write: bool = False,
+) -> None:
+    """Search settings on tuning seeds; killed, the same command goes on.
+
+    Parameters
+    ----------
+    env
+        Environment id.
+    algo
+        Algorithm.
+    variant
+        Of the preset.
+    trials
+        Settings to try, those that the storage holds counted in.
+    steps
+        Control periods of each of a trial's two trainings; default: a tenth of the preset's.
+    seed
+        Of the search.
+    storage
+        SQLite file; default: runs/tune/ENV.ALGO.db. Several processes may share it.
+    write
+        Put the best settings and the budget into the preset's file.
+    """
+    from agents import tune as tuning
+
+    path = configs.preset_path(env, algo, variant)
+    config = configs.read(path)
+    place = storage or Path("runs/tune") / f"{path.stem}.db"
+    job = tuning.Job(config, trials, steps or max(config.steps // 10, 1), seed, place)
+    study = tuning.search(job, Console(stderr=True))
+    print(json.dumps({"value": study.best_value, **study.best_params}, indent=1))
+    if write:
+        tuning.write(job, study, path)
+        print(path)
+
+
+def classical(
+    env: Annotated[str, tyro.conf.Positional],
+    /,
+    algo: Algo = "ppo",
+    variant: str = "residual",
+) -> None:
+    """Evaluate the classical controllers of an environment on tuning seeds, the best first.
+
+    Which one a residual corrects is chosen by this, never by the board. The first number is what
+    the preset's evaluation.objective goes by.
+
+    Parameters
+    ----------
+    env
+        Environment id.
+    algo
+        Algorithm of the preset that says on which plants and references.
+    variant
+        Of that preset.
+    """
+    from agents.controllers import names_for
+    from agents.evaluation import evaluate, value_of
+
+    config = configs.preset(env, algo, variant)
+    scores = {name: evaluate(name, config) for name in names_for(env)}
+    values = {name: value_of(score, config) for name, score in scores.items()}
+    for name in sorted(values, key=lambda name: values[name]):
+        made = scores[name]
+        print(
+            f"{values[name]:.5g}  {name}  RMS {made.rms:.5g}, return {made.mean_return:.5g}, "
+            f"failures {made.failures}, travel {made.travel:.4g} Pa"
+        )
+
+
 def presets() -> None:
     """List the presets."""
-    for env, algo in configs.presets():
-        print(f"{env}  {algo}  {configs.preset(env, algo).steps:,} steps")
+    for env, algo, variant in configs.presets():
+        wanted = configs.preset(env, algo, variant)
+        kind = f"{algo} --variant {variant}" if variant else algo
+        trials = wanted.search.trials
+        how = wanted.search.note if trials is None else f"{trials} trials of search"
+        print(f"{env}  {kind}  {wanted.steps:,} steps, {how}")
 
 
 def speed(seconds: float = 20.0) -> None:
@@ -101,16 +293,30 @@ def speed(seconds: float = 20.0) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    commands: dict[str, Any] = {"train": train, "show": show, "presets": presets, "speed": speed}
+    commands: dict[str, Any] = {
+        "train": train,
+        "sweep": sweep,
+        "tune": tune,
+        "classical": classical,
+        "show": show,
+        "looks": looks,
+        "presets": presets,
+        "speed": speed,
+    }
     try:
-        tyro.extras.subcommand_cli_from_dict(commands, prog="python -m agents", args=arguments)
+        status = tyro.extras.subcommand_cli_from_dict(
+            commands, prog="python -m agents", args=arguments
+        )
     except ValueError as error:  # settings, checkpoints and policy files say what to do
         print(f"error: {error}", file=sys.stderr)
         return 2
     except ModuleNotFoundError as error:
         print(f"error: training needs {error.name}; install the extra 'agents'", file=sys.stderr)
         return 2
-    return 0
+    except KeyboardInterrupt:
+        print("interrupted; what was done is kept: a sweep goes on where it was", file=sys.stderr)
+        return 130
+    return int(status or 0)
 
 
 if __name__ == "__main__":

@@ -1,99 +1,37 @@
-"""Training presets, one YAML file per environment and algorithm, with a checked schema."""
+"""Training presets, one YAML file per environment and algorithm, with a checked schema.
+
+A file is named ``ENV.ALGO.yaml`` or ``ENV.ALGO-VARIANT.yaml``. With ``extends: ENV.ALGO`` it
+states only what differs from another preset; the other's search is left behind, and its algorithm
+where that differs.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
+import gymnasium as gym
 import yaml
 
+import pam_envs  # noqa: F401  (registers the environments)
+from agents import parts
+from agents.parts import Evaluation, History, Network, Normalize, Plants, Residual, Search
 from agents.settings import SettingsError, build, choice, nearest, number
 
 FOLDER = Path(__file__).resolve().parent / "configs"
-Algo = Literal["ppo", "sac"]
-ALGORITHMS: tuple[str, ...] = ("ppo", "sac")
-
-
-@dataclass(frozen=True)
-class Network:
-    """The policy's network.
-
-    Attributes
-    ----------
-    hidden : tuple of int
-        Width of each hidden layer, of the policy and of the critic alike.
-    activation : {"tanh", "relu", "elu"}
-    log_std_init : float
-        PPO: logarithm of the first standard deviation of the action, in its range [-1, 1].
-    differences : tuple of str
-        ``"a - b"`` with names of signals: fixed extra inputs ``gain * (a - b)``. A millimetre is a
-        thirtieth of the range, so that errors are small numbers among the plain signals.
-    gain : float
-        That factor.
-    linear : bool
-        PPO: a linear path from the inputs to the action beside the layers, as in structured
-        control nets (Srouji, Zhang, Salakhutdinov, ICML 2018).
-    hold : tuple of str
-        PPO with ``linear``: a signal for each action. The untrained policy returns its value, so
-        that learning starts from "keep the last set-point".
-    """
-
-    hidden: tuple[int, ...] = number((64, 64), 1, 4096)
-    activation: str = choice("tanh", "tanh", "relu", "elu")
-    log_std_init: float = number(0.0, -10.0, 3.0)
-    differences: tuple[str, ...] = ()
-    gain: float = number(10.0, 0.0, 1e4)
-    linear: bool = False
-    hold: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Normalize:
-    """Running normalisation during training; the exported policy contains it."""
-
-    observation: bool = False
-    reward: bool = True
-    clip_observation: float = number(10.0, 0.1, 1e6)
-    clip_reward: float = number(10.0, 0.1, 1e6)
-
-
-@dataclass(frozen=True)
-class PPO:
-    """Proximal policy optimisation (Schulman et al. 2017), names as in stable-baselines3.
-
-    ``learning_rate`` runs linearly from the first value to the second over the training.
-    """
-
-    n_steps: int = number(32, 2, 100_000)
-    batch_size: int = number(2048, 2, 1_000_000)
-    n_epochs: int = number(4, 1, 100)
-    learning_rate: tuple[float, float] = number((3e-4, 3e-4), 0.0, 1.0)
-    gamma: float = number(0.97, 0.0, 1.0)
-    gae_lambda: float = number(0.95, 0.0, 1.0)
-    clip_range: float = number(0.2, 1e-3, 10.0)
-    ent_coef: float = number(0.0, 0.0, 10.0)
-    vf_coef: float = number(0.5, 0.0, 100.0)
-    max_grad_norm: float = number(0.5, 1e-3, 1e3)
-    target_kl: float | None = number(None, 1e-6, 10.0)
-
-
-@dataclass(frozen=True)
-class SAC:
-    """Soft actor-critic (Haarnoja et al. 2018), names as in stable-baselines3."""
-
-    buffer_size: int = number(200_000, 100, 100_000_000)
-    learning_starts: int = number(5_000, 0, 100_000_000)
-    batch_size: int = number(256, 1, 1_000_000)
-    learning_rate: tuple[float, float] = number((1e-3, 1e-3), 0.0, 1.0)
-    gamma: float = number(0.97, 0.0, 1.0)
-    tau: float = number(0.005, 0.0, 1.0)
-    train_freq: int = number(1, 1, 100_000)
-    gradient_steps: int = number(8, 1, 100_000)
-    ent_coef: float | Literal["auto"] = number("auto", 0.0, 100.0)
+ALGORITHMS: tuple[str, ...] = ("ppo", "sac", "tqc", "recurrent_ppo")
+ON_POLICY = ("ppo", "recurrent_ppo")
+OPTIONAL = ("share", "per_reference", "history", "residual", "plants", "evaluation", "search")
+"""Parts that are left out of the plain form where they hold their defaults."""
+NAME = re.compile(r"[A-Za-z0-9]+-v[0-9]+\.[a-z_]+(-[a-z_]+)?")
+ENV = re.compile(r"PAM/[A-Za-z0-9]+-v[0-9]+")
+"""Ids of environments here. In ``module:id`` Gymnasium imports the module, which runs its code."""
 
 
 @dataclass(frozen=True)
@@ -103,8 +41,8 @@ class Config:
     Attributes
     ----------
     env : str
-        Environment id.
-    algo : {"ppo", "sac"}
+        Id of a registered environment of this package.
+    algo : {"ppo", "sac", "tqc", "recurrent_ppo"}
     steps : int
         Control periods of all rows together.
     num_envs : int
@@ -113,8 +51,16 @@ class Config:
         Control periods between checkpoints.
     env_kwargs : dict
         Arguments of the environment.
-    network, normalize, ppo, sac
-        The parts; ``ppo`` or ``sac`` is used according to ``algo``.
+    share : dict
+        Arguments of the environment that differ among the rows, each a list: every combination
+        gets as many rows.
+    per_reference : dict
+        Further arguments by the kind's reference, as in scenario files: a reward in which
+        references that are followed to a hundredth of a millimetre count as much as steps.
+    network, normalize, history, residual, plants, evaluation, search
+        The parts, see :mod:`agents.parts`.
+    ppo, sac, tqc, recurrent_ppo
+        The algorithms' parts; the one that ``algo`` names is used.
     schema : int
         Version of this schema.
     """
@@ -122,36 +68,121 @@ class Config:
     env: str
     algo: str = choice("ppo", *ALGORITHMS)
     steps: int = number(1_000_000, 1, 10**12)
-    num_envs: int = number(256, 1, 2**20)
+    num_envs: int = number(256, 1, 1_000_000)
     checkpoint_steps: int = number(500_000, 1, 10**12)
     env_kwargs: dict[str, Any] = field(default_factory=dict)
+    share: dict[str, Any] = field(default_factory=dict)
+    per_reference: dict[str, Any] = field(default_factory=dict)
     network: Network = field(default_factory=Network)
     normalize: Normalize = field(default_factory=Normalize)
-    ppo: PPO = field(default_factory=PPO)
-    sac: SAC = field(default_factory=SAC)
+    history: History = field(default_factory=History)
+    residual: Residual = field(default_factory=Residual)
+    plants: Plants = field(default_factory=Plants)
+    evaluation: Evaluation = field(default_factory=Evaluation)
+    search: Search = field(default_factory=Search)
+    ppo: parts.PPO = field(default_factory=parts.PPO)
+    sac: parts.SAC = field(default_factory=parts.SAC)
+    tqc: parts.TQC = field(default_factory=parts.TQC)
+    recurrent_ppo: parts.RecurrentPPO = field(default_factory=parts.RecurrentPPO)
     schema: int = number(1, 1, 1)
 
     def __post_init__(self) -> None:
-        """Refuse combinations that cannot train."""
-        rollout = self.ppo.n_steps * self.num_envs
-        if self.algo == "ppo" and rollout % min(self.ppo.batch_size, rollout):
-            raise SettingsError(
-                f"ppo.batch_size = {self.ppo.batch_size} does not divide the {rollout} samples of "
-                f"a rollout (ppo.n_steps * num_envs); choose a divisor"
-            )
-        if self.network.hold and not self.network.linear:
+        """Refuse foreign environments and combinations that cannot train."""
+        check_env(self.env)
+        self._check_rollout()
+        network = self.network
+        if network.hold and not network.linear:
             raise SettingsError("network.hold needs network.linear: true")
-        if self.algo == "sac" and self.network.linear:
-            raise SettingsError("network.linear is for ppo; leave it out for sac")
+        if self.algo not in ON_POLICY and network.linear:
+            raise SettingsError(f"network.linear is for ppo; leave it out for {self.algo}")
+        if self.residual.controller and network.hold:
+            raise SettingsError(
+                "network.hold is not for a residual, which starts from its controller; leave it out"
+            )
+        if bool(self.history.frames) != bool(self.history.signals):
+            raise SettingsError("history needs both frames and signals, or neither")
+        self._check_kinds()
+
+    def _check_kinds(self) -> None:
+        given = {"randomize", "hysteresis"} & {*self.env_kwargs, *self.share}
+        if self.plants != Plants() and given:
+            raise SettingsError(
+                f"env_kwargs or share and plants both say {', '.join(sorted(given))}; keep plants"
+            )
+        for name, values in self.share.items():
+            if not isinstance(values, list) or not values:
+                raise SettingsError(f"share.{name} = {values!r} must be a list of values")
+        unknown = set(self.per_reference) - set(self.share.get("reference", ()))
+        if unknown:
+            raise SettingsError(
+                f"per_reference names {', '.join(sorted(unknown))}, which share.reference lacks"
+            )
+        kinds = len(self.kinds())
+        if self.num_envs % kinds:
+            raise SettingsError(
+                f"num_envs = {self.num_envs} is no multiple of the {kinds} kinds that share and "
+                "plants.hysteresis make; choose one"
+            )
+
+    def kinds(self) -> tuple[dict[str, Any], ...]:
+        """Return the environment's arguments of each kind that the rows are shared out among."""
+        laws = {"hysteresis": list(self.plants.hysteresis)} if self.plants.hysteresis else {}
+        shared = {**laws, **self.share}
+        base = {**self.env_kwargs, **({"randomize": True} if self.plants.randomize else {})}
+        kinds = [
+            {**base, **dict(zip(shared, values, strict=True))}
+            for values in itertools.product(*shared.values())
+        ]
+        own = self.per_reference
+        return tuple({**kind, **own.get(str(kind.get("reference")), {})} for kind in kinds)
+
+    def _check_rollout(self) -> None:
+        if self.algo not in ON_POLICY:
+            return
+        rollout = self.chosen.n_steps * self.num_envs
+        if rollout % min(self.chosen.batch_size, rollout):
+            raise SettingsError(
+                f"{self.algo}.batch_size = {self.chosen.batch_size} does not divide the {rollout} "
+                f"samples of a rollout ({self.algo}.n_steps * num_envs); choose a divisor"
+            )
+
+    @property
+    def chosen(self) -> Any:
+        """The part of the algorithm in use."""
+        return getattr(self, self.algo)
+
+    def decisive(self) -> Config:
+        """Return the settings that decide which policy is shipped: also how it is looked at."""
+        usual: Any = Config.checkpoint_steps
+        return dataclasses.replace(self, search=Search(), checkpoint_steps=usual)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain values, without the other algorithm's part."""
+        """Return plain values, without the other algorithms' parts and those left at rest."""
         plain = _plain(dataclasses.asdict(self))
-        for other in ALGORITHMS:
-            if other != self.algo:
-                del plain[other]
+        idle = [a for a in ALGORITHMS if a != self.algo]
+        idle += [name for name in OPTIONAL if getattr(self, name) == _fresh(name)]
+        for name in idle:
+            del plain[name]
         made: dict[str, Any] = plain
         return made
+
+
+def check_env(name: str) -> None:
+    """Raise unless a name is that of an environment of this package.
+
+    Raises
+    ------
+    SettingsError
+        Naming the nearest.
+    """
+    if not (ENV.fullmatch(name) and name in gym.registry):
+        known = [env for env in gym.registry if ENV.fullmatch(env)]
+        raise SettingsError(f"env = {name!r} is no environment here{nearest(name, known)}")
+
+
+def _fresh(name: str) -> Any:
+    kinds = {f.name: f.default_factory for f in dataclasses.fields(Config)}
+    return kinds[name]()  # type: ignore[operator, misc]
 
 
 def _plain(value: Any) -> Any:
@@ -160,32 +191,39 @@ def _plain(value: Any) -> Any:
     return [_plain(v) for v in value] if isinstance(value, (list, tuple)) else value
 
 
-def presets() -> dict[tuple[str, str], Path]:
-    """Return the presets' files by environment id and algorithm."""
+def presets() -> dict[tuple[str, str, str], Path]:
+    """Return the presets' files by environment id, algorithm and variant ("" for the plain)."""
     found = {}
     for path in sorted(FOLDER.glob("*.yaml")):
-        name, _, algo = path.stem.rpartition(".")
-        found[f"PAM/{name}", algo] = path
+        name, _, kind = path.stem.rpartition(".")
+        algo, _, variant = kind.partition("-")
+        found[f"PAM/{name}", algo, variant] = path
     return found
 
 
-def preset(env: str, algo: str) -> Config:
-    """Return the preset of an environment and algorithm.
+def preset_path(env: str, algo: str, variant: str = "") -> Path:
+    """Return the file of a preset; see :func:`preset`."""
+    found = presets()
+    if algo not in ALGORITHMS:
+        raise SettingsError(f"algo = {algo!r} is not known{nearest(algo, list(ALGORITHMS))}")
+    if (env, algo, variant) not in found:
+        ids = [e for e, a, v in found if (a, v) == (algo, variant)]
+        what = f"{algo}-{variant}" if variant else algo
+        raise SettingsError(
+            f"no {what} preset for {env!r}{nearest(env, ids)} A file of your own: --config FILE"
+        )
+    return found[env, algo, variant]
+
+
+def preset(env: str, algo: str, variant: str = "") -> Config:
+    """Return the preset of an environment, algorithm and variant.
 
     Raises
     ------
     SettingsError
         If there is none, naming the nearest.
     """
-    found = presets()
-    if algo not in ALGORITHMS:
-        raise SettingsError(f"algo = {algo!r} is not known{nearest(algo, list(ALGORITHMS))}")
-    if (env, algo) not in found:
-        ids = [e for e, a in found if a == algo]
-        raise SettingsError(
-            f"no {algo} preset for {env!r}{nearest(env, ids)} A file of your own: --config FILE"
-        )
-    return read(found[env, algo])
+    return read(preset_path(env, algo, variant))
 
 
 def read(path: str | Path) -> Config:
@@ -197,11 +235,7 @@ def read(path: str | Path) -> Config:
         If the file is no YAML mapping or a setting is unknown or out of bounds.
     """
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-        given = json.loads(text) if path.suffix == ".json" else yaml.safe_load(text)
-    except (OSError, ValueError, yaml.YAMLError) as error:
-        raise SettingsError(f"{path.name} cannot be read as YAML: {error}") from error
+    given = _mapping(path)
     if isinstance(given, Mapping) and "action_signals" in given:
         given = given.get("config")
     try:
@@ -210,10 +244,66 @@ def read(path: str | Path) -> Config:
         raise SettingsError(f"{path.name}: {error}") from error
 
 
+def _mapping(path: Path) -> Any:
+    try:
+        text = path.read_text(encoding="utf-8")
+        return json.loads(text) if path.suffix == ".json" else yaml.safe_load(text)
+    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
+        raise SettingsError(f"{path.name} cannot be read as YAML: {error}") from error
+
+
+def from_text(text: str) -> Config:
+    """Return the configuration that a YAML text describes; see :func:`read`."""
+    return from_mapping(yaml.safe_load(text))
+
+
 def from_mapping(given: Any) -> Config:
     """Return the configuration that a mapping describes; see :func:`read`."""
+    if isinstance(given, Mapping) and "extends" in given:
+        given = _extended(given)
     made: Config = build(Config, given)
     return made
+
+
+def _extended(given: Mapping[str, Any], above: tuple[str, ...] = ()) -> Any:
+    """Return a mapping laid over the preset that it extends, whose search is not its own.
+
+    Parameters
+    ----------
+    given : mapping
+    above : tuple of str
+        Presets that lead here, each extending the next.
+    """
+    name = given["extends"]
+    under = _mapping(_extendable(name, above))
+    own = {key: value for key, value in given.items() if key != "extends"}
+    if "extends" in under:
+        under = _extended(under, (*above, name))
+    foreign = ["search"]
+    if own.get("algo", under.get("algo")) != under.get("algo"):
+        foreign += ALGORITHMS
+    under = {key: value for key, value in under.items() if key not in foreign}
+    return _laid_over(under, own)
+
+
+def _extendable(name: Any, above: tuple[str, ...]) -> Path:
+    """Return the file of a preset that another extends."""
+    if not isinstance(name, str) or not NAME.fullmatch(name):
+        raise SettingsError(f"extends = {name!r} must name a preset, for example KneeWalk-v0.ppo")
+    if name in above:
+        circle = " -> ".join((*above[above.index(name) :], name))
+        raise SettingsError(f"extends = {name!r} goes in a circle ({circle}); take one out")
+    path = FOLDER / f"{name}.yaml"
+    if not path.is_file():
+        names = [p.stem for p in presets().values()]
+        raise SettingsError(f"extends = {name!r} is no preset{nearest(name, names)}")
+    return path
+
+
+def _laid_over(under: Any, over: Any) -> Any:
+    if not (isinstance(under, Mapping) and isinstance(over, Mapping)):
+        return over
+    return {**under, **{k: _laid_over(under.get(k), v) for k, v in over.items()}}
 
 
 def changed(config: Config, assignments: Sequence[str]) -> Config:
@@ -229,11 +319,16 @@ def changed(config: Config, assignments: Sequence[str]) -> Config:
         name, equals, text = assignment.partition("=")
         if not equals:
             raise SettingsError(f"{assignment!r} must read name=value, for example ppo.gamma=0.95")
-        at: Any = plain
-        *above, last = name.strip().split(".")
-        for part in above:
-            at = at.setdefault(part, {}) if isinstance(at, dict) else None
-            if not isinstance(at, Mapping):
-                raise SettingsError(f"{name!r} names no setting")
-        at[last] = yaml.safe_load(text)
+        put(plain, name, yaml.safe_load(text))
     return from_mapping(plain)
+
+
+def put(plain: dict[str, Any], name: str, value: Any) -> None:
+    """Set an entry of nested mappings by its dotted name."""
+    at: Any = plain
+    *above, last = name.strip().split(".")
+    for part in above:
+        at = at.setdefault(part, {}) if isinstance(at, dict) else None
+        if not isinstance(at, Mapping):
+            raise SettingsError(f"{name!r} names no setting")
+    at[last] = value

@@ -1,114 +1,104 @@
-"""From a trained model to a policy file: the deterministic action as a graph of arithmetic.
-
-The graph is written node by node (no tracing), so that the same weights give the same bytes:
-
-    observation -> normaliser -> fixed differences -> layers -> action -> limits
-"""
+"""From a trained model to a policy file: the deterministic action as a graph of arithmetic."""
 
 from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import onnx
-from numpy.typing import NDArray
-from onnx import TensorProto, helper, numpy_helper
+from onnx import TensorProto
+from sb3_contrib import TQC, RecurrentPPO
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.torch_layers import FlattenExtractor
 from torch import nn
 
 import pam_envs
+from agents import controllers, probe
 from agents.checkpoint import write_atomically
-from agents.networks import LayersAndInputs, LinearFeatures
-from agents.onnx_file import CARD, INPUT, OUTPUT, SCHEMA, check_graph
+from agents.graph import Graph, array
+from agents.history_vec_env import HistoryVecEnv
+from agents.networks import LayersAndInputs, LinearFeatures, MemoryAndInputs
+from agents.onnx_file import CARD, CONTROLLER, INPUT, SCHEMA, check_graph
 from agents.policy import describe
+from agents.residual_vec_env import ResidualVecEnv
 
-OPSET, IR = 17, 8
-ACTIVATIONS = {nn.Tanh: "Tanh", nn.ReLU: "Relu", nn.ELU: "Elu"}
-
-
-class Graph:
-    """A chain of nodes under construction; ``last`` is what the next one reads."""
-
-    def __init__(self) -> None:
-        self.nodes: list[onnx.NodeProto] = []
-        self.numbers: list[onnx.TensorProto] = []
-        self.last = INPUT
-
-    def number(self, value: NDArray[Any]) -> str:
-        """Return the name of a constant."""
-        name = f"c{len(self.numbers)}"
-        self.numbers.append(numpy_helper.from_array(np.ascontiguousarray(value), name))
-        return name
-
-    def add(self, operator: str, *constants: NDArray[Any], **attributes: Any) -> str:
-        """Append a node that reads ``last`` and constants; return its output's name."""
-        inputs = [self.last, *(self.number(value) for value in constants)]
-        return self.join(operator, inputs, **attributes)
-
-    def join(self, operator: str, inputs: list[str], **attributes: Any) -> str:
-        """Append a node that reads named values; return its output's name."""
-        self.last = f"v{len(self.nodes)}"
-        self.nodes.append(helper.make_node(operator, inputs, [self.last], **attributes))
-        return self.last
-
-    def linear(self, layer: nn.Linear) -> None:
-        """Append ``x W^T + b``."""
-        self.add("Gemm", _array(layer.weight), _array(layer.bias), transB=1)
+ALGORITHMS: dict[type[BaseAlgorithm], str] = {
+    PPO: "ppo",
+    SAC: "sac",
+    TQC: "tqc",
+    RecurrentPPO: "recurrent_ppo",
+}
+OWN = ("info", "num_envs", "vectorization_mode", "threads")
+"""Arguments of the batch, which decide nothing that is learned."""
+L = TypeVar("L")
 
 
 def export_policy(
-    model: BaseAlgorithm, path: str | Path, card: Mapping[str, Any] | None = None
+    model: BaseAlgorithm,
+    path: str | Path,
+    card: Mapping[str, Any] | None = None,
+    beside: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Write the model's deterministic action as a policy file, and its card beside it.
 
+    The card is written first, so that a policy that is there has one, whenever a process is killed.
+
     Parameters
     ----------
-    model : PPO or SAC
+    model : PPO, RecurrentPPO, SAC or TQC
         With its environment (a :class:`agents.sb3_vec_env.BatchVecEnv`, wrapped or not), from
         which come the signals and the observation's normaliser.
     path : str or Path
         ``policy.onnx``; the card is written to ``policy.json``.
     card : mapping, optional
         Further entries of the card: seed, steps, command.
+    beside : mapping, optional
+        Entries of the JSON file alone, which differ from one occasion to the next: times, machine.
 
     Returns
     -------
     dict
-        The card.
+        The card, as in the file.
 
     Raises
     ------
     ValueError
-        If the model has layers that have no counterpart here.
+        If the model has layers that have no counterpart here, or corrects a controller that is
+        mostly at a limit.
     """
     path = Path(path)
-    full = {**_facts(model), **(card or {})}
+    full = {**facts(model), **(card or {})}
     data = policy_bytes(model, full)
-    write_atomically(path, data)
-    text = json.dumps(full, indent=1, sort_keys=True) + "\n"
+    text = json.dumps({**full, **(beside or {})}, indent=1, sort_keys=True) + "\n"
     write_atomically(path.with_suffix(".json"), text.encode())
+    write_atomically(path, data)
     return full
 
 
 def policy_bytes(model: Any, card: Mapping[str, Any]) -> bytes:
     """Return the policy file's bytes: a function of weights, normaliser and card alone."""
     graph = Graph()
+    env = model.get_env()
+    corrects, past = _layer(env, ResidualVecEnv), _layer(env, HistoryVecEnv)
+    if corrects is not None:
+        graph.join("Concat", [INPUT, CONTROLLER], axis=1)
+    if past is not None:
+        graph.past(past.columns, past.frames)
     _normaliser(graph, model)
-    if isinstance(model, PPO):
-        _ppo_action(graph, model)
-    elif isinstance(model, SAC):
-        _sac_action(graph, model)
-    else:
-        raise ValueError(f"{type(model).__name__} cannot be exported; PPO and SAC can")
-    _limits(graph, model)
-    made = _model(graph, len(card["signals"]), len(card["action_signals"]))
+    _action(graph, model)
+    _limits(graph, model.action_space)
+    if corrects is not None:
+        graph.add("Mul", np.full(1, corrects.scale, np.float32))
+        graph.join("Add", [CONTROLLER, graph.last])
+        _limits(graph, corrects.range)
+    signals, actions = len(card["signals"]), len(card["action_signals"])
+    made = graph.model(signals, actions, corrects is not None)
     made.metadata_props.add(key=CARD, value=json.dumps(dict(card), sort_keys=True))
     onnx.checker.check_model(made)
     check_graph(made)
@@ -116,21 +106,30 @@ def policy_bytes(model: Any, card: Mapping[str, Any]) -> bytes:
     return data
 
 
-def _facts(model: BaseAlgorithm) -> dict[str, Any]:
+def _layer(env: Any, kind: type[L]) -> L | None:
+    """Return the wrapper of a kind around the environment, if there is one."""
+    while hasattr(env, "venv"):
+        if isinstance(env, kind):
+            return env
+        env = env.venv
+    return None
+
+
+def facts(model: BaseAlgorithm) -> dict[str, Any]:
+    """Return what a card says of a model: where it was trained, what it reads, versions."""
     env = model.get_env()
     if env is None:
         raise ValueError("the model has no environment; call model.set_env(env) first")
     spec = env.get_attr("spec")[0]
-    own = {"info", "num_envs", "vectorization_mode", "threads"}
-    names = ("torch", "stable_baselines3", "gymnasium", "numpy", "onnx")
-    return {
+    names = ("torch", "stable_baselines3", "sb3_contrib", "gymnasium", "numpy", "onnx")
+    made = {
         "schema": SCHEMA,
         "env": spec.id,
-        "env_kwargs": {k: _plain(v) for k, v in spec.kwargs.items() if k not in own},
-        "plant": env.get_attr("plant")[0].digest(),
+        "env_kwargs": _in_common([kind for kind, _ in _kinds(env)]),
+        "plants": plants_of(env),
         "signals": describe(env.get_attr("signals")[0]),
         "action_signals": describe(env.get_attr("action_signals")[0]),
-        "algo": type(model).__name__.lower(),
+        "algo": ALGORITHMS.get(type(model), type(model).__name__.lower()),
         "steps": int(model.num_timesteps),
         "seed": model.seed,
         "versions": {
@@ -139,6 +138,52 @@ def _facts(model: BaseAlgorithm) -> dict[str, Any]:
             **{name: version(name) for name in names},
         },
     }
+    corrects = _layer(env, ResidualVecEnv)
+    return made if corrects is None else {**made, "baseline": _baseline(corrects, spec.id)}
+
+
+def plants_of(env: Any) -> list[str]:
+    """Return the digests of the nominal plants that the rows are on, each once."""
+    return list(dict.fromkeys(plant.digest() for _, plant in _kinds(env)))
+
+
+def _kinds(env: Any) -> Iterator[tuple[dict[str, Any], Any]]:
+    """Yield the environment's arguments and the nominal plant of each kind of row."""
+    base = env.unwrapped
+    for batch in getattr(base, "batches", (base,)):
+        given = batch.get_attr("spec")[0].kwargs
+        kind = {name: value for name, value in given.items() if name not in OWN}
+        yield kind, batch.get_attr("plant")[0]
+
+
+def _in_common(kinds: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the arguments that all kinds have alike."""
+    first, *others = ({name: _plain(value) for name, value in kind.items()} for kind in kinds)
+    return {
+        name: value
+        for name, value in first.items()
+        if all(name in other and other[name] == value for other in others)
+    }
+
+
+def _baseline(layer: ResidualVecEnv, env: str) -> dict[str, Any]:
+    """Return what the card says of the controller that the policy corrects."""
+    kinds: dict[str, list[dict[str, Any]]] = {}
+    for kind, plant in _kinds(layer):
+        kinds.setdefault(plant.digest(), []).append(kind)
+    made = {_plant_at(layer, rows): controller for rows, controller in layer.controllers}
+    told = []
+    for digest, controller in made.items():
+        found = probe.record(env, kinds[digest], controller, layer.name)
+        parameters = controllers.parameters(controller)
+        told.append({"plant": digest, "parameters": parameters, "probe": found.as_dict()})
+    return {"name": layer.name, "scale": float(layer.scale), "told": told}
+
+
+def _plant_at(layer: ResidualVecEnv, rows: slice) -> str:
+    """Return the digest of the plant of some rows, which is the same for all of them."""
+    digest: str = layer.get_attr("plant", [rows.start or 0])[0].digest()
+    return digest
 
 
 def _plain(value: Any) -> Any:
@@ -172,30 +217,62 @@ def _features(graph: Graph, extractor: nn.Module) -> str:
     """Append the fixed differences; return the name of the inputs."""
     if isinstance(extractor, LinearFeatures):
         matrix: Any = extractor.matrix
-        return graph.add("Gemm", _array(matrix), transB=1)
+        return graph.add("Gemm", array(matrix), transB=1)
     if isinstance(extractor, FlattenExtractor):
         return graph.last
     raise ValueError(f"the features of {type(extractor).__name__} cannot be exported")
 
 
-def _ppo_action(graph: Graph, model: PPO) -> None:
-    policy = model.policy
-    if policy.squash_output or not isinstance(policy.action_net, nn.Linear):
-        raise ValueError("only PPO with a plain Gaussian action can be exported")
+def _action(graph: Graph, model: Any) -> None:
+    if isinstance(model, RecurrentPPO):
+        _recurrent_action(graph, model.policy)
+    elif isinstance(model, PPO):
+        _ppo_action(graph, model.policy)
+    elif isinstance(model, (SAC, TQC)):
+        _squashed_action(graph, model)
+    else:
+        raise ValueError(f"{type(model).__name__} cannot be exported; PPO, SAC and TQC can")
+
+
+def _ppo_action(graph: Graph, policy: Any) -> None:
+    _check_plain(policy)
     inputs = _features(graph, policy.pi_features_extractor)
     layers = policy.mlp_extractor
-    _sequence(graph, layers.policy_net)
+    graph.layers(layers.policy_net)
     if isinstance(layers, LayersAndInputs):
         graph.join("Concat", [graph.last, inputs], axis=1)
     graph.linear(policy.action_net)
 
 
-def _sac_action(graph: Graph, model: SAC) -> None:
-    actor = model.policy.actor
+def _check_plain(policy: Any) -> None:
+    if policy.squash_output or not isinstance(policy.action_net, nn.Linear):
+        raise ValueError("only PPO with a plain Gaussian action can be exported")
+
+
+def _recurrent_action(graph: Graph, policy: Any) -> None:
+    _check_plain(policy)
+    if policy.lstm_actor.num_layers != 1:
+        raise ValueError(
+            f"n_lstm_layers = {policy.lstm_actor.num_layers}: only one layer can be exported"
+        )
+    inputs = _features(graph, policy.pi_features_extractor)
+    output = graph.lstm(policy.lstm_actor)
+    layers = policy.mlp_extractor
+    beside = isinstance(layers, MemoryAndInputs)
+    if beside:
+        graph.join("Concat", [output, inputs], axis=1)
+    graph.layers(layers.policy_net)
+    if beside:
+        graph.join("Concat", [graph.last, inputs], axis=1)
+    graph.linear(policy.action_net)
+
+
+def _squashed_action(graph: Graph, model: SAC | TQC) -> None:
+    actor: Any = model.policy.actor
     space: Any = model.action_space
     _features(graph, actor.features_extractor)
-    _sequence(graph, actor.latent_pi)
-    _sequence(graph, [actor.mu])
+    graph.layers(actor.latent_pi)
+    graph.layers([actor.mu])
     graph.add("Tanh")
     graph.add("Add", np.full(1, 1.0, np.float32))
     graph.add("Mul", np.full(1, 0.5, np.float32))
@@ -203,42 +280,7 @@ def _sac_action(graph: Graph, model: SAC) -> None:
     graph.add("Add", np.asarray(space.low, np.float32))
 
 
-def _sequence(graph: Graph, layers: Any) -> None:
-    for layer in layers:
-        if isinstance(layer, nn.Linear):
-            graph.linear(layer)
-        elif type(layer) in ACTIVATIONS:
-            graph.add(ACTIVATIONS[type(layer)])
-        else:
-            raise ValueError(f"a layer of {type(layer).__name__} cannot be exported")
-
-
-def _limits(graph: Graph, model: BaseAlgorithm) -> None:
-    """Hold the action within the environment's range."""
-    space: Any = model.action_space
+def _limits(graph: Graph, space: Any) -> None:
+    """Hold the action within a range."""
     graph.add("Max", np.asarray(space.low, np.float32))
     graph.add("Min", np.asarray(space.high, np.float32))
-
-
-def _model(graph: Graph, signals: int, actions: int) -> onnx.ModelProto:
-    graph.nodes[-1].output[0] = OUTPUT
-    inside = helper.make_graph(
-        graph.nodes,
-        "policy",
-        [helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, ["batch", signals])],
-        [helper.make_tensor_value_info(OUTPUT, TensorProto.FLOAT, ["batch", actions])],
-        graph.numbers,
-    )
-    made = helper.make_model(
-        inside,
-        opset_imports=[helper.make_opsetid("", OPSET)],
-        producer_name="pam_envs agents",
-        producer_version=pam_envs.__version__,
-    )
-    made.ir_version = IR
-    return made
-
-
-def _array(tensor: Any) -> NDArray[np.float32]:
-    array: NDArray[np.float32] = tensor.detach().cpu().numpy().astype(np.float32)
-    return array

@@ -20,6 +20,10 @@ MOST_NUMBERS = 100_000
 CARD = "pam_policy"
 SCHEMA = 1
 INPUT, OUTPUT = "observation", "action"
+CONTROLLER = "controller"
+"""Input of a policy that corrects a controller: the controller's action."""
+STATE, START, AFTER = "state", "start", "state_after"
+"""Inputs and output of a policy that remembers: numbers a row, and 1 where an episode begins."""
 OPERATORS = frozenset(
     (
         *("Abs", "Add", "Cast", "Clip", "Concat", "Constant", "Div", "Elu", "Exp", "Flatten"),
@@ -29,7 +33,8 @@ OPERATORS = frozenset(
         *("Transpose", "Unsqueeze"),
     )
 )
-"""Operators of feed-forward policies: none loops, and none can make a tensor from a size."""
+"""Operators of policies: none loops, and none can make a tensor from a size. A policy that
+remembers does so from call to call, by what it is given back."""
 
 
 class PolicyFileError(ValueError):
@@ -50,7 +55,7 @@ def read(path: str | Path) -> PolicyFile:
     Raises
     ------
     PolicyFileError
-        If it is anything but a small feed-forward ONNX policy with its card.
+        If it is anything but a small ONNX policy of plain arithmetic with its card.
     """
     path = Path(path)
     try:
@@ -70,6 +75,24 @@ def read(path: str | Path) -> PolicyFile:
         return PolicyFile(data, _card(model))
     except PolicyFileError as error:
         raise PolicyFileError(f"{path.name}: {error}") from error
+
+
+def finished(path: str | Path) -> dict[str, Any] | None:
+    """Return the card of a policy that is there whole, None where a file is missing or older.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the policy; its card lies beside it, with what the training cost.
+    """
+    path = Path(path)
+    try:
+        beside = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+        inside = read(path).card
+    except (OSError, ValueError):
+        return None
+    known = isinstance(beside, dict) and {key: beside.get(key) for key in inside} == inside
+    return inside if known else None
 
 
 def _refuse_code(name: str, data: bytes) -> None:
@@ -143,7 +166,7 @@ def _card(model: onnx.ModelProto) -> dict[str, Any]:
         )
     try:
         card = json.loads(texts[CARD])
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise PolicyFileError(f"its card is not JSON: {error}") from error
     if not isinstance(card, dict) or card.get("schema") != SCHEMA:
         raise PolicyFileError(f"its card is not of schema {SCHEMA}; export it with this version")

@@ -20,6 +20,9 @@ from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
+from agents.history_vec_env import HistoryVecEnv
+from agents.residual_vec_env import ResidualVecEnv
+
 COUNTERS = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_remaining")
 LAST = ("_last_obs", "_last_episode_starts", "_last_original_obs")
 BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
@@ -37,6 +40,7 @@ def take(model: BaseAlgorithm) -> dict[str, Any]:
         "last": {name: getattr(model, name) for name in LAST},
         "episodes": _episodes(model),
         "replay": _replay(model),
+        "lstm": [part.clone() for pair in _lstm(model) for part in pair],
         "layers": {type(layer).__name__: _layer(layer) for layer in _layers(env)},
         "env": env.unwrapped.get_state(),  # type: ignore[attr-defined]
         "random": _random_state(model),
@@ -60,6 +64,9 @@ def put_back(model: BaseAlgorithm, snapshot: dict[str, Any]) -> None:
     )
     model.ep_success_buffer = deque(maxlen=100)
     _put_replay(model, snapshot["replay"])
+    places = [part for pair in _lstm(model) for part in pair]
+    for place, tensor in zip(places, snapshot["lstm"], strict=True):
+        place.copy_(tensor)
     for layer in _layers(env):
         _put_layer(layer, snapshot["layers"][type(layer).__name__])
     state = {name: value.numpy().copy() for name, value in snapshot["env"].items()}
@@ -72,15 +79,23 @@ def _episodes(model: BaseAlgorithm) -> np.ndarray[Any, Any]:
     return np.array(rows, np.float64).reshape(-1, 3)
 
 
+def _lstm(model: BaseAlgorithm) -> tuple[Any, ...]:
+    """Return the states of a recurrent policy's memories at the rollout's start."""
+    states = getattr(model, "_last_lstm_states", None)
+    return () if states is None else (states.pi, states.vf)
+
+
 def _layers(env: VecEnv) -> Iterator[VecEnv]:
     """Yield the wrappers that remember something."""
     while hasattr(env, "venv"):
-        if isinstance(env, (VecMonitor, VecNormalize)):
+        if isinstance(env, (VecMonitor, VecNormalize, HistoryVecEnv, ResidualVecEnv)):
             yield env
         env = env.venv
 
 
 def _layer(layer: VecEnv) -> dict[str, Any]:
+    if isinstance(layer, (HistoryVecEnv, ResidualVecEnv)):
+        return layer.snapshot()
     if isinstance(layer, VecMonitor):
         return {
             "returns": layer.episode_returns.copy(),
@@ -100,6 +115,9 @@ def _layer(layer: VecEnv) -> dict[str, Any]:
 
 
 def _put_layer(layer: VecEnv, saved: dict[str, Any]) -> None:
+    if isinstance(layer, (HistoryVecEnv, ResidualVecEnv)):
+        layer.put_back(saved)
+        return
     if isinstance(layer, VecMonitor):
         layer.episode_returns = saved["returns"].numpy().copy()
         layer.episode_lengths = saved["lengths"].numpy().copy()

@@ -13,8 +13,8 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 
+from agents.building import make_env, make_model
 from agents.configs import preset
-from agents.train import make_env, make_model
 
 ENV = "PAM/MusclePositioning-v0"
 ROUNDS = 3
@@ -65,7 +65,7 @@ def ppo_chunk(num_envs: int = 256) -> Callable[[], int]:
         Rows of the batched environment.
     """
     config = dataclasses.replace(preset(ENV, "ppo"), num_envs=num_envs)
-    return _stepper(make_model(config, 0, make_env(config, 0)))
+    return _stepper(make_model(config, 0, make_env(config)))
 
 
 def _default_model() -> BaseAlgorithm:

@@ -1,45 +1,45 @@
-"""Training: a preset, a seed and a folder give a policy; a killed run goes on where it was.
+"""Training: settings, a seed and a folder give a policy; a killed run goes on where it was.
 
 The folder holds ``checkpoint.pt`` (everything the future depends on, see
 :mod:`agents.snapshot`), ``tensorboard/``, and at the end ``policy.onnx`` with ``policy.json``.
 
+What is shipped is the best policy of those that were evaluated (:mod:`agents.best`), or the last
+one where none was.
+
 Exactness. Checkpoints are taken at the start of a rollout, where nothing is half done. A run that
 was killed and resumed ends with the same bits, and the same ``policy.onnx``, as one that was not:
-for PPO and for SAC, with the same package versions on the same type of processor. Torch uses one
-thread; with several, sums depend on their number. What differs is the log: the steps between the
-last checkpoint and the kill are in it twice.
+for every algorithm, with memory, history and controller, with the same package versions on the
+same type of processor. Torch uses one thread; with several, sums depend on their number. What
+differs is the log: the steps between the last checkpoint and the kill are in it twice.
+
+Seeds. Training and the evaluations during it use the seeds of :mod:`agents.seeds` alone.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import json
-import random
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import torch
 from rich.console import Console
-from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
-from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
-from agents import checkpoint, configs, snapshot
+from agents import checkpoint, configs, snapshot, sources
+from agents.best import Best
+from agents.building import logs_each_rollout, make_env, make_model
+from agents.callbacks import Checkpoints, Evaluations, WarmUp
 from agents.checkpoint import CheckpointError
 from agents.configs import Config
-from agents.export import export_policy
-from agents.networks import policy_arguments
+from agents.export import export_policy, facts, plants_of
+from agents.onnx_file import finished
 from agents.progress import TrainingProgress
-from agents.sb3_vec_env import make_batch_vec_env
+from agents.record import Clock, training
 
 POLICY = "policy.onnx"
-FIRST_SEED = 1_000_000
-"""Environment seeds of training seed ``s`` start at ``FIRST_SEED * (s + 1)``, far from those that
-benchmarks and tests use, so that no scored episode is ever trained on."""
 
 
 @dataclass(frozen=True)
@@ -69,92 +69,29 @@ class Run:
         config = self.config
         words = ["python -m agents train", config.env, "--algo", config.algo]
         words += ["--steps", str(config.steps), "--seed", str(self.seed)]
-        shipped = (config.env, config.algo) in configs.presets()
-        preset = configs.preset(config.env, config.algo) if shipped else None
-        if preset is None or dataclasses.replace(preset, steps=config.steps) != config:
+        variant = self._variant()
+        if variant is None:
             words += ["--config", POLICY.replace(".onnx", ".json")]
+        elif variant:
+            words += ["--variant", variant]
         return " ".join(words)
 
-
-def default_folder(config: Config, seed: int) -> Path:
-    """Return ``runs/<environment>/<algo>-seed<seed>``."""
-    return Path("runs") / config.env.replace("/", "-") / f"{config.algo}-seed{seed}"
-
-
-def make_env(config: Config, seed: int) -> VecEnv:
-    """Return the environment of a run: batched, monitored, normalised."""
-    env: VecEnv = make_batch_vec_env(config.env, config.num_envs, **config.env_kwargs)
-    env = VecMonitor(env)
-    wanted = config.normalize
-    if wanted.observation or wanted.reward:
-        env = VecNormalize(
-            env,
-            norm_obs=wanted.observation,
-            norm_reward=wanted.reward,
-            clip_obs=wanted.clip_observation,
-            clip_reward=wanted.clip_reward,
-            gamma=getattr(config, config.algo).gamma,
-        )
-    return env
+    def _variant(self) -> str | None:
+        """Return the variant of the preset that this is, None if it is none."""
+        config = self.config
+        for env, algo, variant in configs.presets():
+            if (env, algo) == (config.env, config.algo):
+                preset = configs.preset(env, algo, variant)
+                own = {"steps": config.steps, "search": config.search}
+                if dataclasses.replace(preset, **own) == config:
+                    return variant
+        return None
 
 
-def make_model(config: Config, seed: int, env: VecEnv) -> BaseAlgorithm:
-    """Return the untrained model of a run, with all random numbers seeded."""
-    torch.set_num_threads(1)
-    random.seed(seed)
-    chosen: Any = config.ppo if config.algo == "ppo" else config.sac
-    arguments = {k: v for k, v in vars(chosen).items() if k != "learning_rate"}
-    arguments |= policy_arguments(config, *_signals(env))
-    start, end = chosen.learning_rate
-    algorithm: type[BaseAlgorithm] = PPO if config.algo == "ppo" else SAC
-    model = algorithm(
-        env=env,
-        learning_rate=lambda remaining: end + (start - end) * remaining,
-        seed=seed,
-        device="cpu",
-        **arguments,
-    )
-    env.seed(FIRST_SEED * (seed + 1))
-    return model
-
-
-def _signals(env: VecEnv) -> tuple[Any, Any]:
-    return env.get_attr("signals")[0], env.get_attr("action_signals")[0]
-
-
-class Checkpoints(BaseCallback):
-    """Writes a checkpoint at the first rollout's start after every ``interval`` steps."""
-
-    def __init__(self, run: Run, interval: int) -> None:
-        super().__init__()
-        self.run = run
-        self.interval = interval
-
-    def _on_training_start(self) -> None:
-        self.due = self._next()
-
-    def _next(self) -> int:
-        return (self.model.num_timesteps // self.interval + 1) * self.interval
-
-    def _on_rollout_start(self) -> None:
-        if self.model.num_timesteps >= self.due:
-            self.write()
-            self.due = self._next()
-
-    def _on_step(self) -> bool:
-        return True
-
-    def write(self) -> None:
-        """Write the checkpoint now; only between rollouts."""
-        env = self.model.get_env()
-        assert env is not None
-        settings = {
-            "config": self.run.config.as_dict(),
-            "seed": self.run.seed,
-            "plant": env.get_attr("plant")[0].digest(),
-        }
-        content = {"settings": json.dumps(settings), "snapshot": snapshot.take(self.model)}
-        checkpoint.save(self.run.checkpoint, content)
+def default_folder(env: str, algo: str, seed: int, variant: str = "") -> Path:
+    """Return ``runs/<environment>/<algo>[-<variant>]-seed<seed>``."""
+    kind = f"{algo}-{variant}" if variant else algo
+    return Path("runs") / env.replace("/", "-") / f"{kind}-seed{seed}"
 
 
 def start(run: Run) -> BaseAlgorithm:
@@ -164,6 +101,8 @@ def start(run: Run) -> BaseAlgorithm:
     ------
     CheckpointError
         If the folder already holds a run.
+    ValueError
+        If the policy could not be exported in the end.
     """
     if run.checkpoint.exists():
         raise CheckpointError(
@@ -171,7 +110,10 @@ def start(run: Run) -> BaseAlgorithm:
         )
     run.folder.mkdir(parents=True, exist_ok=True)
     checkpoint.sweep(run.folder)
-    return make_model(run.config, run.seed, make_env(run.config, run.seed))
+    model = make_model(run.config, run.seed, make_env(run.config))
+    if run.config.residual.controller:
+        facts(model)
+    return model
 
 
 def saved_run(folder: Path, steps: int | None = None) -> Run:
@@ -186,7 +128,7 @@ def saved_run(folder: Path, steps: int | None = None) -> Run:
 def _settings(content: dict[str, Any]) -> dict[str, Any]:
     try:
         settings: dict[str, Any] = json.loads(content["settings"])
-        return {key: settings[key] for key in ("config", "seed", "plant")}
+        return {key: settings[key] for key in ("config", "seed", "plants", "sources")}
     except (KeyError, TypeError, ValueError) as error:
         raise CheckpointError("the checkpoint does not say how it was trained") from error
 
@@ -197,16 +139,12 @@ def resume(run: Run) -> BaseAlgorithm:
     Raises
     ------
     CheckpointError
-        If there is no sound checkpoint, or the plant has changed since.
+        If there is no sound checkpoint, or plants or sources have changed since.
     """
     checkpoint.sweep(run.folder)
     content = checkpoint.load(run.checkpoint)
-    env = make_env(run.config, run.seed)
-    was, now = _settings(content)["plant"], env.get_attr("plant")[0].digest()
-    if was != now:
-        raise CheckpointError(
-            f"the run was trained on the plant {was}, which is now {now}; train anew"
-        )
+    env = make_env(run.config)
+    _check_unchanged(_settings(content), plants_of(env))
     model = make_model(run.config, run.seed, env)
     model.ep_info_buffer = None
     try:
@@ -218,24 +156,80 @@ def resume(run: Run) -> BaseAlgorithm:
     return model
 
 
+def _check_unchanged(settings: dict[str, Any], plants: list[str]) -> None:
+    """Raise if a run would go on with other plants or sources than it began with."""
+    if settings["plants"] != plants:
+        raise CheckpointError(
+            f"the run was trained on the plants {settings['plants']}, which are now {plants}; "
+            "train anew"
+        )
+    then, now = settings["sources"], sources.digests()
+    other = sorted(name for name in {*then, *now} if then.get(name) != now.get(name))
+    if other:
+        raise CheckpointError(
+            f"the sources of {', '.join(other)} have changed since the run began, so that it would "
+            "end as no other; train anew, or go back to them"
+        )
+
+
 def train(run: Run, model: BaseAlgorithm, console: Console) -> Path:
     """Train to the end of the run and write its policy; return the policy's place."""
     sinks = ["tensorboard"] if find_spec("tensorboard") else []
     model.set_logger(configure(str(run.folder / "tensorboard"), sinks))
-    checkpoints = Checkpoints(run, run.config.checkpoint_steps)
+    clock, evaluations = _so_far(run, model.num_timesteps)
+    checkpoints = Checkpoints(run.checkpoint, run.config, run.seed, clock, evaluations)
     left = run.config.steps - model.num_timesteps
     if left > 0:
         model.learn(
             left,
-            callback=[checkpoints, TrainingProgress(run.config.steps, console)],
+            callback=[
+                WarmUp(run.config),
+                evaluations,
+                checkpoints,
+                TrainingProgress(run.config.steps, console),
+            ],
             reset_num_timesteps=model.num_timesteps == 0,
-            log_interval=1 if run.config.algo == "ppo" else 100,
+            log_interval=1 if logs_each_rollout(run.config) else 100,
         )
-        checkpoints.write()
-    place = run.folder / POLICY
-    export_policy(model, place, {"seed": run.seed, **_record(run)})
-    return place
+        evaluations.last()
+        checkpoints.act()
+    card = {"seed": run.seed, "command": run.command(), "config": run.config.as_dict()}
+    if evaluations.found:
+        card["evaluation"] = evaluations.found
+        card["chosen"] = evaluations.best.chosen(len(evaluations.found))
+        evaluations.best.put_into(model)
+    beside = training(run.config, run.seed, run.command(), clock.spent(), steps=model.num_timesteps)
+    export_policy(model, run.folder / POLICY, card, {"training": beside})
+    return run.folder / POLICY
 
 
-def _record(run: Run) -> dict[str, Any]:
-    return {"command": run.command(), "config": run.config.as_dict()}
+def train_to_the_end(run: Run, console: Console) -> Path:
+    """Start a run, go on with it or, where its policy is there, leave it; return the policy.
+
+    Raises
+    ------
+    CheckpointError
+        If the folder holds a run with other settings.
+    """
+    if not run.checkpoint.exists():
+        return train(run, start(run), console)
+    if saved_run(run.folder) != run:
+        raise CheckpointError(
+            f"{run.folder} holds a training with other settings; give another --out"
+        )
+    done = run.folder / POLICY
+    return done if finished(done) else train(run, resume(run), console)
+
+
+def _so_far(run: Run, steps: int) -> tuple[Clock, Evaluations]:
+    """Return the time spent and the evaluations made until the checkpoint."""
+    if not steps:
+        return Clock(), Evaluations(run.config, [], Best())
+    content = checkpoint.load(run.checkpoint)
+    try:
+        spent, best = content["spent"], Best(**content["best"])
+        best.moments = {name: moment.numpy() for name, moment in best.moments.items()}
+        evaluations = Evaluations(run.config, list(content["evaluations"]), best)
+        return Clock(spent["wall"], spent["cpu"]), evaluations
+    except (KeyError, TypeError, AttributeError) as error:
+        raise CheckpointError(f"{run.checkpoint.name} lacks what was evaluated: {error}") from error

@@ -4,21 +4,30 @@ What a controller *knows* is part of its result. A controller is built from a no
 named signals, never from an environment. Where the label says "nominal model", whoever runs the
 controller decides what that model is: where it is the simulated plant itself, unrandomised, the
 controller knows the true model, and a table of results should say so.
+
+Most numbers of a controller follow from a rule or a paper. What they leave open are its *knobs*
+(:mod:`baselines.knobs`); names with ``_tuned`` are controllers whose knobs were searched for on
+tuning seeds, with the budget that learned controllers have (:mod:`baselines.tuned`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
+from baselines import tuned
 from baselines.contraction_tables import LOADS
 from baselines.controller import Controller, reader
 from baselines.elbow_catalogue import ELBOW_CONTROLLERS, ELBOW_MAKERS
 from baselines.entry import POSITIONING, Entry
+from baselines.inverse import KNOBS as INVERSE_KNOBS
 from baselines.inverse import make_inverse
+from baselines.inverse_pid import KNOBS as INVERSE_PID_KNOBS
 from baselines.inverse_pid import make_inverse_pid
 from baselines.joint_catalogue import ARM, JOINT_CONTROLLERS, JOINT_MAKERS
 from baselines.knee_catalogue import KNEE, KNEE_CONTROLLERS, KNEE_MAKERS, SIMC
+from baselines.knobs import AS_DESIGNED, Knobs, check_knobs
+from baselines.pid import KNOBS as PID_KNOBS
 from baselines.pid import make_pid
 from baselines.plc_polynomial import make_one_cubic, make_plc_as_printed, make_plc_refitted
 from baselines.table_inverse import make_table_inverse
@@ -39,7 +48,7 @@ KREJCI = (
     "Theory Appl. 148 (2001); I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer 1991"
 )
 
-CONTROLLERS: dict[str, Entry] = {
+PUBLISHED: dict[str, Entry] = {
     "zero": Entry("no pressure, ever", "nothing", envs=(*POSITIONING, *KNEE)),
     "random": Entry(
         "set-points drawn evenly from the whole range, seeded",
@@ -68,7 +77,11 @@ CONTROLLERS: dict[str, Entry] = {
         citation=SEED_003,
     ),
     "pid": Entry(
-        "PID on the present error, SIMC tuning", "nominal model", feedback=True, citation=SIMC
+        "PID on the present error, SIMC tuning",
+        "nominal model",
+        feedback=True,
+        citation=SIMC,
+        knobs=PID_KNOBS,
     ),
     "inverse_no_preview": Entry(
         "exact inverse of memory, static law and regulator at the present reference",
@@ -80,6 +93,7 @@ CONTROLLERS: dict[str, Entry] = {
         "nominal model",
         preview=True,
         citation=KREJCI,
+        knobs=INVERSE_KNOBS,
     ),
     "inverse_pid_no_preview": Entry(
         "inverse_no_preview, and a PID on the deviation from the nominal muscle",
@@ -93,11 +107,15 @@ CONTROLLERS: dict[str, Entry] = {
         preview=True,
         feedback=True,
         citation=f"{KREJCI}; {SIMC}",
+        knobs=INVERSE_PID_KNOBS,
     ),
     **KNEE_CONTROLLERS,
     **ELBOW_CONTROLLERS,
     **JOINT_CONTROLLERS,
 }
+"""By rule or as published."""
+TUNED = tuned.read()
+CONTROLLERS: dict[str, Entry] = {**PUBLISHED, **tuned.entries(PUBLISHED, TUNED)}
 
 
 def make_linear(signals: Signals, action_signals: Signals) -> Line:
@@ -118,6 +136,7 @@ def make_controller(
     signals: Signals,
     action_signals: Signals,
     seed: int = 0,
+    knobs: Knobs = AS_DESIGNED,
 ) -> Controller:
     """Return a controller by name.
 
@@ -132,22 +151,45 @@ def make_controller(
         Those of the environment.
     seed : int
         For controllers that draw.
+    knobs : mapping of float
+        Of those that the entry names; 1 where left out.
 
     Raises
     ------
     ValueError
-        If there is no controller of that name.
+        If there is no controller of that name, or it has no such knob with that value.
     """
+    if name in TUNED:
+        found = TUNED[name]
+        told = (plant, signals, action_signals)
+        return make_controller(found.controller, *told, seed, found.knobs)
+    if name not in PUBLISHED:
+        raise ValueError(f"no controller named {name!r}; there are: {', '.join(CONTROLLERS)}")
+    check_knobs(name, PUBLISHED[name].knobs, knobs)
+    return _published(name, plant, signals, action_signals, seed, {"knobs": knobs} if knobs else {})
+
+
+def _published(
+    name: str,
+    plant: Plant,
+    signals: Signals,
+    action_signals: Signals,
+    seed: int,
+    knobs: Mapping[str, Any],
+) -> Controller:
+    """Return a controller as published, but for its ``knobs`` where there are some."""
     told = (signals, action_signals)
     if name in KNEE_MAKERS:
-        made: Controller = KNEE_MAKERS[name](_as(KneeOrthosis, plant, name), *told)
+        made: Controller = KNEE_MAKERS[name](_as(KneeOrthosis, plant, name), *told, **knobs)
         return made
     if name in ELBOW_MAKERS:
         seeded = {"seed": seed} if name == "elbow_random" else {}
-        bending: Controller = ELBOW_MAKERS[name](_as(ElbowOrthosis, plant, name), *told, **seeded)
+        bending: Controller = ELBOW_MAKERS[name](
+            _as(ElbowOrthosis, plant, name), *told, **seeded, **knobs
+        )
         return bending
     if name in JOINT_MAKERS:
-        following: Controller = JOINT_MAKERS[name](_joint(plant, name), *told)
+        following: Controller = JOINT_MAKERS[name](_joint(plant, name), *told, **knobs)
         return following
 
     def muscle() -> SingleMuscle:
@@ -161,14 +203,12 @@ def make_controller(
         "plc_as_printed": lambda: make_plc_as_printed(*told),
         "plc_refitted": lambda: make_plc_refitted(*told),
         "table": lambda: make_table_inverse(*told),
-        "pid": lambda: make_pid(muscle(), *told),
+        "pid": lambda: make_pid(muscle(), *told, **knobs),
         "inverse_no_preview": lambda: make_inverse(muscle(), *told, preview=False),
-        "inverse": lambda: make_inverse(muscle(), *told),
+        "inverse": lambda: make_inverse(muscle(), *told, **knobs),
         "inverse_pid_no_preview": lambda: make_inverse_pid(muscle(), *told, preview=False),
-        "inverse_pid": lambda: make_inverse_pid(muscle(), *told),
+        "inverse_pid": lambda: make_inverse_pid(muscle(), *told, **knobs),
     }
-    if name not in makers:
-        raise ValueError(f"no controller named {name!r}; there are: {', '.join(CONTROLLERS)}")
     built: Controller = makers[name]()
     return built
 

@@ -23,6 +23,7 @@ from baselines.controller import Answer, beginning, choose
 from baselines.elbow_friction import ElbowFriction, make_elbow_friction
 from baselines.elbow_valves import PressureLoop, make_pressure_loop
 from baselines.elbow_view import ElbowSignalMap, make_elbow_signal_map
+from baselines.knobs import AS_DESIGNED, Knobs
 from baselines.nominal import MemoryState
 from baselines.torque_stiffness import Allocation
 from pam_envs.parameters import Signals
@@ -84,6 +85,7 @@ def make_elbow_allocation(
     action_signals: Signals,
     memory: bool = False,
     early: bool = False,
+    knobs: Knobs = AS_DESIGNED,
 ) -> ElbowAllocation:
     """Return the controller for a nominal plant.
 
@@ -95,11 +97,13 @@ def make_elbow_allocation(
         Whether the nominal memory is undone.
     early : bool
         See :class:`ElbowAllocation`.
+    knobs : mapping
+        Of :data:`baselines.elbow_valves.EARLY_KNOBS`.
     """
     return ElbowAllocation(
         Allocation(plant),
         make_elbow_signal_map(signals, action_signals, plant.control_period),
-        make_pressure_loop(plant),
+        make_pressure_loop(plant, knobs),
         make_elbow_friction(plant, known=memory),
         early,
     )

@@ -6,10 +6,14 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from baselines.elbow_allocation import make_elbow_allocation
+from baselines.elbow_pid import KNOBS as PID_KNOBS
 from baselines.elbow_pid import make_elbow_pid
 from baselines.elbow_trivial import make_elbow_random, make_held, make_limp
+from baselines.elbow_valves import EARLY_KNOBS, KNOBS
 from baselines.entry import Entry
 from baselines.knee_catalogue import SIMC
+from pam_envs.parameters import Signals
+from pam_envs.plants.elbow_orthosis import ElbowOrthosis
 
 ELBOW = ("PAM/ElbowOrthosis-v0",)
 SEED_001 = (
@@ -31,6 +35,7 @@ ELBOW_CONTROLLERS: dict[str, Entry] = {
         feedback=True,
         citation=SIMC,
         envs=ELBOW,
+        knobs=PID_KNOBS,
     ),
     "elbow_pid_memory": Entry(
         "elbow_pid, with the bundles' friction in its estimate of the torque",
@@ -38,6 +43,7 @@ ELBOW_CONTROLLERS: dict[str, Entry] = {
         feedback=True,
         citation=SIMC,
         envs=ELBOW,
+        knobs=PID_KNOBS,
     ),
     "elbow_allocation": Entry(
         "exact allocation of torque and stiffness, loops around both pressures",
@@ -45,6 +51,7 @@ ELBOW_CONTROLLERS: dict[str, Entry] = {
         feedback=True,
         citation=SEED_001,
         envs=ELBOW,
+        knobs=KNOBS,
     ),
     "elbow_allocation_memory": Entry(
         "elbow_allocation, with the bundles' friction undone",
@@ -52,6 +59,7 @@ ELBOW_CONTROLLERS: dict[str, Entry] = {
         feedback=True,
         citation=SEED_001,
         envs=ELBOW,
+        knobs=KNOBS,
     ),
     "elbow_allocation_early": Entry(
         "elbow_allocation_memory within the pressures of the valves' next step: torque first",
@@ -59,25 +67,35 @@ ELBOW_CONTROLLERS: dict[str, Entry] = {
         feedback=True,
         citation=SEED_001,
         envs=ELBOW,
+        knobs=EARLY_KNOBS,
     ),
 }
 
 Maker = Callable[..., Any]
+
+
+def _pid(**how: Any) -> Maker:
+    def make(plant: ElbowOrthosis, signals: Signals, actions: Signals, **knobs: Any) -> Any:
+        return make_elbow_pid(plant, signals, actions, **how, **knobs)
+
+    return make
+
+
+def _allocation(**how: Any) -> Maker:
+    def make(plant: ElbowOrthosis, signals: Signals, actions: Signals, **knobs: Any) -> Any:
+        return make_elbow_allocation(plant, signals, actions, **how, **knobs)
+
+    return make
+
 
 ELBOW_MAKERS: Mapping[str, Maker] = {
     "elbow_limp": make_limp,
     "elbow_random": make_elbow_random,
     "elbow_hold": make_held,
     "elbow_pid": make_elbow_pid,
-    "elbow_pid_memory": lambda plant, signals, actions: make_elbow_pid(
-        plant, signals, actions, memory=True
-    ),
+    "elbow_pid_memory": _pid(memory=True),
     "elbow_allocation": make_elbow_allocation,
-    "elbow_allocation_memory": lambda plant, signals, actions: make_elbow_allocation(
-        plant, signals, actions, memory=True
-    ),
-    "elbow_allocation_early": lambda plant, signals, actions: make_elbow_allocation(
-        plant, signals, actions, memory=True, early=True
-    ),
+    "elbow_allocation_memory": _allocation(memory=True),
+    "elbow_allocation_early": _allocation(memory=True, early=True),
 }
-"""From nominal plant, signals and action signals to the controller."""
+"""From nominal plant, signals, action signals and perhaps ``knobs`` to the controller."""

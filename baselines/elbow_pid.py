@@ -23,16 +23,20 @@ from baselines.controller import Answer, beginning, choose
 from baselines.elbow_friction import ElbowFriction, make_elbow_friction
 from baselines.elbow_valves import PressureLoop, make_pressure_loop
 from baselines.elbow_view import ElbowSignalMap, make_elbow_signal_map
+from baselines.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.nominal import MemoryState
 from baselines.pid import Gains, PidState, pid_start, pid_step
+from baselines.simc import PI_KNOBS, simc_rule
 from pam_envs.parameters import Signals
 from pam_envs.plants.elbow_orthosis import ElbowOrthosis
 
 SHARE = 0.2
 """Pressure that both bundles start from, over the largest."""
+KNOBS: Bounds = {**PI_KNOBS, "start": (0.5, 2.0)}
+"""Those of the rule, and on the pressure that both start from."""
 
 
-def simc_torque(plant: ElbowOrthosis) -> Gains:
+def simc_torque(plant: ElbowOrthosis, knobs: Knobs = AS_DESIGNED) -> Gains:
     """Return the gains [Pa/(N m)] of the SIMC rule; see this module's page."""
     angles, full = np.linspace(*plant.angle_range, 25), plant.full_pressure
     swing = plant.torque(angles, 0.0, full) - plant.torque(angles, full, 0.0)
@@ -41,8 +45,7 @@ def simc_torque(plant: ElbowOrthosis) -> Gains:
     step = plant.cycle if pulsed else plant.control_period
     tau = step if pulsed else plant.regulator.time_constant
     theta = 0.5 * step + plant.control_period
-    gain = tau / (steepest * 2.0 * theta)
-    reset = min(tau, 8.0 * theta)
+    gain, reset, _ = simc_rule(steepest, tau, 0.0, theta, knobs=knobs)
     return Gains(
         proportional=gain,
         integral=gain / reset,
@@ -114,6 +117,7 @@ def make_elbow_pid(
     action_signals: Signals,
     gains: Gains | None = None,
     memory: bool = False,
+    knobs: Knobs = AS_DESIGNED,
 ) -> ElbowPid:
     """Return the controller for a nominal plant.
 
@@ -125,13 +129,15 @@ def make_elbow_pid(
         Default: those of :func:`simc_torque`.
     memory : bool
         Whether the nominal memory's friction is added to the estimate of the torque.
+    knobs : mapping
+        Of ``KNOBS``.
     """
     full = plant.full_pressure
     return ElbowPid(
-        simc_torque(plant) if gains is None else gains,
+        simc_torque(plant, knobs) if gains is None else gains,
         make_elbow_signal_map(signals, action_signals, plant.control_period),
         make_pressure_loop(plant) if plant.valves == "on_off" else None,
-        SHARE * full,
+        knob(knobs, "start") * SHARE * full,
         full,
         plant.control_period,
         make_elbow_friction(plant, known=memory),

@@ -25,6 +25,7 @@ import numpy as np
 
 from baselines.controller import Array
 from baselines.elbow_view import ElbowView
+from baselines.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from pam_envs.plants.elbow_orthosis import ElbowOrthosis
 from pam_envs.pneumatics.on_off_pair import ATMOSPHERE, GAS, mass_flow
 
@@ -32,6 +33,10 @@ QUICK = 2.0
 """Control periods that the loop around a regulator takes; fewer would act on sensor noise."""
 TOLD = 1e3
 """Difference of pressures [Pa] that sensors hardly tell: some three times a gauge's noise."""
+KNOBS: Bounds = {"pressure_loop": (0.5, 3.0)}
+"""On what a wanted pressure is beyond the sensed one."""
+EARLY_KNOBS: Bounds = {**KNOBS, "step": (0.5, 4.0)}
+"""Also on how far the pressures are taken to come in the next step."""
 
 
 class PressureLoop(Protocol):
@@ -151,6 +156,45 @@ class PulseLoop:
         return width if short > 0.0 else -width
 
 
-def make_pressure_loop(plant: ElbowOrthosis) -> PressureLoop:
-    """Return the inner loop for the valves of a nominal plant."""
-    return PulseLoop(plant) if plant.valves == "on_off" else RegulatorLoop(plant)
+@dataclass(frozen=True)
+class PacedLoop:
+    """An inner loop that is told to go further, or less far, than the wanted pressures.
+
+    Attributes
+    ----------
+    loop : PressureLoop
+    pace : float
+        What it is told beyond the sensed pressure, over what the wanted one is beyond it.
+    step : float
+        How far the pressures are taken to come in the next step, over what ``loop`` says.
+    full : float
+        Largest pressure [Pa].
+    """
+
+    loop: PressureLoop
+    pace: float
+    step: float
+    full: float
+
+    def commands(self, view: ElbowView, wanted: Array) -> Array:
+        """Return the commands; see :class:`PressureLoop`."""
+        return self.loop.commands(view, self._beyond(view, wanted, self.pace))
+
+    def reach(self, view: ElbowView) -> tuple[Array, Array]:
+        """Return the limits of the next step; see :class:`PressureLoop`."""
+        low, high = self.loop.reach(view)
+        return self._beyond(view, low, self.step), self._beyond(view, high, self.step)
+
+    def _beyond(self, view: ElbowView, pressure: Array, factor: float) -> Array:
+        sensed = view.pressure
+        return np.clip(sensed + factor * (pressure - sensed), 0.0, self.full)
+
+
+def make_pressure_loop(plant: ElbowOrthosis, knobs: Knobs = AS_DESIGNED) -> PressureLoop:
+    """Return the inner loop for the valves of a nominal plant.
+
+    Its ``knobs`` are those of ``EARLY_KNOBS``.
+    """
+    loop = PulseLoop(plant) if plant.valves == "on_off" else RegulatorLoop(plant)
+    pace, step = knob(knobs, "pressure_loop"), knob(knobs, "step")
+    return loop if pace == step == 1.0 else PacedLoop(loop, pace, step, plant.full_pressure)

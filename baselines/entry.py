@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
+
+from baselines.knobs import Bounds
 
 Knowledge = Literal["nothing", "tables", "nominal model", "true model"]
 
@@ -31,6 +33,12 @@ class Entry:
         Environment ids that it is for.
     kind : str
         "classical": a row of results is verified by running it again.
+    tuning : str
+        How its numbers were chosen.
+    trials : int
+        How many settings were tried in simulation to choose them.
+    knobs : mapping
+        What a search may turn, with lowest and highest factor; see :mod:`baselines.knobs`.
     """
 
     summary: str
@@ -40,3 +48,6 @@ class Entry:
     citation: str = ""
     envs: tuple[str, ...] = POSITIONING
     kind: str = "classical"
+    tuning: str = "by rule or as published"
+    trials: int = 0
+    knobs: Bounds = field(default_factory=dict, hash=False)

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.controller import Answer, Array, Reader, answer, beginning, choose, reader
+from baselines.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.nominal import MemoryState, Nominal
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.single_muscle import SingleMuscle
@@ -36,6 +37,7 @@ HORIZON = 0.02
 EARLY = 1.6
 """Travel time over time left at which a step is begun. 2 would centre the transit on the step if
 it lay at the sample that first shows it; it lies up to a preview spacing before."""
+KNOBS: Bounds = {"horizon": (0.5, 4.0), "lead": (0.5, 2.0), "early": (0.5, 2.0)}
 
 
 class InverseState(NamedTuple):
@@ -190,14 +192,14 @@ def _placed(whole: Any, part: MemoryState, rows: Any, n: int) -> MemoryState:
     return tuple(whole)
 
 
-def aims_of(samples: int, spacing: float, lead: float) -> tuple[Array, Array]:
+def aims_of(samples: int, spacing: float, lead: float, early: float = EARLY) -> tuple[Array, Array]:
     """Return the aims of :class:`Inverse` and when they are due, for a preview."""
     aims, due = [preview_weights(samples, spacing, lead)], [0.0]
     for i in range(1, samples + 1):
         left = i * spacing - lead
         if left > 0.0:
             aims.append(np.eye(samples + 1)[i])
-            due.append(EARLY * left)
+            due.append(early * left)
     return np.array(aims), np.array(due)
 
 
@@ -207,6 +209,7 @@ def make_inverse(
     action_signals: Signals,
     preview: bool = True,
     horizon: float = HORIZON,
+    knobs: Knobs = AS_DESIGNED,
 ) -> Inverse:
     """Return the controller for a nominal plant.
 
@@ -219,14 +222,18 @@ def make_inverse(
         Whether to look ahead; without, the present reference is the aim.
     horizon : float
         See :class:`Inverse`.
+    knobs : mapping
+        Of ``KNOBS``: factors on the horizon, on the lead that goes with it, and on ``EARLY``.
     """
     nominal = Nominal(plant)
     samples = preview_count(signals) if preview else 0
-    lead = plant.regulator.dead_time + horizon + nominal.mechanical_lag
+    horizon = knob(knobs, "horizon") * horizon
+    delay = plant.regulator.dead_time + horizon + nominal.mechanical_lag
+    lead, early = knob(knobs, "lead") * delay, knob(knobs, "early") * EARLY
     names = ["contraction", "set_point", "load", "reference"]
     names += [f"reference_{i + 1}" for i in range(samples)]
     spacing = signals["reference_1"].ahead if samples else 0.0
-    aims, due = aims_of(samples, spacing, lead)
+    aims, due = aims_of(samples, spacing, lead, early)
     return Inverse(
         nominal,
         reader(signals, names),

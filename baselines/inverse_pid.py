@@ -20,9 +20,14 @@ from numpy.typing import ArrayLike
 
 from baselines.controller import Answer, Array, answer, beginning, choose
 from baselines.inverse import HORIZON, Inverse, InverseState, make_inverse
+from baselines.inverse import KNOBS as INVERSE_KNOBS
+from baselines.knobs import AS_DESIGNED, Bounds, Knobs
 from baselines.pid import Gains, PidState, pid_start, pid_step, simc
+from baselines.simc import PID_KNOBS
 from pam_envs.parameters import Signals
 from pam_envs.plants.single_muscle import SingleMuscle
+
+KNOBS: Bounds = {**INVERSE_KNOBS, "closed_loop_time": PID_KNOBS["closed_loop_time"]}
 
 
 class InversePidState(NamedTuple):
@@ -121,7 +126,8 @@ def make_inverse_pid(
     preview: bool = True,
     horizon: float = HORIZON,
     gains: Gains | None = None,
+    knobs: Knobs = AS_DESIGNED,
 ) -> InversePid:
     """Return the controller; the parameters are those of ``make_inverse`` and ``make_pid``."""
-    inverse = make_inverse(plant, signals, action_signals, preview, horizon)
-    return InversePid(inverse, simc(plant) if gains is None else gains)
+    inverse = make_inverse(plant, signals, action_signals, preview, horizon, knobs)
+    return InversePid(inverse, simc(plant, knobs=knobs) if gains is None else gains)

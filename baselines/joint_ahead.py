@@ -24,9 +24,12 @@ from numpy.typing import NDArray
 
 from baselines.controller import Array
 from baselines.joint_view import JointSignalMap
+from baselines.knobs import AS_DESIGNED, Bounds, Knobs, knob
 
 MOST = 2.0
 """How far the previewed stretch is prolonged at most, in its own length."""
+KNOBS: Bounds = {"lead": (0.25, 4.0)}
+"""On the delays that are made up for."""
 
 
 def double_lags(poles: Sequence[float]) -> list[float]:
@@ -70,7 +73,10 @@ def ahead_by(leads: Sequence[float], times: Sequence[float]) -> Lookahead:
 
 
 def lookahead_for(
-    signals: JointSignalMap, delays: Sequence[float] | None, period: float
+    signals: JointSignalMap,
+    delays: Sequence[float] | None,
+    period: float,
+    knobs: Knobs = AS_DESIGNED,
 ) -> Lookahead:
     """Return what makes up for the delays of joints [s] and for the hold, or reads the present.
 
@@ -81,10 +87,12 @@ def lookahead_for(
         Without that of the hold; None for the present.
     period : float
         Control period [s].
+    knobs : mapping
+        Of ``KNOBS``.
     """
     if delays is None:
         return present(len(signals.times))
-    return ahead_by([delay + 0.5 * period for delay in delays], signals.times)
+    return ahead_by([knob(knobs, "lead") * delay + 0.5 * period for delay in delays], signals.times)
 
 
 def _weights(lead: float, times: Array) -> Array:

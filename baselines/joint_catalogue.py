@@ -6,12 +6,16 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from baselines.entry import Entry
+from baselines.joint_ahead import KNOBS as AHEAD_KNOBS
 from baselines.joint_feedback import make_joint_feedback
 from baselines.joint_inverse import make_joint_inverse
 from baselines.joint_trivial import make_joint_random, make_straight
 from baselines.knee_catalogue import SIMC
+from baselines.knobs import Bounds
+from baselines.model_following import KNOBS as FOLLOWING_KNOBS
 from baselines.model_following import make_model_following
 from baselines.redundancy import make_inverse_kinematics
+from baselines.simc import PID_KNOBS
 from pam_envs.parameters import Signals
 
 ARM = ("PAM/RedundantManipulator-v0",)
@@ -28,8 +32,23 @@ DK = "A. K. Packard, J. C. Doyle, The complex structured singular value, Automat
 MODEL = "nominal model"
 
 
-def _entry(summary: str, citation: str, feedback: bool = True, ahead: bool = False) -> Entry:
-    return Entry(summary, MODEL, ahead, feedback, citation, JOINT)
+def _entry(
+    summary: str,
+    citation: str,
+    feedback: bool = True,
+    ahead: bool = False,
+    knobs: Bounds | None = None,
+) -> Entry:
+    own = {**(knobs or {}), **(AHEAD_KNOBS if ahead else {})}
+    return Entry(summary, MODEL, ahead, feedback, citation, JOINT, knobs=own)
+
+
+def _pid(summary: str, ahead: bool = False) -> Entry:
+    return _entry(summary, SIMC, ahead=ahead, knobs=PID_KNOBS)
+
+
+def _mfc(summary: str, ahead: bool = False) -> Entry:
+    return _entry(summary, MFC, ahead=ahead, knobs=FOLLOWING_KNOBS)
 
 
 MFC = f"{SEED_002}; {FOLLOWING}; {DK}"
@@ -58,40 +77,47 @@ JOINT_CONTROLLERS: dict[str, Entry] = {
     "joint_pi": _entry("PI that cancels a pole, damping 0.71, as in the paper", SEED_002),
     "joint_pi_slow": _entry("PI that cancels a pole, crossover 4 rad/s", SEED_002),
     "joint_pi_ahead": _entry(f"joint_pi{AHEAD}", SEED_002, ahead=True),
-    "joint_pid": _entry(
-        "PID, SIMC tuning with tau_c = theta; in an arm at most twice as fast as the joint", SIMC
+    "joint_pid": _pid(
+        "PID, SIMC tuning with tau_c = theta; in an arm at most twice as fast as the joint"
     ),
-    "joint_pid_smooth": _entry("PID, SIMC tuning, closed loop as fast as the plant", SIMC),
-    "joint_pid_gravity": _entry("joint_pid, and a feed-forward that carries gravity", SIMC),
-    "joint_pid_ahead": _entry(f"joint_pid{AHEAD}", SIMC, ahead=True),
-    "joint_pid_smooth_ahead": _entry(f"joint_pid_smooth{AHEAD}", SIMC, ahead=True),
-    "joint_mfc_hinf": _entry(
-        "model-following control with inverse and H-infinity disturbance loop", MFC
+    "joint_pid_smooth": _pid("PID, SIMC tuning, closed loop as fast as the plant"),
+    "joint_pid_gravity": _pid("joint_pid, and a feed-forward that carries gravity"),
+    "joint_pid_ahead": _pid(f"joint_pid{AHEAD}", ahead=True),
+    "joint_pid_smooth_ahead": _pid(f"joint_pid_smooth{AHEAD}", ahead=True),
+    "joint_mfc_hinf": _mfc("model-following control with inverse and H-infinity disturbance loop"),
+    "joint_mfc_mu": _mfc(
+        "model-following control with inverse and mu-synthesised disturbance loop: the paper's"
     ),
-    "joint_mfc_mu": _entry(
-        "model-following control with inverse and mu-synthesised disturbance loop: the paper's", MFC
-    ),
-    "joint_mfc_mu_plain": _entry("joint_mfc_mu without the inverse", MFC),
-    "joint_mfc_mu_wrong": _entry("joint_mfc_mu with an inverse 30 % too narrow", MFC),
-    "joint_mfc_mu_gravity": _entry("joint_mfc_mu, and a feed-forward that carries gravity", MFC),
-    "joint_mfc_mu_ahead": _entry(f"joint_mfc_mu{AHEAD}", MFC, ahead=True),
+    "joint_mfc_mu_plain": _mfc("joint_mfc_mu without the inverse"),
+    "joint_mfc_mu_wrong": _mfc("joint_mfc_mu with an inverse 30 % too narrow"),
+    "joint_mfc_mu_gravity": _mfc("joint_mfc_mu, and a feed-forward that carries gravity"),
+    "joint_mfc_mu_ahead": _mfc(f"joint_mfc_mu{AHEAD}", ahead=True),
 }
 
-Maker = Callable[[Any, Signals, Signals], Any]
+Maker = Callable[..., Any]
 WRONG = 0.7
 """Width of the wrong inverse's loops over the right one's."""
 
 
 def _feedback(**how: Any) -> Maker:
-    return lambda plant, signals, actions: make_joint_feedback(plant, signals, actions, **how)
+    def make(plant: Any, signals: Signals, actions: Signals, **knobs: Any) -> Any:
+        return make_joint_feedback(plant, signals, actions, **how, **knobs)
+
+    return make
 
 
 def _inverse(**how: Any) -> Maker:
-    return lambda plant, signals, actions: make_joint_inverse(plant, signals, actions, **how)
+    def make(plant: Any, signals: Signals, actions: Signals, **knobs: Any) -> Any:
+        return make_joint_inverse(plant, signals, actions, **how, **knobs)
+
+    return make
 
 
 def _following(**how: Any) -> Maker:
-    return lambda plant, signals, actions: make_model_following(plant, signals, actions, **how)
+    def make(plant: Any, signals: Signals, actions: Signals, **knobs: Any) -> Any:
+        return make_model_following(plant, signals, actions, **how, **knobs)
+
+    return make
 
 
 AHEAD_TOO: Mapping[str, Any] = {"gravity": True, "ahead": True}
@@ -118,4 +144,4 @@ JOINT_MAKERS: Mapping[str, Maker] = {
     "joint_mfc_mu_gravity": _following(gravity=True),
     "joint_mfc_mu_ahead": _following(**AHEAD_TOO),
 }
-"""From nominal plant, signals and action signals to the controller."""
+"""From nominal plant, signals, action signals and perhaps ``knobs`` to the controller."""

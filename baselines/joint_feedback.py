@@ -44,6 +44,7 @@ from baselines.joint_loop import (
 from baselines.joint_model import POLE, JointModel, joint_model
 from baselines.joint_poles import joint_poles
 from baselines.joint_view import JointSignalMap, make_joint_signal_map
+from baselines.knobs import AS_DESIGNED, Knobs
 from baselines.linear import LinearSystem
 from baselines.simc import WAIT, Simc, simc_rule
 from pam_envs.parameters import Signals
@@ -61,7 +62,12 @@ def closed_loop_time(pole: float, dead_time: float, in_arm: bool, smooth: bool =
 
 
 def simc_joint(
-    gain: float, pole: float, period: float, in_arm: bool = False, smooth: bool = False
+    gain: float,
+    pole: float,
+    period: float,
+    in_arm: bool = False,
+    smooth: bool = False,
+    knobs: Knobs = AS_DESIGNED,
 ) -> Simc:
     """Return the parameters of the rule for a joint; see this module's page.
 
@@ -77,10 +83,12 @@ def simc_joint(
         Whether the joint is one of several.
     smooth : bool
         Whether the loop is to be as fast as the plant and not faster.
+    knobs : mapping
+        Of :data:`baselines.simc.PID_KNOBS`.
     """
     lag, wait = 1.0 / pole, WAIT * period
     pace = closed_loop_time(pole, wait, in_arm, smooth)
-    return simc_rule(gain, lag, lag, wait, pace)
+    return simc_rule(gain, lag, lag, wait, pace, knobs)
 
 
 def pid_system(law: Simc) -> LinearSystem:
@@ -173,6 +181,7 @@ def make_joint_feedback(
     kind: Kind = "pi",
     gravity: bool = False,
     ahead: bool = False,
+    knobs: Knobs = AS_DESIGNED,
 ) -> JointFeedback:
     """Return the controller.
 
@@ -186,12 +195,15 @@ def make_joint_feedback(
         Whether the set-points carry the weight of the links and the payload that is told.
     ahead : bool
         Whether the loop is given the reference ahead of time, by its own delay.
+    knobs : mapping
+        Of :data:`baselines.simc.PID_KNOBS`, which a PI has not, and of
+        :data:`baselines.joint_ahead.KNOBS`.
     """
     model = joint_model(plant, poles=joint_poles(plant)).narrowed(0.0)
     made = make_joint_signal_map(signals, action_signals)
-    loops = _loops(model, kind, in_arm=plant.stages > 1)
+    loops = _loops(model, kind, plant.stages > 1, knobs)
     carried = Gravity(plant if gravity else None)
-    lookahead = lookahead_for(made, loops.delays if ahead else None, model.period)
+    lookahead = lookahead_for(made, loops.delays if ahead else None, model.period, knobs)
     return JointFeedback(model, loops.loop, made, carried, lookahead, loops.prefilter)
 
 
@@ -212,14 +224,14 @@ class Loops(NamedTuple):
     prefilter: Bank | None = None
 
 
-def _loops(model: JointModel, kind: Kind, in_arm: bool) -> Loops:
+def _loops(model: JointModel, kind: Kind, in_arm: bool, knobs: Knobs) -> Loops:
     if kind == "pi":
         return Loops(_pi(model, pole_cancelling), double_lags(model.poles))
     if kind == "pi_slow":
         return Loops(_pi(model, slow_gains), [POLE / (SLOW * pole) for pole in model.poles])
 
     def rule(pole: float) -> Simc:
-        return simc_joint(model.gain, pole, model.period, in_arm, kind == "pid_smooth")
+        return simc_joint(model.gain, pole, model.period, in_arm, kind == "pid_smooth", knobs)
 
     laws = [rule(pole) for pole in model.poles]
     filters = [reference_filter(law).discrete(model.period) for law in laws]

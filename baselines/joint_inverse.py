@@ -22,6 +22,7 @@ from baselines.joint_memory_rows import JointMemories
 from baselines.joint_model import JointModel, joint_model
 from baselines.joint_poles import joint_delays
 from baselines.joint_view import JointSignalMap, make_joint_signal_map
+from baselines.knobs import AS_DESIGNED, Knobs
 from baselines.nominal import MemoryState
 from pam_envs.parameters import Signals
 
@@ -70,6 +71,7 @@ def make_joint_inverse(
     inverse: float = 1.0,
     gravity: bool = False,
     ahead: bool = False,
+    knobs: Knobs = AS_DESIGNED,
 ) -> JointInverse:
     """Return the controller.
 
@@ -85,8 +87,10 @@ def make_joint_inverse(
         Whether the set-points carry the weight of the links and the payload that is told.
     ahead : bool
         Whether the previewed reference is inverted, ahead by the delay of each joint.
+    knobs : mapping
+        Of :data:`baselines.joint_ahead.KNOBS`.
     """
     model = joint_model(plant).narrowed(inverse)
     made = make_joint_signal_map(signals, action_signals)
-    lookahead = lookahead_for(made, joint_delays(plant) if ahead else None, model.period)
+    lookahead = lookahead_for(made, joint_delays(plant) if ahead else None, model.period, knobs)
     return JointInverse(model, made, Gravity(plant if gravity else None), lookahead)

@@ -23,7 +23,7 @@ from scipy.linalg import expm
 
 from baselines.controller import Array
 from baselines.joint_bank import Bank
-from baselines.joint_loop import PiGains, pole_cancelling
+from baselines.joint_loop import DAMPING, PiGains, pole_cancelling
 from baselines.joint_model import JointModel, nominal_motion
 from baselines.linear import DiscreteSystem, LinearSystem
 
@@ -52,9 +52,12 @@ class ModelLoop:
         return self.bank.advance(reference, state)
 
 
-def make_model_loop(model: JointModel) -> ModelLoop:
+def make_model_loop(model: JointModel, damping: float = DAMPING) -> ModelLoop:
     """Return the loops of PI and model for each joint."""
-    closed = [closed_loop(nominal_motion(pole), pole_cancelling(pole=pole)) for pole in model.poles]
+    closed = [
+        closed_loop(nominal_motion(pole), pole_cancelling(pole=pole, damping=damping))
+        for pole in model.poles
+    ]
     return ModelLoop(Bank.of([averaged_hold(system, model.period) for system in closed]))
 
 

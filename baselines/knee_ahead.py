@@ -11,7 +11,10 @@ from baselines.controller import Array, Reader, reader
 from baselines.inverse import preview_count, preview_weights
 from baselines.knee_nominal import KneeNominal
 from baselines.knee_view import Eyes, View
+from baselines.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from pam_envs.parameters import Signals
+
+KNOBS: Bounds = {"lead": (0.25, 4.0)}
 
 
 @dataclass(frozen=True)
@@ -56,16 +59,18 @@ class Ahead:
         return self.nominal.angle_of(tension)
 
 
-def make_ahead(nominal: KneeNominal, signals: Signals, eyes: Eyes) -> Ahead:
+def make_ahead(
+    nominal: KneeNominal, signals: Signals, eyes: Eyes, knobs: Knobs = AS_DESIGNED
+) -> Ahead:
     """Return what looks ahead by the regulator's lag and half a control period."""
     samples = preview_count(signals)
-    lead = nominal.plant.regulator.time_constant + 0.5 * nominal.plant.control_period
+    delay = nominal.plant.regulator.time_constant + 0.5 * nominal.plant.control_period
     spacing = signals["reference_1"].ahead if samples else 0.0
     return Ahead(
         nominal,
         reader(signals, _previews("reference", samples)),
         reader(signals, _previews("angle_reference", samples)) if eyes.gait else None,
-        preview_weights(samples, spacing, lead),
+        preview_weights(samples, spacing, knob(knobs, "lead") * delay),
         eyes.stiffness,
     )
 

@@ -6,10 +6,13 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from baselines.entry import Entry
+from baselines.knee_ahead import KNOBS as AHEAD_KNOBS
+from baselines.knee_design import KNOBS as LOOP_KNOBS
 from baselines.knee_inverse import make_knee_forward
 from baselines.knee_ltr import make_knee_ltr
 from baselines.knee_pid import make_knee_pid
 from baselines.knee_published import NOMINAL_PRESSURE
+from baselines.simc import PI_KNOBS
 from baselines.trivial import Constant
 from pam_envs.parameters import Signals
 from pam_envs.plants.knee_orthosis import KneeOrthosis
@@ -41,7 +44,12 @@ KNEE_CONTROLLERS: dict[str, Entry] = {
         envs=GAIT,
     ),
     "knee_pid": Entry(
-        "PI of the tension, SIMC tuning", MODEL, feedback=True, citation=SIMC, envs=KNEE
+        "PI of the tension, SIMC tuning",
+        MODEL,
+        feedback=True,
+        citation=SIMC,
+        envs=KNEE,
+        knobs=PI_KNOBS,
     ),
     "knee_line": Entry(
         "straight line between the tips of the loop: hysteresis ignored", MODEL, envs=KNEE
@@ -58,6 +66,7 @@ KNEE_CONTROLLERS: dict[str, Entry] = {
         preview=True,
         citation=SEED_000,
         envs=KNEE,
+        knobs=AHEAD_KNOBS,
     ),
     "knee_ltr": Entry(
         "loop transfer recovery on the identified plant, about 2 bar",
@@ -65,6 +74,7 @@ KNEE_CONTROLLERS: dict[str, Entry] = {
         feedback=True,
         citation=f"{SEED_000}; {LTR}; {BUMPLESS}",
         envs=KNEE,
+        knobs=LOOP_KNOBS,
     ),
     "knee_line_ltr": Entry(
         "knee_ltr and knee_line: how much of the gain is feed-forward alone",
@@ -72,6 +82,7 @@ KNEE_CONTROLLERS: dict[str, Entry] = {
         feedback=True,
         citation=f"{LTR}; {BUMPLESS}",
         envs=KNEE,
+        knobs=LOOP_KNOBS,
     ),
     "knee_inverse_ltr": Entry(
         "knee_ltr and knee_inverse: the paper's control system; compensator with K = L = 0,"
@@ -80,6 +91,7 @@ KNEE_CONTROLLERS: dict[str, Entry] = {
         feedback=True,
         citation=f"{SEED_000}; {LTR}; {BUMPLESS}",
         envs=KNEE,
+        knobs=LOOP_KNOBS,
     ),
     "knee_inverse_ahead_ltr": Entry(
         "knee_inverse_ltr, its feed-forward one lag of the regulator ahead",
@@ -88,6 +100,7 @@ KNEE_CONTROLLERS: dict[str, Entry] = {
         feedback=True,
         citation=f"{SEED_000}; {LTR}; {BUMPLESS}",
         envs=KNEE,
+        knobs={**LOOP_KNOBS, **AHEAD_KNOBS},
     ),
     "knee_inverse_ltr_bumpy": Entry(
         "knee_inverse_ltr without compensators: each loop integrates off-line, clamped in charge",
@@ -106,15 +119,21 @@ KNEE_CONTROLLERS: dict[str, Entry] = {
     ),
 }
 
-Maker = Callable[[KneeOrthosis, Signals, Signals], Any]
+Maker = Callable[..., Any]
 
 
 def _forward(**how: Any) -> Maker:
-    return lambda plant, signals, actions: make_knee_forward(plant, signals, actions, **how)
+    def make(plant: KneeOrthosis, signals: Signals, actions: Signals, **knobs: Any) -> Any:
+        return make_knee_forward(plant, signals, actions, **how, **knobs)
+
+    return make
 
 
 def _ltr(**how: Any) -> Maker:
-    return lambda plant, signals, actions: make_knee_ltr(plant, signals, actions, **how)
+    def make(plant: KneeOrthosis, signals: Signals, actions: Signals, **knobs: Any) -> Any:
+        return make_knee_ltr(plant, signals, actions, **how, **knobs)
+
+    return make
 
 
 KNEE_MAKERS: Mapping[str, Maker] = {
@@ -131,4 +150,4 @@ KNEE_MAKERS: Mapping[str, Maker] = {
     "knee_inverse_ltr_bumpy": _ltr(bumpless=False),
     "knee_printed": _ltr(printed=True),
 }
-"""From nominal plant, signals and action signals to the controller."""
+"""From nominal plant, signals, action signals and perhaps ``knobs`` to the controller."""

@@ -22,6 +22,7 @@ from baselines.bumpless import Bumpless, BumplessGains, BumplessState, make_bump
 from baselines.controller import Array
 from baselines.knee_identification import Output, identify
 from baselines.knee_published import printed_bumpless, printed_controller
+from baselines.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.ltr import LtrDesign, design_ltr
 from pam_envs.plants.knee_orthosis import KneeOrthosis
 
@@ -32,11 +33,18 @@ BANDWIDTHS: dict[Output, float] = {"tension": 26.2, "angle": 14.4}
 RECOVERY = {"lag": 1e-5, "measured": 1e-7}
 """Control weight over the plant's static gain squared: recovers the bandwidth to a fifth, with no
 more gain at high frequencies than the printed controller."""
+KNOBS: Bounds = {"bandwidth": (0.4, 4.0), "recovery": (0.1, 10.0)}
+"""On the target loop's bandwidth and on the control weight, which recovers it the less."""
 
-_DESIGNS: dict[tuple[str, str, float | None], LtrDesign] = {}
+_DESIGNS: dict[tuple[str, str, float, float], LtrDesign] = {}
 
 
-def design(plant: KneeOrthosis, output: Output, bandwidth: float | None = None) -> LtrDesign:
+def design(
+    plant: KneeOrthosis,
+    output: Output,
+    bandwidth: float | None = None,
+    knobs: Knobs = AS_DESIGNED,
+) -> LtrDesign:
     """Return the design for an output of a nominal plant.
 
     Parameters
@@ -46,12 +54,15 @@ def design(plant: KneeOrthosis, output: Output, bandwidth: float | None = None) 
     output : {"tension", "angle"}
     bandwidth : float, optional
         Of the target loop [rad/s]; the paper's if not given.
+    knobs : mapping
+        Of ``KNOBS``.
     """
-    key = (plant.digest(), output, bandwidth)
+    wanted = knob(knobs, "bandwidth") * (bandwidth or BANDWIDTHS[output])
+    key = (plant.digest(), output, wanted, knob(knobs, "recovery"))
     if key not in _DESIGNS:
         fit = identify(plant, output)
-        weight = RECOVERY[plant.dynamics] * fit.static_gain**2
-        _DESIGNS[key] = design_ltr(fit, bandwidth or BANDWIDTHS[output], weight)
+        weight = knob(knobs, "recovery") * RECOVERY[plant.dynamics] * fit.static_gain**2
+        _DESIGNS[key] = design_ltr(fit, wanted, weight)
     return _DESIGNS[key]
 
 
@@ -98,9 +109,11 @@ class Loop:
         return self.bumpless.advance(wanted, measured, applied / KILO, state, in_charge)
 
 
-def make_loop(plant: KneeOrthosis, output: Output, bumpless: bool = True) -> Loop:
+def make_loop(
+    plant: KneeOrthosis, output: Output, bumpless: bool = True, knobs: Knobs = AS_DESIGNED
+) -> Loop:
     """Return the designed feedback of an output; ``bumpless=False`` has clamping instead."""
-    made = design(plant, output)
+    made = design(plant, output, knobs=knobs)
     order = made.plant.order
     whole = make_bumpless(
         made.plant, made.controller, plant.control_period, *_limits(plant),

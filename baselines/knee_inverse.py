@@ -18,6 +18,7 @@ from baselines.knee_ahead import Ahead, free_tension, make_ahead, tension
 from baselines.knee_forward import Forward, Kind
 from baselines.knee_nominal import KneeNominal
 from baselines.knee_view import Eyes, View, make_eyes
+from baselines.knobs import AS_DESIGNED, Knobs
 from baselines.nominal import MemoryState
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.knee_orthosis import KneeOrthosis
@@ -83,6 +84,7 @@ def make_knee_forward(
     kind: Kind = "inverse",
     assist: bool = True,
     preview: bool = False,
+    knobs: Knobs = AS_DESIGNED,
 ) -> KneeForward:
     """Return the controller for a nominal plant.
 
@@ -95,9 +97,11 @@ def make_knee_forward(
         See :class:`KneeForward`.
     preview : bool
         Whether it looks one lag ahead.
+    knobs : mapping
+        Of :data:`baselines.knee_ahead.KNOBS`.
     """
     nominal = KneeNominal(plant)
     eyes = make_eyes(nominal, signals)
-    ahead = make_ahead(nominal, signals, eyes) if preview else None
+    ahead = make_ahead(nominal, signals, eyes, knobs) if preview else None
     signal = action_signals["pressure_set_point"]
     return KneeForward(Forward(nominal, kind), eyes, signal, assist, ahead)

@@ -27,6 +27,7 @@ from baselines.knee_design import Loop, make_loop, printed_loop
 from baselines.knee_forward import Forward, Kind
 from baselines.knee_nominal import KneeNominal
 from baselines.knee_view import Eyes, View, make_eyes
+from baselines.knobs import AS_DESIGNED, Knobs
 from baselines.nominal import MemoryState
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.knee_orthosis import KneeOrthosis
@@ -134,6 +135,7 @@ def make_knee_ltr(
     bumpless: bool = True,
     printed: bool = False,
     preview: bool = False,
+    knobs: Knobs = AS_DESIGNED,
 ) -> KneeLtr:
     """Return the controller for a nominal plant.
 
@@ -148,15 +150,18 @@ def make_knee_ltr(
         Whether the tension's controller is the printed one and not a design.
     preview : bool
         Whether the feed-forward looks one lag ahead.
+    knobs : mapping
+        Of :data:`baselines.knee_design.KNOBS`, for the tension's loop alone, and of
+        :data:`baselines.knee_ahead.KNOBS`.
     """
     nominal = KneeNominal(plant)
     eyes = make_eyes(nominal, signals)
-    loop = printed_loop(plant) if printed else make_loop(plant, "tension", bumpless)
+    loop = printed_loop(plant) if printed else make_loop(plant, "tension", bumpless, knobs)
     return KneeLtr(
         loop,
         make_loop(plant, "angle", bumpless) if eyes.gait else None,
         Forward(nominal, forward),
         eyes,
         action_signals["pressure_set_point"],
-        make_ahead(nominal, signals, eyes) if preview else None,
+        make_ahead(nominal, signals, eyes, knobs) if preview else None,
     )

@@ -18,20 +18,24 @@ from baselines.controller import Answer, answer, beginning, choose
 from baselines.knee_nominal import KneeNominal
 from baselines.knee_published import printed_plant
 from baselines.knee_view import Eyes, make_eyes
+from baselines.knobs import AS_DESIGNED, Knobs
 from baselines.pid import Gains, PidState, pid_start, pid_step
 from baselines.simc import WAIT, simc_rule
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.knee_orthosis import KneeOrthosis
 
 
-def simc_tension(plant: KneeOrthosis) -> Gains:
-    """Return the gains [Pa/N] of the SIMC rule for a nominal orthosis; see the module."""
+def simc_tension(plant: KneeOrthosis, knobs: Knobs = AS_DESIGNED) -> Gains:
+    """Return the gains [Pa/N] of the SIMC rule for a nominal orthosis; see the module.
+
+    Its ``knobs`` are those of :data:`baselines.simc.PI_KNOBS`.
+    """
     period = plant.control_period
     theta, tau = WAIT * period, plant.regulator.time_constant
     if plant.dynamics == "measured":
         tau = 0.5 * _sum_of_lags()
         theta = theta + tau
-    gain, reset, _ = simc_rule(KneeNominal(plant).steepest_gain, tau, 0.0, theta)
+    gain, reset, _ = simc_rule(KneeNominal(plant).steepest_gain, tau, 0.0, theta, knobs=knobs)
     return Gains(
         proportional=gain,
         integral=gain / reset,
@@ -84,11 +88,15 @@ class KneePid:
 
 
 def make_knee_pid(
-    plant: KneeOrthosis, signals: Signals, action_signals: Signals, gains: Gains | None = None
+    plant: KneeOrthosis,
+    signals: Signals,
+    action_signals: Signals,
+    gains: Gains | None = None,
+    knobs: Knobs = AS_DESIGNED,
 ) -> KneePid:
     """Return the controller, with the gains of :func:`simc_tension` unless others are given."""
     return KneePid(
-        simc_tension(plant) if gains is None else gains,
+        simc_tension(plant, knobs) if gains is None else gains,
         make_eyes(KneeNominal(plant), signals),
         action_signals["pressure_set_point"],
         plant.control_period,

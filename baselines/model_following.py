@@ -27,15 +27,19 @@ from numpy.typing import ArrayLike
 from baselines.controller import Answer, Array, beginning, choose
 from baselines.joint_ahead import Lookahead, double_lags, lookahead_for
 from baselines.joint_gravity import Gravity
-from baselines.joint_loop import JointLoop, LoopState, make_loop
+from baselines.joint_loop import DAMPING, JointLoop, LoopState, make_loop
 from baselines.joint_memory_rows import JointMemories
 from baselines.joint_model import JointModel, joint_model
 from baselines.joint_poles import joint_poles
 from baselines.joint_tracking import ModelLoop, make_model_loop
 from baselines.joint_view import JointSignalMap, JointView, make_joint_signal_map
+from baselines.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.nominal import MemoryState
 from baselines.robust import Kind, robust_controller
 from pam_envs.parameters import Signals
+
+KNOBS: Bounds = {"damping": (0.5, 1.5), "disturbance": (0.5, 2.0)}
+"""On the damping of the model loop and on the bandwidth of the disturbance loop."""
 
 
 class FollowingState(NamedTuple):
@@ -155,6 +159,7 @@ def make_model_following(
     inverse: float = 1.0,
     gravity: bool = False,
     ahead: bool = False,
+    knobs: Knobs = AS_DESIGNED,
 ) -> ModelFollowing:
     """Return the controller.
 
@@ -172,14 +177,19 @@ def make_model_following(
         Whether the set-points carry the weight of the links and the payload that is told.
     ahead : bool
         Whether the model loop is given the previewed reference in place of the present one.
+    knobs : mapping
+        Of ``KNOBS`` and of :data:`baselines.joint_ahead.KNOBS`. The model loop's delay goes with
+        the square of its damping.
     """
     model = joint_model(plant, poles=joint_poles(plant)).narrowed(inverse)
     made = make_joint_signal_map(signals, action_signals)
+    damping, pace = knob(knobs, "damping"), knob(knobs, "disturbance")
+    delays = [damping**2 * delay for delay in double_lags(model.poles)]
     return ModelFollowing(
         model,
-        make_model_loop(model),
-        make_loop(model, lambda pole: robust_controller(kind, pole=pole)),
+        make_model_loop(model, damping * DAMPING),
+        make_loop(model, lambda pole: robust_controller(kind, pole=pace * pole)),
         made,
         Gravity(plant if gravity else None),
-        lookahead_for(made, double_lags(model.poles) if ahead else None, model.period),
+        lookahead_for(made, delays if ahead else None, model.period, knobs),
     )

@@ -23,8 +23,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.controller import Answer, Array, Reader, answer, beginning, choose, reader
+from baselines.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.nominal import Nominal
-from baselines.simc import WAIT, simc_rule
+from baselines.simc import PID_KNOBS, WAIT, simc_rule
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.single_muscle import SingleMuscle
 
@@ -36,6 +37,7 @@ SWING = 4.0
 REACH = 1.5
 """Margin for a regulator that is slower than the nominal one; the overshoot of a step grows with
 it (0.5 % of the step at 1, 10 % at 1.5, 25 % at 2)."""
+KNOBS: Bounds = {**PID_KNOBS, "reach": (0.67, 2.0)}
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,9 @@ class Gains:
     tracking_time: float
 
 
-def simc(plant: SingleMuscle, closed_loop_time: float | None = None) -> Gains:
+def simc(
+    plant: SingleMuscle, closed_loop_time: float | None = None, knobs: Knobs = AS_DESIGNED
+) -> Gains:
     """Return the gains of the SIMC rule for a nominal plant; see this module's page.
 
     Parameters
@@ -72,6 +76,8 @@ def simc(plant: SingleMuscle, closed_loop_time: float | None = None) -> Gains:
         Nominal plant.
     closed_loop_time : float, optional
         ``tau_c`` [s]; default: see this module's page.
+    knobs : mapping
+        Of :data:`baselines.simc.PID_KNOBS`.
     """
     nominal, period = Nominal(plant), plant.control_period
     theta = plant.regulator.dead_time + WAIT * period
@@ -79,7 +85,7 @@ def simc(plant: SingleMuscle, closed_loop_time: float | None = None) -> Gains:
     tau_c = max(theta, SWING / nominal.slowest_swing - theta)
     if closed_loop_time is not None:
         tau_c = closed_loop_time
-    gain, reset, rate = simc_rule(nominal.steepest_gain, tau_1, tau_2, theta, tau_c)
+    gain, reset, rate = simc_rule(nominal.steepest_gain, tau_1, tau_2, theta, tau_c, knobs)
     return Gains(
         proportional=gain * (1.0 + rate / reset),
         integral=gain / reset,
@@ -196,14 +202,21 @@ class Pid:
 
 
 def make_pid(
-    plant: SingleMuscle, signals: Signals, action_signals: Signals, gains: Gains | None = None
+    plant: SingleMuscle,
+    signals: Signals,
+    action_signals: Signals,
+    gains: Gains | None = None,
+    knobs: Knobs = AS_DESIGNED,
 ) -> Pid:
-    """Return the controller, with the gains of :func:`simc` unless others are given."""
+    """Return the controller, with the gains of :func:`simc` unless others are given.
+
+    Its ``knobs`` are those of ``KNOBS``: "reach" is a factor on the margin ``REACH``.
+    """
     law = plant.regulator
     return Pid(
-        simc(plant) if gains is None else gains,
+        simc(plant, knobs=knobs) if gains is None else gains,
         reader(signals, ["contraction", "pressure", "set_point", "reference"]),
         action_signals["pressure_set_point"],
         plant.control_period,
-        reach=REACH * law.slew_rate * (law.dead_time + law.time_constant),
+        reach=knob(knobs, "reach") * REACH * law.slew_rate * (law.dead_time + law.time_constant),
     )

@@ -19,8 +19,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from baselines.knobs import AS_DESIGNED, Bounds, Knobs, knob
+
 WAIT = 1.5
 """Control periods of dead time: hold and computing."""
+PI_KNOBS: Bounds = {"closed_loop_time": (0.25, 4.0), "integral_time": (0.25, 4.0)}
+PID_KNOBS: Bounds = {**PI_KNOBS, "derivative_time": (0.25, 4.0)}
+"""On ``tau_c``, ``tau_I`` and ``tau_D``."""
 
 
 class Simc(NamedTuple):
@@ -45,6 +50,7 @@ def simc_rule(
     fast: float,
     dead_time: float,
     closed_loop_time: float | None = None,
+    knobs: Knobs = AS_DESIGNED,
 ) -> Simc:
     """Return the parameters of the rule; see this module's page.
 
@@ -58,6 +64,13 @@ def simc_rule(
         ``theta`` [s].
     closed_loop_time : float, optional
         ``tau_c`` [s]; default ``theta``.
+    knobs : mapping
+        Of ``PID_KNOBS``; a factor on ``tau_c`` acts on all that the rule makes of it.
     """
-    pace = dead_time + (dead_time if closed_loop_time is None else closed_loop_time)
-    return Simc(slow / (gain * pace), min(slow, 4.0 * pace), fast)
+    wanted = dead_time if closed_loop_time is None else closed_loop_time
+    pace = dead_time + knob(knobs, "closed_loop_time") * wanted
+    return Simc(
+        slow / (gain * pace),
+        knob(knobs, "integral_time") * min(slow, 4.0 * pace),
+        knob(knobs, "derivative_time") * fast,
+    )

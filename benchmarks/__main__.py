@@ -4,38 +4,16 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
 
 import tyro
 
 from benchmarks import controllers, rows, scenarios
+from sweeps.progress import progress
 
 Positional = tyro.conf.Positional
-
-
-@contextmanager
-def _progress(title: str) -> Iterator[Callable[[int], Callable[[], None]]]:
-    """Show a bar with the time left, and hand out what starts and advances it."""
-    from rich import progress as bars
-
-    columns = (
-        bars.TextColumn("{task.description}"),
-        bars.BarColumn(),
-        bars.MofNCompleteColumn(),
-        bars.TimeElapsedColumn(),
-        bars.TextColumn("left"),
-        bars.TimeRemainingColumn(),
-    )
-    with bars.Progress(*columns) as shown:
-
-        def start(total: int) -> Callable[[], None]:
-            task = shown.add_task(title, total=total)
-            return lambda: shown.advance(task)
-
-        yield start
 
 
 def _choose(names: tuple[str, ...], known: dict[str, Any], what: str) -> list[Any]:
@@ -72,55 +50,83 @@ def run(
         env: Id of an environment; all by default.
         controller: Names of controllers; all by default.
         track: Names of scenario files; all by default.
-        jobs: Processes.
+        jobs: Processes of this machine.
         force: Compute again what is there already.
         out: Folder of the rows.
         cells: Folder of the cells, the checkpoint.
         backend: Processes of this machine, or a running Dask cluster.
-        address: Of the Dask scheduler.
+        address: Of the Dask scheduler, like tcp://host:8786.
         dry_run: List the cells and whether they are there, and stop.
     """
-    from benchmarks import runner
-    from benchmarks.cells import cells_of
-    from benchmarks.store import Store
+    from benchmarks import runner, telling
 
     folder = runner.CELLS if cells is None else cells
+    options = runner.Options(jobs, force, out, folder, backend, address)
     chosen = _choose(controller, controllers.available(), "controller")
     pairs = runner.pairs_of(chosen, _tracks(env, track))
     if not pairs:
         raise ValueError("no controller runs in these environments")
     if dry_run:
-        for cell in (cell for pair in pairs for cell in cells_of(*pair)):
-            there = "there" if Store(folder).path(cell.key).exists() else "to run"
-            print(f"{there}  {cell.entrant.name}  {cell.track.name}/{cell.scenario.name}")
+        planned = list(runner.planned(pairs, options))
+        for cell, there in planned:
+            print(f"{'there ' if there else 'to run'}  {runner.title(cell)}")
+        print(f"{len(planned)} cells, {sum(not there for _, there in planned)} to run")
         return 0
-    options = runner.Options(jobs, force, out, folder, backend, address)
-    with _progress("cells") as start:
+    with progress("cells") as start:
         report = runner.run(pairs, options, start)
-    return _tell(report)
+    return telling.run(report)
 
 
-def _tell(report: Any) -> int:
-    from benchmarks.metrics import headline_of
+def audit(
+    track: Positional[tuple[str, ...]] = (),
+    jobs: int = os.cpu_count() or 1,
+    all: bool = False,
+    out: Path = rows.RESULTS,
+    cells: Path | None = None,
+    backend: Literal["loky", "dask"] = "loky",
+    address: str = "",
+) -> int:
+    """Draw a round of seeds for all controllers of a track, and score them on it.
 
-    print(f"{report.computed} cells computed, {report.found} were there already")
-    for name in report.quarantined:
-        print(f"corrupt, set aside and computed again: {name}")
-    if report.swept:
-        print(f"{report.swept} half-written files removed")
-    for path in report.rows:
-        row = rows.load(path)
-        headline = headline_of(row["scenarios"]["content"])
-        head, failures = row["aggregate"][headline], row["failures"]
-        unit, factor = rows.shown(row["scenarios"]["content"])
-        mean, low, high = (factor * head[name] for name in ("mean", "low", "high"))
-        print(
-            f"{path.stem}: RMS {mean:.3f} {unit} [{low:.3f}, {high:.3f}]"
-            + (f", {failures} of {len(row['episodes'])} episodes failed" if failures else "")
-        )
-    for line in report.missing:
-        print(f"MISSING {line}", file=sys.stderr)
-    return 1 if report.missing else 0
+    Where nothing has changed since the last round, none is drawn.
+
+    Args:
+        track: Names of scenario files.
+        jobs: Processes of this machine.
+        all: Every track.
+        out: Folder of the rows.
+        cells: Folder of the cells, the checkpoint.
+        backend: Processes of this machine, or a running Dask cluster.
+        address: Of the Dask scheduler, like tcp://host:8786.
+    """
+    from benchmarks import audit as auditing
+    from benchmarks import runner, telling
+
+    if bool(track) == all:
+        raise ValueError("name tracks, or give --all")
+    tracks = _choose(track, scenarios.available(), "track")
+    folder = runner.CELLS if cells is None else cells
+    options = runner.Options(jobs, False, out, folder, backend, address)
+    pairs = runner.pairs_of(controllers.available().values(), tracks)
+    for chosen in tracks:
+        drawn = auditing.draw(chosen, [entrant for entrant, other in pairs if other is chosen])
+        print(f"{chosen.name}: {telling.round_in_words(drawn)}", flush=True)
+    with progress("cells") as start:
+        report = runner.run(pairs, options, start)
+    return telling.run(report)
+
+
+def cite(row: Positional[tuple[str, ...]]) -> int:
+    """Print BibTeX of rows, of this package and of the methods in them.
+
+    Args:
+        row: Files or names of rows.
+    """
+    from benchmarks.cite import bibtex
+
+    for name in row:
+        print(bibtex(rows.load(_row_path(name))))
+    return 0
 
 
 def board(results: Path = rows.RESULTS, out: Path | None = None) -> int:
@@ -137,42 +143,98 @@ def board(results: Path = rows.RESULTS, out: Path | None = None) -> int:
     return 0
 
 
+def site(results: Path = rows.RESULTS, out: Path | None = None) -> int:
+    """Write the page of the rows: one folder, no server and no network.
+
+    Args:
+        results: Folder of the rows.
+        out: Folder of the page, benchmarks/site by default.
+    """
+    from benchmarks import site_build
+
+    written = site_build.build(results, site_build.OUT if out is None else out)
+    print(f"{len(written)} files; open {written[0]}")
+    return 0
+
+
 def verify(
-    row: Positional[tuple[str, ...]] = (), jobs: int = os.cpu_count() or 1, all: bool = False
+    row: Positional[tuple[str, ...]] = (),
+    jobs: int = os.cpu_count() or 1,
+    all: bool = False,
+    elsewhere: bool = False,
+    backend: Literal["loky", "dask"] = "loky",
+    address: str = "",
 ) -> int:
     """Run rows again from their own record; exit code 1 if one has drifted.
 
+    What holds is noted in verified.json beside the rows.
+
     Args:
         row: Files or names of rows.
-        jobs: Processes.
+        jobs: Processes of this machine.
         all: Every row of benchmarks/results.
+        elsewhere: Allow for last digits that differ with packages or processor.
+        backend: Processes of this machine, or a running Dask cluster.
+        address: Of the Dask scheduler, like tcp://host:8786.
     """
+    from benchmarks import telling, verified
     from benchmarks import verify as checking
+    from sweeps.engine import Cluster
 
     paths = [_row_path(name) for name in row]
     paths += sorted(rows.RESULTS.glob("*--*.json")) if all else []
     if not paths:
         raise ValueError("name a row, or give --all")
-    verdicts = [checking.verify(path, jobs) for path in paths]
-    for verdict in verdicts:
-        print(f"{verdict.row}: {'holds' if verdict.holds else 'DRIFTED'}")
-        for line in verdict.drifted[:40]:
-            print(f"  {line}")
-        if len(verdict.drifted) > 40:
-            print(f"  and {len(verdict.drifted) - 40} fields more")
-        for line in verdict.notes:
-            print(f"  note: {line}")
-    return 0 if all_hold(verdicts) else 1
-
-
-def all_hold(verdicts: list[Any]) -> bool:
-    """Return whether no row has drifted."""
-    return all(verdict.holds for verdict in verdicts)
+    drifted = 0
+    for path in paths:
+        found = checking.verify(path, Cluster(jobs, backend, address), elsewhere)
+        verified.note(path, found.checksum if found.holds else "", found.mode)
+        telling.verdict(found)
+        drifted += not found.holds
+    return 1 if drifted else 0
 
 
 def _row_path(name: str) -> Path:
-    path = Path(name)
-    return path if path.exists() else rows.RESULTS / f"{path.stem}.json"
+    """Return the file of a row by its path or its name."""
+    given = Path(name)
+    path = given if given.is_file() else rows.RESULTS / f"{given.stem}.json"
+    if not path.is_file():
+        raise ValueError(f"there is no row {name!r}; {given.stem} would be {path}")
+    return path
+
+
+def tune(
+    controller: Positional[str],
+    env: str = "",
+    trials: int = 20,
+    seed: int = 0,
+    episodes: int = 30,
+    write: bool = False,
+    storage: Path | None = None,
+) -> int:
+    """Search the free numbers of a paper's controller on tuning seeds; interrupted, it goes on.
+
+    Args:
+        controller: Name of a controller with knobs.
+        env: Id of the environment, where the controller runs in several.
+        trials: Settings to try, those of earlier calls counted in.
+        seed: Of the sampler.
+        episodes: Of each trial at least.
+        write: Put what is found into baselines/tuned.yaml, which the catalogue reads.
+        storage: SQLite file of the trials, runs/tuning.db by default.
+    """
+    from benchmarks import tuning
+
+    more = {} if storage is None else {"storage": storage}
+    job = tuning.job_of(controller, env, trials=trials, seed=seed, episodes=episodes, **more)
+    course = tuning.Course(controller, tuning.nominal_track(job.env), episodes)
+    with progress("trials") as start:
+        found = tuning.search(job, course.measure, start)
+    print(tuning.sentence(found))
+    if write:
+        tuning.write(found)
+        print(tuning.tuned.FILE)
+    return 0
 
 
 def papers(json: Path | None = None) -> int:
@@ -210,7 +272,7 @@ def speed(
     from benchmarks import speed as measuring
     from benchmarks.store import write_record
 
-    with _progress("groups") as start:
+    with progress("groups") as start:
         results = measuring.measure(only, rounds, start)
     print(measuring.table(results))
     if json:
@@ -288,6 +350,8 @@ def diagnosis(
     timed: bool = False,
     cells: Path | None = None,
     out: Path | None = None,
+    backend: Literal["loky", "dask"] = "loky",
+    address: str = "",
 ) -> int:
     """Diagnose rigs that hide an effect and score what is found; an interrupted run goes on.
 
@@ -307,6 +371,8 @@ def diagnosis(
         cells: Folder of the records, the checkpoint.
         out: Folder of the page, of its numbers and of its figure. By default benchmarks/results for
             the whole of the final set, otherwise beside the records.
+        backend: Processes of this machine, or a running Dask cluster.
+        address: Of the Dask scheduler, like tcp://host:8786.
     """
     from benchmarks import diagnosis as running
     from benchmarks import diagnosis_report as telling
@@ -315,8 +381,9 @@ def diagnosis(
     from pam_envs.diagnosis.readings import diagnose_readings
 
     folder = running.FOLDER if cells is None else cells
+    cluster = (backend, address)
     options = running.Options(
-        chosen, offset, fraction, kind, name, limit, loops, next, jobs, force, folder
+        chosen, offset, fraction, kind, name, limit, loops, next, jobs, force, folder, *cluster
     )
     if retell:
         records = running.retold(options)
@@ -324,7 +391,7 @@ def diagnosis(
         for path in telling.write(records, out or folder / "pages" / "retold", "--retell"):
             print(path)
         return 0
-    with _progress("cases") as start:
+    with progress("cases") as start:
         report = running.run(options, start)
     print(f"{report.computed} computed, {report.found} were there already")
     for line in report.quarantined:
@@ -346,7 +413,11 @@ def diagnosis(
 COMMANDS: dict[str, Callable[..., int]] = {
     "run": run,
     "board": board,
+    "site": site,
     "verify": verify,
+    "audit": audit,
+    "cite": cite,
+    "tune": tune,
     "papers": papers,
     "speed": speed,
     "show": show,
@@ -365,6 +436,9 @@ def main(arguments: list[str] | None = None) -> int:
     except ValueError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print("interrupted; what was done is kept: the same command goes on", file=sys.stderr)
+        return 130
 
 
 if __name__ == "__main__":

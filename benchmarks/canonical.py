@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Mapping
+import types
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -61,13 +63,20 @@ def arrays_digest(arrays: Iterable[Any]) -> str:
 SOURCES = {".py", ".yaml", ".yml", ".csv", ".json", ".npz", ".onnx", ".safetensors"}
 
 
-def sources_digest(paths: Iterable[Path]) -> str:
-    """Return the SHA-256 of files and of folders' code and data by relative name, 16 digits."""
+def sources_digest(paths: Iterable[Path], kinds: Collection[str] = SOURCES) -> str:
+    """Return the SHA-256 of files and of folders' code and data by relative name, 16 digits.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+    kinds : collection of str
+        Suffixes of the files that count.
+    """
     state = hashlib.sha256()
     for root in paths:
         files = sorted(root.rglob("*")) if root.is_dir() else [root]
         for file in files:
-            if file.is_file() and file.suffix in SOURCES:
+            if file.is_file() and file.suffix in kinds:
                 state.update(file.relative_to(root.parent).as_posix().encode())
                 state.update(file.read_bytes())
     return state.hexdigest()[:16]
@@ -99,14 +108,52 @@ def _contents(thing: Any, above: tuple[int, ...]) -> Any:
         entries = [_contents(entry, above) for entry in thing]
         ordered = isinstance(thing, (list, tuple))
         return entries if ordered else sorted(entries, key=canonical_text)
-    if dataclasses.is_dataclass(thing):
-        held = {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing)}
-    elif hasattr(thing, "__qualname__"):
+    held = held_by(thing)
+    if held is None:
         return f"{thing.__module__}.{thing.__qualname__}"
-    else:
-        held = dict(vars(thing)) if hasattr(thing, "__dict__") else {}
     named = type(thing)
     return {
         "class": f"{named.__module__}.{named.__qualname__}",
         "holds": {name: _contents(entry, above) for name, entry in held.items()},
     }
+
+
+def held_by(thing: Any) -> dict[str, Any] | None:
+    """Return what an object holds by name, ``None`` for one that is only a name (a function)."""
+    if isinstance(thing, types.MethodType):
+        return {"function": thing.__func__, "of": thing.__self__}
+    if isinstance(thing, functools.partial):
+        return {"function": thing.func, "arguments": thing.args, "named": thing.keywords}
+    if isinstance(thing, types.FunctionType):
+        cells = [cell.cell_contents for cell in thing.__closure__ or ()]
+        given = [thing.__defaults__, thing.__kwdefaults__]
+        name = f"{thing.__module__}.{thing.__qualname__}"
+        return {"name": name, "captured": cells, "defaults": given} if cells else None
+    if dataclasses.is_dataclass(thing):
+        return {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing)}
+    if hasattr(thing, "__qualname__"):
+        return None
+    slots = [name for kind in type(thing).__mro__ for name in getattr(kind, "__slots__", ())]
+    held = {name: getattr(thing, name) for name in slots if hasattr(thing, name)}
+    return held | dict(getattr(thing, "__dict__", {}))
+
+
+def classes_in(thing: Any) -> Iterator[type]:
+    """Yield the class of an object and of all that it holds, each once."""
+    seen: set[int] = set()
+    kinds: set[type] = set()
+    left = [thing]
+    while left:
+        entry = left.pop()
+        if id(entry) in seen or isinstance(entry, (type, str, bytes, np.ndarray, np.generic)):
+            continue
+        seen.add(id(entry))
+        if type(entry) not in kinds:
+            kinds.add(type(entry))
+            yield type(entry)
+        if isinstance(entry, Mapping):
+            left += entry.values()
+        elif isinstance(entry, (list, tuple, set, frozenset)):
+            left += entry
+        else:
+            left += (held_by(entry) or {}).values()

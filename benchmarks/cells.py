@@ -3,25 +3,38 @@
 from __future__ import annotations
 
 import base64
+import math
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks import controllers, metrics, provenance, rollout
+from benchmarks import (
+    artefacts,
+    controllers,
+    knowledge,
+    metrics,
+    provenance,
+    rollout,
+    traces,
+    trainings,
+)
+from benchmarks.audit import Audit
 from benchmarks.canonical import arrays_digest, digest
 from benchmarks.controllers import Entrant
+from benchmarks.making import make_env, model_of, plant_digests
 from benchmarks.scenarios import Scenario, ScenarioSet
+from sweeps.worker import wanted
 
+SCHEMA = 2
+PUBLIC, AUDIT = "public", "audit"
 PROBED_STEPS = 250
 """Steps of the episode on which the use of the preview is measured."""
-PLANTS = Path(__file__).parent / "scenarios" / "plants"
-"""Plants that scenario files name."""
+MOST_ACTIONS = 10_000_000
+"""Numbers that the recorded actions of an episode may be."""
 
 
 @dataclass(frozen=True)
@@ -34,101 +47,155 @@ class Cell:
     track : ScenarioSet
         The file that the scenario is from.
     scenario : Scenario
+    training_seed : int, optional
+        Which policy of a learned controller.
+    split : {"public", "audit"}
+    seeds : tuple of int
     probe : bool
-        Whether the use of the preview is measured here.
+        Whether the use of the preview and of the model is measured here.
     """
 
     entrant: Entrant
     track: ScenarioSet
     scenario: Scenario
+    training_seed: int | None = None
+    split: str = PUBLIC
+    seeds: tuple[int, ...] = ()
     probe: bool = False
 
     @property
     def key(self) -> str:
         """Digest of all that the result depends on: the name under which it is kept."""
-        grid = ("grid", "per_reference", "title")
+        grid = ("grid", "per_reference", "title", "seeds")
         return digest(
             {
+                "schema": SCHEMA,
                 "controller": [self.entrant.source, self.entrant.name, self.entrant.kind],
+                "knowledge": self.entrant.knowledge,
+                "policy": self._policy(),
                 "track": {k: v for k, v in self.track.content.items() if k not in grid},
                 "scenario": [self.scenario.name, self.scenario.kwargs, self.scenario.rests],
-                "probe": self.probe,
+                "plants": plant_digests(self.scenario),
+                "episodes": [self.split, self.training_seed, self.seeds, self.probe, self.drawn],
                 "packages": provenance.packages(),
-                "sources": provenance.sources(self.entrant.source.partition(".")[0]),
+                "cpu": provenance.cpu(),
+                "sources": sources(self.entrant),
             }
         )[:32]
 
+    @property
+    def first(self) -> bool:
+        """Whether actions and pictures of this cell are kept: of one training seed, public."""
+        return self.split == PUBLIC and self.training_seed == self.entrant.training_seeds[0]
 
-def cells_of(entrant: Entrant, track: ScenarioSet) -> list[Cell]:
-    """Return the cells of one row, in the order of the scenario file."""
-    scenarios = track.scenarios()
-    probed = next((s.name for s in scenarios if not s.rests), scenarios[0].name)
-    return [Cell(entrant, track, s, s.name == probed) for s in scenarios]
+    @property
+    def drawn(self) -> bool:
+        """Whether a picture is kept."""
+        return self.first and self.scenario.name in traces.chosen(self.track)
 
-
-def make_env(env: str, kwargs: Mapping[str, Any]) -> Any:
-    """Return the single environment of a scenario; a plant is the name of a file in ``PLANTS``."""
-    import pam_envs  # noqa: F401  registers the ids
-
-    given = dict(kwargs)
-    if isinstance(given.get("plant"), str):
-        given["plant"] = PLANTS / given["plant"]
-    return gym.make(env, disable_env_checker=True, **given)
+    def _policy(self) -> dict[str, Any] | None:
+        files = dict(self.entrant.files)
+        seed = self.training_seed
+        return artefacts.file_record(files[seed], seed) if seed is not None else None
 
 
-def model_for(cell: Cell, env: Any) -> Any:
-    """Return the plant that the controller is told: the environment's, or the scenario's model."""
-    if not cell.scenario.model:
-        return env.unwrapped.plant
-    other = make_env(cell.track.env, {**cell.scenario.kwargs, **cell.scenario.model})
-    plant = other.unwrapped.plant
-    other.close()
-    return plant
+def sources(entrant: Entrant) -> dict[str, str]:
+    """Return digests of the code that a controller's scores depend on."""
+    found = provenance.sources(entrant.source.partition(".")[0], bool(entrant.files))
+    if entrant.kind == artefacts.RESIDUAL:
+        return provenance.sources(artefacts.BASELINES) | found
+    return found
 
 
-def compute(cell: Cell, recorded: Mapping[int, NDArray[Any]] | None = None) -> dict[str, Any]:
-    """Run the cell's episodes and return its record.
+def cells_of(entrant: Entrant, track: ScenarioSet, found: Audit | None = None) -> list[Cell]:
+    """Return the cells of a row, public ones first, by training seed and scenario.
 
     Parameters
     ----------
-    cell : Cell
-    recorded : mapping from seed to (n, n_act) array, optional
-        Actions to replay in place of asking the controller.
+    entrant : Entrant
+    track : ScenarioSet
+    found : Audit, optional
+        Whose episodes are run as well.
     """
+    scenarios, public = track.scenarios(), track.seeds
+    probed = next((s.name for s in scenarios if not s.rests), scenarios[0].name)
+    runs = [(seed, s) for seed in entrant.training_seeds for s in scenarios]
+    first = (entrant.training_seeds[0], probed)
+    cells = [
+        Cell(entrant, track, s, seed, PUBLIC, public[s.name], (seed, s.name) == first)
+        for seed, s in runs
+    ]
+    if found is not None:
+        cells += [Cell(entrant, track, s, seed, AUDIT, found.seeds[s.name]) for seed, s in runs]
+    return cells
+
+
+def compute(cell: Cell) -> dict[str, Any]:
+    """Run the cell's episodes and return its record."""
     env = make_env(cell.track.env, cell.scenario.kwargs)
-    model = model_for(cell, env)
-    controller = controllers.make(cell.entrant, model, env)
+    model = model_of(cell.track.env, cell.scenario, env)
+    controller = _controller(cell, model, env)
     record: dict[str, Any] = {
-        "schema": 1,
+        "schema": SCHEMA,
+        "env": cell.track.env,
         "controller": cell.entrant.name,
         "track": cell.track.name,
         "scenario": cell.scenario.name,
+        "training_seed": cell.training_seed,
+        "split": cell.split,
         "controller_digest": controllers.parameters_digest(controller),
+        "code_digest": artefacts.controller_code(cell.entrant, controller),
         "plant_digest": env.unwrapped.plant.digest(),
         "model_digest": model.digest(),
+        "knows_plant": knowledge.knows_plant(cell.entrant, controller, model, env),
         "episodes": [],
     }
-    spent, actions = [], {}
-    for seed in cell.track.seeds:
-        answering = controller if recorded is None else rollout.Replay(recorded[seed])
-        episode = rollout.run(env, answering, seed)
+    if cell.entrant.files:
+        record["card"] = trainings.card_record(controller)
+    if cell.probe and cell.entrant.knowledge in knowledge.IGNORANT:
+        record["uses_model"] = knowledge.uses_model(cell.entrant, model, env, cell.training_seed)
+    spent = []
+    for seed in cell.seeds:
+        if not wanted():
+            raise RuntimeError("nobody waits for it any more")
+        episode = rollout.run(env, controller, seed)
         record["episodes"].append(episode_record(cell, seed, episode))
         spent.append(episode.seconds)
-        actions[str(seed)] = pack(episode.actions)
-        if cell.probe and "preview_used" not in record and recorded is None:
-            record["preview_used"] = _preview_seconds(cell, env, controller, episode)
+        if cell.first and seed == cell.seeds[0]:
+            record |= _kept(cell, env, controller, seed, episode)
     env.close()
-    if cell.entrant.kind == "learned":
-        record["actions"] = actions
-    micro = 1e6 * np.concatenate(spent)
-    record["volatile"] = {
-        **provenance.occasion(),
-        "predict_us": {
-            "median": float(np.median(micro)) if len(micro) else None,
-            "p99": float(np.percentile(micro, 99)) if len(micro) else None,
-        },
-    }
+    record["volatile"] = {**provenance.occasion(), "predict_us": _times(np.concatenate(spent))}
     return record
+
+
+def _controller(cell: Cell, model: Any, env: Any) -> controllers.Controller:
+    return controllers.make(cell.entrant, model, env, training_seed=cell.training_seed)
+
+
+def _kept(
+    cell: Cell, env: Any, controller: Any, seed: int, episode: rollout.Episode
+) -> dict[str, Any]:
+    """Return what a record keeps of one episode: its actions, its picture, the preview's use."""
+    kept: dict[str, Any] = {}
+    if cell.entrant.files:
+        kept["actions"] = {str(seed): pack(episode.actions)}
+    if cell.drawn and len(episode.actions):
+        content = cell.track.content
+        made = traces.of_episode(
+            cell.scenario.name, seed, episode.signals, content, cell.training_seed
+        )
+        kept["traces"] = [made]
+    if cell.probe:
+        kept["preview_used"] = _preview_seconds(cell, env, controller, episode)
+    return kept
+
+
+def _times(seconds: NDArray[Any]) -> dict[str, float | None]:
+    """Return median and 99th percentile of the time of an answer, in microseconds."""
+    if not len(seconds):
+        return {"median": None, "p99": None}
+    micro = 1e6 * seconds
+    return {"median": float(np.median(micro)), "p99": float(np.percentile(micro, 99))}
 
 
 def _preview_seconds(cell: Cell, env: Any, controller: Any, episode: rollout.Episode) -> float:
@@ -142,9 +209,35 @@ def episode_record(cell: Cell, seed: int, episode: rollout.Episode) -> dict[str,
     """Return the scores of an episode; one that did not end by its time gets the worst case."""
     content = cell.track.content
     signals = {**episode.signals}
-    signals["sensed"] = signals.get(content["sensed"], np.zeros(0))
+    signals["sensed"] = signals[content["sensed"]]
+    scores = _scores(signals, episode, content)
+    if episode.failed:
+        scores = metrics.worst_of(scores, content["worst_case"])
+    if not cell.scenario.rests:
+        scores["steady_state_error"] = float("nan")
+    saturated = signals.get("saturated", np.zeros(0))
+    return {
+        "scenario": cell.scenario.name,
+        "seed": seed,
+        "training_seed": cell.training_seed,
+        "split": cell.split,
+        "steps": len(episode.actions),
+        "failed": episode.failed,
+        "failure": episode.failure,
+        "saturated": float(np.mean(saturated)) if len(saturated) else 0.0,
+        "scores": scores,
+        "trajectory": arrays_digest([episode.actions, *episode.signals.values()]),
+    }
+
+
+def _scores(
+    signals: Mapping[str, NDArray[Any]], episode: rollout.Episode, content: Mapping[str, Any]
+) -> dict[str, float]:
+    """Return what can be scored of an episode: nothing, if it failed before there was anything."""
+    if episode.failed and not len(episode.actions):
+        return {}
     try:
-        scores = metrics.score(
+        return metrics.score(
             signals,
             episode.period,
             float(content["settle_seconds"]),
@@ -156,25 +249,10 @@ def episode_record(cell: Cell, seed: int, episode: rollout.Episode) -> dict[str,
             content.get("half_range"),
             content.get("tool_length"),
         )
-    except (ValueError, IndexError, KeyError):
+    except ValueError:  # nothing left to score after settling
         if not episode.failed:
             raise
-        scores = {}
-    if episode.failed:
-        scores = metrics.worst_of(scores, content["worst_case"])
-    if not cell.scenario.rests:
-        scores["steady_state_error"] = float("nan")
-    saturated = signals.get("saturated", np.zeros(0))
-    return {
-        "scenario": cell.scenario.name,
-        "seed": seed,
-        "steps": len(episode.actions),
-        "failed": episode.failed,
-        "failure": episode.failure,
-        "saturated": float(np.mean(saturated)) if len(saturated) else 0.0,
-        "scores": scores,
-        "trajectory": arrays_digest([episode.actions, *episode.signals.values()]),
-    }
+        return {}
 
 
 def pack(actions: NDArray[Any]) -> dict[str, Any]:
@@ -185,6 +263,22 @@ def pack(actions: NDArray[Any]) -> dict[str, Any]:
 
 
 def unpack(packed: Mapping[str, Any]) -> NDArray[Any]:
-    """Return the actions that :func:`pack` wrote."""
-    raw = zlib.decompress(base64.b85decode(packed["data"]))
-    return np.frombuffer(raw, np.dtype(packed["dtype"])).reshape(packed["shape"]).copy()
+    """Return the actions that :func:`pack` wrote.
+
+    Raises
+    ------
+    ValueError
+        If they are not of the size that they say, or too many: the text may be a stranger's.
+    """
+    kind, shape = np.dtype(str(packed["dtype"])), [int(n) for n in packed["shape"]]
+    size = math.prod(shape)
+    if kind.kind != "f" or min(shape, default=0) < 0 or size > MOST_ACTIONS:
+        raise ValueError(f"recorded actions of type {kind} and shape {shape} are none")
+    try:
+        expected = size * kind.itemsize
+        raw = zlib.decompressobj().decompress(base64.b85decode(packed["data"]), expected + 1)
+    except zlib.error as error:
+        raise ValueError(f"recorded actions are damaged: {error}") from error
+    if len(raw) != expected:
+        raise ValueError(f"recorded actions are not of shape {shape}; run the row again")
+    return np.frombuffer(raw, kind).reshape(shape).copy()

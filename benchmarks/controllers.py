@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import importlib
-import inspect
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from benchmarks.canonical import object_digest, sources_digest
+from benchmarks.canonical import object_digest
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -27,6 +26,9 @@ class Controller(Protocol):
         ...
 
 
+BY_RULE = "by rule or as published"
+
+
 @dataclass(frozen=True)
 class Entrant:
     """A controller as the board names it.
@@ -37,10 +39,19 @@ class Entrant:
         ``knowledge`` is "nothing", "tables", "nominal model" or "true model".
     envs : tuple of str
         Ids that it runs in; empty means any.
-    kind : {"classical", "learned"}
-        Learned ones are verified by replaying their recorded actions.
+    kind : {"classical", "learned", "residual"}
+        Residual ones are learned on top of a classical one.
     source : str
         Module whose ``make_controller`` builds it.
+    files : tuple of (int, Path)
+        Training seed and policy file (relative to the checkout), ascending; none for a controller
+        that is not trained.
+    trials : int
+        Settings that were tried out to choose a classical controller's numbers.
+    tuning : str
+        How they were chosen.
+    author : str
+        Who made it, as BibTeX wants it; empty for the authors of this package.
     """
 
     name: str
@@ -50,6 +61,15 @@ class Entrant:
     envs: tuple[str, ...]
     kind: str
     source: str
+    files: tuple[tuple[int, Path], ...] = ()
+    trials: int = 0
+    tuning: str = BY_RULE
+    author: str = ""
+
+    @property
+    def training_seeds(self) -> tuple[int | None, ...]:
+        """Training seeds, or ``None`` alone for a controller that is not trained."""
+        return tuple(seed for seed, _ in self.files) or (None,)
 
     def runs_in(self, env: str) -> bool:
         """Return whether the controller is meant for an environment."""
@@ -70,18 +90,36 @@ def _entrants(module: str, package: str, kind: str) -> dict[str, Entrant]:
         if error.name in (package, module):
             return {}
         raise
-    return {
-        name: Entrant(
-            name=name,
-            summary=str(getattr(entry, "summary", "")),
-            knowledge=str(getattr(entry, "knowledge", "nothing")),
-            citation=str(getattr(entry, "citation", "")),
-            envs=tuple(getattr(entry, "envs", ()) or ()),
-            kind=str(getattr(entry, "kind", kind)),
-            source=module,
-        )
-        for name, entry in found.CONTROLLERS.items()
-    }
+    made = (_entrant(name, entry, module, kind) for name, entry in found.CONTROLLERS.items())
+    return {entrant.name: entrant for entrant in made if entrant is not None}
+
+
+def _entrant(name: str, entry: Any, module: str, kind: str) -> Entrant | None:
+    """Return an entry of a catalogue, ``None`` for a policy that is not trained yet."""
+    listed = getattr(entry, "files", None)
+    found = listed() if callable(listed) else {}
+    files = tuple((seed, _movable(path)) for seed, path in sorted(found.items()))
+    if callable(listed) and not files:
+        return None
+    return Entrant(
+        name=name,
+        summary=str(getattr(entry, "summary", "")),
+        knowledge=str(getattr(entry, "knowledge", "nothing")),
+        citation=str(getattr(entry, "citation", "")),
+        envs=tuple(getattr(entry, "envs", ()) or ()),
+        kind=str(getattr(entry, "kind", kind)),
+        source=module,
+        files=files,
+        trials=int(getattr(entry, "trials", 0)),
+        tuning=str(getattr(entry, "tuning", BY_RULE)),
+        author=str(getattr(entry, "author", "")),
+    )
+
+
+def _movable(path: Path) -> Path:
+    """Return a path relative to the checkout where it is in it: another may lie elsewhere."""
+    whole = Path(path).resolve()
+    return whole.relative_to(ROOT) if whole.is_relative_to(ROOT) else whole
 
 
 def available() -> dict[str, Entrant]:
@@ -109,7 +147,9 @@ def find(name: str) -> Entrant:
     return known[name]
 
 
-def make(entrant: Entrant, model: Any, env: Any, seed: int = 0) -> Controller:
+def make(
+    entrant: Entrant, model: Any, env: Any, seed: int = 0, training_seed: int | None = None
+) -> Controller:
     """Return a controller built from a nominal plant and the named signals.
 
     Parameters
@@ -121,25 +161,18 @@ def make(entrant: Entrant, model: Any, env: Any, seed: int = 0) -> Controller:
         Only its named signals are used, never its plant.
     seed : int
         For controllers that draw.
+    training_seed : int, optional
+        Which of the policies of a learned controller.
     """
     maker = importlib.import_module(entrant.source).make_controller
     base = env.unwrapped
-    made: Controller = maker(
-        entrant.name,
-        plant=model,
-        signals=base.signals,
-        action_signals=base.action_signals,
-        seed=seed,
-    )
+    told = {"plant": model, "signals": base.signals, "action_signals": base.action_signals}
+    if training_seed is not None:
+        told["training_seed"] = training_seed
+    made: Controller = maker(entrant.name, seed=seed, **told)
     return made
 
 
 def parameters_digest(controller: Controller) -> str:
     """Return a digest of all that the controller holds."""
     return object_digest(controller)
-
-
-def source_digest(entrant: Entrant) -> str:
-    """Return a digest of the package that the controller comes from."""
-    module = inspect.getfile(importlib.import_module(entrant.source))
-    return sources_digest([Path(module).parent])

@@ -7,29 +7,25 @@ is made again. A case that fails has a record too, and counts as wrong.
 from __future__ import annotations
 
 import math
-import os
-import threading
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks import provenance, runner
+from benchmarks import provenance
 from benchmarks.canonical import digest, sources_digest
 from benchmarks.diagnosis_cases import Case, cases
 from benchmarks.diagnosis_study import STAGES, loops, promised, study
 from benchmarks.store import Store, read_record
 from pam_envs.diagnosis.rule import Rule, judge
+from sweeps import engine
 
 HERE = Path(__file__).parent
 FOLDER = HERE / ".cells" / "diagnosis"
-ATTEMPTS = 3
-"""Rounds over what is still missing; in the last every case is alone, so that a dead worker
-costs no other case."""
 SHUFFLE = 20_260_101
 
 LOOP_FILES = ("gain.py", "gain_references.py", "plant_inverse.py")
@@ -113,6 +109,10 @@ class Options:
         Make again what is there already.
     folder : Path
         Of the records.
+    backend : {"loky", "dask"}
+        Processes of this machine, or an existing Dask cluster at ``address``.
+    address : str
+        Of the Dask scheduler.
     """
 
     chosen: str = "small"
@@ -126,6 +126,13 @@ class Options:
     jobs: int = 1
     force: bool = False
     folder: Path = FOLDER
+    backend: str = "loky"
+    address: str = ""
+
+    @property
+    def cluster(self) -> engine.Cluster:
+        """Where to compute."""
+        return engine.Cluster(self.jobs, self.backend, self.address)
 
     @property
     def whole(self) -> bool:
@@ -324,7 +331,7 @@ def _stage(
     report.found += len(tasks) - len(missing)
     if missing:
         advance = start(len(missing))
-        for _ in _computed(missing, store, options.jobs, act):
+        for _ in _computed(missing, store, options.cluster, act):
             report.computed += 1
             advance()
     made = {}
@@ -335,54 +342,23 @@ def _stage(
     return made
 
 
-def _computed(missing: Sequence[Task], store: Store, jobs: int, act: Study) -> Iterator[None]:
-    """Make records round by round; a case whose worker dies every time becomes a failed one."""
-    left = list(missing)
-    for attempt in range(ATTEMPTS):
-        alone = attempt == ATTEMPTS - 1
-        for batch in [[task] for task in left] if alone else [left]:
-            for task in _attempt(batch, store, jobs, act):
-                left = [other for other in left if other != task]
-                yield
-        if not left:
-            return
-    for task in left:
-        died = f"its worker died {ATTEMPTS} times; run it with --jobs 1 to see why"
-        store.save(task.key, {"schema": 1, "case": task.case.record(), "failure": died})
+def _computed(
+    missing: Sequence[Task], store: Store, cluster: engine.Cluster, act: Study
+) -> Iterator[None]:
+    """Make records and keep each as it comes; a case whose workers die becomes a failed one."""
+    tasks = {task.key: task for task in missing}
+    for done in engine.run(partial(_made, act), missing, cluster):
+        task = tasks[done.key]
+        if done.lost:
+            case = task.case.record()
+            store.save(done.key, {"schema": 1, "case": case, "failure": done.error})
+        elif done.error:
+            raise ValueError(f"{task.case}: {done.error}")
+        else:
+            store.save(done.key, done.value)
         yield
 
 
-def _attempt(left: Sequence[Task], store: Store, jobs: int, act: Study) -> Iterator[Task]:
-    """Make records until done or a worker dies."""
-    if jobs == 1:
-        for task in left:
-            yield _one(task, task.key, store, act)
-        return
-    from joblib import Parallel, delayed
-    from joblib.externals.loky.process_executor import BrokenProcessPool
-
-    parallel = Parallel(n_jobs=jobs, return_as="generator_unordered", pre_dispatch="2*n_jobs")
-    calls = (
-        delayed(_in_worker)(task, task.key, store, act, sources(task.stage), os.getpid())
-        for task in left
-    )
-    try:
-        yield from parallel(calls)
-    except BrokenProcessPool:  # the records on disk stay; the next attempt does the rest
-        return
-
-
-def _one(task: Task, key: str, store: Store, act: Study) -> Task:
-    """Make a record and keep it."""
-    store.save(key, {**act(task.case, (task.stage,)), "stage": task.stage})
-    return task
-
-
-def _in_worker(task: Task, key: str, store: Store, act: Study, wanted: str, driver: int) -> Task:
-    """As :func:`_one`, in a process that ends with the one that started it."""
-    if not runner._watching.is_set():
-        runner._watching.set()
-        threading.Thread(target=runner._end_with, args=(driver,), daemon=True).start()
-    if sources(task.stage) != wanted:  # a worker that was started later runs other code
-        raise ValueError("the sources were changed while the run went on; start it again")
-    return _one(task, key, store, act)
+def _made(act: Study, task: Task) -> dict[str, Any]:
+    """Make a record; called in workers."""
+    return {**act(task.case, (task.stage,)), "stage": task.stage}

@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import plots, rows, statistics
-from benchmarks.metrics import headline_of
+from benchmarks import audit, board_summary, plots, rows, standings, verified, views
+from benchmarks.board_format import number, table
+from benchmarks.board_tables import Column, track_page, with_costs
 from benchmarks.rows import Row, shown
-from benchmarks.statistics import Interval
 from benchmarks.store import write_text
 
 BOARD = Path(__file__).parent / "LEADERBOARD.md"
 
-Column = tuple[str, str, float]
 EFFORT: tuple[Column, ...] = (
     ("pressure_travel", "pressure travel [bar/s]", 1e-5),
     ("air_use", "air [mg/s]", 1e6),
@@ -99,18 +98,45 @@ def columns_of(content: Mapping[str, Any]) -> tuple[Column, ...]:
     return (*errors, *EFFORT, ("constraint_cost", "constraint cost", 1.0))
 
 
-PREFACE = """\
+INTRODUCTION = """\
 # Leaderboard
 
 Written by `python -m benchmarks board` from `benchmarks/results/*.json`; do not edit. Every row
-holds what runs it again: `python -m benchmarks verify ROW`.
+holds what runs it again: `python -m benchmarks verify ROW`. `python -m benchmarks site` makes a
+page of the same rows, with trajectories; `python -m benchmarks cite ROW` prints BibTeX. What the
+columns mean stands [at the end](#how-to-read-this).
+"""
 
+NO_ROWS = "There are no rows yet: run `python -m benchmarks run`."
+
+PREFACE = """\
 - **RMS** is the headline: true output minus the external reference, without noise, after the
-  settling window; the mean over episodes with its 95 % interval (stratified bootstrap over
-  scenarios and seeds). Everything but the sensed error is noise-free.
+  settling window; the mean over episodes with its 95 % interval (stratified bootstrap over training
+  seeds and, within scenarios, over seeds). *IQM* is the mean of the middle half of all episodes:
+  it leaves out failures, so it never leads. Everything but the sensed error is noise-free.
+- **Audit round**: scores, ranks, P(improvement), costs, failures and claims are of episodes whose
+  seeds come from the task, all artefacts of the round and a salt that was drawn after they were
+  committed. All rows of a round have the same episodes. *audit - public* is the gap to the public
+  seeds, paired by training seed, bold where the row does worse on episodes that it could not be
+  tuned to. *artefact 2* says that another artefact of this name was in an earlier round.
+- A track without a round is **self-reported**: all of it is of the public episodes, which a maker
+  can try as often as he likes, and nothing is claimed. Rows outside of the round of a track that
+  has one are listed apart with their public scores.
+- **Ranks**: a row shares the place of the first of its group (`=`) where the 95 % interval of their
+  paired difference holds zero. A learned row needs five training seeds to be ranked.
+- **Best paper controller**: the lowest mean among classical controllers with a source, that is, a
+  paper's method or a textbook rule.
+- **P(improvement)**: how likely a training seed's error is below the best paper controller's in
+  the same episode, ties half, with its interval over training seeds, scenarios and seeds. *Better*
+  needs more than 0.95 with a lower bound above 0.5 and a lower mean, ten training seeds, an audit
+  of both in one round, no more failures, and pressure travel, air, constraint cost and (of a gait)
+  EMG ratio of at most 1.1 times the paper controller's, each; with a higher cost it is called
+  *better error, higher cost*. A constraint cost below a thousandth counts as none.
+- **state**: the day on which `verify` ran the row again and found every number; *elsewhere*: on
+  another machine, where the last digits of a policy differ.
+- *Smooth references*: RMS without steps and staircases, whose edges no controller can follow.
 - A run that a limit ended counts at the worst-case value and shows under *failures*; none is left
   out.
-- Rows whose intervals overlap that of the first of their group share its rank (`=`).
 - *knows* is what the controller was built from; *preview* is how far ahead it reads the reference,
   measured on what it does.
 - Steady-state errors are of references that rest. Constraint cost 1 is one millimetre (or one bar)
@@ -144,156 +170,9 @@ holds what runs it again: `python -m benchmarks verify ROW`.
   with the planned angles, of which the tool knows nothing. *Error to its own model* is of
   controllers that follow a model: the true angle less the model's.
 - A controller's name leads to its row, where every metric of every episode stands.
-- Times per step are in [results/TIMES.md](results/TIMES.md), since no two runs give the same.
+- Times per step are in [results/TIMES.md](results/TIMES.md): as stated by who ran the row, not
+  verified, since no two runs give the same.
 """
-
-
-def interval(row: Mapping[str, Any], metric: str = "") -> Interval:
-    """Return a metric's mean with its interval, the headline's where none is named."""
-    entry = row["aggregate"][metric or headline_of(row["scenarios"]["content"])]
-    return Interval(entry["mean"], entry["low"], entry["high"])
-
-
-def tracks(all_rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """Return the rows of each track, best first; tracks by environment, the nominal one first."""
-    grouped: dict[str, list[Row]] = {}
-    for row in all_rows:
-        grouped.setdefault(row["scenarios"]["name"], []).append(row)
-    names = sorted(grouped, key=lambda n: (_family(grouped[n][0]), "nominal" not in n, n))
-    order = lambda row: (interval(row).value, row["controller"]["name"])  # noqa: E731
-    return {name: sorted(grouped[name], key=order) for name in names}
-
-
-def _family(row: Row) -> str:
-    """Return what tracks of one environment sort by: positioning first."""
-    env = str(row["env"]["id"])
-    return "" if "Positioning" in env else env
-
-
-def ranks(ordered: Sequence[Row]) -> list[str]:
-    """Return the rank of each row, best first; rows that overlap the group's first share it."""
-    groups: list[list[int]] = []
-    for i, row in enumerate(ordered):
-        if groups and interval(row).overlaps(interval(ordered[groups[-1][0]])):
-            groups[-1].append(i)
-        else:
-            groups.append([i])
-    return [f"{group[0] + 1}{'=' if len(group) > 1 else ''}" for group in groups for _ in group]
-
-
-def number(value: float | None) -> str:
-    """Return a number with three significant digits, or a dash."""
-    if value is None or not np.isfinite(value):
-        return "-"
-    if value == 0.0:
-        return "0"
-    digits = int(np.floor(np.log10(abs(value))))
-    return f"{value:.{max(0, 2 - digits)}f}" if digits >= -3 else f"{value:.2g}"
-
-
-def _line(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cells) + " |"
-
-
-def _table(heading: Sequence[str], lines: Sequence[Sequence[str]]) -> list[str]:
-    rule = [":--" if name == "controller" else "--:" for name in heading]
-    return [_line(heading), _line(rule), *(_line(line) for line in lines)]
-
-
-def _score_line(rank: str, row: Row) -> list[str]:
-    controller, head = row["controller"], interval(row)
-    content = row["scenarios"]["content"]
-    _, factor = shown(content)
-    preview = controller["preview_seconds"]
-    bounds = f"[{number(factor * head.low)}, {number(factor * head.high)}]"
-    measured = [
-        number(None if row["aggregate"][m]["mean"] is None else f * row["aggregate"][m]["mean"])
-        for m, _, f in columns_of(content)
-    ]
-    return [
-        rank,
-        f"[`{controller['name']}`](results/{row['row']}.json)",
-        controller["knowledge"],
-        f"{preview:g} s" if preview else "none",
-        f"**{number(factor * head.value)}** {bounds}",
-        *measured,
-        f"{row['failures']} of {len(row['episodes'])}",
-    ]
-
-
-def _matching(first: Row, second: Row) -> bool:
-    keys = [[(e["scenario"], e["seed"]) for e in row["episodes"]] for row in (first, second)]
-    return keys[0] == keys[1]
-
-
-def _pair_line(row: Row, above: Row | None) -> list[str]:
-    content = row["scenarios"]["content"]
-    headline, (_, factor) = headline_of(content), shown(content)
-    inner = row["aggregate"][headline]
-    middle = f"{number(factor * inner['iqm'])}"
-    bounds = f"[{number(factor * inner['iqm_low'])}, {number(factor * inner['iqm_high'])}]"
-    line = [f"`{row['controller']['name']}`", f"{middle} {bounds}"]
-    if above is None or not _matching(row, above):
-        return [*line, "-", "-"]
-    ours, theirs = (rows.scores_of(r["episodes"], headline) for r in (row, above))
-    gap = statistics.paired_difference(
-        ours, theirs, [episode["scenario"] for episode in row["episodes"]]
-    )
-    value, low, high = (factor * number for number in (gap.value, gap.low, gap.high))
-    words = f"{value:+.3f} [{low:+.3f}, {high:+.3f}]"
-    return [*line, words, f"{100.0 * statistics.share_better(ours, theirs):.0f} %"]
-
-
-def _by_line(row: Row, columns: Sequence[tuple[str, str]]) -> list[str]:
-    _, factor = shown(row["scenarios"]["content"])
-    values = [number(factor * row["by"][axis][point]) for axis, point in columns]
-    return [f"`{row['controller']['name']}`", *values]
-
-
-def _track_page(name: str, ordered: Sequence[Row], figure: str | None) -> list[str]:
-    first = ordered[0]
-    content = first["scenarios"]["content"]
-    digests = {row["scenarios"]["digest"] for row in ordered}
-    unit, factor = shown(content)
-    heading = ["rank", "controller", "knows", "preview", f"RMS [{unit}] [95 %]"]
-    heading += [title for _, title, _ in columns_of(content)] + ["failures"]
-    pairs = zip(ordered, [None, *ordered[:-1]], strict=True)
-    columns = [(axis, str(point)) for axis in first["by"] for point in first["by"][axis]]
-    lines = [
-        f"## {content['title']}",
-        "",
-        f"`{first['env']['id']}`, scenarios `{name}` version {content['version']} "
-        f"(`{first['scenarios']['digest'][:12]}`), {len(first['plants'])} scenarios x "
-        f"{len(first['seeds'])} seeds, settling window {content['settle_seconds']:g} s, "
-        f"worst case {factor * content['worst_case'][headline_of(content)]:g} {unit}.",
-        "",
-    ]
-    if len(digests) > 1:
-        lines += ["**These rows are not of one scenario file: run the track again.**", ""]
-    scored = zip(ranks(ordered), ordered, strict=True)
-    lines += [*_table(heading, [_score_line(rank, row) for rank, row in scored]), ""]
-    if figure:
-        lines += [f"![error and effort of {name}]({figure})", ""]
-    heading = ["controller", f"IQM of RMS [{unit}] [95 %]"]
-    heading += [f"RMS minus the row above [{unit}] [95 %]"]
-    heading += ["better than the row above in"]
-    lines += ["Paired with the row above, episode by episode:", ""]
-    lines += [*_table(heading, [_pair_line(*pair) for pair in pairs]), ""]
-    if columns:
-        lines += [f"RMS [{unit}] by setting:", ""]
-        heading = ["controller", *(f"{axis} {point}" for axis, point in columns)]
-        lines += [*_table(heading, [_by_line(row, columns) for row in ordered]), ""]
-    return lines
-
-
-def _legend(all_rows: Sequence[Row]) -> list[str]:
-    entries = {row["controller"]["name"]: row["controller"] for row in all_rows}
-    lines = ["## Controllers", ""]
-    for name in sorted(entries):
-        about = entries[name]
-        cited = f" *{about['citation']}*" if about["citation"] else ""
-        lines.append(f"- `{name}`: {about['summary']}{cited}")
-    return lines
 
 
 def board_text(all_rows: Sequence[Row], figures: Mapping[str, str] | None = None) -> str:
@@ -306,10 +185,27 @@ def board_text(all_rows: Sequence[Row], figures: Mapping[str, str] | None = None
     figures : mapping from track to path, optional
         Pictures to show, relative to the board.
     """
-    lines = [*PREFACE.splitlines(), ""]
-    for name, ordered in tracks(all_rows).items():
-        lines += _track_page(name, ordered, (figures or {}).get(name))
-    return "\n".join(lines + _legend(all_rows)).rstrip() + "\n"
+    tracks = standings.tracks(all_rows)
+    if not tracks:
+        return f"{INTRODUCTION}\n{NO_ROWS}\n"
+    lines = [*INTRODUCTION.splitlines(), "", "## Nominal tracks", ""]
+    lines += [*board_summary.winners(tracks), "", "## Rank changes between tracks", ""]
+    lines += [*RANK_CHANGES.splitlines(), "", *board_summary.rank_changes(tracks)]
+    lines += ["## Tracks", ""]
+    for name, ordered in tracks.items():
+        columns = with_costs(columns_of(ordered[0]["scenarios"]["content"]))
+        lines += track_page(ordered, columns, (figures or {}).get(name))
+    lines += ["## What they cost to make", "", *board_summary.costs(all_rows), ""]
+    lines += ["## Controllers", "", *board_summary.legend(all_rows), ""]
+    lines += ["## How to read this", "", *PREFACE.splitlines()]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+RANK_CHANGES = """\
+Each track against the nominal one of its environment, among the controllers that have run in all of
+them: does what wins on the plant it was designed for still win on another? ▼ and ▲: places lost and
+gained. *Episodes*: which ones the places are of, of both tracks where they differ.
+"""
 
 
 def times_text(all_rows: Sequence[Row]) -> str:
@@ -317,35 +213,55 @@ def times_text(all_rows: Sequence[Row]) -> str:
     lines = [
         "# Compute time per step",
         "",
-        "Of `predict` alone, Python included, as measured when the row was run: median over the",
-        "scenarios of the median and of the 99th percentile. Machines and their load differ.",
+        "Of `predict` alone, Python included, as stated by who ran the row, not verified: median",
+        "over the scenarios of the median and of the 99th percentile. Machines and loads differ.",
         "",
     ]
-    for name, ordered in tracks(all_rows).items():
-        table = [
-            [
-                f"`{row['controller']['name']}`",
-                number(row["volatile"]["predict_us"]["median"]),
-                number(row["volatile"]["predict_us"]["p99"]),
-                row["volatile"]["machine"],
-                row["volatile"]["date"],
-            ]
-            for row in ordered
-        ]
-        heading = ["controller", "median [us]", "p99 [us]", "machine", "date"]
-        lines += [f"## {name}", "", *_table(heading, table), ""]
+    heading = ["controller", "median [us]", "p99 [us]", "machine", "date"]
+    for name, ordered in standings.tracks(all_rows).items():
+        lines += [f"## {name}", "", *table(heading, [_time_line(row) for row in ordered]), ""]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def _time_line(row: Row) -> list[str]:
+    volatile = row["volatile"]
+    return [
+        f"`{row['controller']['name']}`",
+        number(volatile["predict_us"]["median"]),
+        number(volatile["predict_us"]["p99"]),
+        volatile["machine"],
+        volatile["date"],
+    ]
+
+
+def load(folder: Path) -> list[Row]:
+    """Return the rows of a folder as they stand: with their verifications, and in a round or not.
+
+    Raises
+    ------
+    ValueError
+        If there is no such folder, or a row of it is refused.
+    """
+    if not folder.is_dir():
+        raise ValueError(f"{folder}: no such folder of rows; run `python -m benchmarks run` first")
+    found = verified.read(folder)
+    return [_standing(row, verified.of(row, found)) for row in rows.load_all(folder)]
+
+
+def _standing(row: Row, verification: Mapping[str, Any] | None) -> Row:
+    """Return a row with its verification; the audit of another than the last round is none."""
+    last = audit.last(views.track_of(row)) if audit.in_last_round(row) else None
+    held = {**row["audit"], "entrants": last.entrants} if last else None
+    return {**row, "audit": held, views.VERIFIED: verification}
 
 
 def write(folder: Path = rows.RESULTS, board: Path = BOARD) -> list[Path]:
     """Write the board, its figures and the times, and return the paths."""
-    all_rows = rows.load_all(folder)
-    if not all_rows:
-        raise ValueError(f"no rows in {folder}; run `python -m benchmarks run` first")
+    all_rows = load(folder)
     written, figures = [], {}
-    for name, ordered in tracks(all_rows).items():
+    for name, ordered in standings.tracks(all_rows).items():
         path = folder / f"{name}.svg"
-        write_text(path, plots.error_against_effort(ordered))
+        write_text(path, plots.track_figure(ordered))
         inside = path.resolve().is_relative_to(board.parent.resolve())
         relative = path.resolve().relative_to(board.parent.resolve()) if inside else path
         figures[name] = relative.as_posix()

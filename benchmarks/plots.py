@@ -8,67 +8,104 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.metrics import headline_of
-from benchmarks.rows import shown
-
-COLOURS = {
-    "nothing": "#7f7f7f",
-    "tables": "#e69f00",
-    "nominal model": "#0072b2",
-    "true model": "#009e73",
-}
-"""Colour of what a controller knows (a palette that colour-blind readers can tell apart)."""
+from benchmarks import profiles, standings, views
+from benchmarks.rows import Row, shown
 
 _FIXED: dict[str, Any] = {
     "svg.hashsalt": "benchmarks",
-    "svg.fonttype": "path",
-    "font.family": "DejaVu Sans",
+    "svg.fonttype": "none",
+    "font.family": ["DejaVu Sans"],
     "font.size": 8.0,
 }
 
 
-def error_against_effort(ordered: Sequence[Mapping[str, Any]]) -> str:
-    """Return an SVG of headline error against pressure travel, the same bytes for equal rows.
+MARKS = {"classical": "o", "residual": "D", "learned": "s"}
+DRAWN = 8
+"""Classical controllers that are drawn, the best of a track, beside all learned ones."""
+
+
+def track_figure(ordered: Sequence[Row]) -> str:
+    """Return an SVG of a track: error against effort, and performance profiles.
+
+    Of the rows that are compared with each other, over the episodes that they are compared on.
+
+    The same bytes for equal rows.
 
     Parameters
     ----------
     ordered : sequence of rows
-        Of one track.
+        Of one track, best first.
     """
     import matplotlib
     from matplotlib.figure import Figure
 
-    unit, _ = shown(ordered[0]["scenarios"]["content"])
+    drawn = drawn_rows(ordered)
     with matplotlib.rc_context(_FIXED):
-        figure = Figure(figsize=(6.4, 4.0), layout="constrained")
-        axes = figure.add_subplot()
-        for row in ordered:
-            _point(axes, row)
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        axes.set_xlabel("pressure travel [bar/s]")
-        axes.set_ylabel(f"RMS error [{unit}], mean and 95 % interval")
-        axes.grid(True, which="both", linewidth=0.3)
-        known = {row["controller"]["knowledge"] for row in ordered}
-        for knowledge in (k for k in COLOURS if k in known):
-            axes.plot([], [], "o", color=COLOURS[knowledge], label=f"knows {knowledge}")
-        axes.legend(frameon=False)
+        figure = Figure(figsize=(9.6, 3.6), layout="constrained")
+        effort, share = figure.subplots(1, 2)
+        _draw_effort(effort, drawn)
+        _draw_profiles(share, drawn)
+        effort.set_title(f"{views.published_split(drawn[0])} episodes", loc="left", fontsize=8.0)
+        figure.legend(*share.get_legend_handles_labels(), loc="outside right center", frameon=False)
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     return "\n".join(line.rstrip() for line in buffer.getvalue().splitlines()) + "\n"
 
 
-def _point(axes: Any, row: Mapping[str, Any]) -> None:
-    content = row["scenarios"]["content"]
-    head, effort = row["aggregate"][headline_of(content)], row["aggregate"]["pressure_travel"]
-    _, factor = shown(content)
-    x, y = max(1e-5 * effort["mean"], 1e-3), max(factor * head["mean"], 1e-4)
-    bounds = factor * np.array([[head["mean"] - head["low"]], [head["high"] - head["mean"]]])
-    colour = COLOURS.get(row["controller"]["knowledge"], "#000000")
-    axes.errorbar(x, y, np.maximum(bounds, 0.0), fmt="o", markersize=4, color=colour, linewidth=1)
-    axes.annotate(
-        row["controller"]["name"], (x, y), textcoords="offset points", xytext=(5, 3), fontsize=6
-    )
+def drawn_rows(ordered: Sequence[Row]) -> list[Row]:
+    """Return the rows of a track that are drawn, best first."""
+    inside = standings.ordered(standings.listing(ordered).inside)
+    best = [r["row"] for r in inside if r["controller"]["kind"] == "classical"][:DRAWN]
+    return [r for r in inside if r["controller"]["kind"] != "classical" or r["row"] in best]
+
+
+def _style(number: int, row: Row) -> dict[str, Any]:
+    learned = row["controller"]["kind"] != "classical"
+    return {"color": f"C{number % 10}", "linestyle": "--" if learned else "-"}
+
+
+def _draw_effort(axes: Any, drawn: Sequence[Row]) -> None:
+    unit, factor = shown(drawn[0]["scenarios"]["content"])
+    for number, row in enumerate(drawn):
+        head = views.interval(row)
+        x, y = 1e-5 * views.mean_of(row, "pressure_travel"), factor * head.value
+        bounds = factor * np.array([[head.value - head.low], [head.high - head.value]])
+        mark = MARKS.get(row["controller"]["kind"], "s")
+        style = {
+            "fmt": mark,
+            "markersize": 5,
+            "linewidth": 1,
+            "color": _style(number, row)["color"],
+        }
+        axes.errorbar(x, y, np.maximum(bounds, 0.0), **style)
+    _plain_log(axes.yaxis)
+    axes.set_xlabel("pressure travel [bar/s]")
+    axes.set_ylabel(f"RMS [{unit}], mean and 95 % interval")
+
+
+def _draw_profiles(axes: Any, drawn: Sequence[Row]) -> None:
+    unit, factor = shown(drawn[0]["scenarios"]["content"])
+    errors = profiles.thresholds(drawn)
+    for number, row in enumerate(drawn):
+        shares, band = profiles.profile(row, errors)
+        label, style = row["controller"]["name"], _style(number, row)
+        axes.plot(factor * errors, 100.0 * shares, linewidth=1.1, label=label, **style)
+        bounds = {"facecolor": style["color"], "alpha": 0.12, "linewidth": 0.0}
+        axes.fill_between(factor * errors, *(100.0 * band), **bounds)
+    _plain_log(axes.xaxis)
+    axes.set_xlabel(f"RMS of an episode [{unit}]")
+    axes.set_ylabel("episodes with at most this RMS [%], 95 % band")
+
+
+def _plain_log(axis: Any) -> None:
+    """Make an axis logarithmic, its ticks plain numbers."""
+    from matplotlib import ticker
+
+    axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+    axis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(ticker.NullLocator())
+    axis.axes.grid(True, linewidth=0.3)
 
 
 def episode_figure(signals: Mapping[str, Any], set_points: Any, title: str) -> Any:

@@ -10,22 +10,34 @@ import subprocess
 from functools import lru_cache
 from pathlib import Path
 
-from benchmarks.canonical import sources_digest
+from benchmarks.canonical import SOURCES, sources_digest
 
-ROOT = Path(__file__).resolve().parent.parent
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent
+CODE = (
+    *("pam_envs", "sweeps", "baselines", "agents", "benchmarks"),
+    *(f":(exclude)benchmarks/{name}" for name in ("results", "site", "rounds.json")),
+    ":(exclude)benchmarks/LEADERBOARD.md",
+)
+"""What makes results, as git names it: all but what a run writes."""
 PACKAGES = ("numpy", "scipy", "numba", "gymnasium", "onnxruntime")
+METRICS = tuple(sorted(path.name for path in HERE.glob("metrics*.py")))
 SCORING = (
     "canonical.py",
     "cells.py",
     "controllers.py",
     "errors.py",
-    "metrics.py",
-    "metrics_elbow.py",
-    "metrics_joint.py",
-    "metrics_knee.py",
     "rollout.py",
+    "scenarios.py",
+    "artefacts.py",
+    "knowledge.py",
+    "making.py",
+    "source_code.py",
+    "traces.py",
+    "trainings.py",
+    *METRICS,
 )
-"""Pages of this package that a score depends on."""
+"""Pages of this package that the record of a score depends on."""
 
 
 @lru_cache(maxsize=1)
@@ -41,38 +53,62 @@ def packages() -> dict[str, str]:
 
 
 @lru_cache(maxsize=8)
-def sources(package: str) -> dict[str, str]:
+def sources(package: str, code_only: bool = False) -> dict[str, str]:
     """Return digests of the code and data that a score of a controller depends on.
 
     Parameters
     ----------
     package : str
         The controller's own package.
+    code_only : bool
+        Leave the package's data out: policies, whose own files are named one by one.
     """
-    here = Path(__file__).parent
+    kinds = {".py"} if code_only else SOURCES
     return {
         "pam_envs": sources_digest([ROOT / "pam_envs"]),
-        package: sources_digest([ROOT / package]),
-        "benchmarks": sources_digest([here / name for name in SCORING]),
+        package: sources_digest([ROOT / package], kinds),
+        "benchmarks": sources_digest([HERE / name for name in SCORING]),
     }
 
 
 @lru_cache(maxsize=1)
+def cpu() -> str:
+    """Return the kind of processor that numerical libraries choose their code by."""
+    import llvmlite.binding
+
+    return str(llvmlite.binding.get_host_cpu_name())
+
+
+@lru_cache(maxsize=1)
 def commit() -> str:
-    """Return the checkout's commit, with ``+`` where files differ, or ``"unknown"``."""
+    """Return the checkout's commit, with ``+`` where code differs, or ``"unknown"``."""
     try:
-        head = _git("rev-parse", "HEAD")
-        # results are what a run writes: they do not make the checkout another one
-        changed = _git("status", "--porcelain", "--", "pam_envs", "baselines", "agents")
+        return git("rev-parse", "HEAD") + ("+" if changed() else "")
     except (OSError, subprocess.SubprocessError):
         return "unknown"
-    return head + ("+" if changed else "")
 
 
-def _git(*arguments: str) -> str:
-    command = ["git", "-C", str(ROOT), *arguments]
-    done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=20)
-    return done.stdout.strip()
+def changed(folder: Path = ROOT) -> list[str]:
+    """Return the files of code and scenarios that are not as in the last commit.
+
+    Raises
+    ------
+    OSError, subprocess.SubprocessError
+        If the folder is not a git checkout, or there is no git.
+    """
+    said = git("status", "--porcelain", "--untracked-files=all", "--", *CODE, folder=folder)
+    return [line[2:].strip() for line in said.splitlines()]
+
+
+def git(*arguments: str, folder: Path = ROOT) -> str:
+    """Return what git says in a folder."""
+    return git_bytes(*arguments, folder=folder).decode().strip()
+
+
+def git_bytes(*arguments: str, folder: Path = ROOT) -> bytes:
+    """Return what git says in a folder, as it is."""
+    command = ["git", "-C", str(folder), *arguments]
+    return subprocess.run(command, check=True, capture_output=True, timeout=20).stdout
 
 
 def occasion() -> dict[str, str]:

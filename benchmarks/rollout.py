@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -10,7 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.controllers import Controller
+from benchmarks.controllers import ROOT, Controller
+
+LONGEST = 300
+"""Characters of a message that a row keeps."""
 
 Array = NDArray[np.float64]
 Watch = Callable[[Any], None]
@@ -34,7 +38,8 @@ class Episode:
     period : float
         Control period [s].
     failure : str
-        Why the episode ended before its time; empty if it did not.
+        Why the episode ended before its time, in the words of the error where a controller raised
+        one; empty if it did not.
     """
 
     signals: Mapping[str, Array]
@@ -62,6 +67,12 @@ def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None)
         Of the environment's reset.
     watch : callable, optional
         Called with the environment after the reset and after each step (for a video).
+
+    Raises
+    ------
+    Exception
+        Whatever the environment raises of an action that it has to take: an error of the project's
+        own, and no result. What the controller raises is one.
     """
     observation, first = env.reset(seed=seed)
     keys = tuple(first)
@@ -77,28 +88,33 @@ def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None)
             begin = clock()
             action, state = controller.predict(observation, state, start, True)
             spent = clock() - begin
+            followed = np.ravel(told(state)).tolist() if told else []
+        except Exception as error:
+            failure = _sentence(error)
+            break
+        try:
             after, _, terminated, truncated, info = env.step(action)
         except Exception as error:
-            failure = f"{type(error).__name__}: {error}"
+            if _acceptable(action, env):
+                raise
+            failure = _sentence(error)
             break
         start = False
         observations.append(observation)
         actions.append(action)
         seconds.append(spent)
         infos.append(tuple([info[key] for key in keys]))
-        if told:
-            models.append(np.ravel(told(state)).tolist())
+        models.append(followed)
         observation, over = after, terminated or truncated
         if terminated:
             failure = f"a limit ended the episode at {info['time']:g} s"
         if watch:
             watch(env)
     table = np.array(infos, np.float64).reshape(-1, len(keys))
-    followed = np.array(models, np.float64).T
     return Episode(
         signals={
             **{key: np.ascontiguousarray(table[:, i]) for i, key in enumerate(keys)},
-            **{f"model/{k}": series.copy() for k, series in enumerate(followed)},
+            **{f"model/{k}": one.copy() for k, one in enumerate(np.array(models, np.float64).T)},
         },
         observations=np.array(observations),
         actions=np.array(actions),
@@ -108,22 +124,20 @@ def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None)
     )
 
 
-class Replay:
-    """A controller that gives recorded actions, whatever it observes."""
+def _acceptable(action: Any, env: Any) -> bool:
+    """Return whether an environment has to take an action: numbers of the right shape."""
+    try:
+        given = np.asarray(action, np.float64)
+    except (TypeError, ValueError):
+        return False
+    return given.shape == env.action_space.shape and bool(np.isfinite(given).all())
 
-    def __init__(self, actions: NDArray[Any]) -> None:
-        self.actions = actions
 
-    def predict(
-        self,
-        observation: Any,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = True,
-    ) -> tuple[Any, Any]:
-        """Return the next recorded action; ``state`` counts the steps."""
-        step = 0 if state is None or episode_start else int(state)
-        return self.actions[step], step + 1
+def _sentence(error: Exception) -> str:
+    """Return kind and message of an error, without what differs from run to run."""
+    text = f"{type(error).__name__}: {error}".replace(f"{ROOT}/", "")
+    text = re.sub(r"0x[0-9a-fA-F]{6,}", "0x...", " ".join(text.split()))
+    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
 
 
 def preview_used(episode: Episode, controller: Controller, signals: Any) -> int:

@@ -2,28 +2,50 @@
 
 from __future__ import annotations
 
-import os
-import threading
-import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
+from benchmarks import audit, rows
 from benchmarks import cells as cells_module
-from benchmarks import rows
+from benchmarks.audit import Audit
 from benchmarks.cells import Cell, cells_of
 from benchmarks.controllers import Entrant
 from benchmarks.scenarios import ScenarioSet
 from benchmarks.store import Store, sweep
-
-ATTEMPTS = 4
-"""Rounds over the cells that are still missing, so that a killed worker costs one cell."""
+from sweeps import engine
 
 CELLS = Path(__file__).parent / ".cells"
 
 Advance = Callable[[], None]
+Pair = tuple[Entrant, ScenarioSet]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A row to be made.
+
+    Attributes
+    ----------
+    entrant : Entrant
+    track : ScenarioSet
+    found : Audit, optional
+        Where the controller as it is now is in the last round of the track.
+    """
+
+    entrant: Entrant
+    track: ScenarioSet
+    found: Audit | None
+
+    @property
+    def cells(self) -> list[Cell]:
+        """All cells of the row."""
+        return cells_of(self.entrant, self.track, self.found)
+
+
+def plans(pairs: Iterable[Pair]) -> list[Plan]:
+    """Return what has to be run for rows."""
+    return [Plan(*pair, audit.find(*pair)) for pair in pairs]
 
 
 @dataclass
@@ -41,7 +63,7 @@ class Report:
     rows : list of Path
         Rows that were written.
     missing : list of str
-        Cells that could not be computed, with the reason.
+        Cells that could not be computed, and rows that could not be made, with the reason.
     """
 
     computed: int = 0
@@ -77,9 +99,14 @@ class Options:
     backend: str = "loky"
     address: str = ""
 
+    @property
+    def cluster(self) -> engine.Cluster:
+        """Where to compute."""
+        return engine.Cluster(self.jobs, self.backend, self.address)
+
 
 def run(
-    pairs: Sequence[tuple[Entrant, ScenarioSet]],
+    pairs: Sequence[Pair],
     options: Options,
     start: Callable[[int], Advance] = lambda total: lambda: None,
 ) -> Report:
@@ -93,128 +120,74 @@ def run(
     start : callable
         Called with the number of cells to compute; returns what to call after each of them.
     """
-    store = Store(options.cells)
+    cluster, store = options.cluster, Store(options.cells)
     report = Report(swept=store.sweep() + sweep(options.out))
     before = set(store.quarantined())
-    wanted = {cell.key: cell for pair in pairs for cell in cells_of(*pair)}
+    chosen = [(plan, {cell.key: cell for cell in plan.cells}) for plan in plans(pairs)]
+    wanted = {key: cell for _, cells in chosen for key, cell in cells.items()}
     if options.force:
         for key in wanted:
             store.path(key).unlink(missing_ok=True)
     missing = {key: cell for key, cell in wanted.items() if store.load(key) is None}
     report.found = len(wanted) - len(missing)
-    errors = _compute_all(missing, store, options, start(len(missing)))
-    for pair in pairs:
-        _finish(pair, store, options, report)
-    report.computed = len(missing) - sum(store.load(key) is None for key in missing)
-    report.missing = [f"{_title(wanted[key])}: {text}" for key, text in errors.items()]
+    errors = _compute(missing.values(), store, cluster, start(len(missing)))
+    for plan, cells in chosen:
+        _finish(plan, list(cells), store, options, report, errors)
+    report.computed = sum(key not in errors for key in missing)
+    report.missing += [f"{title(wanted[key])}: {text}" for key, text in errors.items()]
     report.quarantined = sorted(set(store.quarantined()) - before)
     return report
 
 
+def planned(pairs: Sequence[Pair], options: Options) -> Iterator[tuple[Cell, bool]]:
+    """Return the cells of rows, and whether each is there already; nothing is changed."""
+    store = Store(options.cells)
+    for cell in (cell for plan in plans(pairs) for cell in plan.cells):
+        yield cell, not options.force and store.sound(cell.key)
+
+
 def _finish(
-    pair: tuple[Entrant, ScenarioSet], store: Store, options: Options, report: Report
+    plan: Plan,
+    keys: Sequence[str],
+    store: Store,
+    options: Options,
+    report: Report,
+    errors: dict[str, str],
 ) -> None:
     """Write a row whose cells are all there."""
-    loaded = [store.load(cell.key) for cell in cells_of(*pair)]
-    records = [record for record in loaded if record is not None]
+    loaded = {key: store.load(key) for key in keys}
+    records = [record for record in loaded.values() if record is not None]
     if len(records) == len(loaded):
-        report.rows.append(rows.save(rows.assemble(*pair, records), options.out))
+        try:
+            row = rows.assemble(plan.entrant, plan.track, records, plan.found)
+            report.rows.append(rows.save(row, options.out))
+        except ValueError as error:
+            report.missing.append(f"{rows.row_name(plan.track.name, plan.entrant.name)}: {error}")
+    for key in (key for key, record in loaded.items() if record is None):
+        errors.setdefault(key, "its file has been removed meanwhile; run it again")
 
 
-def _title(cell: Cell) -> str:
-    return f"{cell.entrant.name} in {cell.track.name}/{cell.scenario.name}"
+def title(cell: Cell) -> str:
+    """Return a cell in words."""
+    policy = "" if cell.training_seed is None else f" of training seed {cell.training_seed}"
+    return f"{cell.entrant.name}{policy} in {cell.track.name}/{cell.scenario.name} ({cell.split})"
 
 
-def _compute_all(
-    missing: dict[str, Cell], store: Store, options: Options, advance: Advance
+def _compute(
+    missing: Iterable[Cell], store: Store, cluster: engine.Cluster, advance: Advance
 ) -> dict[str, str]:
-    """Compute cells round by round, and return what could not be computed."""
-    left, errors = dict(missing), dict[str, str]()
-    for attempt in range(ATTEMPTS):
-        if not left:
-            break
-        # with the last attempt alone in this process, a cell that kills its worker is named
-        for key, error in _attempt(left, store, options):
-            if error:
-                errors[key] = error
-            else:
-                errors.pop(key, None)
-                advance()
-        left = {k: c for k, c in left.items() if k not in errors and store.load(k) is None}
-        if left and attempt + 1 < ATTEMPTS:
-            time.sleep(0.1)
-    for key in left:
-        errors[key] = f"its worker died {ATTEMPTS} times; run it with --jobs 1 to see why"
+    """Compute cells, keep each as it comes, and return what could not be computed."""
+    errors = {}
+    for done in engine.run(cells_module.compute, missing, cluster):
+        if done.error is None:
+            store.save(done.key, done.value)
+        else:
+            errors[done.key] = done.error
+        advance()
     return errors
 
 
-def _attempt(
-    left: dict[str, Cell], store: Store, options: Options
-) -> Iterator[tuple[str, str | None]]:
-    """Compute cells until done or a worker dies."""
-    if options.jobs == 1 and options.backend == "loky":
-        for cell in left.values():
-            yield _compute_one(cell, store)
-        return
-    from joblib import Parallel, delayed
-    from joblib.externals.loky.process_executor import BrokenProcessPool
-
-    tasks = (delayed(_compute_in_worker)(cell, store, os.getpid()) for cell in left.values())
-    with _backend(options):
-        parallel = Parallel(
-            n_jobs=options.jobs, return_as="generator_unordered", pre_dispatch="3*n_jobs"
-        )
-        try:
-            yield from parallel(tasks)
-        except BrokenProcessPool:  # the cells on disk stay; the next attempt does the rest
-            return
-
-
-def _backend(options: Options) -> AbstractContextManager[Any]:
-    """Return the joblib backend: processes here, or a running Dask cluster."""
-    if options.backend == "dask":
-        import joblib
-        from dask.distributed import Client
-
-        client = Client(options.address)
-        return joblib.parallel_config(backend="dask", client=client)
-    if options.backend != "loky":
-        raise ValueError(f"backend = {options.backend!r}; choose 'loky' or 'dask'")
-    return nullcontext()
-
-
-def _compute_one(cell: Cell, store: Store) -> tuple[str, str | None]:
-    """Compute a cell and keep it; an error is returned as a sentence."""
-    try:
-        store.save(cell.key, cells_module.compute(cell))
-    except Exception as error:
-        return cell.key, f"{type(error).__name__}: {error}"
-    return cell.key, None
-
-
-_watching = threading.Event()
-
-
-def _compute_in_worker(cell: Cell, store: Store, driver: int) -> tuple[str, str | None]:
-    """As :func:`_compute_one`, in a process that ends with the one that started it."""
-    if not _watching.is_set():
-        _watching.set()
-        threading.Thread(target=_end_with, args=(driver,), daemon=True).start()
-    return _compute_one(cell, store)
-
-
-def _end_with(driver: int) -> None:
-    """End this process when the driver is gone (a killed driver leaves its workers otherwise)."""
-    if os.getppid() != driver:  # a cluster's worker, or one started through a helper
-        return
-    while os.getppid() == driver:
-        time.sleep(0.5)
-    os._exit(1)
-
-
-def pairs_of(
-    entrants: Iterable[Entrant], tracks: Iterable[ScenarioSet]
-) -> list[tuple[Entrant, ScenarioSet]]:
+def pairs_of(entrants: Iterable[Entrant], tracks: Iterable[ScenarioSet]) -> list[Pair]:
     """Return every controller with every track of an environment that it runs in."""
     chosen = list(entrants)
     return [(e, track) for track in tracks for e in chosen if e.runs_in(track.env)]

@@ -1,14 +1,19 @@
 """Fixed scenario files: which episodes are run, and how they are scored.
 
-A file names an environment, a grid of keyword arguments, the seeds, the settling window and the
-worst-case values. What is digested is the content and not the layout, so that a comment changes
-nothing and a number changes everything.
+A file names an environment, a grid of keyword arguments, the number of seeds, the settling window
+and the worst-case values. What is digested is the content and not the layout, so that a comment
+changes nothing and a number changes everything.
+
+Every scenario has public seeds of its own, derived from its name: one seed would give all scenarios
+of a grid the same reference and noise, and their errors would rise and fall together. A scenario
+of the same name in another track has the same seeds, so that tracks are compared in pairs.
 """
 
 from __future__ import annotations
 
+import hashlib
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -59,6 +64,9 @@ _OPTIONAL = {
     "unit",
     "shown",
 }
+MOST_SEEDS = 1000
+PUBLIC_SEEDS = 899_999
+"""Public seeds are from 1 to this number; those of tuning and training are above."""
 _UNITS = {"load": "kg", "mismatch": "N", "pace": "s", "payload": "kg"}
 """Of the axes of a grid, for the scenarios' names."""
 
@@ -84,6 +92,18 @@ class Scenario:
     kwargs: Mapping[str, Any]
     model: Mapping[str, Any]
     rests: bool
+
+
+def public_seeds(name: str, number: int) -> tuple[int, ...]:
+    """Return the public seeds of a scenario: a function of its name, all different."""
+    different = dict.fromkeys(itertools.islice(_drawn(name), 2 * number))
+    return tuple(different)[:number]
+
+
+def _drawn(name: str) -> Iterator[int]:
+    for k in itertools.count():
+        drawn = hashlib.sha256(f"public|{name}|{k}".encode()).digest()[:8]
+        yield 1 + int.from_bytes(drawn, "big") % PUBLIC_SEEDS
 
 
 @dataclass(frozen=True)
@@ -119,9 +139,11 @@ class ScenarioSet:
             raise ValueError(f"{name}: the metrics of a chain need tool_length [m]")
         if set(self.content["worst_case"]) != set(wanted):
             raise ValueError(f"{name}: worst_case needs a value for each of {', '.join(wanted)}")
-        seeds = self.content["seeds"]
-        if not seeds or len(set(seeds)) != len(seeds):
-            raise ValueError(f"{name}: seeds must be different whole numbers, got {seeds}")
+        number = self.content["seeds"]
+        if type(number) is not int or not 1 <= number <= MOST_SEEDS:
+            raise ValueError(
+                f"{name}: seeds must be their number, from 1 to {MOST_SEEDS}, got {number!r}"
+            )
 
     @property
     def name(self) -> str:
@@ -134,14 +156,19 @@ class ScenarioSet:
         return str(self.content["env"])
 
     @property
-    def seeds(self) -> tuple[int, ...]:
-        """Seeds of each scenario's episodes."""
-        return tuple(int(seed) for seed in self.content["seeds"])
+    def seeds(self) -> dict[str, tuple[int, ...]]:
+        """Public seeds of each scenario."""
+        names = [scenario.name for scenario in self.scenarios()]
+        return {name: public_seeds(name, self.content["seeds"]) for name in names}
 
     @property
     def digest(self) -> str:
         """SHA-256 of the content."""
         return digest(self.content)
+
+    def __hash__(self) -> int:
+        """Return a hash of the content, so that what is built of a track can be kept by it."""
+        return hash(self.digest)
 
     def scenarios(self) -> tuple[Scenario, ...]:
         """Return the grid, written out by the names of its axes.
@@ -190,6 +217,11 @@ def load(path: Path) -> ScenarioSet:
     return made
 
 
-def available(folder: Path = FOLDER) -> dict[str, ScenarioSet]:
+def names(folder: Path | None = None) -> tuple[str, ...]:
+    """Return the names of the scenario files of a folder, by default of the checkout."""
+    return tuple(sorted(path.stem for path in (folder or FOLDER).glob("*.yaml")))
+
+
+def available(folder: Path | None = None) -> dict[str, ScenarioSet]:
     """Return all scenario files by name."""
-    return {path.stem: load(path) for path in sorted(folder.glob("*.yaml"))}
+    return {name: load((folder or FOLDER) / f"{name}.yaml") for name in names(folder)}

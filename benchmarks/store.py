@@ -11,6 +11,7 @@ import json
 import os
 import socket
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -101,16 +102,26 @@ class Store:
 
     def load(self, key: str) -> dict[str, Any] | None:
         """Return a record, ``None`` if it is missing; a corrupt one is set aside first."""
-        path = self.path(key)
-        if not path.exists():
-            return None
         try:
-            record = read_record(path)
-            if record.get("key") != key:
-                raise ValueError(f"{path}: holds the record {record.get('key')!r}")
-        except ValueError:
-            self.quarantine(path)
+            return self._read(key)
+        except FileNotFoundError:
             return None
+        except ValueError:
+            self.quarantine(self.path(key))
+            return None
+
+    def sound(self, key: str) -> bool:
+        """Return whether the record ``key`` is there and whole; nothing is changed."""
+        try:
+            self._read(key)
+        except (FileNotFoundError, ValueError):
+            return False
+        return True
+
+    def _read(self, key: str) -> dict[str, Any]:
+        record = read_record(self.path(key))
+        if record.get("key") != key:
+            raise ValueError(f"{self.path(key)}: holds the record {record.get('key')!r}")
         return record
 
     def save(self, key: str, record: Mapping[str, Any]) -> None:
@@ -123,7 +134,8 @@ class Store:
         aside.mkdir(parents=True, exist_ok=True)
         number = len(list(aside.iterdir()))
         target = aside / f"{path.stem}.{number}{path.suffix}"
-        os.replace(path, target)
+        with suppress(FileNotFoundError):  # another run was faster
+            os.replace(path, target)
         return target
 
     def quarantined(self) -> list[str]:

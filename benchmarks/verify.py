@@ -1,25 +1,29 @@
-"""Run a row again from its own record and say what differs."""
+"""Run a row again from its own record and say what differs.
+
+Nothing of a row is believed: environment, scenarios, policy files, salt and the set of episodes
+are those of this checkout, and every number is computed again.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from benchmarks import cells, provenance, rows, scenarios
+from benchmarks import audit, cells, nearly, replay, rows, scenarios, tasks, verified
+from benchmarks.audit import Audit
 from benchmarks.canonical import plain
+from benchmarks.cells import Cell, cells_of
 from benchmarks.controllers import Entrant, find
-from benchmarks.metrics import headline_of
+from benchmarks.nearly import differences
 from benchmarks.scenarios import ScenarioSet
-from benchmarks.store import comparable, fault
+from benchmarks.store import CHECKSUM, comparable, fault
+from sweeps import engine
 
-REPLAYED = 1e-3
-"""Relative difference of the headline that a learned row may have on another machine."""
-
-_NOTED = ("made_with",)
-_UNREPEATED = ("actions",)
+Record = Mapping[str, Any]
 
 
 @dataclass
@@ -29,15 +33,21 @@ class Verdict:
     Attributes
     ----------
     row : str
+    mode : {"bits", "elsewhere"}
+        How it was compared.
     drifted : list of str
         Every field that differs, with both values; empty if the row holds.
     notes : list of str
         Differences that are no drift by themselves (versions, commit).
+    checksum : str
+        Of the row that was read.
     """
 
     row: str
+    mode: str = verified.BITS
     drifted: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    checksum: str = ""
 
     @property
     def holds(self) -> bool:
@@ -45,130 +55,161 @@ class Verdict:
         return not self.drifted
 
 
-def verify(path: Path, jobs: int = 1, folder: Path = scenarios.FOLDER) -> Verdict:
+def verify(path: Path, cluster: engine.Cluster | None = None, elsewhere: bool = False) -> Verdict:
     """Run the row of a file again and compare.
 
-    Classical rows must come out equal to the last bit. Learned rows replay their recorded
-    actions, and their headline must come out within 0.1 %.
+    Rows must come out equal to the last bit. The row has no say in that; whoever verifies may ask
+    for a comparison that allows for another machine, see :mod:`benchmarks.nearly`.
 
     Parameters
     ----------
     path : Path
-    jobs : int
-        Processes.
-    folder : Path
-        Where the checkout's scenario files lie.
+    cluster : Cluster, optional
+        Where to compute; in this process by default.
+    elsewhere : bool
+        Whether last digits may differ, since the row was made with other packages or another
+        processor.
     """
+    verdict = Verdict(path.stem, verified.ELSEWHERE if elsewhere else verified.BITS)
     try:
         stored = json.loads(path.read_bytes())
-    except (OSError, ValueError) as error:
-        return Verdict(path.stem, [f"the file cannot be read: {error}"])
-    verdict = Verdict(path.stem)
+        rows.check_schema(stored, path)
+    except (OSError, ValueError, AttributeError, TypeError) as error:
+        verdict.drifted.append(f"the file cannot be read: {error}")
+        return verdict
+    verdict.checksum = str(stored.get(CHECKSUM))
     wrong = fault(stored)
     if wrong:
         verdict.drifted.append(f"file: {wrong}")
     try:
-        track = ScenarioSet(stored["scenarios"]["content"])
-        entrant = find(stored["controller"]["name"])
-        _compare_scenarios(stored, track, folder, verdict)
-        again = _run_again(stored, entrant, track, jobs)
+        _check(stored, cluster or engine.Cluster(), verdict)
+    except KeyError as error:
+        verdict.drifted.append(f"cannot be run again: there is no {error}")
     except Exception as error:
         verdict.drifted.append(f"cannot be run again: {type(error).__name__}: {error}")
-        return verdict
-    _compare(stored, again, entrant, verdict)
     return verdict
 
 
-def _compare_scenarios(
-    stored: Mapping[str, Any], track: ScenarioSet, folder: Path, verdict: Verdict
+def _check(stored: Record, cluster: engine.Cluster, verdict: Verdict) -> None:
+    tasks.check_version(stored["env"]["id"], stored["row"])
+    entrant = find(stored["controller"]["name"])
+    track = scenarios.load(scenarios.FOLDER / f"{stored['scenarios']['name']}.yaml")
+    other = _other_scenarios(stored, track)
+    if other:  # and nothing of it is run
+        verdict.drifted += other
+        return
+    artefact = stored["controller"]["artefact"]["digest"]
+    found = audit.of(track, entrant.name, stored["task"], artefact)
+    wanted = cells_of(entrant, track, found)
+    _compare_audit(stored, entrant, track, found, verdict)
+    _compare_episodes(stored, wanted, verdict)
+    again = _run_again(entrant, track, found, wanted, cluster)
+    _compare(stored, again, entrant, track, verdict)
+
+
+def _other_scenarios(stored: Record, track: ScenarioSet) -> list[str]:
+    """Return in what the recorded scenarios are not those of the checkout's file."""
+    said, file = stored["scenarios"], f"{track.name}.yaml, version {track.content['version']}"
+    found = []
+    if plain(track.content) != said["content"]:
+        found.append(f"scenarios: the content is not that of {file}; run the row again")
+    if said["digest"] != track.digest:
+        found.append(
+            f"scenarios.digest: {str(said['digest'])[:16]} recorded, {track.digest[:16]} of {file}"
+        )
+    if stored["env"]["id"] != track.env:
+        found.append(f"env.id: {stored['env']['id']} recorded, {track.env} of {file}")
+    return found
+
+
+def _compare_audit(
+    stored: Record,
+    entrant: Entrant,
+    track: ScenarioSet,
+    found: Audit | None,
+    verdict: Verdict,
 ) -> None:
-    """Compare the row's scenarios with their digest and with the file of that name."""
-    if stored["scenarios"]["digest"] != track.digest:
+    """Compare the row's audit with the last round of its track, and the round with git."""
+    audit.check_only_added()
+    recorded = stored["audit"]
+    if found is None and recorded is not None:
         verdict.drifted.append(
-            f"scenarios.digest: {stored['scenarios']['digest'][:16]} recorded, "
-            f"{track.digest[:16]} of the recorded content"
+            f"audit: its task and artefact are not in the last round of {track.name}; run "
+            f"`python -m benchmarks audit {track.name}`"
         )
-    files = scenarios.available(folder)
-    if track.name not in files:
-        verdict.drifted.append(f"scenarios: there is no file {track.name}.yaml")
-    elif files[track.name].digest != track.digest:
+    if found is None:
+        return
+    if recorded is None:
         verdict.drifted.append(
-            f"scenarios: the content is not that of {track.name}.yaml, version "
-            f"{files[track.name].content['version']}; run the row again"
+            f"audit: left out, though round {found.round.number} was drawn on "
+            f"{found.round.drawn}; run the row again"
         )
+        return
+    for name, value in plain(found.record()).items():
+        verdict.drifted += differences(recorded.get(name), value, f"audit.{name}")
+    said = audit.history(found.round, entrant, track)
+    verdict.drifted += said.wrong
+    verdict.notes += [said.unknown] if said.unknown else []
+
+
+def _compare_episodes(stored: Record, wanted: Sequence[Cell], verdict: Verdict) -> None:
+    """Compare which episodes there are with which there must be."""
+    recorded = Counter(
+        (e["split"], e["training_seed"], e["scenario"], e["seed"]) for e in stored["episodes"]
+    )
+    needed = Counter(
+        (cell.split, cell.training_seed, cell.scenario.name, seed)
+        for cell in wanted
+        for seed in cell.seeds
+    )
+    for what, which in (("missing", needed - recorded), ("not to be there", recorded - needed)):
+        if which:
+            split, run, scenario, seed = next(iter(which))
+            trained = "" if run is None else f", training seed {run}"
+            verdict.drifted.append(
+                f"episodes: {which.total()} {what}, the first: {split}, {scenario}, seed {seed}"
+                + trained
+            )
 
 
 def _run_again(
-    stored: Mapping[str, Any], entrant: Entrant, track: ScenarioSet, jobs: int
+    entrant: Entrant,
+    track: ScenarioSet,
+    found: Audit | None,
+    wanted: Sequence[Cell],
+    cluster: engine.Cluster,
 ) -> dict[str, Any]:
-    recorded = stored.get("actions") if entrant.kind == "learned" else None
-    tasks = [
-        (cell, None if recorded is None else _unpacked(recorded[cell.scenario.name]))
-        for cell in cells.cells_of(entrant, track)
-    ]
-    if jobs == 1:
-        records = [cells.compute(*task) for task in tasks]
-    else:
-        from joblib import Parallel, delayed
-
-        records = Parallel(n_jobs=jobs)(delayed(cells.compute)(*task) for task in tasks)
-    return dict(plain(rows.assemble(entrant, track, records)))
-
-
-def _unpacked(actions: Mapping[str, Any]) -> dict[int, Any]:
-    return {int(seed): cells.unpack(packed) for seed, packed in actions.items()}
+    keys, records = [cell.key for cell in wanted], {}
+    for done in engine.run(cells.compute, wanted, cluster):
+        if done.error is not None:
+            raise ValueError(done.error)
+        records[done.key] = done.value
+    return dict(plain(rows.assemble(entrant, track, [records[key] for key in keys], found)))
 
 
 def _compare(
-    stored: Mapping[str, Any], again: dict[str, Any], entrant: Entrant, verdict: Verdict
+    stored: Record, again: dict[str, Any], entrant: Entrant, track: ScenarioSet, verdict: Verdict
 ) -> None:
     before, after = comparable(stored), comparable(again)
-    for name in _NOTED:
-        verdict.notes += differences(before.pop(name, None), after.pop(name, None), name)
-    if entrant.kind != "learned":
-        verdict.drifted += differences(before, after)
+    made = [row.pop("made_with", None) for row in (before, after)]
+    verdict.notes += differences(*made, "made_with")
+    if verdict.mode == verified.BITS:
+        drifted = differences(before, after)
+        verdict.drifted += drifted
+        if drifted and _other_machine(verdict.notes):
+            verdict.notes.append(OTHER)
         return
-    headline = ("aggregate", headline_of(stored["scenarios"]["content"]), "mean")
-    old, new = _at(before, headline), _at(after, headline)
-    if not abs(new - old) <= REPLAYED * abs(old):
-        verdict.drifted.append(f"{'.'.join(headline)}: {old!r} recorded, {new!r} now")
-    for name in ("env", "scenarios", "plants", "models", "seeds", "failures"):
-        verdict.drifted += differences(before.get(name), after.get(name), name)
-    identity = ("digest", "parameters", "name", "kind", "knowledge")
-    for name in identity:
-        verdict.drifted += differences(
-            before["controller"].get(name), after["controller"].get(name), f"controller.{name}"
-        )
+    nearly.compare(before, after, verdict.drifted, verdict.notes)
+    if entrant.files:
+        verdict.drifted += replay.differences(stored, entrant, track)
 
 
-def _at(record: Any, place: tuple[str, ...]) -> float:
-    for key in place:
-        record = record[key]
-    return float(record)
+OTHER = (
+    "packages or processor are others than recorded, which changes last digits: `verify "
+    "--elsewhere` allows for that, and then every score to 1 %, every mean and interval to 0.1 % "
+    "has to agree; what it finds is no proof of equal bits"
+)
 
 
-def differences(old: Any, new: Any, where: str = "") -> list[str]:
-    """Return a line for every leaf in which two plain values differ, with both values."""
-    return list(_differences(old, new, where))
-
-
-def _differences(old: Any, new: Any, where: str) -> Iterator[str]:
-    if isinstance(old, dict) and isinstance(new, dict):
-        for key in dict.fromkeys([*old, *new]):
-            place = f"{where}.{key}" if where else str(key)
-            yield from _differences(old.get(key), new.get(key), place)
-    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
-        for i, pair in enumerate(zip(old, new, strict=True)):
-            yield from _differences(*pair, f"{where}[{i}]")
-    elif type(old) is not type(new) or old != new:
-        yield f"{where}: {_short(old)} recorded, {_short(new)} now"
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def environment_note() -> str:
-    """Return the versions that the comparison was made with, in one line."""
-    return ", ".join(f"{name} {version}" for name, version in provenance.packages().items())
+def _other_machine(notes: Sequence[str]) -> bool:
+    return any(note.startswith(("made_with.packages", "made_with.cpu")) for note in notes)

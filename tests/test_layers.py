@@ -7,10 +7,13 @@ import sys
 
 import pytest
 
-HEAVY = ("torch", "stable_baselines3", "matplotlib", "pygame", "imageio", "onnxruntime", "joblib")
+HEAVY = (
+    *("torch", "stable_baselines3", "matplotlib", "pygame", "imageio", "onnxruntime"),
+    *("joblib", "dask", "distributed"),
+)
 """What only learning, drawing and benchmarks need."""
 
-OURS = ("baselines", "agents", "benchmarks", "tests")
+OURS = ("sweeps", "baselines", "agents", "benchmarks", "tests")
 """What is not in the wheel."""
 
 IMPORT = "import pam_envs"

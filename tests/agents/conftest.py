@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-NEEDED = ("torch", "stable_baselines3", "onnx", "onnxruntime")
+NEEDED = ("torch", "stable_baselines3", "sb3_contrib", "onnx", "onnxruntime")
 collect_ignore_glob = [] if all(map(find_spec, NEEDED)) else ["test_*.py"]
 
 
 @pytest.fixture(scope="session")
-def ppo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Path]:
-    """Return the preset's network after a moment of training, and its folder."""
-    from short_runs import tiny, trained
+def short_run(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tuple[Any, Path]]:
+    """Return what gives a model of a kind after a moment of training, and its folder."""
+    from short_runs import kind, trained
 
-    folder = tmp_path_factory.mktemp("ppo")
-    return trained(folder, tiny()), folder
+    made: dict[str, tuple[Any, Path]] = {}
+
+    def run(name: str) -> tuple[Any, Path]:
+        if name not in made:
+            folder = tmp_path_factory.mktemp(name)
+            made[name] = trained(folder, kind(name)), folder
+        return made[name]
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def ppo(short_run: Callable[[str], tuple[Any, Path]]) -> tuple[Any, Path]:
+    """Return the preset's network after a moment of training, and its folder."""
+    return short_run("ppo")
 
 
 @pytest.fixture(scope="session")
@@ -33,9 +47,6 @@ def normalized_ppo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Path]
 
 
 @pytest.fixture(scope="session")
-def sac(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Path]:
+def sac(short_run: Callable[[str], tuple[Any, Path]]) -> tuple[Any, Path]:
     """Return SAC after a moment of training, and its folder."""
-    from short_runs import tiny, trained
-
-    folder = tmp_path_factory.mktemp("sac")
-    return trained(folder, tiny("sac")), folder
+    return short_run("sac")

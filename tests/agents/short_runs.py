@@ -11,17 +11,73 @@ from agents import configs, train
 
 ID = "PAM/MusclePositioning-v0"
 SHORT = {"episode_seconds": 0.3, "reference": "mixed", "load": None}
+LOOK = {"interval": 512, "episodes": 4, "settle_seconds": 0.1}
+MIXED = {"hysteresis": ["maxwell_slip", "preisach"], "randomize": True}
+PAST = {"frames": 3, "signals": ["contraction", "pressure"]}
+NARROW = {"hidden": [16], "activation": "tanh"}
+
+KINDS: dict[str, tuple[str, dict[str, Any]]] = {
+    "ppo": ("ppo", {}),
+    "sac": ("sac", {}),
+    "tqc": ("tqc", {"network": NARROW}),
+    "recurrent": ("recurrent_ppo", {"normalize": {"observation": False}}),
+    "plain_recurrent": (
+        "recurrent_ppo",
+        {"network": {"hidden": [16], "log_std_init": -0.5}, "normalize": {"observation": True}},
+    ),
+    "history": ("ppo", {"network": NARROW, "history": PAST, "evaluation": LOOK}),
+    "residual": (
+        "ppo",
+        {
+            "network": {"hidden": [16], "linear": True},
+            "residual": {"controller": "inverse_pid", "scale": 0.3},
+            "plants": MIXED,
+            "ppo": {"warm_up": 5},
+        },
+    ),
+    "residual_sac": (
+        "sac",
+        {
+            "network": NARROW,
+            "residual": {"controller": "pid"},
+            "history": PAST,
+            "normalize": {"observation": False, "reward": True},
+        },
+    ),
+    "residual_recurrent": (
+        "recurrent_ppo",
+        {
+            "network": {"hidden": [16], "linear": True},
+            "residual": {"controller": "inverse"},
+            "history": PAST,
+            "normalize": {"observation": True, "reward": True},
+            "recurrent_ppo": {"warm_up": 5},
+        },
+    ),
+}
+"""One of each kind of policy: algorithm, and what differs from its preset."""
 
 
 def tiny(algo: str = "ppo", **changes: Any) -> configs.Config:
     """Return settings that train in about a second, with many automatic resets."""
     plain = configs.preset(ID, algo).as_dict()
     plain |= {"num_envs": 8, "steps": 1024, "checkpoint_steps": 256, "env_kwargs": SHORT}
-    if algo == "ppo":
-        plain["ppo"] |= {"n_steps": 16, "batch_size": 64}
+    if algo in configs.ON_POLICY:
+        plain[algo] |= {"n_steps": 16, "batch_size": 64}
     else:
-        plain["sac"] |= {"learning_starts": 128, "gradient_steps": 2, "buffer_size": 600}
-    return configs.from_mapping({**plain, **changes})
+        plain[algo] |= {"learning_starts": 256, "gradient_steps": 1, "buffer_size": 600}
+    if algo == "recurrent_ppo":
+        plain[algo] |= {"lstm_size": 8, "n_epochs": 1}
+    for name in ("evaluation", "plants"):
+        plain.pop(name, None)
+    own = {**plain[algo], **changes.get(algo, {})}
+    return configs.from_mapping({**plain, **changes, algo: own})
+
+
+def kind(name: str, **changes: Any) -> configs.Config:
+    """Return tiny settings of a kind of policy."""
+    algo, own = KINDS[name]
+    return tiny(algo, **{**own, **changes})
 
 
 def trained(folder: Path, config: configs.Config, seed: int = 3) -> Any:

@@ -7,6 +7,7 @@ import io
 import json
 import os
 import pickle
+import sys
 import zipfile
 from base64 import b64encode
 from collections.abc import Callable
@@ -18,17 +19,20 @@ import gymnasium as gym
 import numpy as np
 import onnx
 import pytest
+import yaml
 from onnx import TensorProto, helper
-from short_runs import ID
+from short_runs import ID, tiny
 from stable_baselines3 import PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 
-from agents import catalogue, configs
+from agents import catalogue, checkpoint, configs, sweep
 from agents.__main__ import main
 from agents.export import export_policy
 from agents.onnx_file import CARD, MOST_BYTES, PolicyFileError
 from agents.policy import OnnxPolicy
 from agents.sb3_vec_env import make_batch_vec_env
+from agents.settings import SettingsError
+from agents.train import saved_run
 from pam_envs.parameters import Signals
 
 MODELS = ("ppo", "normalized_ppo", "sac")
@@ -215,6 +219,62 @@ def test_a_doctored_pickle_runs_nothing(protocol: int, tmp_path: Path) -> None:
     assert not marker.exists()
 
 
+class Gift:
+    """A folder of files of sound formats that name an environment in a module of their own.
+
+    Gymnasium imports what stands before the colon, and the module makes a file.
+    """
+
+    def __init__(self, folder: Path, policy: Path) -> None:
+        self.marker = folder / "ran"
+        self.env = f"gift:{ID}"
+        (folder / "gift.py").write_text(f"open({str(self.marker)!r}, 'w')\n")
+        config = {**tiny().as_dict(), "env": self.env}
+        (folder / "config.yaml").write_text(yaml.safe_dump(config))
+        content = checkpoint.load(policy.with_name(checkpoint.NAME))
+        settings = json.loads(content["settings"])
+        content["settings"] = json.dumps({**settings, "config": config})
+        checkpoint.save(folder / checkpoint.NAME, content)
+        model = onnx.load_model(policy)
+        card = {**OnnxPolicy.load(policy).card, "env": self.env, "config": config}
+        del model.metadata_props[:]
+        model.metadata_props.add(key=CARD, value=json.dumps(card))
+        (folder / "policy.onnx").write_bytes(model.SerializeToString())
+        (folder / "policy.json").write_text(json.dumps(card))
+
+
+@pytest.fixture
+def gift(tmp_path: Path, ppo: tuple[Any, Path], monkeypatch: pytest.MonkeyPatch) -> Gift:
+    """Return a gift whose module would be found."""
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "gift", raising=False)
+    return Gift(tmp_path, ppo[1] / "policy.onnx")
+
+
+def test_a_run_or_setting_of_others_cannot_name_a_module(
+    gift: Gift, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["train", ID, "--resume", "--out", str(tmp_path)]) == 2
+    assert "is no environment here" in capsys.readouterr().err
+    for place in (tmp_path / "config.yaml", tmp_path / "policy.json"):
+        for env in (ID, gift.env):
+            assert main(["train", env, "--config", str(place), "--out", "nowhere"]) == 2
+        with pytest.raises(SettingsError, match="is no environment here"):
+            configs.read(place)
+    with pytest.raises(SettingsError, match="is no environment here"):
+        saved_run(tmp_path)
+    with pytest.raises(SettingsError, match="is no environment here"):
+        sweep.Training(tiny(), 3, tmp_path).finished()
+    assert main(["show", str(tmp_path / "policy.onnx")]) == 0
+    assert not gift.marker.exists()
+
+
+def test_the_module_would_run_elsewhere(gift: Gift) -> None:
+    """Without this, the test above could pass on a harmless name."""
+    gym.make_vec(gift.env, 1, vectorization_mode="vector_entry_point")
+    assert gift.marker.exists()
+
+
 def graph(nodes: list[Any], numbers: list[Any] = (), domains: tuple[str, ...] = ("",)) -> Any:  # type: ignore[assignment]
     """Return a model of observation -> action around nodes."""
     made = helper.make_graph(
@@ -314,6 +374,11 @@ def test_large_empty_and_unlabelled_files_are_refused(
     with pytest.raises(PolicyFileError, match="cannot be read"):
         OnnxPolicy.load(tmp_path / "none.onnx")
     model = onnx.load_model(io.BytesIO((ppo[1] / "policy.onnx").read_bytes()))
+    del model.metadata_props[:]
+    model.metadata_props.add(key=CARD, value="[" * 100_000)
+    file.write_bytes(model.SerializeToString())
+    with pytest.raises(PolicyFileError, match="is not JSON"):
+        OnnxPolicy.load(file)
     del model.metadata_props[:]
     file.write_bytes(model.SerializeToString())
     with pytest.raises(PolicyFileError, match="which signals it reads"):

@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
+import re
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
+import onnx
 import pytest
 from short_runs import ID
 
 from agents import catalogue, configs
+from agents.onnx_file import CARD
 from agents.policy import OnnxPolicy
+from agents.residual import ResidualPolicy, with_controller
 from benchmarks import rows
 
-NAMES = sorted(catalogue.PRETRAINED)
+FILES = [path for entry in catalogue.CONTROLLERS.values() for path in entry.files().values()]
+NUMBERED = [path for path in FILES if re.search(r"\.s[0-9]+$", path.stem)]
+"""Those with their training seed in the name. (One without is of a preset as it was.)"""
+RECORDED = {
+    *("steps", "seconds", "cpu_seconds", "frames_per_second", "hardware", "seed"),
+    *("first_env_seed", "tuning_seeds", "tuning_trials", "command"),
+}
 
 
 def rms(controller: object, reference: str, hysteresis: str, load: float) -> float:
@@ -52,29 +64,93 @@ class FeedForward:
         return self.action.encode(pressure)[:, None], None
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_the_file_is_small_and_its_training_is_recorded(name: str) -> None:
-    path = Path(catalogue.PRETRAINED[name])
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_the_file_is_small_and_its_training_is_recorded(path: Path) -> None:
     assert path.stat().st_size < 100_000
     card = json.loads(path.with_suffix(".json").read_text())
+    occasion = card.pop("training", {})
+    assert set(occasion) <= RECORDED
     assert OnnxPolicy.load(path).card == card
     assert f"--steps {card['config']['steps']} --seed {card['seed']}" in card["command"]
+    assert configs.from_mapping(card["config"]).env == card["env"]
+
+
+@pytest.mark.parametrize("path", NUMBERED, ids=lambda path: path.stem)
+def test_the_recorded_preset_is_the_one_that_ships(path: Path) -> None:
+    card = OnnxPolicy.load(path).card
     assert configs.from_mapping(card["config"]).as_dict() == card["config"]
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_the_recorded_preset_is_the_one_that_ships(name: str) -> None:
-    card = OnnxPolicy.load(catalogue.PRETRAINED[name]).card
-    assert configs.preset(card["env"], card["algo"]).as_dict() == card["config"]
+    preset = configs.read(configs.FOLDER / f"{path.stem.rpartition('.')[0]}.yaml")
+    assert preset.decisive() == configs.from_mapping(card["config"]).decisive()
     assert "--config" not in card["command"]
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_it_was_trained_on_the_plant_that_ships(name: str) -> None:
-    policy = OnnxPolicy.load(catalogue.PRETRAINED[name])
-    env = gym.make(policy.card["env"], **policy.card["env_kwargs"]).unwrapped
-    policy.check(env.signals, env.action_signals)
-    assert env.plant.digest() == policy.card["plant"], "the plant has changed: train it anew"
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_it_was_trained_on_the_plants_that_ship(path: Path) -> None:
+    policy = OnnxPolicy.load(path)
+    plants = []
+    for kind in configs.from_mapping(policy.card["config"]).kinds():
+        env = gym.make(policy.card["env"], **kind).unwrapped
+        policy.check(env.signals, env.action_signals)
+        with_controller(policy, env.plant)
+        plants.append(env.plant.digest())
+    trained = policy.card.get("plants") or [policy.card["plant"]]
+    assert list(dict.fromkeys(plants)) == trained, "the plant has changed: train it anew"
+
+
+def named(source: Path, place: Path, **changes: Any) -> None:
+    """Write a policy with another card."""
+    model = onnx.load_model(source)
+    card = {**OnnxPolicy.load(source).card, **changes}
+    del model.metadata_props[:]
+    model.metadata_props.add(key=CARD, value=json.dumps(card))
+    place.write_bytes(model.SerializeToString())
+
+
+def test_several_trainings_of_one_policy_are_told_apart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = Path(catalogue.PRETRAINED["ppo"])
+    monkeypatch.setattr(catalogue, "FOLDER", tmp_path)
+    file = "MusclePositioning-v0.ppo.s{seed}.onnx"
+    entry = dataclasses.replace(catalogue.CONTROLLERS["ppo"], file=file)
+    single = "MusclePositioning-v0.ppo.onnx"
+    for name, seed in ((file.format(seed=2), 2), (file.format(seed=11), 11), (single, 0)):
+        named(source, tmp_path / name, seed=seed)
+    for name in (file.format(seed=1)[:-5] + ".json", file.format(seed="x")):
+        (tmp_path / name).write_bytes(source.read_bytes())
+    assert {seed: path.name for seed, path in entry.files().items()} == {
+        0: single,
+        2: file.format(seed=2),
+        11: file.format(seed=11),
+    }
+    named(source, tmp_path / file.format(seed=0), seed=0)
+    assert entry.files()[0].name == file.format(seed=0)
+    monkeypatch.setitem(catalogue.CONTROLLERS, "x", entry)
+    assert catalogue.load_pretrained("x", training_seed=11).name == file.format(seed=11)
+    assert catalogue.load_pretrained("x").name == file.format(seed=0)
+    with pytest.raises(ValueError, match=r"no training seed 5; there are: \[0, 2, 11\]"):
+        catalogue.load_pretrained("x", training_seed=5)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"seed": 4}, "of seed 4, and should be of 3"),
+        ({"seed": None}, "of seed None, and should be of 3"),
+        ({"seed": 3, "env": "PAM/KneeWalk-v0"}, "of env 'PAM/KneeWalk-v0'"),
+        ({"seed": 3, "algo": "sac"}, "of algo 'sac'"),
+        ({"seed": 3, "baseline": {"name": "pid"}}, "of baseline 'pid'"),
+    ],
+)
+def test_a_policy_under_anothers_name_is_refused(
+    changes: dict[str, Any], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = Path(catalogue.PRETRAINED["ppo"])
+    monkeypatch.setattr(catalogue, "FOLDER", tmp_path)
+    monkeypatch.setattr(OnnxPolicy, "_check_shapes", lambda _: 0)
+    named(source, tmp_path / "MusclePositioning-v0.ppo.s3.onnx", **changes)
+    with pytest.raises(ValueError, match=message):
+        catalogue.load_pretrained("ppo", training_seed=3)
 
 
 @pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach"])
@@ -94,7 +170,11 @@ def test_benchmarks_find_it_among_the_controllers() -> None:
         env = gym.make(*entry.envs).unwrapped
         made = catalogue.make_controller(name, env.plant, env.signals, env.action_signals, seed=0)
         assert entry.envs == (made.card["env"],)
-        assert made.digest() == catalogue.load_pretrained(name).digest()
+        policy = catalogue.load_pretrained(name)
+        inside = made.policy if isinstance(made, ResidualPolicy) else made
+        assert inside.digest() == policy.digest()
+        assert policy.corrects == entry.baseline
+        assert (entry.kind == "residual") == bool(entry.baseline)
     with pytest.raises(ValueError, match="no policy named 'pppo'; did you mean 'ppo'"):
         catalogue.load_pretrained("pppo")
 

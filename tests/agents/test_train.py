@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
+import json
 import os
 import pickle
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +20,17 @@ import pytest
 import torch
 import yaml
 from rich.console import Console
-from short_runs import ID, tiny, trained
+from short_runs import ID, KINDS, kind, tiny, trained
 from stable_baselines3.common.evaluation import evaluate_policy
 
-from agents import checkpoint, configs, train
+from agents import checkpoint, configs, seeds, sources, train
 from agents.__main__ import main
+from agents.building import make_env, make_model
 from agents.checkpoint import MARK, CheckpointError
+from agents.parts import Evaluation
 from agents.policy import OnnxPolicy
 from agents.sb3_vec_env import make_batch_vec_env
+from benchmarks import scenarios
 
 QUIET = Console(quiet=True)
 ROOT = Path(__file__).resolve().parents[2]
@@ -51,12 +57,12 @@ def killed_after(run: train.Run, steps: int) -> None:
     torch.manual_seed(999)
 
 
-@pytest.mark.parametrize("algo", ["ppo", "sac"])
+@pytest.mark.parametrize("name", KINDS)
 def test_resumed_is_uninterrupted_to_the_last_bit(
-    algo: str, tmp_path: Path, request: pytest.FixtureRequest
+    name: str, tmp_path: Path, short_run: Callable[[str], tuple[Any, Path]]
 ) -> None:
-    whole, folder = request.getfixturevalue(algo)
-    run = train.Run(tiny(algo), 3, tmp_path)
+    whole, folder = short_run(name)
+    run = train.Run(kind(name), 3, tmp_path)
     killed_after(run, 700)
     again = train.saved_run(tmp_path)
     assert again == run
@@ -192,8 +198,39 @@ def test_a_changed_plant_is_not_trained_on_unnoticed(ppo: tuple[Any, Path], tmp_
     digest = ppo[0].get_env().get_attr("plant")[0].digest()
     content["settings"] = content["settings"].replace(digest, "0123456789abcdef")
     checkpoint.save(tmp_path / checkpoint.NAME, content)
-    with pytest.raises(CheckpointError, match="train anew"):
+    with pytest.raises(CheckpointError, match=r"trained on the plants .*train anew"):
         train.resume(train.saved_run(tmp_path))
+
+
+def test_changed_sources_are_not_trained_with_unnoticed(
+    ppo: tuple[Any, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = sources.digests()
+    monkeypatch.setattr(sources, "digests", lambda: {**now, "pam_envs": "0123456789abcdef"})
+    with pytest.raises(CheckpointError, match="the sources of pam_envs have changed"):
+        train.resume(train.saved_run(ppo[1]))
+
+
+@pytest.mark.parametrize(
+    "given", [["PAM/KneeWalk-v0"], [ID, "--algo", "sac"], [ID, "--seed", "4"]], ids=str
+)
+def test_a_run_is_not_resumed_as_another(
+    given: list[str], ppo: tuple[Any, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["train", *given, "--out", str(ppo[1]), "--resume"]) == 2
+    assert f"not of {given[-1]}; leave it out" in capsys.readouterr().err
+
+
+def test_a_training_that_lost_its_card_is_finished_again(
+    tmp_path: Path, short_run: Callable[[str], tuple[Any, Path]]
+) -> None:
+    _, folder = short_run("ppo")
+    run = train.Run(kind("ppo"), 3, tmp_path)
+    for name in (checkpoint.NAME, "policy.onnx"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    assert train.train_to_the_end(run, QUIET) == tmp_path / "policy.onnx"
+    assert (tmp_path / "policy.onnx").read_bytes() == (folder / "policy.onnx").read_bytes()
+    assert (tmp_path / "policy.json").is_file()
 
 
 def test_the_log_and_the_card_are_written(ppo: tuple[Any, Path]) -> None:
@@ -203,7 +240,7 @@ def test_the_log_and_the_card_are_written(ppo: tuple[Any, Path]) -> None:
     assert card["steps"] == 1024
     assert card["seed"] == 3
     assert card["command"].startswith(f"python -m agents train {ID} --algo ppo --steps 1024")
-    assert card["plant"] == ppo[0].get_env().get_attr("plant")[0].digest()
+    assert card["plants"] == [ppo[0].get_env().get_attr("plant")[0].digest()]
     assert configs.read(folder / "policy.json") == tiny()
     text = (folder / "policy.json").read_text()
     assert str(folder) not in text
@@ -212,9 +249,68 @@ def test_the_log_and_the_card_are_written(ppo: tuple[Any, Path]) -> None:
 
 def test_training_episodes_are_far_from_those_that_are_scored() -> None:
     config = tiny()
-    env = train.make_env(config, 0)
-    train.make_model(config, 0, env)
-    assert env.unwrapped._seeds == list(range(train.FIRST_SEED, train.FIRST_SEED + 8))
+    env = make_env(config)
+    make_model(config, 0, env)
+    assert env.unwrapped._seeds == list(range(seeds.TRAINING, seeds.TRAINING + 8))
+    tracks = scenarios.available().values()
+    scored = {seed for track in tracks for own in track.seeds.values() for seed in own}
+    tuned = set(seeds.tuning(seeds.MOST_TUNING))
+    assert not scored & tuned
+    assert max(scored | tuned) < seeds.first_training(0)
+
+
+def test_what_a_training_cost_stands_beside_the_policy(
+    short_run: Callable[[str], tuple[Any, Path]],
+) -> None:
+    _, folder = short_run("history")
+    beside = json.loads((folder / "policy.json").read_text())
+    cost = beside.pop("training")
+    card = OnnxPolicy.load(folder / "policy.onnx").card
+    assert beside == card
+    assert cost["steps"] == 1024
+    assert cost["seconds"] > 0.0
+    assert cost["frames_per_second"] == pytest.approx(1024 / cost["seconds"], rel=0.5, abs=2)
+    assert "cores" in cost["hardware"]
+    assert (cost["seed"], cost["first_env_seed"]) == (3, seeds.first_training(3))
+    assert cost["tuning_seeds"] == [seeds.TUNING, 4]
+    assert cost["tuning_trials"] is None
+    assert cost["command"] == card["command"]
+    assert [entry["steps"] for entry in card["evaluation"]] == [0, 512, 1024]
+    assert all(entry["rms"] > 0.0 for entry in card["evaluation"])
+    log = next((folder / "tensorboard").glob("events*")).read_bytes()
+    assert b"tuning/rms" in log
+
+
+def test_looking_at_a_policy_does_not_change_the_training(
+    tmp_path: Path, short_run: Callable[[str], tuple[Any, Path]]
+) -> None:
+    _, watched = short_run("history")
+    trained(tmp_path, dataclasses.replace(kind("history"), evaluation=Evaluation()))
+    ends = [checkpoint.load(folder / checkpoint.NAME) for folder in (watched, tmp_path)]
+    mine, theirs = (end["snapshot"]["parameters"]["policy"] for end in ends)
+    assert all(torch.equal(mine[name], theirs[name]) for name in theirs)
+    card = OnnxPolicy.load(tmp_path / "policy.onnx").card
+    assert not {"evaluation", "chosen"} & set(card)
+
+
+def test_a_finished_run_is_left_and_a_foreign_one_refused(
+    short_run: Callable[[str], tuple[Any, Path]],
+) -> None:
+    _, folder = short_run("ppo")
+    before = (folder / "policy.json").stat().st_mtime_ns
+    run = train.Run(kind("ppo"), 3, folder)
+    assert train.train_to_the_end(run, QUIET) == folder / "policy.onnx"
+    assert (folder / "policy.json").stat().st_mtime_ns == before
+    with pytest.raises(CheckpointError, match="other settings"):
+        train.train_to_the_end(train.Run(kind("ppo"), 4, folder), QUIET)
+
+
+def test_the_command_names_the_variant() -> None:
+    preset = configs.preset(ID, "ppo", "residual")
+    command = train.Run(preset, 7, Path("x")).command()
+    assert command.endswith(f"--steps {preset.steps} --seed 7 --variant residual")
+    other = configs.changed(preset, ["residual.scale=0.123"])
+    assert train.Run(other, 7, Path("x")).command().endswith("--config policy.json")
 
 
 def test_learning_improves_the_return(tmp_path: Path) -> None:

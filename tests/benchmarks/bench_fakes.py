@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 import signal
 from dataclasses import dataclass
@@ -63,6 +65,43 @@ class Killer:
 
 
 @dataclass(frozen=True)
+class Raises:
+    """Works for half a second, then raises."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        step = 0 if state is None or episode_start else state
+        if step == 50:
+            raise KeyError(f"no such thing at {hex(id(self))} of {os.getcwd()}")
+        return np.array([0.0], np.float32), step + 1
+
+
+class Trained:
+    """A policy that is a file: weights of load, reference and what has been missed so far."""
+
+    def __init__(self, path, signals, action_signals):
+        data = path.read_bytes()
+        self.card = json.loads(data)
+        self.signals, self.action_signals = signals, action_signals
+        self._digest = hashlib.sha256(data).hexdigest()
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        total = 0.0 if state is None or episode_start else state
+        wanted = float(self.signals.decode(observation, "reference"))
+        seen = float(self.signals.decode(observation, "contraction"))
+        total += self.card["gain"] * (wanted - seen)
+        load = float(self.signals.decode(observation, "load"))
+        pressure = self.card["slope"] * (wanted + total) + 1e4 * load
+        return self.action_signals[0].encode([pressure]).astype(np.float32), total
+
+    def digest(self):
+        return self._digest
+
+
+POLICIES: Path | None = None
+"""Folder of the policy files, where a test has written some."""
+
+
+@dataclass(frozen=True)
 class Entry:
     """As an entry of the catalogue."""
 
@@ -73,28 +112,55 @@ class Entry:
     kind: str = "classical"
 
 
+@dataclass(frozen=True)
+class PolicyEntry(Entry):
+    """As an entry of a catalogue of policies."""
+
+    def files(self):
+        found = sorted(POLICIES.glob("trained.s*.json")) if POLICIES else []
+        return {int(path.stem.partition(".s")[2]): path for path in found}
+
+
 CONTROLLERS = {
     "low": Entry("holds 1.5 bar"),
     "middle": Entry("holds 3 bar"),
     "inverse": Entry("static inverse", "nominal model"),
     "ahead": Entry("static inverse, two preview samples early", "nominal model"),
     "integral": Entry("static inverse with an integrator", "nominal model"),
-    "learned": Entry("as integral, verified as learned ones are", kind="learned"),
+    "boastful": Entry("static inverse, says that it knows nothing", "nothing"),
+    "trained": PolicyEntry("a file", "nominal model", kind="learned"),
     "refused": Entry("not a number"),
+    "raises": Entry("raises"),
     "killer": Entry("kills its worker once"),
 }
 
 
-def make_controller(name, plant=None, signals=None, action_signals=None, seed=0):
+def write_policies(folder, *gains, plant="", **others):
+    """Write a policy file for each gain, training seed 0 first; no others are left there."""
+    folder.mkdir(exist_ok=True)
+    for old in folder.glob("trained.s*.json"):
+        old.unlink()
+    for seed, gain in enumerate(gains):
+        card = {"gain": gain, "slope": 4e7, "plant": plant, "seed": seed, **others}
+        card["training"] = {"steps": 1000, "command": f"train --seed {seed}"}
+        (folder / f"trained.s{seed}.json").write_text(json.dumps(card))
+
+
+def make_controller(
+    name, plant=None, signals=None, action_signals=None, seed=0, training_seed=None
+):
     """Return a controller by name."""
     parts = (plant, signals, action_signals)
+    if name == "trained":
+        return Trained(POLICIES / f"trained.s{training_seed}.json", *parts[1:])
     made = {
         "low": lambda: Hold(-0.5),
         "middle": lambda: Hold(0.0),
         "inverse": lambda: Inverse(*parts),
         "ahead": lambda: Inverse(*parts, ahead=2),
         "integral": lambda: Inverse(*parts, gain=0.02),
-        "learned": lambda: Inverse(*parts, gain=0.02),
+        "boastful": lambda: Inverse(*parts),
+        "raises": Raises,
         "refused": Refused,
         "killer": Killer,
     }

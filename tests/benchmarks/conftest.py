@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import yaml
 
-from benchmarks import controllers, scenarios
+from benchmarks import artefacts, audit, controllers, scenarios, tasks
 
 CONTENT = {
     "schema": 1,
@@ -15,7 +16,7 @@ CONTENT = {
     "version": 1,
     "title": "A short track",
     "env": "PAM/MusclePositioning-v0",
-    "seeds": [1, 2, 3],
+    "seeds": 3,
     "settle_seconds": 0.5,
     "hold_seconds": 0.3,
     "sensed": "sensor/contraction",
@@ -36,11 +37,21 @@ CONTENT = {
 }
 
 
+@pytest.fixture(autouse=True)
+def anew() -> Iterator[None]:
+    """Forget what was built of tracks and controllers: tests change what they are built from."""
+    for kept in (tasks.built, tasks.metrics_digest, artefacts._built):
+        kept.cache_clear()
+    yield
+
+
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Folder with the scenario file ``short``; the fake controllers are the only ones."""
+    """The only scenario file is ``short``, and the only controllers are the fake ones."""
     (tmp_path / "short.yaml").write_text(yaml.safe_dump(CONTENT))
     monkeypatch.setattr(controllers, "SOURCES", (("bench_fakes", "bench_fakes", "classical"),))
+    monkeypatch.setattr(scenarios, "FOLDER", tmp_path)
+    monkeypatch.setattr(audit, "FILE", tmp_path / "rounds.json")
     return tmp_path
 
 

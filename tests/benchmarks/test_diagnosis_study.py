@@ -7,7 +7,6 @@ import json
 import os
 from collections.abc import Collection
 from pathlib import Path
-from threading import Event
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,13 +15,12 @@ import pytest
 from diagnosis_fakes import counted, loop, record
 from joblib.externals.loky import get_reusable_executor
 
-from benchmarks import diagnosis, diagnosis_study, runner
-from benchmarks.diagnosis import Options, Task, retold, run, select
+from benchmarks import diagnosis, diagnosis_study
+from benchmarks.diagnosis import Options, retold, run, select
 from benchmarks.diagnosis_cases import NOISE, Case, cases, make
 from benchmarks.diagnosis_next import DrivenRig, OracleRig
 from benchmarks.diagnosis_report import figures
 from benchmarks.diagnosis_study import study, trace_errors
-from benchmarks.store import Store
 from pam_envs.diagnosis.gain import COMPENSABLE
 from tests.diagnosis import hidden
 
@@ -99,7 +97,7 @@ class Counting:
 
 
 def test_a_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
-    class Stopped(Exception):
+    class Stopped(BaseException):
         pass
 
     def stopping(case: Case, stages: Collection[str]) -> dict[str, Any]:
@@ -214,25 +212,10 @@ def deadly(case: Case, stages: Collection[str]) -> dict[str, Any]:
     return answer(case, stages)
 
 
-in_worker = diagnosis._in_worker
-
-
-def unchanging(stage: str) -> str:
-    """Stand for the digest of the sources."""
-    return f"the sources of {stage}"
-
-
-def in_worker_of_unchanging_sources(*given: Any) -> Task:
-    """Work as a worker does, whatever is written to the engine's files meanwhile."""
-    diagnosis.sources = unchanging
-    return in_worker(*given)
-
-
 def test_a_case_that_kills_its_worker_is_a_failed_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(diagnosis, "sources", unchanging)
-    monkeypatch.setattr(diagnosis, "_in_worker", in_worker_of_unchanging_sources)
+    diagnosis.sources.cache_clear()  # the workers look at the files anew
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(Path(__file__).parent)]))
     get_reusable_executor().shutdown(wait=True)
     options = Options(kinds=("single",), names=("creep", "leak"), folder=tmp_path, jobs=2)
@@ -240,21 +223,6 @@ def test_a_case_that_kills_its_worker_is_a_failed_one(
     get_reusable_executor().shutdown(wait=True)
     assert [bool(record["failure"]) for record in report.records] == [False, True]
     assert "its worker died 3 times" in report.failed[0]
-
-
-def test_a_worker_whose_sources_are_others_makes_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    watched = Event()
-    watched.set()
-    monkeypatch.setattr(runner, "_watching", watched)
-    monkeypatch.setattr(diagnosis, "sources", unchanging)
-    task, store = Task(Case("single", 1, ("creep",), (2.0,)), "verdict"), Store(tmp_path)
-    with pytest.raises(ValueError, match="the sources were changed while the run went on"):
-        in_worker(task, task.key, store, answer, "others", os.getpid())
-    assert store.load(task.key) is None
-    assert in_worker(task, task.key, store, answer, unchanging("verdict"), os.getpid()) == task
-    assert store.load(task.key)["names"] == ["creep"]
 
 
 def test_records_are_judged_anew(tmp_path: Path) -> None:

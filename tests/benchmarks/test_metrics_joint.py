@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import pam_envs  # noqa: F401 (registers)
-from benchmarks import metrics, metrics_joint, rollout, rows
-from benchmarks.cells import make_env
-from benchmarks.leaderboard import columns_of, tracks
+from benchmarks import metrics, metrics_joint, rollout, rows, standings
+from benchmarks.leaderboard import columns_of
+from benchmarks.making import make_env
 from benchmarks.scenarios import ScenarioSet, available
 
 PERIOD = 0.01
@@ -131,18 +131,20 @@ def test_a_chain_is_ranked_by_its_whole_tool() -> None:
         changed = {k: v for k, v in (arm | {key: value}).items() if v is not None}
         with pytest.raises(ValueError, match=key):
             ScenarioSet(changed)
-    ordered = tracks([_row(arm, "tip", 1e-3, 9e-3), _row(arm, "tool", 2e-3, 3e-3)])
+    ordered = standings.tracks([_row(arm, "tip", 1e-3, 9e-3), _row(arm, "tool", 2e-3, 3e-3)])
     names = [row["controller"]["name"] for row in ordered["manipulator_nominal"]]
     assert names == ["tool", "tip"]
 
 
 def _row(content: Any, name: str, tip: float, tool: float) -> dict[str, Any]:
-    values = {"rms_error": tip, "tool_rms_error": tool}
+    scores = {"rms_error": tip, "tool_rms_error": tool}
+    where = {"scenario": "path", "seed": 1, "training_seed": None, "split": "public"}
     return {
-        "controller": {"name": name},
+        "controller": {"name": name, "kind": "classical"},
         "env": {"id": CHAIN},
         "scenarios": {"name": content["name"], "content": content},
-        "aggregate": {k: {"mean": v, "low": v, "high": v} for k, v in values.items()},
+        "episodes": [{**where, "failed": False, "scores": scores}],
+        "audit": None,
     }
 
 

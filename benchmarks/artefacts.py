@@ -1,0 +1,190 @@
+"""What a row is the score of: policy files, or the code and the numbers of a controller."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import inspect
+import subprocess
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from benchmarks import controllers, provenance, tasks
+from benchmarks.canonical import classes_in, digest
+from benchmarks.controllers import Entrant
+from benchmarks.scenarios import ScenarioSet
+from benchmarks.source_code import code_digest, needed
+
+RESIDUAL = "residual"
+BASELINES = "baselines"
+"""Package of what residual controllers correct."""
+
+
+@dataclass(frozen=True)
+class Artefact:
+    """A controller as files.
+
+    Attributes
+    ----------
+    digest : str
+        SHA-256 of the policy files, of all numbers that the controllers hold, and of their code
+        where they are more than policy files.
+    code : tuple of str
+        Digests of the code alone, which are the same on every machine.
+    files : tuple of mapping
+        Name, sha256, bytes and training_seed of each policy file.
+    """
+
+    digest: str
+    code: tuple[str, ...]
+    files: tuple[Mapping[str, Any], ...]
+
+    def record(self) -> dict[str, Any]:
+        """Return the artefact as a row holds it."""
+        return {
+            "digest": self.digest,
+            "code": list(self.code),
+            "files": [dict(file) for file in self.files],
+        }
+
+
+def located(path: Path) -> Path:
+    """Return where a policy file lies in this checkout."""
+    return (controllers.ROOT / path).resolve()
+
+
+def file_record(path: Path, training_seed: int) -> dict[str, Any]:
+    """Return name, digest and size of a policy file."""
+    data = located(path).read_bytes()
+    return {
+        "name": path.name,
+        "sha256": hashlib.sha256(data).hexdigest(),
+        "bytes": len(data),
+        "training_seed": training_seed,
+    }
+
+
+def combine(entrant: Entrant, parameters: Iterable[str], code: Iterable[str]) -> Artefact:
+    """Return the artefact from the digests of the controllers that were built.
+
+    Parameters
+    ----------
+    entrant : Entrant
+    parameters : iterable of str
+        Digests of what the controllers hold.
+    code : iterable of str
+        Digests of their code, empty for what is all policy file.
+    """
+    files = tuple(file_record(path, seed) for seed, path in entrant.files)
+    said = {
+        "files": [[file["training_seed"], file["sha256"]] for file in files],
+        "parameters": sorted(set(parameters)),
+        "code": sorted(set(code)),
+    }
+    return Artefact(digest(said), tuple(said["code"]), files)
+
+
+def of(entrant: Entrant, track: ScenarioSet) -> Artefact:
+    """Return the artefact of a controller in a track, without running it."""
+    return _built(entrant, track, _bytes_of(entrant))[0]
+
+
+def files_of(entrant: Entrant, track: ScenarioSet) -> frozenset[Path]:
+    """Return every file that the artefact is: policies, and code with what lists it."""
+    return _built(entrant, track, _bytes_of(entrant))[1]
+
+
+def _bytes_of(entrant: Entrant) -> tuple[str, ...]:
+    return tuple(file_record(path, seed)["sha256"] for seed, path in entrant.files)
+
+
+@lru_cache(maxsize=1024)
+def _built(
+    entrant: Entrant, track: ScenarioSet, policies: tuple[str, ...]
+) -> tuple[Artefact, frozenset[Path]]:
+    """Build a controller for each plant and set of signals, once in a process."""
+    listing = Path(inspect.getfile(importlib.import_module(entrant.source))).resolve()
+    found = {located(path) for _, path in entrant.files} or {listing}
+    numbers, code = [], []
+    for model, env in tasks.built(track).told:
+        for seed in entrant.training_seeds:
+            made = controllers.make(entrant, model, env, training_seed=seed)
+            numbers.append(controllers.parameters_digest(made))
+            code.append(controller_code(entrant, made))
+            found |= needed(*code_files(entrant, made))
+    return combine(entrant, numbers, code), frozenset(found)
+
+
+def controller_code(entrant: Entrant, controller: Any) -> str:
+    """Return a digest of the code of a controller, empty for one that is all policy file."""
+    files, root = code_files(entrant, controller)
+    return _code_digest(files, root) if files else ""
+
+
+def code_files(entrant: Entrant, controller: Any) -> tuple[frozenset[Path], Path]:
+    """Return the files of a controller's own classes, and the folder of their package.
+
+    Of a residual controller those of the one that it corrects; of a learned one none.
+    """
+    if entrant.files and entrant.kind != RESIDUAL:
+        return frozenset(), controllers.ROOT
+    package = BASELINES if entrant.kind == RESIDUAL else entrant.source.partition(".")[0]
+    place = Path(inspect.getfile(importlib.import_module(package))).resolve()
+    root = place.parent.parent if place.name == "__init__.py" else place.parent
+    modules = {kind.__module__ for kind in classes_in(controller)}
+    own = {name for name in modules if name.partition(".")[0] == package}
+    if not own and entrant.kind != RESIDUAL:
+        own = {entrant.source}
+    files = (Path(inspect.getfile(importlib.import_module(name))).resolve() for name in own)
+    return frozenset(files), root
+
+
+@lru_cache(maxsize=256)
+def _code_digest(files: frozenset[Path], root: Path) -> str:
+    return code_digest(needed(files, root), root)
+
+
+def uncommitted(files: Iterable[Path]) -> list[Path]:
+    """Return the files whose bytes are not those of the checkout's last commit.
+
+    Raises
+    ------
+    ValueError
+        If one is not in a git checkout, or there is no git.
+    """
+    return [file for file in sorted(files) if committed_bytes(file) != file.read_bytes()]
+
+
+def committed_bytes(file: Path) -> bytes | None:
+    """Return a file as it is in the last commit, ``None`` if it is not there.
+
+    Raises
+    ------
+    ValueError
+        If it is not in a git checkout, or there is no git.
+    """
+    try:
+        top = top_of(file.parent)
+    except (OSError, subprocess.SubprocessError) as error:
+        raise ValueError(
+            f"{file} is not in a git checkout: an audit needs to know that the artefact was "
+            "committed before the salt was drawn; clone the repository and commit it there"
+        ) from error
+    return bytes_at("HEAD", file, top)
+
+
+def top_of(folder: Path) -> Path:
+    """Return the top of the git checkout that a folder is in."""
+    return Path(provenance.git("rev-parse", "--show-toplevel", folder=folder)).resolve()
+
+
+def bytes_at(commit: str, file: Path, top: Path) -> bytes | None:
+    """Return a file of a checkout as it is in a commit, ``None`` if it is not there."""
+    name = file.resolve().relative_to(top).as_posix()
+    try:
+        return provenance.git_bytes("cat-file", "blob", f"{commit}:{name}", folder=top)
+    except subprocess.CalledProcessError:
+        return None

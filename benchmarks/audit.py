@@ -1,0 +1,295 @@
+"""Audit rounds: seeds from the task, all artefacts of a track, and a salt drawn after them.
+
+Whoever makes a controller can try it on the public seeds as often as he likes. What the board
+compares is therefore episodes whose seeds nobody could know: the first eight bytes of
+
+    sha256(task | entrants | salt | scenario | number)
+
+less their last eleven bits, so that every reader of JSON holds the number exactly. *Entrants* is
+the digest of all artefacts of the track by their controllers' names. The maintainer draws one salt
+for all of them, once git has them as committed, so that all are compared on the same episodes.
+Rounds are only ever added to ``rounds.json``; what has changed since the last one is self-reported
+until the next.
+"""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+import json
+import math
+import secrets
+import subprocess
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from filelock import FileLock
+
+from benchmarks import artefacts, provenance, scenarios, tasks, trainings
+from benchmarks.canonical import digest
+from benchmarks.controllers import Entrant
+from benchmarks.scenarios import ScenarioSet
+from benchmarks.source_code import code_text
+from benchmarks.store import write_text
+
+FILE = Path(__file__).resolve().parent / "rounds.json"
+EPISODES = 30
+"""Audit episodes that a row has at least."""
+PER_SCENARIO = 2
+"""And at least so many of each scenario, since an interval needs the scatter within one."""
+
+NAMED = 5
+"""Changed files that a refusal names at most."""
+
+
+@dataclass(frozen=True)
+class Round:
+    """One salt for all controllers of a track.
+
+    Attributes
+    ----------
+    track : str
+    number : int
+        From 1 in each track.
+    task : str
+        Digest of the task.
+    entrants : mapping of str
+        Digest of the artefact of each controller.
+    salt, drawn : str
+        ``drawn`` is the day.
+    commit : str
+        In which all of it was committed.
+    """
+
+    track: str
+    number: int
+    task: str
+    entrants: Mapping[str, str]
+    salt: str
+    drawn: str
+    commit: str
+
+    def seeds(self, names: Sequence[str]) -> dict[str, tuple[int, ...]]:
+        """Return the audit seeds of each of a track's scenarios."""
+        each = max(PER_SCENARIO, math.ceil(EPISODES / len(names)))
+        all_artefacts = digest(self.entrants)
+        return {
+            name: tuple(seed_of(self.task, all_artefacts, self.salt, name, k) for k in range(each))
+            for name in names
+        }
+
+
+@dataclass(frozen=True)
+class Audit:
+    """A controller's place in the last round of a track.
+
+    Attributes
+    ----------
+    round : Round
+    entry : int
+        How many different artefacts the controller's name has had in the rounds of the track.
+    seeds : mapping of tuple
+        Seeds of each scenario.
+    """
+
+    round: Round
+    entry: int
+    seeds: Mapping[str, tuple[int, ...]]
+
+    def record(self) -> dict[str, Any]:
+        """Return the audit as a row holds it, less its scores."""
+        return {
+            "round": self.round.number,
+            "salt": self.round.salt,
+            "drawn": self.round.drawn,
+            "commit": self.round.commit,
+            "entry": self.entry,
+            "seeds": {name: list(seeds) for name, seeds in self.seeds.items()},
+        }
+
+
+def seed_of(task: str, entrants: str, salt: str, scenario: str, number: int) -> int:
+    """Return a seed, 53 bits."""
+    text = "|".join((task, entrants, salt, scenario, str(number)))
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big") >> 11
+
+
+def rounds(file: Path | None = None) -> list[Round]:
+    """Return the rounds in the order of their drawing; none where there is no file.
+
+    Raises
+    ------
+    ValueError
+        If the file is damaged, or the rounds of a track are not numbered one after another.
+    """
+    path = FILE if file is None else file
+    if not path.exists():
+        return []
+    try:
+        found = [Round(**entry) for entry in json.loads(path.read_text("utf-8"))["rounds"]]
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"{path}: not a list of rounds ({error}); restore it from git") from error
+    for number, entry in _numbered(found):
+        if entry.number != number:
+            raise ValueError(
+                f"{path}: round {entry.number} of {entry.track} stands where round {number} has "
+                "to be; restore the file from git"
+            )
+    return found
+
+
+def _numbered(found: Iterable[Round]) -> Iterable[tuple[int, Round]]:
+    """Yield rounds with the numbers that they have to have."""
+    seen: dict[str, int] = {}
+    for entry in found:
+        seen[entry.track] = seen.get(entry.track, 0) + 1
+        yield seen[entry.track], entry
+
+
+def last(track: str, file: Path | None = None) -> Round | None:
+    """Return the last round of a track, ``None`` where there was none."""
+    return next((entry for entry in rounds(file)[::-1] if entry.track == track), None)
+
+
+def of(track: ScenarioSet, controller: str, task: str, artefact: str) -> Audit | None:
+    """Return the audit of an artefact, ``None`` where it is not in the last round of its track."""
+    found = last(track.name)
+    if found is None or (found.task, found.entrants.get(controller)) != (task, artefact):
+        return None
+    names = [scenario.name for scenario in track.scenarios()]
+    mine = [entry for entry in rounds() if entry.track == track.name]
+    had = {entry.entrants[controller] for entry in mine if controller in entry.entrants}
+    return Audit(found, len(had), found.seeds(names))
+
+
+def find(entrant: Entrant, track: ScenarioSet) -> Audit | None:
+    """Return the audit of a controller as it is now."""
+    found = last(track.name)
+    if found is None or entrant.name not in found.entrants:  # saves building controllers
+        return None
+    artefact = artefacts.of(entrant, track).digest
+    return of(track, entrant.name, tasks.task_digest(track), artefact)
+
+
+def in_last_round(row: Mapping[str, Any]) -> bool:
+    """Return whether a row's audit is of the last round of its track; if not, it reports itself."""
+    found, said, about = last(row["scenarios"]["name"]), row["audit"], row["controller"]
+    if found is None or said is None:
+        return False
+    mine = (row["task"], about["artefact"]["digest"], said["round"], said["salt"])
+    return mine == (found.task, found.entrants.get(about["name"]), found.number, found.salt)
+
+
+def draw(track: ScenarioSet, entrants: Sequence[Entrant]) -> Round:
+    """Draw a round of a track and add it to the file; the last one stays if nothing has changed.
+
+    Raises
+    ------
+    ValueError
+        If something is not as in the last commit, an older round was changed, or policies are not
+        of different training seeds.
+    """
+    with FileLock(FILE.with_name(f".{FILE.name}.lock")):
+        for entrant in entrants:
+            trainings.check_files(entrant)
+        task = tasks.task_digest(track)
+        here = {entrant.name: artefacts.of(entrant, track).digest for entrant in entrants}
+        there = last(track.name)
+        if there is not None and (there.task, there.entrants) == (task, here):
+            return there
+        check_only_added()
+        _check_committed(track, entrants)
+        made = Round(
+            track=track.name,
+            number=1 if there is None else there.number + 1,
+            task=task,
+            entrants=here,
+            salt=secrets.token_hex(16),
+            drawn=datetime.datetime.now(datetime.UTC).date().isoformat(),
+            commit=provenance.git("rev-parse", "HEAD", folder=FILE.parent),
+        )
+        text = json.dumps({"rounds": [asdict(entry) for entry in [*rounds(), made]]}, indent=1)
+        write_text(FILE, text + "\n")
+    return made
+
+
+def _check_committed(track: ScenarioSet, entrants: Sequence[Entrant]) -> None:
+    """Raise unless artefacts, task and code are as in the last commit."""
+    files = {scenarios.FOLDER / f"{track.name}.yaml"}
+    files = files.union(*(artefacts.files_of(entrant, track) for entrant in entrants))
+    names = [file.name for file in artefacts.uncommitted(files)] or provenance.changed()
+    if names:
+        more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+        raise ValueError(
+            f"{track.name}: not as in the last commit: {', '.join(names[:NAMED])}{more}; commit it "
+            "first, the salt is drawn after it"
+        )
+
+
+def check_only_added() -> None:
+    """Raise if a round that the last commit holds was changed, moved or taken out.
+
+    Raises
+    ------
+    ValueError
+        Naming the file. A file outside of a checkout has no history to compare with.
+    """
+    try:
+        committed = artefacts.committed_bytes(FILE)
+    except ValueError:
+        return
+    old = [Round(**entry) for entry in json.loads(committed)["rounds"]] if committed else []
+    if rounds()[: len(old)] != old:
+        raise ValueError(f"{FILE}: rounds of the last commit were changed; restore it from git")
+
+
+@dataclass(frozen=True)
+class History:
+    """What git says of a round.
+
+    Attributes
+    ----------
+    wrong : tuple of str
+        What contradicts it.
+    unknown : str
+        Why something could not be looked up, empty if all could.
+    """
+
+    wrong: tuple[str, ...] = ()
+    unknown: str = ""
+
+
+def history(found: Round, entrant: Entrant, track: ScenarioSet) -> History:
+    """Return whether the commit of a round is one of this checkout, and holds the artefact."""
+    try:
+        top = artefacts.top_of(FILE.parent)
+        shallow = provenance.git("rev-parse", "--is-shallow-repository", folder=top) == "true"
+    except (OSError, subprocess.SubprocessError):
+        return History(unknown="this is no git checkout: the commit of the round was not looked up")
+    try:
+        provenance.git("merge-base", "--is-ancestor", found.commit, "HEAD", folder=top)
+    except subprocess.CalledProcessError:
+        if shallow:
+            return History(
+                unknown="this clone is shallow: the commit of the round was not looked up; "
+                "`git fetch --unshallow` gets it"
+            )
+        return History((f"audit.commit: {found.commit[:12]} is none of the present commit's past",))
+    files = sorted(artefacts.files_of(entrant, track))
+    inside = [file for file in files if file.is_relative_to(top)]
+    other = [file.name for file in inside if not _same(found.commit, file, top)]
+    outside = [file.name for file in files if file not in inside]
+    return History(
+        tuple(f"audit.commit: {found.commit[:12]} has another {name}" for name in other),
+        f"not in this checkout: {', '.join(outside)}" if outside else "",
+    )
+
+
+def _same(commit: str, file: Path, top: Path) -> bool:
+    """Return whether a file says the same in a commit: policies to the byte, code as code."""
+    then, now = artefacts.bytes_at(commit, file, top), file.read_bytes()
+    if then is None or file.suffix != ".py":
+        return then == now
+    return code_text(then.decode()) == code_text(now.decode())

@@ -1,0 +1,247 @@
+"""A residual policy notices another controller than the one that it has learned to correct."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from short_runs import ID, kind, tiny
+
+from agents import catalogue, checkpoint, configs, controllers, probe
+from agents.building import make_env, signals_of
+from agents.export import facts
+from agents.onnx_file import PolicyFileError
+from agents.policy import OnnxPolicy
+from agents.residual import ResidualPolicy, ResidualState, with_controller
+from agents.residual_vec_env import ResidualVecEnv, parts_of
+from agents.settings import SettingsError
+from baselines import catalogue as baselines
+
+LAWS = ("maxwell_slip", "preisach")
+RESIDUALS = sorted(key for key in configs.presets() if "residual" in key[2])
+
+
+@pytest.fixture
+def file(short_run: Callable[[str], tuple[Any, Path]]) -> OnnxPolicy:
+    """Return a policy that corrects inverse_pid on plants with either memory."""
+    return OnnxPolicy.load(short_run("residual")[1] / "policy.onnx")
+
+
+def plant_with(law: str) -> Any:
+    """Return the nominal plant with a memory."""
+    return gym.make(ID, hysteresis=law).unwrapped.plant
+
+
+def test_the_card_says_which_plants_and_what_each_kind_of_row_has_in_common(
+    file: OnnxPolicy,
+) -> None:
+    assert file.card["plants"] == [plant_with(law).digest() for law in LAWS]
+    assert file.card["env_kwargs"] == {**kind("residual").env_kwargs, "randomize": True}
+
+
+def test_the_card_holds_what_the_controller_was_and_answered(file: OnnxPolicy) -> None:
+    known = file.card["baseline"]
+    assert (known["name"], known["scale"]) == ("inverse_pid", pytest.approx(0.3))
+    assert [entry["plant"] for entry in known["told"]] == file.card["plants"]
+    for law, entry in zip(LAWS, known["told"], strict=True):
+        env = gym.make(ID, hysteresis=law).unwrapped
+        controller = controllers.make("inverse_pid", env.plant, env.signals, env.action_signals)
+        assert entry["parameters"] == controllers.parameters(controller)
+        seen = probe.Probe.of(entry["probe"], len(file.signals))
+        assert np.ptp(seen.observations, axis=0).max() > 1e-3
+        assert seen.travel > 1e-2
+        assert np.abs(probe.answers(controller, seen.observations) - seen.answers).max() < 1e-6
+
+
+class Shifted:
+    """A controller whose answers are a little off."""
+
+    def __init__(self, controller: Any, shift: float) -> None:
+        self.controller, self.shift = controller, np.float32(shift)
+
+    def predict(self, observation: Any, state: Any = None, start: Any = None) -> Any:
+        action, state = self.controller.predict(observation, state, start)
+        return action + self.shift, state
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_another_controller_is_refused_on_every_plant_of_the_training(
+    law: str, file: OnnxPolicy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plant, make = plant_with(law), controllers.make
+    assert isinstance(with_controller(file, plant), ResidualPolicy)
+
+    def later(*told: Any) -> Any:
+        made = make(*told)
+        return dataclasses.replace(made, inverse=_with_horizon(made.inverse))
+
+    monkeypatch.setattr(controllers, "make", later)
+    with pytest.raises(PolicyFileError, match=r"another one now: .*horizon.* was 0.0.*train it"):
+        with_controller(file, plant)
+    monkeypatch.setattr(controllers, "parameters", lambda _: {})
+    with pytest.raises(PolicyFileError, match="answers otherwise"):
+        with_controller(file, plant)
+    monkeypatch.setattr(controllers, "make", lambda *told: Shifted(make(*told), 1e-3))
+    with pytest.raises(PolicyFileError, match="answers otherwise"):
+        with_controller(file, plant)
+    monkeypatch.setattr(controllers, "make", lambda *told: Shifted(make(*told), 1e-7))
+    assert isinstance(with_controller(file, plant), ResidualPolicy)
+
+
+def _with_horizon(inverse: Any) -> Any:
+    return dataclasses.replace(inverse, horizon=1.5 * inverse.horizon)
+
+
+def test_told_another_plant_it_may_answer_otherwise(file: OnnxPolicy) -> None:
+    plant = plant_with("preisach")
+    told = plant.replace({"mass.damping": 1.2 * plant.mass.damping})
+    assert isinstance(with_controller(file, told), ResidualPolicy)
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda known: known.pop("told"),
+        lambda known: known.update(told=3),
+        lambda known: known["told"][0].pop("probe"),
+        lambda known: known["told"][0].pop("parameters"),
+        lambda known: known["told"][0]["probe"].update(observations="?"),
+        lambda known: known["told"][0]["probe"].update(observations="", answers=[]),
+        lambda known: known["told"][0]["probe"]["answers"].pop(),
+        lambda known: known["told"][0]["probe"].update(answers=[["x"]]),
+    ],
+)
+def test_a_card_without_a_sound_record_is_refused(
+    spoil: Callable[[Any], None],
+    file: OnnxPolicy,
+    short_run: Callable[[str], tuple[Any, Path]],
+) -> None:
+    card = json.loads(json.dumps(file.card))
+    spoil(card["baseline"])
+    data = (short_run("residual")[1] / "policy.onnx").read_bytes()
+    with pytest.raises(PolicyFileError, match="export it with this version"):
+        with_controller(OnnxPolicy(data, card), plant_with("maxwell_slip"))
+
+
+def test_a_controller_that_rests_at_a_limit_cannot_be_recorded() -> None:
+    class Stuck:
+        def predict(self, observation: Any, state: Any = None, start: Any = None) -> Any:
+            return np.ones((len(observation), 1), np.float32), None
+
+    with pytest.raises(SettingsError, match="'stuck' is at a limit in more than 10%"):
+        probe.record(ID, [{}], Stuck(), "stuck")
+
+
+def test_numbers_are_compared_where_both_have_them() -> None:
+    then = {"a": 1.0, "b": {"c": [1.0, 2.0]}, "gone": 3, "on": True}
+    assert not probe.difference(then, {"a": 1.0 + 1e-9, "b": {"c": [1.0, 2.0]}, "new": 4})
+    assert probe.difference(then, {"b": {"c": [1.0, 2.1]}}) == "b.c[1] was 2.0 and is 2.1"
+    assert probe.difference(then, {"b": {"c": [1.0]}}).startswith("b.c was [1.0, 2.0]")
+    assert probe.difference(then, {"on": 1.5}) == "on was True and is 1.5"
+
+
+# --- the presets' own controllers -------------------------------------------------------------
+
+
+@pytest.fixture(params=RESIDUALS, ids=lambda key: f"{key[0]}-{key[2]}".removeprefix("PAM/"))
+def residual(request: pytest.FixtureRequest) -> ResidualVecEnv:
+    """Return what a residual preset trains in, with three rows for each memory."""
+    config = configs.preset(*request.param)
+    plain = config.as_dict() | {"history": {}, "share": {}, "per_reference": {}}
+    plain |= {"num_envs": 6, "normalize": {"reward": False}, config.algo: {"batch_size": 6}}
+    env: Any = make_env(configs.from_mapping(plain))
+    while not isinstance(env, ResidualVecEnv):
+        env = env.venv
+    return env
+
+
+def test_states_of_controllers_survive_a_checkpoint(
+    residual: ResidualVecEnv, tmp_path: Path
+) -> None:
+    """The same next answers, to the last bit, and every preset's controller can be recorded."""
+    rng = np.random.default_rng(0)
+    residual.seed(900_000)
+    residual.reset()
+    width = residual.action_space.shape
+    pushes = rng.uniform(-1, 1, (10, residual.num_envs, *(width or ()))).astype(np.float32)
+    for push in pushes[:5]:
+        residual.step(push)
+    base: Any = residual.unwrapped
+    content = {"layer": residual.snapshot(), "env": base.get_state()}
+    checkpoint.save(tmp_path / "x", content)
+    then = [residual.step(push)[0] for push in pushes[5:]]
+    residual.reset()
+    saved = checkpoint.load(tmp_path / "x")
+    residual.put_back(saved["layer"])
+    base.set_state({name: value.numpy().copy() for name, value in saved["env"].items()})
+    again = [residual.step(push)[0] for push in pushes[5:]]
+    assert np.array_equal(then, again)
+    for digest, entry in zip(
+        dict.fromkeys(plant.digest() for _, plant in parts_of(residual)),
+        _recorded(residual),
+        strict=True,
+    ):
+        assert entry["plant"] == digest
+        answers = np.array(entry["probe"]["answers"])
+        assert (np.abs(answers) < 1.0).mean() >= 1.0 - probe.MOST_AT_LIMIT
+        assert np.ptp(answers, axis=0).max() > 1e-2
+
+
+def _recorded(env: ResidualVecEnv) -> list[dict[str, Any]]:
+    class Model:
+        num_timesteps, seed = 0, 0
+
+        def get_env(self) -> ResidualVecEnv:
+            return env
+
+    told: list[dict[str, Any]] = facts(Model())["baseline"]["told"]  # type: ignore[arg-type]
+    return told
+
+
+def test_a_residual_offers_what_its_controllers_model_should_do() -> None:
+    class Following:
+        def predict(self, observation: Any, state: Any = None, start: Any = None) -> Any:
+            return np.zeros(1, np.float32), 7
+
+        def model_output(self, state: int) -> int:
+            return 2 * state
+
+    class Adds:
+        card = ()
+
+        def answer(self, observation: Any, state: Any, start: Any, given: Any) -> Any:
+            return given, None
+
+    made = ResidualPolicy(Adds(), Following())  # type: ignore[arg-type]
+    _, state = made.predict(np.zeros(3))
+    assert isinstance(state, ResidualState)
+    assert made.model_output(state) == 14
+    env = make_env(tiny())
+    plain = controllers.make("inverse", parts_of(env)[0][1], *signals_of(env))
+    assert not hasattr(ResidualPolicy(Adds(), plain), "model_output")  # type: ignore[arg-type]
+
+
+def test_the_board_offers_what_there_is_a_preset_for() -> None:
+    known = {key for key in configs.presets() if "residual" not in key[2]}
+    files = {
+        (f"PAM/{entry.file.split('.')[0]}", entry.file.split(".")[1]): entry
+        for entry in catalogue.OFFERED.values()
+    }
+    assert set(files) == {
+        (env, f"{algo}-{variant}" if variant else algo) for env, algo, variant in configs.presets()
+    }
+    assert len(files) == len(catalogue.OFFERED) == len(known) + len(RESIDUALS)
+    for env, algo, variant in RESIDUALS:
+        entry = files[env, f"{algo}-{variant}"]
+        corrected = baselines.CONTROLLERS[entry.baseline]
+        assert entry.baseline == configs.preset(env, algo, variant).residual.controller
+        assert entry.knowledge == corrected.knowledge
+        assert set(entry.envs) <= set(corrected.envs)
+        assert entry.kind == "residual"
+    assert {entry.author for entry in files.values()} == {""}

@@ -1,0 +1,254 @@
+"""Training seeds side by side: the policies of lone trainings, whatever is killed on the way."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+import yaml
+from rich.console import Console
+from short_runs import ID, tiny
+
+from agents import configs, export, sources, sweep, train
+from agents.__main__ import main
+from agents.settings import SettingsError
+from sweeps.engine import Cluster
+from tests.sweeps.dask_processes import DaskProcesses
+from tests.sweeps.processes_of import alive, new_family, start, wait_until
+
+pytestmark = pytest.mark.xdist_group("training_sweep")  # one cluster
+SEEDS = (3, 4)
+CONFIG = configs.changed(tiny(), ["steps=5_000"])
+
+PROGRAM = """
+import json, sys
+from pathlib import Path
+from agents import configs, sweep
+from sweeps.engine import Cluster
+folder, jobs, address = sys.argv[1:]
+config = configs.read(Path(folder) / "tiny.yaml")
+cluster = Cluster(int(jobs), "dask" if address else "loky", address)
+report = sweep.run(sweep.trainings([config], (3, 4), Path(folder), "ppo"), cluster)
+print(report)
+sys.exit(bool(report.missing))
+"""
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[int, bytes]:
+    """The policies of trainings that nothing disturbs, by seed."""
+    policies = {}
+    for seed in SEEDS:
+        run = train.Run(CONFIG, seed, tmp_path_factory.mktemp(f"seed{seed}"))
+        policies[seed] = train.train_to_the_end(run, Console(quiet=True)).read_bytes()
+    return policies
+
+
+@pytest.fixture(scope="module")
+def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DaskProcesses]:
+    """A scheduler and two workers."""
+    pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
+    with DaskProcesses(tmp_path_factory.mktemp("dask")) as made:
+        yield made
+
+
+class Driver:
+    """Sweeps into one folder, each in a process of its own."""
+
+    def __init__(self, folder: Path, address: str = "") -> None:
+        (folder / "tiny.yaml").write_text(yaml.safe_dump(CONFIG.as_dict()))
+        self.folder, self.address, self.family = folder, address, new_family()
+        self.log = folder / "log.txt"
+        self.trainings = sweep.trainings([CONFIG], SEEDS, folder, "ppo")
+
+    def start(self, jobs: int = 2) -> subprocess.Popen[bytes]:
+        """Start a sweep."""
+        given = (str(self.folder), str(jobs), self.address)
+        return start(self.family, "-c", PROGRAM, *given, log=self.log)
+
+    def under_way(self) -> bool:
+        """Return whether both trainings have a checkpoint, and neither its policy."""
+        return all((each.folder / "checkpoint.pt").exists() for each in self.trainings)
+
+    def trainers(self) -> list[psutil.Process]:
+        """Return the processes that train."""
+        return trainers(self.family)
+
+    def policies(self) -> dict[int, bytes]:
+        """Return the policies by seed."""
+        return {
+            training.seed: (training.folder / "policy.onnx").read_bytes()
+            for training in self.trainings
+            if training.finished()
+        }
+
+
+def trainers(family: str) -> list[psutil.Process]:
+    """Return the processes of a family that train."""
+    return [process for process in alive(family) if "agents.sweep_one" in process.cmdline()]
+
+
+def test_whoever_is_killed_the_policies_are_those_of_lone_trainings(
+    tmp_path: Path, whole: dict[int, bytes]
+) -> None:
+    driver = Driver(tmp_path)
+    running = driver.start()
+    wait_until(driver.under_way)
+    running.kill()
+    running.wait()
+    wait_until(lambda: not alive(driver.family))
+    assert len(driver.policies()) < len(SEEDS)
+    first, second = driver.start(), driver.start()  # one waits for what the other trains
+    wait_until(driver.trainers)
+    driver.trainers()[0].kill()
+    assert first.wait() == second.wait() == 0, driver.log.read_text()
+    assert driver.policies() == whole
+    wait_until(lambda: not alive(driver.family))
+
+
+def test_a_dask_cluster_loses_no_training_and_keeps_none_that_nobody_wants(
+    tmp_path: Path, dask: DaskProcesses, whole: dict[int, bytes]
+) -> None:
+    driver = Driver(tmp_path, dask.address)
+    running = driver.start()
+    wait_until(driver.under_way)
+    before = {process.pid for process in trainers(dask.family)}
+    dask.workers()[0].kill()
+    wait_until(lambda: {process.pid for process in trainers(dask.family)} - before)
+    running.kill()
+    running.wait()
+    wait_until(lambda: not trainers(dask.family))
+    assert len(driver.policies()) < len(SEEDS)
+    assert driver.start().wait() == 0, driver.log.read_text()
+    assert driver.policies() == whole
+
+
+def test_a_policy_made_elsewhere_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = {"policy.onnx": b"policy", "policy.json": b"{}"}
+    monkeypatch.setattr(sweep, "train", lambda training: files)
+    (training,) = sweep.trainings([CONFIG], (3,), tmp_path, "ppo")
+    ticks: list[int] = []
+    report = sweep.run([training], Cluster(), lambda total: lambda: ticks.append(total))
+    assert report.trained == [training.folder / "policy.onnx"]
+    assert {file.name: file.read_bytes() for file in training.folder.iterdir()} == files
+    assert ticks == [1]
+
+
+def test_other_settings_are_not_mixed_up(tmp_path: Path, ppo: tuple[object, Path]) -> None:
+    def training(config: configs.Config, seed: int) -> sweep.Training:
+        return sweep.Training(config, seed, ppo[1])
+
+    assert training(tiny(), 3).finished()
+    assert not sweep.Training(tiny(), 3, tmp_path).finished()
+    for other in (training(tiny(steps=2048), 3), training(tiny(), 4)):
+        with pytest.raises(SettingsError, match="give another --out"):
+            other.finished()
+
+
+def test_a_policy_without_its_own_card_is_made_again(
+    tmp_path: Path, whole: dict[int, bytes]
+) -> None:
+    """A process may be killed between the two files."""
+    run = train.Run(CONFIG, 3, tmp_path / "there")
+    train.train_to_the_end(run, Console(quiet=True))
+    training = sweep.Training(CONFIG, 3, run.folder)
+    card, policy = run.folder / "policy.json", run.folder / "policy.onnx"
+    good = card.read_text()
+    assert training.finished()
+    card.write_text(json.dumps({**json.loads(good), "steps": 7}))
+    assert not training.finished()
+    for spoil in (card.unlink, policy.unlink):
+        spoil()
+        assert not training.finished()
+        report = sweep.run([training], Cluster())
+        assert (report.trained, report.missing) == ([policy], [])
+        assert training.finished()
+    assert policy.read_bytes() == whole[3]
+
+
+def test_the_card_is_written_before_the_policy(
+    ppo: tuple[Any, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written: list[str] = []
+    monkeypatch.setattr(export, "write_atomically", lambda path, _: written.append(path.name))
+    export.export_policy(ppo[0], tmp_path / "policy.onnx")
+    assert written == ["policy.json", "policy.onnx"]
+
+
+@pytest.mark.parametrize("package", ["agents", "baselines", "pam_envs"])
+def test_other_sources_are_another_training(
+    package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A worker that computes another key than the driver's refuses the task."""
+    training = sweep.Training(CONFIG, 3, tmp_path)
+    key, digests = training.key, sources.digests()
+    assert sweep.Training(CONFIG, 3, tmp_path).key == key
+    assert set(digests) == {"agents", "baselines", "pam_envs"}
+    monkeypatch.setattr(sources, "digests", lambda: {**digests, package: "0"})
+    assert training.key != key
+
+
+@pytest.mark.parametrize("package", ["gymnasium", "scipy", "torch", "stable_baselines3"])
+def test_other_versions_are_another_training(
+    package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    training = sweep.Training(CONFIG, 3, tmp_path)
+    key, known = training.key, importlib.metadata.version
+
+    def other(name: str) -> str:
+        return "0.0" if name == package else known(name)
+
+    monkeypatch.setattr(importlib.metadata, "version", other)
+    assert training.key != key
+
+
+def test_sources_are_every_python_file_of_a_package(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("1")
+    first = sources.digest_of(tmp_path)
+    (tmp_path / "notes.txt").write_text("x")
+    assert sources.digest_of(tmp_path) == first
+    (tmp_path / "a.py").write_text("2")
+    second = sources.digest_of(tmp_path)
+    (tmp_path / "a.py").rename(tmp_path / "b.py")
+    assert len({first, second, sources.digest_of(tmp_path)}) == 3
+
+
+def test_a_training_that_fails_is_missing_and_says_why(tmp_path: Path) -> None:
+    wrong = configs.changed(tiny(), ["env_kwargs.load=99.0"])
+    (training,) = sweep.trainings([wrong], (3,), tmp_path, "ppo")
+    report = sweep.run([training], Cluster())
+    (line,) = report.missing
+    assert str(training.folder) in line and "99" in line
+
+
+@pytest.fixture
+def ask(tmp_path: Path) -> Callable[..., int]:
+    """Return what runs the command with two seeds."""
+    return lambda *arguments: main(
+        ["sweep", ID, "--seeds", "2", "--out", str(tmp_path), *arguments]
+    )
+
+
+def test_the_command_lists_refuses_and_tells(
+    ask: Callable[..., int],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert ask("--dry-run", "--first-seed", "7") == 0
+    listed = capsys.readouterr().out.splitlines()
+    assert [line.split()[-1].rpartition("/")[2] for line in listed] == ["ppo-seed7", "ppo-seed8"]
+    assert all(line.startswith("to run") for line in listed)
+    assert not list(tmp_path.iterdir())
+    assert ask("--backend", "dask") == 2
+    assert "needs both" in capsys.readouterr().err
+    failing = sweep.Report(missing=["there: no"])
+    monkeypatch.setattr(sweep, "run", lambda *_: failing)
+    assert ask() == 1
+    assert "MISSING there: no" in capsys.readouterr().err

@@ -1,0 +1,226 @@
+"""A search proposes by rule, goes on where it was, and leaves its budget in the preset's file."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import optuna
+import pytest
+from optuna.trial import TrialState
+from rich.console import Console
+from short_runs import ID, KINDS, kind, tiny
+
+from agents import configs, preset_text, tune
+from agents.configs import Config
+from agents.evaluation import Score, value_of
+from agents.parts import Plants, Search
+from agents.search_spaces import as_settings, from_settings, space_of, with_settings
+from agents.settings import SettingsError
+
+QUIET = Console(quiet=True)
+LOOK = {"episodes": 2, "settle_seconds": 0.1}
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def small(**changes: Any) -> Config:
+    """Return settings whose trials take a moment."""
+    return tiny(network={"hidden": [32, 32], "gain": 10.0}, evaluation=LOOK, **changes)
+
+
+def job(folder: Path, trials: int = 4, **changes: Any) -> tune.Job:
+    return tune.Job(small(**changes), trials, 256, 0, folder / "s.db")
+
+
+def tried(study: optuna.Study) -> list[tuple[Any, Any]]:
+    trials = study.get_trials(states=tune.DONE)
+    return [(trial.params, trial.value) for trial in trials]
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_every_kind_has_a_space_that_holds_its_preset(name: str) -> None:
+    config = kind(name)
+    values = from_settings(config)
+    assert set(values) == set(space_of(config))
+    fixed = optuna.trial.FixedTrial(values)
+    chosen = {n: range_.suggest(fixed, n) for n, range_ in space_of(config).items()}
+    again = with_settings(config, as_settings(config, chosen))
+    assert again.algo == config.algo
+    assert again.chosen.gamma == pytest.approx(config.chosen.gamma, abs=2e-5)
+
+
+@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
+def test_a_search_that_stopped_goes_the_same_way(tmp_path: Path) -> None:
+    for place in ("whole", "parts"):
+        (tmp_path / place).mkdir()
+    whole = tune.search(job(tmp_path / "whole", 3), QUIET)
+    tune.search(job(tmp_path / "parts", 2), QUIET)
+    parts = tune.search(job(tmp_path / "parts", 3), QUIET)
+    assert tried(parts) == tried(whole)
+    assert len(tried(whole)) == 3
+    assert tried(whole)[0][0] == from_settings(small())
+    assert tune.finished(tune.search(job(tmp_path / "whole", 3), QUIET)) == 3
+
+
+@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
+def test_a_trial_whose_process_was_killed_is_done_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code = f"""
+import sys, time
+sys.path.insert(0, {str(Path(__file__).parent)!r})
+import optuna
+optuna.logging.disable_default_handler()
+from pathlib import Path
+from agents import tune
+import test_tune
+tune.HEARTBEAT = 1
+def hang(*_):
+    time.sleep(2)  # until the first sign of life is written
+    print("running", flush=True)
+    time.sleep(600)
+tune.objective = hang
+tune.search(test_tune.job(Path({str(tmp_path)!r}), 1), test_tune.QUIET)
+"""
+    process = subprocess.Popen(
+        [sys.executable, "-W", "ignore", "-c", code], cwd=ROOT, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "running\n"
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    process.stdout.close()
+    monkeypatch.setattr(tune, "HEARTBEAT", 1)
+    study = tune.open_study(job(tmp_path, 1))
+    assert [t.state for t in study.trials] == [TrialState.RUNNING]
+    time.sleep(4)
+    after = tune.search(job(tmp_path, 1), QUIET)
+    states = [t.state for t in after.trials]
+    assert states[0] == TrialState.FAIL
+    assert states.count(TrialState.COMPLETE) == 1
+    assert TrialState.RUNNING not in states
+    done = after.get_trials(states=(TrialState.COMPLETE,))[0]
+    assert done.params == from_settings(small())
+
+
+@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
+def test_the_budget_and_the_best_settings_are_written(tmp_path: Path) -> None:
+    made = job(tmp_path, 2)
+    study = tune.search(made, QUIET)
+    path = tmp_path / "preset.yaml"
+    path.write_text(
+        "# why\n" + configs.preset_path(ID, "ppo").read_text(encoding="utf-8"), encoding="utf-8"
+    )
+    given = configs.read(path)
+    wanted = dataclasses.replace(made, config=given)
+    after = tune.write(wanted, study, path)
+    assert configs.read(path) == after
+    assert (after.search.trials, after.search.steps, after.search.seed) == (2, 256, 0)
+    assert after.ppo.gamma != 0.0
+    best = study.best_params["learning_rate"]
+    assert after.ppo.learning_rate[0] == pytest.approx(best, rel=5e-3)
+    again = dataclasses.replace(wanted, config=after)
+    assert again.name == wanted.name
+    text = path.read_text()
+    assert text.startswith("# why\n")
+    assert "# untrained, it keeps the last set-point" in text
+    assert after.network.differences == given.network.differences
+    assert after.env_kwargs == given.env_kwargs
+
+
+@pytest.mark.parametrize("names", sorted(configs.presets()))
+def test_every_preset_can_be_edited_in_place(names: tuple[str, str, str]) -> None:
+    path = configs.preset_path(*names)
+    config = configs.read(path)
+    changes = {
+        **as_settings(config, _chosen(config)),
+        "search.trials": 7,
+        "search.note": "a: b # c",
+        "steps": 12_345,
+    }
+    text = preset_text.edited(path.read_text(encoding="utf-8"), changes)
+    assert configs.from_text(text) == with_settings(config, changes)
+    before = path.read_text(encoding="utf-8")
+    assert before.splitlines()[0] == text.splitlines()[0]
+
+
+def _chosen(config: Config) -> dict[str, Any]:
+    fixed = optuna.trial.FixedTrial(from_settings(config))
+    return {name: range_.suggest(fixed, name) for name, range_ in space_of(config).items()}
+
+
+def test_a_failed_episode_makes_a_trial_worse() -> None:
+    good, bad = Score(0.1, -1.0, 0), Score(0.1, -1.0, 2)
+    assert value_of(bad, small()) > 2 * value_of(good, small())
+    assert value_of(Score(float("nan"), 0.0, 0), small()) == float("inf")
+    by_return = tiny(evaluation={**LOOK, "objective": "return"})
+    assert value_of(Score(0.1, -3.0, 0), by_return) == 3.0
+    by_ratio = tiny(evaluation={**LOOK, "objective": "geometric"})
+    score = Score(0.1, -3.0, 0, kinds=(0.01, 0.04))
+    assert value_of(score, by_ratio) == pytest.approx(0.02)
+
+
+def test_a_correction_pays_for_moving_the_set_point_more_than_its_controller() -> None:
+    assert value_of(Score(0.1, 0.0, 0, travel=105.0), small(), 100.0) == pytest.approx(0.1)
+    assert value_of(Score(0.1, 0.0, 0, travel=210.0), small(), 100.0) == pytest.approx(0.2)
+    assert value_of(Score(0.1, 0.0, 0, travel=210.0), small()) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("names", sorted(configs.presets()))
+def test_the_first_trial_is_the_preset_itself(names: tuple[str, str, str]) -> None:
+    config = configs.preset(*names)
+    assert with_settings(config, as_settings(config, _chosen(config))) == config
+
+
+def test_a_study_is_of_settings_whose_values_mean_the_same(tmp_path: Path) -> None:
+    one = job(tmp_path)
+
+    def named(**changes: Any) -> str:
+        return dataclasses.replace(one, config=dataclasses.replace(one.config, **changes)).name
+
+    same = dataclasses.replace(one.config.ppo, gamma=0.9, learning_rate=(2e-4, 1e-5), n_epochs=3)
+    assert named(ppo=same, steps=99, search=Search(trials=7)) == one.name
+    evaluation = dataclasses.replace(one.config.evaluation, objective="geometric")
+    others = (
+        named(evaluation=evaluation),
+        named(ppo=dataclasses.replace(one.config.ppo, target_kl=0.1)),
+        named(plants=Plants(randomize=True)),
+        named(env_kwargs={}),
+    )
+    assert len({one.name, *others}) == 5
+
+
+@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
+def test_searches_side_by_side_propose_different_settings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    proposed = {}
+
+    def objective(made: tune.Job, trial: optuna.Trial) -> float:
+        space = space_of(made.config).items()
+        proposed[trial.number] = {name: range_.suggest(trial, name) for name, range_ in space}
+        if trial.number == 1:  # while another process does the rest
+            tune.search(job(tmp_path, 2), QUIET)
+        return 1.0
+
+    monkeypatch.setattr(tune, "objective", objective)
+    tune.search(job(tmp_path, 2), QUIET)
+    assert list(proposed) == [0, 1, 2]
+    assert proposed[1] != proposed[2]
+
+
+def test_a_search_trains_with_seeds_that_no_reported_policy_has() -> None:
+    assert min(tune.TRAINING_SEEDS) >= 10_000
+    assert len(set(tune.TRAINING_SEEDS)) == 2
+
+
+def test_a_search_needs_something_to_look_at(tmp_path: Path) -> None:
+    blind = tune.Job(tiny(), 1, 256, 0, tmp_path / "s.db")
+    with pytest.raises(SettingsError, match=r"evaluation.episodes = 0"):
+        tune.search(blind, QUIET)

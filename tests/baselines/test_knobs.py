@@ -1,0 +1,235 @@
+"""Knobs: at 1 nothing changes, elsewhere each does what it is named for, and bounds hold."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import yaml
+
+import pam_envs  # noqa: F401  registers the ids
+from baselines import catalogue, joint_model, knee_design, tuned
+from baselines.catalogue import CONTROLLERS, PUBLISHED, make_controller
+from baselines.joint_tracking import make_model_loop
+from baselines.simc import simc_rule
+from benchmarks.canonical import object_digest
+from benchmarks.joint_studies import ReducedRig
+from pam_envs.identification.frequency import fit_rational
+
+FREQUENCIES = np.geomspace(0.5, 60.0, 24)
+RIG = fit_rational(FREQUENCIES, 1.2 / (1.0 + 0.05j * FREQUENCIES), 1)
+"""A knee's tension over its pressure set-point, so that nothing has to be identified."""
+ENVS = {
+    "PAM/MusclePositioning-v0": {},
+    "PAM/KneeStiffness-v0": {},
+    "PAM/AntagonisticJoint-v0": {},
+    "PAM/ElbowOrthosis-v0": {},
+}
+PAIRS = [
+    (name, next(env for env in ENVS if env in entry.envs))
+    for name, entry in PUBLISHED.items()
+    if entry.knobs
+]
+
+
+@pytest.fixture(autouse=True)
+def known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Replace what is identified on plants by models that are at hand."""
+    monkeypatch.setattr(knee_design, "identify", lambda plant, output: RIG)
+    monkeypatch.setattr(knee_design, "_DESIGNS", {})
+    joint = made_env("PAM/AntagonisticJoint-v0").plant
+    key = f"{joint.digest()} {joint_model.LEVELS}"
+    monkeypatch.setitem(joint_model._MEMORIES, key, ReducedRig().memory)
+
+
+def made_env(env: str) -> Any:
+    return gym.make(env, disable_env_checker=True, **ENVS[env]).unwrapped
+
+
+def built(name: str, env: Any, **knobs: float) -> Any:
+    return make_controller(name, env.plant, env.signals, env.action_signals, knobs=knobs)
+
+
+@pytest.mark.parametrize(("name", "env"), PAIRS)
+def test_knobs_at_1_change_nothing_and_each_alone_changes_the_controller(name, env):
+    base, bounds = made_env(env), PUBLISHED[name].knobs
+    plain = object_digest(built(name, base))
+    assert object_digest(built(name, base, **dict.fromkeys(bounds, 1.0))) == plain
+    for knob, (low, high) in bounds.items():
+        assert low < 1.0 < high
+        ends = [object_digest(built(name, base, **{knob: end})) for end in (low, high)]
+        assert len({plain, *ends}) == 3, knob
+
+
+def test_every_environment_has_a_pid_and_a_papers_controller_to_tune():
+    for env in (env for env in gym.registry if env.startswith("PAM/")):
+        named = [n for n, e in PUBLISHED.items() if e.knobs and env in e.envs]
+        assert any("pid" in name for name in named)
+        assert any(PUBLISHED[n].citation and "pid" not in n for n in named)
+
+
+def test_times_of_the_rule():
+    plain = simc_rule(2.0, 0.3, 0.05, 0.02)
+    slow = simc_rule(2.0, 0.3, 0.05, 0.02, knobs={"closed_loop_time": 3.0})
+    assert slow.gain == pytest.approx(0.5 * plain.gain)
+    assert slow.integral_time == 0.3
+    late = simc_rule(2.0, 0.3, 0.05, 0.02, knobs={"integral_time": 2.0})
+    assert late == plain._replace(integral_time=2.0 * plain.integral_time)
+    keen = simc_rule(2.0, 0.3, 0.05, 0.02, knobs={"derivative_time": 2.0})
+    assert keen == plain._replace(derivative_time=0.1)
+
+
+def test_muscle():
+    env = made_env("PAM/MusclePositioning-v0")
+    pid, inverse = built("pid", env), built("inverse", env)
+    assert built("pid", env, reach=2.0).reach == pytest.approx(2.0 * pid.reach)
+    assert built("pid", env, closed_loop_time=2.0).gains.integral < pid.gains.integral
+    assert built("inverse", env, horizon=2.0).horizon == 2.0 * inverse.horizon
+    times = np.arange(inverse.aims.shape[1])
+    leads = [(built("inverse", env, lead=k).aims[0] @ times) for k in (0.5, 1.0, 2.0)]
+    assert leads[0] == pytest.approx(0.5 * leads[1]) and leads[2] == pytest.approx(2.0 * leads[1])
+    early = built("inverse", env, early=1.5)
+    np.testing.assert_allclose(early.due, 1.5 * inverse.due)
+    both = built("inverse_pid", env, closed_loop_time=2.0, horizon=2.0)
+    assert both.inverse.horizon == 2.0 * inverse.horizon
+    assert both.gains == built("pid", env, closed_loop_time=2.0).gains
+
+
+def test_knee():
+    env = made_env("PAM/KneeStiffness-v0")
+    plain = knee_design.design(env.plant, "tension").figures
+    fast = knee_design.design(env.plant, "tension", knobs={"bandwidth": 2.0}).figures
+    tame = knee_design.design(env.plant, "tension", knobs={"recovery": 10.0}).figures
+    assert fast.bandwidth > 1.5 * plain.bandwidth
+    assert tame.bandwidth < plain.bandwidth
+    aheads = [built("knee_inverse_ahead", env, lead=k).ahead.weights for k in (1.0, 2.0)]
+    times = np.arange(len(aheads[0]))
+    assert aheads[1] @ times == pytest.approx(2.0 * (aheads[0] @ times))
+    loops = [built("knee_inverse_ltr", env, bandwidth=k).tension.bumpless for k in (1.0, 2.0)]
+    assert np.abs(loops[1].controller.c).max() != np.abs(loops[0].controller.c).max()
+
+
+def test_joint():
+    env = made_env("PAM/AntagonisticJoint-v0")
+    leads = [built("joint_pid_ahead", env, lead=k).lookahead.weights[0] for k in (0.5, 1.0)]
+    times = np.arange(len(leads[0]))
+    assert leads[0] @ times < leads[1] @ times
+    plain = built("joint_mfc_mu_ahead", env)
+    fast = built("joint_mfc_mu_ahead", env, disturbance=2.0)
+    np.testing.assert_array_equal(fast.lookahead.weights, plain.lookahead.weights)
+    gains = [np.abs(made.disturbance.controller.b).max() for made in (plain, fast)]
+    assert gains[1] > gains[0]
+    slow = built("joint_mfc_mu_ahead", env, damping=1.4)
+    assert slow.lookahead.weights[0] @ times > plain.lookahead.weights[0] @ times
+    loops = [make_model_loop(plain.model, damping) for damping in (0.5, 1.0)]
+    shares = [float(loop.bank.d[0]) for loop in loops]  # of the reference, at once
+    assert shares[0] > shares[1]
+
+
+def test_elbow():
+    env = made_env("PAM/ElbowOrthosis-v0")
+    plain = built("elbow_pid", env)
+    assert built("elbow_pid", env, start=2.0).middle == 2.0 * plain.middle
+    assert built("elbow_pid", env, integral_time=2.0).gains.integral < plain.gains.integral
+    inner = built("elbow_allocation_early", env).loop
+    outer = built("elbow_allocation_early", env, pressure_loop=1.5, step=0.5).loop
+    view = built("elbow_pid", env).signals.read(env.reset(seed=1)[0])
+    view = view._replace(pressure=np.full_like(view.pressure, 2e5))
+    wanted = view.pressure + 1e4
+    np.testing.assert_allclose(
+        outer.commands(view, wanted) - 2e5, 1.5 * (inner.commands(view, wanted) - 2e5)
+    )
+    for narrow, wide in zip(outer.reach(view), inner.reach(view), strict=True):
+        np.testing.assert_allclose(narrow - 2e5, 0.5 * (wide - 2e5))
+    far = outer.commands(view, np.full_like(wanted, outer.full))
+    assert np.all(far == inner.commands(view, np.full_like(wanted, outer.full)))
+
+
+@pytest.mark.parametrize(
+    ("name", "knobs", "message"),
+    [
+        ("pid", {"reach": 5.0}, r"pid: knob reach is 5.0, and goes from 0.67 to 2; give"),
+        ("pid", {"reech": 1.0}, r"pid has no knob 'reech'; choose from closed_loop_time"),
+        ("pid", {"reach": float("nan")}, r"knob reach is nan"),
+        ("table", {"reach": 1.0}, r"table has no knob 'reach'; it has none"),
+    ],
+)
+def test_what_a_controller_does_not_have_is_refused(name, knobs, message):
+    env = made_env("PAM/MusclePositioning-v0")
+    with pytest.raises(ValueError, match=message):
+        built(name, env, **knobs)
+
+
+# --- the file ---------------------------------------------------------------------------------
+
+FOUND = tuned.Tuned(
+    controller="pid",
+    env="PAM/MusclePositioning-v0",
+    knobs={"closed_loop_time": 0.7, "reach": 1.2},
+    trials=20,
+    seed=0,
+    before=7.1e-4,
+    after=6.2e-4,
+    command="python -m benchmarks tune pid",
+)
+
+
+def written(folder: Path, entries: Mapping[str, Any]) -> Path:
+    file = folder / "tuned.yaml"
+    file.write_text(yaml.safe_dump({"schema": 1, "tuned": dict(entries)}))
+    return file
+
+
+def test_entries_of_the_file_are_in_the_catalogue_with_their_budget():
+    assert set(CONTROLLERS) == set(PUBLISHED) | set(tuned.read())
+    for name, found in tuned.read().items():
+        entry = CONTROLLERS[name]
+        assert (entry.trials, entry.envs) == (found.trials, (found.env,))
+        assert entry.tuning == f"Optuna TPE, {found.trials} trials on tuning seeds"
+        assert found.after <= found.before
+
+
+def test_an_entry_is_the_published_controller_with_its_knobs(monkeypatch, tmp_path):
+    file = written(tmp_path, {"pid_tuned": dataclasses.asdict(FOUND)})
+    read = tuned.read(file)
+    assert read == {"pid_tuned": FOUND}
+    entry = tuned.entries(PUBLISHED, read)["pid_tuned"]
+    assert entry.citation == PUBLISHED["pid"].citation and entry.trials == 20
+    assert not entry.knobs and "closed_loop_time, reach" in entry.summary
+    monkeypatch.setattr(catalogue, "TUNED", read)
+    env = made_env("PAM/MusclePositioning-v0")
+    assert object_digest(built("pid_tuned", env)) == object_digest(built("pid", env, **FOUND.knobs))
+
+
+def test_names_tell_environments_apart():
+    assert tuned.tuned_name("pid", "PAM/MusclePositioning-v0") == "pid_tuned"
+    assert tuned.tuned_name("knee_pid", "PAM/KneeWalk-v0") == "knee_pid_tuned_walk"
+    pairs = [(n, env) for n, entry in PUBLISHED.items() for env in entry.envs if entry.knobs]
+    assert len({tuned.tuned_name(*pair) for pair in pairs}) == len(pairs)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"knobs": {"reach": 9.0}}, "knob reach is 9.0"),
+        ({"controller": "pyd"}, "is of pyd in PAM/MusclePositioning-v0; name it pyd_tuned"),
+        ({"env": "PAM/KneeWalk-v0"}, "name it pid_tuned_walk"),
+        ({"more": 1}, "unexpected keyword argument 'more'; search again"),
+    ],
+)
+def test_a_file_that_is_not_as_a_search_writes_it_is_refused(tmp_path, change, message):
+    file = written(tmp_path, {"pid_tuned": dataclasses.asdict(FOUND) | change})
+    with pytest.raises(ValueError, match=message):
+        tuned.entries(PUBLISHED, tuned.read(file))
+
+
+def test_another_schema_is_refused(tmp_path):
+    file = tmp_path / "tuned.yaml"
+    file.write_text("schema: 2\n")
+    with pytest.raises(ValueError, match="not of schema 1; take the one of the last commit"):
+        tuned.read(file)

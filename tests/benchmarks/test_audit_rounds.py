@@ -1,0 +1,349 @@
+"""Audit rounds: one salt a track, drawn after all artefacts, of no use to who tries many."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import bench_fakes
+import numpy as np
+import pytest
+from filelock import FileLock, Timeout
+from numpy.typing import NDArray
+
+from benchmarks import artefacts, audit, provenance, rows, scenarios, tasks
+from benchmarks.__main__ import main
+from benchmarks.canonical import digest
+from benchmarks.controllers import find
+from benchmarks.store import comparable, read_record
+from benchmarks.verify import verify
+from tests.benchmarks.row_helpers import commit, draw, git, place, run_row, tiny
+
+
+@pytest.fixture
+def board(tmp_path: Path) -> Iterator[Path]:
+    with place(tmp_path) as folder:
+        yield folder
+
+
+def a_round(**changes: object) -> audit.Round:
+    """Return a round of two controllers."""
+    given = {
+        "track": "tiny",
+        "number": 1,
+        "task": "task",
+        "entrants": {"low": "a", "high": "b"},
+        "salt": "salt",
+        "drawn": "2026-01-01",
+        "commit": "c" * 40,
+    }
+    return audit.Round(**{**given, **changes})
+
+
+def test_seeds_follow_from_task_entrants_salt_scenario_and_number() -> None:
+    everybody = hashlib.sha256(b'{"high":"b","low":"a"}').hexdigest()
+    text = f"task|{everybody}|salt|steps|3".encode()
+    first = int.from_bytes(hashlib.sha256(text).digest()[:8], "big")
+    assert a_round().seeds(["steps", "sines"])["steps"][3] == first >> 11 < 2**53
+    found = {a_round().seeds(["steps"])["steps"][0], a_round().seeds(["sines"])["sines"][0]}
+    changed = ({"task": "other"}, {"salt": "other"}, {"entrants": {"low": "a", "high": "c"}})
+    found |= {a_round(**change).seeds(["steps"])["steps"][0] for change in changed}
+    assert len(found) == 5
+
+
+@pytest.mark.parametrize(("scenarios", "each"), [(1, 30), (2, 15), (8, 4), (30, 2), (40, 2)])
+def test_there_are_thirty_audit_episodes_and_two_of_each_scenario(
+    scenarios: int, each: int
+) -> None:
+    seeds = a_round().seeds([f"{k}" for k in range(scenarios)])
+    assert {len(found) for found in seeds.values()} == {each}
+    assert sum(map(len, seeds.values())) >= 30
+    assert len({seed for found in seeds.values() for seed in found}) == scenarios * each
+
+
+def test_a_round_is_drawn_once_and_all_of_it_run_the_same_episodes(board: Path) -> None:
+    reported = rows.load(run_row(board, "trained"))
+    assert reported["audit"] is None
+    assert not audit.in_last_round(reported)
+    drawn = draw(board, "trained", "integral")
+    assert draw(board, "trained", "integral") == drawn == audit.last("tiny")
+    assert audit.rounds() == [drawn]
+    assert (drawn.number, drawn.task) == (1, tasks.task_digest(tiny(board)))
+    seeds = drawn.seeds([scenario.name for scenario in tiny(board).scenarios()])
+    wanted = [(name, seed) for name, own in seeds.items() for seed in own]
+    for name, runs in (("trained", (0, 1)), ("integral", (None,))):
+        row = rows.load(run_row(board, name))
+        assert audit.in_last_round(row)
+        assert {k: row["audit"][k] for k in ("round", "salt", "drawn", "commit", "entry")} == {
+            "round": 1,
+            "salt": drawn.salt,
+            "drawn": drawn.drawn,
+            "commit": drawn.commit,
+            "entry": 1,
+        }
+        assert {k: tuple(own) for k, own in row["audit"]["seeds"].items()} == seeds
+        episodes = rows.episodes_of(row, "audit")
+        for run in runs:
+            mine = [(e["scenario"], e["seed"]) for e in episodes if e["training_seed"] == run]
+            assert mine == wanted
+        scores = row["audit"]["aggregate"]["rms_error"]
+        assert scores["mean"] == pytest.approx(rows.scores_of(episodes, "rms_error").mean())
+        gap = scores["mean"] - row["aggregate"]["rms_error"]["mean"]
+        assert row["audit"]["gap"]["rms_error"] == gap != 0.0
+    assert row["aggregate"] != reported["aggregate"]
+
+
+def test_the_command_draws_runs_and_tells(
+    board: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = ("trained", "low")
+    chosen = {name: entry for name, entry in bench_fakes.CONTROLLERS.items() if name in names}
+    monkeypatch.setattr(bench_fakes, "CONTROLLERS", chosen)
+    folders = ["--out", str(board / "out"), "--cells", str(board / "cells"), "--jobs", "1"]
+    assert main(["audit", "tiny", *folders]) == 0
+    (drawn,) = audit.rounds()
+    said = capsys.readouterr().out
+    assert f"tiny: round 1, 2 controllers, salt {drawn.salt} of {drawn.drawn}" in said
+    assert "; audit " in said
+    before = lasting(board / "out")
+    assert set(before) == {"tiny--trained", "tiny--low"}
+    assert main(["audit", "--all", *folders]) == 0
+    assert "0 cells computed" in capsys.readouterr().out
+    assert lasting(board / "out") == before
+    assert audit.rounds() == [drawn]
+    for given in (["short"], [], ["tiny", "--all"]):
+        assert main(["audit", *given, *folders]) == 2
+    assert "name tracks, or give --all" in capsys.readouterr().err
+
+
+def lasting(folder: Path) -> dict[str, object]:
+    """Return what is compared of the rows of a folder."""
+    return {path.stem: comparable(read_record(path)) for path in folder.iterdir()}
+
+
+def test_what_has_changed_reports_itself_until_the_next_round(board: Path) -> None:
+    first = draw(board, "trained", "low")
+    old = rows.load(run_row(board, "low"))
+    bench_fakes.write_policies(board / "policies", 0.02, 0.06)
+    assert audit.find(find("trained"), tiny(board)) is None
+    with pytest.raises(ValueError, match=r"not as in the last commit: trained\.s1\.json; commit"):
+        draw(board, "trained", "low")
+    commit(board)
+    second = draw(board, "trained", "low")
+    assert (first.number, second.number) == (1, 2)
+    names = [scenario.name for scenario in tiny(board).scenarios()]
+    assert not set(first.seeds(names).values()) & set(second.seeds(names).values())
+    entries = [audit.find(find(name), tiny(board)) for name in ("trained", "low")]
+    assert [found.entry for found in entries if found] == [2, 1]
+    assert not audit.in_last_round(old)  # its artefact is the same, its episodes are not
+    assert audit.in_last_round(rows.load(run_row(board, "low")))
+    assert draw(board, "low").number == 3  # one that is gone is a change, too
+
+
+def test_a_changed_task_needs_a_round(board: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    draw(board, "low")
+    monkeypatch.setattr(tasks, "metrics_digest", lambda groups: "another rule")
+    assert audit.find(find("low"), tiny(board)) is None
+    assert draw(board, "low").number == 2
+
+
+def test_what_git_does_not_know_gets_no_salt(board: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench_fakes.write_policies(board / "policies", 0.02, 0.05, 0.08)
+    with pytest.raises(ValueError, match=r"trained\.s2\.json"):
+        draw(board, "trained")
+    git(board, "add", "--all")  # known, and not committed
+    with pytest.raises(ValueError, match=r"trained\.s2\.json"):
+        draw(board, "trained")
+    commit(board)
+    task = board / "tiny.yaml"
+    task.write_text(task.read_text() + "# another\n")
+    with pytest.raises(ValueError, match=r"tiny\.yaml"):
+        draw(board, "trained")
+    git(board, "checkout", "--", "tiny.yaml")
+    monkeypatch.setattr(provenance, "changed", lambda: ["pam_envs/kernels.py"])
+    with pytest.raises(ValueError, match=r"tiny: not as in the last commit: pam_envs/kernels\.py"):
+        draw(board, "trained")
+    assert audit.rounds() == []
+
+
+def test_outside_of_a_checkout_there_is_no_salt(
+    board: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    elsewhere = tmp_path_factory.mktemp("no checkout")
+    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(elsewhere.parent))
+    bench_fakes.write_policies(elsewhere, 0.02)
+    monkeypatch.setattr(bench_fakes, "POLICIES", elsewhere)
+    with pytest.raises(ValueError, match="not in a git checkout"):
+        draw(board, "trained")
+
+
+def test_two_that_draw_at_once_draw_one_after_the_other(
+    board: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lock = audit.FILE.with_name(f".{audit.FILE.name}.lock")
+    monkeypatch.setattr(audit, "FileLock", lambda path: FileLock(path, timeout=0.1))
+    with FileLock(lock), pytest.raises(Timeout):
+        draw(board, "low")
+    assert draw(board, "low").number == 1
+
+
+def test_the_files_of_a_classical_controller_are_its_code(board: Path) -> None:
+    entrant, track = find("integral"), tiny(board)
+    assert artefacts.files_of(entrant, track) == {Path(bench_fakes.__file__).resolve()}
+    integral, inverse = (artefacts.of(find(name), track) for name in ("integral", "inverse"))
+    assert integral.digest != inverse.digest
+    assert integral.code == inverse.code
+    assert artefacts.of(find("trained"), track).code == ("",)
+
+
+def test_rounds_are_only_ever_added(board: Path) -> None:
+    draw(board, "trained")
+    audit.check_only_added()
+    commit(board)
+    (kept,) = json.loads(audit.FILE.read_text())["rounds"]
+    for changed in ([], [{**kept, "salt": "0" * 32}]):
+        audit.FILE.write_text(json.dumps({"rounds": changed}))
+        with pytest.raises(ValueError, match="were changed; restore it from git"):
+            audit.check_only_added()
+    with pytest.raises(ValueError, match="were changed"):
+        draw(board, "trained", "low")
+    audit.FILE.write_text(json.dumps({"rounds": [kept, kept]}))
+    with pytest.raises(ValueError, match="round 1 of tiny stands where round 2 has to be"):
+        audit.rounds()
+    audit.FILE.write_text(json.dumps({"rounds": [{"salt": "0"}]}))
+    with pytest.raises(ValueError, match="not a list of rounds"):
+        audit.rounds()
+
+
+def recorded(board: Path, **changes: str) -> list[str]:
+    """Return what ``verify`` finds once the round of a row that was run was altered."""
+    content = json.loads(audit.FILE.read_text())
+    content["rounds"][0] |= changes
+    audit.FILE.write_text(json.dumps(content))
+    return verify(run_row(board, "trained")).drifted
+
+
+def test_the_commit_of_a_round_has_to_be_there_and_before(board: Path) -> None:
+    draw(board, "trained")
+    assert recorded(board) == []
+    (wrong,) = recorded(board, commit="0" * 40)
+    assert wrong == "audit.commit: 000000000000 is none of the present commit's past"
+    git(board, "checkout", "--quiet", "-b", "aside")
+    git(board, "commit", "--quiet", "--allow-empty", "--message", "aside")
+    aside = head(board)
+    git(board, "checkout", "--quiet", "-")
+    (wrong,) = recorded(board, commit=aside)
+    assert "is none of the present commit's past" in wrong
+
+
+def test_the_commit_of_a_round_has_to_hold_the_artefact(board: Path) -> None:
+    first = head(board)
+    bench_fakes.write_policies(board / "policies", 0.02, 0.05, 0.08)
+    commit(board)
+    draw(board, "trained")
+    assert recorded(board) == []
+    (wrong,) = recorded(board, commit=first)
+    assert wrong == f"audit.commit: {first[:12]} has another trained.s2.json"
+
+
+def head(folder: Path) -> str:
+    """Return the present commit."""
+    return provenance.git("rev-parse", "HEAD", folder=folder)
+
+
+def test_where_git_cannot_say_a_note_does(
+    board: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draw(board, "trained")
+    commit(board)
+    commit(board)
+    path = run_row(board, "trained")
+    shallow = tmp_path_factory.mktemp("shallow") / "clone"
+    git(board, "clone", "--quiet", "--depth", "1", board.as_uri(), str(shallow))
+    monkeypatch.setattr(audit, "FILE", shallow / "rounds.json")
+    verdict = verify(path)
+    assert verdict.holds, verdict.drifted
+    assert any("this clone is shallow" in note for note in verdict.notes)
+
+    def absent(*_: object, **__: object) -> None:
+        raise FileNotFoundError("git")
+
+    monkeypatch.setattr(subprocess, "run", absent)
+    verdict = verify(path)
+    assert verdict.holds, verdict.drifted
+    assert any("this is no git checkout" in note for note in verdict.notes)
+
+
+# A task of one number: a table of answers, given blindly, to what a seed draws. None can do better
+# than by its size, but on known seeds one of a thousand does.
+VARIANTS, STEPS, SIZE = 1000, 12, 0.5
+PUBLIC = range(101, 106)
+TASK = digest("a tiny task")
+SCENARIOS = ("calm", "windy")
+DRAWN = np.random.default_rng(3).normal(size=(9973, STEPS))
+
+
+def disturbances(scenario: str, seeds: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return what the seeds of a scenario draw, shape (seeds, steps)."""
+    return DRAWN[[(seed + len(scenario)) % len(DRAWN) for seed in seeds]]
+
+
+def score(table: NDArray[np.float64], seeds: dict[str, tuple[int, ...]]) -> float:
+    """Return the mean RMS over scenarios and seeds of what a table of answers leaves."""
+    left = [disturbances(name, found) + table for name, found in seeds.items()]
+    return float(np.mean([np.sqrt(np.mean(part**2, axis=-1)).mean() for part in left]))
+
+
+def variants() -> NDArray[np.float64]:
+    """Return a thousand artefacts that are equally good, shape (variants, steps)."""
+    drawn = np.random.default_rng(7).normal(size=(VARIANTS, STEPS))
+    return SIZE * drawn / np.sqrt(np.mean(drawn**2, axis=-1, keepdims=True))
+
+
+def ground(tables: NDArray[np.float64], known: list[dict[str, tuple[int, ...]]]) -> int:
+    """Return the variant with the lowest score on the seeds that its maker can know."""
+    return int(np.argmin([score(table, seeds) for table, seeds in zip(tables, known, strict=True)]))
+
+
+def audit_seeds(table: NDArray[np.float64], salt: str) -> dict[str, tuple[int, ...]]:
+    entrants = {"ground": digest(table), "rival": "r" * 64}
+    return a_round(task=TASK, entrants=entrants, salt=salt).seeds(SCENARIOS)
+
+
+def test_grinding_a_thousand_variants_gains_nothing() -> None:
+    tables = variants()
+    public = dict.fromkeys(SCENARIOS, tuple(PUBLIC))
+    best = ground(tables, [public] * VARIANTS)
+    claimed = score(tables[best], public)
+    level = np.mean([score(table, public) for table in tables])
+    assert claimed < 0.93 * level  # on the public seeds it pays
+
+    # each salt gives every variant audit seeds of its own
+    salts = [f"{k:032x}" for k in range(40)]
+    audited = [score(tables[best], audit_seeds(tables[best], salt)) for salt in salts]
+    others = [score(table, audit_seeds(table, salts[0])) for table in tables]
+    scatter = np.std(audited) / np.sqrt(len(salts)) + np.std(others) / np.sqrt(VARIANTS)
+    assert abs(np.mean(audited) - np.mean(others)) < 3.0 * scatter
+    assert np.mean(audited) - claimed > 0.8 * (np.mean(others) - claimed) > 0.0
+    assert min(audited) > claimed
+
+
+def test_without_a_salt_to_come_grinding_would_pay() -> None:
+    tables, guess, drawn = variants(), "", "5" * 32
+    best = ground(tables, [audit_seeds(table, guess) for table in tables])
+    known = score(tables[best], audit_seeds(tables[best], guess))
+    blind = score(tables[best], audit_seeds(tables[best], drawn))
+    level = np.mean([score(table, audit_seeds(table, drawn)) for table in tables])
+    assert known < 0.9 * level
+    assert abs(blind - level) < 3.0 * np.std(
+        [score(table, audit_seeds(table, drawn)) for table in tables]
+    )
+    assert blind > known
+
+
+def test_tracks_have_names_that_a_seed_can_be_derived_from() -> None:
+    tracks = scenarios.available().values()
+    assert not [s.name for track in tracks for s in track.scenarios() if "|" in s.name]

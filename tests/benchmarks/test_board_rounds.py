@@ -1,0 +1,49 @@
+"""Rows as they are run and audited, on the board and on the page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from benchmarks import leaderboard, site_build, standings, verified, views
+from benchmarks.store import CHECKSUM
+from tests.benchmarks.row_helpers import draw, place, run_row
+
+
+def test_a_round_its_entrants_and_who_is_outside_of_it(tmp_path: Path) -> None:
+    with place(tmp_path):
+        run_row(tmp_path, "middle")
+        draw(tmp_path, "trained", "low", "integral")
+        path = run_row(tmp_path, "trained")
+        run_row(tmp_path, "low")
+        held = json.loads(path.read_text())
+        verified.note(path, held[CHECKSUM], verified.BITS)
+        loaded = leaderboard.load(tmp_path / "out")
+        (tracks,) = standings.tracks(loaded).values()
+        found = standings.listing(tracks)
+        assert [views.name_of(row) for row in found.outside] == ["middle"]
+        assert {views.name_of(row) for row in found.inside} == {"low", "trained"}
+        assert found.missing == ("integral",)
+        assert len({views.pairs_of(row, "audit") for row in found.inside}) == 1
+
+        text = leaderboard.board_text(loaded)
+        assert "Audit round 1, drawn" in text
+        assert "30 episodes that nobody could tune to, 2 of 3 rows" in text
+        assert "In the round and without a row: integral." in text
+        assert f"verified {verified.read(path.parent)[path.stem]['date']}" in text
+
+        for row in found.inside:  # the row's own record and the board say the same
+            stated = row["audit"]["aggregate"]["rms_error"]
+            score, middle = views.interval(row), views.middle(row)
+            assert (score.value, score.low, score.high) == (
+                stated["mean"],
+                stated["low"],
+                stated["high"],
+            )
+            assert (middle.value, middle.low) == (stated["iqm"], stated["iqm_low"])
+
+        site_build.build(tmp_path / "out", tmp_path / "site")
+        assert (tmp_path / "site" / "rows" / path.name).read_bytes() == path.read_bytes()
+
+        draw(tmp_path, "trained", "middle")
+        assert not any(views.is_audited(row) for row in leaderboard.load(tmp_path / "out"))

@@ -1,0 +1,101 @@
+"""Cells: what their keys follow, what they may be of, and actions that strangers have packed."""
+
+from __future__ import annotations
+
+import dataclasses
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks import cells, making, provenance, scenarios
+from benchmarks.controllers import find
+from benchmarks.scenarios import ScenarioSet
+from sweeps import worker
+
+
+def test_the_key_of_a_cell_follows_plant_files_and_processor(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(making.PLANTS, tmp_path / "plants")
+    monkeypatch.setattr(making, "PLANTS", tmp_path / "plants")
+    track = scenarios.available()["joint_reduced"]
+    scenario = track.scenarios()[0]
+    cell = cells.Cell(find("zero"), track, scenario, seeds=(1,))
+    keys = {cell.key}
+    plant = making.plant_file(scenario.kwargs["plant"])
+    plant.write_text(plant.read_text() + "# another\n")
+    keys.add(cell.key)
+    monkeypatch.setattr(provenance, "cpu", lambda: "another")
+    keys.add(cell.key)
+    model = dataclasses.replace(scenario, model={"plant": "knee_rig_measured.yaml"})
+    keys.add(dataclasses.replace(cell, scenario=model).key)
+    assert len(keys) == 4
+
+
+@pytest.mark.parametrize("env", ["os:PAM/MusclePositioning-v0", "CartPole-v1", "PAM/../X-v0"])
+def test_only_environments_of_this_package_are_made(env: str) -> None:
+    with pytest.raises(ValueError, match="is no environment of this package"):
+        making.make_env(env, {})
+
+
+@pytest.mark.parametrize("plant", ["/etc/passwd", "../positioning_nominal.yaml", "a/b.yaml"])
+def test_only_plants_of_the_folder_of_plants_are_read(plant: str) -> None:
+    with pytest.raises(ValueError, match="is not the mere name of a file"):
+        making.make_env("PAM/AntagonisticJoint-v0", {"plant": plant})
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_actions_are_kept_to_the_bit(kind: type) -> None:
+    actions = np.random.default_rng(0).normal(size=(50, 2)).astype(kind)
+    again = cells.unpack(cells.pack(actions))
+    assert again.dtype == actions.dtype
+    assert np.array_equal(again, actions)
+    assert cells.unpack(cells.pack(actions[:0])).shape == (0, 2)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"shape": [10, 1]}, "are not of shape"),
+        ({"shape": [1000, 1]}, "are not of shape"),
+        ({"shape": [10**9, 10**9]}, "are none"),
+        ({"shape": [-1, -100]}, "are none"),
+        ({"dtype": "O"}, "are none"),
+        ({"data": "ZZZZZ"}, "are damaged"),
+    ],
+)
+def test_actions_that_are_not_what_they_say_are_refused(change: dict[str, Any], words: str) -> None:
+    packed = cells.pack(np.zeros((100, 1))) | change
+    with pytest.raises(ValueError, match=words):
+        cells.unpack(packed)
+
+
+def test_a_bomb_is_not_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:
+    bomb = cells.pack(np.zeros((4_000_000, 1))) | {"shape": [100, 1]}
+    sizes: list[int] = []
+    make = cells.zlib.decompressobj
+
+    class Counting:
+        def decompress(self, data: bytes, most: int) -> bytes:
+            sizes.append(most)
+            return make().decompress(data, most)
+
+    monkeypatch.setattr(cells.zlib, "decompressobj", Counting)
+    with pytest.raises(ValueError, match="are not of shape"):
+        cells.unpack(bomb)
+    assert sizes == [801]
+
+
+def test_a_cell_that_nobody_waits_for_ends(
+    track: ScenarioSet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario = track.scenarios()[0]
+    cell = cells.Cell(find("low"), track, scenario, seeds=track.seeds[scenario.name])
+    asked = iter([True, False])
+    monkeypatch.setattr(cells, "wanted", lambda: next(asked))
+    with pytest.raises(RuntimeError, match="nobody waits"):
+        cells.compute(cell)
+    assert worker.wanted()  # outside of a cluster somebody always does

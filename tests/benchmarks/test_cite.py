@@ -1,0 +1,133 @@
+"""BibTeX of rows: every method of every controller has its entry."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import board_fakes as fakes
+import pytest
+import yaml
+
+from benchmarks import cite
+from benchmarks.__main__ import main
+from benchmarks.controllers import available
+from benchmarks.provenance import ROOT
+from benchmarks.scenarios import ScenarioSet
+from benchmarks.store import write_record
+from tests.benchmarks.test_harness import options, score
+
+SIMC = "S. Skogestad, Simple analytic rules for model reduction and PID controller tuning, 2003"
+PPO = "Schulman et al., Proximal policy optimization algorithms, arXiv:1707.06347, 2017"
+
+
+def parsed(text: str) -> dict[str, dict[str, str]]:
+    """Return BibTeX entries by key; anything but entries of braced fields is an error."""
+    found: dict[str, dict[str, str]] = {}
+    while text := text.lstrip():
+        head = re.match(r"@([a-z]+)\{([A-Za-z0-9_-]+),\n", text)
+        assert head, text[:60]
+        fields = {"type": head[1]}
+        text = text[head.end() :]
+        while field := re.match(r"  ([a-z]+) = (?=\{)", text):
+            end = braced(text, field.end())
+            fields[field[1]] = text[field.end() + 1 : end - 1]
+            assert text[end : end + 2] == ",\n"
+            text = text[end + 2 :]
+        assert text.startswith("}\n")
+        assert head[2] not in found
+        found[head[2]] = fields
+        text = text[2:]
+    return found
+
+
+def braced(text: str, start: int) -> int:
+    """Return where the group in braces that begins at ``start`` ends."""
+    depth = 0
+    for place in range(start, len(text)):
+        depth += {"{": 1, "}": -1}.get(text[place], 0)
+        if depth == 0:
+            return place + 1
+    raise AssertionError(f"a brace is not closed: {text[start : start + 60]}")
+
+
+@pytest.mark.parametrize("name", sorted(available()))
+def test_every_method_of_every_controller_has_its_entry(name: str) -> None:
+    citation = available()[name].citation
+    found = cite.methods(citation)
+    assert bool(found) == bool(citation)
+
+
+def test_entries_are_bibtex() -> None:
+    for key, fields in cite.references().items():
+        entry = parsed(cite.entry(key, fields))[key]
+        assert set(entry) == set(fields)
+        assert entry["title"] == f"{{{fields['title']}}}".replace("&", r"\&")
+        assert entry["type"] in ("article", "inproceedings", "book", "misc")
+        needs = {"article": ("journal", "year"), "inproceedings": ("booktitle", "year")}
+        assert set(needs.get(entry["type"], ())) <= set(entry)
+
+
+def test_a_method_without_an_entry_is_named() -> None:
+    assert cite.methods(f"{SIMC}; {PPO}; {SIMC}") == ["skogestad2003", "schulman2017"]
+    assert cite.methods("") == []
+    with pytest.raises(ValueError, match=r"'N\. N\., A method' holds the title of no entry"):
+        cite.methods(f"{SIMC}; N. N., A method")
+
+
+def test_special_letters_are_escaped() -> None:
+    entry = cite.entry("key", {"type": "misc", "title": "50 % of A_b & C"})
+    assert r"title = {{50 \% of A\_b \& C}}" in entry
+
+
+def test_the_package_is_cited_as_it_says() -> None:
+    about = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    (entry,) = parsed(cite.package()).values()
+    assert entry["type"] == "software"
+    assert entry["version"] == str(about["version"])
+    assert entry["title"] == f"{{{about['title']}}}"
+
+
+def test_a_row_is_cited_with_what_runs_it_again(
+    track: ScenarioSet, folder: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from benchmarks import rows
+
+    (path,) = score(track, folder, "integral").rows
+    row = rows.load(path)
+    row["controller"]["citation"] = f"{PPO}; {SIMC}"
+    write_record(path, row)
+    row = rows.load(path)
+    assert main(["cite", str(path)]) == 0
+    entries = parsed(capsys.readouterr().out)
+    key = f"short--integral-{row['controller']['artefact']['digest'][:8]}"
+    assert list(entries) == [key, "pam_envs", "schulman2017", "skogestad2003"]
+    said = entries[key]
+    assert "PAM/MusclePositioning-v0" in said["note"]
+    assert row["task"][:16] in said["note"]
+    assert row["controller"]["artefact"]["digest"][:16] in said["note"]
+    assert row["checksum"] in said["note"]
+    assert "not audited" in said["note"]
+    assert said["howpublished"] == "python -m benchmarks verify short--integral"
+    assert options(folder).out == path.parent
+
+
+def test_a_row_is_cited_with_its_score_its_round_and_its_author() -> None:
+    row = fakes.row("pid", 2e-3, audit=2.6e-3)
+    said = parsed(cite.bibtex(row | {"controller": row["controller"] | {"citation": ""}}))
+    entry = said["short_nominal--pid-aaaaaaaa"]
+    assert entry["author"] == f"{{{cite.AUTHORS}}}"
+    assert entry["year"] == "2026"
+    assert (
+        r"RMS 2.60 [2.58, 2.62] mm (mean and 95 \% interval over audit episodes)" in entry["note"]
+    )
+    assert "audit round 2, salt 5a17" in entry["note"]
+
+
+def test_the_words_of_a_stranger_stay_in_their_field() -> None:
+    row = fakes.row("pid", 2e-3)
+    row["controller"]["author"] = r"A. B}}, note = {won} \input{x}"
+    row["controller"]["citation"] = ""
+    entry = parsed(cite.bibtex(row))["short_nominal--pid-aaaaaaaa"]
+    assert entry["author"] == "{A. B, note = won inputx}"
+    assert entry["note"].startswith("RMS")

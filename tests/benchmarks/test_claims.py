@@ -1,0 +1,195 @@
+"""What may be claimed, and each thing that keeps it from being claimed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import board_fakes as fakes
+import numpy as np
+import pytest
+
+from benchmarks import claims, standings, views
+
+TEN = np.linspace(0.4e-3, 0.6e-3, 10)
+PAPER = fakes.row("inverse", 1e-3, audit=1e-3, constraint_cost=0.01, air_use=1e-5)
+
+
+def learned(public: Any = TEN, **changes: Any) -> dict[str, Any]:
+    given = {"audit": public, "constraint_cost": 0.01, "air_use": 1e-5, **changes}
+    return fakes.row("ppo", public, kind="learned", **given)
+
+
+def in_round(*rows: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return rows that are all that their round has."""
+    names = [row["controller"]["name"] for row in rows if row["audit"]]
+    for row in rows:
+        if row["audit"]:
+            row["audit"]["entrants"] = dict.fromkeys(names, "a" * 64)
+    return list(rows)
+
+
+def verdict(row: dict[str, Any], paper: dict[str, Any] = PAPER) -> tuple[str, str]:
+    found = claims.claim(row, paper)
+    assert found is not None
+    return found.verdict, "; ".join(found.reasons)
+
+
+def test_ten_seeds_below_at_no_higher_cost_are_better() -> None:
+    found = claims.claim(learned(), PAPER)
+    assert found is not None
+    assert (found.verdict, found.reasons) == (claims.BETTER, ())
+    assert found.split == "audit"
+    assert found.probability.value == 1.0
+    assert found.ratios["pressure travel"] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"travel": 1.2e5}, "pressure travel 1.20x"),
+        ({"air_use": 1.2e-5}, "air 1.20x"),
+        ({"constraint_cost": 0.012}, "constraint cost 1.20x"),
+    ],
+)
+def test_a_lower_error_at_a_higher_cost_says_so(changes: dict[str, float], words: str) -> None:
+    assert verdict(learned(**changes)) == (claims.DEARER, words)
+
+
+def test_a_cost_of_a_tenth_more_is_allowed() -> None:
+    assert verdict(learned(travel=1.0999e5))[0] == claims.BETTER
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        (learned(TEN[:9]), "9 training seeds, a claim needs 10"),
+        (learned(audit=None), "not audited"),
+        (learned(failed_unseen=1), "1 of 60 episodes failed"),
+        (learned([*TEN[:9], 2e-3]), "P 0.90, needs more than 0.95"),
+        (learned(TEN * 3), "P 0.00, needs more than 0.95"),
+    ],
+)
+def test_what_keeps_a_claim_from_being_made(row: dict[str, Any], words: str) -> None:
+    found, reasons = verdict(row)
+    assert found == claims.NOT_SHOWN
+    assert words in reasons
+
+
+def test_a_lower_error_in_most_episodes_and_not_in_the_mean_is_not_better() -> None:
+    many = learned(np.full(40, 0.9e-3))
+    one = [episode for episode in many["episodes"] if episode["training_seed"] == 0]
+    for episode in one:
+        episode["scores"]["rms_error"] = 0.025
+    found, reasons = verdict(many)
+    assert (found, reasons) == (claims.NOT_SHOWN, "lower in most episodes, not in the mean")
+
+
+# A maker can try public episodes until they suit him: nothing that he gains there may count.
+GROUND = {
+    "a hair below on the audit, half on the public episodes": (
+        {"audit": 0.9995e-3, "public": np.full(10, 0.5e-3)},
+        "P",
+    ),
+    "above on the audit, half on the public episodes": (
+        {"audit": 1.5e-3, "public": np.full(10, 0.5e-3)},
+        "P 0.00, needs more than 0.95",
+    ),
+    "fails on the audit alone": ({"failed_unseen": 24}, "24 of 60 episodes failed"),
+    "costs more on the audit alone": (
+        {"unseen": {"pressure_travel": 3e5}},
+        "pressure travel 3.00x",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", GROUND)
+def test_a_ground_row_gains_nothing(kind: str) -> None:
+    changes, words = GROUND[kind]
+    row = learned(**changes)
+    if "hair" in kind:  # as good as the paper controller, with the scatter that episodes have
+        random = np.random.default_rng(0)
+        for episode in row["episodes"]:
+            if episode["split"] == "audit":
+                episode["scores"]["rms_error"] *= 1.0 + 0.02 * float(random.normal())
+    (found,) = claims.learned_claims(in_round(PAPER, row))
+    assert found.verdict != claims.BETTER
+    assert words in "; ".join(found.reasons)
+    places = standings.ranks(standings.ordered([row, PAPER]))
+    better_unseen = views.mean_of(row, split="audit") < 1e-3
+    first = standings.ordered([row, PAPER])[0] is row
+    assert first == better_unseen
+    if "above" in kind:
+        assert [str(place) for place in places] == ["1", "2"]
+    if "hair" in kind:
+        assert [str(place) for place in places] == ["1=", "1="]
+
+
+def test_what_was_lost_on_the_public_episodes_does_not_count_either() -> None:
+    unlucky = learned(public=TEN * 4, audit=TEN, failed=3)
+    (found,) = claims.learned_claims(in_round(PAPER, unlucky))
+    assert found.verdict == claims.BETTER
+
+
+def test_without_a_round_nothing_is_better() -> None:
+    paper = fakes.row("inverse", 1e-3)
+    (found,) = claims.learned_claims([paper, learned(audit=None)])
+    assert (found.verdict, found.split) == (claims.NOT_SHOWN, "public")
+    assert found.reasons[0] == "not audited"
+
+
+def test_a_paper_controller_outside_of_the_round_is_a_doubt() -> None:
+    told = fakes.row("inverse", 1e-3, constraint_cost=0.01, air_use=1e-5)
+    (found,) = claims.learned_claims(in_round(learned(audit=2.5e-3), told))
+    assert found.verdict == claims.NOT_SHOWN
+    assert "inverse not audited" in found.reasons
+
+
+def test_a_paper_controller_is_not_spared_for_want_of_an_audit() -> None:
+    told = fakes.row("inverse", 0.1e-3)
+    pid = fakes.row("pid", 1e-3, audit=1e-3, constraint_cost=0.01, air_use=1e-5)
+    (found,) = claims.learned_claims(in_round(pid, told, learned()))
+    assert views.name_of(found.paper) == "pid"
+    assert found.reasons == ("inverse, not audited, is below pid on public episodes",)
+    worse = fakes.row("inverse", 3e-3)
+    (found,) = claims.learned_claims(in_round(pid, worse, learned()))
+    assert found.verdict == claims.BETTER
+
+
+def test_an_entrant_of_the_round_without_a_row_is_a_doubt() -> None:
+    rows = in_round(PAPER, learned())
+    for row in rows:
+        row["audit"]["entrants"]["lost"] = "b" * 64
+    (found,) = claims.learned_claims(rows)
+    assert found.reasons == ("lost is in the audit round and has no row",)
+
+
+def test_a_constraint_cost_that_is_next_to_nothing_is_none() -> None:
+    clean = fakes.row("inverse", 1e-3, constraint_cost=0.0)
+
+    def ratio(cost: float) -> float:
+        row = learned(constraint_cost=cost)
+        return claims.cost_ratios(row, clean, "public")["constraint cost"]
+
+    assert ratio(1e-6) == 1.0
+    assert ratio(0.1) == pytest.approx(100.0)
+
+
+def test_the_best_paper_controller_is_classical_and_has_a_source() -> None:
+    rows = [
+        fakes.row("trivial", 0.1e-3, citation=""),
+        learned(),
+        fakes.row("pid", 2e-3),
+        fakes.row("inverse", 1e-3),
+    ]
+    found = claims.best_paper(rows)
+    assert found is not None
+    assert views.name_of(found) == "inverse"
+    assert claims.best_paper(rows[:2]) is None
+    assert claims.learned_claims(rows[:2]) == []
+
+
+def test_the_likeliest_claim_comes_first_and_the_audited_before_the_others() -> None:
+    worse, outside = learned(TEN * 3), learned(audit=None)
+    worse["controller"]["name"], outside["controller"]["name"] = "sac", "td3"
+    found = claims.learned_claims(in_round(worse, outside, PAPER, learned()))
+    assert [views.name_of(entry.row) for entry in found] == ["ppo", "sac", "td3"]

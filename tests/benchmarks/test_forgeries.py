@@ -1,0 +1,520 @@
+"""A row that was altered does not verify, whatever its checksum says."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import bench_fakes
+import numpy as np
+import pytest
+
+from benchmarks import audit, cells, provenance, rows, tasks, traces, verified, verify
+from benchmarks.__main__ import main
+from benchmarks.canonical import digest, plain
+from benchmarks.metrics import of_track
+from benchmarks.store import read_record, write_record
+from pam_envs.envs import muscle_positioning
+from pam_envs.pneumatics.regulator import Regulator
+from tests.benchmarks.row_helpers import draw, place, run_row
+
+Row = dict[str, Any]
+SALT = "4f" * 16
+
+
+@pytest.fixture(scope="module")
+def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    with place(tmp_path_factory.mktemp("board")) as folder:
+        draw(folder, "trained", "inverse")
+        run_row(folder, "trained")
+        run_row(folder, "integral")
+        run_row(folder, "raises")
+        yield folder
+
+
+def verdict_of(board: Path, name: str, elsewhere: bool = False) -> verify.Verdict:
+    return verify.verify(board / "out" / f"tiny--{name}.json", elsewhere=elsewhere)
+
+
+@pytest.fixture
+def forged(board: Path) -> Iterator[Callable[..., verify.Verdict]]:
+    """Return what alters a row, seals it anew and verifies it; the row is put back afterwards."""
+    kept: dict[Path, bytes] = {}
+
+    def alter(
+        name: str, change: Callable[[Row], None], elsewhere: bool = False, loads: bool = True
+    ) -> verify.Verdict:
+        path = board / "out" / f"tiny--{name}.json"
+        path.write_bytes(kept.setdefault(path, path.read_bytes()))
+        row = read_record(path)
+        before = copy.deepcopy(row)
+        change(row)
+        assert row != before
+        write_record(path, row)
+        if loads:  # sealed anew: the checksum does not tell
+            assert rows.load(path)
+        return verdict_of(board, name, elsewhere)
+
+    yield alter
+    for path, content in kept.items():
+        path.write_bytes(content)
+
+
+@pytest.mark.parametrize("name", ["trained", "integral", "raises"])
+def test_an_honest_row_holds(name: str, board: Path) -> None:
+    verdict = verdict_of(board, name)
+    assert verdict.holds, verdict.drifted
+    assert not [note for note in verdict.notes if "commit" not in note]
+
+
+def tell(verdict: verify.Verdict, words: str) -> None:
+    assert not verdict.holds
+    assert any(words in line for line in verdict.drifted), verdict.drifted
+
+
+# The first of five: an altered number.
+
+
+ALTERED = [
+    *(("trained", place) for place in ("aggregate", "audit", "by", "episode", "gap", "cost")),
+    *(("integral", place) for place in ("aggregate", "by", "episode")),
+]
+
+
+@pytest.mark.parametrize(("name", "place"), ALTERED)
+def test_an_altered_number(name: str, place: str, forged: Any) -> None:
+    def change(row: Row) -> None:
+        parts = {
+            "aggregate": lambda: (row["aggregate"]["rms_error"], "mean"),
+            "audit": lambda: (row["audit"]["aggregate"]["rms_error"], "low"),
+            "by": lambda: (row["by"]["reference"], "steps"),
+            "episode": lambda: (row["episodes"][-1]["scores"], "rms_error"),
+            "gap": lambda: (row["audit"]["gap"], "rms_error"),
+            "cost": lambda: (row["controller"]["training"][0], "steps"),
+        }
+        record, key = parts[place]()
+        record[key] *= 1.0 - 1e-12 if isinstance(record[key], float) else 2
+
+    verdict = forged(name, change)
+    assert len(verdict.drifted) == 1
+    assert "recorded" in verdict.drifted[0]
+
+
+# The second: a swapped artefact.
+
+
+def test_a_swapped_policy(board: Path) -> None:
+    try:
+        bench_fakes.write_policies(board / "policies", 0.02, 0.0500001)
+        verdict = verdict_of(board, "trained")
+    finally:
+        bench_fakes.write_policies(board / "policies", 0.02, 0.05)
+    tell(verdict, "controller.artefact.files[1].sha256")
+    tell(verdict, "controller.artefact.digest")
+
+
+def test_a_policy_whose_digest_was_swapped_in_the_row(forged: Any) -> None:
+    def change(row: Row) -> None:
+        row["controller"]["artefact"]["files"][0]["sha256"] = "0" * 64
+        row["controller"]["artefact"]["digest"] = "0" * 64
+
+    tell(forged("trained", change), "controller.artefact.digest")
+
+
+def test_another_controller_under_the_name(board: Path) -> None:
+    path = board / "out" / "tiny--low.json"
+    row = read_record(board / "out" / "tiny--integral.json")
+    row["controller"]["name"], row["row"] = "low", "tiny--low"
+    write_record(path, row)
+    verdict = verdict_of(board, "low")
+    path.unlink()
+    tell(verdict, "controller.artefact.digest")
+
+
+def test_a_classical_controller_with_another_constant(
+    board: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make = bench_fakes.make_controller
+
+    def other(name: str, *arguments: Any, **named: Any) -> Any:
+        return dataclasses.replace(make(name, *arguments, **named), gain=0.0200001)
+
+    monkeypatch.setattr(bench_fakes, "make_controller", other)
+    tell(verdict_of(board, "integral"), "controller.artefact.digest")
+
+
+# The third: an edited constant of the environment.
+
+
+def test_an_edited_constant_of_the_plant(board: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = cells.make_env
+
+    def softer(env: str, kwargs: Any) -> Any:
+        plant = made(env, kwargs).unwrapped.plant
+        return made(env, {**kwargs, "plant": plant.replace({"regulator.time_constant": 0.0123})})
+
+    assert "time_constant" in {field.name for field in dataclasses.fields(Regulator)}
+    for module in (cells, tasks):
+        monkeypatch.setattr(module, "make_env", softer)
+    verdict = verdict_of(board, "integral")
+    tell(verdict, "plants.")
+    tell(verdict, "env.digest")
+    tell(verdict, "task")
+
+
+def test_an_edited_constant_that_no_digest_holds(
+    board: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    low, high = muscle_positioning.REFERENCE_RANGE
+    monkeypatch.setattr(muscle_positioning, "REFERENCE_RANGE", (low, high * (1.0 - 1e-6)))
+    verdict = verdict_of(board, "integral")
+    assert not [line for line in verdict.drifted if line.startswith(("plants", "task"))]
+    tell(verdict, "trajectory")
+
+
+def test_plants_that_were_edited_in_the_row(forged: Any) -> None:
+    def change(row: Row) -> None:
+        row["plants"] = {name: "0" * 16 for name in row["plants"]}
+
+    tell(forged("integral", change), "plants.")
+
+
+# The fourth: a failing episode that was dropped.
+
+
+def test_a_dropped_failing_episode(forged: Any) -> None:
+    def change(row: Row) -> None:
+        assert row["episodes"].pop()["failed"]
+        row["failures"] -= 1
+
+    tell(forged("raises", change), "episodes: 1 missing, the first: public, ")
+
+
+def test_a_failing_episode_that_another_one_replaces(forged: Any) -> None:
+    def change(row: Row) -> None:
+        row["episodes"][-1] = copy.deepcopy(row["episodes"][0])
+
+    verdict = forged("trained", change)
+    tell(verdict, "episodes: 1 missing, the first: audit, ")
+    tell(verdict, "episodes: 1 not to be there, the first: public, ")
+
+
+def test_a_failure_that_was_declared_none(forged: Any) -> None:
+    tell(forged("raises", lambda row: row["episodes"][0].update(failed=False)), "failed: False")
+
+
+# The fifth: another version.
+
+
+def test_another_version_of_the_environment(forged: Any) -> None:
+    def change(row: Row) -> None:
+        text = json.dumps(row).replace("Positioning-v0", "Positioning-v1")
+        row.update(json.loads(text.replace('"version": 0', '"version": 1')))
+
+    verdict = forged("integral", change)
+    tell(verdict, "MusclePositioning-v1, and this checkout has PAM/MusclePositioning-v0")
+
+
+def test_a_version_edited_beside_the_scenarios(forged: Any) -> None:
+    tell(forged("integral", lambda row: row["env"].update(version=1)), "env.version: 1 recorded")
+
+
+def test_scenarios_of_another_version(forged: Any) -> None:
+    def change(row: Row) -> None:
+        row["scenarios"]["content"]["settle_seconds"] = 0.25
+
+    verdict = forged("integral", change)
+    tell(verdict, "scenarios: the content is not that of tiny.yaml, version 1")
+    assert len(verdict.drifted) == 1  # and it was not run
+
+
+@pytest.mark.parametrize("honest", [False, True])
+def test_environment_and_code_that_a_row_names_are_not_run(
+    honest: bool, forged: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A row can have digests that fit what it says: none of it is looked up to be run."""
+    module, mark = tmp_path / "stranger.py", tmp_path / "ran"
+    module.write_text(f"open({str(mark)!r}, 'w')")
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def change(row: Row) -> None:
+        said = row["scenarios"]
+        said["content"]["env"] = "stranger:PAM/MusclePositioning-v0"
+        said["content"]["kwargs"]["episode_seconds"] = 1e9
+        if honest:
+            said["digest"] = digest(said["content"])
+
+    tell(forged("integral", change), "the content is not that of tiny.yaml")
+    assert not mark.exists()
+
+
+def test_names_with_a_path_are_not_read(forged: Any) -> None:
+    def change(row: Row) -> None:
+        row["row"] = "../../../escaped"
+
+    tell(forged("integral", change, loads=False), "file, row, track and controller have to agree")
+
+
+def test_a_row_that_lacks_something_is_told_what(forged: Any) -> None:
+    def whole(row: Row) -> None:
+        del row["env"]
+
+    def within(row: Row) -> None:
+        del row["episodes"][0]["split"]
+
+    tell(forged("integral", whole, loads=False), "a row without env, env.id, env.version")
+    tell(forged("integral", within), "cannot be run again: there is no 'split'")
+
+
+# And what an audit rests on.
+
+
+def test_a_salt_of_ones_own(forged: Any, board: Path) -> None:
+    def change(row: Row) -> None:
+        row["audit"]["salt"] = SALT
+
+    verdict = forged("trained", change)
+    tell(verdict, f"audit.salt: '{SALT}' recorded, ")
+
+
+@pytest.mark.parametrize("what", ["round", "entry", "commit", "drawn"])
+def test_an_audit_of_another_round(what: str, forged: Any) -> None:
+    def change(row: Row) -> None:
+        row["audit"][what] = 2 if what in ("round", "entry") else "0" * 40
+
+    tell(forged("trained", change), f"audit.{what}: ")
+
+
+def test_audit_seeds_of_ones_own(forged: Any) -> None:
+    def change(row: Row) -> None:
+        name = next(iter(row["audit"]["seeds"]))
+        row["audit"]["seeds"][name][0] += 1
+
+    tell(forged("trained", change), "audit.seeds.")
+
+
+def test_an_audit_that_was_left_out(forged: Any) -> None:
+    def change(row: Row) -> None:
+        row["audit"] = None
+        row["episodes"] = rows.episodes_of(row)
+
+    verdict = forged("trained", change)
+    tell(verdict, "audit: left out, though round 1 was drawn on 20")
+    tell(verdict, "episodes: 60 missing, the first: audit")
+
+
+def test_an_audit_whose_salt_nobody_drew(board: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(audit, "FILE", board / "none.json")
+    verdict = verdict_of(board, "trained")
+    tell(verdict, "not in the last round of tiny; run `python -m benchmarks audit tiny`")
+
+
+def test_a_label_that_says_less_than_the_controller_knows(forged: Any) -> None:
+    def change(row: Row) -> None:
+        row["controller"]["knowledge"] = "nothing"
+
+    tell(forged("integral", change), "controller.knowledge: 'nothing' recorded, 'true model' now")
+
+
+def test_a_row_edited_by_hand_and_one_that_is_none(board: Path, tmp_path: Path) -> None:
+    path = tmp_path / "tiny--integral.json"
+    row = json.loads((board / "out" / path.name).read_bytes())
+    row["failures"] = 0.5
+    path.write_text(json.dumps(row))
+    tell(verify.verify(path), "file: the checksum does not match")
+    path.write_text("no row")
+    tell(verify.verify(path), "cannot be read")
+    write_record(path, {**row, "schema": 1})
+    tell(verify.verify(path), "run it again: python -m benchmarks run --track tiny")
+
+
+# On another machine last digits differ. Whoever verifies may allow for that; the row may not.
+
+
+@pytest.fixture
+def elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another processor, on which controllers round otherwise."""
+    monkeypatch.setattr(provenance, "cpu", lambda: "another")
+    for kind in (bench_fakes.Trained, bench_fakes.Inverse):
+        monkeypatch.setattr(kind, "predict", rounding(kind.predict))
+
+
+def rounding(predict: Callable[..., Any]) -> Callable[..., Any]:
+    """Return what answers a little otherwise."""
+
+    def rounded(self: Any, *arguments: Any, **named: Any) -> Any:
+        action, state = predict(self, *arguments, **named)
+        return action * (1.0 + 2e-7), state
+
+    return rounded
+
+
+@pytest.mark.parametrize("name", ["trained", "integral"])
+def test_elsewhere_a_row_is_compared_nearly_where_that_is_asked_for(
+    name: str, board: Path, elsewhere: None, forged: Any
+) -> None:
+    verdict = verdict_of(board, name)
+    assert not verdict.holds
+    assert any("`verify --elsewhere` allows for that" in note for note in verdict.notes)
+    verdict = verdict_of(board, name, elsewhere=True)
+    assert verdict.holds, verdict.drifted
+    assert verdict.mode == "elsewhere"
+    assert any("scores to 1 %" in note for note in verdict.notes)
+
+
+def test_elsewhere_a_controller_that_is_designed_there_may_have_other_last_digits(
+    board: Path, elsewhere: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make = bench_fakes.make_controller
+
+    def designed(name: str, *arguments: Any, **named: Any) -> Any:
+        made = make(name, *arguments, **named)
+        return dataclasses.replace(made, gain=made.gain * (1.0 + 1e-9))
+
+    monkeypatch.setattr(bench_fakes, "make_controller", designed)
+    verdict = verdict_of(board, "integral", elsewhere=True)
+    assert verdict.holds, verdict.drifted
+    assert any("otherwise here: controller.artefact.digest, " in note for note in verdict.notes)
+
+
+def test_a_row_cannot_choose_how_it_is_compared(forged: Any) -> None:
+    """Episodes made equal around their mean: no mean tells, and every interval is narrower."""
+
+    def change(row: Row) -> None:
+        row["made_with"]["cpu"] = "anything"
+        flatten(row)
+
+    for asked in (False, True):
+        verdict = forged("trained", change, elsewhere=asked)
+        tell(verdict, "].scores.rms_error: ")
+        tell(verdict, "aggregate.rms_error")
+
+
+def flatten(row: Row) -> None:
+    """Set scores to their means, but of the episodes whose actions are kept, and sum up anew."""
+    for split in ("public", "audit"):
+        for scenario in row["plants"]:
+            chosen = [
+                e
+                for e in rows.episodes_of(row, split)
+                if e["scenario"] == scenario and (split == "audit" or e["training_seed"] == 1)
+            ]
+            for metric in ("rms_error", "p95_error"):
+                mean = float(np.mean(rows.scores_of(chosen, metric)))
+                for episode in chosen:
+                    episode["scores"][metric] = mean * (1 - 9e-4)
+    wanted = of_track(row["scenarios"]["content"])
+    row["aggregate"] = plain(rows.aggregate(rows.episodes_of(row), wanted))
+    scores = rows.aggregate(rows.episodes_of(row, "audit"), wanted)
+    row["audit"]["aggregate"] = plain(scores)
+    row["audit"]["gap"] = plain(rows.gap(scores, row["aggregate"]))
+
+
+def test_elsewhere_one_training_seed_cannot_be_made_better(elsewhere: None, forged: Any) -> None:
+    """Within what an episode may differ, but all of one seed's."""
+
+    def change(row: Row) -> None:
+        for episode in row["episodes"]:
+            if episode["training_seed"] == 1:
+                episode["scores"]["rms_error"] *= 1.0 - 5e-3
+
+    verdict = forged("trained", change, elsewhere=True)
+    tell(verdict, "audit mean of rms_error, training seed 1: ")
+    tell(verdict, "public mean of rms_error, training seed 1: ")
+
+
+KINDS = {
+    "episode": "].scores.rms_error",
+    "replayed": "replayed maxwell_slip_steps, seed ",
+    "interval": "aggregate.rms_error.low",
+    "iqm": "audit.aggregate.rms_error.iqm",
+    "mean": "audit.aggregate.rms_error.mean",
+    "gap": "audit.gap.rms_error",
+    "by": "by.reference.steps",
+    "failed": "episodes[67].failure",
+    "dropped": "episodes: 1 missing",
+    "picture": "traces[0].signals.output: another curve now",
+    "actions": "replayed",
+    "summary": "controller.summary",
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_elsewhere_a_forged_policy_is_found(kind: str, elsewhere: None, forged: Any) -> None:
+    def change(row: Row) -> None:
+        public, unseen = row["aggregate"]["rms_error"], row["audit"]["aggregate"]["rms_error"]
+        if kind == "episode":
+            row["episodes"][-1]["scores"]["rms_error"] *= 0.98
+        if kind == "replayed":
+            row["episodes"][0]["scores"]["rms_error"] *= 1.0 - 1e-6
+        if kind == "interval":
+            public["low"] *= 1.002
+        if kind == "iqm":
+            unseen["iqm"] *= 0.99
+        if kind == "mean":
+            unseen["mean"] *= 1.0 - 1e-6
+        if kind == "gap":
+            row["audit"]["gap"]["rms_error"] = 0.0
+        if kind == "by":
+            row["by"]["reference"]["steps"] *= 0.99
+        if kind == "failed":
+            row["episodes"][-1]["failure"] = "the weather"
+        if kind == "dropped":
+            row["episodes"].pop()
+        if kind == "picture":
+            drawn = row["traces"][0]["signals"]
+            drawn["output"] = traces.pack(traces.unpack(drawn["output"]) * 0.99)
+        if kind == "actions":
+            packed = row["actions"][next(iter(row["actions"]))]
+            ((seed, actions),) = packed.items()
+            moved = cells.unpack(actions)
+            moved[20:] += 1e-5
+            packed[seed] = cells.pack(moved)
+        if kind == "summary":
+            row["controller"]["summary"] = "another"
+
+    tell(forged("trained", change, elsewhere=True), KINDS[kind])
+
+
+def test_elsewhere_a_policy_that_answers_otherwise_is_found(
+    board: Path, elsewhere: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    predict = bench_fakes.Trained.predict
+
+    def other(self: Any, *arguments: Any, **named: Any) -> Any:
+        action, state = predict(self, *arguments, **named)
+        return action + 0.01, state
+
+    monkeypatch.setattr(bench_fakes.Trained, "predict", other)
+    tell(verdict_of(board, "trained", elsewhere=True), "the policy answers otherwise by 0.005")
+
+
+def test_the_command_says_which_row_drifted_and_notes_which_held(
+    board: Path, forged: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    honest, other = (str(board / "out" / f"tiny--{name}.json") for name in ("integral", "raises"))
+    assert main(["verify", honest, other, "--jobs", "1"]) == 0
+    assert "tiny--integral: holds" in capsys.readouterr().out
+    found = verified.read(board / "out")
+    assert set(found) == {"tiny--integral", "tiny--raises"}
+    row = rows.load(Path(honest))
+    entry = verified.of(row, found)
+    assert entry is not None
+    assert entry["mode"] == "bits"
+    assert entry["commit"] == provenance.commit()
+    assert verified.of({**row, "checksum": "another"}, found) is None
+    forged("raises", lambda row: row["episodes"].pop())
+    assert main(["verify", honest, other, "--elsewhere", "--jobs", "1"]) == 1
+    said = capsys.readouterr().out
+    assert "tiny--integral: holds" in said
+    assert "tiny--raises: DRIFTED\n  episodes: 1 missing, the first: public, " in said
+    assert "run the row again: python -m benchmarks run --track tiny --controller raises" in said
+    found = verified.read(board / "out")
+    assert {name: entry["mode"] for name, entry in found.items()} == {"tiny--integral": "elsewhere"}
+    for command in ("verify", "cite"):
+        assert main([command, "tiny--nobody"]) == 2
+        assert "there is no row 'tiny--nobody'" in capsys.readouterr().err

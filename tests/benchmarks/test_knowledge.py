@@ -1,0 +1,52 @@
+"""What the catalogues say that controllers know, tried out on plants that are a little off."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks import knowledge
+from benchmarks.controllers import available, find
+from benchmarks.making import make_env
+from benchmarks.scenarios import available as tracks
+
+IDS = sorted({track.env for track in tracks().values()})
+CLAIMS = [
+    (name, env)
+    for name, entrant in sorted(available().items())
+    for env in IDS
+    if entrant.runs_in(env) and entrant.knowledge in knowledge.IGNORANT
+]
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_a_foil_is_another_plant_in_nearly_all(env_id: str) -> None:
+    env = make_env(env_id, {})
+    plant = env.unwrapped.plant
+    other = knowledge.foil(plant)
+    assert other.digest() != plant.digest()
+    named = [name for name in plant.names if plant.value(name) != 0.0]
+    moved = [name for name in named if other.value(name) != plant.value(name)]
+    assert len(moved) > 0.8 * len(named)
+    env.close()
+
+
+@pytest.mark.parametrize(("name", "env_id"), CLAIMS)
+def test_who_says_that_he_knows_no_model_depends_on_none(name: str, env_id: str) -> None:
+    env = make_env(env_id, {})
+    assert not knowledge.uses_model(find(name), env.unwrapped.plant, env, None)
+    env.close()
+
+
+def test_who_is_built_from_a_model_depends_on_it() -> None:
+    env = make_env("PAM/MusclePositioning-v0", {})
+    assert knowledge.uses_model(find("pid"), env.unwrapped.plant, env, None)
+    env.close()
+
+
+def test_labels() -> None:
+    told, drawn = {"knows_plant": True}, {"knows_plant": False}
+    assert knowledge.label("nominal model", [told, told]) == "true model"
+    assert knowledge.label("nominal model", [told, drawn]) == "nominal model"
+    assert knowledge.label("true model", [drawn]) == "nominal model"
+    assert knowledge.label("tables", [told]) == "tables"
+    assert knowledge.label("nothing", [told | {"uses_model": True}]) == "true model"

@@ -1,0 +1,315 @@
+"""Rows: what they hold, and which are not put side by side."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import json
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import bench_fakes
+import gymnasium as gym
+import pytest
+
+from benchmarks import artefacts, cells, rows, scenarios, tasks
+from benchmarks.cells import cells_of
+from benchmarks.controllers import available, find
+from benchmarks.metrics import GROUPS
+from benchmarks.provenance import METRICS
+from benchmarks.store import read_record, write_record
+from tests.benchmarks.row_helpers import place, run_row, tiny
+
+HEX = re.compile(r"[0-9a-f]{64}")
+
+
+@pytest.fixture(scope="module")
+def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    with place(tmp_path_factory.mktemp("rows")) as folder:
+        yield folder
+
+
+@pytest.fixture(scope="module")
+def trained(board: Path) -> dict[str, Any]:
+    return rows.load(run_row(board, "trained"))
+
+
+@pytest.fixture(scope="module")
+def classical(board: Path) -> dict[str, Any]:
+    return rows.load(run_row(board, "integral"))
+
+
+def test_a_row_names_environment_task_and_artefact(classical: dict[str, Any], board: Path) -> None:
+    assert classical["schema"] == rows.SCHEMA
+    assert classical["env"]["id"] == "PAM/MusclePositioning-v0"
+    assert classical["env"]["version"] == 0
+    assert HEX.fullmatch(classical["env"]["digest"])
+    assert classical["task"] == tasks.task_digest(tiny(board))
+    artefact = classical["controller"]["artefact"]
+    assert HEX.fullmatch(artefact["digest"])
+    assert artefact["files"] == []
+    assert classical["controller"]["training"] is None
+    assert classical["controller"]["tuning"]["trials"] == 0
+    assert classical["audit"] is None
+    assert classical["controller"]["author"] == ""
+
+
+def test_every_training_seed_is_run_in_every_episode(trained: dict[str, Any], board: Path) -> None:
+    keys = [(e["split"], e["training_seed"], e["scenario"], e["seed"]) for e in trained["episodes"]]
+    seeds = tiny(board).seeds
+    wanted = [
+        ("public", run, name, seed) for run in (0, 1) for name, own in seeds.items() for seed in own
+    ]
+    assert keys == wanted
+    assert trained["training_seeds"] == [0, 1]
+    files = trained["controller"]["artefact"]["files"]
+    assert [(file["name"], file["training_seed"]) for file in files] == [
+        ("trained.s0.json", 0),
+        ("trained.s1.json", 1),
+    ]
+    commands = [run["command"] for run in trained["controller"]["training"]]
+    assert commands == ["train --seed 0", "train --seed 1"]
+    assert trained["controller"]["tuning"] is None
+    of_runs = [
+        [e["trajectory"] for e in trained["episodes"] if e["training_seed"] == run]
+        for run in (0, 1)
+    ]
+    assert not set(of_runs[0]) & set(of_runs[1])
+    first = {name: {str(own[0])} for name, own in seeds.items()}
+    assert {name: set(packed) for name, packed in trained["actions"].items()} == first
+
+
+def test_the_interval_is_over_training_seeds_too(trained: dict[str, Any]) -> None:
+    from benchmarks import statistics
+
+    episodes = rows.episodes_of(trained)
+    values = rows.scores_of(episodes, "rms_error")
+    strata = [episode["scenario"] for episode in episodes]
+    seen = trained["aggregate"]["rms_error"]
+    apart = statistics.bootstrap(values, strata)
+    assert seen["mean"] == apart.value == pytest.approx(values.mean())
+    assert (seen["low"], seen["high"]) != (apart.low, apart.high)
+
+
+@pytest.mark.parametrize(
+    ("name", "claimed", "found"),
+    [
+        ("low", "nothing", "nothing"),
+        ("integral", "nominal model", "true model"),
+        ("boastful", "nothing", "true model"),
+    ],
+)
+def test_knowledge_is_tried_and_not_believed(
+    name: str, claimed: str, found: str, board: Path
+) -> None:
+    about = rows.load(run_row(board, name))["controller"]
+    assert (about["claimed"], about["knowledge"]) == (claimed, found)
+
+
+def test_a_policy_knows_the_plant_of_its_training(board: Path, trained: dict[str, Any]) -> None:
+    assert trained["controller"]["knowledge"] == "nominal model"
+    (plant,) = set(trained["plants"].values())
+    bench_fakes.write_policies(board / "policies", 0.02, 0.05, plant=plant)
+    again = rows.load(run_row(board, "trained", out=board / "told"))
+    bench_fakes.write_policies(board / "policies", 0.02, 0.05)
+    assert again["controller"]["knowledge"] == "true model"
+    assert again["aggregate"] == trained["aggregate"]
+
+
+def test_an_entry_without_its_policies_is_no_controller(
+    board: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    assert "trained" in available()
+    monkeypatch.setattr(bench_fakes, "POLICIES", tmp_path)
+    assert "trained" not in available()
+
+
+def test_a_row_of_the_former_schema_is_to_be_run_again(
+    classical: dict[str, Any], tmp_path: Path
+) -> None:
+    path = tmp_path / "tiny--integral.json"
+    write_record(path, {**classical, "schema": 1})
+    with pytest.raises(ValueError, match=r"schema 3, but of 1; run it again: .*--track tiny"):
+        rows.load(path)
+
+
+def of_version(row: dict[str, Any], number: int) -> dict[str, Any]:
+    """Return a row as if it were of another version of its environment."""
+    text = json.dumps(row).replace("Positioning-v0", f"Positioning-v{number}")
+    row = json.loads(text)
+    return {**row, "row": f"tiny--v{number}", "controller": {**row["controller"], "name": "v1"}}
+
+
+def test_rows_of_two_versions_are_not_mixed(
+    classical: dict[str, Any], board: Path, tmp_path: Path
+) -> None:
+    write_record(tmp_path / "tiny--integral.json", classical)
+    write_record(tmp_path / "tiny--v1.json", of_version(classical, 1))
+    with pytest.raises(ValueError, match=r"Positioning-v1, and this checkout has .*Positioning-v0"):
+        rows.load_all(tmp_path)
+    spec = gym.spec("PAM/MusclePositioning-v0")
+    gym.register("PAM/MusclePositioning-v1", entry_point=spec.entry_point)
+    try:
+        with pytest.raises(ValueError, match=r"Positioning-v1 and .*Positioning-v0: their results"):
+            rows.load_all(tmp_path)
+    finally:
+        del gym.envs.registration.registry["PAM/MusclePositioning-v1"]
+
+
+@pytest.mark.parametrize("what", ["task", "pam_envs", "benchmarks"])
+def test_rows_of_two_tasks_or_codes_are_not_mixed(what: str, classical: dict[str, Any]) -> None:
+    other = {**copy.deepcopy(classical), "row": "tiny--other"}
+    rows.check_together([classical, other])
+    (other if what == "task" else other["made_with"]["sources"])[what] = "0" * 12
+    words = rf"{what} 000000000000 and tiny--integral of .*: python -m benchmarks run --track tiny"
+    with pytest.raises(ValueError, match=words):
+        rows.check_together([classical, other])
+
+
+def test_a_row_that_is_there_twice_is_refused(classical: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="tiny--integral is there twice"):
+        rows.check_together([classical, classical])
+
+
+def test_no_rows_are_no_error(tmp_path: Path) -> None:
+    assert rows.load_all(tmp_path / "none") == []
+
+
+NAMED: dict[str, Callable[[dict[str, Any]], object]] = {
+    "row": lambda row: row.update(row="../../../escaped"),
+    "track": lambda row: row["scenarios"].update(name="../../evil"),
+    "controller": lambda row: row["controller"].update(name="integral/.."),
+    "file": lambda row: row.update(row="tiny--inverse"),
+}
+
+
+@pytest.mark.parametrize("what", sorted(NAMED))
+def test_names_that_lead_elsewhere_or_disagree_are_refused(
+    what: str, classical: dict[str, Any], board: Path, tmp_path: Path
+) -> None:
+    row = copy.deepcopy(classical)
+    NAMED[what](row)
+    write_record(tmp_path / "tiny--integral.json", row)
+    with pytest.raises(ValueError, match="have to agree, in letters, digits and _"):
+        rows.load(tmp_path / "tiny--integral.json")
+    row["scenarios"]["name"], row["controller"]["name"] = "a/b", "c"
+    path = tmp_path / "other.json"
+    write_record(path, {**row, "row": "a/b--c"})
+    with pytest.raises(ValueError, match="have to agree"):
+        rows.load(path)
+
+
+def test_a_copy_under_another_name_is_no_row(
+    classical: dict[str, Any], board: Path, tmp_path: Path
+) -> None:
+    write_record(tmp_path / "tiny--mine.json", classical)
+    with pytest.raises(ValueError, match="holds 'tiny--integral'"):
+        rows.load_all(tmp_path)
+
+
+def test_a_row_of_an_unknown_track_is_refused(
+    classical: dict[str, Any], board: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_record(tmp_path / "tiny--integral.json", classical)
+    monkeypatch.setattr(scenarios, "FOLDER", tmp_path)
+    with pytest.raises(ValueError, match="this checkout has no track 'tiny'"):
+        rows.load(tmp_path / "tiny--integral.json")
+
+
+def test_what_a_row_lacks_is_named(classical: dict[str, Any], board: Path, tmp_path: Path) -> None:
+    path = tmp_path / "tiny--integral.json"
+    row = copy.deepcopy(classical)
+    del row["aggregate"], row["env"]["digest"]
+    write_record(path, row)
+    with pytest.raises(ValueError, match=r"a row without aggregate, env\.digest; run it again"):
+        rows.load(path)
+    write_record(path, {**classical, "controller": "inverse"})
+    with pytest.raises(ValueError, match=r"without controller\.name, "):
+        rows.load(path)
+
+
+def test_cells_of_another_version_or_plant_are_not_assembled(board: Path) -> None:
+    entrant, track = find("low"), tiny(board)
+    records = [cells.compute(cell) for cell in cells_of(entrant, track)]
+    assert rows.assemble(entrant, track, records)["failures"] == 0
+    with pytest.raises(ValueError, match="the cells are not those of tiny"):
+        rows.assemble(entrant, track, records[:1])
+    other = [records[0], {**records[1], "env": "PAM/MusclePositioning-v1"}]
+    with pytest.raises(ValueError, match="Positioning-v1 among those of PAM/MusclePositioning-v0"):
+        rows.assemble(entrant, track, other)
+    for name in ("plant_digest", "model_digest"):
+        with pytest.raises(ValueError, match="is of another plant or model"):
+            rows.assemble(entrant, track, [records[0], {**records[1], name: "0"}])
+
+
+PARTS = ("env", "plants", "models", "metrics")
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_the_task_is_of_environment_plants_models_and_metrics(
+    part: str, board: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    track = tiny(board)
+    before, built = tasks.task_digest(track), tasks.built(track)
+    if part == "metrics":
+        monkeypatch.setattr(tasks, "metrics_digest", lambda groups: "another rule")
+    else:
+        named = getattr(built, part)
+        other = dataclasses.replace(built, **{part: {**named, next(iter(named)): "0"}})
+        monkeypatch.setattr(tasks, "built", lambda track: other)
+    assert tasks.task_digest(track) != before
+
+
+def test_only_metrics_that_score_a_track_are_of_its_task(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert set.union(*tasks.GROUPS_OF.values()) == set(GROUPS)
+    assert set(tasks.GROUPS_OF) < set(METRICS)
+    read: list[set[str]] = []
+    monkeypatch.setattr(
+        tasks, "code_digest", lambda files, root: read.append({f.name for f in files}) or ""
+    )
+    tasks.metrics_digest(frozenset({"gait"}))
+    tasks.metrics_digest(frozenset({"chain", "joint"}))
+    tasks.metrics_digest(frozenset())
+    always = {"errors.py", "metrics.py"}
+    assert read == [always | {"metrics_knee.py"}, always | {"metrics_joint.py"}, always]
+
+
+def test_the_environments_of_a_track_are_built_once(
+    board: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+    make = tasks.make_env
+
+    def counted(env: str, kwargs: Any) -> Any:
+        made.append(env)
+        return make(env, kwargs)
+
+    monkeypatch.setattr(tasks, "make_env", counted)
+    for name in ("low", "inverse", "trained"):
+        tasks.task_digest(tiny(board))
+        artefacts.of(find(name), tiny(board))
+    assert len(made) == len(tiny(board).scenarios()) + 1  # and one for the description
+
+
+def test_the_key_of_a_cell_follows_its_policy(board: Path) -> None:
+    track = tiny(board)
+    before = [cell.key for cell in cells_of(find("trained"), track)]
+    assert len(set(before)) == len(before) == 4
+    bench_fakes.write_policies(board / "policies", 0.02, 0.06)
+    after = [cell.key for cell in cells_of(find("trained"), track)]
+    bench_fakes.write_policies(board / "policies", 0.02, 0.05)
+    assert after[:2] == before[:2]
+    assert not set(after[2:]) & set(before)
+
+
+def test_what_a_controller_raises_is_a_failure_with_its_words(board: Path) -> None:
+    row = rows.load(run_row(board, "raises"))
+    assert row["failures"] == len(row["episodes"]) == 4
+    worst = row["scenarios"]["content"]["worst_case"]["rms_error"]
+    assert row["aggregate"]["rms_error"]["mean"] == pytest.approx(worst)
+    (words,) = {episode["failure"] for episode in row["episodes"]}
+    assert words.startswith("KeyError: 'no such thing at 0x...")
+    assert {episode["steps"] for episode in row["episodes"]} == {50}
+    assert read_record(board / "out" / "tiny--raises.json")["failures"] == 4

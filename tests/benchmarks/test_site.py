@@ -1,0 +1,313 @@
+"""The page: the same bytes for the same rows, and what a reader does works in a real browser."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import board_fakes as fakes
+import pytest
+
+from benchmarks import leaderboard, site_build, site_data, traces
+from benchmarks.__main__ import main
+from benchmarks.controllers import find
+from benchmarks.runner import Options, run
+from benchmarks.scenarios import ScenarioSet
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+BROWSER = next((path for path in map(shutil.which, BROWSERS) if path), None)
+pytestmark = pytest.mark.xdist_group("site")
+needs_browser = pytest.mark.skipif(
+    BROWSER is None, reason=f"no browser here; install one of {', '.join(BROWSERS)}"
+)
+HOSTILE = "<img src=x onerror=\"document.title='taken'\"></script><b id=taken>bold</b>"
+
+DRIVER = """
+"use strict";
+const told = { faults: [] };
+addEventListener("error", (event) => told.faults.push(String(event.message)));
+addEventListener("securitypolicyviolation", (event) => told.faults.push(event.violatedDirective));
+const all = (query) => [...document.querySelectorAll(query)];
+const one = (query) => document.querySelector(query);
+const names = () => all("#rows tr.pick td.name").map((cell) => cell.textContent);
+const click = (query) => one(query).click();
+const choose = (id, value) => {
+  one(id).value = value;
+  one(id).dispatchEvent(new Event(id === "#query" ? "input" : "change"));
+};
+const until = (seen) => new Promise((done) => {
+  const look = () => (seen() ? done() : setTimeout(look, 20));
+  look();
+});
+async function drive() {
+  told.first = names();
+  told.winners = one("#winners tbody").textContent;
+  told.changes = one("#changes tbody").textContent;
+  told.places = all("#places svg path").length;
+  told.groups = all("#rows tr.apart").map((line) => line.textContent);
+  told.headings = all("#rows thead th").map((cell) => cell.textContent);
+  told.round = one("#round").textContent;
+  told.intervals = all("#rows tbody svg circle, #rows tbody svg path.dot").length;
+  for (const step of ["up", "down", "none"]) {
+    click('#rows button[data-sort="controller"]');
+    told[step] = names();
+  }
+  click('#rows button[data-sort="gap"]');
+  told.sorted = one("th[aria-sort]").textContent;
+  click('#rows button[data-sort="rank"]');
+  choose("#knows", "nothing");
+  told.nothing = names();
+  choose("#knows", "");
+  click('#rows button[data-sort="kind"]');
+  told.kinds = names();
+  click('#rows button[data-sort="kind"]');
+  click('#rows button[data-sort="kind"]');
+  choose("#state", "self-reported");
+  told.reported = names();
+  choose("#state", "");
+  choose("#query", "pi");
+  told.query = names();
+  choose("#query", "");
+  choose("#track", "short_wrong_model");
+  told.other = names();
+  told.figure = one("#figure").getAttribute("src");
+  choose("#track", "short_nominal");
+  click('tr[data-row="short_nominal--pid"]');
+  await until(() => one(".pictures"));
+  told.address = location.hash;
+  told.charts = all(".pictures svg").length;
+  told.lines = all(".pictures path").map((line) => line.getAttribute("d"));
+  told.words = one(".pictures").textContent;
+  told.again = one("pre.again").textContent;
+  told.bibtex = one("pre.bibtex").textContent;
+  told.detail = one(".detail").textContent;
+  told.raw = one("a.raw").getAttribute("href");
+  click('tr[data-row="short_nominal--pid"]');
+  told.closed = all(".detail").length;
+  click('tr[data-row="short_nominal--inverse"]');
+  await until(() => one(".pictures"));
+  told.hostile = one(".detail").textContent;
+  click('tr[data-row="short_nominal--ppo"]');
+  await until(() => one(".pictures"));
+  told.learned = one(".detail").textContent;
+  click('tr[data-row="short_nominal--zero"]');
+  await until(() => one(".traces .note"));
+  told.missing = one(".traces .note").textContent;
+  told.taken = Boolean(one("#taken") || one(".detail img")) || document.title === "taken";
+  told.loaded = all("script, link, img").map((part) => part.src || part.href);
+}
+drive().catch((fault) => told.faults.push(String(fault))).finally(() => {
+  const result = document.createElement("pre");
+  result.id = "result";
+  result.textContent = JSON.stringify(told);
+  document.body.append(result);
+});
+"""
+
+
+def page_rows() -> list[dict[str, Any]]:
+    made = fakes.board()
+    made[0]["controller"]["summary"] = HOSTILE
+    made[1]["verified"] = {"date": "2026-01-03", "mode": "bits"}
+    for episode in made[3]["episodes"]:
+        episode["scores"]["rms_error"] = None  # a row without a score breaks no table
+    return made
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with the page of the fakes."""
+    out = tmp_path_factory.mktemp("page")
+    for name, text in site_build.page(page_rows()).items():
+        (out / name).parent.mkdir(parents=True, exist_ok=True)
+        (out / name).write_text(text)
+    return out
+
+
+def browse(address: str, folder: Path) -> str:
+    """Return the page after its scripts have run, without any way out of this machine."""
+    command = [
+        *(str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--disable-extensions"),
+        *("--proxy-server=127.0.0.1:9", f"--user-data-dir={folder / 'profile'}"),
+        *("--virtual-time-budget=20000", "--dump-dom", address),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def told(built: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What the driver saw in the browser while it clicked its way through the page."""
+    copy = tmp_path_factory.mktemp("driven")
+    shutil.copytree(built, copy, dirs_exist_ok=True)
+    (copy / "data/traces/short_nominal--zero.js").unlink()
+    (copy / "driver.js").write_text(DRIVER)
+    index = (copy / "index.html").read_text()
+    (copy / "index.html").write_text(
+        index.replace("</body>", '<script src="driver.js"></script></body>')
+    )
+    shown = browse((copy / "index.html").as_uri(), copy)
+    found = re.search(r'<pre id="result">(.*?)</pre>', shown, re.DOTALL)
+    assert found, shown[-2000:]
+    result: dict[str, Any] = json.loads(html.unescape(found[1]))
+    return result
+
+
+ORDER = ["ppo", "inverse", "pid", "zero", "young", "told"]
+
+
+@needs_browser
+def test_nothing_fails_and_nothing_comes_from_elsewhere(told: dict[str, Any]) -> None:
+    assert told["faults"] == []
+    assert {"page.css", "board.js", "page.js"} <= {Path(name).name for name in told["loaded"]}
+    assert all(name.startswith("file:") for name in told["loaded"])
+
+
+@needs_browser
+def test_verdicts_and_rank_changes_lead(told: dict[str, Any]) -> None:
+    assert "inverse" in told["winners"]
+    assert told["winners"].endswith("better")
+    assert "inverse 2 → 3" in told["changes"]
+    assert told["places"] == 4
+
+
+@needs_browser
+def test_rows_stand_in_their_groups_with_their_intervals(told: dict[str, Any]) -> None:
+    assert told["first"] == ORDER
+    assert told["groups"] == [title for title in site_data.GROUPS.values() if title]
+    assert told["intervals"] == len(ORDER) - 1
+    assert told["round"].startswith("Audit round 2, drawn 2026-01-02: 6 episodes")
+
+
+@needs_browser
+def test_headings_say_of_which_episodes_and_what_is_not_verified(told: dict[str, Any]) -> None:
+    wanted = ["audit RMS [mm] [95 %]", "IQM [mm]", "public RMS [mm]", "audit - public [mm]"]
+    wanted += ["P(improvement), audit episodes", "step [µs] *", "trained [steps] *"]
+    assert set(wanted) <= set(told["headings"])
+
+
+@needs_browser
+def test_a_heading_sorts_within_the_groups_up_and_down_and_lets_go(told: dict[str, Any]) -> None:
+    assert told["up"] == ["inverse", "pid", "ppo", "zero", "young", "told"]
+    assert told["down"] == ["zero", "ppo", "pid", "inverse", "young", "told"]
+    assert told["none"] == ORDER
+    assert told["sorted"].startswith("audit - public")
+
+
+@needs_browser
+def test_filters_keep_what_they_name(told: dict[str, Any]) -> None:
+    assert told["kinds"] == ["inverse", "pid", "zero", "ppo", "young", "told"]
+    assert told["nothing"] == ["zero"]
+    assert told["reported"] == ["told"]
+    assert told["query"] == ["pid"]
+    assert told["other"] == ["ppo", "pid", "inverse", "zero"]
+    assert told["figure"] == "figures/short_wrong_model.svg"
+
+
+@needs_browser
+def test_a_click_opens_trajectories_the_loop_and_what_runs_it_again(told: dict[str, Any]) -> None:
+    assert "row=short_nominal--pid" in told["address"]
+    assert told["charts"] == 4
+    # two errors, two loops, one pressure; reference, output, and the paper controller's output
+    assert len(told["lines"]) == 8
+    assert all(line.count("L") > 200 and "NaN" not in line for line in told["lines"])
+    assert "the plant's loop" in told["words"]
+    assert "inverse" in told["words"]
+    assert "python -m benchmarks verify short_nominal--pid" in told["again"]
+    assert told["bibtex"].startswith("@")
+    assert "round 2, drawn 2026-01-02, salt 5a17; artefact number 1" in told["detail"]
+    assert "verified 2026-01-03" in told["detail"]
+    assert told["raw"] == "rows/short_nominal--pid.json"
+    assert told["closed"] == 0
+
+
+@needs_browser
+def test_a_learned_row_shows_every_training_seed(told: dict[str, Any]) -> None:
+    assert "RMS [mm] by training seed, audit episodes" in told["learned"]
+    assert "seed 00.400" in told["learned"]
+    assert "seed 90.600" in told["learned"]
+    assert "As stated by its maker, not verified" in told["learned"]
+
+
+@needs_browser
+def test_trajectories_that_are_missing_are_not_waited_for(told: dict[str, Any]) -> None:
+    assert told["missing"].startswith("data/traces/short_nominal--zero.js cannot be read")
+
+
+@needs_browser
+def test_words_of_a_stranger_are_shown_and_never_run(told: dict[str, Any]) -> None:
+    assert HOSTILE in told["hostile"]
+    assert not told["taken"]
+
+
+@needs_browser
+def test_an_address_opens_a_row(built: Path) -> None:
+    address = f"{(built / 'index.html').as_uri()}#row=short_wrong_model--ppo"
+    shown = browse(address, built)
+    assert 'class="pictures"' in shown
+    assert "python -m agents train X --seed 0" in html.unescape(shown)
+
+
+@needs_browser
+def test_a_page_without_rows_says_so(tmp_path: Path) -> None:
+    site_build.build(tmp_path, tmp_path / "out")
+    shown = browse((tmp_path / "out" / "index.html").as_uri(), tmp_path)
+    assert "There are no rows yet" in shown
+
+
+def test_the_page_is_the_same_when_it_is_built_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = {"rows": page_rows()}
+    monkeypatch.setattr(leaderboard, "load", lambda folder: made["rows"])
+    for row in made["rows"]:
+        (tmp_path / f"{row['row']}.json").write_text(json.dumps({"the row": row["row"]}))
+    written = site_build.build(tmp_path, tmp_path / "out")
+    assert written[0].name == "index.html"
+    raw = tmp_path / "out" / "rows" / "short_nominal--pid.json"
+    assert json.loads(raw.read_text()) == {"the row": "short_nominal--pid"}
+    before = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*.*")}
+    made["rows"] = page_rows()[::-1]
+    site_build.build(tmp_path, tmp_path / "out")
+    after = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*.*")}
+    assert after == before
+    made["rows"] = page_rows()[:4]
+    site_build.build(tmp_path, tmp_path / "out")
+    for folder, end in (("data/traces", "js"), ("rows", "json")):
+        left = {path.name for path in (tmp_path / "out" / folder).iterdir()}
+        assert left == {f"short_nominal--{n}.{end}" for n in ("inverse", "pid", "zero", "told")}
+
+
+def test_the_page_asks_for_nothing_from_elsewhere() -> None:
+    for path in site_build.ASSETS.iterdir():
+        links = re.findall(r"https?://[^\s\"']+", path.read_text())
+        assert set(links) <= {"http://www.w3.org/2000/svg"}, path.name  # a name, not an address
+    index = (site_build.ASSETS / "index.html").read_text()
+    assert "default-src 'none'" in index
+
+
+def test_rows_of_a_run_make_a_board_and_a_page_with_their_trajectories(
+    track: ScenarioSet, folder: Path
+) -> None:
+    out = folder / "out"
+    pairs = [(find(name), track) for name in ("low", "integral")]
+    run(pairs, Options(jobs=1, out=out, cells=folder / "cells"))
+    written = leaderboard.write(out, folder / "LEADERBOARD.md")
+    assert "`integral`" in written[0].read_text()
+    assert main(["site", "--results", str(out), "--out", str(folder / "site")]) == 0
+    assert main(["site", "--results", str(folder / "nowhere")]) == 2
+    text = (folder / "site/data/traces/short--integral.js").read_text()
+    call, _, held = text.partition(",")
+    assert call == 'loadTraces("short--integral"'
+    drawn = json.loads(held.rpartition(")")[0])
+    assert [trace["scenario"] for trace in drawn] == ["maxwell_slip_steps", "maxwell_slip_sines"]
+    output = traces.unpack(drawn[0]["signals"]["output"])
+    pressure = traces.unpack(drawn[0]["signals"]["state/pressure"])
+    assert len(output) == len(pressure) > 90
+    assert 0.0 < output.max() < 0.05  # m
+    assert 1e4 < pressure.max() < 1e6  # Pa

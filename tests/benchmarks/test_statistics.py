@@ -1,0 +1,200 @@
+"""Statistics against numbers worked out by hand, and against scipy's own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from benchmarks import statistics
+
+
+def test_interquartile_mean_by_hand() -> None:
+    # of eight the middle four: (2 + 3 + 4 + 5) / 4
+    samples = np.array([[100.0, 2.0, 3.0, 4.0, 5.0, 1.0, 0.0, 50.0]])
+    assert statistics.interquartile_mean(samples)[0] == 3.5
+
+
+def test_probability_of_improvement_by_hand() -> None:
+    # two training seeds against one run, in three episodes: below twice, a tie, above
+    first = np.array([[1.0, 5.0, 2.0], [2.0, 5.0, 9.0]])
+    second = np.array([[3.0, 5.0, 4.0]])
+    found = statistics.probability_of_improvement(first, second, ["a", "b", "c"])
+    assert found.value == pytest.approx((1.0 + 0.5 + 0.5) / 3)
+    other = statistics.probability_of_improvement(second, first, ["a", "b", "c"])
+    assert other.value == pytest.approx(1.0 - found.value)
+
+
+def test_probability_of_improvement_is_mann_whitney_averaged_over_tasks() -> None:
+    random = np.random.default_rng(0)
+    first = np.round(random.normal(0.0, 1.0, (7, 6)), 1)  # rounded: ties occur
+    second = np.round(random.normal(0.3, 1.0, (5, 6)), 1)
+    found = statistics.probability_of_improvement(first, second, np.arange(6))
+    expected = [
+        # U counts pairs in which the first argument is the larger
+        stats.mannwhitneyu(second[:, k], first[:, k], method="asymptotic").statistic / 35
+        for k in range(6)
+    ]
+    assert found.value == pytest.approx(np.mean(expected))
+    assert found.low < found.value < found.high
+
+
+def test_a_sure_improvement_has_no_spread_and_one_seed_in_two_has_all() -> None:
+    always = statistics.probability_of_improvement(np.zeros((10, 6)), np.ones((1, 6)), [0, 1] * 3)
+    assert always == statistics.Interval(1.0, 1.0, 1.0)
+    half = np.repeat([[0.0], [2.0]], 6, axis=1)
+    found = statistics.probability_of_improvement(half, np.ones((1, 6)), [0, 1] * 3)
+    assert (found.value, found.low, found.high) == (0.5, 0.0, 1.0)
+
+
+def test_scenarios_are_drawn_again_as_wholes() -> None:
+    # below in all of one scenario and in none of the other: one of two is drawn
+    second = np.ones((1, 10))
+    first = np.repeat([[0.0, 2.0]], 5, axis=1)
+    found = statistics.probability_of_improvement(first, second, np.repeat(["a", "b"], 5))
+    assert (found.value, found.low, found.high) == (0.5, 0.0, 1.0)
+
+
+def test_performance_profile_by_hand() -> None:
+    scores = np.array([[1.0, 2.0], [3.0, 2.0]])
+    found = statistics.performance_profile(scores, [0.5, 1.0, 2.0, 2.5, 3.0])
+    assert found.tolist() == [0.0, 0.25, 0.75, 0.75, 1.0]
+
+
+def test_training_seeds_widen_an_interval_as_their_scatter_says() -> None:
+    # seeds differ by normal offsets, episodes do not: the interval is that of the mean of ten seeds
+    random = np.random.default_rng(1)
+    offsets = random.normal(0.0, 1.0, 10)
+    runs = np.repeat(np.arange(10), 6).tolist()
+    pairs = [(k // 3, k % 3) for k in range(6)] * 10
+    samples = np.repeat(offsets, 6)
+    strata = [scenario for scenario, _ in pairs]
+    found = statistics.bootstrap(samples, strata, runs=runs, pairs=pairs)
+    assert found.value == pytest.approx(offsets.mean())
+    wanted = 1.96 * offsets.std(ddof=1) / np.sqrt(10)
+    assert 0.5 * (found.high - found.low) == pytest.approx(wanted, rel=0.06)
+    blind = statistics.bootstrap(samples, strata)
+    assert blind.high - blind.low < 0.5 * (found.high - found.low)
+
+
+def test_one_training_seed_gives_the_bits_of_none() -> None:
+    values, strata = np.random.default_rng(2).normal(size=12), [0, 1, 2] * 4
+    pairs = list(enumerate(strata))
+    plain = statistics.bootstrap(values, strata)
+    assert statistics.bootstrap(values, strata, runs=[0] * 12, pairs=pairs) == plain
+
+
+def test_the_order_of_episodes_does_not_matter_to_training_seeds() -> None:
+    random = np.random.default_rng(3)
+    runs = np.repeat([4, 5, 6], 4)
+    pairs = [("a", 1), ("a", 2), ("b", 1), ("b", 2)] * 3
+    values = random.normal(size=12)
+    table, order = statistics.crossed(values, runs.tolist(), pairs)
+    assert table.tolist() == values.reshape(3, 4).tolist()
+    assert order == pairs[:4]
+    strata = [scenario for scenario, _ in pairs]
+    found = statistics.bootstrap(values, strata, runs=runs.tolist(), pairs=pairs)
+    turned = {"runs": runs.tolist()[::-1], "pairs": pairs[::-1]}
+    assert statistics.bootstrap(values[::-1], strata[::-1], **turned) == found
+
+
+def test_a_training_seed_that_lacks_an_episode_is_refused() -> None:
+    runs, pairs = [0, 0, 1], ["a", "b", "a"]
+    with pytest.raises(ValueError, match="every training seed must be run in every episode"):
+        statistics.bootstrap(np.ones(3), ["s"] * 3, runs=runs, pairs=pairs)
+    with pytest.raises(ValueError, match="need `runs` and `pairs`"):
+        statistics.bootstrap(np.ones(3), ["s"] * 3, runs=runs)
+
+
+def test_paired_differences_see_what_overlapping_intervals_hide() -> None:
+    # hard and easy episodes differ by far more than the two controllers do
+    random = np.random.default_rng(4)
+    hardness = random.uniform(1.0, 10.0, (1, 20))
+    strata = [0] * 20
+    first, second = hardness, hardness + 0.1 + 0.01 * random.normal(size=(1, 20))
+    alone = [statistics.bootstrap(table[0], strata) for table in (first, second)]
+    assert alone[1].low < alone[0].high
+    found = statistics.difference_of_tables(second, first, strata)
+    assert found.low > 0.09
+    assert found.high < 0.11
+
+
+def test_differences_of_several_training_seeds_by_hand() -> None:
+    first, second = np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([[1.0, 1.0]])
+    found = statistics.difference_of_tables(first, second, ["a", "b"])
+    assert found.value == pytest.approx(1.5)
+    # one of two seeds is drawn: the mean of the first less 1, or of the second less 1
+    assert (found.low, found.high) == (pytest.approx(0.5), pytest.approx(2.5))
+
+
+def test_equal_scores_give_equal_intervals_whatever_was_asked_before() -> None:
+    random = np.random.default_rng(5)
+    first, second = random.normal(size=(10, 12)), random.normal(size=(1, 12))
+    strata = np.repeat([0, 1, 2], 4)
+    before = statistics.probability_of_improvement(first, second, strata)
+    statistics.probability_of_improvement(second, first, strata)
+    assert statistics.probability_of_improvement(first, second, strata) == before
+
+
+def test_clusters_need_the_same_seeds_in_every_scenario() -> None:
+    with pytest.raises(ValueError, match="the same seeds"):
+        statistics.probability_of_improvement(np.zeros((1, 3)), np.ones((1, 3)), [0, 0, 1])
+
+
+def covered(random: np.random.Generator, common: float) -> bool:
+    """Return whether the interval of 30 scenarios x 5 seeds holds the true mean, 0.
+
+    Scenarios differ by far more than episodes; ``common`` is the share of the variance of an
+    episode that all scenarios have in common, as they would if a seed were used in all of them.
+    """
+    levels = np.linspace(-10.0, 10.0, 30)[:, None]
+    shared = random.normal(size=(1, 5)) * np.sqrt(common)
+    own = random.normal(size=(30, 5)) * np.sqrt(1.0 - common)
+    strata = np.repeat(np.arange(30), 5)
+    found = statistics.bootstrap((levels + shared + own).ravel(), strata, resamples=400)
+    return found.low <= 0.0 <= found.high
+
+
+def test_the_interval_covers_as_it_says_where_scenarios_have_seeds_of_their_own() -> None:
+    random = np.random.default_rng(7)
+    share = np.mean([covered(random, 0.0) for _ in range(4000)])
+    assert 0.925 <= share <= 0.965  # 400 resamples give 0.94; a standard error is 0.004
+
+
+def test_one_seed_in_all_scenarios_would_make_the_interval_far_too_narrow() -> None:
+    random = np.random.default_rng(8)
+    assert np.mean([covered(random, 0.5) for _ in range(200)]) < 0.6
+
+
+def audited(random: np.random.Generator) -> bool:
+    """Return whether the interval of 15 scenarios x 2 seeds and 10 trainings holds the mean, 0."""
+    table = random.normal(size=(10, 1)) + random.normal(size=(1, 30))
+    found = statistics.of_table(table, np.repeat(np.arange(15), 2), resamples=400)
+    return found.low <= 0.0 <= found.high
+
+
+def test_the_interval_of_an_audit_covers_as_it_says() -> None:
+    random = np.random.default_rng(9)
+    share = np.mean([audited(random) for _ in range(400)])
+    assert 0.89 <= share <= 0.96  # 0.92: ten policies, and no Student's t
+
+
+def test_the_gap_between_splits_is_paired_by_training_seed() -> None:
+    random = np.random.default_rng(10)
+    policies = random.normal(0.0, 5.0, (10, 1))
+    public = policies + 0.1 * random.normal(size=(10, 12))
+    audit = policies + 0.5 + 0.1 * random.normal(size=(10, 30))
+    strata = np.repeat(np.arange(6), 2), np.repeat(np.arange(6), 5)
+    found = statistics.difference_of_splits(audit, strata[1], public, strata[0])
+    assert found.value == pytest.approx(audit.mean() - public.mean())
+    assert found.low > 0.4
+    assert found.high < 0.6
+
+
+def test_the_band_of_a_profile_is_of_the_same_resamples_as_a_mean() -> None:
+    random = np.random.default_rng(11)
+    scores, strata = random.normal(size=(4, 12)), np.repeat([0, 1, 2], 4)
+    low, high = statistics.profile_band(scores, strata, [-9.0, 0.0, 9.0], resamples=300)
+    assert (low[0], high[0], low[2], high[2]) == (0.0, 0.0, 1.0, 1.0)
+    share = statistics.of_table((scores <= 0.0).astype(float), strata, resamples=300)
+    assert (low[1], high[1]) == (pytest.approx(share.low), pytest.approx(share.high))

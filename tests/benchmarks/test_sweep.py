@@ -1,0 +1,233 @@
+"""Runs whose workers and whose driver are killed give the rows of one that was left in peace."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+import yaml
+
+from benchmarks import cells, rows, scenarios
+from benchmarks.__main__ import main
+from benchmarks.controllers import find
+from benchmarks.runner import Options, run
+from benchmarks.scenarios import ScenarioSet
+from tests.benchmarks.conftest import CONTENT
+from tests.sweeps.dask_processes import DaskProcesses
+from tests.sweeps.processes_of import alive, new_family, start, wait_until
+
+pytestmark = pytest.mark.xdist_group("row_sweep")  # one cluster
+HERE = Path(__file__).parent
+NAMES = ("low", "middle", "integral")
+
+PROGRAM = """
+import sys
+from pathlib import Path
+from benchmarks import controllers, scenarios
+from benchmarks.controllers import find
+from benchmarks.runner import Options, run
+controllers.SOURCES = (("bench_fakes", "bench_fakes", "classical"),)
+folder, jobs, address, *names = sys.argv[1:]
+folder = Path(folder)
+track = scenarios.load(folder / "short.yaml")
+options = Options(
+    jobs=int(jobs), out=folder / "out", cells=folder / "cells",
+    backend="dask" if address else "loky", address=address,
+)
+report = run([(find(name), track) for name in names], options)
+print(report)
+sys.exit(bool(report.missing))
+"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def uncompiled() -> Iterator[None]:
+    """Programs of these tests run so little that compiling it would take longer."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PAM_ENVS_COMPILE", "0")
+        yield
+
+
+@pytest.fixture(scope="module")
+def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DaskProcesses]:
+    """A scheduler and two workers that can import the fake controllers."""
+    pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
+    with DaskProcesses(tmp_path_factory.mktemp("dask"), HERE) as made:
+        yield made
+
+
+class Driver:
+    """Runs of one folder, each in a process of its own."""
+
+    def __init__(self, folder: Path, address: str = "") -> None:
+        folder.mkdir(exist_ok=True)
+        content = {**CONTENT, "seeds": 2, "kwargs": {"episode_seconds": 1.0}}
+        (folder / "short.yaml").write_text(yaml.safe_dump(content))
+        self.folder, self.address, self.family = folder, address, new_family()
+        self.log = folder / "log.txt"
+
+    def start(self, *names: str, jobs: int = 2) -> subprocess.Popen[bytes]:
+        """Start a run."""
+        given = (str(self.folder), str(jobs), self.address, *(names or NAMES))
+        return start(self.family, "-c", PROGRAM, *given, paths=(HERE,), log=self.log)
+
+    def finish(self, jobs: int = 2) -> dict[str, str]:
+        """Run to the end and return the rows."""
+        assert self.start(jobs=jobs).wait() == 0, self.log.read_text()
+        return self.rows()
+
+    def cells(self) -> list[Path]:
+        """Return the cells that are there."""
+        return sorted((self.folder / "cells").glob("*.json"))
+
+    def kill(self, driver: subprocess.Popen[bytes], ready: Callable[[], object]) -> None:
+        """Kill a run once something is true, and see that all of it ends."""
+        wait_until(lambda: ready() or driver.poll() is not None)
+        driver.send_signal(signal.SIGKILL)
+        driver.wait()
+        wait_until(lambda: not alive(self.family), 20.0)
+
+    def workers(self) -> list[psutil.Process]:
+        """Return loky's processes."""
+        return [p for p in alive(self.family) if any("popen_loky" in word for word in p.cmdline())]
+
+    def rows(self) -> dict[str, str]:
+        """Return the rows' texts without times, host and date."""
+        found = {}
+        for path in sorted((self.folder / "out").glob("*.json")):
+            text, count = re.subn(
+                r'^ "volatile": \{.*?^ \}', "", path.read_text(), flags=re.M | re.S
+            )
+            assert count == 1
+            found[path.name] = text
+        return found
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The rows of a run in one process that nothing disturbs."""
+    rows = Driver(tmp_path_factory.mktemp("whole")).finish(jobs=1)
+    assert len(rows) == len(NAMES)
+    return rows
+
+
+@pytest.mark.parametrize("backend", ["loky", "dask"])
+def test_a_run_whose_driver_is_killed_goes_on_and_gives_the_same_bytes(
+    backend: str, whole: dict[str, str], tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    address = request.getfixturevalue("dask").address if backend == "dask" else ""
+    driver = Driver(tmp_path, address)
+    driver.kill(driver.start(), driver.cells)
+    before = {path: path.read_bytes() for path in driver.cells()}
+    assert 1 <= len(before) < 2 * len(NAMES)
+    assert driver.finish() == whole
+    assert all(path.read_bytes() == content for path, content in before.items())
+    wait_until(lambda: not alive(driver.family))
+
+
+@pytest.mark.parametrize("backend", ["loky", "dask"])
+def test_a_worker_that_is_killed_in_the_middle_changes_nothing(
+    backend: str, whole: dict[str, str], tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    dask = request.getfixturevalue("dask") if backend == "dask" else None
+    driver = Driver(tmp_path, dask.address if dask else "")
+    running = driver.start()
+    wait_until(driver.cells)
+    (dask or driver).workers()[0].kill()
+    assert running.wait() == 0, driver.log.read_text()
+    assert driver.rows() == whole
+
+
+def test_two_drivers_on_one_folder_give_the_rows_of_one(
+    whole: dict[str, str], tmp_path: Path
+) -> None:
+    driver = Driver(tmp_path)
+    first, second = driver.start(jobs=1), driver.start(jobs=1)
+    assert first.wait() == second.wait() == 0, driver.log.read_text()
+    assert driver.rows() == whole
+    assert {path.suffix for path in (tmp_path / "cells").iterdir()} == {".json"}
+    assert len(driver.cells()) == 2 * len(NAMES)
+
+
+# --- the command line ----------------------------------------------------------------------------
+
+
+@pytest.fixture
+def ask(track: ScenarioSet, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
+    """Return what runs the command on the short track."""
+    monkeypatch.setattr(scenarios, "available", lambda *_: {track.name: track})
+    places = ("--out", str(folder / "out"), "--cells", str(folder / "cells"), "--jobs", "1")
+
+    def run(*arguments: str) -> int:
+        return main(["run", *places, "--controller", "low", *arguments])
+
+    return run
+
+
+def test_a_dry_run_lists_the_cells_and_runs_none(
+    ask: Callable[..., int], folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert ask("--dry-run") == 0
+    listed = capsys.readouterr().out.splitlines()
+    assert listed[0].startswith("to run  low in short/maxwell_slip_steps")
+    assert listed[-1] == "2 cells, 2 to run"
+    assert not (folder / "cells").exists()
+    assert ask() == 0
+    damaged, _ = sorted((folder / "cells").glob("*.json"))
+    damaged.write_text("{}")
+    capsys.readouterr()
+    assert ask("--dry-run") == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "2 cells, 1 to run"
+    assert damaged.read_text() == "{}"
+    assert ask("--dry-run", "--force") == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "2 cells, 2 to run"
+
+
+def test_exit_codes(
+    ask: Callable[..., int], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def wrong(*_: object) -> None:
+        raise ArithmeticError("no number")
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    assert ask("--controller", "lowest") == 2
+    assert "no controller named 'lowest'" in capsys.readouterr().err
+    assert ask("--backend", "dask") == 2
+    assert "needs both" in capsys.readouterr().err
+    with monkeypatch.context() as patch:
+        patch.setattr(cells, "compute", wrong)
+        assert ask() == 1
+        said = capsys.readouterr().err
+        assert "MISSING low in short/maxwell_slip_steps" in said
+        assert "ArithmeticError: no number" in said
+    with monkeypatch.context() as patch:
+        patch.setattr(rows, "assemble", interrupted)
+        assert ask() == 130
+        assert "the same command goes on" in capsys.readouterr().err
+    assert ask() == 0
+    assert "0 cells computed, 2 were there already" in capsys.readouterr().out
+
+
+def test_a_cell_that_another_run_removes_is_told(
+    track: ScenarioSet, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = Options(jobs=1, out=folder / "out", cells=folder / "cells")
+    assemble = rows.assemble
+
+    def removing(*given: object) -> object:
+        for path in (folder / "cells").glob("*.json"):
+            path.unlink()
+        return assemble(*given)
+
+    monkeypatch.setattr(rows, "assemble", removing)
+    report = run([(find("low"), track), (find("middle"), track)], options)
+    assert len(report.rows) == 1
+    assert len(report.missing) == 2
+    assert all("removed meanwhile" in line for line in report.missing)

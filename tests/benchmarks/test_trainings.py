@@ -1,0 +1,111 @@
+"""Training seeds of a learned row: the first n of one training, none copied, chosen or left out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import bench_fakes
+import pytest
+
+from benchmarks import rows, trainings
+from benchmarks.controllers import find
+from benchmarks.runner import Options, run
+from benchmarks.verify import verify
+from tests.benchmarks.row_helpers import GAINS, commit, draw, place, run_row, tiny
+
+
+@pytest.fixture(scope="module")
+def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    with place(tmp_path_factory.mktemp("trainings")) as folder:
+        run_row(folder, "trained")
+        yield folder
+
+
+@pytest.fixture(autouse=True)
+def put_back(board: Path) -> Iterator[None]:
+    yield
+    bench_fakes.write_policies(board / "policies", *GAINS)
+    commit(board)
+
+
+def card(board: Path, seed: int) -> Path:
+    return board / "policies" / f"trained.s{seed}.json"
+
+
+def edit(board: Path, **changes: object) -> None:
+    """Change entries of the file of training seed 1, which is its own card."""
+    said = json.loads(card(board, 1).read_text())
+    card(board, 1).write_text(json.dumps(said | changes))
+
+
+CHANGES: dict[str, tuple[Callable[[Path], object], str]] = {
+    "copied": (
+        lambda board: card(board, 1).write_bytes(card(board, 0).read_bytes()),
+        "training seeds 0 and 1 are one policy",
+    ),
+    "copied and renamed": (
+        lambda board: edit(board, gain=GAINS[0]),
+        "training seeds 0 and 1 are one policy",
+    ),
+    "renamed": (lambda board: edit(board, seed=7), "training seed 1 has seed 7 on its card"),
+    "renamed beside": (
+        lambda board: edit(board, training={"seed": 7}),
+        "training seed 1 has seed 7 on its card",
+    ),
+    "left out": (
+        lambda board: card(board, 0).rename(card(board, 2)),
+        "training seeds 1, 2, and they must be 0 to 1",
+    ),
+    "longer": (
+        lambda board: edit(board, steps=2e6),
+        "training seed 1 was trained with other settings than seed 0",
+    ),
+    "tuned": (
+        lambda board: edit(board, config={"ppo": {"gamma": 0.9}}),
+        "training seed 1 was trained with other settings than seed 0",
+    ),
+    "of another plant": (
+        lambda board: edit(board, plants=["0" * 16]),
+        "training seed 1 was trained with other settings than seed 0",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", CHANGES)
+def test_seeds_that_are_no_trainings_of_their_own_make_no_row(what: str, board: Path) -> None:
+    change, words = CHANGES[what]
+    change(board)
+    commit(board)
+    options = Options(jobs=1, out=board / "new", cells=board / "cells")
+    report = run([(find("trained"), tiny(board))], options)
+    assert report.rows == []
+    (line,) = report.missing
+    assert line.startswith("tiny--trained: trained: ")
+    assert words in line
+    assert any(words in line for line in verify(board / "out" / "tiny--trained.json").drifted)
+
+
+def test_a_round_takes_no_copies(board: Path) -> None:
+    CHANGES["copied"][0](board)
+    commit(board)
+    with pytest.raises(ValueError, match="are one policy"):
+        draw(board, "trained")
+
+
+def test_what_changes_nothing_that_is_learned_may_differ(board: Path) -> None:
+    edit(board, config={"checkpoint_steps": 10, "search": {"trials": 3}})
+    edit(board, baseline={"probe": [0.1]})
+    row = rows.load(run_row(board, "trained", out=board / "other"))
+    assert row["training_seeds"] == [0, 1]
+
+
+def test_the_row_says_what_the_cards_say(board: Path) -> None:
+    found = trainings.of(find("trained"))
+    assert found is not None
+    assert [(run["training_seed"], run["command"]) for run in found] == [
+        (0, "train --seed 0"),
+        (1, "train --seed 1"),
+    ]
+    assert trainings.of(find("low")) is None

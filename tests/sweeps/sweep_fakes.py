@@ -1,0 +1,55 @@
+"""Tasks whose workers live, fail and die."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from sweeps.worker import wanted
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number to be squared.
+
+    ``kind`` says what happens on the way; ``folder`` is where it leaves a mark that it began.
+    """
+
+    number: int
+    kind: str = ""
+    folder: str = ""
+
+    @property
+    def key(self) -> str:
+        """Name of the task; ``foreign`` ones have another in every process."""
+        return f"{self.number}{os.getpid() if self.kind == 'foreign' else ''}"
+
+    @property
+    def mark(self) -> Path:
+        """File with a line for each time that the task was begun."""
+        return Path(self.folder) / f"begun_{self.number}"
+
+    def begins(self) -> int:
+        """Return how often the task was begun."""
+        return len(self.mark.read_text().split()) if self.mark.exists() else 0
+
+
+def square(task: Number) -> int:
+    """Return the square, unless something comes between."""
+    with task.mark.open("a") as file:
+        file.write(f"{os.getpid()}\n")
+    if task.kind == "deadly" or (task.kind == "deadly once" and task.begins() == 1):
+        os.kill(os.getpid(), signal.SIGKILL)
+    if task.kind == "wrong":
+        raise ValueError(f"{task.number} has no square")
+    if task.kind == "slow":
+        time.sleep(0.3)
+    if task.kind == "endless":
+        until = time.monotonic() + 60.0
+        while wanted() and time.monotonic() < until:
+            time.sleep(0.05)
+        (Path(task.folder) / f"ended_{task.number}").write_text("")
+    return task.number**2

@@ -1,0 +1,110 @@
+"""Tasks on a Dask cluster whose workers, whose scheduler and whose callers are killed."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from sweeps.engine import Cluster, Done, run
+from tests.sweeps.dask_processes import DaskProcesses
+from tests.sweeps.processes_of import alive, new_family, start, wait_until
+from tests.sweeps.sweep_fakes import Number, square
+
+pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
+
+pytestmark = pytest.mark.xdist_group("dask_cluster")  # one cluster
+
+
+def on(dask: DaskProcesses) -> Cluster:
+    return Cluster(backend="dask", address=dask.address)
+
+
+def test_results_are_those_of_one_process(dask: DaskProcesses, tmp_path: Path) -> None:
+    kinds = {2: "wrong", 4: "foreign"}
+    tasks = [Number(k, kinds.get(k, ""), str(tmp_path)) for k in range(8)]
+    done = {d.key: d for d in run(square, tasks, on(dask))}
+    assert len(done) == 8
+    assert done["2"] == Done("2", error="ValueError: 2 has no square")
+    assert "other sources, package versions" in done.pop(tasks[4].key).error
+    for k in (0, 1, 3, 5, 6, 7):
+        assert done[str(k)] == Done(str(k), k * k)
+
+
+def test_a_killed_worker_loses_nothing(dask: DaskProcesses, tmp_path: Path) -> None:
+    tasks = [Number(k, "deadly once" if k == 1 else "slow", str(tmp_path)) for k in range(8)]
+    done = list(run(square, tasks, on(dask)))
+    assert sorted((d.key, d.value) for d in done) == [(str(k), k * k) for k in range(8)]
+    assert tasks[1].begins() == 2
+
+
+def test_a_task_that_kills_its_workers_is_named_and_costs_no_other(
+    dask: DaskProcesses, tmp_path: Path
+) -> None:
+    tasks = [Number(k, "deadly" if k == 1 else "", str(tmp_path)) for k in range(5)]
+    done = {d.key: d for d in run(square, tasks, on(dask))}
+    assert "its worker died again and again" in done.pop("1").error
+    assert sorted((d.key, d.value) for d in done.values()) == [
+        ("0", 0),
+        ("2", 4),
+        ("3", 9),
+        ("4", 16),
+    ]
+
+
+def test_workers_that_lack_the_code_are_told_apart(
+    dask: DaskProcesses, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    elsewhere = ModuleType("only_here")
+    exec("def act(task): return task.number", vars(elsewhere))
+    monkeypatch.setitem(sys.modules, "only_here", elsewhere)
+    tasks = [Number(1, "", str(tmp_path))]
+    (done,) = run(elsewhere.act, tasks, on(dask))
+    assert "No module named 'only_here'" in done.error
+    assert "start `dask worker` in the checkout" in done.error
+
+
+PROGRAM = """
+import sys
+from tests.sweeps.sweep_fakes import Number, square
+from sweeps.engine import Cluster, run
+folder, kind, address = sys.argv[1:]
+tasks = [Number(k, kind, folder) for k in range(100)]
+for done in run(square, tasks, Cluster(backend="dask", address=address)):
+    print(done)
+"""
+
+
+def test_what_a_killed_driver_asked_for_ends(dask: DaskProcesses, tmp_path: Path) -> None:
+    family = new_family()
+    driver = start(family, "-c", PROGRAM, str(tmp_path), "endless", dask.address)
+    wait_until(lambda: len(list(tmp_path.glob("begun_*"))) == 2)
+    driver.send_signal(signal.SIGKILL)
+    driver.wait()
+    wait_until(lambda: len(list(tmp_path.glob("ended_*"))) == 2, 30.0)
+    assert not alive(family)
+    after = [Number(k, "", str(tmp_path)) for k in range(200, 204)]  # the cluster is free again
+    assert sorted(d.value for d in run(square, after, on(dask))) == [k * k for k in range(200, 204)]
+    assert len(list(tmp_path.glob("begun_*"))) == 2 + len(after)
+
+
+def test_no_scheduler_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sweeps.dask_cluster.SECONDS", 1.0)
+    with pytest.raises(ValueError, match=r"no Dask scheduler answers at .tcp://127\.0\.0\.1:9."):
+        list(run(square, [Number(1)], Cluster(backend="dask", address="tcp://127.0.0.1:9")))
+
+
+def test_a_scheduler_that_goes_away_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sweeps.dask_cluster.SECONDS", 2.0)
+    with DaskProcesses(tmp_path, workers=1) as dask:
+        tasks = [Number(k, "slow", str(tmp_path)) for k in range(100)]
+        found = run(square, tasks, on(dask))
+        assert next(found).error is None
+        dask.scheduler.kill()
+        with pytest.raises(ValueError, match="went away; what was done is kept"):
+            list(found)
