@@ -25,7 +25,7 @@ from benchmarks import (
 from benchmarks.audit import Audit
 from benchmarks.canonical import arrays_digest, digest
 from benchmarks.controllers import Entrant
-from benchmarks.making import make_env, model_of, plant_digests
+from benchmarks.making import make_batch, make_env, model_of, plant_digests
 from benchmarks.scenarios import Scenario, ScenarioSet
 from sweeps.worker import wanted
 
@@ -154,17 +154,18 @@ def compute(cell: Cell) -> dict[str, Any]:
         record["card"] = trainings.card_record(controller)
     if cell.probe and cell.entrant.knowledge in knowledge.IGNORANT:
         record["uses_model"] = knowledge.uses_model(cell.entrant, model, env, cell.training_seed)
-    spent = []
-    for seed in cell.seeds:
-        if not wanted():
-            raise RuntimeError("nobody waits for it any more")
-        episode = rollout.run(env, controller, seed)
+    if not wanted():
+        raise RuntimeError("nobody waits for it any more")
+    batch = make_batch(cell.track.env, cell.scenario.kwargs, len(cell.seeds))
+    episodes = rollout.run_all(batch, env, controller, cell.seeds)
+    for seed, episode in zip(cell.seeds, episodes, strict=True):
         record["episodes"].append(episode_record(cell, seed, episode))
-        spent.append(episode.seconds)
-        if cell.first and seed == cell.seeds[0]:
-            record |= _kept(cell, env, controller, seed, episode)
+    if cell.first:
+        record |= _kept(cell, env, controller, cell.seeds[0], episodes[0])
+    batch.close()
     env.close()
-    record["volatile"] = {**provenance.occasion(), "predict_us": _times(np.concatenate(spent))}
+    spent = np.concatenate([episode.seconds for episode in episodes])
+    record["volatile"] = {**provenance.occasion(), "predict_us": _times(spent)}
     return record
 
 

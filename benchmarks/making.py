@@ -30,14 +30,29 @@ def make_env(env: str, kwargs: Mapping[str, Any]) -> Any:
     ValueError
         If the id is not one of this package, or the plant is not the mere name of a file.
     """
+    return gym.make(_checked(env), disable_env_checker=True, **_arguments(kwargs))
+
+
+def make_batch(env: str, kwargs: Mapping[str, Any], rows: int) -> Any:
+    """Return the batched environment of a scenario; see :func:`make_env`."""
+    how = {"num_envs": rows, "vectorization_mode": "vector_entry_point"}
+    return gym.make_vec(_checked(env), **how, **_arguments(kwargs))
+
+
+def _checked(env: str) -> str:
     import pam_envs  # noqa: F401  registers the ids
 
     if not _ID.fullmatch(env):
         raise ValueError(f"{env!r} is no environment of this package; give one like PAM/NAME-v0")
+    return env
+
+
+def _arguments(kwargs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a scenario's arguments with the file of its plant in place of the file's name."""
     given = dict(kwargs)
     if isinstance(given.get("plant"), str):
         given["plant"] = plant_file(given["plant"])
-    return gym.make(env, disable_env_checker=True, **given)
+    return given
 
 
 def plant_file(name: str) -> Path:

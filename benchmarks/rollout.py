@@ -1,10 +1,10 @@
-"""One episode, recorded as physical signals from ``info``."""
+"""Episodes, recorded as physical signals from ``info``: one, or several as rows of a batch."""
 
 from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,9 @@ from benchmarks.controllers import ROOT, Controller
 
 LONGEST = 300
 """Characters of a message that a row keeps."""
+
+REPLAYED = 250
+"""Steps of an episode that a controller is asked for again, alone, after it ran in a batch."""
 
 Array = NDArray[np.float64]
 Watch = Callable[[Any], None]
@@ -33,8 +36,9 @@ class Episode:
         What the controller was given at each step.
     actions : (n, n_act) array
         What it answered.
-    seconds : (n,) array
-        Time that each answer took [s].
+    seconds : (m,) array
+        Times that answers to one observation took [s], not of all steps where episodes ran as
+        rows of a batch.
     period : float
         Control period [s].
     failure : str
@@ -112,16 +116,136 @@ def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None)
             watch(env)
     table = np.array(infos, np.float64).reshape(-1, len(keys))
     return Episode(
-        signals={
-            **{key: np.ascontiguousarray(table[:, i]) for i, key in enumerate(keys)},
-            **{f"model/{k}": one.copy() for k, one in enumerate(np.array(models, np.float64).T)},
-        },
+        signals=_named(keys, table, np.array(models, np.float64)),
         observations=np.array(observations),
         actions=np.array(actions),
         seconds=np.array(seconds),
         period=float(env.unwrapped.control_period),
         failure=failure,
     )
+
+
+def _named(keys: Sequence[str], table: Array, models: Array) -> dict[str, Array]:
+    """Return the columns of ``info`` and of what a model says, by name."""
+    return {
+        **{key: np.ascontiguousarray(table[:, i]) for i, key in enumerate(keys)},
+        **{f"model/{k}": one.copy() for k, one in enumerate(models.T)},
+    }
+
+
+# --- several at once ---------------------------------------------------------------------------
+
+
+def run_all(batch: Any, env: Any, controller: Controller, seeds: Sequence[int]) -> list[Episode]:
+    """Run an episode for each seed, as rows of a batch where that gives the same bits.
+
+    A row of a batch is the single environment to the last bit, and a row of a controller should be.
+    Whether it is, is looked at: the first answers to the first and to the last row are asked for
+    again, alone. Where one differs, where the controller takes no batch, and where anything is
+    raised, the episodes are run one after the other, as if there were no batch.
+
+    Parameters
+    ----------
+    batch : gymnasium.vector.VectorEnv
+        With as many rows as there are seeds.
+    env : gymnasium.Env
+        The same environment alone.
+    controller : Controller
+    seeds : sequence of int
+        Of the environment's resets.
+    """
+    try:
+        episodes = _rows(batch, controller, seeds)
+    except Exception:  # told by the single run, in the words of one row
+        episodes = None
+    return episodes or [run(env, controller, seed) for seed in seeds]
+
+
+def _rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> list[Episode] | None:
+    """Return the episodes as rows of a batch, None where the controller's are not single ones."""
+    course = _run_rows(batch, controller, seeds)
+    if course is None:
+        return None
+    seconds: list[Array] = []
+    for row in sorted({0, len(seeds) - 1}):
+        first = min(REPLAYED, int(course.lengths[row]))
+        alone, spent = _timed(controller, course.observations[:first, row])
+        together = course.actions[:first, row]
+        if alone.dtype != together.dtype or not np.array_equal(alone, together, equal_nan=True):
+            return None
+        seconds.append(spent)
+    spent = np.concatenate(seconds)
+    period = float(batch.control_period)
+    return [course.episode(row, spent, period) for row in range(len(seeds))]
+
+
+@dataclass(frozen=True)
+class _Course:
+    """What was recorded of a batch in n steps: until its last row had ended.
+
+    Attributes
+    ----------
+    keys : tuple of str
+        Of ``info``.
+    infos : (n, n_keys, n_rows) array
+    models : (n, n_rows, n_outputs) array
+    observations : (n, n_rows, n_obs) array
+    actions : (n, n_rows, n_act) array
+    lengths : (n_rows,) array
+        Steps of each row's first episode.
+    failures : list of str
+    """
+
+    keys: tuple[str, ...]
+    infos: Array
+    models: Array
+    observations: NDArray[Any]
+    actions: NDArray[Any]
+    lengths: NDArray[np.int64]
+    failures: list[str]
+
+    def episode(self, row: int, seconds: Array, period: float) -> Episode:
+        """Return the first episode of a row."""
+        n = int(self.lengths[row])
+        return Episode(
+            signals=_named(self.keys, self.infos[:n, :, row], self.models[:n, row]),
+            observations=self.observations[:n, row].copy(),
+            actions=self.actions[:n, row].copy(),
+            seconds=seconds,
+            period=period,
+            failure=self.failures[row],
+        )
+
+
+def _run_rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> _Course | None:
+    """Step until every row has ended once; None if the controller answers in another shape."""
+    count = len(seeds)
+    observation, report = batch.reset(seed=list(seeds))
+    keys = tuple(report)
+    told = getattr(controller, "model_output", None)
+    infos, models, observations, actions = [], [], [], []
+    state, start, running = None, np.ones(count, bool), np.ones(count, bool)
+    lengths, failures = np.zeros(count, np.int64), [""] * count
+    while running.any():
+        action, state = controller.predict(observation, state, start, True)
+        if np.shape(action) != batch.action_space.shape:
+            return None
+        models.append(np.reshape(told(state) if told else [], (count, -1)))
+        after, _, terminated, truncated, report = batch.step(action)
+        start = terminated | truncated
+        table = np.array([report[key] for key in keys])
+        if start.any():  # of a row that has ended, the last of that episode
+            table[:, start] = np.array([report["final_info"][key][start] for key in keys])
+        infos.append(table)
+        observations.append(observation)
+        actions.append(action)
+        lengths[running] += 1
+        for row in np.flatnonzero(running & terminated):
+            end = table[keys.index("time"), row]
+            failures[row] = f"a limit ended the episode at {end:g} s"
+        observation, running = after, running & ~start
+    recorded = (np.array(each) for each in (infos, models, observations, actions))
+    return _Course(keys, *recorded, lengths, failures)
 
 
 def _acceptable(action: Any, env: Any) -> bool:
@@ -179,8 +303,15 @@ def _previewed(index: Mapping[str, int]) -> dict[int, list[tuple[int, int]]]:
 
 
 def _answers(controller: Controller, observations: NDArray[Any]) -> NDArray[Any]:
-    answers, state = [], None
+    return _timed(controller, observations)[0]
+
+
+def _timed(controller: Controller, observations: NDArray[Any]) -> tuple[NDArray[Any], Array]:
+    """Return what a controller answers to an episode's observations, and the times it took [s]."""
+    answers, seconds, state, clock = [], [], None, time.perf_counter
     for i, observation in enumerate(observations):
+        begin = clock()
         action, state = controller.predict(observation, state, i == 0, True)
+        seconds.append(clock() - begin)
         answers.append(action)
-    return np.array(answers)
+    return np.array(answers), np.array(seconds)

@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.speed import Measurement, Missing, median
 
 ROOT = Path(__file__).resolve().parent.parent
-SEED, EFFECT, AMPLITUDE = 4_242, "creep", 0.6
+SEED, EFFECT, AMPLITUDE = 4_242, "creep", 3.0
 CORES = 2
 REPORT_S, VERDICT_S = 10.0, 30.0
 RUN = """

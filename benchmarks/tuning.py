@@ -41,7 +41,7 @@ from baselines.tuned import Tuned, tuned_name
 from benchmarks import cells, controllers, rollout, scenarios
 from benchmarks.canonical import SOURCES, digest, sources_digest
 from benchmarks.claims import COST_FLOOR, COST_RATIO, COSTS
-from benchmarks.making import make_env, model_of
+from benchmarks.making import make_batch, make_env, model_of
 from benchmarks.metrics import headline_of
 from benchmarks.scenarios import ScenarioSet
 from benchmarks.store import write_text
@@ -192,21 +192,26 @@ class Course:
             for scenario in track.scenarios()
         ]
         self.envs = [make_env(track.env, cell.scenario.kwargs) for cell in self.cells]
+        self.batches = [
+            make_batch(track.env, cell.scenario.kwargs, len(cell.seeds)) for cell in self.cells
+        ]
 
     def measure(self, knobs: Knobs) -> Measured:
         """Run all episodes with the controller's knobs at these factors."""
         kinds: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
-        for cell, env in zip(self.cells, self.envs, strict=True):
+        for cell, env, batch in zip(self.cells, self.envs, self.batches, strict=True):
             kind = str(cell.scenario.kwargs.get("reference", ""))
-            kinds[kind] += self._run(cell, env, knobs)
+            kinds[kind] += self._run(cell, env, batch, knobs)
         return measured(kinds, self.track)
 
-    def _run(self, cell: cells.Cell, env: Any, knobs: Knobs) -> list[dict[str, Any]]:
+    def _run(self, cell: cells.Cell, env: Any, batch: Any, knobs: Knobs) -> list[dict[str, Any]]:
         model, base = model_of(self.track.env, cell.scenario, env), env.unwrapped
         told = (model, base.signals, base.action_signals)
         made = catalogue.make_controller(self.controller, *told, knobs=knobs)
+        episodes = rollout.run_all(batch, env, made, cell.seeds)
         return [
-            cells.episode_record(cell, seed, rollout.run(env, made, seed)) for seed in cell.seeds
+            cells.episode_record(cell, seed, episode)
+            for seed, episode in zip(cell.seeds, episodes, strict=True)
         ]
 
 

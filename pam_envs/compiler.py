@@ -185,7 +185,7 @@ def _told_apart(name: str, bound: kernels.Bound) -> str:
 
 def _said(value: Any) -> str:
     """Return a value of a name so that it reads the same in every process."""
-    if isinstance(value, int | float | bool):
+    if isinstance(value, int | float):
         return repr(value)
     return f"{value.__module__}.{value.__qualname__}"
 
@@ -205,9 +205,4 @@ def compiled(
             dispatcher._cache = _Cache(made)
         return dispatcher  # type: ignore[no-any-return]
 
-    key = (function, kernels.bound(function, names, {}))
-    done = {k: v for k, v in _DONE.items() if k != key}
-    dispatcher = kernels.rebind(function, names, finish, done)
-    del done[key]
-    _DONE.update(done)
-    return dispatcher
+    return kernels.rebind(function, names, finish, _DONE)

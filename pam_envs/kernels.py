@@ -163,26 +163,26 @@ def rebind(
     Parameters
     ----------
     function : callable
-        A kernel.
+        A kernel. It is copied anew in every call.
     names : dict
         Values for global names, wherever the call graph uses them.
     finish : callable
         Gets the copy, the original, and the names and values that are bound in its call graph.
     done : dict
-        The copies so far, by original and what is bound in it: callees that use none of the names,
+        The callees so far, by original and what is bound in it: those that use none of the names,
         or the same values, are made once. It can serve several calls with other names.
     known : dict, optional
         What is bound in each function with these ``names``.
     """
     known = {} if known is None else known
-    key = (function, bound(function, names, known))
-    if key in done:
-        return done[key]
     scope = dict(function.__globals__)  # type: ignore[attr-defined]
     for used in function.__code__.co_names:  # type: ignore[attr-defined]
         value: Any = names.get(used, scope.get(used))
         if hasattr(value, "__pam_kernel__"):
-            value = rebind(value, names, finish, done, known)
+            key = (value, bound(value, names, known))
+            if key not in done:
+                done[key] = rebind(value, names, finish, done, known)
+            value = done[key]
         if used in scope:
             scope[used] = value
     made = types.FunctionType(
@@ -193,8 +193,7 @@ def rebind(
     )
     made.__qualname__ = function.__qualname__
     made.__module__ = function.__module__
-    done[key] = finish(made, function, key[1])
-    return done[key]
+    return finish(made, function, bound(function, names, known))
 
 
 def bound(function: Callable[..., Any], names: dict[str, Any], known: dict[Any, Bound]) -> Bound:

@@ -158,7 +158,7 @@ def _both(x: float) -> float:
     return _inner(x) + _doubled(x)
 
 
-def test_what_uses_no_replaced_name_is_made_once() -> None:
+def test_callees_are_made_once_for_what_is_bound_in_them() -> None:
     made: list[tuple[str, set[tuple[str, object]]]] = []
 
     def finish(copy: Any, original: Any, bound: kernels.Bound) -> Any:
@@ -170,13 +170,14 @@ def test_what_uses_no_replaced_name_is_made_once() -> None:
         kernels.rebind(_both, {"OFFSET": offset, "unused": unused}, finish, done)
         for offset, unused in ((10, 1), (10, 2), (20, 1))
     )
-    assert first is again
-    assert (first(1.0), other(1.0)) == (13.0, 23.0)
+    assert first is not again
+    assert (first(1.0), again(1.0), other(1.0)) == (13.0, 13.0, 23.0)
     ten, twenty = {("OFFSET", 10)}, {("OFFSET", 20)}
     assert sorted(made, key=str) == sorted(
         [
             ("_inner", ten),
             ("_doubled", set()),
+            ("_both", ten),
             ("_both", ten),
             ("_inner", twenty),
             ("_both", twenty),

@@ -110,8 +110,8 @@ def _against(rivals: list[dict[str, Any]]) -> list[str]:
         high = (rival["behind"]["interval"] or (0.0, 0.0))[1]
         if rival["why"] not in ("the best", "not excluded") and high < 0.0:
             told.append(
-                f"on what was held out here {rival['name']} does better than what is named, by "
-                f"{-rival['behind']['value']:.2g}; it is left out ({rival['why']}) because the "
+                f"on what was held out here {rival['name']} does better than the plant decided on, "
+                f"by {-rival['behind']['value']:.2g}; it is left out ({rival['why']}) because the "
                 "decision rests on blocks of the whole recording"
             )
     return told

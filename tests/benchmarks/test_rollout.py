@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import rollout
-from benchmarks.making import make_env
+from benchmarks import controllers, rollout
+from benchmarks.making import make_batch, make_env
 
 SHORT = {"episode_seconds": 0.2}
 
@@ -68,3 +68,94 @@ def test_an_error_of_the_environment_is_raised(env, error, monkeypatch):
     monkeypatch.setattr(env.unwrapped, "step", broken)
     with pytest.raises(type(error), match="ours"):
         rollout.run(env, Gives(np.zeros(1, np.float32)), 1)
+
+
+# --- several at once ---------------------------------------------------------------------------
+
+SEEDS = (7, 1, 12, 30)
+SWINGS = {"reference": "path_2", "path_seconds": 0.6, "rest_seconds": 0.2, "episode_seconds": 1.5}
+
+
+class Rows:
+    """A controller whose row is a function of that row, and of the others by ``mixed``."""
+
+    def __init__(self, mixed=0.0, alone=True, swing=0):
+        self.mixed, self.alone, self.swing, self.batches = mixed, alone, swing, 0
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        rows = np.atleast_2d(observation)
+        if len(rows) > 1:
+            self.batches += 1
+            if not self.alone:
+                raise TypeError("one at a time")
+        step = np.zeros(len(rows)) if state is None else np.where(episode_start, 0, state + 1)
+        value = np.tanh(rows[:, [0]] + self.mixed * rows.mean())
+        if self.swing:
+            value = np.sign(rows[:, [0]]) * (-1.0) ** (step[:, None] // self.swing)
+        action = np.repeat(value, 10 if self.swing else 1, axis=1).astype(np.float32)
+        return (action if np.ndim(observation) == 2 else action[0]), step
+
+
+def compared(env_id, kwargs, controller, seeds=SEEDS):
+    """Return episodes run together, after comparing them with single ones."""
+    env, batch = make_env(env_id, kwargs), make_batch(env_id, kwargs, len(seeds))
+    together = rollout.run_all(batch, env, controller, seeds)
+    for episode, seed in zip(together, seeds, strict=True):
+        alone = rollout.run(env, controller, seed)
+        assert (episode.failure, episode.period) == (alone.failure, alone.period)
+        assert list(episode.signals) == list(alone.signals)
+        for name, signal in alone.signals.items():
+            np.testing.assert_array_equal(episode.signals[name], signal, err_msg=name)
+        for mine, other in (
+            (episode.observations, alone.observations),
+            (episode.actions, alone.actions),
+        ):
+            assert mine.dtype == other.dtype
+            np.testing.assert_array_equal(mine, other)
+    return together
+
+
+@pytest.mark.parametrize(
+    ("env_id", "name", "kwargs"),
+    [
+        ("PAM/MusclePositioning-v0", "inverse_pid", {"episode_seconds": 2.0, "load": None}),
+        ("PAM/AntagonisticJoint-v0", "joint_mfc_mu", {"episode_seconds": 2.0}),
+        ("PAM/KneeWalk-v0", "knee_inverse_ahead_ltr", {}),
+    ],
+)
+def test_rows_of_a_batch_are_single_episodes_to_the_bit(env_id, name, kwargs, monkeypatch):
+    env = make_env(env_id, kwargs)
+    controller = controllers.make(controllers.find(name), env.unwrapped.plant, env)
+    compared(env_id, kwargs, controller)
+    monkeypatch.setattr(rollout, "run", None)  # not needed
+    batch = make_batch(env_id, kwargs, 2)
+    assert len(rollout.run_all(batch, env, controller, (3, 4))) == 2
+
+
+@pytest.mark.parametrize(
+    ("controller", "batches"),
+    [(Rows(), 20), (Rows(mixed=1.0), 20), (Rows(alone=False), 1)],
+    ids=["rows", "mixed", "takes no batch"],
+)
+def test_a_controller_whose_rows_are_not_alone_is_run_alone(controller, batches):
+    compared("PAM/MusclePositioning-v0", SHORT, controller)
+    assert controller.batches == batches
+
+
+def test_rows_end_when_they_end():
+    together = compared("PAM/RedundantManipulator-v0", SWINGS, Rows(swing=25))
+    lengths = [len(episode.actions) for episode in together]
+    assert all(episode.failed for episode in together)
+    assert min(lengths) < 150
+
+
+@pytest.mark.parametrize("thing", [np.array([np.nan]), np.zeros(2), RuntimeError("no")])
+def test_what_fails_together_is_told_in_the_words_of_one(thing):
+    together = compared("PAM/MusclePositioning-v0", SHORT, Gives(thing))
+    assert all(episode.failed for episode in together)
+
+
+def test_answers_are_timed_one_at_a_time():
+    (episode, *_) = compared("PAM/MusclePositioning-v0", SHORT, Rows())
+    assert len(episode.seconds) == 2 * 20
+    assert (episode.seconds > 0.0).all()
