@@ -213,8 +213,9 @@ def times_text(all_rows: Sequence[Row]) -> str:
     lines = [
         "# Compute time per step",
         "",
-        "Of `predict` alone, Python included, as stated by who ran the row, not verified: median",
-        "over the scenarios of the median and of the 99th percentile. Machines and loads differ.",
+        "Of `predict` alone for one observation, Python included, as stated by who ran the row, not",
+        "verified: median over the scenarios of the median and of the 99th percentile, each of the",
+        "first 250 answers in two episodes. Machines and loads differ.",
         "",
     ]
     heading = ["controller", "median [us]", "p99 [us]", "machine", "date"]
