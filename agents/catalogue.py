@@ -14,9 +14,9 @@ from agents import configs
 from agents.onnx_file import PolicyFileError
 from agents.policy import OnnxPolicy
 from agents.residual import ResidualPolicy, with_controller
-from agents.settings import nearest
 from baselines.catalogue import CONTROLLERS as CLASSICAL
 from pam_envs.parameters import Signals
+from pam_envs.wording import near
 
 FOLDER = Path(__file__).resolve().parent / "pretrained"
 
@@ -201,7 +201,7 @@ def load_pretrained(
         environment, algorithm or training seed than its name says.
     """
     if name not in CONTROLLERS:
-        raise ValueError(f"no policy named {name!r}{nearest(name, list(CONTROLLERS))}")
+        raise ValueError(f"no policy named {name!r}{near(name, CONTROLLERS)}")
     files = CONTROLLERS[name].files()
     seed = min(files) if training_seed is None else training_seed
     if seed not in files:

@@ -22,7 +22,8 @@ import yaml
 import pam_envs  # noqa: F401  (registers the environments)
 from agents import parts
 from agents.parts import Evaluation, History, Network, Normalize, Plants, Residual, Search
-from agents.settings import SettingsError, build, choice, nearest, number
+from agents.settings import SettingsError, build, choice, number
+from pam_envs.wording import near
 
 FOLDER = Path(__file__).resolve().parent / "configs"
 ALGORITHMS: tuple[str, ...] = ("ppo", "sac", "tqc", "recurrent_ppo")
@@ -177,7 +178,7 @@ def check_env(name: str) -> None:
     """
     if not (ENV.fullmatch(name) and name in gym.registry):
         known = [env for env in gym.registry if ENV.fullmatch(env)]
-        raise SettingsError(f"env = {name!r} is no environment here{nearest(name, known)}")
+        raise SettingsError(f"env = {name!r} is no environment here{near(name, known)}")
 
 
 def _fresh(name: str) -> Any:
@@ -205,12 +206,12 @@ def preset_path(env: str, algo: str, variant: str = "") -> Path:
     """Return the file of a preset; see :func:`preset`."""
     found = presets()
     if algo not in ALGORITHMS:
-        raise SettingsError(f"algo = {algo!r} is not known{nearest(algo, list(ALGORITHMS))}")
+        raise SettingsError(f"algo = {algo!r} is not known{near(algo, ALGORITHMS)}")
     if (env, algo, variant) not in found:
         ids = [e for e, a, v in found if (a, v) == (algo, variant)]
         what = f"{algo}-{variant}" if variant else algo
         raise SettingsError(
-            f"no {what} preset for {env!r}{nearest(env, ids)} A file of your own: --config FILE"
+            f"no {what} preset for {env!r}{near(env, ids)} A file of your own: --config FILE"
         )
     return found[env, algo, variant]
 
@@ -296,7 +297,7 @@ def _extendable(name: Any, above: tuple[str, ...]) -> Path:
     path = FOLDER / f"{name}.yaml"
     if not path.is_file():
         names = [p.stem for p in presets().values()]
-        raise SettingsError(f"extends = {name!r} is no preset{nearest(name, names)}")
+        raise SettingsError(f"extends = {name!r} is no preset{near(name, names)}")
     return path
 
 

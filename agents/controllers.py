@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.settings import SettingsError, nearest
+from agents.settings import SettingsError
 from baselines import catalogue
 from pam_envs.parameters import Signals
+from pam_envs.wording import near
 
 MOST_NUMBERS = 64
 """Larger arrays stand on a card by their shape alone."""
@@ -27,7 +28,7 @@ def make(name: str, plant: Any, signals: Signals, actions: Signals) -> Any:
     """
     if name not in catalogue.CONTROLLERS:
         known = list(catalogue.CONTROLLERS)
-        raise SettingsError(f"residual.controller = {name!r} is not known{nearest(name, known)}")
+        raise SettingsError(f"residual.controller = {name!r} is not known{near(name, known)}")
     return catalogue.make_controller(name, plant=plant, signals=signals, action_signals=actions)
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from agents.configs import Config
-from agents.settings import SettingsError, nearest
+from agents.settings import SettingsError
 from pam_envs.parameters import Signals
+from pam_envs.wording import near
 
 
 def names(config: Config, signals: Signals, actions: Signals) -> tuple[str, ...]:
@@ -24,7 +25,7 @@ def index(known: tuple[str, ...], name: str, where: str) -> int:
     """Return an input's place, or raise naming the nearest."""
     name = name.strip()
     if name not in known:
-        raise SettingsError(f"{where}: no signal named {name!r}{nearest(name, list(known))}")
+        raise SettingsError(f"{where}: no signal named {name!r}{near(name, known)}")
     return known.index(name)
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import types
 from collections.abc import Mapping
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from pam_envs.wording import near
 
 
 class SettingsError(ValueError):
@@ -22,14 +23,6 @@ def number(default: Any, low: float, high: float) -> Any:
 def choice(default: Any, *choices: str) -> Any:
     """Return a dataclass field for one of several words."""
     return dataclasses.field(default=default, metadata={"choices": choices})
-
-
-def nearest(word: str, known: list[str]) -> str:
-    """Return "; did you mean 'x'?", or what there is to choose from."""
-    close = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    if close:
-        return f"; did you mean {close[0]!r}?"
-    return f"; there are: {', '.join(sorted(known))}"
 
 
 def build(cls: type, given: Any, where: str = "") -> Any:
@@ -57,7 +50,7 @@ def build(cls: type, given: Any, where: str = "") -> Any:
     for key, value in given.items():
         place = f"{where}.{key}" if where else str(key)
         if key not in fields:
-            raise SettingsError(f"unknown setting {place!r}{nearest(str(key), list(fields))}")
+            raise SettingsError(f"unknown setting {place!r}{near(str(key), list(fields))}")
         values[key] = _value(hints[key], value, place)
         _check_field(fields[key], values[key], place)
     missing = [
@@ -84,7 +77,7 @@ def _value(kind: Any, value: Any, place: str) -> Any:
     if origin is Literal:
         if value not in get_args(kind):
             raise SettingsError(
-                f"{place} = {value!r} is not known{nearest(str(value), [*get_args(kind)])}"
+                f"{place} = {value!r} is not known{near(str(value), [*get_args(kind)])}"
             )
         return value
     if origin in (dict, Mapping):
@@ -142,7 +135,7 @@ def _number_in(text: str) -> float | str:
 def _check_field(field: dataclasses.Field[Any], value: Any, place: str) -> None:
     if "choices" in field.metadata and value not in field.metadata["choices"]:
         known = list(field.metadata["choices"])
-        raise SettingsError(f"{place} = {value!r} is not known{nearest(str(value), known)}")
+        raise SettingsError(f"{place} = {value!r} is not known{near(str(value), known)}")
     if "bounds" not in field.metadata or value is None or isinstance(value, str):
         return
     low, high = field.metadata["bounds"]

@@ -213,8 +213,8 @@ def times_text(all_rows: Sequence[Row]) -> str:
     lines = [
         "# Compute time per step",
         "",
-        "Of `predict` alone for one observation, Python included, as stated by who ran the row, not",
-        "verified: median over the scenarios of the median and of the 99th percentile, each of the",
+        "Of `predict` alone for one observation, Python included, as stated by who ran the row,",
+        "not verified: median over the scenarios of the median and of the 99th percentile of the",
         "first 250 answers in two episodes. Machines and loads differ.",
         "",
     ]

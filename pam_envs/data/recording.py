@@ -28,8 +28,9 @@ from pam_envs.data.recording_columns import (
     rows_text,
 )
 from pam_envs.data.recording_segments import check_rig, load_changes, repeat_rows, returns
-from pam_envs.data.rig_file import BAR, MM, Rig, near
+from pam_envs.data.rig_file import BAR, MM, Rig
 from pam_envs.data.tables import ContractionTable
+from pam_envs.wording import near
 
 __all__ = [
     "Recording",

@@ -11,7 +11,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.data.rig_file import near
+from pam_envs.wording import near
 
 Array = NDArray[np.float64]
 SHOWN = 5

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.data.recording_columns import rows_text
-from pam_envs.data.rig_file import Rig, near
+from pam_envs.data.rig_file import Rig
+from pam_envs.wording import near
 
 if TYPE_CHECKING:
     from pam_envs.data.recording import Recording

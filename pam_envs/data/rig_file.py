@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import difflib
 import hashlib
 import json
 import math
@@ -26,6 +25,8 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 import yaml
+
+from pam_envs.wording import near
 
 Load = Literal["hanging_mass", "constant_force"]
 LOADS: tuple[str, ...] = get_args(Load)
@@ -72,15 +73,6 @@ KEYS = (
     "tolerance",
 )
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-
-
-def near(word: str, known: Iterable[str]) -> str:
-    """Return "; did you mean 'x'?", or what there is to choose from."""
-    choices = list(known)
-    close = difflib.get_close_matches(word, choices, n=1, cutoff=0.6)
-    if close:
-        return f"; did you mean {close[0]!r}?"
-    return f"; known: {', '.join(choices)}"
 
 
 @dataclasses.dataclass(frozen=True)

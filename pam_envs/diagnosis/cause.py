@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+
+from pam_envs.wording import near
 
 NEEDS = {
     "contraction": "`contraction_mm`",
@@ -125,9 +126,8 @@ class Cause:
             raise ValueError(f"needs of {self.name} is {self.needs!r}; give a tuple of words")
         for word in self.needs:
             if word not in NEEDS:
-                close = difflib.get_close_matches(str(word), NEEDS, n=1)
-                hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(NEEDS)}"
-                raise ValueError(f"{self.name} needs {word!r}, which no recording has; {hint}")
+                hint = near(str(word), NEEDS)
+                raise ValueError(f"{self.name} needs {word!r}, which no recording has{hint}")
 
     @property
     def in_valve(self) -> bool:

@@ -6,7 +6,6 @@ what surely lies beyond is an error of the payload.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
@@ -19,6 +18,7 @@ from pam_envs.diagnosis.search import Blocks, Candidate, refit, whole
 from pam_envs.diagnosis.single_muscle import BASE
 from pam_envs.diagnosis.summary_causes import spans
 from pam_envs.plants import single_muscle_rows as R
+from pam_envs.wording import near
 
 LOAD = "mass.load"
 """The declared parameter whose error a cause stands for."""
@@ -28,20 +28,16 @@ UNWEIGHED = 0.5
 """Relative error of a load of which nothing is declared."""
 
 
+_NONE = ", which is no parameter of the plant; docs/diagnosis_causes.md lists them"
+
+
 def unknown_names(tolerance: Iterable[str]) -> list[str]:
     """Return a sentence on each name that is no parameter of the plant."""
     return [
-        f"RIG.yaml: tolerance names {name!r}{_hint(name)}"
+        f"RIG.yaml: tolerance names {name!r}{near(name, R.NAMES, _NONE)}"
         for name in tolerance
         if name not in R.NAMES
     ]
-
-
-def _hint(name: str) -> str:
-    close = difflib.get_close_matches(name, R.NAMES, n=1, cutoff=0.6)
-    if close:
-        return f"; did you mean {close[0]!r}?"
-    return ", which is no parameter of the plant; docs/diagnosis_causes.md lists them"
 
 
 def unused(tolerance: Iterable[str]) -> list[str]:

@@ -43,7 +43,7 @@ def test_every_environment_has_a_preset_of_every_kind() -> None:
     [
         ({"env": ID, "stepps": 3}, "unknown setting 'stepps'; did you mean 'steps'?"),
         ({"env": ID, "ppo": {"n_epoch": 3}}, "unknown setting 'ppo.n_epoch'; did you mean"),
-        ({"env": ID, "ppo": {"zzz": 3}}, "there are: .*gamma"),
+        ({"env": ID, "ppo": {"zzz": 3}}, "known: .*gamma"),
         ({"env": ID, "ppo": {"gamma": 1.2}}, "ppo.gamma = 1.2 must be from 0 to 1"),
         ({"env": ID, "ppo": {"gamma": "high"}}, "ppo.gamma = 'high' must be a finite number"),
         ({"env": ID, "steps": 1.5}, "steps = 1.5 must be a whole number"),
@@ -69,7 +69,7 @@ def test_every_environment_has_a_preset_of_every_kind() -> None:
         ({"env": "PAM/MusclePositoning-v0"}, "did you mean 'PAM/MusclePositioning-v0'"),
         ({"env": f"evil:{ID}"}, "is no environment here"),
         ({"env": f"{ID}\n"}, "is no environment here"),
-        ({"env": "CartPole-v1"}, "is no environment here; there are: PAM/"),
+        ({"env": "CartPole-v1"}, "is no environment here; known: PAM/"),
     ],
 )
 def test_a_mistake_is_named(given: object, message: str) -> None:

@@ -127,7 +127,7 @@ def test_every_file_is_one_cause_and_named_as_it():
 
 
 def test_an_unknown_cause_is_refused_by_name():
-    with pytest.raises(ValueError, match="no cause named 'gremlins'; there are: creep, leak"):
+    with pytest.raises(ValueError, match="no cause named 'gremlins'; known: creep, leak"):
         by_name("gremlins")
     with pytest.raises(ValueError, match=r"no cause named 'leek'; did you mean 'leak'\?"):
         by_name("leek")

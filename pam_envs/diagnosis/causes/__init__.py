@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 
 from pam_envs.diagnosis.cause import Cause
@@ -33,6 +32,7 @@ from pam_envs.diagnosis.causes import (
     viscous_loss,
     wire_slack,
 )
+from pam_envs.wording import near
 
 _FILES = (
     creep,
@@ -79,10 +79,7 @@ def by_name(name: str) -> Cause:
     for cause in catalogue():
         if cause.name == name:
             return cause
-    names = [c.name for c in catalogue()]
-    close = difflib.get_close_matches(name, names, n=1)
-    hint = f"did you mean {close[0]!r}?" if close else f"there are: {', '.join(names)}"
-    raise ValueError(f"no cause named {name!r}; {hint}")
+    raise ValueError(f"no cause named {name!r}{near(name, [c.name for c in catalogue()])}")
 
 
 def chosen(given: Sequence[Cause | str] | None = None) -> tuple[Cause, ...]:

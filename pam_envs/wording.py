@@ -1,0 +1,25 @@
+"""What messages about unknown names end with."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+def near(word: str, known: Iterable[str], otherwise: str = "") -> str:
+    """Return "; did you mean 'x'?", or what there is to choose from.
+
+    Parameters
+    ----------
+    word : str
+        What was given.
+    known : iterable of str
+        What might have been meant.
+    otherwise : str
+        What to say in place of all that is known, where nothing known is near.
+    """
+    choices = list(known)
+    close = difflib.get_close_matches(word, choices, n=1, cutoff=0.6)
+    if close:
+        return f"; did you mean {close[0]!r}?"
+    return otherwise or f"; known: {', '.join(choices)}"
