@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.catalogue import CONTROLLERS, make_controller
+from baselines.catalogue import PUBLISHED, make_controller
 from baselines.knee_catalogue import KNEE, KNEE_CONTROLLERS, KNEE_MAKERS
 from pam_envs.plants.single_muscle import SingleMuscle
 from tests.baselines.conftest import built, check_form, observations_of
@@ -13,7 +13,7 @@ from tests.baselines.knee_runs import make_knee, quiet, run
 
 PAIRS = [
     (env.split("/")[1].split("-")[0], name)
-    for name, entry in CONTROLLERS.items()
+    for name, entry in PUBLISHED.items()
     for env in entry.envs
     if env in KNEE
 ]
