@@ -7,6 +7,7 @@ import math
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -156,13 +157,12 @@ def compute(cell: Cell) -> dict[str, Any]:
         record["uses_model"] = knowledge.uses_model(cell.entrant, model, env, cell.training_seed)
     if not wanted():
         raise RuntimeError("nobody waits for it any more")
-    batch = make_batch(cell.track.env, cell.scenario.kwargs, len(cell.seeds))
-    episodes = rollout.run_all(batch, env, controller, cell.seeds)
+    batches = partial(make_batch, cell.track.env, cell.scenario.kwargs)
+    episodes = rollout.run_all(batches, env, controller, cell.seeds)
     for seed, episode in zip(cell.seeds, episodes, strict=True):
         record["episodes"].append(episode_record(cell, seed, episode))
     if cell.first:
         record |= _kept(cell, env, controller, cell.seeds[0], episodes[0])
-    batch.close()
     env.close()
     spent = np.concatenate([episode.seconds for episode in episodes])
     record["volatile"] = {**provenance.occasion(), "predict_us": _times(spent)}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -136,34 +137,38 @@ def _named(keys: Sequence[str], table: Array, models: Array) -> dict[str, Array]
 # --- several at once ---------------------------------------------------------------------------
 
 
-def run_all(batch: Any, env: Any, controller: Controller, seeds: Sequence[int]) -> list[Episode]:
+def run_all(
+    make: Callable[[int], Any], env: Any, controller: Controller, seeds: Sequence[int]
+) -> list[Episode]:
     """Run an episode for each seed, as rows of a batch where that gives the same bits.
 
     A row of a batch is the single environment to the last bit, and a row of a controller should be.
     Whether it is, is looked at: the first answers to the first and to the last row are asked for
-    again, alone. Where one differs, where the controller takes no batch, and where anything is
-    raised, the episodes are run one after the other, as if there were no batch.
+    again, alone. Where one differs, each episode is a batch of its own. Where the controller takes
+    no batch, and where anything is raised, the episodes are run as if there were none.
 
     Parameters
     ----------
-    batch : gymnasium.vector.VectorEnv
-        With as many rows as there are seeds.
+    make : callable
+        From a number of rows to the batched environment.
     env : gymnasium.Env
         The same environment alone.
     controller : Controller
     seeds : sequence of int
         Of the environment's resets.
     """
-    try:
-        episodes = _rows(batch, controller, seeds)
-    except Exception:  # told by the single run, in the words of one row
-        episodes = None
-    return episodes or [run(env, controller, seed) for seed in seeds]
+    for groups in ([list(seeds)], [[seed] for seed in seeds]):
+        with suppress(Exception):  # the single run tells it, in the words of one row
+            made = [_rows(make(len(group)), controller, group) for group in groups]
+            if None not in made:
+                return [episode for group in made for episode in group]
+    return [run(env, controller, seed) for seed in seeds]
 
 
 def _rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> list[Episode] | None:
     """Return the episodes as rows of a batch, None where the controller's are not single ones."""
     course = _run_rows(batch, controller, seeds)
+    batch.close()
     if course is None:
         return None
     seconds: list[Array] = []

@@ -23,6 +23,7 @@ import statistics
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -192,23 +193,21 @@ class Course:
             for scenario in track.scenarios()
         ]
         self.envs = [make_env(track.env, cell.scenario.kwargs) for cell in self.cells]
-        self.batches = [
-            make_batch(track.env, cell.scenario.kwargs, len(cell.seeds)) for cell in self.cells
-        ]
 
     def measure(self, knobs: Knobs) -> Measured:
         """Run all episodes with the controller's knobs at these factors."""
         kinds: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
-        for cell, env, batch in zip(self.cells, self.envs, self.batches, strict=True):
+        for cell, env in zip(self.cells, self.envs, strict=True):
             kind = str(cell.scenario.kwargs.get("reference", ""))
-            kinds[kind] += self._run(cell, env, batch, knobs)
+            kinds[kind] += self._run(cell, env, knobs)
         return measured(kinds, self.track)
 
-    def _run(self, cell: cells.Cell, env: Any, batch: Any, knobs: Knobs) -> list[dict[str, Any]]:
+    def _run(self, cell: cells.Cell, env: Any, knobs: Knobs) -> list[dict[str, Any]]:
         model, base = model_of(self.track.env, cell.scenario, env), env.unwrapped
         told = (model, base.signals, base.action_signals)
         made = catalogue.make_controller(self.controller, *told, knobs=knobs)
-        episodes = rollout.run_all(batch, env, made, cell.seeds)
+        batches = partial(make_batch, self.track.env, cell.scenario.kwargs)
+        episodes = rollout.run_all(batches, env, made, cell.seeds)
         return [
             cells.episode_record(cell, seed, episode)
             for seed, episode in zip(cell.seeds, episodes, strict=True)

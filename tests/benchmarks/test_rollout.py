@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -98,8 +100,8 @@ class Rows:
 
 def compared(env_id, kwargs, controller, seeds=SEEDS):
     """Return episodes run together, after comparing them with single ones."""
-    env, batch = make_env(env_id, kwargs), make_batch(env_id, kwargs, len(seeds))
-    together = rollout.run_all(batch, env, controller, seeds)
+    env, batches = make_env(env_id, kwargs), partial(make_batch, env_id, kwargs)
+    together = rollout.run_all(batches, env, controller, seeds)
     for episode, seed in zip(together, seeds, strict=True):
         alone = rollout.run(env, controller, seed)
         assert (episode.failure, episode.period) == (alone.failure, alone.period)
@@ -128,8 +130,20 @@ def test_rows_of_a_batch_are_single_episodes_to_the_bit(env_id, name, kwargs, mo
     controller = controllers.make(controllers.find(name), env.unwrapped.plant, env)
     compared(env_id, kwargs, controller)
     monkeypatch.setattr(rollout, "run", None)  # not needed
-    batch = make_batch(env_id, kwargs, 2)
-    assert len(rollout.run_all(batch, env, controller, (3, 4))) == 2
+    assert len(rollout.run_all(partial(make_batch, env_id, kwargs), env, controller, (3, 4))) == 2
+
+
+def test_who_draws_otherwise_in_other_rows_has_batches_of_one(monkeypatch):
+    env_id = "PAM/MusclePositioning-v0"
+    env = make_env(env_id, SHORT)
+    controller = controllers.make(controllers.find("random"), env.unwrapped.plant, env)
+    first, *others = compared(env_id, SHORT, controller)
+    assert all(np.array_equal(first.actions, other.actions) for other in others)
+    monkeypatch.setattr(rollout, "run", None)  # not needed
+    rows = []
+    batches = partial(make_batch, env_id, SHORT)
+    rollout.run_all(lambda n: rows.append(n) or batches(n), env, controller, (3, 4))
+    assert rows == [2, 1, 1]
 
 
 @pytest.mark.parametrize(
