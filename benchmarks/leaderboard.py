@@ -215,7 +215,7 @@ def times_text(all_rows: Sequence[Row]) -> str:
         "",
         "Of `predict` alone for one observation, Python included, as stated by who ran the row,",
         "not verified: median over the scenarios of the median and of the 99th percentile of the",
-        "first 250 answers in two episodes. Machines and loads differ.",
+        "first 100 answers in two episodes. Machines and loads differ.",
         "",
     ]
     heading = ["controller", "median [us]", "p99 [us]", "machine", "date"]

@@ -17,7 +17,7 @@ from benchmarks.controllers import ROOT, Controller
 LONGEST = 300
 """Characters of a message that a row keeps."""
 
-REPLAYED = 250
+REPLAYED = 100
 """Steps of an episode that a controller is asked for again, alone, after it ran in a batch."""
 
 Array = NDArray[np.float64]
