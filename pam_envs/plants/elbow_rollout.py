@@ -21,7 +21,7 @@ from pam_envs.plants.elbow_orthosis_kernels import (
     start_memory,
 )
 from pam_envs.plants.elbow_orthosis_rows import N_COUNTS, N_PARAMETERS
-from pam_envs.plants.tiles import drives_of, in_tiles
+from pam_envs.plants.tiles import drives_of, first_of, in_tiles
 
 OUTPUTS = {
     "angle": K.ANGLE,
@@ -181,12 +181,7 @@ def simulate_elbow(
         If the plants are not of one make, or a shape or a value does not fit.
     """
     several = [plants] if isinstance(plants, ElbowOrthosis) else list(plants)
-    if not several:
-        raise ValueError("no plants are given; give one or more")
-    first = several[0]
-    makes = {(p.memory.kind, p.valves, p.substeps) for p in several}
-    if len(makes) != 1:
-        raise ValueError(f"plants that are simulated together need to be of one make, got {makes}")
+    first = first_of(several, "memory.kind", "valves", "substeps")
     command = np.asarray(commands, np.float64)
     motion = intent if isinstance(intent, tuple) else (intent, 0.0, 0.0)
     _check_shapes(several, command, motion)

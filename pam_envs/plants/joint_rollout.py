@@ -22,7 +22,7 @@ from pam_envs.plants.antagonistic_joint_kernels import (
     start_memory,
 )
 from pam_envs.plants.antagonistic_joint_rows import N_COUNTS, N_PARAMETERS
-from pam_envs.plants.tiles import drives_of, in_tiles
+from pam_envs.plants.tiles import drives_of, first_of, in_tiles
 
 OUTPUTS = {
     "angle": K.ANGLE,
@@ -167,10 +167,7 @@ def simulate_joint(
         one plant and (T, n) for several.
     """
     several = [plants] if isinstance(plants, AntagonisticJoint) else list(plants)
-    first = several[0]
-    makes = {(p.memory.kind, p.dynamics, p.substeps) for p in several}
-    if len(makes) != 1:
-        raise ValueError(f"plants that are simulated together need to be of one make, got {makes}")
+    first = first_of(several, "memory.kind", "dynamics", "substeps")
     stress = first.prestress if prestress is None else prestress
     given = (0.0, 0.0) if pressures is None else pressures
     direct = 0.0 if pressures is None else 1.0

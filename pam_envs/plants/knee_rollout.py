@@ -21,7 +21,7 @@ from pam_envs.plants.knee_orthosis_kernels import (
     start_memory,
 )
 from pam_envs.plants.knee_orthosis_rows import N_COUNTS, N_PARAMETERS
-from pam_envs.plants.tiles import in_tiles
+from pam_envs.plants.tiles import first_of, in_tiles
 
 OUTPUTS = {
     "angle": K.ANGLE,
@@ -147,10 +147,8 @@ def simulate_knee(
         one plant and (T, n) for several.
     """
     several = [plants] if isinstance(plants, KneeOrthosis) else list(plants)
-    first = several[0]
-    makes = {(p.memory.kind, p.mounting, p.dynamics, p.activity, p.substeps) for p in several}
-    if len(makes) != 1:
-        raise ValueError(f"plants that are simulated together need to be of one make, got {makes}")
+    words = ("memory.kind", "mounting", "dynamics", "activity", "substeps")
+    first = first_of(several, *words)
     arrays = arrays_for(several, set_points)
     if not COMPILED:
         arrays = [a.tolist() for a in arrays]

@@ -38,6 +38,7 @@ from pam_envs.plants.single_muscle_effects import (
 )
 from pam_envs.plants.single_muscle_kernels import MEMORY_ROWS, N_WORK
 from pam_envs.plants.single_muscle_rows import N_COUNTS, N_PARAMETERS
+from pam_envs.plants.tiles import in_tiles
 
 CHANNELS = ("contraction", "pressure")
 LONGEST_STEP = 0.0201
@@ -248,12 +249,9 @@ def alike(columns: Array) -> list[NDArray[np.int64]]:
 
 def _replay_tiles(plant: SingleMuscle, columns: Array, inputs: Inputs, table: Array) -> Array:
     kind, n = plant.memory.kind, len(columns)
-    tiles = -(-n // TILE)
+    fixed = in_tiles(columns, n, TILE)
+    tiles = len(fixed)
     rows = np.zeros((tiles, R.END + MEMORY_ROWS[kind] + R.N_EFFECTS, TILE))
-    column = np.minimum(np.arange(tiles * TILE), n - 1)
-    fixed = np.ascontiguousarray(
-        columns[column].T.reshape(-1, tiles, TILE).transpose(1, 0, 2), dtype=np.float64
-    )
     counts = np.zeros((tiles, N_COUNTS, TILE), np.int64)
     outputs = np.empty((len(CHANNELS), len(inputs.command), n))
     substeps = max(1, int(np.ceil(inputs.period / inputs.longest_step)))

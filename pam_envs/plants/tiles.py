@@ -3,12 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from operator import attrgetter
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+P = TypeVar("P")
+
+
+def first_of(plants: Sequence[P], *words: str) -> P:
+    """Return the first of some plants that are to run side by side.
+
+    Parameters
+    ----------
+    plants : sequence
+    words : str
+        Attributes that have to be the same in all of them: they choose the code that runs.
+
+    Raises
+    ------
+    ValueError
+        If there is none, or they are not of one make.
+    """
+    if not plants:
+        raise ValueError("no plants are given; give one or more")
+    makes = {tuple(attrgetter(word)(plant) for word in words) for plant in plants}
+    if len(makes) != 1:
+        raise ValueError(
+            f"plants that are simulated together need to be of one make ({', '.join(words)}), "
+            f"got {makes}"
+        )
+    return plants[0]
 
 
 def in_tiles(parameters: ArrayLike, plants: int, lanes: int) -> Array:

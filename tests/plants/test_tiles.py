@@ -1,0 +1,37 @@
+"""Plants side by side: which may run together, and how they are laid out."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace as Plant
+
+import numpy as np
+import pytest
+
+from pam_envs.plants.tiles import first_of, in_tiles
+
+
+def plant(kind: str, substeps: int = 4) -> Plant:
+    return Plant(memory=Plant(kind=kind), substeps=substeps, load=np.random.default_rng(0).random())
+
+
+def test_the_first_of_one_make_is_returned() -> None:
+    several = [plant("preisach"), plant("preisach")]
+    assert first_of(several, "memory.kind", "substeps") is several[0]
+
+
+def test_other_makes_and_none_are_refused_by_name() -> None:
+    with pytest.raises(
+        ValueError, match=r"one make \(memory.kind, substeps\), got .*'preisach', 5"
+    ):
+        first_of([plant("preisach"), plant("preisach", 5)], "memory.kind", "substeps")
+    with pytest.raises(ValueError, match="no plants are given"):
+        first_of([], "substeps")
+
+
+def test_tiles_hold_sets_lane_by_lane_and_repeat_the_last() -> None:
+    sets = np.arange(15.0).reshape(5, 3)
+    tiles = in_tiles(sets, 5, 4)
+    assert tiles.shape == (2, 3, 4)
+    assert tiles.flags.c_contiguous
+    np.testing.assert_array_equal(tiles[0].T, sets[:4])
+    np.testing.assert_array_equal(tiles[1].T, sets[[4, 4, 4, 4]])
