@@ -32,13 +32,14 @@ LOOP_FILES = ("gain.py", "gain_references.py", "plant_inverse.py")
 NOT_DECIDING = ("page", "readings", "report", "audit_tables", "outcome", "steps", "summary_text")
 """Beginnings of the names of files that only tell what was decided, or read tables."""
 LIBRARY = (
-    *("compiler.py", "kernels.py", "parameters.py", "data/mas10_maxwell_slip.yaml"),
+    *("compiler.py", "kernels.py", "parameters.py", "wording.py", "data/mas10_maxwell_slip.yaml"),
     *("data/rig_file.py", "data/recording_segments.py"),
     *(f"data/{name}.py" for name in ("recording", "recording_clock", "recording_columns")),
     *(f"hysteresis/{name}.py" for name in ("elements", "everett", "maxwell_slip", "preisach")),
     *("hysteresis/checks.py", "hysteresis/extrema.py", "mechanics/hanging_mass.py"),
     *("muscle/effective_area.py", "pneumatics/regulator.py", "sensing/sensor.py"),
-    *(f"plants/{name}.py" for name in ("memory", "plant", "replay", "stepping", "single_muscle")),
+    *(f"plants/{name}.py" for name in ("memory", "plant", "replay", "stepping", "tiles")),
+    "plants/single_muscle.py",
     *(f"plants/single_muscle_{name}.py" for name in ("effects", "kernels", "rows")),
 )
 """What of the library besides the diagnosis decides: the one plant it knows, and its data."""
