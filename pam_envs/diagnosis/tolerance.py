@@ -28,13 +28,11 @@ UNWEIGHED = 0.5
 """Relative error of a load of which nothing is declared."""
 
 
-_NONE = ", which is no parameter of the plant; docs/diagnosis_causes.md lists them"
-
-
 def unknown_names(tolerance: Iterable[str]) -> list[str]:
     """Return a sentence on each name that is no parameter of the plant."""
+    none = ", which is no parameter of the plant; docs/diagnosis_causes.md lists them"
     return [
-        f"RIG.yaml: tolerance names {name!r}{near(name, R.NAMES, _NONE)}"
+        f"RIG.yaml: tolerance names {name!r}{near(name, R.NAMES, none)}"
         for name in tolerance
         if name not in R.NAMES
     ]
