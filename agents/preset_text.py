@@ -61,5 +61,5 @@ def _flow(value: Any) -> str:
     if isinstance(value, float):
         digits = repr(value)
         return digits.replace("e", ".0e") if "e" in digits and "." not in digits else digits
-    text: str = yaml.safe_dump(value, default_flow_style=True, width=10**6)
-    return text.removesuffix("\n").removesuffix("\n...").strip()
+    text: str = yaml.safe_dump([value], default_flow_style=True, width=10**6)
+    return text.strip()[1:-1]  # as it stands in a list, where a comma needs quotes

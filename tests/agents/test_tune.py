@@ -134,14 +134,15 @@ def test_the_budget_and_the_best_settings_are_written(tmp_path: Path) -> None:
     assert after.env_kwargs == given.env_kwargs
 
 
+@pytest.mark.parametrize("note", ["a: b # c", "a, b"])
 @pytest.mark.parametrize("names", sorted(configs.presets()))
-def test_every_preset_can_be_edited_in_place(names: tuple[str, str, str]) -> None:
+def test_every_preset_can_be_edited_in_place(names: tuple[str, str, str], note: str) -> None:
     path = configs.preset_path(*names)
     config = configs.read(path)
     changes = {
         **as_settings(config, _chosen(config)),
         "search.trials": 7,
-        "search.note": "a: b # c",
+        "search.note": note,
         "steps": 12_345,
     }
     text = preset_text.edited(path.read_text(encoding="utf-8"), changes)
