@@ -82,7 +82,6 @@ OWN: dict[str, dict[str, dict[str, Any]]] = {
     "PAM/MusclePositioning-v0": {
         "preisach": {"hysteresis": "preisach"},
         "preisach_random": PREISACH,
-        "none": NONE,
         "loads": {
             "randomize": True,
             "load": None,
@@ -118,7 +117,7 @@ OWN: dict[str, dict[str, dict[str, Any]]] = {
             "preview": 3,
         },
         "by_torque": {
-            **NONE,
+            "normalize": False,
             "action": "torque_stiffness",
             "reference": "weight",
             "motion": "mixed",
@@ -172,6 +171,7 @@ SHORT_PATH = SHORT.pose(0.15 + LINE[:, :5]).tolist()
 """An arm of five joints, the last of which turns the tool about itself, and a path for it."""
 
 PLAIN: dict[str, dict[str, dict[str, Any]]] = {
+    "PAM/MusclePositioning-v0": {"none": NONE},
     "PAM/KneeTension-v0": {"none": NONE},
     "PAM/KneeStiffness-v0": {"preisach_random": PREISACH, "none": NONE},
     "PAM/KneeWalk-v0": {"preisach_random": PREISACH, "none": NONE},
@@ -181,6 +181,7 @@ PLAIN: dict[str, dict[str, dict[str, Any]]] = {
         "preisach_random": PREISACH,
         "pulses_plays": {"valves": "on_off", "motion": "mixed", "randomize": True},
         "pulses_none": {"valves": "on_off", "hysteresis": "none", "reference": "wall"},
+        "none": NONE,
     },
     "PAM/AntagonisticJoint-v0": {
         "reduced_preisach": {"plant": AntagonisticJoint.reduced("preisach"), "randomize": True},
