@@ -219,7 +219,7 @@ def tune(
     trials
         Settings to try, those that the storage holds counted in.
     steps
-        Control periods of each of a trial's two trainings; default: a tenth of the preset's.
+        Control periods of each of a trial's two trainings; default: the preset's.
     seed
         Of the search.
     storage
@@ -232,7 +232,7 @@ def tune(
     path = configs.preset_path(env, algo, variant)
     config = configs.read(path)
     place = storage or Path("runs/tune") / f"{path.stem}.db"
-    job = tuning.Job(config, trials, steps or max(config.steps // 10, 1), seed, place)
+    job = tuning.Job(config, trials, steps or config.steps, seed, place)
     study = tuning.search(job, Console(stderr=True))
     print(json.dumps({"value": study.best_value, **study.best_params}, indent=1))
     if write:
