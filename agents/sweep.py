@@ -7,9 +7,7 @@ checkpoint. The policies are those that ``python -m agents train`` gives, bit fo
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
 import json
-import platform
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -22,6 +20,7 @@ from agents.configs import Config
 from agents.onnx_file import finished
 from agents.settings import SettingsError
 from sweeps import engine
+from sweeps.versions import versions_of
 from sweeps.worker import LOOK, wanted
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -98,13 +97,7 @@ def trainings(
 
 def versions() -> dict[str, str]:
     """Return what a policy's bits may depend on besides its settings."""
-    found = {"python": platform.python_version()}
-    for name in PACKAGES:
-        try:
-            found[name] = importlib.metadata.version(name)
-        except importlib.metadata.PackageNotFoundError:
-            found[name] = "absent"
-    return found
+    return versions_of(PACKAGES)
 
 
 @dataclass

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import importlib.metadata
 import platform
 import socket
 import subprocess
@@ -11,6 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from benchmarks.canonical import SOURCES, sources_digest
+from sweeps.versions import versions_of
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
@@ -43,13 +43,7 @@ SCORING = (
 @lru_cache(maxsize=1)
 def packages() -> dict[str, str]:
     """Return the versions of Python and of the packages that a score may depend on."""
-    found = {"python": platform.python_version()}
-    for name in PACKAGES:
-        try:
-            found[name] = importlib.metadata.version(name)
-        except importlib.metadata.PackageNotFoundError:
-            found[name] = "absent"
-    return found
+    return versions_of(PACKAGES)
 
 
 @lru_cache(maxsize=8)
