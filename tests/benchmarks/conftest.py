@@ -5,34 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import board_fakes
 import pytest
 import yaml
 
 from benchmarks import artefacts, audit, controllers, scenarios, tasks
 
-CONTENT = {
-    "schema": 1,
+CONTENT = board_fakes.CONTENT | {
     "name": "short",
-    "version": 1,
-    "title": "A short track",
-    "env": "PAM/MusclePositioning-v0",
-    "seeds": 3,
-    "settle_seconds": 0.5,
-    "hold_seconds": 0.3,
-    "sensed": "sensor/contraction",
-    "rests": ["steps"],
-    "cost_scales": {"cost/contraction": 0.001, "cost/pressure": 1.0e5},
-    "worst_case": {
-        "rms_error": 0.025,
-        "p95_error": 0.025,
-        "max_error": 0.025,
-        "steady_state_error": 0.025,
-        "sensed_rms_error": 0.025,
-        "pressure_travel": 1.2e6,
-        "air_use": 5.0e-5,
-        "constraint_cost": 10.0,
-    },
-    "kwargs": {"episode_seconds": 2.0},
     "grid": {"hysteresis": ["maxwell_slip"], "reference": ["steps", "sines"]},
 }
 
