@@ -157,8 +157,7 @@ def compute(cell: Cell) -> dict[str, Any]:
         record["uses_model"] = knowledge.uses_model(cell.entrant, model, env, cell.training_seed)
     if not wanted():
         raise RuntimeError("nobody waits for it any more")
-    batches = partial(make_batch, cell.track.env, cell.scenario.kwargs)
-    episodes = rollout.run_all(batches, env, controller, cell.seeds)
+    episodes = episodes_of(cell, env, controller)
     for seed, episode in zip(cell.seeds, episodes, strict=True):
         record["episodes"].append(episode_record(cell, seed, episode))
     if cell.first:
@@ -167,6 +166,12 @@ def compute(cell: Cell) -> dict[str, Any]:
     spent = np.concatenate([episode.seconds for episode in episodes])
     record["volatile"] = {**provenance.occasion(), "predict_us": _times(spent)}
     return record
+
+
+def episodes_of(cell: Cell, env: Any, controller: Any) -> list[rollout.Episode]:
+    """Return a cell's episodes; ``env`` is its environment alone."""
+    batches = partial(make_batch, cell.track.env, cell.scenario.kwargs)
+    return rollout.run_all(batches, env, controller, cell.seeds)
 
 
 def _controller(cell: Cell, model: Any, env: Any) -> controllers.Controller:

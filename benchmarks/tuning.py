@@ -23,7 +23,6 @@ import statistics
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,10 +38,10 @@ from agents.seeds import MOST_TUNING, tuning
 from baselines import catalogue, tuned
 from baselines.knobs import Bounds, Knobs
 from baselines.tuned import Tuned, tuned_name
-from benchmarks import cells, controllers, rollout, scenarios
+from benchmarks import cells, controllers, scenarios
 from benchmarks.canonical import SOURCES, digest, sources_digest
 from benchmarks.claims import COST_FLOOR, COST_RATIO, COSTS
-from benchmarks.making import make_batch, make_env, model_of
+from benchmarks.making import make_env, model_of
 from benchmarks.metrics import headline_of
 from benchmarks.scenarios import ScenarioSet
 from benchmarks.store import write_text
@@ -206,8 +205,7 @@ class Course:
         model, base = model_of(self.track.env, cell.scenario, env), env.unwrapped
         told = (model, base.signals, base.action_signals)
         made = catalogue.make_controller(self.controller, *told, knobs=knobs)
-        batches = partial(make_batch, self.track.env, cell.scenario.kwargs)
-        episodes = rollout.run_all(batches, env, made, cell.seeds)
+        episodes = cells.episodes_of(cell, env, made)
         return [
             cells.episode_record(cell, seed, episode)
             for seed, episode in zip(cell.seeds, episodes, strict=True)
