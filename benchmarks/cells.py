@@ -28,7 +28,6 @@ from benchmarks.canonical import arrays_digest, digest
 from benchmarks.controllers import Entrant
 from benchmarks.making import make_batch, make_env, model_of, plant_digests
 from benchmarks.scenarios import Scenario, ScenarioSet
-from sweeps.worker import wanted
 
 SCHEMA = 2
 PUBLIC, AUDIT = "public", "audit"
@@ -155,8 +154,6 @@ def compute(cell: Cell) -> dict[str, Any]:
         record["card"] = trainings.card_record(controller)
     if cell.probe and cell.entrant.knowledge in knowledge.IGNORANT:
         record["uses_model"] = knowledge.uses_model(cell.entrant, model, env, cell.training_seed)
-    if not wanted():
-        raise RuntimeError("nobody waits for it any more")
     episodes = episodes_of(cell, env, controller)
     for seed, episode in zip(cell.seeds, episodes, strict=True):
         record["episodes"].append(episode_record(cell, seed, episode))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.controllers import ROOT, Controller
+from sweeps.worker import wanted
 
 LONGEST = 300
 """Characters of a message that a row keeps."""
@@ -145,7 +146,7 @@ def run_all(
     A row of a batch is the single environment to the last bit, and a row of a controller should be.
     Whether it is, is looked at: the first answers to the first and to the last row are asked for
     again, alone. Where one differs, each episode is a batch of its own. Where the controller takes
-    no batch, and where anything is raised, the episodes are run as if there were none.
+    no batch, or raises anything, the episodes are run as if there were none.
 
     Parameters
     ----------
@@ -156,28 +157,52 @@ def run_all(
     controller : Controller
     seeds : sequence of int
         Of the environment's resets.
+
+    Raises
+    ------
+    RuntimeError
+        If nobody waits for the episodes any more.
+    Exception
+        Whatever the environment raises of an action that it has to take; see :func:`run`.
     """
     for groups in ([list(seeds)], [[seed] for seed in seeds]):
-        with suppress(Exception):  # the single run tells it, in the words of one row
-            made = [_rows(make(len(group)), controller, group) for group in groups]
-            if None not in made:
-                return [episode for group in made for episode in group]
-    return [run(env, controller, seed) for seed in seeds]
+        made: list[Episode] = []
+        for group in groups:
+            _still_wanted()
+            try:
+                made += _rows(make(len(group)), controller, group)
+            except _NotAsRows:  # the single run tells what is wrong, in the words of one row
+                break
+        else:
+            return made
+    episodes = []
+    for seed in seeds:
+        _still_wanted()
+        episodes.append(run(env, controller, seed))
+    return episodes
 
 
-def _rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> list[Episode] | None:
-    """Return the episodes as rows of a batch, None where the controller's are not single ones."""
+def _still_wanted() -> None:
+    if not wanted():
+        raise RuntimeError("nobody waits for it any more")
+
+
+class _NotAsRows(Exception):
+    """A controller takes no batch, or its rows are not what they are alone."""
+
+
+def _rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> list[Episode]:
+    """Return the episodes as rows of a batch; raise where the controller's are not single ones."""
     course = _run_rows(batch, controller, seeds)
     batch.close()
-    if course is None:
-        return None
     seconds: list[Array] = []
     for row in sorted({0, len(seeds) - 1}):
         first = min(REPLAYED, int(course.lengths[row]))
-        alone, spent = _timed(controller, course.observations[:first, row])
+        with _asked():
+            alone, spent = _timed(controller, course.observations[:first, row])
         together = course.actions[:first, row]
         if alone.dtype != together.dtype or not np.array_equal(alone, together, equal_nan=True):
-            return None
+            raise _NotAsRows
         seconds.append(spent)
     spent = np.concatenate(seconds)
     period = float(batch.control_period)
@@ -222,8 +247,17 @@ class _Course:
         )
 
 
-def _run_rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> _Course | None:
-    """Step until every row has ended once; None if the controller answers in another shape."""
+@contextmanager
+def _asked() -> Iterator[None]:
+    """Take whatever a controller raises to say that it takes no batch."""
+    try:
+        yield
+    except Exception as error:
+        raise _NotAsRows from error
+
+
+def _run_rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> _Course:
+    """Step until every row has ended once."""
     count = len(seeds)
     observation, report = batch.reset(seed=list(seeds))
     keys = tuple(report)
@@ -232,10 +266,11 @@ def _run_rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> _Cour
     state, start, running = None, np.ones(count, bool), np.ones(count, bool)
     lengths, failures = np.zeros(count, np.int64), [""] * count
     while running.any():
-        action, state = controller.predict(observation, state, start, True)
-        if np.shape(action) != batch.action_space.shape:
-            return None
-        models.append(np.reshape(told(state) if told else [], (count, -1)))
+        with _asked():
+            action, state = controller.predict(observation, state, start, True)
+            models.append(np.reshape(told(state) if told else [], (count, -1)))
+        if not _acceptable(action, batch):
+            raise _NotAsRows
         after, _, terminated, truncated, report = batch.step(action)
         start = terminated | truncated
         table = np.array([report[key] for key in keys])

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import cells, making, provenance, scenarios
+from benchmarks import cells, making, provenance, rollout, scenarios
 from benchmarks.controllers import find
 from benchmarks.scenarios import ScenarioSet
 from sweeps import worker
@@ -95,7 +95,7 @@ def test_a_cell_that_nobody_waits_for_ends(
     scenario = track.scenarios()[0]
     cell = cells.Cell(find("low"), track, scenario, seeds=track.seeds[scenario.name])
     asked = iter([False])
-    monkeypatch.setattr(cells, "wanted", lambda: next(asked))
+    monkeypatch.setattr(rollout, "wanted", lambda: next(asked))
     with pytest.raises(RuntimeError, match="nobody waits"):
         cells.compute(cell)
     assert worker.wanted()  # outside of a cluster somebody always does

@@ -173,3 +173,33 @@ def test_answers_are_timed_one_at_a_time():
     (episode, *_) = compared("PAM/MusclePositioning-v0", SHORT, Rows())
     assert len(episode.seconds) == 2 * 20
     assert (episode.seconds > 0.0).all()
+
+
+def test_a_fault_of_the_batch_is_raised_and_not_run_alone():
+    env_id = "PAM/MusclePositioning-v0"
+
+    def broken(rows):
+        batch = make_batch(env_id, SHORT, rows)
+
+        def step(action):
+            raise ValueError("ours")
+
+        batch.step = step
+        return batch
+
+    with pytest.raises(ValueError, match="ours"):
+        rollout.run_all(broken, make_env(env_id, SHORT), Rows(), SEEDS)
+
+
+@pytest.mark.parametrize(
+    ("controller", "answers"), [(Rows(mixed=1.0), 3), (Rows(alone=False), 2)], ids=["rows", "alone"]
+)
+def test_it_is_asked_before_each_run_whether_somebody_waits(controller, answers, monkeypatch):
+    env_id = "PAM/MusclePositioning-v0"
+    asked = iter([*[True] * answers, False])
+    monkeypatch.setattr(rollout, "wanted", lambda: next(asked))
+    with pytest.raises(RuntimeError, match="nobody waits"):
+        rollout.run_all(
+            partial(make_batch, env_id, SHORT), make_env(env_id, SHORT), controller, SEEDS
+        )
+    assert not [*asked]
