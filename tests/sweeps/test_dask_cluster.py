@@ -100,7 +100,7 @@ def test_no_scheduler_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_scheduler_that_goes_away_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sweeps.dask_cluster.SECONDS", 2.0)
+    monkeypatch.setattr("sweeps.dask_cluster.SECONDS", 6.0)
     with DaskProcesses(tmp_path, workers=1) as dask:
         tasks = [Number(k, "slow", str(tmp_path)) for k in range(100)]
         found = run(square, tasks, on(dask))
