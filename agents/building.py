@@ -109,7 +109,7 @@ def learning_rate(config: Config) -> Callable[[float], float]:
         )
 
     def rate(remaining: float) -> float:
-        usual = end + (start - end) * remaining
+        usual = max(end + (start - end) * remaining, 0.0)  # the last rollout may end beyond 0
         done = round((1.0 - remaining) * config.steps)
         return usual * min((done - alone) / alone, 1.0) if done > alone > 0 else usual
 

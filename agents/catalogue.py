@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from agents import configs
+from agents.configs import Config
 from agents.onnx_file import PolicyFileError
 from agents.policy import OnnxPolicy
 from agents.residual import ResidualPolicy, with_controller
@@ -19,6 +20,9 @@ from pam_envs.parameters import Signals
 from pam_envs.wording import near
 
 FOLDER = Path(__file__).resolve().parent / "pretrained"
+
+
+BY_HAND = "by hand"
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,11 @@ class Entry:
         Name of the controller that a residual corrects.
     author : str
         Who trained it, as BibTeX wants it; empty for the authors of this package.
+    trials : int or None
+        Settings that were tried to choose the preset's, those of earlier searches and of a
+        residual's controller with them; None where nobody counted.
+    tuning : str
+        How that number came about.
     """
 
     file: str
@@ -50,6 +59,8 @@ class Entry:
     kind: str = "learned"
     baseline: str = ""
     author: str = ""
+    trials: int | None = None
+    tuning: str = BY_HAND
 
     def files(self) -> dict[int, Path]:
         """Return the files that are there by training seed."""
@@ -136,26 +147,31 @@ def _offered() -> dict[str, Entry]:
     for env_id, algo, variant in configs.presets():
         env = env_id.removeprefix("PAM/")
         preset = f"{algo}-{variant}" if variant else algo
+        config = configs.preset(env_id, algo, variant)
         if preset.startswith("ppo-residual"):
-            corrected = configs.preset(env_id, algo, variant).residual.controller
-            made[variant + SUFFIXES[env]] = _residual(env, preset, corrected)
+            made[variant + SUFFIXES[env]] = _residual(env, preset, config)
         elif preset in KINDS:
-            made[KINDS[preset].name + SUFFIXES[env]] = _learned(env, preset)
+            made[KINDS[preset].name + SUFFIXES[env]] = _learned(env, preset, config)
     return made
 
 
-def _learned(env: str, preset: str) -> Entry:
+def _learned(env: str, preset: str, config: Config) -> Entry:
     kind = KINDS[preset]
+    trials, tuning = budget(config)
     return Entry(
         file=f"{env}.{preset}.s{{seed}}.onnx",
         summary=f"{kind.summary}{WHERE.get(env, '')}",
         knowledge=MODEL,
         citation=kind.citation,
         envs=(f"PAM/{env}",),
+        trials=trials,
+        tuning=tuning,
     )
 
 
-def _residual(env: str, preset: str, baseline: str) -> Entry:
+def _residual(env: str, preset: str, config: Config) -> Entry:
+    baseline = config.residual.controller
+    trials, tuning = budget(config)
     return Entry(
         file=f"{env}.{preset}.s{{seed}}.onnx",
         summary=f"{baseline} corrected by a PPO policy, which sees its action{WHERE.get(env, '')}",
@@ -164,7 +180,21 @@ def _residual(env: str, preset: str, baseline: str) -> Entry:
         envs=(f"PAM/{env}",),
         kind="residual",
         baseline=baseline,
+        trials=trials,
+        tuning=tuning,
     )
+
+
+def budget(config: Config) -> tuple[int | None, str]:
+    """Return how many settings were tried to choose a preset's, and where."""
+    search, corrected = config.search, config.residual.controller
+    if search.trials is None:
+        return None, BY_HAND
+    base = CLASSICAL[corrected].trials if corrected else 0
+    said = [f"search of {search.trials}"]
+    said += [f"{search.earlier} of searches before it"] if search.earlier else []
+    said += [f"{base} of its controller"] if base else []
+    return search.trials + search.earlier + base, ", ".join(said)
 
 
 OFFERED: dict[str, Entry] = _offered()

@@ -227,6 +227,8 @@ class Search:
     ----------
     trials : int or None
         Settings that were tried; None where they were set by hand, and nobody counted.
+    earlier : int
+        Settings that searches before it tried, from whose result it began.
     steps : int
         Control periods of each training of a trial.
     seed : int
@@ -236,6 +238,7 @@ class Search:
     """
 
     trials: int | None = number(None, 0, 10**6)
+    earlier: int = number(0, 0, 10**6)
     steps: int = number(0, 0, 10**12)
     seed: int = number(0, 0, 2**31)
     note: str = "by hand"

@@ -40,6 +40,8 @@ RETRIES = 2
 REPORTS = 5
 """How often a training is looked at before its end."""
 DONE = (TrialState.COMPLETE, TrialState.PRUNED)
+EARLIER = "earlier"
+"""What a study keeps the trials under that led to the preset it began from."""
 TRAINING_SEEDS = (10_000, 10_001)
 """Far from those that are reported: settings that suit one seed's luck win nothing there."""
 
@@ -130,6 +132,8 @@ def open_study(job: Job) -> optuna.Study:
     )
     if not study.trials:
         study.enqueue_trial(from_settings(job.config))
+        before = job.config.search
+        study.set_user_attr(EARLIER, (before.trials or 0) + before.earlier)
     return study
 
 
@@ -219,6 +223,7 @@ def write(job: Job, study: optuna.Study, path: Path) -> Config:
     """
     search_part = Search(
         trials=finished(study),
+        earlier=study.user_attrs.get(EARLIER, 0),
         steps=job.steps,
         seed=job.seed,
         note=f"Optuna TPE, {len(TRAINING_SEEDS)} trainings a trial, each looked at in "

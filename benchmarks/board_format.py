@@ -55,6 +55,12 @@ def chance(interval: Interval | None) -> str:
     return f"{interval.value:.2f} [{interval.low:.2f}, {interval.high:.2f}]"
 
 
+def percent(interval: Interval) -> str:
+    """Return a share with its interval in percent, signs and all."""
+    value, low, high = (f"{100.0 * x:+.2g}" for x in (interval.value, interval.low, interval.high))
+    return f"{value} % [{low}, {high}]"
+
+
 def duration(seconds: float | None) -> str:
     """Return a time in the unit that suits it, or a dash."""
     if seconds is None or not np.isfinite(seconds):

@@ -6,7 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from benchmarks import claims, standings, views
-from benchmarks.board_format import bounded, chance, duration, folded, millions, number, table
+from benchmarks.board_format import (
+    bounded,
+    chance,
+    duration,
+    folded,
+    millions,
+    number,
+    percent,
+    table,
+)
 from benchmarks.claims import Claim
 from benchmarks.rows import Row, shown
 from benchmarks.standings import Changes, Track
@@ -65,19 +74,21 @@ def _winner(track: str, rows: Sequence[Row]) -> Winner:
 def winners(tracks: Tracks) -> list[str]:
     """Return the table of the nominal tracks: best paper controller, best learned one, verdict."""
     heading = ["environment", "episodes", "best paper controller", "RMS [95 %]"]
-    heading += ["best learned", "RMS [95 %]", "P(improvement) [95 %]", "largest cost", "verdict"]
+    heading += ["best learned", "RMS [95 %]", "lower by [95 %]", "P(improvement) [95 %]"]
+    heading += ["largest cost", "verdict"]
     return table(heading, [_winner_line(found) for found in nominal(tracks).values()])
 
 
 def _winner_line(found: Winner) -> list[str]:
     line = [f"`{found.env}`", found.split or "-", *_named(found.paper, found.split)]
     if found.claim is None:
-        return [*line, *_named(None, ""), "-", "-", found.silence]
+        return [*line, *_named(None, ""), "-", "-", "-", found.silence]
     best = found.claim
     verdict = plain_verdict(best)
     bold = f"**{verdict}**" if best.verdict == claims.BETTER else verdict
     learned = _named(best.row, best.split)
-    return [*line, *learned, chance(best.probability), largest_cost(best), bold]
+    against = [percent(best.gain), chance(best.probability), largest_cost(best)]
+    return [*line, *learned, *against, bold]
 
 
 def _named(row: Row | None, split: str) -> list[str]:
@@ -100,9 +111,9 @@ def largest_cost(entry: Claim) -> str:
 
 
 def plain_verdict(entry: Claim) -> str:
-    """Return the verdict of a claim with what keeps it from being better."""
-    because = f" ({'; '.join(entry.reasons)})" if entry.reasons else ""
-    return f"{entry.verdict}{because}"
+    """Return the verdict of a claim with what keeps it from being better, and what to know."""
+    words = "; ".join((*entry.reasons, *entry.remarks))
+    return f"{entry.verdict} ({words})" if words else entry.verdict
 
 
 def rank_changes(tracks: Tracks) -> list[str]:
@@ -175,17 +186,23 @@ def costs(rows: Sequence[Row]) -> list[str]:
 
 
 def _budgets(rows: Sequence[Row]) -> str:
-    """Return a sentence on the tuning trials of classical and learned controllers."""
-    trials: dict[bool, int] = {}
+    """Return sentences on the tuning trials of classical and learned controllers."""
+    trials: dict[bool, list[int | None]] = {}
     for row in rows:
         learned = row["controller"]["kind"] != "classical"
-        trials[learned] = max(trials.get(learned, 0), views.cost_of(row).trials or 0)
-    if len(trials) < 2 or trials[True] == trials[False]:
+        trials.setdefault(learned, []).append(views.cost_of(row).trials)
+    if len(trials) < 2:
         return ""
-    return (
-        f" Tuning budgets are not equal: up to {trials[True]} trials of a learned controller, up "
-        f"to {trials[False]} of a classical one."
-    )
+    most = {learned: max(count or 0 for count in counts) for learned, counts in trials.items()}
+    said = ""
+    if most[True] != most[False]:
+        said += (
+            f" Tuning budgets are not equal: up to {most[True]} trials of a learned controller, "
+            f"up to {most[False]} of a classical one."
+        )
+    if by_hand := trials[True].count(None):
+        said += f" Of {by_hand} learned controllers the settings were chosen by hand, uncounted."
+    return said
 
 
 def _cost_table(entries: Mapping[str, Row]) -> list[str]:

@@ -148,6 +148,7 @@ def compute(cell: Cell) -> dict[str, Any]:
         "plant_digest": env.unwrapped.plant.digest(),
         "model_digest": model.digest(),
         "knows_plant": knowledge.knows_plant(cell.entrant, controller, model, env),
+        "trained_on_plant": knowledge.trained_on_plant(controller, model, env),
         "episodes": [],
     }
     if cell.entrant.files:
@@ -189,7 +190,7 @@ def _kept(
         )
         kept["traces"] = [made]
     if cell.probe:
-        kept["preview_used"] = _preview_seconds(cell, env, controller, episode)
+        kept["preview_used"] = _preview_seconds(env, controller, episode)
     return kept
 
 
@@ -201,11 +202,9 @@ def _times(seconds: NDArray[Any]) -> dict[str, float | None]:
     return {"median": float(np.median(micro)), "p99": float(np.percentile(micro, 99))}
 
 
-def _preview_seconds(cell: Cell, env: Any, controller: Any, episode: rollout.Episode) -> float:
+def _preview_seconds(env: Any, controller: Any, episode: rollout.Episode) -> float:
     part = rollout.Episode(**{**vars(episode), "observations": episode.observations[:PROBED_STEPS]})
-    used = rollout.preview_used(part, controller, env.unwrapped.signals)
-    stride = cell.scenario.kwargs.get("preview_stride", 4)
-    return round(used * stride * episode.period, 9)
+    return rollout.preview_used(part, controller, env.unwrapped.signals)
 
 
 def episode_record(cell: Cell, seed: int, episode: rollout.Episode) -> dict[str, Any]:

@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from benchmarks import standings, views
+from benchmarks import knowledge, standings, views
 from benchmarks.metrics import of_track
 from benchmarks.rows import Row
-from benchmarks.statistics import Interval
+from benchmarks.statistics import NOTHING, Interval
 
 CLAIM_SEEDS = 10
 """Training seeds that a claim needs."""
@@ -47,6 +47,10 @@ class Claim:
         ``BETTER``, ``DEARER`` or ``NOT_SHOWN``.
     reasons : tuple of str
         What keeps the claim from being ``BETTER``.
+    gain : Interval
+        By what share of the paper controller's mean the row's is lower, paired by episode.
+    remarks : tuple of str
+        What has to be known beside the verdict: on how many settings each side was chosen.
     """
 
     row: Row
@@ -56,6 +60,8 @@ class Claim:
     ratios: dict[str, float]
     verdict: str
     reasons: tuple[str, ...]
+    gain: Interval
+    remarks: tuple[str, ...]
 
 
 def is_paper(row: Row) -> bool:
@@ -98,27 +104,52 @@ def claim(row: Row, paper: Row, doubts: Sequence[str] = ()) -> Claim | None:
     split, probability = views.common_split(row, paper), standings.improvement(row, paper)
     if split is None or probability is None:
         return None
-    ratios = cost_ratios(row, paper, split)
-    against = [*_doubts(row, paper, probability, split), *doubts]
+    ratios, gained = cost_ratios(row, paper, split), gain(row, paper, split)
+    against = [*_doubts(row, paper, probability, gained, split), *doubts]
     costs = [f"{name} {ratio:.2f}x" for name, ratio in ratios.items() if not ratio <= COST_RATIO]
     verdict = NOT_SHOWN if against else DEARER if costs else BETTER
-    return Claim(row, paper, split, probability, ratios, verdict, (*against, *costs))
+    reasons = (*against, *costs)
+    return Claim(
+        row, paper, split, probability, ratios, verdict, reasons, gained, _budgets(row, paper)
+    )
 
 
-def _doubts(row: Row, paper: Row, probability: Interval, split: str) -> list[str]:
+def gain(row: Row, paper: Row, split: str) -> Interval:
+    """Return by what share of the paper controller's mean the row's is lower."""
+    more, whole = standings.difference(row, paper), views.mean_of(paper, split=split)
+    if more is None or not whole > 0.0:
+        return NOTHING
+    return Interval(-more.value / whole, -more.high / whole, -more.low / whole)
+
+
+def _budgets(row: Row, paper: Row) -> tuple[str, ...]:
+    """Return a remark where the two were not chosen from as many settings."""
+    mine, theirs = (views.cost_of(each).trials for each in (row, paper))
+    if mine == theirs:
+        return ()
+    words = ["by hand" if count is None else str(count) for count in (mine, theirs)]
+    return (f"settings tried: {words[0]}, paper's {words[1]}",)
+
+
+def _doubts(row: Row, paper: Row, probability: Interval, gained: Interval, split: str) -> list[str]:
     """Return what speaks against a lower error, each as a few words."""
     doubts = []
     if not probability.value > PROBABILITY:
         doubts.append(f"P {probability.value:.2f}, needs more than {PROBABILITY:g}")
     elif not probability.low > LOWER_BOUND:
         doubts.append(f"lower bound of P {probability.low:.2f}, needs more than {LOWER_BOUND:g}")
-    elif not views.mean_of(row, split=split) < views.mean_of(paper, split=split):
+    elif not gained.value > 0.0:
         doubts.append("lower in most episodes, not in the mean")
+    elif not gained.low > 0.0:
+        doubts.append("the interval of the mean's gain holds zero")
+    mine, theirs = (each["controller"]["knowledge"] for each in (row, paper))
+    if knowledge.is_ahead(mine, theirs):
+        doubts.append(f"knows the plant ({mine}) of which {views.name_of(paper)} is told another")
     seeds = views.training_seeds(row)
     if row["controller"]["kind"] != "classical" and seeds < CLAIM_SEEDS:
         doubts.append(f"{seeds} training seed{'s' * (seeds != 1)}, a claim needs {CLAIM_SEEDS}")
-    (failed, total), (theirs, of) = (views.failures_of(r, split) for r in (row, paper))
-    if failed / total > theirs / of:
+    (failed, total), (failed_too, of) = (views.failures_of(r, split) for r in (row, paper))
+    if failed / total > failed_too / of:
         doubts.append(f"{failed} of {total} episodes failed")
     if not views.is_audited(row):
         doubts.append("not audited")

@@ -46,8 +46,8 @@ class Entrant:
     files : tuple of (int, Path)
         Training seed and policy file (relative to the checkout), ascending; none for a controller
         that is not trained.
-    trials : int
-        Settings that were tried out to choose a classical controller's numbers.
+    trials : int or None
+        Settings that were tried out to choose its numbers; None where nobody counted.
     tuning : str
         How they were chosen.
     author : str
@@ -62,7 +62,7 @@ class Entrant:
     kind: str
     source: str
     files: tuple[tuple[int, Path], ...] = ()
-    trials: int = 0
+    trials: int | None = 0
     tuning: str = BY_RULE
     author: str = ""
 
@@ -110,7 +110,7 @@ def _entrant(name: str, entry: Any, module: str, kind: str) -> Entrant | None:
         kind=str(getattr(entry, "kind", kind)),
         source=module,
         files=files,
-        trials=int(getattr(entry, "trials", 0)),
+        trials=getattr(entry, "trials", 0),
         tuning=str(getattr(entry, "tuning", BY_RULE)),
         author=str(getattr(entry, "author", "")),
     )

@@ -10,6 +10,9 @@ from benchmarks.controllers import Entrant
 
 IGNORANT = ("nothing", "tables")
 """Labels of controllers that must not depend on the model."""
+NOMINAL, TRUE = "nominal model", "true model"
+TRAINED = "nominal model, trained on the plant"
+"""Label of a policy that has met, in training, the plant of which others are told another."""
 MOVED = 1.01
 """Factor by which a foil's parameters differ."""
 
@@ -52,6 +55,21 @@ def knows_plant(entrant: Entrant, controller: Any, model: Any, env: Any) -> bool
     return knows and not base.setup.drawn
 
 
+def trained_on_plant(controller: Any, model: Any, env: Any) -> bool:
+    """Return whether a policy was trained on a plant that is simulated and that it is not told.
+
+    On drawn plants that is one whose training drew them, too, or was on their middle where the
+    model is another.
+    """
+    card = getattr(controller, "card", None)
+    if not isinstance(card, Mapping):
+        return False
+    base = env.unwrapped
+    varied = (card.get("env_kwargs") or {}).get("randomize")
+    met = base.plant.digest() in card.get("plants", [card.get("plant")])
+    return bool((varied and base.setup.drawn) or (met and model.digest() != base.plant.digest()))
+
+
 def label(claimed: str, cells: Sequence[Mapping[str, Any]]) -> str:
     """Return what a controller knows in a track.
 
@@ -60,8 +78,15 @@ def label(claimed: str, cells: Sequence[Mapping[str, Any]]) -> str:
     claimed : str
         By its catalogue.
     cells : sequence of mapping
-        Records with ``knows_plant`` and, where it was tried, ``uses_model``.
+        Records with ``knows_plant``, ``trained_on_plant`` and, where it was tried, ``uses_model``.
     """
     if claimed in IGNORANT and not any(cell.get("uses_model") for cell in cells):
         return claimed
-    return "true model" if all(cell["knows_plant"] for cell in cells) else "nominal model"
+    if all(cell["knows_plant"] for cell in cells):
+        return TRUE
+    return TRAINED if any(cell.get("trained_on_plant") for cell in cells) else NOMINAL
+
+
+def is_ahead(mine: str, other: str) -> bool:
+    """Return whether a label says that one knows the plant of which the other is told another."""
+    return mine in (TRUE, TRAINED) and other == NOMINAL

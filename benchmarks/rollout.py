@@ -304,8 +304,8 @@ def _sentence(error: Exception) -> str:
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
 
 
-def preview_used(episode: Episode, controller: Controller, signals: Any) -> int:
-    """Return how many preview samples a controller reads, measured on what it does.
+def preview_used(episode: Episode, controller: Controller, signals: Any) -> float:
+    """Return how far ahead a controller reads the reference [s], measured on what it does.
 
     The episode's observations are shown to it again with the last samples replaced by the
     present reference. The first replacement that changes an action marks the last sample in use.
@@ -320,7 +320,8 @@ def preview_used(episode: Episode, controller: Controller, signals: Any) -> int:
     """
     ahead = _previewed({signal.name: signal.index for signal in signals})
     if not ahead or not len(episode.observations):
-        return 0
+        return 0.0
+    seconds = {signal.index: signal.ahead for signal in signals}
     plain = _answers(controller, episode.observations)
     for first in range(len(ahead), 0, -1):
         masked = episode.observations.copy()
@@ -328,8 +329,8 @@ def preview_used(episode: Episode, controller: Controller, signals: Any) -> int:
             for column, present in ahead[number]:
                 masked[:, column] = masked[:, present]
         if not np.array_equal(_answers(controller, masked), plain, equal_nan=True):
-            return first
-    return 0
+            return round(max(seconds[column] for column, _ in ahead[first]), 9)
+    return 0.0
 
 
 def _previewed(index: Mapping[str, int]) -> dict[int, list[tuple[int, int]]]:

@@ -169,7 +169,6 @@ def _check_plants(entrant: Entrant, built: tasks.Built, cells: Sequence[Record])
 def _controller(entrant: Entrant, cells: Sequence[Record]) -> dict[str, Any]:
     parameters = {_place(cell): cell["controller_digest"] for cell in cells}
     code = [cell["code_digest"] for cell in cells]
-    trained = entrant.kind != "classical"
     return {
         "name": entrant.name,
         "kind": entrant.kind,
@@ -182,7 +181,7 @@ def _controller(entrant: Entrant, cells: Sequence[Record]) -> dict[str, Any]:
         "digest": digest(parameters)[:16],
         "parameters": parameters,
         "preview_seconds": max(cell.get("preview_used", 0.0) for cell in cells),
-        "tuning": None if trained else {"trials": entrant.trials, "how": entrant.tuning},
+        "tuning": {"trials": entrant.trials, "how": entrant.tuning},
         "artefact": artefacts.combine(entrant, parameters.values(), code).record(),
         "training": trainings.of(entrant),
     }

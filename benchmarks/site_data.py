@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import board_summary, board_tables, cite, claims, standings, views
+from benchmarks.board_format import percent
 from benchmarks.board_tables import Column, with_costs
 from benchmarks.claims import Claim
 from benchmarks.leaderboard import columns_of
@@ -192,6 +193,7 @@ def _winner(found: board_summary.Winner) -> dict[str, Any]:
         "learned": views.name_of(entry.row) if entry else "none",
         "learned_score": board_summary.score_words(entry.row if entry else None, found.split),
         "chance": _numbers(entry.probability) if entry else None,
+        "gain": percent(entry.gain) if entry else "-",
         "cost": board_summary.largest_cost(entry) if entry else "-",
         "verdict": board_summary.plain_verdict(entry) if entry else found.silence,
         "better": entry is not None and entry.verdict == claims.BETTER,

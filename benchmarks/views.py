@@ -220,7 +220,7 @@ class Cost:
     tuning : str
         How it was tuned.
     trials : int or None
-        Settings that were tried.
+        Settings that were tried; None where nobody counted.
     steps, seconds : float or None
         Of one training seed, the mean over the seeds [1], [s].
     hardware : str
@@ -238,13 +238,12 @@ class Cost:
 
 def cost_of(row: Mapping[str, Any]) -> Cost:
     """Return what a controller cost to make, as its row states it."""
-    tuning = row["controller"].get("tuning") or {}
+    tuning = row["controller"]["tuning"]
     records = row["controller"].get("training") or []
-    trials = [r["tuning_trials"] for r in records if r.get("tuning_trials") is not None]
     hardware = dict.fromkeys(str(r["hardware"]) for r in records if r.get("hardware"))
     return Cost(
-        tuning=str(tuning.get("how", "search" if trials else "by hand" if records else "")),
-        trials=max(trials) if trials else tuning.get("trials"),
+        tuning=str(tuning["how"]),
+        trials=tuning["trials"],
         steps=_average(records, "steps"),
         seconds=_average(records, "seconds"),
         hardware=", ".join(hardware),

@@ -110,6 +110,19 @@ tune.search(test_tune.job(Path({str(tmp_path)!r}), 1), test_tune.QUIET)
 
 
 @pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
+def test_a_search_counts_those_that_led_to_what_it_began_from(tmp_path: Path) -> None:
+    path = tmp_path / "preset.yaml"
+    path.write_text(configs.preset_path(ID, "ppo").read_text(encoding="utf-8"), encoding="utf-8")
+    made = job(tmp_path, 1, search={"trials": 20, "earlier": 5})
+    wanted = dataclasses.replace(made, config=configs.read(path))
+    first = tune.write(wanted, tune.search(made, QUIET), path)
+    assert (first.search.trials, first.search.earlier) == (1, 25)
+    longer = dataclasses.replace(made, trials=2)  # the same search goes on
+    again = tune.write(wanted, tune.search(longer, QUIET), path)
+    assert (again.search.trials, again.search.earlier) == (2, 25)
+
+
+@pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
 def test_the_budget_and_the_best_settings_are_written(tmp_path: Path) -> None:
     made = job(tmp_path, 2)
     study = tune.search(made, QUIET)

@@ -88,6 +88,11 @@ def test_the_rate_rises_from_nothing_once_the_policy_learns() -> None:
     assert shares[9:] == [1.0] * 92
 
 
+def test_no_rate_is_below_nothing_where_the_last_rollout_ends_beyond_the_end() -> None:
+    rate = learning_rate(config_of("plain", 0, steps=100 * ROLLOUT))
+    assert rate(-0.5) == 0.0 < rate(0.5)
+
+
 def test_a_lead_that_leaves_nothing_to_learn_is_refused() -> None:
     with pytest.raises(SettingsError, match="warm_up = 8 rollouts are 1024 steps of 1024"):
         learning_rate(config_of("plain", 8))

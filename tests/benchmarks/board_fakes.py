@@ -101,7 +101,9 @@ def row(
             "author": "",
             "citation": citation,
             "preview_seconds": 0.0,
-            "tuning": {"trials": 0, "how": "by rule"} if kind == "classical" else None,
+            "tuning": {"trials": 0, "how": "by rule"}
+            if kind == "classical"
+            else {"trials": 40, "how": "search of 40"},
             "artefact": {"digest": "a" * 64, "files": []},
             "training": None if kind == "classical" else [training(seed) for seed in seeds],
         },
@@ -162,7 +164,6 @@ def training(seed: int) -> dict[str, Any]:
         "steps": 1e6,
         "seconds": 300.0,
         "hardware": "2 cores",
-        "tuning_trials": 40,
         "command": f"python -m agents train X --seed {seed}",
     }
 

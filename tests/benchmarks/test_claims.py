@@ -8,7 +8,7 @@ import board_fakes as fakes
 import numpy as np
 import pytest
 
-from benchmarks import claims, standings, views
+from benchmarks import board_summary, claims, knowledge, standings, views
 
 TEN = np.linspace(0.4e-3, 0.6e-3, 10)
 PAPER = fakes.row("inverse", 1e-3, audit=1e-3, constraint_cost=0.01, air_use=1e-5)
@@ -82,6 +82,44 @@ def test_a_lower_error_in_most_episodes_and_not_in_the_mean_is_not_better() -> N
         episode["scores"]["rms_error"] = 0.025
     found, reasons = verdict(many)
     assert (found, reasons) == (claims.NOT_SHOWN, "lower in most episodes, not in the mean")
+
+
+def test_a_mean_whose_gain_may_be_none_is_not_better() -> None:
+    found = claims.claim(learned([*np.full(39, 0.99e-3), 1.2e-3]), PAPER)
+    assert found is not None
+    assert found.probability.value > claims.PROBABILITY
+    assert found.gain.low < 0.0 < found.gain.value
+    assert found.reasons == ("the interval of the mean's gain holds zero",)
+
+
+def test_the_gain_is_a_share_of_the_paper_controllers_mean() -> None:
+    found = claims.claim(learned(np.full(10, 0.75e-3)), PAPER)
+    assert found is not None
+    assert found.gain.value == pytest.approx(0.25)
+    assert found.gain.low <= found.gain.value <= found.gain.high
+
+
+@pytest.mark.parametrize("knows", [knowledge.TRUE, knowledge.TRAINED])
+def test_who_met_the_plant_of_which_the_other_is_told_another_is_not_better(knows: str) -> None:
+    found, reasons = verdict(learned(knowledge=knows))
+    assert found == claims.NOT_SHOWN
+    assert "of which inverse is told another" in reasons
+    costs = {"constraint_cost": 0.01, "air_use": 1e-5}
+    knowing = fakes.row("inverse", 1e-3, audit=1e-3, knowledge=knows, **costs)
+    assert verdict(learned(knowledge=knows), knowing)[0] == claims.BETTER
+
+
+@pytest.mark.parametrize(
+    ("trials", "words"),
+    [(60, "settings tried: 60, paper's 0"), (None, "tried: by hand, paper's 0")],
+)
+def test_unequal_budgets_stand_beside_the_verdict(trials: int | None, words: str) -> None:
+    row = learned()
+    row["controller"]["tuning"] = {"trials": trials, "how": "search"}
+    found = claims.claim(row, PAPER)
+    assert found is not None
+    assert found.verdict == claims.BETTER
+    assert words in board_summary.plain_verdict(found)
 
 
 # A maker can try public episodes until they suit him: nothing that he gains there may count.

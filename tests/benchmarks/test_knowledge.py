@@ -48,5 +48,30 @@ def test_labels() -> None:
     assert knowledge.label("nominal model", [told, told]) == "true model"
     assert knowledge.label("nominal model", [told, drawn]) == "nominal model"
     assert knowledge.label("true model", [drawn]) == "nominal model"
+    met = drawn | {"trained_on_plant": True}
+    assert knowledge.label("nominal model", [drawn, met]) == knowledge.TRAINED
+    assert knowledge.label("nominal model", [told]) == "true model"
     assert knowledge.label("tables", [told]) == "tables"
     assert knowledge.label("nothing", [told | {"uses_model": True}]) == "true model"
+
+
+class Policy:
+    """A controller with a card."""
+
+    def __init__(self, plants: list[str], **env_kwargs: object) -> None:
+        self.card = {"plants": plants, "env_kwargs": env_kwargs}
+
+
+def test_a_policy_that_met_what_others_are_not_told_was_trained_on_the_plant() -> None:
+    name = "PAM/MusclePositioning-v0"
+    env, drawn = make_env(name, {"hysteresis": "preisach"}), make_env(name, {"randomize": True})
+    plant, told = env.unwrapped.plant, drawn.unwrapped.plant
+    both = Policy([plant.digest(), told.digest()])
+    assert knowledge.trained_on_plant(both, told, env)
+    assert not knowledge.trained_on_plant(both, plant, env)
+    assert not knowledge.trained_on_plant(Policy([told.digest()]), told, env)
+    assert not knowledge.trained_on_plant(object(), told, env)
+    assert not knowledge.trained_on_plant(both, told, drawn)
+    assert knowledge.trained_on_plant(Policy([told.digest()], randomize=True), told, drawn)
+    env.close()
+    drawn.close()

@@ -38,8 +38,9 @@ def test_the_verdict_stands_first_and_says_what_was_beaten(text: str) -> None:
     assert cells[1:3] == ["audit", "`inverse`"]
     assert cells[4] == "`ppo`"
     assert cells[5].startswith("0.500 [")
-    assert cells[6] == "1.00 [1.00, 1.00]"
-    assert cells[8] == "**better**"
+    assert cells[6] == "+50 % [+46, +54]"
+    assert cells[7] == "1.00 [1.00, 1.00]"
+    assert cells[9] == "**better (settings tried: 40, paper's 0)**"
 
 
 def test_rank_changes_are_a_headline_table(text: str) -> None:
@@ -130,7 +131,7 @@ def test_costs_to_make_are_told(text: str) -> None:
     costs = section(text, "What they cost to make")
     assert "As stated by its maker, not verified" in costs
     assert "not equal: up to 40 trials of a learned controller, up to 0 of a classical one" in costs
-    assert "| `ppo` | learned | search | 40 | 10 | 1 M | 5.00 min | 2 cores |" in costs
+    assert "| `ppo` | learned | search of 40 | 40 | 10 | 1 M | 5.00 min | 2 cores |" in costs
     assert "| `pid` | classical | by rule | 0 | - | - | - | - |" in costs
 
 

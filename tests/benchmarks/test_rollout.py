@@ -203,3 +203,19 @@ def test_it_is_asked_before_each_run_whether_somebody_waits(controller, answers,
             partial(make_batch, env_id, SHORT), make_env(env_id, SHORT), controller, SEEDS
         )
     assert not [*asked]
+
+
+@pytest.mark.parametrize(
+    ("env_id", "name", "reference", "seconds"),
+    [
+        ("PAM/MusclePositioning-v0", "inverse_no_preview", "sines", 0.0),
+        ("PAM/AntagonisticJoint-v0", "joint_mfc_mu_ahead", "sine", 0.12),
+        ("PAM/RedundantManipulator-v0", "joint_mfc_mu_ahead", "path_1", 0.15),
+    ],
+)
+def test_the_preview_is_told_in_seconds_of_the_environment(env_id, name, reference, seconds):
+    kwargs = {"episode_seconds": 1.0, "reference": reference}
+    env = make_env(env_id, kwargs)
+    controller = controllers.make(controllers.find(name), env.unwrapped.plant, env)
+    episode = rollout.run(env, controller, 5)
+    assert rollout.preview_used(episode, controller, env.unwrapped.signals) == seconds

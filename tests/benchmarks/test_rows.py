@@ -16,7 +16,7 @@ import pytest
 
 from benchmarks import artefacts, cells, rows, scenarios, tasks
 from benchmarks.cells import cells_of
-from benchmarks.controllers import available, find
+from benchmarks.controllers import BY_RULE, available, find
 from benchmarks.metrics import GROUPS
 from benchmarks.provenance import METRICS
 from benchmarks.store import read_record, write_record
@@ -71,7 +71,7 @@ def test_every_training_seed_is_run_in_every_episode(trained: dict[str, Any], bo
     ]
     commands = [run["command"] for run in trained["controller"]["training"]]
     assert commands == ["train --seed 0", "train --seed 1"]
-    assert trained["controller"]["tuning"] is None
+    assert trained["controller"]["tuning"] == {"trials": 0, "how": BY_RULE}
     of_runs = [
         [e["trajectory"] for e in trained["episodes"] if e["training_seed"] == run]
         for run in (0, 1)

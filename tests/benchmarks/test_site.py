@@ -171,7 +171,7 @@ def test_nothing_fails_and_nothing_comes_from_elsewhere(told: dict[str, Any]) ->
 @needs_browser
 def test_verdicts_and_rank_changes_lead(told: dict[str, Any]) -> None:
     assert "inverse" in told["winners"]
-    assert told["winners"].endswith("better")
+    assert told["winners"].endswith("better (settings tried: 40, paper's 0)")
     assert "inverse 2 → 3" in told["changes"]
     assert told["places"] == 4
 
