@@ -56,11 +56,11 @@ def _exact(before: Row, after: Row) -> tuple[list[str], list[str]]:
     """Return in what parts differ that no rounding changes, and which numbers were let through.
 
     The numbers of a controller that is designed on the spot may differ, where its code and files
-    are the same.
+    are the same; those of a policy are its file.
     """
     old, new = ({k: v for k, v in row.items() if k not in _NEARLY} for row in (before, after))
     lines = differences(old, new)
-    if not any(new["controller"]["artefact"]["code"]):
+    if new["controller"]["kind"] == "learned":
         return lines, []
     let = [line for line in lines if line.startswith(_NUMBERS)]
     return [line for line in lines if line not in let], [line.partition(":")[0] for line in let]
