@@ -6,7 +6,8 @@ A controller may have been trained several times: its file then has ``{seed}`` i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,8 @@ class Entry:
         Name of the controller that a residual corrects.
     author : str
         Who trained it, as BibTeX wants it; empty for the authors of this package.
+    found : mapping
+        What a search found for the knobs of that controller.
     """
 
     file: str
@@ -50,6 +53,7 @@ class Entry:
     kind: str = "learned"
     baseline: str = ""
     author: str = ""
+    found: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def files(self) -> dict[int, Path]:
         """Return the files that are there by training seed."""
@@ -164,6 +168,7 @@ def _residual(env: str, preset: str, baseline: str) -> Entry:
         envs=(f"PAM/{env}",),
         kind="residual",
         baseline=baseline,
+        found=CLASSICAL[baseline].found,
     )
 
 

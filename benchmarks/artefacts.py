@@ -21,6 +21,8 @@ from benchmarks.source_code import code_digest, needed
 RESIDUAL = "residual"
 BASELINES = "baselines"
 """Package of what residual controllers correct."""
+TUNED = controllers.ROOT / BASELINES / "tuned.yaml"
+"""Knobs that searches found."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,9 @@ class Artefact:
     digest : str
         SHA-256 of the policy files, of all numbers that the controllers hold, and of their code.
     code : tuple of str
-        Digests of the code alone, which are the same on every machine.
+        Digests of the code with the knobs, which are the same on every machine.
+    knobs : mapping of float
+        What a search found for a controller, as it stands in ``baselines/tuned.yaml``.
     files : tuple of mapping
         Name, sha256, bytes and training_seed of each policy file.
     """
@@ -40,6 +44,7 @@ class Artefact:
     digest: str
     code: tuple[str, ...]
     files: tuple[Mapping[str, Any], ...]
+    knobs: Mapping[str, float]
 
     def record(self) -> dict[str, Any]:
         """Return the artefact as a row holds it."""
@@ -47,6 +52,7 @@ class Artefact:
             "digest": self.digest,
             "code": list(self.code),
             "files": [dict(file) for file in self.files],
+            "knobs": dict(self.knobs),
         }
 
 
@@ -78,12 +84,20 @@ def combine(entrant: Entrant, parameters: Iterable[str], code: Iterable[str]) ->
         Digests of their code.
     """
     files = tuple(file_record(path, seed) for seed, path in entrant.files)
+    said = tuple(sorted(set(code)))
+    return Artefact(digest_of(files, parameters, said), said, files, dict(entrant.knobs))
+
+
+def digest_of(
+    files: Iterable[Mapping[str, Any]], parameters: Iterable[str], code: Iterable[str]
+) -> str:
+    """Return the digest of an artefact from what a row says of it; see :func:`combine`."""
     said = {
         "files": [[file["training_seed"], file["sha256"]] for file in files],
         "parameters": sorted(set(parameters)),
         "code": sorted(set(code)),
     }
-    return Artefact(digest(said), tuple(said["code"]), files)
+    return digest(said)
 
 
 def of(entrant: Entrant, track: ScenarioSet) -> Artefact:
@@ -92,7 +106,7 @@ def of(entrant: Entrant, track: ScenarioSet) -> Artefact:
 
 
 def files_of(entrant: Entrant, track: ScenarioSet) -> frozenset[Path]:
-    """Return every file that the artefact is: policies, and code with what lists it."""
+    """Return every file that the artefact is: policies, knobs, and code with what lists it."""
     return _built(entrant, track, _bytes_of(entrant))[1]
 
 
@@ -107,6 +121,7 @@ def _built(
     """Build a controller for each plant and set of signals, once in a process."""
     listing = _page(entrant.source)
     found = {listing, *(located(path) for _, path in entrant.files)}
+    found |= {TUNED} if entrant.knobs else set()
     numbers, code = [], []
     for model, env in tasks.built(track).told:
         for seed in entrant.training_seeds:
@@ -118,8 +133,9 @@ def _built(
 
 
 def controller_code(entrant: Entrant, controller: Any) -> str:
-    """Return a digest of the code of a controller."""
-    return digest([_code_digest(*part) for part in code_files(entrant, controller)])
+    """Return a digest of the code of a controller, and of its knobs to the last digit."""
+    code = [_code_digest(*part) for part in code_files(entrant, controller)]
+    return digest({"code": code, "knobs": dict(entrant.knobs)})
 
 
 def code_files(entrant: Entrant, controller: Any) -> list[tuple[frozenset[Path], Path]]:

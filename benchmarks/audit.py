@@ -25,6 +25,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import yaml
 from filelock import FileLock
 
 from benchmarks import artefacts, provenance, scenarios, tasks, trainings
@@ -285,7 +286,7 @@ def history(found: Round, entrant: Entrant, track: ScenarioSet) -> History:
     files = sorted(artefacts.files_of(entrant, track) | tasks.files_of(track))
     inside = [file for file in files if file.is_relative_to(top)]
     touched = _touched(found.commit, inside, top)
-    other = [file.name for file in touched if not _same(found.commit, file, top)]
+    other = [file.name for file in touched if not _same(entrant, found.commit, file, top)]
     outside = [file.name for file in files if not file.is_relative_to(top)]
     return History(
         tuple(f"audit.commit: {found.commit[:12]} has another {name}" for name in other),
@@ -307,9 +308,15 @@ def _touched(commit: str, files: Sequence[Path], top: Path) -> list[Path]:
     return [file for file, name in placed.items() if name in changed or name not in there]
 
 
-def _same(commit: str, file: Path, top: Path) -> bool:
-    """Return whether a file says the same in a commit: policies to the byte, code as code."""
+def _same(entrant: Entrant, commit: str, file: Path, top: Path) -> bool:
+    """Return whether a file says the same in a commit: policies to the byte, code as code.
+
+    Of the knobs those of the controller count, since searches for others add to their file.
+    """
     then, now = artefacts.bytes_at(commit, file, top), file.read_bytes()
+    if then is not None and file == artefacts.TUNED:
+        said = (yaml.safe_load(then) or {}).get("tuned") or {}
+        return said.get(entrant.tuned, {}).get("knobs") == dict(entrant.knobs)
     if then is None or file.suffix != ".py":
         return then == now
     return code_text(then.decode()) == code_text(now.decode())

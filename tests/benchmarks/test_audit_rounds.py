@@ -6,6 +6,7 @@ import hashlib
 import json
 import subprocess
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import bench_fakes
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from agents.policy import OnnxPolicy
 from agents.residual import ResidualPolicy
+from baselines import tuned
 from baselines.trivial import Constant
 from benchmarks import artefacts, audit, controllers, provenance, rows, scenarios, tasks
 from benchmarks.__main__ import main
@@ -214,6 +216,21 @@ def test_the_code_that_answers_for_a_policy_is_of_its_artefact(
     assert after.files == before.files
     assert after.code != before.code
     assert after.digest != before.digest
+
+
+def test_knobs_that_a_search_found_are_of_the_artefact() -> None:
+    found = tuned.read()
+    for name, entrant in controllers.available().items():
+        assert dict(entrant.knobs) == (found[entrant.tuned].knobs if entrant.tuned else {})
+        if entrant.kind == "classical":
+            assert entrant.tuned == (name if name in found else "")
+    some = Constant(None)
+    plain = Entrant("zero", "", "nothing", "", (), "classical", "baselines.catalogue")
+    codes = {
+        artefacts.controller_code(replace(plain, knobs=knobs), some)
+        for knobs in ((), (("lead", 1.0),), (("lead", 1.0 + 1e-15),))
+    }
+    assert len(codes) == 3
 
 
 NEEDED = {"policy.py", "residual.py", "catalogue.py", "controllers.py", "onnx_file.py"}
