@@ -41,9 +41,6 @@ EPISODES = 30
 PER_SCENARIO = 2
 """And at least so many of each scenario, since an interval needs the scatter within one."""
 
-NAMED = 5
-"""Files that a sentence names at most."""
-
 
 @dataclass(frozen=True)
 class Round:
@@ -223,15 +220,9 @@ def _check_committed(track: ScenarioSet, entrants: Sequence[Entrant]) -> None:
     names = [file.name for file in artefacts.uncommitted(files)] or provenance.changed()
     if names:
         raise ValueError(
-            f"{track.name}: not as in the last commit: {_listed(names)}; commit it first, the salt "
-            "is drawn after it"
+            f"{track.name}: not as in the last commit: {provenance.listed(names)}; commit it "
+            "first, the salt is drawn after it"
         )
-
-
-def _listed(names: Sequence[str]) -> str:
-    """Return the first of some names, and how many more there are."""
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return ", ".join(names[:NAMED]) + more
 
 
 def check_only_added() -> None:
@@ -287,10 +278,10 @@ def history(found: Round, entrant: Entrant, track: ScenarioSet) -> History:
     inside = [file for file in files if file.is_relative_to(top)]
     touched = _touched(found.commit, inside, top)
     other = [file.name for file in touched if not _same(entrant, found.commit, file, top)]
-    outside = [file.name for file in files if not file.is_relative_to(top)]
+    outside = provenance.listed([file.name for file in files if not file.is_relative_to(top)])
     return History(
         tuple(f"audit.commit: {found.commit[:12]} has another {name}" for name in other),
-        f"not looked up in the round's commit, as outside of its checkout: {_listed(outside)}"
+        f"not looked up in the round's commit, as outside of its checkout: {outside}"
         if outside
         else "",
     )

@@ -559,6 +559,8 @@ def test_the_command_says_which_row_drifted_and_notes_which_held(
     assert entry is not None
     assert entry["mode"] == "bits"
     assert entry["commit"] == provenance.commit()
+    assert entry["sources"] == row["made_with"]["sources"]
+    assert entry["older"] is False
     assert verified.of({**row, "checksum": "another"}, found) is None
     forged("raises", lambda row: row["episodes"].pop())
     assert main(["verify", honest, other, "--elsewhere", "--jobs", "1"]) == 1
@@ -571,3 +573,29 @@ def test_the_command_says_which_row_drifted_and_notes_which_held(
     for command in ("verify", "cite"):
         assert main([command, "tiny--nobody"]) == 2
         assert "there is no row 'tiny--nobody'" in capsys.readouterr().err
+
+
+def test_the_command_notes_nothing_where_code_is_not_committed(
+    board: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, noted = str(board / "out" / "tiny--integral.json"), board / "out" / verified.FILE
+    assert main(["verify", path, "--jobs", "1"]) == 0
+    before = noted.read_bytes()
+    assert json.loads(before)["tiny--integral"]["mode"] == "bits"
+    monkeypatch.setattr(provenance, "changed", lambda: ["pam_envs/kernels.py"])
+    assert main(["verify", path, "--elsewhere", "--jobs", "1"]) == 2
+    said = capsys.readouterr()
+    assert "tiny--integral: holds" in said.out
+    assert said.err == (
+        "error: not noted in verified.json, since pam_envs/kernels.py is not as in the last "
+        "commit: commit or stash it and verify again\n"
+    )
+    assert noted.read_bytes() == before
+
+
+def test_outside_of_a_checkout_nothing_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    def absent() -> list[str]:
+        raise FileNotFoundError("git")
+
+    monkeypatch.setattr(provenance, "changed", absent)
+    assert verified.refusal() == ""
