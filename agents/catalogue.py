@@ -6,7 +6,8 @@ A controller may have been trained several times: its file then has ``{seed}`` i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,8 @@ class Entry:
         residual's controller with them; None where nobody counted.
     tuning : str
         How that number came about.
+    found : mapping
+        What a search found for the knobs of that controller.
     """
 
     file: str
@@ -61,6 +64,7 @@ class Entry:
     author: str = ""
     trials: int | None = None
     tuning: str = BY_HAND
+    found: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def files(self) -> dict[int, Path]:
         """Return the files that are there by training seed."""
@@ -182,6 +186,7 @@ def _residual(env: str, preset: str, config: Config) -> Entry:
         baseline=baseline,
         trials=trials,
         tuning=tuning,
+        found=CLASSICAL[baseline].found,
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from baselines.knobs import Bounds
+from baselines.knobs import Bounds, Knobs
 
 Knowledge = Literal["nothing", "tables", "nominal model", "true model"]
 
@@ -39,6 +39,8 @@ class Entry:
         How many settings were tried in simulation to choose them.
     knobs : mapping
         What a search may turn, with lowest and highest factor; see :mod:`baselines.knobs`.
+    found : mapping
+        What a search found for them; see :mod:`baselines.tuned`.
     """
 
     summary: str
@@ -51,3 +53,4 @@ class Entry:
     tuning: str = "by rule or as published"
     trials: int = 0
     knobs: Bounds = field(default_factory=dict, hash=False)
+    found: Knobs = field(default_factory=dict, hash=False)

@@ -133,4 +133,5 @@ def _as_entry(name: str, plain: Mapping[str, Entry], made: Tuned) -> Entry:
         tuning=f"Optuna TPE, {made.trials} trials on tuning seeds",
         trials=made.trials,
         knobs={},
+        found=made.knobs,
     )

@@ -167,7 +167,8 @@ def verify(
 ) -> int:
     """Run rows again from their own record; exit code 1 if one has drifted.
 
-    What holds is noted in verified.json beside the rows.
+    What holds is noted in verified.json beside the rows; exit code 2 if that is refused, since
+    code is not as in the last commit.
 
     Args:
         row: Files or names of rows.
@@ -185,13 +186,16 @@ def verify(
     paths += sorted(rows.RESULTS.glob("*--*.json")) if all else []
     if not paths:
         raise ValueError("name a row, or give --all")
-    drifted = 0
+    drifted, refusal = 0, verified.refusal()
     for path in paths:
         found = checking.verify(path, Cluster(jobs, backend, address), elsewhere)
-        verified.note(path, found.checksum if found.holds else "", found.mode)
+        if not refusal:
+            verified.note(path, found.checksum if found.holds else "", found.mode, found.sources)
         telling.verdict(found)
         drifted += not found.holds
-    return 1 if drifted else 0
+    if refusal:
+        print(f"error: {refusal}", file=sys.stderr)
+    return 1 if drifted else 2 if refusal else 0
 
 
 def _row_path(name: str) -> Path:

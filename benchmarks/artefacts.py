@@ -21,6 +21,8 @@ from benchmarks.source_code import code_digest, needed
 RESIDUAL = "residual"
 BASELINES = "baselines"
 """Package of what residual controllers correct."""
+TUNED = controllers.ROOT / BASELINES / "tuned.yaml"
+"""Knobs that searches found."""
 
 
 @dataclass(frozen=True)
@@ -30,10 +32,11 @@ class Artefact:
     Attributes
     ----------
     digest : str
-        SHA-256 of the policy files, of all numbers that the controllers hold, and of their code
-        where they are more than policy files.
+        SHA-256 of the policy files, of all numbers that the controllers hold, and of their code.
     code : tuple of str
-        Digests of the code alone, which are the same on every machine.
+        Digests of the code with the knobs, which are the same on every machine.
+    knobs : mapping of float
+        What a search found for a controller, as it stands in ``baselines/tuned.yaml``.
     files : tuple of mapping
         Name, sha256, bytes and training_seed of each policy file.
     """
@@ -41,6 +44,7 @@ class Artefact:
     digest: str
     code: tuple[str, ...]
     files: tuple[Mapping[str, Any], ...]
+    knobs: Mapping[str, float]
 
     def record(self) -> dict[str, Any]:
         """Return the artefact as a row holds it."""
@@ -48,6 +52,7 @@ class Artefact:
             "digest": self.digest,
             "code": list(self.code),
             "files": [dict(file) for file in self.files],
+            "knobs": dict(self.knobs),
         }
 
 
@@ -76,15 +81,23 @@ def combine(entrant: Entrant, parameters: Iterable[str], code: Iterable[str]) ->
     parameters : iterable of str
         Digests of what the controllers hold.
     code : iterable of str
-        Digests of their code, empty for what is all policy file.
+        Digests of their code.
     """
     files = tuple(file_record(path, seed) for seed, path in entrant.files)
+    said = tuple(sorted(set(code)))
+    return Artefact(digest_of(files, parameters, said), said, files, dict(entrant.knobs))
+
+
+def digest_of(
+    files: Iterable[Mapping[str, Any]], parameters: Iterable[str], code: Iterable[str]
+) -> str:
+    """Return the digest of an artefact from what a row says of it; see :func:`combine`."""
     said = {
         "files": [[file["training_seed"], file["sha256"]] for file in files],
         "parameters": sorted(set(parameters)),
         "code": sorted(set(code)),
     }
-    return Artefact(digest(said), tuple(said["code"]), files)
+    return digest(said)
 
 
 def of(entrant: Entrant, track: ScenarioSet) -> Artefact:
@@ -93,7 +106,7 @@ def of(entrant: Entrant, track: ScenarioSet) -> Artefact:
 
 
 def files_of(entrant: Entrant, track: ScenarioSet) -> frozenset[Path]:
-    """Return every file that the artefact is: policies, and code with what lists it."""
+    """Return every file that the artefact is: policies, knobs, and code with what lists it."""
     return _built(entrant, track, _bytes_of(entrant))[1]
 
 
@@ -106,45 +119,65 @@ def _built(
     entrant: Entrant, track: ScenarioSet, policies: tuple[str, ...]
 ) -> tuple[Artefact, frozenset[Path]]:
     """Build a controller for each plant and set of signals, once in a process."""
-    listing = Path(inspect.getfile(importlib.import_module(entrant.source))).resolve()
-    found = {located(path) for _, path in entrant.files} or {listing}
+    listing = _page(entrant.source)
+    found = {listing, *(located(path) for _, path in entrant.files)}
+    found |= {TUNED} if entrant.knobs else set()
     numbers, code = [], []
     for model, env in tasks.built(track).told:
         for seed in entrant.training_seeds:
             made = controllers.make(entrant, model, env, training_seed=seed)
             numbers.append(controllers.parameters_digest(made))
             code.append(controller_code(entrant, made))
-            found |= needed(*code_files(entrant, made))
+            found = found.union(*(_needed(*part) for part in code_files(entrant, made)))
     return combine(entrant, numbers, code), frozenset(found)
 
 
 def controller_code(entrant: Entrant, controller: Any) -> str:
-    """Return a digest of the code of a controller, empty for one that is all policy file."""
-    files, root = code_files(entrant, controller)
-    return _code_digest(files, root) if files else ""
+    """Return a digest of the code of a controller, and of its knobs to the last digit."""
+    code = [_code_digest(*part) for part in code_files(entrant, controller)]
+    return digest({"code": code, "knobs": dict(entrant.knobs)})
 
 
-def code_files(entrant: Entrant, controller: Any) -> tuple[frozenset[Path], Path]:
-    """Return the files of a controller's own classes, and the folder of their package.
+def code_files(entrant: Entrant, controller: Any) -> list[tuple[frozenset[Path], Path]]:
+    """Return the files of a controller's own classes by packages, each with the package's place.
 
-    Of a residual controller those of the one that it corrects; of a learned one none.
+    What answers for a policy is its catalogue's package: the file is only read by it. A residual
+    controller is of the package of the one that it corrects, too.
     """
-    if entrant.files and entrant.kind != RESIDUAL:
-        return frozenset(), controllers.ROOT
-    package = BASELINES if entrant.kind == RESIDUAL else entrant.source.partition(".")[0]
-    place = Path(inspect.getfile(importlib.import_module(package))).resolve()
-    root = place.parent.parent if place.name == "__init__.py" else place.parent
     modules = {kind.__module__ for kind in classes_in(controller)}
-    own = {name for name in modules if name.partition(".")[0] == package}
-    if not own and entrant.kind != RESIDUAL:
-        own = {entrant.source}
-    files = (Path(inspect.getfile(importlib.import_module(name))).resolve() for name in own)
-    return frozenset(files), root
+    package = entrant.source.partition(".")[0]
+    own = _within(modules, package)
+    if entrant.files or not own:
+        own.add(entrant.source)
+    parts = [_part(own, package)]
+    if entrant.kind == RESIDUAL:
+        parts.append(_part(_within(modules, BASELINES), BASELINES))
+    return parts
+
+
+def _within(modules: Iterable[str], package: str) -> set[str]:
+    return {name for name in modules if name.partition(".")[0] == package}
+
+
+def _part(modules: Iterable[str], package: str) -> tuple[frozenset[Path], Path]:
+    """Return the files of modules, and the folder that their package lies in."""
+    place = _page(package)
+    root = place.parent.parent if place.name == "__init__.py" else place.parent
+    return frozenset(map(_page, modules)), root
+
+
+def _page(module: str) -> Path:
+    return Path(inspect.getfile(importlib.import_module(module))).resolve()
+
+
+@lru_cache(maxsize=256)
+def _needed(files: frozenset[Path], root: Path) -> frozenset[Path]:
+    return frozenset(needed(files, root))
 
 
 @lru_cache(maxsize=256)
 def _code_digest(files: frozenset[Path], root: Path) -> str:
-    return code_digest(needed(files, root), root)
+    return code_digest(_needed(files, root), root)
 
 
 def uncommitted(files: Iterable[Path]) -> list[Path]:

@@ -25,6 +25,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import yaml
 from filelock import FileLock
 
 from benchmarks import artefacts, provenance, scenarios, tasks, trainings
@@ -39,9 +40,6 @@ EPISODES = 30
 """Audit episodes that a row has at least."""
 PER_SCENARIO = 2
 """And at least so many of each scenario, since an interval needs the scatter within one."""
-
-NAMED = 5
-"""Changed files that a refusal names at most."""
 
 
 @dataclass(frozen=True)
@@ -221,9 +219,8 @@ def _check_committed(track: ScenarioSet, entrants: Sequence[Entrant]) -> None:
     files = files.union(*(artefacts.files_of(entrant, track) for entrant in entrants))
     names = [file.name for file in artefacts.uncommitted(files)] or provenance.changed()
     if names:
-        more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
         raise ValueError(
-            f"{track.name}: not as in the last commit: {', '.join(names[:NAMED])}{more}; commit it "
+            f"{track.name}: not as in the last commit: {provenance.listed(names)}; commit it "
             "first, the salt is drawn after it"
         )
 
@@ -262,7 +259,7 @@ class History:
 
 
 def history(found: Round, entrant: Entrant, track: ScenarioSet) -> History:
-    """Return whether the commit of a round is one of this checkout, and holds the artefact."""
+    """Return whether the commit of a round is one of this checkout, and holds artefact and task."""
     try:
         top = artefacts.top_of(FILE.parent)
         shallow = provenance.git("rev-parse", "--is-shallow-repository", folder=top) == "true"
@@ -277,19 +274,40 @@ def history(found: Round, entrant: Entrant, track: ScenarioSet) -> History:
                 "`git fetch --unshallow` gets it"
             )
         return History((f"audit.commit: {found.commit[:12]} is none of the present commit's past",))
-    files = sorted(artefacts.files_of(entrant, track))
+    files = sorted(artefacts.files_of(entrant, track) | tasks.files_of(track))
     inside = [file for file in files if file.is_relative_to(top)]
-    other = [file.name for file in inside if not _same(found.commit, file, top)]
-    outside = [file.name for file in files if file not in inside]
+    touched = _touched(found.commit, inside, top)
+    other = [file.name for file in touched if not _same(entrant, found.commit, file, top)]
+    outside = provenance.listed([file.name for file in files if not file.is_relative_to(top)])
     return History(
         tuple(f"audit.commit: {found.commit[:12]} has another {name}" for name in other),
-        f"not in this checkout: {', '.join(outside)}" if outside else "",
+        f"not looked up in the round's commit, as outside of its checkout: {outside}"
+        if outside
+        else "",
     )
 
 
-def _same(commit: str, file: Path, top: Path) -> bool:
-    """Return whether a file says the same in a commit: policies to the byte, code as code."""
+def _touched(commit: str, files: Sequence[Path], top: Path) -> list[Path]:
+    """Return the files that are not, byte by byte, those of a commit."""
+
+    def names(*command: str) -> set[str]:
+        said = provenance.git(*command, "-z", "--name-only", commit, folder=top)
+        return set(said.split("\0"))
+
+    there, changed = names("ls-tree", "-r"), names("diff", "--no-renames")
+    placed = {file: file.relative_to(top).as_posix() for file in files}
+    return [file for file, name in placed.items() if name in changed or name not in there]
+
+
+def _same(entrant: Entrant, commit: str, file: Path, top: Path) -> bool:
+    """Return whether a file says the same in a commit: policies to the byte, code as code.
+
+    Of the knobs those of the controller count, since searches for others add to their file.
+    """
     then, now = artefacts.bytes_at(commit, file, top), file.read_bytes()
+    if then is not None and file == artefacts.TUNED:
+        said = (yaml.safe_load(then) or {}).get("tuned") or {}
+        return said.get(entrant.tuned, {}).get("knobs") == dict(entrant.knobs)
     if then is None or file.suffix != ".py":
         return then == now
     return code_text(then.decode()) == code_text(now.decode())

@@ -52,6 +52,10 @@ class Entrant:
         How they were chosen.
     author : str
         Who made it, as BibTeX wants it; empty for the authors of this package.
+    tuned : str
+        Name in ``baselines/tuned.yaml``; of a residual controller that of the one it corrects.
+    knobs : tuple of (str, float)
+        The numbers that stand there under that name, none for a controller that is not tuned.
     """
 
     name: str
@@ -65,6 +69,8 @@ class Entrant:
     trials: int | None = 0
     tuning: str = BY_RULE
     author: str = ""
+    tuned: str = ""
+    knobs: tuple[tuple[str, float], ...] = ()
 
     @property
     def training_seeds(self) -> tuple[int | None, ...]:
@@ -99,6 +105,7 @@ def _entrant(name: str, entry: Any, module: str, kind: str) -> Entrant | None:
     listed = getattr(entry, "files", None)
     found = listed() if callable(listed) else {}
     files = tuple((seed, _movable(path)) for seed, path in sorted(found.items()))
+    knobs = tuple(sorted(getattr(entry, "found", {}).items()))
     if callable(listed) and not files:
         return None
     return Entrant(
@@ -113,6 +120,8 @@ def _entrant(name: str, entry: Any, module: str, kind: str) -> Entrant | None:
         trials=getattr(entry, "trials", 0),
         tuning=str(getattr(entry, "tuning", BY_RULE)),
         author=str(getattr(entry, "author", "")),
+        tuned=str(getattr(entry, "baseline", "") or name) if knobs else "",
+        knobs=knobs,
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import cells, rows, traces
+from benchmarks import artefacts, cells, rows, traces
 from benchmarks.canonical import plain
 from benchmarks.metrics import headline_of, of_track
 
@@ -40,6 +40,7 @@ def compare(before: Row, after: Row, drifted: list[str], notes: list[str]) -> No
     """
     lines, computed = _exact(before, after)
     drifted += lines
+    drifted += _artefact(before["controller"])
     if computed:
         notes.append(f"computed a little otherwise here: {', '.join(computed)}")
     drifted += differences(*(_frame(row) for row in (before, after)), "episodes")
@@ -56,14 +57,21 @@ def _exact(before: Row, after: Row) -> tuple[list[str], list[str]]:
     """Return in what parts differ that no rounding changes, and which numbers were let through.
 
     The numbers of a controller that is designed on the spot may differ, where its code and files
-    are the same.
+    are the same; those of a policy are its file.
     """
     old, new = ({k: v for k, v in row.items() if k not in _NEARLY} for row in (before, after))
     lines = differences(old, new)
-    if not any(new["controller"]["artefact"]["code"]):
+    if new["controller"]["kind"] == "learned":
         return lines, []
     let = [line for line in lines if line.startswith(_NUMBERS)]
     return [line for line in lines if line not in let], [line.partition(":")[0] for line in let]
+
+
+def _artefact(about: Mapping[str, Any]) -> list[str]:
+    """Return whether an artefact's digest is that of the files, numbers and code that are told."""
+    told = about["artefact"]
+    own = artefacts.digest_of(told["files"], about["parameters"].values(), told["code"])
+    return differences(told["digest"], own, "controller.artefact.digest, of its own parts")
 
 
 def _frame(row: Row) -> list[Any]:

@@ -6,6 +6,7 @@ import datetime
 import platform
 import socket
 import subprocess
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
@@ -38,6 +39,8 @@ SCORING = (
     *METRICS,
 )
 """Pages of this package that the record of a score depends on."""
+NAMED = 5
+"""Files that a sentence names at most."""
 
 
 @lru_cache(maxsize=1)
@@ -92,6 +95,12 @@ def changed(folder: Path = ROOT) -> list[str]:
     """
     said = git("status", "--porcelain", "--untracked-files=all", "--", *CODE, folder=folder)
     return [line[2:].strip() for line in said.splitlines()]
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return the first of some files' names, and how many more there are."""
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return ", ".join(names[:NAMED]) + more
 
 
 def git(*arguments: str, folder: Path = ROOT) -> str:

@@ -63,6 +63,8 @@ def code_digest(files: Iterable[Path], root: Path) -> str:
 def needed(files: Iterable[Path], root: Path) -> set[Path]:
     """Return files and all that they import from their own packages under a folder.
 
+    The pages of the packages that they are in are imported with them.
+
     Parameters
     ----------
     files : iterable of Path
@@ -77,7 +79,14 @@ def needed(files: Iterable[Path], root: Path) -> set[Path]:
         names = _imports(ast.parse(file.read_text(encoding="utf-8")))
         own = {name for name in names if name.partition(".")[0] in tops}
         left |= {path for name in own if (path := _file(name, root)) is not None} - found
+        left |= _packages(file, root) - found
     return found
+
+
+def _packages(file: Path, root: Path) -> set[Path]:
+    """Return the ``__init__.py`` of each package that a file is in."""
+    folders = [folder for folder in file.parents if folder.is_relative_to(root) and folder != root]
+    return {page for folder in folders if (page := folder / "__init__.py").is_file()}
 
 
 def _imports(tree: ast.AST) -> set[str]:

@@ -1,17 +1,17 @@
-"""What a score is of: environment, scenarios, plants, models and metrics, in one digest."""
+"""What a score is of: environment, scenarios, plants, models and scoring, in one digest."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 
-from benchmarks.canonical import digest
+from benchmarks.canonical import SOURCES, digest, sources_digest
 from benchmarks.making import make_env, model_of
-from benchmarks.provenance import HERE, METRICS
+from benchmarks.provenance import HERE, ROOT, SCORING
 from benchmarks.scenarios import ScenarioSet
 from benchmarks.source_code import code_digest
 
@@ -21,6 +21,8 @@ GROUPS_OF = {
     "metrics_joint.py": {"joint", "chain"},
 }
 """Pages of metrics that only tracks with one of these groups are scored by."""
+ENVIRONMENTS = ROOT / "pam_envs"
+"""Package of the environments, whose code is of every task."""
 
 
 @dataclass(frozen=True)
@@ -105,22 +107,44 @@ def built(track: ScenarioSet) -> Built:
     return Built(describe_env(track.env), plants, models, tuple(told.values()))
 
 
-@lru_cache(maxsize=16)
-def metrics_digest(groups: frozenset[str]) -> str:
-    """Return the digest of what the code says that scores tracks of these groups."""
+def scoring_files(groups: frozenset[str]) -> frozenset[Path]:
+    """Return the files of the code that runs and scores tracks of these groups."""
     unused = {name for name, own in GROUPS_OF.items() if not own & groups}
-    return code_digest([HERE / name for name in {"errors.py", *METRICS} - unused], HERE)
+    return frozenset(HERE / name for name in set(SCORING) - unused)
+
+
+@lru_cache(maxsize=16)
+def scoring_digest(groups: frozenset[str]) -> str:
+    """Return the digest of what the code says that runs and scores tracks of these groups."""
+    return code_digest(scoring_files(groups), HERE)
+
+
+@lru_cache(maxsize=1)
+def environments_digest() -> str:
+    """Return the digest of what the environments' code says, and of their data."""
+    code = code_digest(ENVIRONMENTS.rglob("*.py"), ROOT)
+    return digest([code, sources_digest([ENVIRONMENTS], SOURCES - {".py"})])
+
+
+def files_of(track: ScenarioSet) -> frozenset[Path]:
+    """Return every file of code and data that a track's scores depend on, controllers aside."""
+    environments = (file for file in ENVIRONMENTS.rglob("*") if file.suffix in SOURCES)
+    return scoring_files(_groups(track)).union(environments)
+
+
+def _groups(track: ScenarioSet) -> frozenset[str]:
+    return frozenset(track.content.get("metrics") or ())
 
 
 def task_digest(track: ScenarioSet) -> str:
-    """Return the SHA-256 of environment, scenarios, metrics, plants and models."""
+    """Return the SHA-256 of environment, scenarios, plants, models, and the code that scores."""
     found = built(track)
-    groups: Iterable[str] = track.content.get("metrics") or ()
     return digest(
         {
             "env": found.env,
             "scenarios": track.content,
-            "metrics": metrics_digest(frozenset(groups)),
+            "scoring": scoring_digest(_groups(track)),
+            "environments": environments_digest(),
             "plants": found.plants,
             "models": found.models,
         }

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import datetime
 import json
+import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from filelock import FileLock
 
-from benchmarks import provenance
+from benchmarks import artefacts, cells, controllers, provenance
 from benchmarks.store import CHECKSUM, write_text
 
 FILE = "verified.json"
-"""Beside the rows: from row to ``checksum``, ``commit``, ``date`` and ``mode``."""
+"""Beside the rows: of each row ``checksum``, ``date``, ``mode``, and what it was run again with."""
 BITS, ELSEWHERE = "bits", "elsewhere"
+OLDER = "older"
+"""Key under which :func:`of` puts whether the code is another one since."""
 
 Found = Mapping[str, Mapping[str, Any]]
 
@@ -38,12 +41,43 @@ def read(folder: Path) -> Found:
 
 
 def of(row: Mapping[str, Any], found: Found) -> Mapping[str, Any] | None:
-    """Return the verification of a row as it is, ``None`` where there is none since it changed."""
+    """Return the verification of a row as it is, ``None`` where there is none since it changed.
+
+    ``older`` says whether it was of other code, data or policies than are here now.
+    """
     entry = found.get(row["row"])
-    return entry if entry and entry["checksum"] == row.get(CHECKSUM) else None
+    if not entry or entry["checksum"] != row.get(CHECKSUM):
+        return None
+    return {**entry, OLDER: _is_older(row, entry)}
 
 
-def note(path: Path, checksum: str, mode: str) -> None:
+def _is_older(row: Mapping[str, Any], entry: Mapping[str, Any]) -> bool:
+    about = row["controller"]
+    entrant = controllers.available().get(about["name"])
+    if entrant is None or cells.sources(entrant) != entry.get("sources"):
+        return True
+    policies = [artefacts.file_record(path, seed)["sha256"] for seed, path in entrant.files]
+    return policies != [file["sha256"] for file in about["artefact"]["files"]]
+
+
+def refusal() -> str:
+    """Return why nothing can be noted in this checkout, empty where it can.
+
+    A note names the code by its commit: none does that is changed since.
+    """
+    try:
+        changed = provenance.changed()
+    except (OSError, subprocess.SubprocessError):  # no checkout: the digests of sources tell
+        return ""
+    if not changed:
+        return ""
+    return (
+        f"not noted in {FILE}, since {provenance.listed(changed)} is not as in the last commit: "
+        "commit or stash it and verify again"
+    )
+
+
+def note(path: Path, checksum: str, mode: str, sources: Mapping[str, str]) -> None:
     """Note beside a row that it held, or take out what was noted where it did not.
 
     Parameters
@@ -54,6 +88,8 @@ def note(path: Path, checksum: str, mode: str) -> None:
         Of what was verified; empty where it did not hold.
     mode : {"bits", "elsewhere"}
         How it was compared.
+    sources : mapping of str
+        Digests of what it was run again with; see :func:`benchmarks.cells.sources`.
     """
     with FileLock(path.parent / f".{FILE}.lock"):
         before = read(path.parent)
@@ -62,6 +98,8 @@ def note(path: Path, checksum: str, mode: str) -> None:
             known[path.stem] = {
                 "checksum": checksum,
                 "commit": provenance.commit(),
+                "sources": dict(sources),
+                "packages": provenance.packages(),
                 "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
                 "mode": mode,
             }

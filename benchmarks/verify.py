@@ -41,6 +41,8 @@ class Verdict:
         Differences that are no drift by themselves (versions, commit).
     checksum : str
         Of the row that was read.
+    sources : mapping of str
+        Digests of what it was run again with, none if it was not.
     """
 
     row: str
@@ -48,6 +50,7 @@ class Verdict:
     drifted: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     checksum: str = ""
+    sources: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def holds(self) -> bool:
@@ -104,6 +107,7 @@ def _check(stored: Record, cluster: engine.Cluster, verdict: Verdict) -> None:
     _compare_audit(stored, entrant, track, found, verdict)
     _compare_episodes(stored, wanted, verdict)
     again = _run_again(entrant, track, found, wanted, cluster)
+    verdict.sources = again["made_with"]["sources"]
     _compare(stored, again, entrant, track, verdict)
 
 

@@ -161,11 +161,12 @@ def failures_of(row: Mapping[str, Any], split: str = "") -> tuple[int, int]:
 
 
 def verified_words(row: Mapping[str, Any]) -> str:
-    """Return whether and when the row, as it is, was run again and came out the same."""
+    """Return whether and when the row was run again and came out the same, and with which code."""
     found = row.get(VERIFIED)
     if not found:
         return "not verified yet"
-    return f"verified {found['date']}" + (" elsewhere" if found["mode"] == "elsewhere" else "")
+    where = " elsewhere" if found["mode"] == "elsewhere" else ""
+    return f"verified {found['date']}{where}" + (", at an older code" if found["older"] else "")
 
 
 JUMPING = ("steps", "staircase")

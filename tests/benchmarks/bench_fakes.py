@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 
 @dataclass(frozen=True)
@@ -121,12 +122,28 @@ class PolicyEntry(Entry):
         return {int(path.stem.partition(".s")[2]): path for path in found}
 
 
+@dataclass(frozen=True)
+class TunedEntry(Entry):
+    """As an entry with knobs that a search found: beside the policies, in a file that lists them.
+
+    There are none where no test has written some.
+    """
+
+    @property
+    def found(self):
+        file = POLICIES / "tuned.yaml" if POLICIES else None
+        if file is None or not file.is_file():
+            return {}
+        return yaml.safe_load(file.read_text())["tuned"]["tuned"]["knobs"]
+
+
 CONTROLLERS = {
     "low": Entry("holds 1.5 bar"),
     "middle": Entry("holds 3 bar"),
     "inverse": Entry("static inverse", "nominal model"),
     "ahead": Entry("static inverse, two preview samples early", "nominal model"),
     "integral": Entry("static inverse with an integrator", "nominal model"),
+    "tuned": TunedEntry("static inverse with an integrator, tuned", "nominal model"),
     "boastful": Entry("static inverse, says that it knows nothing", "nothing"),
     "trained": PolicyEntry("a file", "nominal model", kind="learned"),
     "refused": Entry("not a number"),
@@ -146,6 +163,13 @@ def write_policies(folder, *gains, plant="", **others):
         (folder / f"trained.s{seed}.json").write_text(json.dumps(card))
 
 
+def write_knobs(folder, **others):
+    """Write what searches found: the gain of ``tuned``, and knobs of another controller."""
+    found = {"tuned": {"knobs": {"gain": 0.02}}, "other": {"knobs": {"lead": 1.0}}}
+    found |= {name: {"knobs": knobs} for name, knobs in others.items()}
+    (folder / "tuned.yaml").write_text(yaml.safe_dump({"schema": 1, "tuned": found}))
+
+
 def make_controller(
     name, plant=None, signals=None, action_signals=None, seed=0, training_seed=None
 ):
@@ -159,6 +183,7 @@ def make_controller(
         "inverse": lambda: Inverse(*parts),
         "ahead": lambda: Inverse(*parts, ahead=2),
         "integral": lambda: Inverse(*parts, gain=0.02),
+        "tuned": lambda: Inverse(*parts, gain=CONTROLLERS["tuned"].found["gain"]),
         "boastful": lambda: Inverse(*parts),
         "raises": Raises,
         "refused": Refused,

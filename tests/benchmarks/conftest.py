@@ -20,7 +20,7 @@ CONTENT = board_fakes.CONTENT | {
 @pytest.fixture(autouse=True)
 def anew() -> Iterator[None]:
     """Forget what was built of tracks and controllers: tests change what they are built from."""
-    for kept in (tasks.built, tasks.metrics_digest, artefacts._built):
+    for kept in (tasks.built, artefacts._built):
         kept.cache_clear()
     yield
 

@@ -47,11 +47,13 @@ def place(folder: Path) -> Iterator[Path]:
     """Make a folder a checkout of policies, scenarios and rounds, which the harness then uses."""
     (folder / "tiny.yaml").write_text(yaml.safe_dump(TINY))
     bench_fakes.write_policies(folder / "policies", *GAINS)
+    bench_fakes.write_knobs(folder / "policies")
     git(folder, "init", "--quiet")
     commit(folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(controllers, "SOURCES", (("bench_fakes", "bench_fakes", "classical"),))
         patch.setattr(bench_fakes, "POLICIES", folder / "policies")
+        patch.setattr(artefacts, "TUNED", folder / "policies" / "tuned.yaml")
         patch.setattr(scenarios, "FOLDER", folder)
         patch.setattr(audit, "FILE", folder / "rounds.json")
         # the checkout that is tested may hold what is not committed yet

@@ -6,6 +6,7 @@ import hashlib
 import json
 import subprocess
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import bench_fakes
@@ -14,10 +15,15 @@ import pytest
 from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
-from benchmarks import artefacts, audit, provenance, rows, scenarios, tasks
+from agents.policy import OnnxPolicy
+from agents.residual import ResidualPolicy
+from baselines import tuned
+from baselines.trivial import Constant
+from benchmarks import artefacts, audit, controllers, provenance, rows, scenarios, tasks
 from benchmarks.__main__ import main
 from benchmarks.canonical import digest
-from benchmarks.controllers import find
+from benchmarks.controllers import Entrant, find
+from benchmarks.source_code import needed
 from benchmarks.store import comparable, read_record
 from benchmarks.verify import verify
 from tests.benchmarks.row_helpers import commit, draw, git, place, run_row, tiny
@@ -145,7 +151,7 @@ def test_what_has_changed_reports_itself_until_the_next_round(board: Path) -> No
 
 def test_a_changed_task_needs_a_round(board: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     draw(board, "low")
-    monkeypatch.setattr(tasks, "metrics_digest", lambda groups: "another rule")
+    monkeypatch.setattr(tasks, "scoring_digest", lambda groups: "another rule")
     assert audit.find(find("low"), tiny(board)) is None
     assert draw(board, "low").number == 2
 
@@ -196,7 +202,53 @@ def test_the_files_of_a_classical_controller_are_its_code(board: Path) -> None:
     integral, inverse = (artefacts.of(find(name), track) for name in ("integral", "inverse"))
     assert integral.digest != inverse.digest
     assert integral.code == inverse.code
-    assert artefacts.of(find("trained"), track).code == ("",)
+
+
+def test_the_code_that_answers_for_a_policy_is_of_its_artefact(
+    board: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entrant, track = find("trained"), tiny(board)
+    before = artefacts.of(entrant, track)
+    assert Path(bench_fakes.__file__).resolve() in artefacts.files_of(entrant, track)
+    monkeypatch.setattr(artefacts, "_code_digest", lambda files, root: "another")
+    artefacts._built.cache_clear()
+    after = artefacts.of(entrant, track)
+    assert after.files == before.files
+    assert after.code != before.code
+    assert after.digest != before.digest
+
+
+def test_knobs_that_a_search_found_are_of_the_artefact() -> None:
+    found = tuned.read()
+    for name, entrant in controllers.available().items():
+        assert dict(entrant.knobs) == (found[entrant.tuned].knobs if entrant.tuned else {})
+        if entrant.kind == "classical":
+            assert entrant.tuned == (name if name in found else "")
+    some = Constant(None)
+    plain = Entrant("zero", "", "nothing", "", (), "classical", "baselines.catalogue")
+    codes = {
+        artefacts.controller_code(replace(plain, knobs=knobs), some)
+        for knobs in ((), (("lead", 1.0),), (("lead", 1.0 + 1e-15),))
+    }
+    assert len(codes) == 3
+
+
+NEEDED = {"policy.py", "residual.py", "catalogue.py", "controllers.py", "onnx_file.py"}
+
+
+@pytest.mark.parametrize("kind", ["learned", "residual"])
+def test_a_policy_needs_the_agents_that_answer_and_the_controller_that_it_corrects(
+    kind: str,
+) -> None:
+    entrant = Entrant("any", "", "nothing", "", (), kind, "agents.catalogue", ((0, Path("any")),))
+    policy = OnnxPolicy.__new__(OnnxPolicy)
+    learned = policy if kind == "learned" else ResidualPolicy(policy, Constant(None))
+    found = [needed(*part) for part in artefacts.code_files(entrant, learned)]
+    names = [{file.relative_to(controllers.ROOT).as_posix() for file in part} for part in found]
+    assert {f"agents/{name}" for name in NEEDED} < names[0]
+    assert all(name.startswith("agents/") for name in names[0])
+    assert [part for part in names[1:] if "baselines/trivial.py" in part] == names[1:]
+    assert len(names) == 1 + (kind == "residual")
 
 
 def test_rounds_are_only_ever_added(board: Path) -> None:
@@ -247,6 +299,31 @@ def test_the_commit_of_a_round_has_to_hold_the_artefact(board: Path) -> None:
     assert recorded(board) == []
     (wrong,) = recorded(board, commit=first)
     assert wrong == f"audit.commit: {first[:12]} has another trained.s2.json"
+
+
+def test_the_commit_of_a_round_has_to_hold_the_code_that_answers_and_that_scores(
+    board: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers, scores = board / "answers.py", board / "scores.py"
+    answers.write_text("filtered = False\n")
+    commit(board)
+    drawn, entrant, track = draw(board, "trained"), find("trained"), tiny(board)
+    monkeypatch.setattr(artefacts, "files_of", lambda *_: frozenset({answers}))
+    monkeypatch.setattr(tasks, "files_of", lambda _: frozenset({scores}))
+    scores.write_text("worst = 1.0\n")
+    commit(board)
+
+    def wrong() -> list[str]:
+        return [line.rpartition(" ")[2] for line in audit.history(drawn, entrant, track).wrong]
+
+    assert wrong() == ["scores.py"]  # the round's commit does not have it at all
+    monkeypatch.setattr(tasks, "files_of", lambda _: frozenset())
+    answers.write_text("# told\nfiltered = False\n")
+    assert wrong() == []
+    answers.write_text("filtered = True\n")
+    assert wrong() == ["answers.py"]
+    commit(board)
+    assert wrong() == ["answers.py"]
 
 
 def head(folder: Path) -> str:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import bench_fakes
+
 from benchmarks import leaderboard, site_build, standings, verified, views
 from benchmarks.store import CHECKSUM
-from tests.benchmarks.row_helpers import draw, place, run_row
+from tests.benchmarks.row_helpers import commit, draw, place, run_row
 
 
 def test_a_round_its_entrants_and_who_is_outside_of_it(tmp_path: Path) -> None:
@@ -17,7 +19,7 @@ def test_a_round_its_entrants_and_who_is_outside_of_it(tmp_path: Path) -> None:
         path = run_row(tmp_path, "trained")
         run_row(tmp_path, "low")
         held = json.loads(path.read_text())
-        verified.note(path, held[CHECKSUM], verified.BITS)
+        verified.note(path, held[CHECKSUM], verified.BITS, held["made_with"]["sources"])
         loaded = leaderboard.load(tmp_path / "out")
         (tracks,) = standings.tracks(loaded).values()
         found = standings.listing(tracks)
@@ -30,7 +32,8 @@ def test_a_round_its_entrants_and_who_is_outside_of_it(tmp_path: Path) -> None:
         assert "Audit round 1, drawn" in text
         assert "30 episodes that nobody could tune to, 2 of 3 rows" in text
         assert "In the round and without a row: integral." in text
-        assert f"verified {verified.read(path.parent)[path.stem]['date']}" in text
+        day = verified.read(path.parent)[path.stem]["date"]
+        assert f"| verified {day} |" in text
 
         for row in found.inside:  # the row's own record and the board say the same
             stated = row["audit"]["aggregate"]["rms_error"]
@@ -44,6 +47,11 @@ def test_a_round_its_entrants_and_who_is_outside_of_it(tmp_path: Path) -> None:
 
         site_build.build(tmp_path / "out", tmp_path / "site")
         assert (tmp_path / "site" / "rows" / path.name).read_bytes() == path.read_bytes()
+
+        bench_fakes.write_policies(tmp_path / "policies", 0.02, 0.06)
+        older = leaderboard.board_text(leaderboard.load(tmp_path / "out"))
+        assert f"| verified {day}, at an older code |" in older
+        commit(tmp_path)
 
         draw(tmp_path, "trained", "middle")
         assert not any(views.is_audited(row) for row in leaderboard.load(tmp_path / "out"))

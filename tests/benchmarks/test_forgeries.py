@@ -29,8 +29,9 @@ SALT = "4f" * 16
 @pytest.fixture(scope="module")
 def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     with place(tmp_path_factory.mktemp("board")) as folder:
-        draw(folder, "trained", "inverse")
+        draw(folder, "trained", "inverse", "tuned")
         run_row(folder, "trained")
+        run_row(folder, "tuned")
         run_row(folder, "integral")
         run_row(folder, "raises")
         yield folder
@@ -64,7 +65,7 @@ def forged(board: Path) -> Iterator[Callable[..., verify.Verdict]]:
         path.write_bytes(content)
 
 
-@pytest.mark.parametrize("name", ["trained", "integral", "raises"])
+@pytest.mark.parametrize("name", ["trained", "tuned", "integral", "raises"])
 def test_an_honest_row_holds(name: str, board: Path) -> None:
     verdict = verdict_of(board, name)
     assert verdict.holds, verdict.drifted
@@ -381,6 +382,58 @@ def test_elsewhere_a_controller_that_is_designed_there_may_have_other_last_digit
     assert any("otherwise here: controller.artefact.digest, " in note for note in verdict.notes)
 
 
+@pytest.fixture
+def turned(board: Path) -> Iterator[Row]:
+    """A knob is turned a little after the round, and the row run with it as it is."""
+    try:
+        bench_fakes.write_knobs(board / "policies", tuned={"gain": 0.020000001})
+        yield read_record(run_row(board, "tuned", out=board / "turned", cells=board / "anew"))
+    finally:
+        bench_fakes.write_knobs(board / "policies")
+
+
+def resealed(board: Path, row: Row) -> verify.Verdict:
+    path = board / "turned" / "tiny--tuned.json"
+    write_record(path, row)
+    return verify.verify(path, elsewhere=True)
+
+
+PARTS = {
+    "digest": "controller.artefact.digest, of its own parts: ",
+    "artefact": "controller.artefact.knobs.gain: 0.02 recorded, 0.020000001 now",
+    "numbers": "controller.artefact.code[0]: ",
+}
+
+
+@pytest.mark.parametrize("kept", PARTS)
+def test_elsewhere_a_knob_that_was_turned_after_the_round_is_found(
+    kept: str, board: Path, turned: Row
+) -> None:
+    """Scores, means and episodes are those of the round, whose artefact the row says it is."""
+    assert turned["audit"] is None  # honest, it is outside of the round
+    old = read_record(board / "out" / "tiny--tuned.json")
+    row = copy.deepcopy(old)
+    if kept != "numbers":
+        for part in ("digest", "parameters"):
+            row["controller"][part] = turned["controller"][part]
+    if kept == "digest":
+        row["controller"]["artefact"] = turned["controller"]["artefact"] | {
+            "digest": old["controller"]["artefact"]["digest"]
+        }
+    verdict = resealed(board, row)
+    tell(verdict, PARTS[kept])
+    tell(verdict, "has another tuned.yaml")
+
+
+def test_a_knob_of_another_controller_changes_nothing(board: Path) -> None:
+    try:
+        bench_fakes.write_knobs(board / "policies", other={"lead": 1.5}, more={"lead": 1.1})
+        verdict = verdict_of(board, "tuned", elsewhere=True)
+    finally:
+        bench_fakes.write_knobs(board / "policies")
+    assert verdict.holds, verdict.drifted
+
+
 def test_a_row_cannot_choose_how_it_is_compared(forged: Any) -> None:
     """Episodes made equal around their mean: no mean tells, and every interval is narrower."""
 
@@ -506,6 +559,8 @@ def test_the_command_says_which_row_drifted_and_notes_which_held(
     assert entry is not None
     assert entry["mode"] == "bits"
     assert entry["commit"] == provenance.commit()
+    assert entry["sources"] == row["made_with"]["sources"]
+    assert entry["older"] is False
     assert verified.of({**row, "checksum": "another"}, found) is None
     forged("raises", lambda row: row["episodes"].pop())
     assert main(["verify", honest, other, "--elsewhere", "--jobs", "1"]) == 1
@@ -518,3 +573,29 @@ def test_the_command_says_which_row_drifted_and_notes_which_held(
     for command in ("verify", "cite"):
         assert main([command, "tiny--nobody"]) == 2
         assert "there is no row 'tiny--nobody'" in capsys.readouterr().err
+
+
+def test_the_command_notes_nothing_where_code_is_not_committed(
+    board: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, noted = str(board / "out" / "tiny--integral.json"), board / "out" / verified.FILE
+    assert main(["verify", path, "--jobs", "1"]) == 0
+    before = noted.read_bytes()
+    assert json.loads(before)["tiny--integral"]["mode"] == "bits"
+    monkeypatch.setattr(provenance, "changed", lambda: ["pam_envs/kernels.py"])
+    assert main(["verify", path, "--elsewhere", "--jobs", "1"]) == 2
+    said = capsys.readouterr()
+    assert "tiny--integral: holds" in said.out
+    assert said.err == (
+        "error: not noted in verified.json, since pam_envs/kernels.py is not as in the last "
+        "commit: commit or stash it and verify again\n"
+    )
+    assert noted.read_bytes() == before
+
+
+def test_outside_of_a_checkout_nothing_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    def absent() -> list[str]:
+        raise FileNotFoundError("git")
+
+    monkeypatch.setattr(provenance, "changed", absent)
+    assert verified.refusal() == ""

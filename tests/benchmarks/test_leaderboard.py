@@ -10,9 +10,20 @@ from types import SimpleNamespace
 import board_fakes as fakes
 import pytest
 
-from benchmarks import audit, claims, leaderboard, plots, rows, standings, views
+from benchmarks import (
+    audit,
+    cells,
+    claims,
+    leaderboard,
+    plots,
+    rows,
+    standings,
+    verified,
+    views,
+)
 from benchmarks.board_format import duration, number, table
 from benchmarks.board_tables import with_costs
+from benchmarks.controllers import find
 from benchmarks.metrics import of_track
 
 
@@ -88,10 +99,13 @@ def test_an_entrant_of_the_round_that_has_no_row_is_named() -> None:
 def test_a_verified_row_says_when() -> None:
     row = fakes.row("pid", 1e-3)
     assert "not verified yet" in leaderboard.board_text([row])
-    row["verified"] = {"date": "2026-01-03", "mode": "bits"}
+    row["verified"] = {"date": "2026-01-03", "mode": "bits", "older": False}
     assert "| verified 2026-01-03 |" in leaderboard.board_text([row])
     row["verified"]["mode"] = "elsewhere"
     assert "| verified 2026-01-03 elsewhere |" in leaderboard.board_text([row])
+    row["verified"]["older"] = True
+    words = "| verified 2026-01-03 elsewhere, at an older code |"
+    assert words in leaderboard.board_text([row])
 
 
 def test_a_row_of_an_older_round_is_self_reported(
@@ -113,11 +127,29 @@ def test_a_verification_counts_for_the_row_that_it_was_of(
 ) -> None:
     given = [fakes.row("pid", 1e-3), fakes.row("zero", 2e-3)]
     monkeypatch.setattr(rows, "load_all", lambda folder: given)
-    entry = {"checksum": "e" * 64, "commit": "c", "date": "2026-01-03", "mode": "bits"}
+    sources = cells.sources(find("pid"))
+    entry = {"checksum": "e" * 64, "date": "2026-01-03", "mode": "bits", "sources": sources}
     held = {given[0]["row"]: entry, given[1]["row"]: {**entry, "checksum": "an older row"}}
     (tmp_path / "verified.json").write_text(json.dumps(held))
     words = [views.verified_words(row) for row in leaderboard.load(tmp_path)]
     assert words == ["verified 2026-01-03", "not verified yet"]
+
+
+@pytest.mark.parametrize("package", ["pam_envs", "baselines", "benchmarks", ""])
+def test_a_verification_is_of_the_code_that_it_ran(package: str) -> None:
+    row = fakes.row("pid", 1e-3)
+    now = cells.sources(find("pid"))
+    entry = {"checksum": row["checksum"], "date": "2026-01-03", "mode": "bits"}
+
+    def older(**others: object) -> bool:
+        found = verified.of(row, {row["row"]: {**entry, **others}})
+        assert found is not None
+        return bool(found["older"])
+
+    assert not older(sources=now)
+    assert older(sources={**now, package: "another"}) if package else older()
+    row["controller"]["name"] = "nobody"
+    assert older(sources=now)
 
 
 def test_a_checkout_without_rows_has_a_board_that_says_so(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import provenance
+from benchmarks.source_code import needed
 from tests.benchmarks.row_helpers import commit, git
 
 CODE = ("pam_envs", "sweeps", "baselines", "agents", "benchmarks", "benchmarks/scenarios")
@@ -51,3 +52,9 @@ def test_every_page_of_metrics_counts() -> None:
     pages = {path.name for path in provenance.HERE.glob("metrics*.py")}
     assert pages < set(provenance.SCORING)
     assert all((provenance.HERE / name).is_file() for name in provenance.SCORING)
+
+
+def test_all_that_a_cell_is_computed_by_counts() -> None:
+    kept_beside = {"__init__.py", "audit.py", "provenance.py", "store.py", "tasks.py"}
+    used = needed([provenance.HERE / "cells.py"], provenance.ROOT)
+    assert {path.name for path in used} - kept_beside == set(provenance.SCORING)

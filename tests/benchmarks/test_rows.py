@@ -18,7 +18,7 @@ from benchmarks import artefacts, cells, rows, scenarios, tasks
 from benchmarks.cells import cells_of
 from benchmarks.controllers import BY_RULE, available, find
 from benchmarks.metrics import GROUPS
-from benchmarks.provenance import METRICS
+from benchmarks.provenance import METRICS, SCORING
 from benchmarks.store import read_record, write_record
 from tests.benchmarks.row_helpers import place, run_row, tiny
 
@@ -244,17 +244,18 @@ def test_cells_of_another_version_or_plant_are_not_assembled(board: Path) -> Non
             rows.assemble(entrant, track, [records[0], {**records[1], name: "0"}])
 
 
-PARTS = ("env", "plants", "models", "metrics")
+PARTS = ("env", "plants", "models")
+DIGESTS = ("scoring_digest", "environments_digest")
 
 
-@pytest.mark.parametrize("part", PARTS)
-def test_the_task_is_of_environment_plants_models_and_metrics(
+@pytest.mark.parametrize("part", PARTS + DIGESTS)
+def test_the_task_is_of_environment_plants_models_and_the_code_that_scores(
     part: str, board: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     track = tiny(board)
     before, built = tasks.task_digest(track), tasks.built(track)
-    if part == "metrics":
-        monkeypatch.setattr(tasks, "metrics_digest", lambda groups: "another rule")
+    if part in DIGESTS:
+        monkeypatch.setattr(tasks, part, lambda *_: "another rule")
     else:
         named = getattr(built, part)
         other = dataclasses.replace(built, **{part: {**named, next(iter(named)): "0"}})
@@ -262,18 +263,36 @@ def test_the_task_is_of_environment_plants_models_and_metrics(
     assert tasks.task_digest(track) != before
 
 
-def test_only_metrics_that_score_a_track_are_of_its_task(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_metrics_that_score_a_track_are_of_its_task() -> None:
     assert set.union(*tasks.GROUPS_OF.values()) == set(GROUPS)
     assert set(tasks.GROUPS_OF) < set(METRICS)
-    read: list[set[str]] = []
-    monkeypatch.setattr(
-        tasks, "code_digest", lambda files, root: read.append({f.name for f in files}) or ""
-    )
-    tasks.metrics_digest(frozenset({"gait"}))
-    tasks.metrics_digest(frozenset({"chain", "joint"}))
-    tasks.metrics_digest(frozenset())
-    always = {"errors.py", "metrics.py"}
-    assert read == [always | {"metrics_knee.py"}, always | {"metrics_joint.py"}, always]
+    always = set(SCORING) - set(METRICS) | {"metrics.py"}
+    assert {"cells.py", "rollout.py", "errors.py"} < always
+    for groups, page in ({"gait"}, "metrics_knee.py"), ({"chain", "joint"}, "metrics_joint.py"):
+        names = {file.name for file in tasks.scoring_files(frozenset(groups))}
+        assert names == always | {page}
+    assert {file.name for file in tasks.scoring_files(frozenset())} == always
+
+
+def test_the_code_and_the_data_of_the_environments_are_of_every_task(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = tmp_path / "pam_envs"
+    made.mkdir()
+    monkeypatch.setattr(tasks, "ENVIRONMENTS", made)
+    monkeypatch.setattr(tasks, "ROOT", tmp_path)
+    found = []
+    for name, text in (
+        ("a.py", "x = 1\n"),
+        ("a.py", "# said\nx = 1\n"),
+        ("a.py", "x = 2\n"),
+        ("data.csv", "1\n"),
+        ("data.csv", "2\n"),
+    ):
+        (made / name).write_text(text)
+        found.append(tasks.environments_digest.__wrapped__())
+    assert found[0] == found[1]
+    assert len(set(found)) == 4
 
 
 def test_the_environments_of_a_track_are_built_once(
