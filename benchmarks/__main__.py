@@ -11,6 +11,7 @@ from typing import Any, Literal
 import tyro
 
 from benchmarks import controllers, rows, scenarios
+from pam_envs.envs.registration import full_id
 from sweeps.progress import progress
 
 Positional = tyro.conf.Positional
@@ -25,7 +26,7 @@ def _choose(names: tuple[str, ...], known: dict[str, Any], what: str) -> list[An
 
 def _tracks(env: str, track: tuple[str, ...]) -> list[scenarios.ScenarioSet]:
     chosen = _choose(track, scenarios.available(), "track")
-    found = [made for made in chosen if not env or env in (made.env, made.env.split("/")[-1])]
+    found = [made for made in chosen if not env or made.env == full_id(env)]
     if not found:
         ids = sorted({made.env for made in scenarios.available().values()})
         raise ValueError(f"no scenarios for {env!r}; there are some for: {', '.join(ids)}")
@@ -319,7 +320,7 @@ def show(
         "load_disturbance": load_disturbance,
         "randomize": randomize,
     }
-    env_id = env if "/" in env else f"PAM/{env}"
+    env_id = full_id(env)
     episode, set_points = showing.play(env_id, controller, kwargs, seed, video)
     if episode.failed:
         print(f"ended early: {episode.failure}")
