@@ -6,6 +6,7 @@ A controller may have been trained several times: its file then has ``{seed}`` i
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -42,8 +43,6 @@ class Entry:
     kind : {"learned", "residual"}
     baseline : str
         Name of the controller that a residual corrects.
-    author : str
-        Who trained it, as BibTeX wants it; empty for the authors of this package.
     trials : int or None
         Settings that were tried to choose the preset's, those of earlier searches and of a
         residual's controller with them; None where nobody counted.
@@ -58,9 +57,19 @@ class Entry:
     envs: tuple[str, ...]
     kind: str = "learned"
     baseline: str = ""
-    author: str = ""
     trials: int | None = None
     tuning: str = BY_HAND
+
+    @property
+    def author(self) -> str:
+        """Who trained it, as BibTeX wants it; empty for the authors of this package.
+
+        The JSON file beside the policy of the lowest training seed says so, under ``author``.
+        """
+        cards = [path.with_suffix(".json") for path in self.files().values()]
+        if not cards or not cards[0].is_file():
+            return ""
+        return str(json.loads(cards[0].read_text(encoding="utf-8")).get("author", ""))
 
     def files(self) -> dict[int, Path]:
         """Return the files that are there by training seed."""

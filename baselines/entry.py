@@ -39,6 +39,8 @@ class Entry:
         How many settings were tried in simulation to choose them.
     knobs : mapping
         What a search may turn, with lowest and highest factor; see :mod:`baselines.knobs`.
+    author : str
+        Who made it, as BibTeX wants it; empty for the authors of this package.
     """
 
     summary: str
@@ -51,3 +53,4 @@ class Entry:
     tuning: str = "by rule or as published"
     trials: int = 0
     knobs: Bounds = field(default_factory=dict, hash=False)
+    author: str = ""
