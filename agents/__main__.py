@@ -1,4 +1,4 @@
-"""``python -m agents``: train, look at a policy, measure the speed of training."""
+"""``python -m agents``: train, enter and look at policies, measure the speed of training."""
 
 from __future__ import annotations
 
@@ -169,6 +169,32 @@ def sweep(
     return 1 if report.missing else 0
 
 
+def enter(
+    runs: Annotated[tuple[Path, ...], tyro.conf.Positional],
+    /,
+    author: str = "",
+) -> None:
+    """Copy finished runs to agents/pretrained, where the board finds them.
+
+    They are training seeds 0 to n - 1 of one preset, and take the place of its older files.
+
+    Parameters
+    ----------
+    runs
+        Folders of the runs, each with policy.onnx and policy.json.
+    author
+        Who trained them, as BibTeX wants it; default: the authors of this package.
+    """
+    from agents.entering import enter as put
+
+    made = put(runs, author)
+    for path in made.replaced:
+        print(f"replaced {path}")
+    for path in made.files:
+        print(path)
+    print(f"{made.controller}: training seeds {', '.join(map(str, range(len(made.files))))}")
+
+
 def show(policy: Annotated[Path, tyro.conf.Positional], /) -> None:
     """Print the card of a policy file, after the checks that loading it makes."""
     from agents.policy import OnnxPolicy
@@ -301,6 +327,7 @@ def main(arguments: list[str] | None = None) -> int:
         "sweep": sweep,
         "tune": tune,
         "classical": classical,
+        "enter": enter,
         "show": show,
         "looks": looks,
         "presets": presets,
