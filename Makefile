@@ -62,7 +62,7 @@ layers: $(READY) ## Check which way imports run
 check: lint types layers test ## All of the above checks
 
 images: $(READY) ## Draw the pictures of the documentation
-	$(BIN)/python -m benchmarks show MusclePositioning-v0 --controller inverse_pid --episode-seconds 40 --plot docs/images/muscle_positioning.png
+	$(BIN)/python -m benchmarks show MusclePositioning-v0 --controller inverse_pid --reference staircase --load 2.55 --episode-seconds 40 --plot docs/images/muscle_positioning.png
 	$(BIN)/python docs/make_images.py
 
 clean: ## Remove .venv, caches and builds; results stay

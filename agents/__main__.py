@@ -1,4 +1,4 @@
-"""``python -m agents``: train, look at a policy, measure the speed of training."""
+"""``python -m agents``: train, enter and look at policies, measure the speed of training."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from rich.console import Console
 
 from agents import configs
 from agents.settings import SettingsError
+from pam_envs.envs.registration import full_id
 
 Algo = Literal["ppo", "sac", "tqc", "recurrent_ppo"]
 DEFAULT_ENV = "PAM/MusclePositioning-v0"
@@ -36,7 +37,7 @@ def train(
     Parameters
     ----------
     env
-        Environment id; default: PAM/MusclePositioning-v0.
+        Environment id, with or without PAM/; default: PAM/MusclePositioning-v0.
     algo
         Algorithm; default: ppo.
     variant
@@ -57,12 +58,13 @@ def train(
     from agents import train as training
 
     console = Console(stderr=True)
-    name, kind, number = env or DEFAULT_ENV, algo or "ppo", seed or 0
+    given_env = full_id(env) if env else None
+    name, kind, number = given_env or DEFAULT_ENV, algo or "ppo", seed or 0
     if resume:
         folder = out or training.default_folder(name, kind, number, variant)
         run = training.saved_run(folder, steps)
         _refuse_other_settings(config, set)
-        for given, own in ((env, run.config.env), (algo, run.config.algo), (seed, run.seed)):
+        for given, own in ((given_env, run.config.env), (algo, run.config.algo), (seed, run.seed)):
             if given not in (None, own):
                 raise SettingsError(f"{folder} holds a run of {own}, not of {given}; leave it out")
         model = training.resume(run)
@@ -120,7 +122,7 @@ def sweep(
     Parameters
     ----------
     env
-        Environment ids.
+        Environment ids, with or without PAM/.
     algo
         Algorithm.
     variant
@@ -150,7 +152,8 @@ def sweep(
 
     cluster = Cluster(jobs, backend, address)
     changes = [*set, *([] if steps is None else [f"steps={steps}"])]
-    wanted = [configs.changed(configs.preset(name, algo, variant), changes) for name in env]
+    ids = map(full_id, env)
+    wanted = [configs.changed(configs.preset(name, algo, variant), changes) for name in ids]
     kind = f"{algo}-{variant}" if variant else algo
     trainings = sweeping.trainings(wanted, range(first_seed, first_seed + seeds), out, kind)
     if dry_run:
@@ -164,6 +167,32 @@ def sweep(
     for line in report.missing:
         print(f"MISSING {line}", file=sys.stderr)
     return 1 if report.missing else 0
+
+
+def enter(
+    runs: Annotated[tuple[Path, ...], tyro.conf.Positional],
+    /,
+    author: str = "",
+) -> None:
+    """Copy finished runs to agents/pretrained, where the board finds them.
+
+    They are training seeds 0 to n - 1 of one preset, and take the place of its older files.
+
+    Parameters
+    ----------
+    runs
+        Folders of the runs, each with policy.onnx and policy.json.
+    author
+        Who trained them, as BibTeX wants it; default: the authors of this package.
+    """
+    from agents.entering import enter as put
+
+    made = put(runs, author)
+    for path in made.replaced:
+        print(f"replaced {path}")
+    for path in made.files:
+        print(path)
+    print(f"{made.controller}: training seeds {', '.join(map(str, range(len(made.files))))}")
 
 
 def show(policy: Annotated[Path, tyro.conf.Positional], /) -> None:
@@ -211,7 +240,7 @@ def tune(
     Parameters
     ----------
     env
-        Environment id.
+        Environment id, with or without PAM/.
     algo
         Algorithm.
     variant
@@ -229,7 +258,7 @@ def tune(
     """
     from agents import tune as tuning
 
-    path = configs.preset_path(env, algo, variant)
+    path = configs.preset_path(full_id(env), algo, variant)
     config = configs.read(path)
     place = storage or Path("runs/tune") / f"{path.stem}.db"
     job = tuning.Job(config, trials, steps or config.steps, seed, place)
@@ -254,7 +283,7 @@ def classical(
     Parameters
     ----------
     env
-        Environment id.
+        Environment id, with or without PAM/.
     algo
         Algorithm of the preset that says on which plants and references.
     variant
@@ -263,8 +292,8 @@ def classical(
     from agents.controllers import names_for
     from agents.evaluation import evaluate, value_of
 
-    config = configs.preset(env, algo, variant)
-    scores = {name: evaluate(name, config) for name in names_for(env)}
+    config = configs.preset(full_id(env), algo, variant)
+    scores = {name: evaluate(name, config) for name in names_for(config.env)}
     values = {name: value_of(score, config) for name, score in scores.items()}
     for name in sorted(values, key=lambda name: values[name]):
         made = scores[name]
@@ -298,6 +327,7 @@ def main(arguments: list[str] | None = None) -> int:
         "sweep": sweep,
         "tune": tune,
         "classical": classical,
+        "enter": enter,
         "show": show,
         "looks": looks,
         "presets": presets,

@@ -6,6 +6,8 @@ A controller may have been trained several times: its file then has ``{seed}`` i
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +18,7 @@ from agents.configs import Config
 from agents.onnx_file import PolicyFileError
 from agents.policy import OnnxPolicy
 from agents.residual import ResidualPolicy, with_controller
+from agents.settings import SettingsError
 from baselines.catalogue import CONTROLLERS as CLASSICAL
 from pam_envs.parameters import Signals
 from pam_envs.wording import near
@@ -43,8 +46,6 @@ class Entry:
     kind : {"learned", "residual"}
     baseline : str
         Name of the controller that a residual corrects.
-    author : str
-        Who trained it, as BibTeX wants it; empty for the authors of this package.
     trials : int or None
         Settings that were tried to choose the preset's, those of earlier searches and of a
         residual's controller with them; None where nobody counted.
@@ -61,10 +62,20 @@ class Entry:
     envs: tuple[str, ...]
     kind: str = "learned"
     baseline: str = ""
-    author: str = ""
     trials: int | None = None
     tuning: str = BY_HAND
     found: Mapping[str, float] = field(default_factory=dict, hash=False)
+
+    @property
+    def author(self) -> str:
+        """Who trained it, as BibTeX wants it; empty for the authors of this package.
+
+        The JSON file beside the policy of the lowest training seed says so, under ``author``.
+        """
+        cards = [path.with_suffix(".json") for path in self.files().values()]
+        if not cards or not cards[0].is_file():
+            return ""
+        return str(json.loads(cards[0].read_text(encoding="utf-8")).get("author", ""))
 
     def files(self) -> dict[int, Path]:
         """Return the files that are there by training seed."""
@@ -124,7 +135,11 @@ KINDS: dict[str, Kind] = {
     "sac": Kind("sac", "SAC, two layers; no memory", SAC),
     "tqc": Kind("tqc", "TQC, two layers; no memory", TQC),
 }
-"""By algorithm and variant, as in a preset's file name. Residuals are beside these."""
+"""By algorithm and variant, as in a preset's file name. Residuals are beside these, and presets
+of one's own."""
+NAME = re.compile(r"[a-z0-9_]+")
+"""What a row of the board may be named after."""
+HOW_TO_NAME = "name its file ENV.ALGO-VARIANT.yaml, the variant in small letters, digits and _"
 SUFFIXES: dict[str, str] = {
     "MusclePositioning-v0": "",
     "KneeTension-v0": "_knee_tension",
@@ -145,22 +160,59 @@ WHERE: dict[str, str] = {
 }
 
 
-def _offered() -> dict[str, Entry]:
-    """Return an entry for every preset of a known kind, and for every residual."""
-    made = {}
-    for env_id, algo, variant in configs.presets():
+def offered() -> dict[str, Entry]:
+    """Return an entry for every preset.
+
+    Raises
+    ------
+    ValueError
+        If a preset is of another environment or algorithm than its file's name says, or that
+        gives no name or the one of another.
+    """
+    made: dict[str, Entry] = {}
+    for (env_id, algo, variant), path in configs.presets().items():
         env = env_id.removeprefix("PAM/")
         preset = f"{algo}-{variant}" if variant else algo
-        config = configs.preset(env_id, algo, variant)
-        if preset.startswith("ppo-residual"):
-            made[variant + SUFFIXES[env]] = _residual(env, preset, config)
-        elif preset in KINDS:
-            made[KINDS[preset].name + SUFFIXES[env]] = _learned(env, preset, config)
+        config = configs.read(path)
+        if (config.env, config.algo) != (env_id, algo):
+            raise SettingsError(
+                f"{path.name} is for {config.env} with {config.algo}; {HOW_TO_NAME}"
+            )
+        name = _name(preset) + _suffix(env)
+        if name in made or not NAME.fullmatch(name):
+            raise SettingsError(
+                f"the preset {env}.{preset} would be the controller {name!r}, "
+                f"{'as another is' if name in made else 'which is no name'}; {HOW_TO_NAME}"
+            )
+        if config.residual.controller:
+            made[name] = _residual(env, preset, config)
+        else:
+            made[name] = _learned(env, preset, KINDS.get(preset) or _own(preset, path), config)
     return made
 
 
-def _learned(env: str, preset: str, config: Config) -> Entry:
-    kind = KINDS[preset]
+def _name(preset: str) -> str:
+    """Return what names of a preset's controllers begin with."""
+    if preset == "ppo-residual":
+        return "residual"
+    return KINDS[preset].name if preset in KINDS else preset.replace("-", "_")
+
+
+def _suffix(env: str) -> str:
+    """Return what names end with: as listed, or made from the id of an unlisted environment."""
+    words = re.findall(r"[A-Z]?[a-z0-9]+", env.partition("-")[0])
+    return SUFFIXES.get(env, "".join(f"_{word.lower()}" for word in words))
+
+
+def _own(preset: str, path: Path) -> Kind:
+    """Return the kind of a preset of one's own; its file's first comment says what it is."""
+    algo, _, variant = preset.partition("-")
+    first = path.read_text(encoding="utf-8").partition("\n")[0]
+    said = first.removeprefix("#").strip(" .") if first.startswith("#") else ""
+    return Kind(preset, said or f"{algo}, variant {variant}", KINDS[algo].citation)
+
+
+def _learned(env: str, preset: str, kind: Kind, config: Config) -> Entry:
     trials, tuning = budget(config)
     return Entry(
         file=f"{env}.{preset}.s{{seed}}.onnx",
@@ -175,12 +227,19 @@ def _learned(env: str, preset: str, config: Config) -> Entry:
 
 def _residual(env: str, preset: str, config: Config) -> Entry:
     baseline = config.residual.controller
+    if baseline not in CLASSICAL:
+        raise SettingsError(
+            f"{env}.{preset}.yaml: residual.controller = {baseline!r} is no controller"
+            f"{near(baseline, CLASSICAL)}"
+        )
     trials, tuning = budget(config)
+    algo = preset.partition("-")[0]
+    policy, where = algo.upper().replace("_", " "), WHERE.get(env, "")
     return Entry(
         file=f"{env}.{preset}.s{{seed}}.onnx",
-        summary=f"{baseline} corrected by a PPO policy, which sees its action{WHERE.get(env, '')}",
+        summary=f"{baseline} corrected by a {policy} policy, which sees its action{where}",
         knowledge=CLASSICAL[baseline].knowledge,
-        citation=f"{PPO}; {RESIDUAL}",
+        citation=f"{KINDS[algo].citation}; {RESIDUAL}",
         envs=(f"PAM/{env}",),
         kind="residual",
         baseline=baseline,
@@ -202,8 +261,32 @@ def budget(config: Config) -> tuple[int | None, str]:
     return search.trials + search.earlier + base, ", ".join(said)
 
 
-OFFERED: dict[str, Entry] = _offered()
+def check_files(entries: Mapping[str, Entry]) -> None:
+    """Raise if a policy file is of no preset, and would be left out of every comparison.
+
+    Raises
+    ------
+    PolicyFileError
+        Naming the file.
+    """
+    known = {preset_of(entry) for entry in entries.values()}
+    for path in sorted(FOLDER.glob("*.onnx")):
+        preset = re.sub(r"\.s[0-9]+$", "", path.stem)
+        if preset not in known:
+            raise PolicyFileError(
+                f"{path.name} is of no preset: there is no {preset}.yaml in agents/configs; add "
+                "that, or take the file out"
+            )
+
+
+def preset_of(entry: Entry) -> str:
+    """Return the name of an entry's preset, like ``KneeWalk-v0.ppo``."""
+    return entry.file.removesuffix(".s{seed}.onnx")
+
+
+OFFERED: dict[str, Entry] = offered()
 """All policies that the board would take, trained or not."""
+check_files(OFFERED)
 CONTROLLERS: dict[str, Entry] = {n: entry for n, entry in OFFERED.items() if entry.files()}
 """Those of which files are there."""
 PRETRAINED: dict[str, str] = {

@@ -41,6 +41,8 @@ class Entry:
         What a search may turn, with lowest and highest factor; see :mod:`baselines.knobs`.
     found : mapping
         What a search found for them; see :mod:`baselines.tuned`.
+    author : str
+        Who made it, as BibTeX wants it; empty for the authors of this package.
     """
 
     summary: str
@@ -54,3 +56,4 @@ class Entry:
     trials: int = 0
     knobs: Bounds = field(default_factory=dict, hash=False)
     found: Knobs = field(default_factory=dict, hash=False)
+    author: str = ""

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import tyro
 
 from benchmarks import controllers, rows, scenarios
+from pam_envs.envs.registration import full_id
 from sweeps.progress import progress
 
 Positional = tyro.conf.Positional
@@ -25,7 +26,7 @@ def _choose(names: tuple[str, ...], known: dict[str, Any], what: str) -> list[An
 
 def _tracks(env: str, track: tuple[str, ...]) -> list[scenarios.ScenarioSet]:
     chosen = _choose(track, scenarios.available(), "track")
-    found = [made for made in chosen if not env or env in (made.env, made.env.split("/")[-1])]
+    found = [made for made in chosen if not env or made.env == full_id(env)]
     if not found:
         ids = sorted({made.env for made in scenarios.available().values()})
         raise ValueError(f"no scenarios for {env!r}; there are some for: {', '.join(ids)}")
@@ -288,17 +289,19 @@ def speed(
 def show(
     env: Positional[str],
     controller: str,
-    hysteresis: str = "maxwell_slip",
-    reference: str = "staircase",
-    load: float = 2.55,
-    episode_seconds: float = 20.0,
-    load_disturbance: float = 0.0,
+    hysteresis: str | None = None,
+    reference: str | None = None,
+    load: float | None = None,
+    episode_seconds: float | None = None,
+    load_disturbance: float | None = None,
     randomize: bool = False,
     seed: int = 101,
     plot: Path | None = None,
     video: Path | None = None,
 ) -> int:
-    """Run one episode and draw it: reference, output, pressure, loop.
+    """Run one episode and draw it: reference, output, set-points, pressure, loop.
+
+    What is not given is as the environment has it.
 
     Args:
         env: Id of the environment.
@@ -315,24 +318,27 @@ def show(
     """
     from benchmarks import show as showing
 
-    kwargs = {
+    options = {
         "hysteresis": hysteresis,
         "reference": reference,
         "load": load,
         "episode_seconds": episode_seconds,
         "load_disturbance": load_disturbance,
-        "randomize": randomize,
+        "randomize": randomize or None,
     }
-    env_id = env if "/" in env else f"PAM/{env}"
+    kwargs = {name: value for name, value in options.items() if value is not None}
+    env_id = full_id(env)
+    content = _tracks(env_id, ())[0].content
     episode, set_points = showing.play(env_id, controller, kwargs, seed, video)
     if episode.failed:
         print(f"ended early: {episode.failure}")
     else:
-        for name, value in showing.summary(episode, min(2.0, 0.5 * episode_seconds)).items():
+        for name, value in showing.summary(episode, content).items():
             print(f"{name:20s} {value:.6g}")
-    title = f"{controller} in {env_id}, {hysteresis}, {reference}, {load:g} kg, seed {seed}"
     if plot:
-        showing.draw(episode, set_points, title, plot)
+        said = "".join(f", {name} {value}" for name, value in kwargs.items())
+        title = f"{controller} in {env_id}{said}, seed {seed}"
+        showing.draw(episode, set_points, title, plot, rows.shown(content))
         print(plot)
     if video:
         print(video)

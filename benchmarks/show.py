@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks import controllers, metrics, plots, rollout
 from benchmarks.cells import make_env
@@ -23,18 +24,24 @@ def play(
 
     Returns
     -------
-    Episode and (n,) array [Pa]
-        The recording, and the set-points that were asked for.
+    Episode and mapping of (n,) array
+        The recording, and the set-points that were asked for, by name, SI.
+
+    Raises
+    ------
+    ValueError
+        If the controller is not for the environment, or that lacks an argument.
     """
-    filmed = {"render_mode": "rgb_array"} if video else {}
-    env = make_env(env_id, {**kwargs, **filmed})
     entrant = controllers.find(controller)
+    if not entrant.runs_in(env_id):
+        raise ValueError(f"{controller} is for {', '.join(entrant.envs)}, not for {env_id}")
+    filmed = {"render_mode": "rgb_array"} if video else {}
+    env = _made(env_id, {**kwargs, **filmed})
     made = controllers.make(entrant, env.unwrapped.plant, env)
     film = Film(video, env) if video else None
     try:
         episode = rollout.run(env, made, seed, film)
-        signal = env.unwrapped.action_signals[0]
-        set_points = signal.decode(np.clip(episode.actions, *_bounds(env)))
+        set_points = _set_points(env, episode.actions)
     finally:
         env.close()
         if film:
@@ -42,8 +49,26 @@ def play(
     return episode, set_points
 
 
-def _bounds(env: Any) -> tuple[Any, Any]:
-    return env.action_space.low, env.action_space.high
+def _made(env_id: str, kwargs: Mapping[str, Any]) -> Any:
+    """Return the environment; what it says of its arguments is told without Gymnasium's addition.
+
+    Raises
+    ------
+    ValueError
+        If an argument is unknown or out of its bounds.
+    """
+    try:
+        return make_env(env_id, kwargs)
+    except (TypeError, ValueError) as error:
+        said = str(error).partition(" was raised from the environment creator")[0]
+        raise ValueError(f"{env_id}: {said}") from error
+
+
+def _set_points(env: Any, actions: NDArray[Any]) -> dict[str, NDArray[np.float64]]:
+    """Return what was asked for of each set-point, within its range, SI."""
+    space, signals = env.action_space, env.unwrapped.action_signals
+    inside = np.clip(actions.reshape(-1, len(signals)), space.low, space.high)
+    return {name: signals.decode(inside, name) for name in signals.names()}
 
 
 class Film:
@@ -77,14 +102,30 @@ class Film:
             self._frames.close()
 
 
-def summary(episode: rollout.Episode, settle_seconds: float) -> dict[str, float]:
-    """Return the episode's scores (those that need no scale of a scenario file)."""
-    signals = {**episode.signals, "sensed": episode.signals["sensor/contraction"]}
-    return metrics.score(signals, episode.period, settle_seconds, 0.5, {})
+def summary(episode: rollout.Episode, content: Mapping[str, Any]) -> dict[str, float]:
+    """Return the scores of an episode that need no scale of a scenario file.
+
+    Parameters
+    ----------
+    episode : Episode
+    content : mapping
+        Of the scenario file whose sensor and gate count. An episode that is shorter than twice its
+        settling window is scored in its second half.
+    """
+    signals = {**episode.signals, "sensed": episode.signals[content["sensed"]]}
+    settle = min(float(content["settle_seconds"]), 0.5 * float(signals["time"][-1]))
+    gate, hold = content.get("gate") or (), float(content["hold_seconds"])
+    return metrics.score(signals, episode.period, settle, hold, {}, gate)
 
 
-def draw(episode: rollout.Episode, set_points: Any, title: str, path: Path) -> None:
-    """Write the figure of an episode."""
+def draw(
+    episode: rollout.Episode,
+    set_points: Mapping[str, Any],
+    title: str,
+    path: Path,
+    shown: tuple[str, float],
+) -> None:
+    """Write the figure of an episode, its output in a unit of that factor from SI."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure = plots.episode_figure(episode.signals, set_points, title)
+    figure = plots.episode_figure(episode.signals, set_points, title, shown)
     figure.savefig(path, dpi=150)

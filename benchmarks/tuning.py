@@ -45,6 +45,7 @@ from benchmarks.making import make_env, model_of
 from benchmarks.metrics import headline_of
 from benchmarks.scenarios import ScenarioSet
 from benchmarks.store import write_text
+from pam_envs.envs.registration import full_id
 from sweeps.progress import Start
 
 TRIALS = 20
@@ -122,7 +123,7 @@ def job_of(controller: str, env: str = "", **how: Any) -> Job:
         known = [name for name, other in catalogue.PUBLISHED.items() if other.knobs]
         what = "has no knobs" if entry else "is no controller of the catalogue"
         raise ValueError(f"{controller} {what}; choose from {', '.join(known)}")
-    own = [name for name in entry.envs if env in ("", name, name.split("/")[-1])]
+    own = [name for name in entry.envs if not env or name == full_id(env)]
     if len(own) != 1:
         said = f"not in {env}" if env else "in several environments"
         raise ValueError(f"{controller} runs {said}; give --env as one of {', '.join(entry.envs)}")

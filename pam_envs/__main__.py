@@ -18,7 +18,7 @@ import numpy as np
 import tyro
 from numpy.typing import NDArray
 
-from pam_envs.envs.registration import register_all
+from pam_envs.envs.registration import full_id, register_all
 from pam_envs.envs.rendering_film import write_film
 from pam_envs.envs.rendering_policies import POLICIES
 from pam_envs.parameters import Signals
@@ -96,12 +96,10 @@ def env_id(given: str) -> str:
     known = env_ids()
     short = {name.removeprefix("PAM/").rsplit("-v", 1)[0].lower(): name for name in known}
     key = given.removeprefix("PAM/").rsplit("-v", 1)[0].lower()
-    if given in known:
-        return given
+    if full_id(given) in known:
+        return full_id(given)
     if key in short and "-v" not in given:
         return short[key]
-    if f"PAM/{given}" in known:
-        return f"PAM/{given}"
     near = difflib.get_close_matches(key, short, n=1, cutoff=0.4)
     hint = f"; did you mean {short[near[0]]}?" if near else "."
     raise Mistake(f"no environment named {given!r}{hint} There are: {', '.join(known)}")

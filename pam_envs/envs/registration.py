@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gymnasium as gym
 
+NAMESPACE = "PAM/"
 ENVIRONMENTS = {
     "PAM/MusclePositioning-v0": "muscle_positioning:MusclePositioning",
     "PAM/KneeTension-v0": "knee_brace:KneeTension",
@@ -30,3 +31,8 @@ def register_all() -> None:
             order_enforce=False,  # the environment itself asks for reset() before step()
             disable_env_checker=True,  # the checks run in the tests, not in every user's steps
         )
+
+
+def full_id(name: str) -> str:
+    """Return an id with its namespace, which may be left out: PAM/KneeWalk-v0 of KneeWalk-v0."""
+    return name if "/" in name else f"{NAMESPACE}{name}"

@@ -18,7 +18,7 @@ from agents import catalogue, configs
 from agents.onnx_file import CARD
 from agents.policy import OnnxPolicy
 from agents.residual import ResidualPolicy, with_controller
-from benchmarks import rows
+from benchmarks import controllers, rows
 
 FILES = [path for entry in catalogue.CONTROLLERS.values() for path in entry.files().values()]
 NUMBERED = [path for path in FILES if re.search(r"\.s[0-9]+$", path.stem)]
@@ -69,6 +69,7 @@ def test_the_file_is_small_and_its_training_is_recorded(path: Path) -> None:
     assert path.stat().st_size < 100_000
     card = json.loads(path.with_suffix(".json").read_text())
     occasion = card.pop("training", {})
+    assert isinstance(card.pop("author", ""), str)
     assert set(occasion) <= RECORDED
     assert OnnxPolicy.load(path).card == card
     assert f"--steps {card['config']['steps']} --seed {card['seed']}" in card["command"]
@@ -130,6 +131,22 @@ def test_several_trainings_of_one_policy_are_told_apart(
     assert catalogue.load_pretrained("x").name == file.format(seed=0)
     with pytest.raises(ValueError, match=r"no training seed 5; there are: \[0, 2, 11\]"):
         catalogue.load_pretrained("x", training_seed=5)
+
+
+def test_the_author_is_the_one_beside_the_policy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = Path(catalogue.PRETRAINED["ppo"])
+    monkeypatch.setattr(catalogue, "FOLDER", tmp_path)
+    entry = catalogue.CONTROLLERS["ppo"]
+    assert entry.author == ""
+    named(source, tmp_path / "MusclePositioning-v0.ppo.s0.onnx", seed=0)
+    assert entry.author == ""
+    beside = json.loads(source.with_suffix(".json").read_text()) | {"author": "Doe, J."}
+    (tmp_path / "MusclePositioning-v0.ppo.s0.json").write_text(json.dumps(beside))
+    assert entry.author == "Doe, J."
+    assert controllers._entrant("ppo", entry, "agents.catalogue", "learned").author == "Doe, J."
+    assert catalogue.load_pretrained("ppo").card["seed"] == 0
 
 
 @pytest.mark.parametrize(

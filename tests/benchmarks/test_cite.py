@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 from typing import Any
 
+import bench_fakes
 import board_fakes as fakes
 import pytest
 import yaml
 
+from baselines.entry import Entry
 from benchmarks import cite
 from benchmarks.__main__ import main
 from benchmarks.controllers import available
@@ -110,6 +112,17 @@ def test_a_row_is_cited_with_what_runs_it_again(
     assert "not audited" in said["note"]
     assert said["howpublished"] == "python -m benchmarks verify short--integral"
     assert options(folder).out == path.parent
+
+
+def test_the_author_is_the_one_that_the_catalogue_names(
+    track: ScenarioSet, folder: Any, capsys: pytest.CaptureFixture[str], monkeypatch: Any
+) -> None:
+    entry = Entry("with an integrator", "nominal model", author="Doe, J. and Roe, R.")
+    monkeypatch.setitem(bench_fakes.CONTROLLERS, "integral", entry)
+    (path,) = score(track, folder, "integral").rows
+    assert main(["cite", str(path)]) == 0
+    first, *_ = parsed(capsys.readouterr().out).values()
+    assert first["author"] == "{Doe, J. and Roe, R.}"
 
 
 def test_a_row_is_cited_with_its_score_its_round_and_its_author() -> None:

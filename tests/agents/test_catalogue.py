@@ -1,0 +1,91 @@
+"""Which controllers presets make, those of one's own too; no file is left out silently."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from agents import catalogue, configs
+from agents.onnx_file import PolicyFileError
+from agents.settings import SettingsError
+
+BASE = "extends: KneeWalk-v0.ppo\n"
+
+
+@pytest.fixture
+def presets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of presets that may be changed."""
+    folder = tmp_path / "configs"
+    shutil.copytree(configs.FOLDER, folder)
+    monkeypatch.setattr(configs, "FOLDER", folder)
+    return folder
+
+
+def test_a_preset_of_ones_own_is_offered_with_what_it_says_of_itself(presets: Path) -> None:
+    (presets / "KneeWalk-v0.ppo-mine.yaml").write_text(f"# PPO, with my network.\n{BASE}")
+    (presets / "KneeWalk-v0.ppo-terse.yaml").write_text(BASE)
+    made = catalogue.offered()
+    assert set(made) - set(catalogue.OFFERED) == {"ppo_mine_knee_walk", "ppo_terse_knee_walk"}
+    mine = made["ppo_mine_knee_walk"]
+    assert mine.file == "KneeWalk-v0.ppo-mine.s{seed}.onnx"
+    assert mine.envs == ("PAM/KneeWalk-v0",)
+    assert (mine.kind, mine.knowledge) == ("learned", "nominal model")
+    assert mine.citation == catalogue.PPO
+    assert mine.summary == "PPO, with my network; trained at 5 s a stride"
+    assert made["ppo_terse_knee_walk"].summary.startswith("ppo, variant terse;")
+
+
+def test_a_residual_of_ones_own_is_one_by_its_settings(presets: Path) -> None:
+    text = "extends: KneeWalk-v0.sac\nsearch: {trials: 3}\n"
+    text += "residual: {controller: knee_pid, scale: 0.1}\n"
+    (presets / "KneeWalk-v0.sac-on_pid.yaml").write_text(text)
+    entry = catalogue.offered()["sac_on_pid_knee_walk"]
+    assert (entry.kind, entry.baseline) == ("residual", "knee_pid")
+    assert entry.summary.startswith("knee_pid corrected by a SAC policy")
+    assert entry.citation == f"{catalogue.SAC}; {catalogue.RESIDUAL}"
+    assert entry.tuning.startswith("search of 3")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("KneeWalk-v0.ppo-Mine", BASE, "'ppo_Mine_knee_walk', which is no name; name its file"),
+        ("KneeWalk-v0.ppp", BASE, "ppp.yaml is for PAM/KneeWalk-v0 with ppo; name its file"),
+        ("KneeTension-v0.ppo-mine", BASE, "is for PAM/KneeWalk-v0 with ppo; name its file"),
+        (
+            "MusclePositioning-v0.ppo-knee_walk",
+            "extends: MusclePositioning-v0.ppo\n",
+            "'ppo_knee_walk', as another is; name its file ENV.ALGO-VARIANT.yaml",
+        ),
+        (
+            "KneeWalk-v0.ppo-wrong",
+            BASE + "network: {hold: []}\nresidual: {controller: knee_pd}\n",
+            r"residual.controller = 'knee_pd' is no controller; did you mean 'knee_pid'",
+        ),
+    ],
+)
+def test_a_preset_that_cannot_be_offered_is_named(
+    name: str, text: str, message: str, presets: Path
+) -> None:
+    (presets / f"{name}.yaml").write_text(text)
+    with pytest.raises(SettingsError, match=message):
+        catalogue.offered()
+
+
+def test_an_environment_that_is_not_listed_gives_a_name() -> None:
+    assert catalogue._suffix("AnkleBrace2-v0") == "_ankle_brace2"
+    assert catalogue._suffix("MusclePositioning-v0") == ""
+
+
+def test_a_policy_file_of_no_preset_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(catalogue, "FOLDER", tmp_path)
+    for name in ("KneeWalk-v0.ppo.s3", "KneeWalk-v0.ppo"):
+        (tmp_path / f"{name}.onnx").touch()
+    catalogue.check_files(catalogue.OFFERED)
+    (tmp_path / "KneeWalk-v0.ppo-mine.s0.onnx").touch()
+    with pytest.raises(PolicyFileError, match=r"there is no KneeWalk-v0.ppo-mine.yaml in agents"):
+        catalogue.check_files(catalogue.OFFERED)

@@ -1,0 +1,74 @@
+"""One episode of any environment, with what was given on the command line alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks import scenarios
+from benchmarks.__main__ import main
+from benchmarks.controllers import available
+from benchmarks.rows import shown
+
+TRACKS = {track.env: track for track in scenarios.available().values()}
+CLASSICAL = [(n, made) for n, made in available().items() if made.kind == "classical"]
+FIRST = {env: next(n for n, made in CLASSICAL if made.runs_in(env)) for env in sorted(TRACKS)}
+
+
+@pytest.mark.parametrize(("env", "controller"), FIRST.items())
+def test_every_environment_is_shown(
+    env: str, controller: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--controller", controller, "--episode-seconds", "2"]
+    assert main(["show", env.removeprefix("PAM/"), *options]) == 0
+    told = dict(line.split() for line in capsys.readouterr().out.splitlines())
+    assert {"rms_error", "sensed_rms_error", "pressure_travel"} <= set(told)
+    assert 0.0 < float(told["rms_error"]) < float("inf")
+
+
+@pytest.mark.parametrize(
+    "env", ["MusclePositioning-v0", "ElbowOrthosis-v0", "RedundantManipulator-v0"]
+)
+def test_an_episode_is_drawn(env: str, tmp_path: Path) -> None:
+    plot = tmp_path / "episode.svg"
+    options = ["--controller", FIRST[f"PAM/{env}"], "--episode-seconds", "0.5"]
+    assert main(["show", env, *options, "--plot", str(plot)]) == 0
+    assert plot.read_text().rstrip().endswith("</svg>")
+
+
+def test_what_is_given_reaches_the_environment(capsys: pytest.CaptureFixture[str]) -> None:
+    short = ["show", "MusclePositioning-v0", "--controller", "zero", "--episode-seconds", "0.5"]
+    found = []
+    for load in ("0.0", "4.5"):
+        assert main([*short, "--reference", "staircase", "--load", load]) == 0
+        found.append(capsys.readouterr().out)
+    assert found[0] != found[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["KneeWalk-v0", "--controller", "zero", "--load", "2"], "there is no argument 'load'"),
+        (["KneeWalk-v0", "--controller", "zero", "--load-disturbance", "1"], "'load_disturbance'"),
+        (["KneeWalk-v0", "--controller", "zero", "--reference", "x"], "reference = 'x' is not kn"),
+        (["KneeWolk-v0", "--controller", "zero"], "no scenarios for 'PAM/KneeWolk-v0'; there are"),
+        (["KneeWalk-v0", "--controller", "pid"], "pid is for PAM/MusclePositioning-v0, not for"),
+    ],
+)
+def test_mistakes_are_one_sentence(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["show", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert "was raised from" not in error
+    assert len(error.splitlines()) == 1
+
+
+def test_the_tracks_of_an_environment_agree_on_what_is_shown() -> None:
+    for track in scenarios.available().values():
+        other = TRACKS[track.env].content
+        for name in ("sensed", "gate", "settle_seconds", "hold_seconds"):
+            assert track.content.get(name) == other.get(name)
+        assert shown(track.content) == shown(other)
