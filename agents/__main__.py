@@ -229,7 +229,7 @@ def tune(
     /,
     algo: Algo = "ppo",
     variant: str = "",
-    trials: int = 30,
+    trials: int = 20,
     steps: int | None = None,
     seed: int = 0,
     storage: Path | None = None,

@@ -66,7 +66,7 @@ class FeedForward:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_the_file_is_small_and_its_training_is_recorded(path: Path) -> None:
-    assert path.stat().st_size < 100_000
+    assert path.stat().st_size < 150_000  # two layers of 128 are 116 kB
     card = json.loads(path.with_suffix(".json").read_text())
     occasion = card.pop("training", {})
     assert isinstance(card.pop("author", ""), str)
@@ -79,7 +79,10 @@ def test_the_file_is_small_and_its_training_is_recorded(path: Path) -> None:
 @pytest.mark.parametrize("path", NUMBERED, ids=lambda path: path.stem)
 def test_the_recorded_preset_is_the_one_that_ships(path: Path) -> None:
     card = OnnxPolicy.load(path).card
-    assert configs.from_mapping(card["config"]).as_dict() == card["config"]
+    read = configs.from_mapping(card["config"]).as_dict()
+    told, known = (config.pop("search", {}) for config in (dict(card["config"]), read))
+    assert told.items() <= known.items()
+    assert read == {name: value for name, value in card["config"].items() if name != "search"}
     preset = configs.read(configs.FOLDER / f"{path.stem.rpartition('.')[0]}.yaml")
     assert preset.decisive() == configs.from_mapping(card["config"]).decisive()
     assert "--config" not in card["command"]
@@ -201,7 +204,11 @@ def test_benchmarks_find_it_among_the_controllers() -> None:
     [
         ("knee_walk_nominal--ppo_knee_walk", "knee_walk_nominal--knee_inverse_ltr", 0.4),
         ("knee_walk_wrong_model--ppo_knee_walk", "knee_walk_wrong_model--knee_pid", 0.6),
-        ("knee_tension_nominal--ppo_knee_tension", "knee_tension_nominal--knee_pid", 0.7),
+        (
+            "knee_tension_nominal--residual_knee_tension",
+            "knee_tension_nominal--knee_inverse_ahead_tuned_tension",
+            0.8,
+        ),
     ],
 )
 def test_the_knees_policies_do_better_than_classical_ones(
