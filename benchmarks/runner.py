@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from benchmarks import audit, rows
+from benchmarks import artefacts, audit, rows, tasks
 from benchmarks import cells as cells_module
 from benchmarks.audit import Audit
 from benchmarks.cells import Cell, cells_of
@@ -188,6 +189,27 @@ def _compute(
 
 
 def pairs_of(entrants: Iterable[Entrant], tracks: Iterable[ScenarioSet]) -> list[Pair]:
-    """Return every controller with every track of an environment that it runs in."""
+    """Return every controller with every track that it runs in."""
     chosen = list(entrants)
-    return [(e, track) for track in tracks for e in chosen if e.runs_in(track.env)]
+    return [
+        (e, track) for track in tracks for e in chosen if e.runs_in(track.env) and fits(e, track)
+    ]
+
+
+def fits(entrant: Entrant, track: ScenarioSet) -> bool:
+    """Return whether a track shows and takes what a policy was trained on; others always fit.
+
+    The card beside the first policy says by which names. (What an environment shows depends on its
+    arguments, like the valves of the elbow orthosis.)
+    """
+    if not entrant.files:
+        return True
+    card = artefacts.located(entrant.files[0][1]).with_suffix(".json")
+    said = json.loads(card.read_text(encoding="utf-8")) if card.is_file() else {}
+    if not {"signals", "action_signals"} <= set(said):
+        return True
+    learned = [[s["name"] for s in said[part]] for part in ("signals", "action_signals")]
+    bases = [env.unwrapped for _, env in tasks.built(track).told]
+    return all(
+        learned == [[*base.signals.names()], [*base.action_signals.names()]] for base in bases
+    )

@@ -66,7 +66,9 @@ class FeedForward:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_the_file_is_small_and_its_training_is_recorded(path: Path) -> None:
-    assert path.stat().st_size < 250_000  # two layers of 128 on the many inputs of an arm are 199 kB
+    assert (
+        path.stat().st_size < 250_000
+    )  # two layers of 128 on the many inputs of an arm are 199 kB
     card = json.loads(path.with_suffix(".json").read_text())
     occasion = card.pop("training", {})
     assert isinstance(card.pop("author", ""), str)
