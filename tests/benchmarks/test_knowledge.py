@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks import knowledge
+from benchmarks import knowledge, runner
 from benchmarks.controllers import available, find
 from benchmarks.making import make_env
 from benchmarks.scenarios import available as tracks
@@ -75,3 +75,13 @@ def test_a_policy_that_met_what_others_are_not_told_was_trained_on_the_plant() -
     assert knowledge.trained_on_plant(Policy([told.digest()], randomize=True), told, drawn)
     env.close()
     drawn.close()
+
+
+def test_a_policy_runs_in_tracks_that_show_and_take_what_it_was_trained_on() -> None:
+    known = tracks()
+    residual, classical = find("residual_elbow"), find("elbow_allocation")
+    assert runner.fits(residual, known["elbow_nominal"])
+    assert not runner.fits(residual, known["elbow_valves"])
+    assert runner.fits(classical, known["elbow_valves"])
+    pairs = runner.pairs_of([residual, classical], [known["elbow_valves"]])
+    assert [entrant.name for entrant, _ in pairs] == ["elbow_allocation"]

@@ -9,7 +9,7 @@ from pathlib import Path
 import bench_fakes
 import pytest
 
-from benchmarks import rows, runner, scenarios, trainings
+from benchmarks import rows, trainings
 from benchmarks.controllers import find
 from benchmarks.runner import Options, run
 from benchmarks.verify import verify
@@ -109,13 +109,3 @@ def test_the_row_says_what_the_cards_say(board: Path) -> None:
         (1, "train --seed 1"),
     ]
     assert trainings.of(find("low")) is None
-
-
-def test_a_policy_runs_in_tracks_that_show_and_take_what_it_was_trained_on() -> None:
-    known = scenarios.available()
-    residual, classical = find("residual_elbow"), find("elbow_allocation")
-    assert runner.fits(residual, known["elbow_nominal"])
-    assert not runner.fits(residual, known["elbow_valves"])
-    assert runner.fits(classical, known["elbow_valves"])
-    pairs = runner.pairs_of([residual, classical], [known["elbow_valves"]])
-    assert [entrant.name for entrant, _ in pairs] == ["elbow_allocation"]
