@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import audit, board_summary, plots, rows, standings, verified, views
+from benchmarks import audit, board_summary, controllers, plots, rows, standings, verified, views
 from benchmarks.board_format import number, table
 from benchmarks.board_tables import Column, track_page, with_costs
 from benchmarks.rows import Row, shown
@@ -128,10 +128,12 @@ PREFACE = """\
   paper's method or a textbook rule.
 - **P(improvement)**: how likely a training seed's error is below the best paper controller's in
   the same episode, ties half, with its interval over training seeds, scenarios and seeds. *Better*
-  needs more than 0.95 with a lower bound above 0.5 and a lower mean, ten training seeds, an audit
-  of both in one round, no more failures, and pressure travel, air, constraint cost and (of a gait)
-  EMG ratio of at most 1.1 times the paper controller's, each; with a higher cost it is called
-  *better error, higher cost*. A constraint cost below a thousandth counts as none.
+  needs more than 0.95 with a lower bound above 0.5, a mean whose paired difference lies below zero
+  with its whole interval (*lower by* is its share), no plant from training of which the other is
+  told another, ten training seeds, an audit of both in one round, no more failures, and pressure
+  travel, air, constraint cost and (of a gait) EMG ratio of at most 1.1 times the paper
+  controller's, each; with a higher cost it is called *better error, higher cost*. A constraint cost
+  below a thousandth counts as none.
 - **state**: the day on which `verify` ran the row again and found every number; *elsewhere*: on
   another machine, where the last digits of a policy differ; *at an older code*: code, data or
   policies have changed since, and it was not verified with them.
@@ -246,8 +248,8 @@ def load(folder: Path) -> list[Row]:
     """
     if not folder.is_dir():
         raise ValueError(f"{folder}: no such folder of rows; run `python -m benchmarks run` first")
-    found = verified.read(folder)
-    return [_standing(row, verified.of(row, found)) for row in rows.load_all(folder)]
+    found, entrants = verified.read(folder), controllers.available()
+    return [_standing(row, verified.of(row, found, entrants)) for row in rows.load_all(folder)]
 
 
 def _standing(row: Row, verification: Mapping[str, Any] | None) -> Row:

@@ -11,7 +11,8 @@ from typing import Any
 
 from filelock import FileLock
 
-from benchmarks import artefacts, cells, controllers, provenance
+from benchmarks import artefacts, cells, provenance
+from benchmarks.controllers import Entrant
 from benchmarks.store import CHECKSUM, write_text
 
 FILE = "verified.json"
@@ -40,20 +41,25 @@ def read(folder: Path) -> Found:
         raise ValueError(f"{path}: {error}; restore it from git, or verify again") from error
 
 
-def of(row: Mapping[str, Any], found: Found) -> Mapping[str, Any] | None:
+def of(
+    row: Mapping[str, Any], found: Found, entrants: Mapping[str, Entrant]
+) -> Mapping[str, Any] | None:
     """Return the verification of a row as it is, ``None`` where there is none since it changed.
 
-    ``older`` says whether it was of other code, data or policies than are here now.
+    ``older`` says whether it was of other code, data or policies than are here now, those of the
+    entrants by their names.
     """
     entry = found.get(row["row"])
     if not entry or entry["checksum"] != row.get(CHECKSUM):
         return None
-    return {**entry, OLDER: _is_older(row, entry)}
+    return {**entry, OLDER: _is_older(row, entry, entrants)}
 
 
-def _is_older(row: Mapping[str, Any], entry: Mapping[str, Any]) -> bool:
+def _is_older(
+    row: Mapping[str, Any], entry: Mapping[str, Any], entrants: Mapping[str, Entrant]
+) -> bool:
     about = row["controller"]
-    entrant = controllers.available().get(about["name"])
+    entrant = entrants.get(about["name"])
     if entrant is None or cells.sources(entrant) != entry.get("sources"):
         return True
     policies = [artefacts.file_record(path, seed)["sha256"] for seed, path in entrant.files]

@@ -185,16 +185,16 @@ def test_states_of_controllers_survive_a_checkpoint(
     base.set_state({name: value.numpy().copy() for name, value in saved["env"].items()})
     again = [residual.step(push)[0] for push in pushes[5:]]
     assert np.array_equal(then, again)
+    signals = residual.get_attr("signals")[0]
+    read = [signal.index for signal in signals if "reference" in signal.name]
     for digest, entry in zip(
         dict.fromkeys(plant.digest() for _, plant in parts_of(residual)),
         _recorded(residual),
         strict=True,
     ):
         assert entry["plant"] == digest
-        signals = residual.get_attr("signals")[0]
         found = probe.Probe.of(entry["probe"], len(signals))
         assert (np.abs(found.answers) < 1.0).mean() >= 1.0 - probe.MOST_AT_LIMIT
-        read = [signal.index for signal in signals if "reference" in signal.name]
         rests = not np.ptp(found.observations[:, read], axis=0).any()
         # an arm's path begins after the probe, and a feed-forward waits for it
         assert rests or np.ptp(found.answers, axis=0).max() > 1e-2

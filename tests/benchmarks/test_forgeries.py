@@ -16,6 +16,7 @@ import pytest
 from benchmarks import audit, cells, provenance, rows, tasks, traces, verified, verify
 from benchmarks.__main__ import main
 from benchmarks.canonical import digest, plain
+from benchmarks.controllers import available
 from benchmarks.metrics import of_track
 from benchmarks.store import read_record, write_record
 from pam_envs.envs import muscle_positioning
@@ -555,13 +556,13 @@ def test_the_command_says_which_row_drifted_and_notes_which_held(
     found = verified.read(board / "out")
     assert set(found) == {"tiny--integral", "tiny--raises"}
     row = rows.load(Path(honest))
-    entry = verified.of(row, found)
+    entry = verified.of(row, found, available())
     assert entry is not None
     assert entry["mode"] == "bits"
     assert entry["commit"] == provenance.commit()
     assert entry["sources"] == row["made_with"]["sources"]
     assert entry["older"] is False
-    assert verified.of({**row, "checksum": "another"}, found) is None
+    assert verified.of({**row, "checksum": "another"}, found, available()) is None
     forged("raises", lambda row: row["episodes"].pop())
     assert main(["verify", honest, other, "--elsewhere", "--jobs", "1"]) == 1
     said = capsys.readouterr().out

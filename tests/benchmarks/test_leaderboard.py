@@ -23,7 +23,7 @@ from benchmarks import (
 )
 from benchmarks.board_format import duration, number, table
 from benchmarks.board_tables import with_costs
-from benchmarks.controllers import find
+from benchmarks.controllers import available, find
 from benchmarks.metrics import of_track
 
 
@@ -142,7 +142,7 @@ def test_a_verification_is_of_the_code_that_it_ran(package: str) -> None:
     entry = {"checksum": row["checksum"], "date": "2026-01-03", "mode": "bits"}
 
     def older(**others: object) -> bool:
-        found = verified.of(row, {row["row"]: {**entry, **others}})
+        found = verified.of(row, {row["row"]: {**entry, **others}}, available())
         assert found is not None
         return bool(found["older"])
 
