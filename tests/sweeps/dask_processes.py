@@ -31,10 +31,18 @@ class DaskProcesses:
             *self.own,
         )
         self.scheduler = start(self.family, *scheduler, paths=paths)
-        wait_until(self.file.exists)
+        wait_until(self._says_where)
         self.address = str(json.loads(self.file.read_text())["address"])
         self.paths, self.folder = paths, folder
         self.nannies = self.join(workers)
+
+    def _says_where(self) -> bool:
+        """Tell whether the file is whole: it is there, empty, before the scheduler fills it."""
+        try:
+            json.loads(self.file.read_text())
+        except (FileNotFoundError, json.JSONDecodeError):
+            return False
+        return True
 
     def join(self, workers: int, threads: int = 1) -> subprocess.Popen[bytes]:
         """Start workers."""
