@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks.speed import Chunk, Measurement, Missing, interleaved, median, ratio
 from benchmarks.speed_diagnosis import diagnosing
+from benchmarks.speed_learning import shares
 from benchmarks.speed_planning import planning
 
 ENV = "PAM/MusclePositioning-v0"
@@ -404,7 +405,7 @@ GROUPS: dict[str, tuple[Callable[[int], list[Measurement]], ...]] = {
     "planning": (planning,),
     "plain": (uncompiled, jacobian),
     "start": (start_up,),
-    "learning": (learning,),
+    "learning": (learning, shares),
     "diagnosis": (diagnosing,),
 }
 """Probes of each group; a probe takes the number of rounds."""

@@ -1,0 +1,59 @@
+"""The probe of training counts what is spent within the plants, whatever is wrapped around them."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from benchmarks import speed_learning
+
+
+@pytest.mark.parametrize(
+    ("rest", "share", "verdict"), [(38.0, 0.05, "pass"), (18.0, 0.1, "MISSED")]
+)
+def test_a_share_is_of_the_whole_rollout(
+    monkeypatch: pytest.MonkeyPatch, rest: float, share: float, verdict: str
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(speed_learning, "time", SimpleNamespace(process_time=lambda: now[0]))
+
+    class Batch:
+        def step_wait(self) -> None:
+            now[0] += 1.0
+
+        def close(self) -> None:
+            pass
+
+    batches = (Batch(), Batch())
+    env = SimpleNamespace(venv=SimpleNamespace(batches=batches), close=lambda: None)
+
+    class Model:
+        n_steps, n_envs = 1, 2
+
+        def learn(self, steps: int, reset_num_timesteps: bool) -> None:
+            for batch in batches:
+                batch.step_wait()
+            now[0] += rest
+
+    building = SimpleNamespace(make_env=lambda _: env, make_model=lambda *_: Model())
+    preset = SimpleNamespace(env="PAM/KneeWalk-v0", num_envs=2)
+    found = speed_learning._share(building, preset, 3)
+    assert found.value == pytest.approx(share)
+    assert found.verdict == verdict
+    assert "KneeWalk" in found.name
+
+
+@pytest.mark.parametrize("variant", ["", "residual"])
+def test_all_batches_of_a_preset_are_found(variant: str) -> None:
+    building = pytest.importorskip("agents.building", reason="the extra 'agents' is not there")
+    from agents.configs import preset
+    from agents.sb3_vec_env import BatchVecEnv
+
+    wanted = preset("PAM/KneeTension-v0", "ppo", variant)
+    env = building.make_env(wanted)
+    found = list(speed_learning.batches_of(env))
+    env.close()
+    assert len(found) == len(wanted.kinds()) > 1
+    assert all(isinstance(batch, BatchVecEnv) for batch in found)
+    assert sum(batch.num_envs for batch in found) == wanted.num_envs
