@@ -48,8 +48,7 @@ class Gravity:
         """Return the torques [N m] that hold links and payload, shape (n_env, n_joints)."""
         if self.plant.stages == 1:
             return np.asarray(self.plant.weight_torque(angles, payload[:, None]), float)
-        weigh = self.plant.chain.gravity_torque
-        return np.array([weigh(q, float(m)) for q, m in zip(angles, payload, strict=True)])
+        return np.asarray(self.plant.chain.gravity_torque(angles, payload), float)
 
     @cached_property
     def _table(self) -> Array:

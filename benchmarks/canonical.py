@@ -138,14 +138,20 @@ def held_by(thing: Any) -> dict[str, Any] | None:
     return held | dict(getattr(thing, "__dict__", {}))
 
 
+PLAIN = frozenset({float, int, bool, type(None)})
+"""Classes of numbers, of which a plant may hold thousands."""
+
+
 def classes_in(thing: Any) -> Iterator[type]:
-    """Yield the class of an object and of all that it holds, each once."""
+    """Yield the class of an object and of all that it holds, each once; not those of numbers."""
     seen: set[int] = set()
     kinds: set[type] = set()
     left = [thing]
     while left:
         entry = left.pop()
-        if id(entry) in seen or isinstance(entry, (type, str, bytes, np.ndarray, np.generic)):
+        if type(entry) in PLAIN or isinstance(entry, (type, str, bytes, np.ndarray, np.generic)):
+            continue
+        if id(entry) in seen:
             continue
         seen.add(id(entry))
         if type(entry) not in kinds:

@@ -1,11 +1,16 @@
-"""A cell: one controller in one scenario, over all its seeds. What is computed and kept as one."""
+"""A cell: one controller in one scenario, over its public or its audit seeds. It is kept as one.
+
+What is computed as one is a group: the cells of one policy in one scenario, whose episodes run as
+rows of one batch. A record does not depend on the group that its cell was computed in.
+"""
 
 from __future__ import annotations
 
 import base64
 import math
 import zlib
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -130,46 +135,79 @@ def cells_of(entrant: Entrant, track: ScenarioSet, found: Audit | None = None) -
     return cells
 
 
-def compute(cell: Cell) -> dict[str, Any]:
-    """Run the cell's episodes and return its record."""
-    env = make_env(cell.track.env, cell.scenario.kwargs)
-    model = model_of(cell.track.env, cell.scenario, env)
-    controller = _controller(cell, model, env)
-    record: dict[str, Any] = {
+@dataclass(frozen=True)
+class Group:
+    """Cells that differ in their seeds alone.
+
+    Attributes
+    ----------
+    cells : tuple of Cell
+        One or more.
+    """
+
+    cells: tuple[Cell, ...]
+
+    @property
+    def key(self) -> str:
+        """Digest of all that the records depend on: no cell is in two groups."""
+        return self.cells[0].key
+
+
+def grouped(cells: Iterable[Cell]) -> list[Group]:
+    """Return cells in groups, in the order of their first ones."""
+    found: dict[Any, list[Cell]] = defaultdict(list)
+    for cell in cells:
+        found[cell.entrant, cell.track, cell.scenario.name, cell.training_seed].append(cell)
+    return [Group(tuple(members)) for members in found.values()]
+
+
+def compute(group: Group) -> dict[str, dict[str, Any]]:
+    """Run the episodes of a group and return each cell's record by its key."""
+    first = group.cells[0]
+    entrant, track = first.entrant, first.track
+    env = make_env(track.env, first.scenario.kwargs)
+    model = model_of(track.env, first.scenario, env)
+    controller = _controller(first, model, env)
+    said: dict[str, Any] = {
         "schema": SCHEMA,
-        "env": cell.track.env,
-        "controller": cell.entrant.name,
-        "track": cell.track.name,
-        "scenario": cell.scenario.name,
-        "training_seed": cell.training_seed,
-        "split": cell.split,
+        "env": track.env,
+        "controller": entrant.name,
+        "track": track.name,
+        "scenario": first.scenario.name,
+        "training_seed": first.training_seed,
         "controller_digest": controllers.parameters_digest(controller),
-        "code_digest": artefacts.controller_code(cell.entrant, controller),
+        "code_digest": artefacts.controller_code(entrant, controller),
         "plant_digest": env.unwrapped.plant.digest(),
         "model_digest": model.digest(),
-        "knows_plant": knowledge.knows_plant(cell.entrant, controller, model, env),
+        "knows_plant": knowledge.knows_plant(entrant, controller, model, env),
         "trained_on_plant": knowledge.trained_on_plant(controller, model, env),
-        "episodes": [],
     }
-    if cell.entrant.files:
-        record["card"] = trainings.card_record(controller)
-    if cell.probe and cell.entrant.knowledge in knowledge.IGNORANT:
-        record["uses_model"] = knowledge.uses_model(cell.entrant, model, env, cell.training_seed)
-    episodes = episodes_of(cell, env, controller)
-    for seed, episode in zip(cell.seeds, episodes, strict=True):
-        record["episodes"].append(episode_record(cell, seed, episode))
-    if cell.first:
-        record |= _kept(cell, env, controller, cell.seeds[0], episodes[0])
+    if entrant.files:
+        said["card"] = trainings.card_record(controller)
+    episodes = iter(episodes_of(group, env, controller))
+    records = {}
+    for cell in group.cells:
+        record = {**said, "split": cell.split}
+        if cell.probe and entrant.knowledge in knowledge.IGNORANT:
+            record["uses_model"] = knowledge.uses_model(entrant, model, env, cell.training_seed)
+        own = [next(episodes) for _ in cell.seeds]
+        numbered = zip(cell.seeds, own, strict=True)
+        record["episodes"] = [episode_record(cell, seed, episode) for seed, episode in numbered]
+        if cell.first:
+            record |= _kept(cell, env, controller, cell.seeds[0], own[0])
+        spent = np.concatenate([episode.seconds for episode in own])
+        record["volatile"] = {**provenance.occasion(), "predict_us": _times(spent)}
+        records[cell.key] = record
     env.close()
-    spent = np.concatenate([episode.seconds for episode in episodes])
-    record["volatile"] = {**provenance.occasion(), "predict_us": _times(spent)}
-    return record
+    return records
 
 
-def episodes_of(cell: Cell, env: Any, controller: Any) -> list[rollout.Episode]:
-    """Return a cell's episodes; ``env`` is its environment alone."""
-    batches = partial(make_batch, cell.track.env, cell.scenario.kwargs)
-    return rollout.run_all(batches, env, controller, cell.seeds)
+def episodes_of(group: Group, env: Any, controller: Any) -> list[rollout.Episode]:
+    """Return the episodes of a group, cell by cell; ``env`` is its environment alone."""
+    first = group.cells[0]
+    batches = partial(make_batch, first.track.env, first.scenario.kwargs)
+    seeds = [seed for cell in group.cells for seed in cell.seeds]
+    return rollout.run_all(batches, env, controller, seeds)
 
 
 def _controller(cell: Cell, model: Any, env: Any) -> controllers.Controller:

@@ -178,13 +178,15 @@ def _compute(
     missing: Iterable[Cell], store: Store, cluster: engine.Cluster, advance: Advance
 ) -> dict[str, str]:
     """Compute cells, keep each as it comes, and return what could not be computed."""
+    groups = {group.key: group for group in cells_module.grouped(missing)}
     errors = {}
-    for done in engine.run(cells_module.compute, missing, cluster):
-        if done.error is None:
-            store.save(done.key, done.value)
-        else:
-            errors[done.key] = done.error
-        advance()
+    for done in engine.run(cells_module.compute, groups.values(), cluster):
+        for cell in groups[done.key].cells:
+            if done.error is None:
+                store.save(cell.key, done.value[cell.key])
+            else:
+                errors[cell.key] = done.error
+            advance()
     return errors
 
 

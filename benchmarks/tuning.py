@@ -206,7 +206,7 @@ class Course:
         model, base = model_of(self.track.env, cell.scenario, env), env.unwrapped
         told = (model, base.signals, base.action_signals)
         made = catalogue.make_controller(self.controller, *told, knobs=knobs)
-        episodes = cells.episodes_of(cell, env, made)
+        episodes = cells.episodes_of(cells.Group((cell,)), env, made)
         return [
             cells.episode_record(cell, seed, episode)
             for seed, episode in zip(cell.seeds, episodes, strict=True)

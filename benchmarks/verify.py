@@ -184,10 +184,10 @@ def _run_again(
     cluster: engine.Cluster,
 ) -> dict[str, Any]:
     keys, records = [cell.key for cell in wanted], {}
-    for done in engine.run(cells.compute, wanted, cluster):
+    for done in engine.run(cells.compute, cells.grouped(wanted), cluster):
         if done.error is not None:
             raise ValueError(done.error)
-        records[done.key] = done.value
+        records |= done.value
     return dict(plain(rows.assemble(entrant, track, [records[key] for key in keys], found)))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks import cells, making, provenance, rollout, scenarios
+from benchmarks.canonical import canonical_text
 from benchmarks.controllers import find
 from benchmarks.scenarios import ScenarioSet
 from sweeps import worker
@@ -89,6 +90,41 @@ def test_a_bomb_is_not_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:
     assert sizes == [801]
 
 
+@pytest.mark.parametrize(
+    ("track", "controller"),
+    [
+        ("positioning_nominal", "inverse_pid"),  # rows of several loads
+        ("knee_walk_nominal", "ppo_knee_walk"),  # a network
+        ("manipulator_nominal", "joint_mfc_mu_ahead"),  # weights of many arms at once
+    ],
+)
+def test_a_record_does_not_depend_on_what_was_computed_with_it(track: str, controller: str) -> None:
+    chosen, entrant = scenarios.available()[track], find(controller)
+    first = cells.cells_of(entrant, chosen)[0]
+    audited = dataclasses.replace(first, split=cells.AUDIT, seeds=(910_001, 910_002), probe=False)
+    (group,) = cells.grouped([first, audited])
+    together = cells.compute(group)
+    assert [*together] == [first.key, audited.key]
+    for cell in (first, audited):
+        alone = cells.compute(cells.Group((cell,)))[cell.key]
+        assert alone.pop("volatile").keys() == together[cell.key].pop("volatile").keys()
+        assert canonical_text(alone) == canonical_text(together[cell.key])
+        assert [e["seed"] for e in alone["episodes"]] == list(cell.seeds)
+
+
+def test_a_group_is_of_one_policy_in_one_scenario(track: ScenarioSet) -> None:
+    entrant, scenario = find("low"), track.scenarios()[0]
+    plain = cells.Cell(entrant, track, scenario, seeds=(1,))
+    other = [
+        dataclasses.replace(plain, training_seed=3),
+        dataclasses.replace(plain, scenario=track.scenarios()[1]),
+        dataclasses.replace(plain, entrant=find("middle")),
+    ]
+    audited = [dataclasses.replace(c, split=cells.AUDIT, seeds=(2,)) for c in (plain, *other)]
+    made = cells.grouped([plain, *other, *audited])
+    assert [group.cells for group in made] == [*zip([plain, *other], audited, strict=True)]
+
+
 def test_a_cell_that_nobody_waits_for_ends(
     track: ScenarioSet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -97,5 +133,5 @@ def test_a_cell_that_nobody_waits_for_ends(
     asked = iter([False])
     monkeypatch.setattr(rollout, "wanted", lambda: next(asked))
     with pytest.raises(RuntimeError, match="nobody waits"):
-        cells.compute(cell)
+        cells.compute(cells.Group((cell,)))
     assert worker.wanted()  # outside of a cluster somebody always does
