@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -131,9 +131,17 @@ def run(
             store.path(key).unlink(missing_ok=True)
     missing = {key: cell for key, cell in wanted.items() if store.load(key) is None}
     report.found = len(wanted) - len(missing)
-    errors = _compute(missing.values(), store, cluster, start(len(missing)))
-    for plan, cells in chosen:
-        _finish(plan, list(cells), store, options, report, errors)
+    making = _Rows(chosen, missing.keys(), store, options.out)
+    errors, advance = dict[str, str](), start(len(missing))
+    for key, error in _compute(missing.values(), store, cluster):
+        if error is not None:
+            errors[key] = error
+        advance()
+        making.done(key)
+    for _, outcome in sorted(making.outcomes.items()):
+        report.rows += outcome.rows
+        report.missing += outcome.wrong
+        errors = outcome.gone | errors
     report.computed = sum(key not in errors for key in missing)
     report.missing += [f"{title(wanted[key])}: {text}" for key, text in errors.items()]
     report.quarantined = sorted(set(store.quarantined()) - before)
@@ -147,25 +155,63 @@ def planned(pairs: Sequence[Pair], options: Options) -> Iterator[tuple[Cell, boo
         yield cell, not options.force and store.sound(cell.key)
 
 
-def _finish(
-    plan: Plan,
-    keys: Sequence[str],
-    store: Store,
-    options: Options,
-    report: Report,
-    errors: dict[str, str],
-) -> None:
-    """Write a row whose cells are all there."""
-    loaded = {key: store.load(key) for key in keys}
-    records = [record for record in loaded.values() if record is not None]
-    if len(records) == len(loaded):
+@dataclass(frozen=True)
+class _Outcome:
+    """What became of a row: where it is, or what is wrong, or which cells are gone and why."""
+
+    rows: tuple[Path, ...] = ()
+    wrong: tuple[str, ...] = ()
+    gone: dict[str, str] = field(default_factory=dict)
+
+
+class _Rows:
+    """Rows in the making: each is written as soon as its last cell is done.
+
+    Parameters
+    ----------
+    chosen : sequence of (Plan, mapping)
+        Each row with its cells by key.
+    missing : set of str
+        Keys of the cells that are not there yet.
+    store : Store
+    out : Path
+    """
+
+    def __init__(
+        self,
+        chosen: Sequence[tuple[Plan, Mapping[str, Cell]]],
+        missing: Set[str],
+        store: Store,
+        out: Path,
+    ) -> None:
+        self.chosen, self.store, self.out = chosen, store, out
+        self.lacking = [missing & cells.keys() for _, cells in chosen]
+        whole = (place for place, keys in enumerate(self.lacking) if not keys)
+        self.outcomes = {place: self._finish(place) for place in whole}
+
+    def done(self, key: str) -> None:
+        """Take note of a cell that was computed, or could not be."""
+        for place, keys in enumerate(self.lacking):
+            if key in keys:
+                keys.remove(key)
+                if not keys:
+                    self.outcomes[place] = self._finish(place)
+
+    def _finish(self, place: int) -> _Outcome:
+        """Write a row if its cells are all there."""
+        plan, cells = self.chosen[place]
+        loaded = {key: self.store.load(key) for key in cells}
+        gone = [key for key, record in loaded.items() if record is None]
+        if gone:
+            why = "its file has been removed meanwhile; run it again"
+            return _Outcome(gone=dict.fromkeys(gone, why))
+        records = [record for record in loaded.values() if record is not None]
         try:
             row = rows.assemble(plan.entrant, plan.track, records, plan.found)
-            report.rows.append(rows.save(row, options.out))
+            return _Outcome(rows=(rows.save(row, self.out),))
         except ValueError as error:
-            report.missing.append(f"{rows.row_name(plan.track.name, plan.entrant.name)}: {error}")
-    for key in (key for key, record in loaded.items() if record is None):
-        errors.setdefault(key, "its file has been removed meanwhile; run it again")
+            name = rows.row_name(plan.track.name, plan.entrant.name)
+            return _Outcome(wrong=(f"{name}: {error}",))
 
 
 def title(cell: Cell) -> str:
@@ -175,19 +221,15 @@ def title(cell: Cell) -> str:
 
 
 def _compute(
-    missing: Iterable[Cell], store: Store, cluster: engine.Cluster, advance: Advance
-) -> dict[str, str]:
-    """Compute cells, keep each as it comes, and return what could not be computed."""
+    missing: Iterable[Cell], store: Store, cluster: engine.Cluster
+) -> Iterator[tuple[str, str | None]]:
+    """Compute cells, keep each as it comes, and yield its key and why it could not be computed."""
     groups = {group.key: group for group in cells_module.grouped(missing)}
-    errors = {}
     for done in engine.run(cells_module.compute, groups.values(), cluster):
         for cell in groups[done.key].cells:
             if done.error is None:
                 store.save(cell.key, done.value[cell.key])
-            else:
-                errors[cell.key] = done.error
-            advance()
-    return errors
+            yield cell.key, done.error
 
 
 def pairs_of(entrants: Iterable[Entrant], tracks: Iterable[ScenarioSet]) -> list[Pair]:

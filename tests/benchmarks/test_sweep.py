@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import signal
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import psutil
@@ -17,6 +17,8 @@ from benchmarks.__main__ import main
 from benchmarks.controllers import find
 from benchmarks.runner import Options, run
 from benchmarks.scenarios import ScenarioSet
+from sweeps import engine
+from sweeps.engine import Done
 from tests.benchmarks.conftest import CONTENT
 from tests.sweeps.dask_processes import DaskProcesses
 from tests.sweeps.processes_of import alive, new_family, start, wait_until
@@ -219,6 +221,8 @@ def test_a_cell_that_another_run_removes_is_told(
     track: ScenarioSet, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     options = Options(jobs=1, out=folder / "out", cells=folder / "cells")
+    pairs = [(find("low"), track), (find("middle"), track)]
+    assert len(run(pairs, options).rows) == 2
     assemble = rows.assemble
 
     def removing(*given: object) -> object:
@@ -227,7 +231,25 @@ def test_a_cell_that_another_run_removes_is_told(
         return assemble(*given)
 
     monkeypatch.setattr(rows, "assemble", removing)
-    report = run([(find("low"), track), (find("middle"), track)], options)
+    report = run(pairs, options)
     assert len(report.rows) == 1
     assert len(report.missing) == 2
     assert all("removed meanwhile" in line for line in report.missing)
+
+
+def test_a_row_is_written_as_soon_as_its_cells_are_there(
+    track: ScenarioSet, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = []
+
+    def looking(act: object, groups: Iterable[cells.Group], cluster: object) -> Iterator[Done]:
+        for group in groups:
+            yield Done(group.key, cells.compute(group))
+            written.append(sorted(path.name for path in (folder / "out").glob("*.json")))
+
+    monkeypatch.setattr(engine, "run", looking)
+    options = Options(jobs=1, out=folder / "out", cells=folder / "cells")
+    report = run([(find("middle"), track), (find("low"), track)], options)
+    assert [len(names) for names in written] == [0, 1, 1, 2]
+    assert written[1] == ["short--middle.json"]
+    assert [path.name for path in report.rows] == ["short--middle.json", "short--low.json"]
