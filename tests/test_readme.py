@@ -48,3 +48,28 @@ def test_local_links_lead_somewhere(page):
     links = [link for link in LINK.findall(page.read_text()) if "://" not in link]
     missing = [link for link in links if not (page.parent / link).exists()]
     assert not missing
+
+
+ENVIRONMENT = re.compile(r"^\| `(?:PAM/)?(\w+?)(?:-v\d+)?` \|", re.MULTILINE)
+
+
+def nominal_rows(page: Path) -> dict[str, list[str]]:
+    """Return the cells of the first table of environments on a page, by environment."""
+    text = page.read_text().partition("## Rank changes")[0].rpartition("Does a learned")[2]
+    lines = [line for line in text.splitlines() if ENVIRONMENT.match(line)]
+    cells = [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
+    return {ENVIRONMENT.match(line)[1]: row for line, row in zip(lines, cells, strict=True)}
+
+
+def test_the_table_of_the_readme_is_the_board():
+    board = nominal_rows(ROOT / "benchmarks/LEADERBOARD.md")
+    shown = nominal_rows(ROOT / "README.md")
+    assert shown.keys() == board.keys() != set()
+    for env, (_, paper, error, _, learned, lower, wins, verdict) in shown.items():
+        said = board[env]
+        assert paper == said[2]
+        assert [error, learned] == [re.sub(r" \[.*?\]", "", said[k]) for k in (3, 5)]
+        assert float(lower.removesuffix(" %")) == round(float(said[6].split(" %")[0]))
+        assert wins == said[7].split(" [")[0]
+        claim = said[9].strip(" |*").partition(" (")[0].replace(" to be better", "")
+        assert verdict.strip(" |") == claim
