@@ -31,7 +31,12 @@ class DaskProcesses:
             *self.own,
         )
         self.scheduler = start(self.family, *scheduler, paths=paths)
-        wait_until(self._says_where)
+        try:
+            wait_until(self._says_where)
+        except BaseException:
+            self.scheduler.kill()
+            self.scheduler.wait()
+            raise
         self.address = str(json.loads(self.file.read_text())["address"])
         self.paths, self.folder = paths, folder
         self.nannies = self.join(workers)
