@@ -66,7 +66,7 @@ def train(
         _refuse_other_settings(config, set)
         for given, own in ((given_env, run.config.env), (algo, run.config.algo), (seed, run.seed)):
             if given not in (None, own):
-                raise SettingsError(f"{folder} holds a run of {own}, not of {given}; leave it out")
+                raise SettingsError(f"{folder} holds a run of {own}: leave {given} out")
         model = training.resume(run)
         console.print(f"going on at {model.num_timesteps:,} of {run.config.steps:,} steps")
     else:
@@ -74,6 +74,7 @@ def train(
         changes = [*set, *([] if steps is None else [f"steps={steps}"])]
         wanted = configs.changed(wanted, changes)
         folder = out or training.default_folder(name, kind, number, variant)
+        _check_counts(seed=(number, 0))
         run = training.Run(wanted, number, folder)
         model = training.start(run)
     print(training.train(run, model, console))
@@ -90,6 +91,13 @@ def _wanted(env: str, algo: str, variant: str, file: Path | None) -> configs.Con
             f"{wanted.algo}"
         )
     return wanted
+
+
+def _check_counts(**counts: tuple[int | None, int]) -> None:
+    """Refuse numbers below their least, before anything is written."""
+    for name, (value, least) in counts.items():
+        if value is not None and value < least:
+            raise SettingsError(f"{name} = {value} is below {least}; give {least} or more")
 
 
 def _refuse_other_settings(file: Path | None, assignments: tuple[str, ...]) -> None:
@@ -150,6 +158,7 @@ def sweep(
     from sweeps.engine import Cluster
     from sweeps.progress import progress
 
+    _check_counts(seeds=(seeds, 1), first_seed=(first_seed, 0))
     cluster = Cluster(jobs, backend, address)
     changes = [*set, *([] if steps is None else [f"steps={steps}"])]
     ids = map(full_id, env)
@@ -211,6 +220,8 @@ def looks(policies: Annotated[tuple[Path, ...], tyro.conf.Positional], /) -> Non
     """
     from agents.policy import OnnxPolicy
 
+    if not policies:
+        raise SettingsError("name policies, for example runs/*/policy.onnx")
     for place in policies:
         card = OnnxPolicy.load(place).card
         found, chosen = card.get("evaluation", []), card.get("chosen", {})
@@ -258,6 +269,7 @@ def tune(
     """
     from agents import tune as tuning
 
+    _check_counts(trials=(trials, 1), steps=(steps, 1), seed=(seed, 0))
     path = configs.preset_path(full_id(env), algo, variant)
     config = configs.read(path)
     place = storage or Path("runs/tune") / f"{path.stem}.db"
@@ -337,8 +349,16 @@ def main(arguments: list[str] | None = None) -> int:
         status = tyro.extras.subcommand_cli_from_dict(
             commands, prog="python -m agents", args=arguments
         )
+        sys.stdout.flush()
     except ValueError as error:  # settings, checkpoints and policy files say what to do
         print(f"error: {error}", file=sys.stderr)
+        return 2
+    except BrokenPipeError:  # whoever read the output, like `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+    except OSError as error:
+        place = f"{error.filename}: {error.strerror}; give another place"
+        print(f"error: {place if error.filename else error}", file=sys.stderr)
         return 2
     except ModuleNotFoundError as error:
         print(f"error: training needs {error.name}; install the extra 'agents'", file=sys.stderr)

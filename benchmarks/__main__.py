@@ -66,13 +66,18 @@ def run(
     chosen = _choose(controller, controllers.available(), "controller")
     pairs = runner.pairs_of(chosen, _tracks(env, track))
     if not pairs:
-        raise ValueError("no controller runs in these environments")
+        names = ", ".join(entrant.name for entrant in chosen)
+        raise ValueError(
+            f"none of {names} runs in {env or 'these tracks'}; those of an environment stand in "
+            "benchmarks/LEADERBOARD.md"
+        )
     if dry_run:
         planned = list(runner.planned(pairs, options))
         for cell, there in planned:
             print(f"{'there ' if there else 'to run'}  {runner.title(cell)}")
         print(f"{len(planned)} cells, {sum(not there for _, there in planned)} to run")
         return 0
+    print(f"looking at {len(pairs)} rows: what they need, and what is there", file=sys.stderr)
     with progress("cells") as start:
         report = runner.run(pairs, options, start)
     return telling.run(report)
@@ -125,6 +130,8 @@ def cite(row: Positional[tuple[str, ...]]) -> int:
     """
     from benchmarks.cite import bibtex
 
+    if not row:
+        raise ValueError("name a row, for example positioning_nominal--inverse")
     for name in row:
         print(bibtex(rows.load(_row_path(name))))
     return 0
@@ -438,13 +445,20 @@ COMMANDS: dict[str, Callable[..., int]] = {
 def main(arguments: list[str] | None = None) -> int:
     """Run a command and return the exit code; a wrong argument is one sentence, no traceback."""
     try:
-        return int(
-            tyro.extras.subcommand_cli_from_dict(
-                COMMANDS, prog="python -m benchmarks", args=arguments
-            )
+        status = tyro.extras.subcommand_cli_from_dict(
+            COMMANDS, prog="python -m benchmarks", args=arguments
         )
+        sys.stdout.flush()
+        return int(status)
     except ValueError as error:
         print(f"error: {error}", file=sys.stderr)
+        return 2
+    except BrokenPipeError:  # whoever read the output, like `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+    except OSError as error:
+        place = f"{error.filename}: {error.strerror}; give another place"
+        print(f"error: {place if error.filename else error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("interrupted; what was done is kept: the same command goes on", file=sys.stderr)

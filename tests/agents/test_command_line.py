@@ -29,3 +29,31 @@ def test_a_sweep_of_a_short_id_has_the_folders_of_the_long_one(
         *("to", "run", str(folder / "ppo-seed0")),
         *("to", "run", str(folder / "ppo-seed1")),
     ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["sweep", "KneeWalk-v0", "--seeds", "0"], "seeds = 0 is below 1"),
+        (["sweep", "KneeWalk-v0", "--first-seed", "-1"], "first_seed = -1 is below 0"),
+        (["tune", "KneeWalk-v0", "--trials", "-1"], "trials = -1 is below 1"),
+        (["tune", "KneeWalk-v0", "--steps", "0"], "steps = 0 is below 1"),
+        (["train", "KneeWalk-v0", "--seed", "-1"], "seed = -1 is below 0"),
+        (["train", "KneeWalk-v0", "--out", "file/run"], "Not a directory; give another place"),
+        (["looks"], "name policies"),
+    ],
+)
+def test_mistakes_are_one_sentence_and_leave_nothing(
+    arguments: list[str],
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    assert main(arguments) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert len(error.splitlines()) == 1
+    assert [*tmp_path.iterdir()] == [tmp_path / "file"]

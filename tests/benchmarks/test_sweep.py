@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import signal
 import subprocess
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
@@ -215,6 +216,19 @@ def test_exit_codes(
         assert "the same command goes on" in capsys.readouterr().err
     assert ask() == 0
     assert "0 cells computed, 2 were there already" in capsys.readouterr().out
+
+
+def test_a_reader_that_has_seen_enough_is_no_error(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "benchmarks", "cite", "positioning_nominal--inverse"]
+    with subprocess.Popen(
+        command, cwd=HERE.parents[1], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as asked:
+        assert asked.stdout is not None and asked.stderr is not None
+        asked.stdout.close()  # as `head` does
+        said = asked.stderr.read().decode()
+    assert asked.returncode == 141
+    assert "Traceback" not in said
+    assert "Broken" not in said
 
 
 def test_a_cell_that_another_run_removes_is_told(
