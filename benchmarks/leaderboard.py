@@ -191,7 +191,7 @@ def board_text(all_rows: Sequence[Row], figures: Mapping[str, str] | None = None
     tracks = standings.tracks(all_rows)
     if not tracks:
         return f"{INTRODUCTION}\n{NO_ROWS}\n"
-    lines = [*INTRODUCTION.splitlines(), "", "## Nominal tracks", ""]
+    lines = [*INTRODUCTION.splitlines(), "", verified_of(all_rows), "", "## Nominal tracks", ""]
     lines += [*board_summary.winners(tracks), "", "## Rank changes between tracks", ""]
     lines += [*RANK_CHANGES.splitlines(), "", *board_summary.rank_changes(tracks)]
     lines += ["## Tracks", ""]
@@ -202,6 +202,13 @@ def board_text(all_rows: Sequence[Row], figures: Mapping[str, str] | None = None
     lines += ["## Controllers", "", *board_summary.legend(all_rows), ""]
     lines += ["## How to read this", "", *PREFACE.splitlines()]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def verified_of(all_rows: Sequence[Row]) -> str:
+    """Return how many rows were run again and came out the same, and when."""
+    dates = [row[views.VERIFIED]["date"] for row in all_rows if views.is_verified(row)]
+    when = f", last on {max(dates)}" if dates else ""
+    return f"{len(dates)} of {len(all_rows)} rows are verified with the code as it is{when}."
 
 
 RANK_CHANGES = """\

@@ -160,6 +160,12 @@ def failures_of(row: Mapping[str, Any], split: str = "") -> tuple[int, int]:
     return sum(bool(episode["failed"]) for episode in episodes), len(episodes)
 
 
+def is_verified(row: Mapping[str, Any]) -> bool:
+    """Return whether the row was run again with the code as it is and came out the same."""
+    found = row.get(VERIFIED)
+    return bool(found) and not found["older"]
+
+
 def verified_words(row: Mapping[str, Any]) -> str:
     """Return whether and when the row was run again and came out the same, and with which code."""
     found = row.get(VERIFIED)

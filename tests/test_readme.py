@@ -25,7 +25,7 @@ def test_the_snippets_of_the_readme_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = run_snippets(ROOT / "README.md")
     assert names["rms"] < 0.5e-3  # m; what the page says of its controller
-    assert (tmp_path / "rig.yaml").exists()
+    assert (tmp_path / "slow.yaml").exists()
 
 
 def test_the_snippets_of_the_orthosis_run_and_give_what_the_page_says(capsys):

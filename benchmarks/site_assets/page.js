@@ -131,16 +131,17 @@ function headed(heading, lines) {
 }
 
 function renderWinners() {
-  const heading = ["environment", "episodes", "best paper controller", "best learned controller", "lower by [95 %]", "P [95 %]", "largest cost", "verdict"];
+  const heading = ["environment", "verdict", "best paper controller", "best learned controller", "lower by [95 %]", "P [95 %]", "largest cost", "episodes", "in full"];
   const both = (name, score) => [make("span", { class: "name" }, name), make("br"), make("span", { class: "soft" }, score)];
   const lines = BOARD.winners.map((entry) => {
     const line = make("tr", { class: "pick", tabindex: "0", "data-track": entry.track });
     line.append(
-      make("td", { class: "name" }, entry.env), make("td", {}, entry.split || "–"),
+      make("td", { class: "name" }, entry.env),
+      make("td", { class: entry.better ? "verdict good" : "verdict" }, entry.verdict.split(" (")[0]),
       make("td", {}, ...both(entry.paper, entry.paper_score)), make("td", {}, ...both(entry.learned, entry.learned_score)),
       make("td", { class: "short" }, entry.gain),
       make("td", { class: "short" }, chance(entry.chance)), make("td", {}, entry.cost),
-      make("td", { class: entry.better ? "verdict good" : "verdict" }, entry.verdict),
+      make("td", {}, entry.split || "–"), make("td", { class: "soft" }, entry.verdict),
     );
     const open = () => { go({ track: entry.track, row: "" }); at("track-title").scrollIntoView(); };
     line.addEventListener("click", open);

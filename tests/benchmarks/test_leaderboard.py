@@ -99,13 +99,17 @@ def test_an_entrant_of_the_round_that_has_no_row_is_named() -> None:
 def test_a_verified_row_says_when() -> None:
     row = fakes.row("pid", 1e-3)
     assert "not verified yet" in leaderboard.board_text([row])
+    assert "0 of 1 rows are verified with the code as it is.\n" in leaderboard.board_text([row])
     row["verified"] = {"date": "2026-01-03", "mode": "bits", "older": False}
     assert "| verified 2026-01-03 |" in leaderboard.board_text([row])
+    said = leaderboard.board_text([row, fakes.row("zero", 2e-3)])
+    assert "1 of 2 rows are verified with the code as it is, last on 2026-01-03.\n" in said
     row["verified"]["mode"] = "elsewhere"
     assert "| verified 2026-01-03 elsewhere |" in leaderboard.board_text([row])
     row["verified"]["older"] = True
     words = "| verified 2026-01-03 elsewhere, at an older code |"
     assert words in leaderboard.board_text([row])
+    assert "0 of 1 rows are verified" in leaderboard.board_text([row])
 
 
 def test_a_row_of_an_older_round_is_self_reported(
