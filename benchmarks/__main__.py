@@ -340,8 +340,8 @@ def show(
     if episode.failed:
         print(f"ended early: {episode.failure}")
     else:
-        for name, value in showing.summary(episode, content).items():
-            print(f"{name:20s} {value:.6g}")
+        for line in showing.told(showing.summary(episode, content), content):
+            print(line)
     if plot:
         said = "".join(f", {name} {value}" for name, value in kwargs.items())
         title = f"{controller} in {env_id}{said}, seed {seed}"

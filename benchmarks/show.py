@@ -118,6 +118,17 @@ def summary(episode: rollout.Episode, content: Mapping[str, Any]) -> dict[str, f
     return metrics.score(signals, episode.period, settle, hold, {}, gate)
 
 
+def told(scores: Mapping[str, float], content: Mapping[str, Any]) -> list[str]:
+    """Return a line for each score with its unit, SI; one that no number belongs to says so."""
+    units = metrics.of_track(content)
+    lines = []
+    for name, value in scores.items():
+        unit = "" if units[name] == "1" else f" {units[name]}"
+        said = "does not apply" if np.isnan(value) else f"{value:.6g}{unit}"
+        lines.append(f"{name:20s} {said}")
+    return lines
+
+
 def draw(
     episode: rollout.Episode,
     set_points: Mapping[str, Any],

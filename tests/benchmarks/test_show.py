@@ -22,9 +22,13 @@ def test_every_environment_is_shown(
 ) -> None:
     options = ["--controller", controller, "--episode-seconds", "2"]
     assert main(["show", env.removeprefix("PAM/"), *options]) == 0
-    told = dict(line.split() for line in capsys.readouterr().out.splitlines())
+    told = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
     assert {"rms_error", "sensed_rms_error", "pressure_travel"} <= set(told)
-    assert 0.0 < float(told["rms_error"]) < float("inf")
+    assert told["pressure_travel"].endswith(" Pa/s")
+    assert "nan" not in told.values()
+    value, _, unit = told["rms_error"].partition(" ")
+    assert 0.0 < float(value) < float("inf")
+    assert unit == TRACKS[env].content.get("unit", "m")
 
 
 @pytest.mark.parametrize(
