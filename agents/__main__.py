@@ -14,6 +14,7 @@ from rich.console import Console
 from agents import configs
 from agents.settings import SettingsError
 from pam_envs.envs.registration import full_id
+from sweeps.command_line import answered
 
 Algo = Literal["ppo", "sac", "tqc", "recurrent_ppo"]
 DEFAULT_ENV = "PAM/MusclePositioning-v0"
@@ -345,28 +346,15 @@ def main(arguments: list[str] | None = None) -> int:
         "presets": presets,
         "speed": speed,
     }
+    ask = tyro.extras.subcommand_cli_from_dict
     try:
-        status = tyro.extras.subcommand_cli_from_dict(
-            commands, prog="python -m agents", args=arguments
+        return answered(
+            lambda: ask(commands, prog="python -m agents", args=arguments),
+            "interrupted; what was done is kept: a sweep goes on where it was",
         )
-        sys.stdout.flush()
-    except ValueError as error:  # settings, checkpoints and policy files say what to do
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except BrokenPipeError:  # whoever read the output, like `head`, has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 141
-    except OSError as error:
-        place = f"{error.filename}: {error.strerror}; give another place"
-        print(f"error: {place if error.filename else error}", file=sys.stderr)
-        return 2
     except ModuleNotFoundError as error:
         print(f"error: training needs {error.name}; install the extra 'agents'", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        print("interrupted; what was done is kept: a sweep goes on where it was", file=sys.stderr)
-        return 130
-    return int(status or 0)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import tyro
 
 from benchmarks import controllers, rows, scenarios
 from pam_envs.envs.registration import full_id
+from sweeps.command_line import answered
 from sweeps.progress import progress
 
 Positional = tyro.conf.Positional
@@ -444,25 +445,11 @@ COMMANDS: dict[str, Callable[..., int]] = {
 
 def main(arguments: list[str] | None = None) -> int:
     """Run a command and return the exit code; a wrong argument is one sentence, no traceback."""
-    try:
-        status = tyro.extras.subcommand_cli_from_dict(
-            COMMANDS, prog="python -m benchmarks", args=arguments
-        )
-        sys.stdout.flush()
-        return int(status)
-    except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except BrokenPipeError:  # whoever read the output, like `head`, has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 141
-    except OSError as error:
-        place = f"{error.filename}: {error.strerror}; give another place"
-        print(f"error: {place if error.filename else error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("interrupted; what was done is kept: the same command goes on", file=sys.stderr)
-        return 130
+    ask = tyro.extras.subcommand_cli_from_dict
+    return answered(
+        lambda: ask(COMMANDS, prog="python -m benchmarks", args=arguments),
+        "interrupted; what was done is kept: the same command goes on",
+    )
 
 
 if __name__ == "__main__":

@@ -218,7 +218,7 @@ def test_exit_codes(
     assert "0 cells computed, 2 were there already" in capsys.readouterr().out
 
 
-def test_a_reader_that_has_seen_enough_is_no_error(tmp_path: Path) -> None:
+def test_a_reader_that_has_seen_enough_is_no_error() -> None:
     command = [sys.executable, "-m", "benchmarks", "cite", "positioning_nominal--inverse"]
     with subprocess.Popen(
         command, cwd=HERE.parents[1], stdout=subprocess.PIPE, stderr=subprocess.PIPE
