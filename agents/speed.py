@@ -41,7 +41,7 @@ def measure(seconds: float = 20.0) -> dict[str, Any]:
     torch.set_num_threads(1)
     try:
         turn = seconds / (2 * ROUNDS)
-        ours, theirs = ppo_chunk(preset(ENV, "ppo").num_envs), _stepper(_default_model())
+        ours, theirs = ppo_chunk(preset(ENV, "ppo").num_envs), stepper(_default_model())
         rates = [(_rate(ours, turn), _rate(theirs, turn)) for _ in range(ROUNDS)]
     finally:
         torch.set_num_threads(before)
@@ -65,15 +65,15 @@ def ppo_chunk(num_envs: int = 256) -> Callable[[], int]:
         Rows of the batched environment.
     """
     config = dataclasses.replace(preset(ENV, "ppo"), num_envs=num_envs)
-    return _stepper(make_model(config, 0, make_env(config)))
+    return stepper(make_model(config, 0, make_env(config)))
 
 
 def _default_model() -> BaseAlgorithm:
     return PPO("MlpPolicy", gym.make("Pendulum-v1"), seed=0, device="cpu")
 
 
-def _stepper(model: Any) -> Callable[[], int]:
-    """Return a function that trains for one rollout and returns its number of steps."""
+def stepper(model: Any) -> Callable[[], int]:
+    """Return a function that trains for one rollout and returns its steps, after a first one."""
     size = model.n_steps * model.n_envs
 
     def once() -> int:

@@ -16,30 +16,33 @@ MOST = 0.05
 def shares(rounds: int) -> list[Measurement]:
     """Environments' share of the time of each PPO preset."""
     try:
-        building = importlib.import_module("agents.building")
-        configs = importlib.import_module("agents.configs")
+        building, configs, speed = (
+            importlib.import_module(f"agents.{name}") for name in ("building", "configs", "speed")
+        )
     except ModuleNotFoundError as error:
         raise Missing(f"agents cannot be imported: {error.name} is not installed") from error
     from pam_envs.__main__ import env_ids
 
-    return [_share(building, configs.preset(env, "ppo"), min(rounds, 3)) for env in env_ids()]
+    found = []
+    for preset in (configs.preset(env, "ppo") for env in env_ids()):
+        env = building.make_env(preset)
+        chunk = speed.stepper(building.make_model(preset, 0, env))
+        name = preset.env.removeprefix("PAM/").rpartition("-")[0]
+        found.append(_share(f"{name}, N = {preset.num_envs}", env, chunk, min(rounds, 3)))
+        env.close()
+    return found
 
 
-def _share(building: Any, preset: Any, rounds: int) -> Measurement:
-    """Measure one preset: rollouts and updates together, after one to warm up."""
-    env = building.make_env(preset)
+def _share(name: str, env: Any, chunk: Chunk, rounds: int) -> Measurement:
+    """Measure one preset: a chunk is rollouts and updates together."""
     spent = [_timed(batch) for batch in batches_of(env)]
-    chunk = _rollout(building.make_model(preset, 0, env))
-    chunk()
     found = []
     for _ in range(rounds):
         inside, began = sum(clock() for clock in spent), time.process_time()
         chunk()
         whole = time.process_time() - began
         found.append((sum(clock() for clock in spent) - inside) / whole)
-    env.close()
-    name = preset.env.removeprefix("PAM/").rpartition("-")[0]
-    title = f"environment's share of PPO's time, {name}, N = {preset.num_envs}"
+    title = f"environment's share of PPO's time, {name}"
     return Measurement("learning", title, median(found), "", MOST, better="less")
 
 
@@ -64,13 +67,3 @@ def _timed(batch: Any) -> Callable[[], float]:
 
     batch.step_wait = step_wait
     return lambda: total[0]
-
-
-def _rollout(model: Any) -> Chunk:
-    size = model.n_steps * model.n_envs
-
-    def chunk() -> int:
-        model.learn(size, reset_num_timesteps=False)
-        return int(size)
-
-    return chunk

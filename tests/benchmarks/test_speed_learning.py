@@ -22,23 +22,16 @@ def test_a_share_is_of_the_whole_rollout(
         def step_wait(self) -> None:
             now[0] += 1.0
 
-        def close(self) -> None:
-            pass
-
     batches = (Batch(), Batch())
-    env = SimpleNamespace(venv=SimpleNamespace(batches=batches), close=lambda: None)
+    env = SimpleNamespace(venv=SimpleNamespace(batches=batches))
 
-    class Model:
-        n_steps, n_envs = 1, 2
+    def chunk() -> int:
+        for batch in batches:
+            batch.step_wait()
+        now[0] += rest
+        return 2
 
-        def learn(self, steps: int, reset_num_timesteps: bool) -> None:
-            for batch in batches:
-                batch.step_wait()
-            now[0] += rest
-
-    building = SimpleNamespace(make_env=lambda _: env, make_model=lambda *_: Model())
-    preset = SimpleNamespace(env="PAM/KneeWalk-v0", num_envs=2)
-    found = speed_learning._share(building, preset, 3)
+    found = speed_learning._share("KneeWalk, N = 2", env, chunk, 3)
     assert found.value == pytest.approx(share)
     assert found.verdict == verdict
     assert "KneeWalk" in found.name
