@@ -7,9 +7,12 @@ worker died too often, or cannot import what it is given (joblib 1.6).
 from __future__ import annotations
 
 import sys
+from asyncio import CancelledError
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from queue import Empty, SimpleQueue
 
-from dask.distributed import Client, as_completed
+from dask.distributed import Client, Future
 from distributed.scheduler import KilledWorker
 
 from sweeps.engine import Act, Done, Task
@@ -17,6 +20,9 @@ from sweeps.worker import do_in_cluster
 
 SECONDS = 10.0
 """How long the scheduler has for its first answer."""
+
+LOOK = 5.0
+"""Seconds without a result after which the scheduler is asked whether anybody works."""
 
 
 def run(act: Act, tasks: Mapping[str, Task], address: str) -> Iterator[Done]:
@@ -32,10 +38,10 @@ def run(act: Act, tasks: Mapping[str, Task], address: str) -> Iterator[Done]:
         If no scheduler answers, or it goes away.
     """
     with _client(address) as client:
-        if not client.nthreads():
-            print(f"no worker is at {address} yet; waiting for one", file=sys.stderr)
+        workers = _Workers(client, address)
+        workers.look()
         given_up = []
-        for done in _round(client, act, tasks):
+        for done in _round(client, act, tasks, workers):
             if done.lost:
                 given_up.append(done)
             else:
@@ -43,7 +49,7 @@ def run(act: Act, tasks: Mapping[str, Task], address: str) -> Iterator[Done]:
         if len(given_up) == 1:
             yield given_up.pop()
         for done in given_up:
-            yield from _round(client, act, {done.key: tasks[done.key]})
+            yield from _round(client, act, {done.key: tasks[done.key]}, workers)
 
 
 def _client(address: str) -> Client:
@@ -56,23 +62,72 @@ def _client(address: str) -> Client:
         ) from error
 
 
-def _round(client: Client, act: Act, tasks: Mapping[str, Task]) -> Iterator[Done]:
-    """Return what became of tasks, as they are done."""
-    keys = {
-        client.submit(do_in_cluster, act, task, key, pure=False): key for key, task in tasks.items()
-    }
-    finished = as_completed(list(keys), client.loop, with_results=True, raise_errors=False)
-    for future, result in finished:
-        key = keys.pop(future)
-        if future.status == "finished":
-            yield result
-        elif future.status == "error":
-            error = result[1]
-            yield Done(key, error=_sentence(error), lost=isinstance(error, KilledWorker))
-        else:
+class _Workers:
+    """Says so, once, where nobody is there to do anything.
+
+    Dask waits for a worker without a word. That is right for a cluster that grows by itself, and
+    for ever where every ``dask worker`` has ended.
+    """
+
+    def __init__(self, client: Client, address: str) -> None:
+        self.client, self.address, self.told = client, address, False
+
+    def look(self) -> None:
+        with suppress(OSError):  # the futures tell when the scheduler is gone
+            alone = not self.client.nthreads()
+            if alone and not self.told:
+                print(
+                    f"no worker is at {self.address}; waiting for one: `dask worker "
+                    f"{self.address}` in a checkout adds one (Ctrl-C ends this, and what was done "
+                    "is kept)",
+                    file=sys.stderr,
+                )
+            self.told = alone
+
+
+def _round(
+    client: Client, act: Act, tasks: Mapping[str, Task], workers: _Workers
+) -> Iterator[Done]:
+    """Return what became of tasks, as they are done.
+
+    Each is followed to its value, and not only to its end: a worker that dies in between takes the
+    value with it, and the task is done again. ``as_completed`` forgets one that then fails, and
+    one whose value is on its way when the scheduler goes (distributed 2026.8).
+    """
+    found: SimpleQueue[Done | None] = SimpleQueue()
+
+    async def follow(key: str, future: Future) -> None:
+        try:
+            found.put(await future)
+        except (Exception, CancelledError) as error:
+            found.put(_failed(key, error) if future.status == "error" else None)
+
+    loop = client.loop
+    assert loop is not None  # the client is connected
+    for key, task in tasks.items():
+        loop.add_callback(follow, key, client.submit(do_in_cluster, act, task, key, pure=False))
+    for _ in tasks:
+        done = _next(found, workers)
+        if done is None:
             raise ValueError(
                 "the Dask scheduler went away; what was done is kept: start again when it is back"
             )
+        yield done
+
+
+def _next(found: SimpleQueue[Done | None], workers: _Workers) -> Done | None:
+    while True:
+        try:
+            done = found.get(timeout=LOOK)
+        except Empty:
+            workers.look()
+        else:
+            workers.told = False
+            return done
+
+
+def _failed(key: str, error: BaseException) -> Done:
+    return Done(key, error=_sentence(error), lost=isinstance(error, KilledWorker))
 
 
 def _sentence(error: BaseException) -> str:

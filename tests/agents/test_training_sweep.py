@@ -91,7 +91,7 @@ class Driver:
 
 def trainers(family: str) -> list[psutil.Process]:
     """Return the processes of a family that train."""
-    return [process for process in alive(family) if "agents.sweep_one" in process.cmdline()]
+    return alive(family, "agents.sweep_one")
 
 
 def test_whoever_is_killed_the_policies_are_those_of_lone_trainings(

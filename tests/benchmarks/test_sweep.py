@@ -97,7 +97,7 @@ class Driver:
 
     def workers(self) -> list[psutil.Process]:
         """Return loky's processes."""
-        return [p for p in alive(self.family) if any("popen_loky" in word for word in p.cmdline())]
+        return alive(self.family, "popen_loky")
 
     def rows(self) -> dict[str, str]:
         """Return the rows' texts without times, host and date."""

@@ -7,11 +7,16 @@ import os
 import subprocess
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import psutil
 
 from tests.sweeps.processes_of import alive, new_family, start, wait_until
+
+
+def _state(dask_worker: Any) -> str:
+    """Return how a nanny is; Dask gives it as this argument."""
+    return str(dask_worker.status.name)
 
 
 class DaskProcesses:
@@ -39,7 +44,25 @@ class DaskProcesses:
             raise
         self.address = str(json.loads(self.file.read_text())["address"])
         self.paths, self.folder = paths, folder
-        self.nannies = self.join(workers)
+        self.nannies: list[subprocess.Popen[bytes]] = []
+        self.join(workers)
+        try:
+            wait_until(lambda: self._settled() == workers)
+        except BaseException:
+            self.__exit__()
+            raise
+
+    def _settled(self) -> int:
+        """Return how many workers may be killed: their nannies know that they have begun.
+
+        A worker that dies in the twentieth of a second before that takes its nanny with it, the
+        nanny `dask worker`, and that all other workers (distributed 2026.8).
+        """
+        from distributed import Client
+
+        with Client(self.address, set_as_default=False) as client:
+            states = client.run(_state, nanny=True, on_error="ignore")
+        return sum(state == "running" for state in states.values())
 
     def _says_where(self) -> bool:
         """Tell whether the file is whole: it is there, empty, before the scheduler fills it."""
@@ -49,11 +72,21 @@ class DaskProcesses:
             return False
         return True
 
-    def join(self, workers: int, threads: int = 1) -> subprocess.Popen[bytes]:
+    def join(self, workers: int, threads: int = 1) -> None:
         """Start workers."""
         place = ("--local-directory", str(self.folder), "--nthreads", str(threads))
         command = ("-m", "distributed.cli.dask_worker", *self.own, *place)
-        return start(self.family, *command, "--nworkers", str(workers), paths=self.paths)
+        given = (*command, "--nworkers", str(workers))
+        self.nannies.append(start(self.family, *given, paths=self.paths))
+
+    def end_workers(self) -> None:
+        """End all workers, and what would start them again."""
+        workers = self.workers()
+        for process in self.nannies:
+            process.kill()
+            process.wait()
+        for process in workers:
+            process.kill()
 
     def workers(self) -> list[psutil.Process]:
         """Return the processes that compute."""
@@ -68,7 +101,7 @@ class DaskProcesses:
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
         """End all its processes."""
-        for process in (self.nannies, self.scheduler):
+        for process in (*self.nannies, self.scheduler):
             process.kill()
             process.wait()
         for process in alive(self.family):

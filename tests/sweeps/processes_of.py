@@ -43,15 +43,15 @@ def start(
         )
 
 
-def alive(family: str) -> list[psutil.Process]:
-    """Return the processes of a family that still run."""
+def alive(family: str, word: str = "") -> list[psutil.Process]:
+    """Return the processes of a family that still run, with ``word`` in their command lines."""
     found = []
     for process in psutil.process_iter():
         try:
-            ours = process.environ().get(MARK) == family
+            ours = process.environ().get(MARK) == family and word in " ".join(process.cmdline())
             if ours and process.status() != psutil.STATUS_ZOMBIE:
                 found.append(process)
-        except (psutil.NoSuchProcess, psutil.AccessDenied):
+        except (psutil.NoSuchProcess, psutil.AccessDenied):  # a zombie, too, is none such
             continue
     return found
 

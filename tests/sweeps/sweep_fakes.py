@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,6 +44,8 @@ def square(task: Number) -> int:
         file.write(f"{os.getpid()}\n")
     if task.kind == "deadly" or (task.kind == "deadly once" and task.begins() == 1):
         os.kill(os.getpid(), signal.SIGKILL)
+    if task.kind == "dies with its value" and task.begins() == 1:
+        threading.Timer(0.02, os.kill, (os.getpid(), signal.SIGKILL)).start()
     if task.kind == "wrong":
         raise ValueError(f"{task.number} has no square")
     if task.kind == "slow":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
+import threading
 from pathlib import Path
 from types import ModuleType
 
@@ -39,6 +40,14 @@ def test_a_killed_worker_loses_nothing(dask: DaskProcesses, tmp_path: Path) -> N
     done = list(run(square, tasks, on(dask)))
     assert sorted((d.key, d.value) for d in done) == [(str(k), k * k) for k in range(8)]
     assert tasks[1].begins() == 2
+
+
+def test_a_value_that_is_lost_on_its_way_is_made_again(dask: DaskProcesses, tmp_path: Path) -> None:
+    tasks = [
+        Number(k, "dies with its value" if k % 3 == 1 else "", str(tmp_path)) for k in range(6)
+    ]
+    done = list(run(square, tasks, on(dask)))
+    assert sorted((d.key, d.value) for d in done) == [(str(k), k * k) for k in range(6)]
 
 
 def test_a_task_that_kills_its_workers_is_named_and_costs_no_other(
@@ -89,6 +98,29 @@ def test_what_a_killed_driver_asked_for_ends(dask: DaskProcesses, tmp_path: Path
     after = [Number(k, "", str(tmp_path)) for k in range(200, 204)]  # the cluster is free again
     assert sorted(d.value for d in run(square, after, on(dask))) == [k * k for k in range(200, 204)]
     assert len(list(tmp_path.glob("begun_*"))) == 2 + len(after)
+
+
+def test_workers_that_are_gone_are_told_and_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sweeps.dask_cluster.LOOK", 0.1)
+    with DaskProcesses(tmp_path, workers=1) as dask:
+        tasks = [Number(k, "slow", str(tmp_path)) for k in range(8)]
+        found = run(square, tasks, on(dask))
+        done = [next(found)]
+        dask.end_workers()
+        told = f"no worker is at {dask.address}; waiting for one"
+
+        def join_again() -> None:
+            wait_until(lambda: told in capsys.readouterr().err)
+            dask.join(1)
+
+        helper = threading.Thread(target=join_again)
+        helper.start()
+        done += found
+        helper.join()
+        assert capsys.readouterr().err == ""  # once is enough
+        assert sorted(d.value for d in done) == [k * k for k in range(8)]
 
 
 def test_no_scheduler_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
