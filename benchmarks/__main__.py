@@ -170,11 +170,14 @@ def verify(
     row: Positional[tuple[str, ...]] = (),
     jobs: int = os.cpu_count() or 1,
     all: bool = False,
-    elsewhere: bool = False,
+    compare: Literal["either", "bits", "elsewhere"] = "either",
     backend: Literal["loky", "dask"] = "loky",
     address: str = "",
 ) -> int:
     """Run rows again from their own record; exit code 1 if one has drifted.
+
+    A row must come out equal to the last bit. One that was made with other packages or on another
+    processor, where last digits differ, has to agree nearly, and is noted as verified elsewhere.
 
     What holds is noted in verified.json beside the rows; exit code 2 if that is refused, since
     code is not as in the last commit.
@@ -183,7 +186,7 @@ def verify(
         row: Files or names of rows.
         jobs: Processes of this machine.
         all: Every row of benchmarks/results.
-        elsewhere: Allow for last digits that differ with packages or processor.
+        compare: To the last bit, nearly as of another machine, or whichever the row asks for.
         backend: Processes of this machine, or a running Dask cluster.
         address: Of the Dask scheduler, like tcp://host:8786.
     """
@@ -195,16 +198,18 @@ def verify(
     paths += sorted(rows.RESULTS.glob("*--*.json")) if all else []
     if not paths:
         raise ValueError("name a row, or give --all")
-    drifted, refusal = 0, verified.refusal()
+    said, refusal = [], verified.refusal()
     for path in paths:
-        found = checking.verify(path, Cluster(jobs, backend, address), elsewhere)
+        found = checking.verify(path, Cluster(jobs, backend, address), compare)
         if not refusal:
             verified.note(path, found.checksum if found.holds else "", found.mode, found.sources)
         telling.verdict(found)
-        drifted += not found.holds
+        said.append(telling.outcome(found))
+    if len(said) > 1:
+        print(telling.counted(said))
     if refusal:
         print(f"error: {refusal}", file=sys.stderr)
-    return 1 if drifted else 2 if refusal else 0
+    return 1 if telling.DRIFTED in said else 2 if refusal else 0
 
 
 def _row_path(name: str) -> Path:

@@ -10,18 +10,26 @@ the digest of all artefacts of the track by their controllers' names. The mainta
 for all of them, once git has them as committed, so that all are compared on the same episodes.
 Rounds are only ever added to ``rounds.json``; what has changed since the last one is self-reported
 until the next.
+
+A controller that is designed when it is built, by a Riccati equation say, holds other last digits
+on another processor, and its artefact is another by its digest. So a round also names its *design*,
+which is the same on every machine: policies, code and knobs, and all of the package that it is
+designed by. With the design of the round a controller is in it.
 """
 
 from __future__ import annotations
 
 import datetime
 import hashlib
+import importlib
+import inspect
 import json
 import math
 import secrets
 import subprocess
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +37,10 @@ import yaml
 from filelock import FileLock
 
 from benchmarks import artefacts, provenance, scenarios, tasks, trainings
-from benchmarks.canonical import digest
+from benchmarks.canonical import SOURCES, digest
 from benchmarks.controllers import Entrant
 from benchmarks.scenarios import ScenarioSet
-from benchmarks.source_code import code_text
+from benchmarks.source_code import code_digest, code_text
 from benchmarks.store import write_text
 
 FILE = Path(__file__).resolve().parent / "rounds.json"
@@ -59,6 +67,8 @@ class Round:
         ``drawn`` is the day.
     commit : str
         In which all of it was committed.
+    designs : mapping of str
+        Digest of the design of each controller; see :func:`design_of`. Of no part in the seeds.
     """
 
     track: str
@@ -68,6 +78,7 @@ class Round:
     salt: str
     drawn: str
     commit: str
+    designs: Mapping[str, str] = field(default_factory=dict)
 
     def seeds(self, names: Sequence[str]) -> dict[str, tuple[int, ...]]:
         """Return the audit seeds of each of a track's scenarios."""
@@ -90,15 +101,20 @@ class Audit:
         How many different artefacts the controller's name has had in the rounds of the track.
     seeds : mapping of tuple
         Seeds of each scenario.
+    artefact : str
+        Digest that the round has of it, where it is another here and only the design is the same;
+        empty otherwise.
     """
 
     round: Round
     entry: int
     seeds: Mapping[str, tuple[int, ...]]
+    artefact: str = ""
 
     def record(self) -> dict[str, Any]:
         """Return the audit as a row holds it, less its scores."""
-        return {
+        drawn_as = {"artefact": self.artefact} if self.artefact else {}
+        return drawn_as | {
             "round": self.round.number,
             "salt": self.round.salt,
             "drawn": self.round.drawn,
@@ -151,24 +167,77 @@ def last(track: str, file: Path | None = None) -> Round | None:
     return next((entry for entry in rounds(file)[::-1] if entry.track == track), None)
 
 
-def of(track: ScenarioSet, controller: str, task: str, artefact: str) -> Audit | None:
-    """Return the audit of an artefact, ``None`` where it is not in the last round of its track."""
-    found = last(track.name)
-    if found is None or (found.task, found.entrants.get(controller)) != (task, artefact):
-        return None
-    names = [scenario.name for scenario in track.scenarios()]
-    mine = [entry for entry in rounds() if entry.track == track.name]
-    had = {entry.entrants[controller] for entry in mine if controller in entry.entrants}
-    return Audit(found, len(had), found.seeds(names))
-
-
 def find(entrant: Entrant, track: ScenarioSet) -> Audit | None:
-    """Return the audit of a controller as it is now."""
+    """Return the audit of a controller as it is now, ``None`` where it is in no last round.
+
+    It is in the round if its artefact is, or if its design is.
+    """
     found = last(track.name)
     if found is None or entrant.name not in found.entrants:  # saves building controllers
         return None
     artefact = artefacts.of(entrant, track).digest
-    return of(track, entrant.name, tasks.task_digest(track), artefact)
+    return _place(found, entrant, track, tasks.task_digest(track), artefact)
+
+
+def of_row(row: Mapping[str, Any], entrant: Entrant, track: ScenarioSet) -> Audit | None:
+    """Return the audit of the artefact that a row says it is of.
+
+    Where the round knows its digest, that is all that is looked at. If not, it may have been made
+    on another machine: then the design of the controller as it is now has to be the round's.
+    """
+    found = last(track.name)
+    if found is None:
+        return None
+    return _place(found, entrant, track, row["task"], row["controller"]["artefact"]["digest"])
+
+
+def _place(
+    found: Round, entrant: Entrant, track: ScenarioSet, task: str, artefact: str
+) -> Audit | None:
+    name = entrant.name
+    if found.task != task or name not in found.entrants:
+        return None
+    drawn_as = found.entrants[name]
+    if artefact != drawn_as and found.designs.get(name) != design_of(entrant, track):
+        return None
+    mine = [entry for entry in rounds() if entry.track == track.name]
+    had = {entry.entrants[name] for entry in mine if name in entry.entrants}
+    seeds = found.seeds([scenario.name for scenario in track.scenarios()])
+    return Audit(found, len(had), seeds, "" if artefact == drawn_as else drawn_as)
+
+
+def design_of(entrant: Entrant, track: ScenarioSet) -> str:
+    """Return the digest of what makes a controller and is the same on every machine.
+
+    Its policies, its code and knobs, and all code and data of the package that it is designed by:
+    its own, or that of the controller that it corrects. A policy is designed by none.
+    """
+    made = artefacts.of(entrant, track)
+    designer = artefacts.BASELINES if entrant.kind == artefacts.RESIDUAL else ""
+    if not entrant.files:
+        designer = entrant.source.partition(".")[0]
+    return digest(
+        {
+            "files": [[file["training_seed"], file["sha256"]] for file in made.files],
+            "code": list(made.code),
+            "designer": _package_digest(designer) if designer else "",
+        }
+    )
+
+
+@lru_cache(maxsize=8)
+def _package_digest(name: str) -> str:
+    """Return the digest of all code of a package as code, and of its data but knobs of searches."""
+    place = Path(inspect.getfile(importlib.import_module(name))).resolve()
+    files = place.parent.rglob("*") if place.name == "__init__.py" else [place]
+    known = sorted(file for file in files if file.suffix in SOURCES and file != artefacts.TUNED)
+    code = [file for file in known if file.suffix == ".py"]
+    data = {
+        file.relative_to(place.parent).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in known
+        if file.suffix != ".py"
+    }
+    return digest({"code": code_digest(code, place.parent), "data": data})
 
 
 def in_last_round(row: Mapping[str, Any]) -> bool:
@@ -176,7 +245,8 @@ def in_last_round(row: Mapping[str, Any]) -> bool:
     found, said, about = last(row["scenarios"]["name"]), row["audit"], row["controller"]
     if found is None or said is None:
         return False
-    mine = (row["task"], about["artefact"]["digest"], said["round"], said["salt"])
+    artefact = said.get("artefact", about["artefact"]["digest"])
+    mine = (row["task"], artefact, said["round"], said["salt"])
     return mine == (found.task, found.entrants.get(about["name"]), found.number, found.salt)
 
 
@@ -194,8 +264,9 @@ def draw(track: ScenarioSet, entrants: Sequence[Entrant]) -> Round:
             trainings.check_files(entrant)
         task = tasks.task_digest(track)
         here = {entrant.name: artefacts.of(entrant, track).digest for entrant in entrants}
+        designs = {entrant.name: design_of(entrant, track) for entrant in entrants}
         there = last(track.name)
-        if there is not None and (there.task, there.entrants) == (task, here):
+        if there is not None and there.task == task and _equal(there, here, designs):
             return there
         check_only_added()
         _check_committed(track, entrants)
@@ -207,10 +278,19 @@ def draw(track: ScenarioSet, entrants: Sequence[Entrant]) -> Round:
             salt=secrets.token_hex(16),
             drawn=datetime.datetime.now(datetime.UTC).date().isoformat(),
             commit=provenance.git("rev-parse", "HEAD", folder=FILE.parent),
+            designs=designs,
         )
         text = json.dumps({"rounds": [asdict(entry) for entry in [*rounds(), made]]}, indent=1)
         write_text(FILE, text + "\n")
     return made
+
+
+def _equal(there: Round, here: Mapping[str, str], designs: Mapping[str, str]) -> bool:
+    """Return whether a round is of these artefacts, or of these designs."""
+    return here.keys() == there.entrants.keys() and all(
+        there.entrants[name] == artefact or there.designs.get(name) == designs[name]
+        for name, artefact in here.items()
+    )
 
 
 def _check_committed(track: ScenarioSet, entrants: Sequence[Entrant]) -> None:
@@ -228,6 +308,8 @@ def _check_committed(track: ScenarioSet, entrants: Sequence[Entrant]) -> None:
 def check_only_added() -> None:
     """Raise if a round that the last commit holds was changed, moved or taken out.
 
+    Designs may be added to one that has none.
+
     Raises
     ------
     ValueError
@@ -238,7 +320,11 @@ def check_only_added() -> None:
     except ValueError:
         return
     old = [Round(**entry) for entry in json.loads(committed)["rounds"]] if committed else []
-    if rounds()[: len(old)] != old:
+    kept = [
+        replace(new, designs={}) if not before.designs else new
+        for new, before in zip(rounds(), old, strict=False)
+    ]
+    if kept != old:
         raise ValueError(f"{FILE}: rounds of the last commit were changed; restore it from git")
 
 

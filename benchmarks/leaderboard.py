@@ -135,7 +135,7 @@ PREFACE = """\
   controller's, each; with a higher cost it is called *better error, higher cost*. A constraint cost
   below a thousandth counts as none.
 - **state**: the day on which `verify` ran the row again and found every number; *elsewhere*: on
-  another machine, where the last digits of a policy differ; *at an older code*: code, data or
+  another machine, where last digits differ; *at an older code*: code, data or
   policies have changed since, and it was not verified with them.
 - *Smooth references*: RMS without steps and staircases, whose edges no controller can follow.
 - A run that a limit ended counts at the worst-case value and shows under *failures*; none is left

@@ -23,6 +23,8 @@ OWN = 1e-9
 """That a summary may have from what the row's own episodes give."""
 SLACK = 1e-6
 """Parts of the worst case that are no difference, for scores near zero."""
+SHOWN = 4
+"""Numbers of a controller that a note names."""
 _NEARLY = ("episodes", "aggregate", "by", "audit", "traces", "actions")
 _NUMBERS = ("controller.digest:", "controller.parameters.", "controller.artefact.digest:")
 
@@ -42,7 +44,8 @@ def compare(before: Row, after: Row, drifted: list[str], notes: list[str]) -> No
     drifted += lines
     drifted += _artefact(before["controller"])
     if computed:
-        notes.append(f"computed a little otherwise here: {', '.join(computed)}")
+        more = f" and {len(computed) - SHOWN} more" if len(computed) > SHOWN else ""
+        notes.append(f"computed a little otherwise here: {', '.join(computed[:SHOWN])}{more}")
     drifted += differences(*(_frame(row) for row in (before, after)), "episodes")
     drifted += _scores(before, after)
     drifted += _runs(before, after)
@@ -80,13 +83,14 @@ def _frame(row: Row) -> list[Any]:
     return [{k: v for k, v in e.items() if k not in rounded} for e in row["episodes"]]
 
 
-def _slack(row: Row) -> dict[str, float]:
+def slack_of(row: Row) -> dict[str, float]:
+    """Return below which difference each score of a track is the same: near zero, say."""
     worst = row["scenarios"]["content"]["worst_case"]
     return {metric: SLACK * float(value) for metric, value in worst.items()}
 
 
 def _scores(before: Row, after: Row) -> Iterator[str]:
-    slack = _slack(after)
+    slack = slack_of(after)
     for k, (old, new) in enumerate(zip(before["episodes"], after["episodes"], strict=False)):
         for metric, value in new["scores"].items():
             where = f"episodes[{k}].scores.{metric}"
@@ -95,7 +99,7 @@ def _scores(before: Row, after: Row) -> Iterator[str]:
 
 def _runs(before: Row, after: Row) -> Iterator[str]:
     """Yield in which means of a training seed two rows differ."""
-    slack = _slack(after)
+    slack = slack_of(after)
     for split in (cells.PUBLIC, cells.AUDIT):
         for run in after["training_seeds"]:
             for metric, allowed in slack.items():
@@ -113,14 +117,14 @@ def _mean(row: Row, split: str, run: int, metric: str) -> float | None:
 
 def _summaries(before: Row, after: Row) -> Iterator[str]:
     """Yield in which means and intervals two rows differ, or the first from its own episodes."""
-    slack = _slack(after)
+    slack = slack_of(after)
     old, new, own = _tables(before), _tables(after), _own(before)
     for name, table in new.items():
         for metric, scores in table.items():
             given = old.get(name, {}).get(metric)
             where = f"{name}.{metric}"
             yield from differences(given, scores, where, SUMMARY, slack[metric])
-            followed = own.get(name, {}).get(metric)
+            followed = plain(own.get(name, {}).get(metric))
             yield from differences(given, followed, where, OWN, SLACK * slack[metric])
     headline = slack[headline_of(after["scenarios"]["content"])]
     yield from differences(before["by"], after["by"], "by", SUMMARY, headline)
@@ -147,7 +151,7 @@ def _own(row: Row) -> dict[str, Any]:
     wanted = of_track(row["scenarios"]["content"])
     splits = {"aggregate": cells.PUBLIC, "audit.aggregate": cells.AUDIT}
     scored = {name: rows.episodes_of(row, split) for name, split in splits.items()}
-    return {name: plain(rows.aggregate(found, wanted)) for name, found in scored.items() if found}
+    return {name: rows.aggregate(found, wanted) for name, found in scored.items() if found}
 
 
 def _pictures(old: list[Any], new: list[Any]) -> Iterator[str]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks import rows
+from benchmarks import rows, verified
 from benchmarks.audit import Round
 from benchmarks.metrics import headline_of
 from benchmarks.runner import Report
@@ -56,9 +57,25 @@ def round_in_words(found: Round) -> str:
     )
 
 
+HOLDS, NEARLY, DRIFTED = "holds", "holds nearly, as of another machine", "DRIFTED"
+
+
+def outcome(found: Verdict) -> str:
+    """Return in words whether a row holds: to the last bit, nearly, or not."""
+    if not found.holds:
+        return DRIFTED
+    return HOLDS if found.mode == verified.BITS else NEARLY
+
+
+def counted(outcomes: Sequence[str]) -> str:
+    """Return a line that says how many rows came to which outcome."""
+    counts = [(outcomes.count(word), word) for word in (HOLDS, NEARLY, DRIFTED)]
+    return f"{len(outcomes)} rows: " + "; ".join(f"{n} {word}" for n, word in counts if n)
+
+
 def verdict(found: Verdict) -> None:
     """Print whether a row holds, what has drifted, and what to do about it."""
-    print(f"{found.row}: {'holds' if found.holds else 'DRIFTED'}", flush=True)
+    print(f"{found.row}: {outcome(found)}", flush=True)
     for line in found.drifted[:LINES]:
         print(f"  {line}")
     if len(found.drifted) > LINES:

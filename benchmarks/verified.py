@@ -86,6 +86,8 @@ def refusal() -> str:
 def note(path: Path, checksum: str, mode: str, sources: Mapping[str, str]) -> None:
     """Note beside a row that it held, or take out what was noted where it did not.
 
+    That it held to the last bit stays noted where it holds elsewhere, too, with the same sources.
+
     Parameters
     ----------
     path : Path
@@ -99,6 +101,8 @@ def note(path: Path, checksum: str, mode: str, sources: Mapping[str, str]) -> No
     """
     with FileLock(path.parent / f".{FILE}.lock"):
         before = read(path.parent)
+        if _is_stronger(before.get(path.stem), checksum, mode, sources):
+            return
         known = {name: entry for name, entry in before.items() if name != path.stem}
         if checksum:
             known[path.stem] = {
@@ -111,3 +115,16 @@ def note(path: Path, checksum: str, mode: str, sources: Mapping[str, str]) -> No
             }
         if known != before:
             write_text(path.parent / FILE, json.dumps(known, indent=1, sort_keys=True) + "\n")
+
+
+def _is_stronger(
+    entry: Mapping[str, Any] | None, checksum: str, mode: str, sources: Mapping[str, str]
+) -> bool:
+    """Return whether a note says more than that the same row held elsewhere."""
+    return (
+        entry is not None
+        and mode == ELSEWHERE
+        and entry["mode"] == BITS
+        and entry["checksum"] == checksum
+        and entry.get("sources") == dict(sources)
+    )

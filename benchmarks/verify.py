@@ -34,7 +34,7 @@ class Verdict:
     ----------
     row : str
     mode : {"bits", "elsewhere"}
-        How it was compared.
+        How it was compared: to the last bit, or as of another machine.
     drifted : list of str
         Every field that differs, with both values; empty if the row holds.
     notes : list of str
@@ -58,22 +58,32 @@ class Verdict:
         return not self.drifted
 
 
-def verify(path: Path, cluster: engine.Cluster | None = None, elsewhere: bool = False) -> Verdict:
+def verify(
+    path: Path, cluster: engine.Cluster | None = None, compare: str = verified.BITS
+) -> Verdict:
     """Run the row of a file again and compare.
-
-    Rows must come out equal to the last bit. The row has no say in that; whoever verifies may ask
-    for a comparison that allows for another machine, see :mod:`benchmarks.nearly`.
 
     Parameters
     ----------
     path : Path
     cluster : Cluster, optional
         Where to compute; in this process by default.
-    elsewhere : bool
-        Whether last digits may differ, since the row was made with other packages or another
-        processor.
+    compare : {"bits", "elsewhere", "either"}
+        To the last bit, the default; or as of another machine, where packages or processor round
+        otherwise, see :mod:`benchmarks.nearly`; or the latter where the row is not equal and says
+        that it was made with others. What it says, it may have made up: its verdict's ``mode`` is
+        "elsewhere" then, and never "bits".
+
+    Raises
+    ------
+    ValueError
+        If there is no such comparison.
     """
-    verdict = Verdict(path.stem, verified.ELSEWHERE if elsewhere else verified.BITS)
+    if compare not in COMPARISONS:
+        raise ValueError(f"compare: {compare!r} is none of {', '.join(COMPARISONS)}")
+    verdict = Verdict(
+        path.stem, verified.ELSEWHERE if compare == verified.ELSEWHERE else verified.BITS
+    )
     try:
         stored = json.loads(path.read_bytes())
         rows.check_schema(stored, path)
@@ -85,7 +95,7 @@ def verify(path: Path, cluster: engine.Cluster | None = None, elsewhere: bool = 
     if wrong:
         verdict.drifted.append(f"file: {wrong}")
     try:
-        _check(stored, cluster or engine.Cluster(), verdict)
+        _check(stored, cluster or engine.Cluster(), verdict, compare)
     except KeyError as error:
         verdict.drifted.append(f"cannot be run again: there is no {error}")
     except Exception as error:
@@ -93,7 +103,7 @@ def verify(path: Path, cluster: engine.Cluster | None = None, elsewhere: bool = 
     return verdict
 
 
-def _check(stored: Record, cluster: engine.Cluster, verdict: Verdict) -> None:
+def _check(stored: Record, cluster: engine.Cluster, verdict: Verdict, compare: str) -> None:
     tasks.check_version(stored["env"]["id"], stored["row"])
     entrant = find(stored["controller"]["name"])
     track = scenarios.load(scenarios.FOLDER / f"{stored['scenarios']['name']}.yaml")
@@ -101,14 +111,13 @@ def _check(stored: Record, cluster: engine.Cluster, verdict: Verdict) -> None:
     if other:  # and nothing of it is run
         verdict.drifted += other
         return
-    artefact = stored["controller"]["artefact"]["digest"]
-    found = audit.of(track, entrant.name, stored["task"], artefact)
+    found = audit.of_row(stored, entrant, track)
     wanted = cells_of(entrant, track, found)
     _compare_audit(stored, entrant, track, found, verdict)
     _compare_episodes(stored, wanted, verdict)
     again = _run_again(entrant, track, found, wanted, cluster)
     verdict.sources = again["made_with"]["sources"]
-    _compare(stored, again, entrant, track, verdict)
+    _compare(stored, again, entrant, track, verdict, compare)
 
 
 def _other_scenarios(stored: Record, track: ScenarioSet) -> list[str]:
@@ -192,26 +201,35 @@ def _run_again(
 
 
 def _compare(
-    stored: Record, again: dict[str, Any], entrant: Entrant, track: ScenarioSet, verdict: Verdict
+    stored: Record,
+    again: dict[str, Any],
+    entrant: Entrant,
+    track: ScenarioSet,
+    verdict: Verdict,
+    compare: str,
 ) -> None:
     before, after = comparable(stored), comparable(again)
     made = [row.pop("made_with", None) for row in (before, after)]
     verdict.notes += differences(*made, "made_with")
-    if verdict.mode == verified.BITS:
+    if compare != verified.ELSEWHERE:
         drifted = differences(before, after)
-        verdict.drifted += drifted
-        if drifted and _other_machine(verdict.notes):
-            verdict.notes.append(OTHER)
-        return
+        other = bool(drifted) and _other_machine(verdict.notes)
+        if not other or compare == verified.BITS:
+            verdict.drifted += drifted
+            verdict.notes += [OTHER] if other else []
+            return
+        verdict.mode = verified.ELSEWHERE
+        verdict.notes.append(f"{len(drifted)} fields differ in bits, the first: {drifted[0]}")
     nearly.compare(before, after, verdict.drifted, verdict.notes)
     if entrant.files:
         verdict.drifted += replay.differences(stored, entrant, track)
 
 
+COMPARISONS = (verified.BITS, verified.ELSEWHERE, "either")
 OTHER = (
-    "packages or processor are others than recorded, which changes last digits: `verify "
-    "--elsewhere` allows for that, and then every score to 1 %, every mean and interval to 0.1 % "
-    "has to agree; what it finds is no proof of equal bits"
+    "packages or processor are others than recorded, which changes last digits: `verify --compare "
+    "elsewhere` allows for that, and then every score to 1 %, every mean and interval to 0.1 % has "
+    "to agree; what it finds is no proof of equal bits"
 )
 
 

@@ -270,6 +270,96 @@ def test_rounds_are_only_ever_added(board: Path) -> None:
         audit.rounds()
 
 
+def test_designs_may_be_added_to_a_round_that_has_none_and_not_changed(board: Path) -> None:
+    drawn = draw(board, "low")
+    (kept,) = json.loads(audit.FILE.read_text())["rounds"]
+    assert kept["designs"] == {"low": audit.design_of(find("low"), tiny(board))}
+    old = {name: value for name, value in kept.items() if name != "designs"}
+    audit.FILE.write_text(json.dumps({"rounds": [old]}))
+    commit(board)
+    assert audit.rounds() == [replace(drawn, designs={})]
+    audit.FILE.write_text(json.dumps({"rounds": [kept]}))
+    audit.check_only_added()
+    commit(board)
+    for other in ({"low": "another"}, {}):
+        audit.FILE.write_text(json.dumps({"rounds": [{**kept, "designs": other}]}))
+        with pytest.raises(ValueError, match="were changed; restore it from git"):
+            audit.check_only_added()
+
+
+@pytest.fixture
+def another_machine(monkeypatch: pytest.MonkeyPatch) -> Iterator[pytest.MonkeyPatch]:
+    """A processor on which a controller is designed with other last digits."""
+    make = bench_fakes.make_controller
+
+    def designed(name: str, *arguments: object, **named: object) -> object:
+        made = make(name, *arguments, **named)
+        return replace(made, gain=made.gain * (1.0 + 1e-12)) if hasattr(made, "gain") else made
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bench_fakes, "make_controller", designed)
+        patch.setattr(provenance, "cpu", lambda: "another")
+        artefacts._built.cache_clear()
+        yield patch
+    artefacts._built.cache_clear()
+
+
+def test_on_another_machine_a_design_is_in_its_round(
+    board: Path, request: pytest.FixtureRequest
+) -> None:
+    drawn, track, entrant = draw(board, "integral", "trained"), tiny(board), find("integral")
+    here = run_row(board, "integral", out=board / "here")
+    seeds = rows.load(here)["audit"]["seeds"]
+    there: pytest.MonkeyPatch = request.getfixturevalue("another_machine")
+    assert artefacts.of(entrant, track).digest != drawn.entrants["integral"]
+    found = audit.find(entrant, track)
+    assert found is not None
+    assert found.artefact == drawn.entrants["integral"]
+    assert draw(board, "integral", "trained") == drawn
+    path = run_row(board, "integral", out=board / "there", cells=board / "anew")
+    row = rows.load(path)
+    assert row["audit"]["seeds"] == seeds
+    assert row["audit"]["artefact"] == drawn.entrants["integral"]
+    assert audit.in_last_round(row)
+    assert not audit.in_last_round({**row, "audit": {**row["audit"], "artefact": "another"}})
+    verdict = verify(path)
+    assert verdict.holds, verdict.drifted
+    verdict = verify(here, compare="either")
+    assert (verdict.drifted, verdict.mode) == ([], "elsewhere")
+    with pytest.MonkeyPatch.context() as patch:  # its code has changed since
+        patch.setattr(audit, "_package_digest", lambda name: "another")
+        assert audit.find(entrant, track) is None
+        assert "audit: its task and artefact are not in the last round" in verify(path).drifted[0]
+        assert draw(board, "integral", "trained").number == 2
+    there.undo()
+    artefacts._built.cache_clear()
+
+
+def test_a_row_of_another_machine_is_verified_here(
+    board: Path, request: pytest.FixtureRequest
+) -> None:
+    draw(board, "integral")
+    there: pytest.MonkeyPatch = request.getfixturevalue("another_machine")
+    path = run_row(board, "integral")
+    there.undo()
+    artefacts._built.cache_clear()
+    verdict = verify(path, compare="either")
+    assert (verdict.drifted, verdict.mode) == ([], "elsewhere")
+    assert not verify(path).holds
+
+
+@pytest.mark.parametrize("name", ["positioning_nominal", "knee_tension_nominal", "joint_nominal"])
+def test_all_that_the_last_rounds_are_of_is_here_as_it_was_drawn(name: str) -> None:
+    """Whatever the machine: designs are the same where last digits are not."""
+    track = scenarios.load(scenarios.FOLDER / f"{name}.yaml")
+    drawn = audit.last(name)
+    assert drawn is not None
+    assert drawn.designs.keys() == drawn.entrants.keys()
+    entrants = [controllers.find(entrant) for entrant in drawn.entrants]
+    assert {e.name: audit.design_of(e, track) for e in entrants} == drawn.designs
+    assert all(audit.find(entrant, track) is not None for entrant in entrants)
+
+
 def recorded(board: Path, **changes: str) -> list[str]:
     """Return what ``verify`` finds once the round of a row that was run was altered."""
     content = json.loads(audit.FILE.read_text())

@@ -13,7 +13,18 @@ import bench_fakes
 import numpy as np
 import pytest
 
-from benchmarks import audit, cells, provenance, rows, tasks, traces, verified, verify
+from benchmarks import (
+    audit,
+    cells,
+    metrics,
+    provenance,
+    replay,
+    rows,
+    tasks,
+    traces,
+    verified,
+    verify,
+)
 from benchmarks.__main__ import main
 from benchmarks.canonical import digest, plain
 from benchmarks.controllers import available
@@ -38,8 +49,8 @@ def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield folder
 
 
-def verdict_of(board: Path, name: str, elsewhere: bool = False) -> verify.Verdict:
-    return verify.verify(board / "out" / f"tiny--{name}.json", elsewhere=elsewhere)
+def verdict_of(board: Path, name: str, compare: str = "bits") -> verify.Verdict:
+    return verify.verify(board / "out" / f"tiny--{name}.json", compare=compare)
 
 
 @pytest.fixture
@@ -48,7 +59,7 @@ def forged(board: Path) -> Iterator[Callable[..., verify.Verdict]]:
     kept: dict[Path, bytes] = {}
 
     def alter(
-        name: str, change: Callable[[Row], None], elsewhere: bool = False, loads: bool = True
+        name: str, change: Callable[[Row], None], compare: str = "bits", loads: bool = True
     ) -> verify.Verdict:
         path = board / "out" / f"tiny--{name}.json"
         path.write_bytes(kept.setdefault(path, path.read_bytes()))
@@ -59,7 +70,7 @@ def forged(board: Path) -> Iterator[Callable[..., verify.Verdict]]:
         write_record(path, row)
         if loads:  # sealed anew: the checksum does not tell
             assert rows.load(path)
-        return verdict_of(board, name, elsewhere)
+        return verdict_of(board, name, compare)
 
     yield alter
     for path, content in kept.items():
@@ -361,11 +372,86 @@ def test_elsewhere_a_row_is_compared_nearly_where_that_is_asked_for(
 ) -> None:
     verdict = verdict_of(board, name)
     assert not verdict.holds
-    assert any("`verify --elsewhere` allows for that" in note for note in verdict.notes)
-    verdict = verdict_of(board, name, elsewhere=True)
+    assert any("`verify --compare elsewhere` allows for that" in note for note in verdict.notes)
+    verdict = verdict_of(board, name, compare="elsewhere")
     assert verdict.holds, verdict.drifted
     assert verdict.mode == "elsewhere"
     assert any("scores to 1 %" in note for note in verdict.notes)
+    either = verdict_of(board, name, compare="either")
+    assert (either.holds, either.mode) == (True, "elsewhere")
+    assert any(" fields differ in bits, the first: " in note for note in either.notes)
+
+
+def test_a_comparison_is_one_of_three(board: Path) -> None:
+    with pytest.raises(ValueError, match="compare: 'nearly' is none of bits, elsewhere, either"):
+        verdict_of(board, "integral", compare="nearly")
+
+
+@pytest.mark.parametrize("name", ["trained", "integral"])
+def test_on_the_same_machine_either_is_to_the_last_bit(name: str, board: Path, forged: Any) -> None:
+    verdict = verdict_of(board, name, compare="either")
+    assert (verdict.holds, verdict.mode) == (True, "bits")
+
+    def change(row: Row) -> None:
+        row["episodes"][0]["scores"]["rms_error"] *= 1.0 - 1e-12
+
+    verdict = forged(name, change, compare="either")
+    assert verdict.mode == "bits"
+    tell(verdict, "episodes[0].scores.rms_error")
+
+
+def scored_as(value: float, patch: pytest.MonkeyPatch) -> None:
+    """Let a metric have a value in all episodes."""
+    score = metrics.score
+
+    def told(*arguments: Any, **named: Any) -> dict[str, float]:
+        return {**score(*arguments, **named), "p95_error": value}
+
+    patch.setattr(metrics, "score", told)
+
+
+def test_elsewhere_a_metric_that_does_not_apply_is_no_drift(
+    board: Path, elsewhere: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its means are NaN, and so is their gap."""
+    scored_as(float("nan"), monkeypatch)
+    path = run_row(board, "trained", out=board / "none", cells=board / "none applies")
+    assert read_record(path)["audit"]["gap"]["p95_error"] is None
+    verdict = verify.verify(path, compare="elsewhere")
+    assert verdict.holds, verdict.drifted
+
+
+@pytest.mark.parametrize(("again", "holds"), [(5.1e-16, True), (5e-16 + 1e-9, False)])
+def test_elsewhere_next_to_nothing_may_be_another_nothing(
+    again: float, holds: bool, board: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scored_as(5e-16, monkeypatch)
+    path = run_row(board, "trained", out=board / "tiny", cells=board / "next to nothing")
+    scored_as(again, monkeypatch)
+    verdict = verify.verify(path, compare="elsewhere")
+    assert verdict.holds is holds, verdict.drifted
+    assert holds or all("replayed" in line for line in verdict.drifted)
+
+
+class Modelled:
+    """Says what its model does, from its own state."""
+
+    def predict(self, observation: Any, state: Any = None, *_: Any) -> tuple[Any, Any]:
+        return observation, 1 if state is None else state + 1
+
+    def model_output(self, state: Any) -> float:
+        return 10.0 * state
+
+
+def test_a_model_to_follow_is_asked_for_where_actions_are_played_again() -> None:
+    actions, span = np.zeros((3, 1)), np.ones(1)
+    asked = replay.Questioned(Modelled(), actions, span)
+    state, said = None, []
+    for start in (True, False, False):
+        _, state = asked.predict(np.zeros(1), state, start)
+        said.append(asked.model_output(state))
+    assert said == [10.0, 20.0, 30.0]
+    assert not hasattr(replay.Questioned(bench_fakes.Trained, actions, span), "model_output")
 
 
 def test_elsewhere_a_controller_that_is_designed_there_may_have_other_last_digits(
@@ -378,7 +464,7 @@ def test_elsewhere_a_controller_that_is_designed_there_may_have_other_last_digit
         return dataclasses.replace(made, gain=made.gain * (1.0 + 1e-9))
 
     monkeypatch.setattr(bench_fakes, "make_controller", designed)
-    verdict = verdict_of(board, "integral", elsewhere=True)
+    verdict = verdict_of(board, "integral", compare="elsewhere")
     assert verdict.holds, verdict.drifted
     assert any("otherwise here: controller.artefact.digest, " in note for note in verdict.notes)
 
@@ -396,7 +482,7 @@ def turned(board: Path) -> Iterator[Row]:
 def resealed(board: Path, row: Row) -> verify.Verdict:
     path = board / "turned" / "tiny--tuned.json"
     write_record(path, row)
-    return verify.verify(path, elsewhere=True)
+    return verify.verify(path, compare="elsewhere")
 
 
 PARTS = {
@@ -429,7 +515,7 @@ def test_elsewhere_a_knob_that_was_turned_after_the_round_is_found(
 def test_a_knob_of_another_controller_changes_nothing(board: Path) -> None:
     try:
         bench_fakes.write_knobs(board / "policies", other={"lead": 1.5}, more={"lead": 1.1})
-        verdict = verdict_of(board, "tuned", elsewhere=True)
+        verdict = verdict_of(board, "tuned", compare="elsewhere")
     finally:
         bench_fakes.write_knobs(board / "policies")
     assert verdict.holds, verdict.drifted
@@ -442,8 +528,9 @@ def test_a_row_cannot_choose_how_it_is_compared(forged: Any) -> None:
         row["made_with"]["cpu"] = "anything"
         flatten(row)
 
-    for asked in (False, True):
-        verdict = forged("trained", change, elsewhere=asked)
+    for asked in ("bits", "elsewhere", "either"):
+        verdict = forged("trained", change, compare=asked)
+        assert verdict.mode == ("bits" if asked == "bits" else "elsewhere")
         tell(verdict, "].scores.rms_error: ")
         tell(verdict, "aggregate.rms_error")
 
@@ -476,7 +563,7 @@ def test_elsewhere_one_training_seed_cannot_be_made_better(elsewhere: None, forg
             if episode["training_seed"] == 1:
                 episode["scores"]["rms_error"] *= 1.0 - 5e-3
 
-    verdict = forged("trained", change, elsewhere=True)
+    verdict = forged("trained", change, compare="elsewhere")
     tell(verdict, "audit mean of rms_error, training seed 1: ")
     tell(verdict, "public mean of rms_error, training seed 1: ")
 
@@ -531,7 +618,7 @@ def test_elsewhere_a_forged_policy_is_found(kind: str, elsewhere: None, forged: 
         if kind == "summary":
             row["controller"]["summary"] = "another"
 
-    tell(forged("trained", change, elsewhere=True), KINDS[kind])
+    tell(forged("trained", change, compare="elsewhere"), KINDS[kind])
 
 
 def test_elsewhere_a_policy_that_answers_otherwise_is_found(
@@ -544,7 +631,7 @@ def test_elsewhere_a_policy_that_answers_otherwise_is_found(
         return action + 0.01, state
 
     monkeypatch.setattr(bench_fakes.Trained, "predict", other)
-    tell(verdict_of(board, "trained", elsewhere=True), "the policy answers otherwise by 0.005")
+    tell(verdict_of(board, "trained", compare="elsewhere"), "the policy answers otherwise by 0.005")
 
 
 def test_the_command_says_which_row_drifted_and_notes_which_held(
@@ -564,16 +651,34 @@ def test_the_command_says_which_row_drifted_and_notes_which_held(
     assert entry["older"] is False
     assert verified.of({**row, "checksum": "another"}, found, available()) is None
     forged("raises", lambda row: row["episodes"].pop())
-    assert main(["verify", honest, other, "--elsewhere", "--jobs", "1"]) == 1
+    assert main(["verify", honest, other, "--compare", "elsewhere", "--jobs", "1"]) == 1
     said = capsys.readouterr().out
-    assert "tiny--integral: holds" in said
+    assert "tiny--integral: holds nearly, as of another machine\n" in said
+    assert "2 rows: 1 holds nearly, as of another machine; 1 DRIFTED\n" in said
     assert "tiny--raises: DRIFTED\n  episodes: 1 missing, the first: public, " in said
     assert "run the row again: python -m benchmarks run --track tiny --controller raises" in said
     found = verified.read(board / "out")
-    assert {name: entry["mode"] for name, entry in found.items()} == {"tiny--integral": "elsewhere"}
+    assert {name: entry["mode"] for name, entry in found.items()} == {"tiny--integral": "bits"}
     for command in ("verify", "cite"):
         assert main([command, "tiny--nobody"]) == 2
         assert "there is no row 'tiny--nobody'" in capsys.readouterr().err
+
+
+def test_what_held_to_the_last_bit_stays_noted_so(tmp_path: Path) -> None:
+    path = tmp_path / "a--b.json"
+
+    def noted(checksum: str, mode: str, **sources: str) -> str | None:
+        verified.note(path, checksum, mode, sources)
+        entry = verified.read(tmp_path).get("a--b")
+        return entry and entry["mode"]
+
+    assert noted("1", "elsewhere", code="x") == "elsewhere"
+    assert noted("1", "bits", code="x") == "bits"
+    assert noted("1", "elsewhere", code="x") == "bits"
+    assert noted("1", "elsewhere", code="y") == "elsewhere"  # of other code it says nothing
+    assert noted("1", "bits", code="y") == "bits"
+    assert noted("2", "elsewhere", code="y") == "elsewhere"
+    assert noted("", "elsewhere", code="y") is None
 
 
 def test_the_command_notes_nothing_where_code_is_not_committed(
@@ -584,7 +689,7 @@ def test_the_command_notes_nothing_where_code_is_not_committed(
     before = noted.read_bytes()
     assert json.loads(before)["tiny--integral"]["mode"] == "bits"
     monkeypatch.setattr(provenance, "changed", lambda: ["pam_envs/kernels.py"])
-    assert main(["verify", path, "--elsewhere", "--jobs", "1"]) == 2
+    assert main(["verify", path, "--compare", "elsewhere", "--jobs", "1"]) == 2
     said = capsys.readouterr()
     assert "tiny--integral: holds" in said.out
     assert said.err == (
