@@ -24,7 +24,7 @@ from tests.sweeps.processes_of import alive, new_family, start, wait_until
 
 pytestmark = pytest.mark.xdist_group("training_sweep")  # one cluster
 SEEDS = (3, 4)
-CONFIG = configs.changed(tiny(), ["steps=5_000"])
+CONFIG = configs.changed(tiny(), ["steps=8_000"])
 
 PROGRAM = """
 import json, sys
@@ -74,6 +74,9 @@ class Driver:
 
     def under_way(self) -> bool:
         """Return whether both trainings have a checkpoint, and neither its policy."""
+        assert not any((each.folder / "policy.onnx").exists() for each in self.trainings), (
+            "too late"
+        )
         return all((each.folder / "checkpoint.pt").exists() for each in self.trainings)
 
     def trainers(self) -> list[psutil.Process]:

@@ -21,6 +21,7 @@ from benchmarks.controllers import find
 from benchmarks.runner import Options, Report, run
 from benchmarks.scenarios import ScenarioSet
 from benchmarks.store import Store, comparable, read_record, seal
+from tests.sweeps.processes_of import wait_until
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = ("low", "middle", "integral")
@@ -108,14 +109,18 @@ def test_no_kill_leaves_half_a_file(tmp_path: Path) -> None:
     path = tmp_path / "record.json"
     random = np.random.default_rng(0)
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    half = 0
     for _ in range(8):
+        path.unlink(missing_ok=True)
         writer = subprocess.Popen([sys.executable, "-c", _WRITER, str(path)], env=environment)
-        while not path.exists():
-            time.sleep(0.01)
+        wait_until(lambda writer=writer: path.exists() or writer.poll() is not None)
+        assert writer.poll() is None
         time.sleep(random.uniform(0.0, 0.05))
         writer.send_signal(signal.SIGKILL)
         writer.wait()
         assert len(read_record(path)["filling"]) == 3000
+        half = max(half, len(list(tmp_path.iterdir())) - 1)
+    assert half  # a kill did come in the middle
     Store(tmp_path).sweep()
     assert list(tmp_path.iterdir()) == [path]
 
@@ -141,7 +146,7 @@ def test_an_interrupted_run_goes_on_and_gives_the_rows_of_one_that_was_not(
     whole = {p.name: lasting(p) for p in score(track, folder / "whole").rows}
     paths = os.pathsep.join([str(ROOT), str(Path(__file__).parent)])
     environment = {**os.environ, "PYTHONPATH": paths}
-    for _ in range(3):
+    for turn in range(3):
         command = [sys.executable, "-c", _RUNNER, str(folder)]
         runner = subprocess.Popen(command, env=environment)
         cells = folder / "cells"
@@ -151,6 +156,7 @@ def test_an_interrupted_run_goes_on_and_gives_the_rows_of_one_that_was_not(
             if cells.exists() and len(list(cells.glob("*.json"))) > have:
                 break
             time.sleep(0.005)
+        assert turn or runner.poll() is None  # killed in the middle
         runner.kill()
         runner.wait()
     assert len(list(cells.glob("*.json"))) > 0

@@ -49,11 +49,17 @@ sys.exit(bool(report.missing))
 
 
 @pytest.fixture(scope="module", autouse=True)
-def uncompiled() -> Iterator[None]:
-    """Programs of these tests run so little that compiling it would take longer."""
+def gate(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """What ``integral`` waits for while it is there, in all processes of these tests.
+
+    Their programs run so little that compiling it would take longer.
+    """
+    path = tmp_path_factory.mktemp("gate") / "closed"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PAM_ENVS_COMPILE", "0")
-        yield
+        patch.setenv("BENCH_FAKES_GATE", str(path))
+        yield path
+        path.unlink(missing_ok=True)
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +99,7 @@ class Driver:
         wait_until(lambda: ready() or driver.poll() is not None)
         driver.send_signal(signal.SIGKILL)
         driver.wait()
-        wait_until(lambda: not alive(self.family), 20.0)
+        wait_until(lambda: not alive(self.family))
 
     def workers(self) -> list[psutil.Process]:
         """Return loky's processes."""
@@ -121,11 +127,13 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 @pytest.mark.parametrize("backend", ["loky", "dask"])
 def test_a_run_whose_driver_is_killed_goes_on_and_gives_the_same_bytes(
-    backend: str, whole: dict[str, str], tmp_path: Path, request: pytest.FixtureRequest
+    backend: str, whole: dict[str, str], tmp_path: Path, request: pytest.FixtureRequest, gate: Path
 ) -> None:
     address = request.getfixturevalue("dask").address if backend == "dask" else ""
     driver = Driver(tmp_path, address)
+    gate.touch()
     driver.kill(driver.start(), driver.cells)
+    gate.unlink()
     before = {path: path.read_bytes() for path in driver.cells()}
     assert 1 <= len(before) < 2 * len(NAMES)
     assert driver.finish() == whole
@@ -135,13 +143,17 @@ def test_a_run_whose_driver_is_killed_goes_on_and_gives_the_same_bytes(
 
 @pytest.mark.parametrize("backend", ["loky", "dask"])
 def test_a_worker_that_is_killed_in_the_middle_changes_nothing(
-    backend: str, whole: dict[str, str], tmp_path: Path, request: pytest.FixtureRequest
+    backend: str, whole: dict[str, str], tmp_path: Path, request: pytest.FixtureRequest, gate: Path
 ) -> None:
     dask = request.getfixturevalue("dask") if backend == "dask" else None
     driver = Driver(tmp_path, dask.address if dask else "")
+    gate.touch()
     running = driver.start()
     wait_until(driver.cells)
     (dask or driver).workers()[0].kill()
+    assert running.poll() is None
+    assert len(driver.cells()) < 2 * len(NAMES)
+    gate.unlink()
     assert running.wait() == 0, driver.log.read_text()
     assert driver.rows() == whole
 
@@ -224,8 +236,12 @@ def test_a_reader_that_has_seen_enough_is_no_error() -> None:
         command, cwd=HERE.parents[1], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as asked:
         assert asked.stdout is not None and asked.stderr is not None
-        asked.stdout.close()  # as `head` does
-        said = asked.stderr.read().decode()
+        try:
+            asked.stdout.close()  # as `head` does
+            said = asked.stderr.read().decode()
+        except BaseException:
+            asked.kill()  # or what ends the test would wait for it
+            raise
     assert asked.returncode == 141
     assert "Traceback" not in said
     assert "Broken" not in said

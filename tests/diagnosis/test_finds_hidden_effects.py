@@ -18,7 +18,10 @@ from benchmarks.diagnosis_study import diagnosed, study
 from pam_envs.kernels import COMPILED
 from tests.diagnosis.hidden import EFFECTS
 
-pytestmark = pytest.mark.xdist_group("hidden effects")  # one process makes the sample
+pytestmark = [
+    pytest.mark.xdist_group("hidden effects"),  # one process makes the sample
+    pytest.mark.timeout(2700),  # the first test waits for all of it
+]
 compiled = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")
 
 SIZE = 3.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -86,7 +87,8 @@ class DaskProcesses:
             process.kill()
             process.wait()
         for process in workers:
-            process.kill()
+            with suppress(psutil.NoSuchProcess):  # a nanny's end may have ended it
+                process.kill()
 
     def workers(self) -> list[psutil.Process]:
         """Return the processes that compute."""
@@ -105,5 +107,6 @@ class DaskProcesses:
             process.kill()
             process.wait()
         for process in alive(self.family):
-            process.kill()
+            with suppress(psutil.NoSuchProcess):
+                process.kill()
         wait_until(lambda: not alive(self.family))

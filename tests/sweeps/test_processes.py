@@ -114,12 +114,13 @@ for done in run(square, tasks, Cluster(jobs=2)):
 """
 
 
-@pytest.mark.parametrize("moment", ["the workers start", "tasks are done"])
+@pytest.mark.parametrize("moment", ["it begins", "the workers start", "tasks are done"])
 def test_a_killed_driver_leaves_no_process_behind(moment: str, tmp_path: Path) -> None:
     family = new_family()
     driver = start(family, "-c", PROGRAM, str(tmp_path))
     begun = {
-        "the workers start": lambda: len(alive(family)) > 1,
+        "it begins": lambda: len(alive(family)) > 1,  # what watches over files, perhaps
+        "the workers start": lambda: alive(family, "popen_loky"),
         "tasks are done": lambda: len(list(tmp_path.iterdir())) > 3,
     }
     wait_until(begun[moment])
@@ -127,6 +128,6 @@ def test_a_killed_driver_leaves_no_process_behind(moment: str, tmp_path: Path) -
     driver.send_signal(signal.SIGKILL)
     driver.wait()
     assert workers
-    wait_until(lambda: not alive(family), 20.0)
+    wait_until(lambda: not alive(family))
     count = len(list(tmp_path.iterdir()))
     assert count < 100
