@@ -12,9 +12,8 @@ Rounds are only ever added to ``rounds.json``; what has changed since the last o
 until the next.
 
 A controller that is designed when it is built, by a Riccati equation say, holds other last digits
-on another processor, and its artefact is another by its digest. So a round also names its *design*,
-which is the same on every machine: policies, code and knobs, and all of the package that it is
-designed by. With the design of the round a controller is in it.
+on another processor, and its artefact is another by its digest. It is in the round all the same if
+git says that what it is made of is, byte by byte, what it was when the salt was drawn.
 """
 
 from __future__ import annotations
@@ -28,8 +27,7 @@ import math
 import secrets
 import subprocess
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from functools import lru_cache
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -37,10 +35,10 @@ import yaml
 from filelock import FileLock
 
 from benchmarks import artefacts, provenance, scenarios, tasks, trainings
-from benchmarks.canonical import SOURCES, digest
+from benchmarks.canonical import digest
 from benchmarks.controllers import Entrant
 from benchmarks.scenarios import ScenarioSet
-from benchmarks.source_code import code_digest, code_text
+from benchmarks.source_code import code_text
 from benchmarks.store import write_text
 
 FILE = Path(__file__).resolve().parent / "rounds.json"
@@ -67,8 +65,6 @@ class Round:
         ``drawn`` is the day.
     commit : str
         In which all of it was committed.
-    designs : mapping of str
-        Digest of the design of each controller; see :func:`design_of`. Of no part in the seeds.
     """
 
     track: str
@@ -78,7 +74,6 @@ class Round:
     salt: str
     drawn: str
     commit: str
-    designs: Mapping[str, str] = field(default_factory=dict)
 
     def seeds(self, names: Sequence[str]) -> dict[str, tuple[int, ...]]:
         """Return the audit seeds of each of a track's scenarios."""
@@ -102,8 +97,8 @@ class Audit:
     seeds : mapping of tuple
         Seeds of each scenario.
     artefact : str
-        Digest that the round has of it, where it is another here and only the design is the same;
-        empty otherwise.
+        Digest that the round has of it, where it is another here since it is designed here; empty
+        otherwise.
     """
 
     round: Round
@@ -112,7 +107,7 @@ class Audit:
     artefact: str = ""
 
     def record(self) -> dict[str, Any]:
-        """Return the audit as a row holds it, less its scores."""
+        """Return the audit as a row holds it, less its scores; ``artefact`` where it is another."""
         drawn_as = {"artefact": self.artefact} if self.artefact else {}
         return drawn_as | {
             "round": self.round.number,
@@ -170,74 +165,62 @@ def last(track: str, file: Path | None = None) -> Round | None:
 def find(entrant: Entrant, track: ScenarioSet) -> Audit | None:
     """Return the audit of a controller as it is now, ``None`` where it is in no last round.
 
-    It is in the round if its artefact is, or if its design is.
+    It is in the round if its artefact is, or if it is what was drawn but for last digits.
     """
     found = last(track.name)
     if found is None or entrant.name not in found.entrants:  # saves building controllers
         return None
     artefact = artefacts.of(entrant, track).digest
-    return _place(found, entrant, track, tasks.task_digest(track), artefact)
+    if found.task != tasks.task_digest(track) or not _is_of(found, entrant, track, artefact):
+        return None
+    return _audit(found, entrant, track, artefact)
 
 
 def of_row(row: Mapping[str, Any], entrant: Entrant, track: ScenarioSet) -> Audit | None:
     """Return the audit of the artefact that a row says it is of.
 
-    Where the round knows its digest, that is all that is looked at. If not, it may have been made
-    on another machine: then the design of the controller as it is now has to be the round's.
+    Whether the controller is what was drawn is told by :func:`history`. One whose digest the round
+    does not know may have been designed on another machine; then it has to be.
     """
-    found = last(track.name)
-    if found is None:
+    found, artefact = last(track.name), row["controller"]["artefact"]["digest"]
+    if found is None or found.task != row["task"] or entrant.name not in found.entrants:
         return None
-    return _place(found, entrant, track, row["task"], row["controller"]["artefact"]["digest"])
+    if artefact != found.entrants[entrant.name] and not _is_drawn(found, entrant, track):
+        return None
+    return _audit(found, entrant, track, artefact)
 
 
-def _place(
-    found: Round, entrant: Entrant, track: ScenarioSet, task: str, artefact: str
-) -> Audit | None:
-    name = entrant.name
-    if found.task != task or name not in found.entrants:
-        return None
-    drawn_as = found.entrants[name]
-    if artefact != drawn_as and found.designs.get(name) != design_of(entrant, track):
-        return None
+def _audit(found: Round, entrant: Entrant, track: ScenarioSet, artefact: str) -> Audit:
+    name, drawn_as = entrant.name, found.entrants[entrant.name]
     mine = [entry for entry in rounds() if entry.track == track.name]
     had = {entry.entrants[name] for entry in mine if name in entry.entrants}
     seeds = found.seeds([scenario.name for scenario in track.scenarios()])
     return Audit(found, len(had), seeds, "" if artefact == drawn_as else drawn_as)
 
 
-def design_of(entrant: Entrant, track: ScenarioSet) -> str:
-    """Return the digest of what makes a controller and is the same on every machine.
+def _is_of(found: Round, entrant: Entrant, track: ScenarioSet, artefact: str) -> bool:
+    """Return whether a round is of an artefact, or of what it is but for last digits."""
+    return artefact == found.entrants[entrant.name] or _is_drawn(found, entrant, track)
 
-    Its policies, its code and knobs, and all code and data of the package that it is designed by:
-    its own, or that of the controller that it corrects. A policy is designed by none.
+
+def _is_drawn(found: Round, entrant: Entrant, track: ScenarioSet) -> bool:
+    """Return whether git knows that the round's commit holds all that a controller is made of."""
+    said = history(found, entrant, track)
+    return said.complete and not said.wrong
+
+
+def _designer(entrant: Entrant) -> Path | None:
+    """Return the package that designs a controller: its own, or that of what it corrects.
+
+    A policy is designed by none: it is a file.
     """
-    made = artefacts.of(entrant, track)
-    designer = artefacts.BASELINES if entrant.kind == artefacts.RESIDUAL else ""
-    if not entrant.files:
-        designer = entrant.source.partition(".")[0]
-    return digest(
-        {
-            "files": [[file["training_seed"], file["sha256"]] for file in made.files],
-            "code": list(made.code),
-            "designer": _package_digest(designer) if designer else "",
-        }
-    )
-
-
-@lru_cache(maxsize=8)
-def _package_digest(name: str) -> str:
-    """Return the digest of all code of a package as code, and of its data but knobs of searches."""
-    place = Path(inspect.getfile(importlib.import_module(name))).resolve()
-    files = place.parent.rglob("*") if place.name == "__init__.py" else [place]
-    known = sorted(file for file in files if file.suffix in SOURCES and file != artefacts.TUNED)
-    code = [file for file in known if file.suffix == ".py"]
-    data = {
-        file.relative_to(place.parent).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
-        for file in known
-        if file.suffix != ".py"
-    }
-    return digest({"code": code_digest(code, place.parent), "data": data})
+    name = entrant.source.partition(".")[0]
+    if entrant.files:
+        name = artefacts.BASELINES if entrant.kind == artefacts.RESIDUAL else ""
+    if not name:
+        return None
+    page = Path(inspect.getfile(importlib.import_module(name))).resolve()
+    return page.parent if page.name == "__init__.py" else page
 
 
 def in_last_round(row: Mapping[str, Any]) -> bool:
@@ -264,9 +247,9 @@ def draw(track: ScenarioSet, entrants: Sequence[Entrant]) -> Round:
             trainings.check_files(entrant)
         task = tasks.task_digest(track)
         here = {entrant.name: artefacts.of(entrant, track).digest for entrant in entrants}
-        designs = {entrant.name: design_of(entrant, track) for entrant in entrants}
         there = last(track.name)
-        if there is not None and there.task == task and _equal(there, here, designs):
+        same = there is not None and (there.task, set(there.entrants)) == (task, set(here))
+        if same and all(_is_of(there, one, track, here[one.name]) for one in entrants):
             return there
         check_only_added()
         _check_committed(track, entrants)
@@ -278,19 +261,10 @@ def draw(track: ScenarioSet, entrants: Sequence[Entrant]) -> Round:
             salt=secrets.token_hex(16),
             drawn=datetime.datetime.now(datetime.UTC).date().isoformat(),
             commit=provenance.git("rev-parse", "HEAD", folder=FILE.parent),
-            designs=designs,
         )
         text = json.dumps({"rounds": [asdict(entry) for entry in [*rounds(), made]]}, indent=1)
         write_text(FILE, text + "\n")
     return made
-
-
-def _equal(there: Round, here: Mapping[str, str], designs: Mapping[str, str]) -> bool:
-    """Return whether a round is of these artefacts, or of these designs."""
-    return here.keys() == there.entrants.keys() and all(
-        there.entrants[name] == artefact or there.designs.get(name) == designs[name]
-        for name, artefact in here.items()
-    )
 
 
 def _check_committed(track: ScenarioSet, entrants: Sequence[Entrant]) -> None:
@@ -308,8 +282,6 @@ def _check_committed(track: ScenarioSet, entrants: Sequence[Entrant]) -> None:
 def check_only_added() -> None:
     """Raise if a round that the last commit holds was changed, moved or taken out.
 
-    Designs may be added to one that has none.
-
     Raises
     ------
     ValueError
@@ -320,11 +292,7 @@ def check_only_added() -> None:
     except ValueError:
         return
     old = [Round(**entry) for entry in json.loads(committed)["rounds"]] if committed else []
-    kept = [
-        replace(new, designs={}) if not before.designs else new
-        for new, before in zip(rounds(), old, strict=False)
-    ]
-    if kept != old:
+    if rounds()[: len(old)] != old:
         raise ValueError(f"{FILE}: rounds of the last commit were changed; restore it from git")
 
 
@@ -338,14 +306,21 @@ class History:
         What contradicts it.
     unknown : str
         Why something could not be looked up, empty if all could.
+    complete : bool
+        Whether all was looked up that a controller is made of, the package that designs it too.
     """
 
     wrong: tuple[str, ...] = ()
     unknown: str = ""
+    complete: bool = False
 
 
 def history(found: Round, entrant: Entrant, track: ScenarioSet) -> History:
-    """Return whether the commit of a round is one of this checkout, and holds artefact and task."""
+    """Return whether the commit of a round is one of this checkout, and holds artefact and task.
+
+    Where the artefact is another by its digest, its last digits may differ and nothing that makes
+    them: all files of the package that designs it are compared byte by byte.
+    """
     try:
         top = artefacts.top_of(FILE.parent)
         shallow = provenance.git("rev-parse", "--is-shallow-repository", folder=top) == "true"
@@ -364,13 +339,32 @@ def history(found: Round, entrant: Entrant, track: ScenarioSet) -> History:
     inside = [file for file in files if file.is_relative_to(top)]
     touched = _touched(found.commit, inside, top)
     other = [file.name for file in touched if not _same(entrant, found.commit, file, top)]
+    designer = _designer(entrant)
+    complete = designer is not None and designer.is_relative_to(top)
+    if complete and artefacts.of(entrant, track).digest != found.entrants.get(entrant.name):
+        other += _other_bytes(found.commit, designer, top)
     outside = provenance.listed([file.name for file in files if not file.is_relative_to(top)])
     return History(
         tuple(f"audit.commit: {found.commit[:12]} has another {name}" for name in other),
         f"not looked up in the round's commit, as outside of its checkout: {outside}"
         if outside
         else "",
+        complete,
     )
+
+
+def _other_bytes(commit: str, place: Path, top: Path) -> list[str]:
+    """Return the files under a folder that are not as in a commit, also those that git ignores not.
+
+    What docstrings say may be read as data, and so may files of any kind.
+    """
+    said = (
+        provenance.git("diff", "--no-renames", "--name-only", commit, "--", str(place), folder=top),
+        provenance.git(
+            *("ls-files", "--others", "--exclude-standard", "--", str(place)), folder=top
+        ),
+    )
+    return sorted({name for lines in said for name in lines.splitlines()})
 
 
 def _touched(commit: str, files: Sequence[Path], top: Path) -> list[Path]:

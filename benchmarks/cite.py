@@ -130,7 +130,7 @@ def _row_entry(row: Mapping[str, Any]) -> str:
         f"environment {env['id']}",
         f"scenarios {row['scenarios']['name']} version {row['scenarios']['version']}",
         f"task {row['task'][:16]}",
-        f"artefact {about['artefact']['digest'][:16]}",
+        f"artefact {views.artefact_of(row)[:16]}",
         f"commit {row['made_with']['commit']}",
         f"SHA-256 of the row {row[CHECKSUM]}",
     ]
@@ -143,7 +143,7 @@ def _row_entry(row: Mapping[str, Any]) -> str:
         "note": ", ".join(map(_unbraced, said)),
         "howpublished": f"python -m benchmarks verify {row['row']}",
     }
-    return entry(f"{_key(row['row'])}-{about['artefact']['digest'][:8]}", fields)
+    return entry(f"{_key(row['row'])}-{views.artefact_of(row)[:8]}", fields)
 
 
 def _unbraced(text: str) -> str:

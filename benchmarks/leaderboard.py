@@ -135,7 +135,7 @@ PREFACE = """\
   controller's, each; with a higher cost it is called *better error, higher cost*. A constraint cost
   below a thousandth counts as none.
 - **state**: the day on which `verify` ran the row again and found every number; *elsewhere*: on
-  another machine, where last digits differ; *at an older code*: code, data or
+  another machine, and nearly, since last digits differ; *at an older code*: code, data or
   policies have changed since, and it was not verified with them.
 - *Smooth references*: RMS without steps and staircases, whose edges no controller can follow.
 - A run that a limit ended counts at the worst-case value and shows under *failures*; none is left
@@ -205,10 +205,12 @@ def board_text(all_rows: Sequence[Row], figures: Mapping[str, str] | None = None
 
 
 def verified_of(all_rows: Sequence[Row]) -> str:
-    """Return how many rows were run again and came out the same, and when."""
-    dates = [row[views.VERIFIED]["date"] for row in all_rows if views.is_verified(row)]
-    when = f", last on {max(dates)}" if dates else ""
-    return f"{len(dates)} of {len(all_rows)} rows are verified with the code as it is{when}."
+    """Return how many rows were run again and held, nearly or to the last bit, and when."""
+    said = [row[views.VERIFIED] for row in all_rows if views.is_verified(row)]
+    when = f", last on {max(entry['date'] for entry in said)}" if said else ""
+    nearly = sum(entry["mode"] == verified.ELSEWHERE for entry in said)
+    how = f", {nearly} of them elsewhere and nearly" if nearly else ""
+    return f"{len(said)} of {len(all_rows)} rows are verified with the code as it is{when}{how}."
 
 
 RANK_CHANGES = """\

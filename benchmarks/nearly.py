@@ -7,6 +7,7 @@ episodes makes any interval and any probability of improvement out of an honest 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,29 @@ from benchmarks import artefacts, cells, rows, traces
 from benchmarks.canonical import plain
 from benchmarks.metrics import headline_of, of_track
 
-EPISODE = 1e-2
-"""Relative difference that a score of one episode may have."""
-SUMMARY = 1e-3
-"""That a mean, an interval and a trace may have."""
+
+@dataclass(frozen=True)
+class Near:
+    """How near is near.
+
+    Attributes
+    ----------
+    episode : float
+        Relative difference that a score of one episode may have.
+    summary : float
+        That a mean and an interval may have.
+    """
+
+    episode: float
+    summary: float
+
+
+DIGITS = Near(1e-4, 1e-5)
+"""For what is made on another processor: a hundred times what was found."""
+FAR = Near(1e-2, 1e-3)
+"""For whoever asks for it, with other packages say."""
+DRAWN = 1e-3
+"""Part of its range by which a drawn signal may differ."""
 OWN = 1e-9
 """That a summary may have from what the row's own episodes give."""
 SLACK = 1e-6
@@ -31,7 +51,9 @@ _NUMBERS = ("controller.digest:", "controller.parameters.", "controller.artefact
 Row = Mapping[str, Any]
 
 
-def compare(before: Row, after: Row, drifted: list[str], notes: list[str]) -> None:
+def compare(
+    before: Row, after: Row, drifted: list[str], notes: list[str], near: Near = FAR
+) -> None:
     """Add what of two rows differs by more than machines do, and what was let through.
 
     Parameters
@@ -39,6 +61,7 @@ def compare(before: Row, after: Row, drifted: list[str], notes: list[str]) -> No
     before, after : mapping
         As recorded and as run again, in plain types.
     drifted, notes : list of str
+    near : Near
     """
     lines, computed = _exact(before, after)
     drifted += lines
@@ -47,12 +70,13 @@ def compare(before: Row, after: Row, drifted: list[str], notes: list[str]) -> No
         more = f" and {len(computed) - SHOWN} more" if len(computed) > SHOWN else ""
         notes.append(f"computed a little otherwise here: {', '.join(computed[:SHOWN])}{more}")
     drifted += differences(*(_frame(row) for row in (before, after)), "episodes")
-    drifted += _scores(before, after)
-    drifted += _runs(before, after)
-    drifted += _summaries(before, after)
+    drifted += _scores(before, after, near)
+    drifted += _runs(before, after, near)
+    drifted += _summaries(before, after, near)
     drifted += _pictures(before["traces"], after["traces"])
     notes.append(
-        "compared as of another machine: scores to 1 %, means and intervals to 0.1 %, bits not"
+        f"compared as of another machine: scores to {100 * near.episode:g} %, means and intervals "
+        f"to {100 * near.summary:g} %, bits not"
     )
 
 
@@ -89,15 +113,17 @@ def slack_of(row: Row) -> dict[str, float]:
     return {metric: SLACK * float(value) for metric, value in worst.items()}
 
 
-def _scores(before: Row, after: Row) -> Iterator[str]:
+def _scores(before: Row, after: Row, near: Near) -> Iterator[str]:
     slack = slack_of(after)
     for k, (old, new) in enumerate(zip(before["episodes"], after["episodes"], strict=False)):
         for metric, value in new["scores"].items():
             where = f"episodes[{k}].scores.{metric}"
-            yield from differences(old["scores"].get(metric), value, where, EPISODE, slack[metric])
+            yield from differences(
+                old["scores"].get(metric), value, where, near.episode, slack[metric]
+            )
 
 
-def _runs(before: Row, after: Row) -> Iterator[str]:
+def _runs(before: Row, after: Row, near: Near) -> Iterator[str]:
     """Yield in which means of a training seed two rows differ."""
     slack = slack_of(after)
     for split in (cells.PUBLIC, cells.AUDIT):
@@ -105,7 +131,7 @@ def _runs(before: Row, after: Row) -> Iterator[str]:
             for metric, allowed in slack.items():
                 pair = [_mean(row, split, run, metric) for row in (before, after)]
                 where = f"{split} mean of {metric}, training seed {run}"
-                yield from differences(*pair, where, SUMMARY, allowed)
+                yield from differences(*pair, where, near.summary, allowed)
 
 
 def _mean(row: Row, split: str, run: int, metric: str) -> float | None:
@@ -115,7 +141,7 @@ def _mean(row: Row, split: str, run: int, metric: str) -> float | None:
     return float(known.mean()) if len(known) else None
 
 
-def _summaries(before: Row, after: Row) -> Iterator[str]:
+def _summaries(before: Row, after: Row, near: Near) -> Iterator[str]:
     """Yield in which means and intervals two rows differ, or the first from its own episodes."""
     slack = slack_of(after)
     old, new, own = _tables(before), _tables(after), _own(before)
@@ -123,11 +149,11 @@ def _summaries(before: Row, after: Row) -> Iterator[str]:
         for metric, scores in table.items():
             given = old.get(name, {}).get(metric)
             where = f"{name}.{metric}"
-            yield from differences(given, scores, where, SUMMARY, slack[metric])
+            yield from differences(given, scores, where, near.summary, slack[metric])
             followed = plain(own.get(name, {}).get(metric))
             yield from differences(given, followed, where, OWN, SLACK * slack[metric])
     headline = slack[headline_of(after["scenarios"]["content"])]
-    yield from differences(before["by"], after["by"], "by", SUMMARY, headline)
+    yield from differences(before["by"], after["by"], "by", near.summary, headline)
     if after["audit"] and before["audit"]:
         gaps = plain(rows.gap(own["audit.aggregate"], own["aggregate"]))
         for metric, gap in gaps.items():
@@ -174,7 +200,7 @@ def _drawn_alike(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
     if first.shape != second.shape:
         return False
     span = new["high"] - new["low"]
-    near = SUMMARY * span + OWN * max(abs(new["low"]), abs(new["high"]))
+    near = DRAWN * span + OWN * max(abs(new["low"]), abs(new["high"]))
     return bool(np.allclose(first, second, rtol=0.0, atol=near, equal_nan=True))
 
 

@@ -153,7 +153,7 @@ def _origin(row: Row) -> dict[str, Any]:
         },
         "audit": _audit_words(row),
         "task": row.get("task", ""),
-        "artefact": (controller.get("artefact") or {}).get("digest", ""),
+        "artefact": views.artefact_of(row) if controller.get("artefact") else "",
         "checksum": row.get(CHECKSUM, ""),
         "made_with": ", ".join(f"{name} {v}" for name, v in sorted(made["packages"].items())),
         "commit": made["commit"],

@@ -1,7 +1,8 @@
 """Run a row again from its own record and say what differs.
 
-Nothing of a row is believed: environment, scenarios, policy files, salt and the set of episodes
-are those of this checkout, and every number is computed again.
+Nothing of a row is believed but where it was made: environment, scenarios, policy files, salt and
+the set of episodes are those of this checkout, and every number is computed again. A row that says
+that it was made elsewhere may differ in last digits, and can at best be verified "elsewhere".
 """
 
 from __future__ import annotations
@@ -24,6 +25,14 @@ from benchmarks.store import CHECKSUM, comparable, fault
 from sweeps import engine
 
 Record = Mapping[str, Any]
+
+EITHER = "either"
+"""To the last bit, or nearly where a row says that it was made elsewhere."""
+COMPARISONS = (verified.BITS, verified.ELSEWHERE, EITHER)
+DIGITS = (
+    "only last digits differ, as another processor, library of linear algebra or package has them: "
+    "`verify --compare elsewhere` allows for that; what it finds is no proof of equal bits"
+)
 
 
 @dataclass
@@ -69,9 +78,9 @@ def verify(
     cluster : Cluster, optional
         Where to compute; in this process by default.
     compare : {"bits", "elsewhere", "either"}
-        To the last bit, the default; or as of another machine, where packages or processor round
-        otherwise, see :mod:`benchmarks.nearly`; or the latter where the row is not equal and says
-        that it was made with others. What it says, it may have made up: its verdict's ``mode`` is
+        To the last bit; or as of another machine, where packages or processor round otherwise,
+        see :mod:`benchmarks.nearly`; or the latter, and much nearer, where the row is not equal
+        and says that it was made with others. That, it may have made up: its verdict's ``mode`` is
         "elsewhere" then, and never "bits".
 
     Raises
@@ -211,26 +220,29 @@ def _compare(
     before, after = comparable(stored), comparable(again)
     made = [row.pop("made_with", None) for row in (before, after)]
     verdict.notes += differences(*made, "made_with")
+    near = nearly.FAR
     if compare != verified.ELSEWHERE:
-        drifted = differences(before, after)
-        other = bool(drifted) and _other_machine(verdict.notes)
-        if not other or compare == verified.BITS:
+        drifted, near = differences(before, after), nearly.DIGITS
+        made_elsewhere = bool(drifted) and _other_machine(verdict.notes)
+        if not made_elsewhere or compare == verified.BITS:
             verdict.drifted += drifted
-            verdict.notes += [OTHER] if other else []
+            verdict.notes += _hints(before, after) if drifted else []
             return
         verdict.mode = verified.ELSEWHERE
         verdict.notes.append(f"{len(drifted)} fields differ in bits, the first: {drifted[0]}")
-    nearly.compare(before, after, verdict.drifted, verdict.notes)
+    nearly.compare(before, after, verdict.drifted, verdict.notes, near)
     if entrant.files:
         verdict.drifted += replay.differences(stored, entrant, track)
 
 
-COMPARISONS = (verified.BITS, verified.ELSEWHERE, "either")
-OTHER = (
-    "packages or processor are others than recorded, which changes last digits: `verify --compare "
-    "elsewhere` allows for that, and then every score to 1 %, every mean and interval to 0.1 % has "
-    "to agree; what it finds is no proof of equal bits"
-)
+def _hints(before: Record, after: Record) -> list[str]:
+    """Return what to do about a row that is not equal, where only last digits differ."""
+    drifted: list[str] = []
+    try:
+        nearly.compare(before, after, drifted, [], nearly.DIGITS)
+    except (ArithmeticError, LookupError, TypeError, ValueError):  # it is not even a row
+        return []
+    return [] if drifted else [DIGITS]
 
 
 def _other_machine(notes: Sequence[str]) -> bool:

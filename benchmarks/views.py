@@ -63,6 +63,12 @@ def factor_of(row: Mapping[str, Any]) -> float:
     return shown(content_of(row))[1]
 
 
+def artefact_of(row: Mapping[str, Any]) -> str:
+    """Return the digest of the artefact, that of the round where it was designed elsewhere."""
+    own = str(row["controller"]["artefact"]["digest"])
+    return str((row["audit"] or {}).get("artefact", own))
+
+
 def is_audited(row: Mapping[str, Any]) -> bool:
     """Return whether the row is in the audit round of its track."""
     return row["audit"] is not None
@@ -161,7 +167,7 @@ def failures_of(row: Mapping[str, Any], split: str = "") -> tuple[int, int]:
 
 
 def is_verified(row: Mapping[str, Any]) -> bool:
-    """Return whether the row was run again with the code as it is and came out the same."""
+    """Return whether the row was run again with the code as it is and held, nearly at least."""
     found = row.get(VERIFIED)
     return bool(found) and not found["older"]
 

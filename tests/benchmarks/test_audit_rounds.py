@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
 import json
 import subprocess
+import sys
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bench_fakes
@@ -19,12 +21,12 @@ from agents.policy import OnnxPolicy
 from agents.residual import ResidualPolicy
 from baselines import tuned
 from baselines.trivial import Constant
-from benchmarks import artefacts, audit, controllers, provenance, rows, scenarios, tasks
+from benchmarks import artefacts, audit, controllers, provenance, rows, scenarios, tasks, views
 from benchmarks.__main__ import main
 from benchmarks.canonical import digest
 from benchmarks.controllers import Entrant, find
 from benchmarks.source_code import needed
-from benchmarks.store import comparable, read_record
+from benchmarks.store import comparable, read_record, write_record
 from benchmarks.verify import verify
 from tests.benchmarks.row_helpers import commit, draw, git, place, run_row, tiny
 
@@ -270,94 +272,156 @@ def test_rounds_are_only_ever_added(board: Path) -> None:
         audit.rounds()
 
 
-def test_designs_may_be_added_to_a_round_that_has_none_and_not_changed(board: Path) -> None:
-    drawn = draw(board, "low")
-    (kept,) = json.loads(audit.FILE.read_text())["rounds"]
-    assert kept["designs"] == {"low": audit.design_of(find("low"), tiny(board))}
-    old = {name: value for name, value in kept.items() if name != "designs"}
-    audit.FILE.write_text(json.dumps({"rounds": [old]}))
-    commit(board)
-    assert audit.rounds() == [replace(drawn, designs={})]
-    audit.FILE.write_text(json.dumps({"rounds": [kept]}))
-    audit.check_only_added()
-    commit(board)
-    for other in ({"low": "another"}, {}):
-        audit.FILE.write_text(json.dumps({"rounds": [{**kept, "designs": other}]}))
-        with pytest.raises(ValueError, match="were changed; restore it from git"):
-            audit.check_only_added()
+# A controller that is designed when it is built, from a file of its package, holds other last
+# digits on another processor.
+
+CATALOGUE = '''
+"""Scale 1.00"""
+import json
+from pathlib import Path
+from bench_fakes import Entry, Inverse
+CONTROLLERS = {"designed": Entry("as a file says", "nominal model")}
+HERE = Path(__file__).parent
+DIGITS = 1.0
+def make_controller(name, plant=None, signals=None, action_signals=None, seed=0):
+    gain = json.loads((HERE / "gain.txt").read_text()) * float(__doc__.split()[-1])
+    return Inverse(plant, signals, action_signals, gain=gain * DIGITS)
+'''
+
+
+@dataclass
+class Designs:
+    """A package that designs a controller, in a checkout of rounds."""
+
+    board: Path
+    patch: pytest.MonkeyPatch
+
+    @property
+    def folder(self) -> Path:
+        """Where the package lies."""
+        return self.board / "designs_of_tests"
+
+    def entrant(self) -> Entrant:
+        """Return the controller."""
+        return find("designed")
+
+    def go_to(self, digits: float, cpu: str) -> None:
+        """Go to another machine."""
+        self.patch.setattr(self.module, "DIGITS", digits)
+        self.patch.setattr(provenance, "cpu", lambda: cpu)
+        artefacts._built.cache_clear()
+
+    def reload(self) -> None:
+        """Import the package as it is now."""
+        sys.modules.pop("designs_of_tests.catalogue", None)
+        self.module = importlib.import_module("designs_of_tests.catalogue")
+        self.patch.setattr(self.module, "DIGITS", 1.0 + 1e-12)
+        for cache in (artefacts._built, artefacts._needed, artefacts._code_digest):
+            cache.cache_clear()
 
 
 @pytest.fixture
-def another_machine(monkeypatch: pytest.MonkeyPatch) -> Iterator[pytest.MonkeyPatch]:
-    """A processor on which a controller is designed with other last digits."""
-    make = bench_fakes.make_controller
-
-    def designed(name: str, *arguments: object, **named: object) -> object:
-        made = make(name, *arguments, **named)
-        return replace(made, gain=made.gain * (1.0 + 1e-12)) if hasattr(made, "gain") else made
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bench_fakes, "make_controller", designed)
-        patch.setattr(provenance, "cpu", lambda: "another")
-        artefacts._built.cache_clear()
-        yield patch
+def designs(board: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Designs]:
+    made = Designs(board, monkeypatch)
+    made.folder.mkdir()
+    (board / ".gitignore").write_text("__pycache__\nout\ncells\n")
+    (made.folder / "__init__.py").write_text("")
+    (made.folder / "catalogue.py").write_text(CATALOGUE)
+    (made.folder / "gain.txt").write_text("0.02")
+    commit(board)
+    monkeypatch.syspath_prepend(board)
+    source = ("designs_of_tests.catalogue", "designs_of_tests", "classical")
+    monkeypatch.setattr(controllers, "SOURCES", (*controllers.SOURCES, source))
+    made.reload()
+    made.go_to(1.0, "one")
+    yield made
+    for name in ("designs_of_tests", "designs_of_tests.catalogue"):
+        sys.modules.pop(name, None)
     artefacts._built.cache_clear()
 
 
-def test_on_another_machine_a_design_is_in_its_round(
-    board: Path, request: pytest.FixtureRequest
-) -> None:
-    drawn, track, entrant = draw(board, "integral", "trained"), tiny(board), find("integral")
-    here = run_row(board, "integral", out=board / "here")
-    seeds = rows.load(here)["audit"]["seeds"]
-    there: pytest.MonkeyPatch = request.getfixturevalue("another_machine")
-    assert artefacts.of(entrant, track).digest != drawn.entrants["integral"]
-    found = audit.find(entrant, track)
+def test_what_is_designed_on_another_machine_is_in_its_round(board: Path, designs: Designs) -> None:
+    drawn, track = draw(board, "designed", "low"), tiny(board)
+    here = run_row(board, "designed", out=board / "out" / "here")
+    designs.go_to(1.0 + 1e-12, "another")
+    assert artefacts.of(designs.entrant(), track).digest != drawn.entrants["designed"]
+    found = audit.find(designs.entrant(), track)
     assert found is not None
-    assert found.artefact == drawn.entrants["integral"]
-    assert draw(board, "integral", "trained") == drawn
-    path = run_row(board, "integral", out=board / "there", cells=board / "anew")
-    row = rows.load(path)
-    assert row["audit"]["seeds"] == seeds
-    assert row["audit"]["artefact"] == drawn.entrants["integral"]
+    assert found.artefact == drawn.entrants["designed"]
+    assert draw(board, "designed", "low") == drawn
+    there = run_row(board, "designed", out=board / "out" / "there", cells=board / "cells" / "anew")
+    row = rows.load(there)
+    assert row["audit"]["seeds"] == rows.load(here)["audit"]["seeds"]
+    assert row["audit"]["artefact"] == drawn.entrants["designed"]
     assert audit.in_last_round(row)
+    assert views.artefact_of(row) == views.artefact_of(rows.load(here))  # one identity to cite
     assert not audit.in_last_round({**row, "audit": {**row["audit"], "artefact": "another"}})
-    verdict = verify(path)
-    assert verdict.holds, verdict.drifted
-    verdict = verify(here, compare="either")
+    for path, mode in ((there, "bits"), (here, "elsewhere")):
+        verdict = verify(path, compare="either")
+        assert (verdict.drifted, verdict.mode) == ([], mode)
+    designs.go_to(1.0, "one")
+    verdict = verify(there, compare="either")
     assert (verdict.drifted, verdict.mode) == ([], "elsewhere")
-    with pytest.MonkeyPatch.context() as patch:  # its code has changed since
-        patch.setattr(audit, "_package_digest", lambda name: "another")
-        assert audit.find(entrant, track) is None
-        assert "audit: its task and artefact are not in the last round" in verify(path).drifted[0]
-        assert draw(board, "integral", "trained").number == 2
-    there.undo()
-    artefacts._built.cache_clear()
+    assert not verify(there).holds
 
 
-def test_a_row_of_another_machine_is_verified_here(
-    board: Path, request: pytest.FixtureRequest
+CHANGES = {
+    "data": ("gain.txt", "0.025"),
+    "docstring": ("catalogue.py", CATALOGUE.replace("1.00", "1.25")),
+    "another page": ("more.py", "A = 1"),
+}
+
+
+@pytest.mark.parametrize("committed", [False, True])
+@pytest.mark.parametrize("what", CHANGES)
+def test_on_no_machine_a_design_may_be_changed_after_the_salt(
+    what: str, committed: bool, board: Path, designs: Designs
 ) -> None:
-    draw(board, "integral")
-    there: pytest.MonkeyPatch = request.getfixturevalue("another_machine")
-    path = run_row(board, "integral")
-    there.undo()
-    artefacts._built.cache_clear()
-    verdict = verify(path, compare="either")
-    assert (verdict.drifted, verdict.mode) == ([], "elsewhere")
-    assert not verify(path).holds
+    """Also if the row says the old digests: what else makes it, git tells."""
+    drawn, track = draw(board, "designed"), tiny(board)
+    commit(board)
+    honest = read_record(run_row(board, "designed"))
+    name, text = CHANGES[what]
+    (designs.folder / name).write_text(text)
+    if committed:
+        commit(board)
+    designs.reload()
+    designs.go_to(1.0 + 1e-12, "another")
+    assert audit.find(designs.entrant(), track) is None
+    assert name in audit.history(drawn, designs.entrant(), track).wrong[0]
+    path = run_row(board, "designed", out=board / "out" / "after")
+    row = read_record(path)
+    assert row["audit"] is None
+    row = {**honest, "made_with": {**row["made_with"], "cpu": "anything"}}
+    write_record(path, row)
+    for compare in ("bits", "either", "elsewhere"):
+        verdict = verify(path, compare=compare)
+        assert any(f"has another designs_of_tests/{name}" in line for line in verdict.drifted)
 
 
-@pytest.mark.parametrize("name", ["positioning_nominal", "knee_tension_nominal", "joint_nominal"])
-def test_all_that_the_last_rounds_are_of_is_here_as_it_was_drawn(name: str) -> None:
-    """Whatever the machine: designs are the same where last digits are not."""
-    track = scenarios.load(scenarios.FOLDER / f"{name}.yaml")
-    drawn = audit.last(name)
-    assert drawn is not None
-    assert drawn.designs.keys() == drawn.entrants.keys()
-    entrants = [controllers.find(entrant) for entrant in drawn.entrants]
-    assert {e.name: audit.design_of(e, track) for e in entrants} == drawn.designs
-    assert all(audit.find(entrant, track) is not None for entrant in entrants)
+def test_where_git_cannot_say_a_design_is_in_no_round(
+    board: Path, designs: Designs, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    draw(board, "designed")
+    designs.go_to(1.0 + 1e-12, "another")
+    assert audit.find(designs.entrant(), tiny(board)) is not None
+
+    def absent(*_: object, **__: object) -> None:
+        raise FileNotFoundError("git")
+
+    monkeypatch.setattr(subprocess, "run", absent)
+    assert audit.find(designs.entrant(), tiny(board)) is None
+    designs.go_to(1.0, "one")
+    assert audit.find(designs.entrant(), tiny(board)) is not None  # its digest says it
+
+
+def test_a_policy_is_designed_by_none() -> None:
+    entrant = Entrant(
+        "any", "", "nothing", "", (), "learned", "agents.catalogue", ((0, Path("any")),)
+    )
+    assert audit._designer(entrant) is None
+    corrects = audit._designer(replace(entrant, kind="residual"))
+    assert corrects == controllers.ROOT / "baselines"
 
 
 def recorded(board: Path, **changes: str) -> list[str]:

@@ -521,7 +521,7 @@ def test_a_knob_of_another_controller_changes_nothing(board: Path) -> None:
     assert verdict.holds, verdict.drifted
 
 
-def test_a_row_cannot_choose_how_it_is_compared(forged: Any) -> None:
+def test_a_row_that_says_that_it_is_from_elsewhere_gains_nothing(forged: Any) -> None:
     """Episodes made equal around their mean: no mean tells, and every interval is narrower."""
 
     def change(row: Row) -> None:

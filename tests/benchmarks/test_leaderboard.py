@@ -106,6 +106,7 @@ def test_a_verified_row_says_when() -> None:
     assert "1 of 2 rows are verified with the code as it is, last on 2026-01-03.\n" in said
     row["verified"]["mode"] = "elsewhere"
     assert "| verified 2026-01-03 elsewhere |" in leaderboard.board_text([row])
+    assert ", 1 of them elsewhere and nearly." in leaderboard.verified_of([row])
     row["verified"]["older"] = True
     words = "| verified 2026-01-03 elsewhere, at an older code |"
     assert words in leaderboard.board_text([row])
