@@ -34,7 +34,10 @@ class Near:
 
 
 DIGITS = Near(1e-4, 1e-5)
-"""For what is made on another processor: a hundred times what was found."""
+"""For what is made on another processor.
+
+Between Zen 5 and Rocket Lake, in all episodes of the board, 1.4e-7 was found at most.
+"""
 FAR = Near(1e-2, 1e-3)
 """For whoever asks for it, with other packages say."""
 DRAWN = 1e-3
