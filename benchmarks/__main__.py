@@ -198,18 +198,19 @@ def verify(
     paths += sorted(rows.RESULTS.glob("*--*.json")) if all else []
     if not paths:
         raise ValueError("name a row, or give --all")
-    said, refusal = [], verified.refusal()
+    verdicts, refusal = [], verified.refusal()
     for path in paths:
         found = checking.verify(path, Cluster(jobs, backend, address), compare)
         if not refusal:
             verified.note(path, found.checksum if found.holds else "", found.mode, found.sources)
         telling.verdict(found)
-        said.append(telling.outcome(found))
-    if len(said) > 1:
-        print(telling.counted(said))
+        verdicts.append(found)
+    if len(verdicts) > 1:
+        print(telling.counted(verdicts))
     if refusal:
         print(f"error: {refusal}", file=sys.stderr)
-    return 1 if telling.DRIFTED in said else 2 if refusal else 0
+    drifted = sum(not found.holds for found in verdicts)
+    return 1 if drifted else 2 if refusal else 0
 
 
 def _row_path(name: str) -> Path:

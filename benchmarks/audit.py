@@ -171,9 +171,7 @@ def find(entrant: Entrant, track: ScenarioSet) -> Audit | None:
     if found is None or entrant.name not in found.entrants:  # saves building controllers
         return None
     artefact = artefacts.of(entrant, track).digest
-    if found.task != tasks.task_digest(track) or not _is_of(found, entrant, track, artefact):
-        return None
-    return _audit(found, entrant, track, artefact)
+    return _place(found, entrant, track, tasks.task_digest(track), artefact)
 
 
 def of_row(row: Mapping[str, Any], entrant: Entrant, track: ScenarioSet) -> Audit | None:
@@ -183,14 +181,17 @@ def of_row(row: Mapping[str, Any], entrant: Entrant, track: ScenarioSet) -> Audi
     does not know may have been designed on another machine; then it has to be.
     """
     found, artefact = last(track.name), row["controller"]["artefact"]["digest"]
-    if found is None or found.task != row["task"] or entrant.name not in found.entrants:
+    if found is None or entrant.name not in found.entrants:
         return None
-    if artefact != found.entrants[entrant.name] and not _is_drawn(found, entrant, track):
-        return None
-    return _audit(found, entrant, track, artefact)
+    return _place(found, entrant, track, row["task"], artefact)
 
 
-def _audit(found: Round, entrant: Entrant, track: ScenarioSet, artefact: str) -> Audit:
+def _place(
+    found: Round, entrant: Entrant, track: ScenarioSet, task: str, artefact: str
+) -> Audit | None:
+    """Return the audit of an artefact in a round that knows its controller."""
+    if found.task != task or not _is_of(found, entrant, track, artefact):
+        return None
     name, drawn_as = entrant.name, found.entrants[entrant.name]
     mine = [entry for entry in rounds() if entry.track == track.name]
     had = {entry.entrants[name] for entry in mine if name in entry.entrants}
@@ -199,12 +200,12 @@ def _audit(found: Round, entrant: Entrant, track: ScenarioSet, artefact: str) ->
 
 
 def _is_of(found: Round, entrant: Entrant, track: ScenarioSet, artefact: str) -> bool:
-    """Return whether a round is of an artefact, or of what it is but for last digits."""
-    return artefact == found.entrants[entrant.name] or _is_drawn(found, entrant, track)
+    """Return whether a round is of an artefact, or of what it is but for last digits.
 
-
-def _is_drawn(found: Round, entrant: Entrant, track: ScenarioSet) -> bool:
-    """Return whether git knows that the round's commit holds all that a controller is made of."""
+    Of the latter it is if git knows that its commit holds all that the controller is made of.
+    """
+    if artefact == found.entrants[entrant.name]:
+        return True
     said = history(found, entrant, track)
     return said.complete and not said.wrong
 
@@ -223,14 +224,19 @@ def _designer(entrant: Entrant) -> Path | None:
     return page.parent if page.name == "__init__.py" else page
 
 
+def artefact_of(row: Mapping[str, Any]) -> str:
+    """Return the digest of a row's artefact, that of its round where it was designed elsewhere."""
+    own = row["controller"]["artefact"]["digest"]
+    return str((row["audit"] or {}).get("artefact", own))
+
+
 def in_last_round(row: Mapping[str, Any]) -> bool:
     """Return whether a row's audit is of the last round of its track; if not, it reports itself."""
-    found, said, about = last(row["scenarios"]["name"]), row["audit"], row["controller"]
+    found, said, name = last(row["scenarios"]["name"]), row["audit"], row["controller"]["name"]
     if found is None or said is None:
         return False
-    artefact = said.get("artefact", about["artefact"]["digest"])
-    mine = (row["task"], artefact, said["round"], said["salt"])
-    return mine == (found.task, found.entrants.get(about["name"]), found.number, found.salt)
+    mine = (row["task"], artefact_of(row), said["round"], said["salt"])
+    return mine == (found.task, found.entrants.get(name), found.number, found.salt)
 
 
 def draw(track: ScenarioSet, entrants: Sequence[Entrant]) -> Round:
@@ -358,12 +364,11 @@ def _other_bytes(commit: str, place: Path, top: Path) -> list[str]:
 
     What docstrings say may be read as data, and so may files of any kind.
     """
-    said = (
-        provenance.git("diff", "--no-renames", "--name-only", commit, "--", str(place), folder=top),
-        provenance.git(
-            *("ls-files", "--others", "--exclude-standard", "--", str(place)), folder=top
-        ),
+    commands = (
+        ("diff", "--no-renames", "--name-only", commit),
+        ("ls-files", "--others", "--exclude-standard"),
     )
+    said = [provenance.git(*command, "--", str(place), folder=top) for command in commands]
     return sorted({name for lines in said for name in lines.splitlines()})
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from benchmarks import views
+from benchmarks import audit, views
 from benchmarks.board_format import bounded
 from benchmarks.provenance import ROOT
 from benchmarks.rows import shown
@@ -130,7 +130,7 @@ def _row_entry(row: Mapping[str, Any]) -> str:
         f"environment {env['id']}",
         f"scenarios {row['scenarios']['name']} version {row['scenarios']['version']}",
         f"task {row['task'][:16]}",
-        f"artefact {views.artefact_of(row)[:16]}",
+        f"artefact {audit.artefact_of(row)[:16]}",
         f"commit {row['made_with']['commit']}",
         f"SHA-256 of the row {row[CHECKSUM]}",
     ]
@@ -143,7 +143,7 @@ def _row_entry(row: Mapping[str, Any]) -> str:
         "note": ", ".join(map(_unbraced, said)),
         "howpublished": f"python -m benchmarks verify {row['row']}",
     }
-    return entry(f"{_key(row['row'])}-{views.artefact_of(row)[:8]}", fields)
+    return entry(f"{_key(row['row'])}-{audit.artefact_of(row)[:8]}", fields)
 
 
 def _unbraced(text: str) -> str:

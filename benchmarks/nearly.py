@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import artefacts, cells, rows, traces
+from benchmarks import artefacts, cells, provenance, rows, traces
 from benchmarks.canonical import plain
 from benchmarks.metrics import headline_of, of_track
 
@@ -46,8 +46,6 @@ OWN = 1e-9
 """That a summary may have from what the row's own episodes give."""
 SLACK = 1e-6
 """Parts of the worst case that are no difference, for scores near zero."""
-SHOWN = 4
-"""Numbers of a controller that a note names."""
 _NEARLY = ("episodes", "aggregate", "by", "audit", "traces", "actions")
 _NUMBERS = ("controller.digest:", "controller.parameters.", "controller.artefact.digest:")
 
@@ -70,8 +68,7 @@ def compare(
     drifted += lines
     drifted += _artefact(before["controller"])
     if computed:
-        more = f" and {len(computed) - SHOWN} more" if len(computed) > SHOWN else ""
-        notes.append(f"computed a little otherwise here: {', '.join(computed[:SHOWN])}{more}")
+        notes.append(f"computed a little otherwise here: {provenance.listed(computed)}")
     drifted += differences(*(_frame(row) for row in (before, after)), "episodes")
     drifted += _scores(before, after, near)
     drifted += _runs(before, after, near)

@@ -80,8 +80,8 @@ def _differences(stored: Mapping[str, Any], cell: Cell) -> list[str]:
     slack = nearly.slack_of(stored)
     lines = [] if off <= ANSWERED else [f"{where}: the policy answers otherwise by {off:.2g}"]
     for name, value in old["scores"].items():
-        if not _equal(value, plain(new["scores"][name]), nearly.SLACK * slack[name]):
-            lines.append(f"{where}, {name}: {value!r} recorded, {new['scores'][name]!r} now")
+        now, near_zero = plain(new["scores"][name]), nearly.SLACK * slack[name]
+        lines += nearly.differences(value, now, f"{where}, {name}", EQUAL, near_zero)
     return lines
 
 
@@ -101,9 +101,3 @@ def play(cell: Cell, seed: int, actions: NDArray[Any]) -> tuple[dict[str, Any], 
     episode = rollout.run(env, asked, seed)
     env.close()
     return cells.episode_record(cell, seed, episode), asked.off
-
-
-def _equal(old: float | None, new: float | None, slack: float) -> bool:
-    if old is None or new is None:
-        return old is new
-    return abs(new - old) <= EQUAL * max(abs(old), abs(new)) + slack

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import board_summary, board_tables, cite, claims, standings, views
+from benchmarks import audit, board_summary, board_tables, cite, claims, standings, views
 from benchmarks.board_format import percent
 from benchmarks.board_tables import Column, with_costs
 from benchmarks.claims import Claim
@@ -153,7 +153,7 @@ def _origin(row: Row) -> dict[str, Any]:
         },
         "audit": _audit_words(row),
         "task": row.get("task", ""),
-        "artefact": views.artefact_of(row) if controller.get("artefact") else "",
+        "artefact": audit.artefact_of(row) if controller.get("artefact") else "",
         "checksum": row.get(CHECKSUM, ""),
         "made_with": ", ".join(f"{name} {v}" for name, v in sorted(made["packages"].items())),
         "commit": made["commit"],

@@ -67,8 +67,9 @@ def outcome(found: Verdict) -> str:
     return HOLDS if found.mode == verified.BITS else NEARLY
 
 
-def counted(outcomes: Sequence[str]) -> str:
+def counted(found: Sequence[Verdict]) -> str:
     """Return a line that says how many rows came to which outcome."""
+    outcomes = [outcome(one) for one in found]
     counts = [(outcomes.count(word), word) for word in (HOLDS, NEARLY, DRIFTED)]
     return f"{len(outcomes)} rows: " + "; ".join(f"{n} {word}" for n, word in counts if n)
 

@@ -63,12 +63,6 @@ def factor_of(row: Mapping[str, Any]) -> float:
     return shown(content_of(row))[1]
 
 
-def artefact_of(row: Mapping[str, Any]) -> str:
-    """Return the digest of the artefact, that of the round where it was designed elsewhere."""
-    own = str(row["controller"]["artefact"]["digest"])
-    return str((row["audit"] or {}).get("artefact", own))
-
-
 def is_audited(row: Mapping[str, Any]) -> bool:
     """Return whether the row is in the audit round of its track."""
     return row["audit"] is not None
