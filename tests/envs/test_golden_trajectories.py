@@ -1,0 +1,24 @@
+"""Trajectories equal the committed hashes, for every environment and hysteresis model."""
+
+from __future__ import annotations
+
+import pytest
+
+from pam_envs.kernels import COMPILED
+from tests.envs import golden
+
+UNCOMPILED = pytest.mark.skipif(COMPILED, reason="machine code for each case takes minutes")
+
+
+def test_every_case_has_a_hash() -> None:
+    assert {k: set(v) for k, v in golden.committed().items()} == {
+        k: set(v) for k, v in golden.CASES.items()
+    }
+
+
+@UNCOMPILED
+@pytest.mark.parametrize(
+    ("name", "variant"), [(n, v) for n, variants in golden.CASES.items() for v in variants]
+)
+def test_trajectory_equals_its_hash(name: str, variant: str) -> None:
+    assert golden.digest(name, variant) == golden.committed()[name][variant]
