@@ -11,8 +11,8 @@ from typing import Annotated, Any, Literal
 import tyro
 from rich.console import Console
 
-from agents import configs
-from agents.settings import SettingsError
+from agents.settings import presets as configs
+from agents.settings.settings import SettingsError
 from pam_envs.envs.registration import full_id
 from sweeps.command_line import answered
 
@@ -56,7 +56,7 @@ def train(
     set
         Single settings, for example: --set ppo.gamma=0.95 network.hidden=[32,32]
     """
-    from agents import train as training
+    from agents.training import train as training
 
     console = Console(stderr=True)
     given_env = full_id(env) if env else None
@@ -155,7 +155,7 @@ def sweep(
     dry_run
         List the trainings and whether their policies are there, and stop.
     """
-    from agents import sweep as sweeping
+    from agents.training import sweep as sweeping
     from sweeps.engine import Cluster
     from sweeps.progress import progress
 
@@ -195,7 +195,7 @@ def enter(
     author
         Who trained them, as BibTeX wants it; default: the authors of this package.
     """
-    from agents.entering import enter as put
+    from agents.policies.entering import enter as put
 
     made = put(runs, author)
     for path in made.replaced:
@@ -207,7 +207,7 @@ def enter(
 
 def show(policy: Annotated[Path, tyro.conf.Positional], /) -> None:
     """Print the card of a policy file, after the checks that loading it makes."""
-    from agents.policy import OnnxPolicy
+    from agents.policies.policy import OnnxPolicy
 
     made = OnnxPolicy.load(policy)
     print(json.dumps({**made.card, "digest": made.digest()}, indent=1, sort_keys=True))
@@ -219,7 +219,7 @@ def looks(policies: Annotated[tuple[Path, ...], tyro.conf.Positional], /) -> Non
     ``value`` is what policies are chosen by; ``kinds`` are the RMS of the kinds of rows as
     multiples of the first evaluation's, which is the controller's where a policy corrects one.
     """
-    from agents.policy import OnnxPolicy
+    from agents.policies.policy import OnnxPolicy
 
     if not policies:
         raise SettingsError("name policies, for example runs/*/policy.onnx")
@@ -268,7 +268,7 @@ def tune(
     write
         Put the best settings and the budget into the preset's file.
     """
-    from agents import tune as tuning
+    from agents.training import tune as tuning
 
     _check_counts(trials=(trials, 1), steps=(steps, 1), seed=(seed, 0))
     path = configs.preset_path(full_id(env), algo, variant)
@@ -302,8 +302,8 @@ def classical(
     variant
         Of that preset.
     """
-    from agents.controllers import names_for
-    from agents.evaluation import evaluate, value_of
+    from agents.policies.controllers import names_for
+    from agents.training.evaluation import evaluate, value_of
 
     config = configs.preset(full_id(env), algo, variant)
     scores = {name: evaluate(name, config) for name in names_for(config.env)}
@@ -328,7 +328,7 @@ def presets() -> None:
 
 def speed(seconds: float = 20.0) -> None:
     """Measure training steps a second, beside stable-baselines3's default on Pendulum-v1."""
-    from agents.speed import measure
+    from agents.training.speed import measure
 
     print(json.dumps(measure(seconds), indent=1))
 

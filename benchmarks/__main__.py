@@ -10,7 +10,8 @@ from typing import Any, Literal
 
 import tyro
 
-from benchmarks import controllers, rows, scenarios
+from benchmarks.runs import controllers, rows
+from benchmarks.scenarios import scenario as scenarios
 from pam_envs.envs.registration import full_id
 from sweeps.command_line import answered
 from sweeps.progress import progress
@@ -60,7 +61,8 @@ def run(
         address: Of the Dask scheduler, like tcp://host:8786.
         dry_run: List the cells and whether they are there, and stop.
     """
-    from benchmarks import runner, telling
+    from benchmarks.runs import console as telling
+    from benchmarks.runs import runner
 
     folder = runner.CELLS if cells is None else cells
     options = runner.Options(jobs, force, out, folder, backend, address)
@@ -106,8 +108,9 @@ def audit(
         backend: Processes of this machine, or a running Dask cluster.
         address: Of the Dask scheduler, like tcp://host:8786.
     """
-    from benchmarks import audit as auditing
-    from benchmarks import runner, telling
+    from benchmarks.identity import audit as auditing
+    from benchmarks.runs import console as telling
+    from benchmarks.runs import runner
 
     if bool(track) == all:
         raise ValueError("name tracks, or give --all")
@@ -129,7 +132,7 @@ def cite(row: Positional[tuple[str, ...]]) -> int:
     Args:
         row: Files or names of rows.
     """
-    from benchmarks.cite import bibtex
+    from benchmarks.board.cite import bibtex
 
     if not row:
         raise ValueError("name a row, for example positioning_nominal--inverse")
@@ -145,7 +148,7 @@ def board(results: Path = rows.RESULTS, out: Path | None = None) -> int:
         results: Folder of the rows.
         out: The board's file.
     """
-    from benchmarks import leaderboard
+    from benchmarks.board import leaderboard
 
     for path in leaderboard.write(results, leaderboard.BOARD if out is None else out):
         print(path)
@@ -159,7 +162,7 @@ def site(results: Path = rows.RESULTS, out: Path | None = None) -> int:
         results: Folder of the rows.
         out: Folder of the page, benchmarks/site by default.
     """
-    from benchmarks import site_build
+    from benchmarks.board import site_build
 
     written = site_build.build(results, site_build.OUT if out is None else out)
     print(f"{len(written)} files; open {written[0]}")
@@ -190,8 +193,9 @@ def verify(
         backend: Processes of this machine, or a running Dask cluster.
         address: Of the Dask scheduler, like tcp://host:8786.
     """
-    from benchmarks import telling, verified
-    from benchmarks import verify as checking
+    from benchmarks.identity import verified
+    from benchmarks.identity import verify as checking
+    from benchmarks.runs import console as telling
     from sweeps.engine import Cluster
 
     paths = [_row_path(name) for name in row]
@@ -239,10 +243,10 @@ def tune(
         trials: Settings to try, those of earlier calls counted in.
         seed: Of the sampler.
         episodes: Of each trial at least.
-        write: Put what is found into baselines/tuned.yaml, which the catalogue reads.
+        write: Put what is found into baselines/core/tuned.yaml, which the catalogue reads.
         storage: SQLite file of the trials, runs/tuning.db by default.
     """
-    from benchmarks import tuning
+    from benchmarks.runs import tuning
 
     more = {} if storage is None else {"storage": storage}
     job = tuning.job_of(controller, env, trials=trials, seed=seed, episodes=episodes, **more)
@@ -262,8 +266,8 @@ def papers(json: Path | None = None) -> int:
     Args:
         json: Also write them to this file.
     """
-    from benchmarks import papers as published
-    from benchmarks.store import write_record
+    from benchmarks.papers import figures as published
+    from benchmarks.runs.store import write_record
 
     figures = published.all_figures()
     print(published.table(figures))
@@ -288,8 +292,8 @@ def speed(
         json: Also write the figures to this file.
         strict: Exit code 1 if a floor is missed.
     """
-    from benchmarks import speed as measuring
-    from benchmarks.store import write_record
+    from benchmarks.runs.store import write_record
+    from benchmarks.speed import rates as measuring
 
     with progress("groups") as start:
         results = measuring.measure(only, rounds, start)
@@ -330,7 +334,7 @@ def show(
         plot: Picture to write.
         video: Film to write.
     """
-    from benchmarks import show as showing
+    from benchmarks.runs import show as showing
 
     options = {
         "hysteresis": hysteresis,
@@ -398,11 +402,11 @@ def diagnosis(
         backend: Processes of this machine, or a running Dask cluster.
         address: Of the Dask scheduler, like tcp://host:8786.
     """
-    from benchmarks import diagnosis as running
-    from benchmarks import diagnosis_report as telling
-    from benchmarks.speed_diagnosis import whole_reports
+    from benchmarks.diagnosis import report as telling
+    from benchmarks.diagnosis import run as running
+    from benchmarks.speed.diagnosis import whole_reports
     from pam_envs.data.tables import load_contraction_table
-    from pam_envs.diagnosis.readings import diagnose_readings
+    from pam_envs.diagnosis.static.diagnosis import diagnose_readings
 
     folder = running.FOLDER if cells is None else cells
     cluster = (backend, address)

@@ -9,13 +9,15 @@ import gymnasium as gym
 import pygame
 
 import pam_envs  # noqa: F401 (registers the environments)
-from pam_envs.envs.rendering_policies import POLICIES
+from pam_envs.envs.rendering.demonstrators import POLICIES
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from baselines.catalogue import make_controller  # noqa: E402
-from benchmarks import knee_studies, papers_elbow, plots_joint, plots_knee  # noqa: E402
+from baselines.core.catalogue import make_controller  # noqa: E402
+from benchmarks.board import plots_joint, plots_knee  # noqa: E402
+from benchmarks.papers import elbow as papers_elbow  # noqa: E402
+from benchmarks.papers import knee_studies  # noqa: E402
 
 
 def save(env: gym.Env, path: Path) -> None:

@@ -19,10 +19,10 @@ import tyro
 from numpy.typing import NDArray
 
 from pam_envs.envs.registration import full_id, register_all
-from pam_envs.envs.rendering_film import write_film
-from pam_envs.envs.rendering_policies import POLICIES
+from pam_envs.envs.rendering.demonstrators import POLICIES
+from pam_envs.envs.rendering.film import write_film
 from pam_envs.parameters import Signals
-from pam_envs.plants.memory import KINDS, Kind
+from pam_envs.plants.single_muscle.hysteresis import KINDS, Kind
 
 
 @dataclass
@@ -204,7 +204,7 @@ def identify(options: Identify) -> None:
 
 def diagnose(options: Diagnose) -> None:
     """Diagnose a recording and write the report."""
-    from pam_envs.data.recording import Recording, read_input
+    from pam_envs.data.recording.recording import Recording, read_input
     from pam_envs.data.rig_file import Rig
 
     rig = Rig() if options.rig is None else Rig.from_yaml(options.rig)
@@ -213,7 +213,7 @@ def diagnose(options: Diagnose) -> None:
         _diagnose_readings(data, options)
         return
     from pam_envs.diagnosis.diagnosis import diagnose as run
-    from pam_envs.plants.single_muscle import SingleMuscle
+    from pam_envs.plants.single_muscle.plant import SingleMuscle
 
     if rig.plant != SingleMuscle.family:
         raise Mistake(f"plant: {rig.plant!r} cannot be diagnosed; there is: {SingleMuscle.family}")
@@ -230,8 +230,8 @@ def _diagnose_readings(table: Any, options: Diagnose) -> None:
     """Diagnose a table of settled readings."""
     from types import SimpleNamespace
 
-    from pam_envs.diagnosis.readings import diagnose_readings
-    from pam_envs.diagnosis.report import write
+    from pam_envs.diagnosis.report.report import write
+    from pam_envs.diagnosis.static.diagnosis import diagnose_readings
 
     report = diagnose_readings(table, seed=options.seed)
     print(f"{report['verdict']}: {report['text']}")

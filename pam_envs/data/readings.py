@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.data.recording_columns import Sheet, read_sheet, refuse, rows_text
+from pam_envs.data.recording.columns import Sheet, read_sheet, refuse, rows_text
 from pam_envs.data.rig_file import BAR, MM
 from pam_envs.data.tables import ContractionTable
 

@@ -7,9 +7,9 @@ from typing import Any
 __all__ = ["Diagnosis", "diagnose", "diagnose_readings"]
 
 _HOMES = {
-    "Diagnosis": "pam_envs.diagnosis.outcome",
+    "Diagnosis": "pam_envs.diagnosis.decide.outcome",
     "diagnose": "pam_envs.diagnosis.diagnosis",
-    "diagnose_readings": "pam_envs.diagnosis.readings",
+    "diagnose_readings": "pam_envs.diagnosis.static.diagnosis",
 }
 
 

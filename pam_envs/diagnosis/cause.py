@@ -60,8 +60,8 @@ class Form:
     terms : tuple of Term
         Its parameters.
     seeds : callable, optional
-        Makes starts from the base's fit (see :mod:`pam_envs.diagnosis.seeds`) instead of
-        ``Term.starts``.
+        Makes starts from the base's fit (see :mod:`pam_envs.diagnosis.fit.starting_values`)
+        instead of ``Term.starts``.
     """
 
     name: str

@@ -10,36 +10,35 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.data.recording import Recording
+from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
-from pam_envs.diagnosis import gain as loops
-from pam_envs.diagnosis.audit import audit
-from pam_envs.diagnosis.calibrate import calibrate
+from pam_envs.diagnosis.audit.audit import audit
+from pam_envs.diagnosis.audit.noise import ChannelFloor, Floor, noise_floor
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.causes import chosen
-from pam_envs.diagnosis.experiment import propose, rival_of
-from pam_envs.diagnosis.fitting import Fit, Problem, column_of
-from pam_envs.diagnosis.held_out import HeldOut, choose, compared, hold_out, interleaved
-from pam_envs.diagnosis.isolability import Isolability
-from pam_envs.diagnosis.noise import ChannelFloor, Floor, noise_floor
-from pam_envs.diagnosis.outcome import Diagnosis
-from pam_envs.diagnosis.plans import Means
-from pam_envs.diagnosis.report import plain
-from pam_envs.diagnosis.rule import Rule
-from pam_envs.diagnosis.search import Blocks, Candidate
-from pam_envs.diagnosis.single_muscle import (
+from pam_envs.diagnosis.closed_loop import gain as loops
+from pam_envs.diagnosis.decide.held_out import HeldOut, choose, compared, hold_out, interleaved
+from pam_envs.diagnosis.decide.isolability import Isolability
+from pam_envs.diagnosis.decide.outcome import Diagnosis
+from pam_envs.diagnosis.decide.rule import Rule
+from pam_envs.diagnosis.decide.search import Blocks, Candidate
+from pam_envs.diagnosis.decide.structure import Regressors
+from pam_envs.diagnosis.decide.testable import not_testable, too_few, too_short
+from pam_envs.diagnosis.decide.verdict import Decision, decide, traces_of
+from pam_envs.diagnosis.experiment.experiment import propose, rival_of
+from pam_envs.diagnosis.experiment.plans import Means
+from pam_envs.diagnosis.fit.calibrate import calibrate
+from pam_envs.diagnosis.fit.fit_errors import explained
+from pam_envs.diagnosis.fit.least_squares import Fit, Problem, column_of
+from pam_envs.diagnosis.fit.progress import steps
+from pam_envs.diagnosis.fit.single_muscle import (
     KELVIN,
     MuscleFamily,
     identified,
     inputs_of,
     start_plant,
 )
-from pam_envs.diagnosis.steps import steps
-from pam_envs.diagnosis.structure import Regressors
-from pam_envs.diagnosis.summary import report_of
-from pam_envs.diagnosis.summary_causes import judged
-from pam_envs.diagnosis.testable import not_testable, too_few, too_short
-from pam_envs.diagnosis.tolerance import (
+from pam_envs.diagnosis.fit.tolerance import (
     LOAD,
     PAYLOAD_ERROR,
     UNWEIGHED,
@@ -47,11 +46,12 @@ from pam_envs.diagnosis.tolerance import (
     may_be_load,
     released,
 )
-from pam_envs.diagnosis.traces import Traces
-from pam_envs.diagnosis.troubles import explained
-from pam_envs.diagnosis.verdict import Decision, decide, traces_of
+from pam_envs.diagnosis.report.report import plain
+from pam_envs.diagnosis.report.summary import report_of
+from pam_envs.diagnosis.report.summary_causes import judged
+from pam_envs.diagnosis.report.traces import Traces
 from pam_envs.mechanics.hanging_mass import GRAVITY
-from pam_envs.plants.single_muscle import SingleMuscle
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 Array = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ def diagnose(
     Parameters
     ----------
     recording : Recording
-        See :func:`pam_envs.data.recording.load_recording`.
+        See :func:`pam_envs.data.recording.recording.load_recording`.
     plant : SingleMuscle, optional
         Whose present parameters are refitted; what is not neutral in it counts as present.
         Default: the shipped muscle, scaled to the rig's, without any effect.
@@ -88,7 +88,7 @@ def diagnose(
         What is known of the rig; see :class:`pam_envs.data.rig_file.Rig`.
     design : callable, optional
         From a plant to a controller, for the comparison in closed loop
-        (:mod:`pam_envs.diagnosis.gain`).
+        (:mod:`pam_envs.diagnosis.closed_loop.gain`).
     causes : sequence of Cause or str, optional
         Causes, or names of the catalogue's. Default: :func:`pam_envs.diagnosis.causes.catalogue`.
     seed : int
@@ -96,7 +96,7 @@ def diagnose(
     progress : bool
         Show a bar.
     simulated : object, optional
-        The rig itself, where it can be run (:class:`pam_envs.diagnosis.gain.Rig`).
+        The rig itself, where it can be run (:class:`pam_envs.diagnosis.closed_loop.gain.Rig`).
     oracle : SingleMuscle or Simulated, optional
         What the rig really is, where that is known.
     rule : Rule, optional

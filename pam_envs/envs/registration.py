@@ -6,15 +6,15 @@ import gymnasium as gym
 
 NAMESPACE = "PAM/"
 ENVIRONMENTS = {
-    "PAM/MusclePositioning-v0": "muscle_positioning:MusclePositioning",
-    "PAM/KneeTension-v0": "knee_brace:KneeTension",
-    "PAM/KneeStiffness-v0": "knee_brace:KneeStiffness",
-    "PAM/KneeWalk-v0": "knee_gait:KneeWalk",
-    "PAM/KneeStairsUp-v0": "knee_gait:KneeStairsUp",
-    "PAM/KneeStairsDown-v0": "knee_gait:KneeStairsDown",
-    "PAM/ElbowOrthosis-v0": "elbow_orthosis:ElbowOrthosis",
-    "PAM/AntagonisticJoint-v0": "antagonistic_joint:AntagonisticJoint",
-    "PAM/RedundantManipulator-v0": "redundant_manipulator:RedundantManipulator",
+    "PAM/MusclePositioning-v0": "positioning.env:MusclePositioning",
+    "PAM/KneeTension-v0": "knee.brace:KneeTension",
+    "PAM/KneeStiffness-v0": "knee.brace:KneeStiffness",
+    "PAM/KneeWalk-v0": "knee.gait:KneeWalk",
+    "PAM/KneeStairsUp-v0": "knee.gait:KneeStairsUp",
+    "PAM/KneeStairsDown-v0": "knee.gait:KneeStairsDown",
+    "PAM/ElbowOrthosis-v0": "elbow.env:ElbowOrthosis",
+    "PAM/AntagonisticJoint-v0": "joint.env:AntagonisticJoint",
+    "PAM/RedundantManipulator-v0": "manipulator.env:RedundantManipulator",
 }
 """Module in this folder, and what stands before ``Env`` and ``VectorEnv`` in its classes' names."""
 

@@ -5,11 +5,7 @@ of a batch) and ``scaled``; what it remembers is handed in and out. The kernels 
 ``preisach_step`` are what a plant calls, on rows of its own.
 """
 
-from pam_envs.hysteresis.everett import (
-    symmetry_error,
-    table_from_weights,
-    weights_from_table,
-)
+from pam_envs.hysteresis.everett import symmetry_error, table_from_weights, weights_from_table
 from pam_envs.hysteresis.maxwell_slip import (
     MaxwellSlip,
     PlayOperator,
@@ -23,12 +19,7 @@ from pam_envs.hysteresis.modified_maxwell_slip import (
     pressure_step,
     stiffness_step,
 )
-from pam_envs.hysteresis.preisach import (
-    Preisach,
-    PreisachState,
-    preisach_inverse,
-    preisach_step,
-)
+from pam_envs.hysteresis.preisach import Preisach, PreisachState, preisach_inverse, preisach_step
 
 __all__ = [
     "MaxwellSlip",

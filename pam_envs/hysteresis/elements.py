@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.kernels import entry, kernel
+from pam_envs.kernels.build import entry, kernel
 
 Array = NDArray[np.float64]
 

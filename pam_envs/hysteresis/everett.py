@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from pam_envs.kernels import kernel
+from pam_envs.kernels.build import kernel
 
 Array = NDArray[np.float64]
 

@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.hysteresis.everett import everett
-from pam_envs.kernels import clip, entry, kernel
+from pam_envs.kernels.arithmetic import clip
+from pam_envs.kernels.build import entry, kernel
 
 Array = NDArray[np.float64]
 

@@ -38,7 +38,7 @@ from pam_envs.hysteresis.checks import (
     single_rows,
 )
 from pam_envs.hysteresis.elements import play
-from pam_envs.kernels import entry, kernel
+from pam_envs.kernels.build import entry, kernel
 
 Array = NDArray[np.float64]
 

@@ -26,8 +26,8 @@ from pam_envs.data.tables import ContractionTable
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.identification.preisach_forc import PreisachFit, fit_preisach
-from pam_envs.plants.memory import Kind, Memory
-from pam_envs.plants.single_muscle import SingleMuscle
+from pam_envs.plants.single_muscle.hysteresis import Kind, Memory
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 Array = NDArray[np.float64]
 
@@ -339,7 +339,7 @@ def identifiability(fit: CyclesFit, standard_error: float = 6.7e-5) -> Identifia
     operator = plant.memory.operator
     if not isinstance(operator, PlayOperator):
         raise ValueError(f"a Maxwell-slip fit is needed, this one has {plant.memory.kind!r}")
-    from pam_envs.plants.single_muscle_rows import PARAMETERS
+    from pam_envs.plants.single_muscle.rows import PARAMETERS
 
     names = [n for n in PARAMETERS if not n.startswith(("position", "pressure"))]
     columns = []

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from pam_envs.mechanics.leg import GRAVITY, centre_of_pressure
 from pam_envs.muscle.emg import CONSTANTS, Reading, emg_proxy
-from pam_envs.plants.knee_orthosis import Activity, KneeOrthosis
+from pam_envs.plants.knee_orthosis.plant import Activity, KneeOrthosis
 from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE, gait_curves
 from pam_envs.sensing.butterworth import PERIOD, filtered
 from pam_envs.sensing.shoe import estimated_torque, heel_load

@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 
 from pam_envs.parameters import declarations
-from pam_envs.plants import single_muscle_rows as R
-from pam_envs.plants.rollout import OUTPUTS, simulate_rows
-from pam_envs.plants.single_muscle import SingleMuscle
+from pam_envs.plants.single_muscle import rows as R
+from pam_envs.plants.single_muscle.plant import SingleMuscle
+from pam_envs.plants.single_muscle.rollout import OUTPUTS, simulate_rows
 
 Array = NDArray[np.float64]
 
@@ -105,7 +105,7 @@ def jacobian(
     Returns
     -------
     outputs : array, shape (4, T)
-        As :func:`pam_envs.plants.rollout.simulate_rows`.
+        As :func:`pam_envs.plants.single_muscle.rollout.simulate_rows`.
     derivatives : array, shape (4, T, n)
         In SI units of output per SI unit of parameter.
     """

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from pam_envs.plants.antagonistic_joint import AntagonisticJoint
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
 Array = NDArray[np.float64]
 

@@ -18,8 +18,8 @@ from scipy.optimize import least_squares, nnls
 from pam_envs.data.tables import number, read_columns
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.muscle.force_map import ForceMap
-from pam_envs.plants.antagonistic_joint import AntagonisticJoint
-from pam_envs.plants.joint_memory import ANGLE_THRESHOLDS
+from pam_envs.plants.antagonistic_joint.hysteresis import ANGLE_THRESHOLDS
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
 Array = NDArray[np.float64]
 

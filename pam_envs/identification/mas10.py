@@ -13,9 +13,9 @@ from pam_envs.data.tables import ContractionTable, load_contraction_table
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.identification import contraction_cycles as cycles
 from pam_envs.identification.preisach_forc import congruency_error
-from pam_envs.plants import plant_file
-from pam_envs.plants.memory import KINDS
-from pam_envs.plants.single_muscle import SingleMuscle
+from pam_envs.plants.core import plant_file
+from pam_envs.plants.single_muscle.hysteresis import KINDS
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 MISSED = (
     "the flat step of the inflating curve from 5 to 5.5 bar at 0 and 2.55 kg",

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pam_envs.hysteresis.extrema import preisach_step
 from pam_envs.hysteresis.preisach import Preisach, Start
-from pam_envs.kernels import entry, kernel
+from pam_envs.kernels.build import entry, kernel
 
 Array = NDArray[np.float64]
 

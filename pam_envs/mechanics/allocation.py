@@ -18,7 +18,7 @@ optimisation (its reference 14); none is needed.
 
 from __future__ import annotations
 
-from pam_envs.kernels import kernel
+from pam_envs.kernels.build import kernel
 
 LEAST_SHAPE = 1e-9
 """Smallest ``phi`` [m^2] that is divided by: bundles contracted to ``C_max`` give no force."""

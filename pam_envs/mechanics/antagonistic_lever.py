@@ -19,7 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.kernels import kernel, sine_of_turns
+from pam_envs.kernels.arithmetic import sine_of_turns
+from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
 _SIZE = "with it +-30 degrees take 0 to 25 % of a muscle of 150 mm (seed 002, section 2)"

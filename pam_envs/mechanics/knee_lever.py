@@ -19,7 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.kernels import kernel, sine_of_turns
+from pam_envs.kernels.arithmetic import sine_of_turns
+from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
 _GEOMETRY = "reproduces 158 N at 2 bar and 22 cm with seed 000's range of tension and stiffness"

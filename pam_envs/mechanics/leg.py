@@ -26,7 +26,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pam_envs.kernels import kernel, sine_of_turns
+from pam_envs.kernels.arithmetic import sine_of_turns
+from pam_envs.kernels.build import kernel
 from pam_envs.mechanics.knee_lever import PER_TURN
 from pam_envs.parameters import parameter
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.kernels import kernel
+from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
 Array = NDArray[np.float64]

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.kernels import COMPILED, build
+from pam_envs.kernels.build import COMPILED, build
 from pam_envs.mechanics.redundancy_equations import TASK
 from pam_envs.mechanics.redundancy_newton import resolve_path
 from pam_envs.mechanics.serial_chain import SerialChain

@@ -16,7 +16,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from pam_envs.kernels import kernel, log_of_fraction, routine
+from pam_envs.kernels.arithmetic import log_of_fraction
+from pam_envs.kernels.build import kernel, routine
 from pam_envs.mechanics.serial_chain_kinematics import N_STAGES, cross, place_chain
 from pam_envs.mechanics.serial_chain_rows import AXIS, DIRECTION, LEVER, POINT, block
 

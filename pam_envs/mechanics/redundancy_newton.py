@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pam_envs.kernels import kernel, routine
+from pam_envs.kernels.build import kernel, routine
 from pam_envs.mechanics.redundancy_equations import (
     TASK,
     merit,

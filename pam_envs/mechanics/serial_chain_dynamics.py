@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pam_envs.kernels import LANES, kernel
+from pam_envs.kernels.build import LANES, kernel
 from pam_envs.mechanics.serial_chain_kinematics import N_STAGES, cross, place_chain
 from pam_envs.mechanics.serial_chain_rows import (
     ACROSS,

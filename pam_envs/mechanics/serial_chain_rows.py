@@ -12,7 +12,7 @@ of ``n`` joints:
 
 from __future__ import annotations
 
-from pam_envs.kernels import kernel
+from pam_envs.kernels.build import kernel
 
 TURN_X, TURN_Y, TURN_Z, LENGTH, MASS, CENTRE, ACROSS, ALONG = range(8)
 """Joint axis in the frame before the joint; length [m]; mass [kg]; centre of mass from the joint

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.kernels import kernel
+from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
 _FIT = "least squares on seed 003, Tables 3-5"

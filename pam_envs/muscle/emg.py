@@ -25,7 +25,8 @@ import numpy as np
 import yaml
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.kernels import decay, entry, kernel
+from pam_envs.kernels.arithmetic import decay
+from pam_envs.kernels.build import entry, kernel
 from pam_envs.parameters import parameter
 
 Reading = Literal["uncalibrated", "A", "B"]

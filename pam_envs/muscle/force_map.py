@@ -26,7 +26,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.kernels import decay, kernel
+from pam_envs.kernels.arithmetic import decay
+from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
 _FIT = "least squares on the measured map of a DMSP-10-250 (data/dmsp10_force_map.csv)"

@@ -15,7 +15,8 @@ from __future__ import annotations
 import cmath
 from dataclasses import dataclass
 
-from pam_envs.kernels import decay, kernel, sine_of_turns
+from pam_envs.kernels.arithmetic import decay, sine_of_turns
+from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
 NUMERATOR = ((1.0, 17.45, 75.79), (1.0, 7.39, 13.41))

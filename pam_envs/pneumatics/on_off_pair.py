@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from pam_envs.kernels import kernel
+from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
 ATMOSPHERE = 101325.0

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pam_envs.kernels import decay, kernel
+from pam_envs.kernels.arithmetic import decay
+from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
 DELAY_PERIODS = 12

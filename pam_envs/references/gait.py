@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.kernels import kernel
+from pam_envs.kernels.build import kernel
 
 ACTIVITIES = ("walk", "stairs_up", "stairs_down")
 SIGNALS = ("knee", "shank", "ground_z", "ground_x", "cop", "ankle")

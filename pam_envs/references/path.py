@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.kernels import kernel, seed_words, uniform
+from pam_envs.kernels.build import kernel
+from pam_envs.kernels.random import seed_words, uniform
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from pam_envs.kernels import kernel, routine, sine_of_turns, uniform
+from pam_envs.kernels.arithmetic import sine_of_turns
+from pam_envs.kernels.build import kernel, routine
+from pam_envs.kernels.random import uniform
 from pam_envs.references.path import least_jerk
 
 MOTIONS = ("reaches", "sines", "still", "mixed")

@@ -13,7 +13,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from pam_envs.kernels import kernel, routine, sine_of_turns, uniform
+from pam_envs.kernels.arithmetic import sine_of_turns
+from pam_envs.kernels.build import kernel, routine
+from pam_envs.kernels.random import uniform
 
 FAMILIES = ("steps", "ramps", "sines", "multisine", "staircase", "mixed")
 SAMPLES = len(FAMILIES)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.kernels import entry, kernel
+from pam_envs.kernels.build import entry, kernel
 
 PERIOD = 0.01
 """Sampling period [s] that the coefficients are for."""

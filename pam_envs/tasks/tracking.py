@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pam_envs.kernels import kernel
+from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
 

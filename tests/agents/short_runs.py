@@ -7,7 +7,8 @@ from typing import Any
 
 from rich.console import Console
 
-from agents import configs, train
+from agents.settings import presets as configs
+from agents.training import train
 
 ID = "PAM/MusclePositioning-v0"
 SHORT = {"episode_seconds": 0.3, "reference": "mixed", "load": None}

@@ -11,10 +11,11 @@ import torch
 from rich.console import Console
 from short_runs import LOOK, NARROW, tiny
 
-from agents import best, callbacks, configs, train
 from agents.__main__ import main
-from agents.evaluation import Score
-from agents.policy import OnnxPolicy
+from agents.policies.policy import OnnxPolicy
+from agents.settings import presets as configs
+from agents.training import best, callbacks, train
+from agents.training.evaluation import Score
 
 QUIET = Console(quiet=True)
 NORMALIZED = {"observation": True, "reward": True}

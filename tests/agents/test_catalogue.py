@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from agents import catalogue, configs
-from agents.onnx_file import PolicyFileError
-from agents.settings import SettingsError
+from agents.export.onnx_file import PolicyFileError
+from agents.policies import catalogue
+from agents.settings import presets as configs
+from agents.settings.settings import SettingsError
 
 BASE = "extends: KneeWalk-v0.ppo\n"
 

@@ -9,10 +9,12 @@ import gymnasium as gym
 import pytest
 from short_runs import ID
 
-from agents import configs, evaluation, inputs, seeds
-from agents.networks import input_matrix
-from agents.parts import TQC, Network, Search
-from agents.settings import SettingsError
+from agents.policies import inputs
+from agents.policies.networks import input_matrix
+from agents.settings import presets as configs
+from agents.settings.parts import TQC, Network, Search
+from agents.settings.settings import SettingsError
+from agents.training import evaluation, seeds
 
 TWO = {"hysteresis": ["maxwell_slip", "preisach"]}
 DRAWN = {"randomize": True}

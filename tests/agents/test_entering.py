@@ -10,9 +10,10 @@ from typing import Any
 import onnx
 import pytest
 
-from agents import catalogue, configs
 from agents.__main__ import main
-from agents.onnx_file import CARD
+from agents.export.onnx_file import CARD
+from agents.policies import catalogue
+from agents.settings import presets as configs
 
 PRETRAINED = catalogue.FOLDER
 NAME = "KneeWalk-v0.ppo"

@@ -15,15 +15,16 @@ import pytest
 from short_runs import ID, KINDS, kind, tiny
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-from agents import configs, evaluation
-from agents.building import make_env, signals_of
-from agents.export import facts, policy_bytes
-from agents.mixed_vec_env import MixedVecEnv
-from agents.policy import OnnxPolicy
-from agents.residual import with_controller
-from agents.residual_vec_env import parts_of
-from agents.settings import SettingsError
-from baselines.catalogue import make_controller
+from agents.export.export import facts, policy_bytes
+from agents.policies.policy import OnnxPolicy
+from agents.policies.residual import with_controller
+from agents.settings import presets as configs
+from agents.settings.settings import SettingsError
+from agents.training import evaluation
+from agents.training.building import make_env, signals_of
+from agents.vec_envs.mixed import MixedVecEnv
+from agents.vec_envs.residual import parts_of
+from baselines.core.catalogue import make_controller
 
 Run = Callable[[str], tuple[Any, Path]]
 REMEMBERS = ("recurrent", "plain_recurrent", "history", "residual_sac", "residual_recurrent")
@@ -133,7 +134,7 @@ def test_policies_without_memory_have_none(name: str, short_run: Run) -> None:
 
 
 def test_an_untrained_residual_is_its_controller() -> None:
-    from agents.building import make_model
+    from agents.training.building import make_model
 
     config = kind("residual")
     env = make_env(config)
@@ -296,9 +297,9 @@ class Missing:
             raise ModuleNotFoundError(name)
 sys.meta_path.insert(0, Missing())
 import gymnasium as gym, pam_envs
-from agents.policy import OnnxPolicy
-from agents.residual import with_controller
-import agents.catalogue
+from agents.policies.policy import OnnxPolicy
+from agents.policies.residual import with_controller
+import agents.policies.catalogue
 env = gym.make({ID!r})
 policy = with_controller(OnnxPolicy.load({str(place)!r}), env.unwrapped.plant)
 observation, _ = env.reset(seed=900_000)

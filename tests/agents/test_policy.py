@@ -25,14 +25,16 @@ from short_runs import ID, tiny
 from stable_baselines3 import PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 
-from agents import catalogue, checkpoint, configs, sweep
 from agents.__main__ import main
-from agents.export import export_policy
-from agents.onnx_file import CARD, MOST_BYTES, PolicyFileError
-from agents.policy import OnnxPolicy
-from agents.sb3_vec_env import make_batch_vec_env
-from agents.settings import SettingsError
-from agents.train import saved_run
+from agents.export.export import export_policy
+from agents.export.onnx_file import CARD, MOST_BYTES, PolicyFileError
+from agents.policies import catalogue
+from agents.policies.policy import OnnxPolicy
+from agents.settings import presets as configs
+from agents.settings.settings import SettingsError
+from agents.training import checkpoint, sweep
+from agents.training.train import saved_run
+from agents.vec_envs.sb3 import make_batch_vec_env
 from pam_envs.parameters import Signals
 
 MODELS = ("ppo", "normalized_ppo", "sac")

@@ -7,7 +7,7 @@ import math
 import gymnasium as gym
 import pytest
 
-from agents import configs
+from agents.settings import presets as configs
 
 PRESETS = sorted(configs.presets())
 RESIDUAL = [names for names in PRESETS if names[2].startswith("residual")]

@@ -14,11 +14,12 @@ import onnx
 import pytest
 from short_runs import ID
 
-from agents import catalogue, configs
-from agents.onnx_file import CARD
-from agents.policy import OnnxPolicy
-from agents.residual import ResidualPolicy, with_controller
-from benchmarks import controllers, rows
+from agents.export.onnx_file import CARD
+from agents.policies import catalogue
+from agents.policies.policy import OnnxPolicy
+from agents.policies.residual import ResidualPolicy, with_controller
+from agents.settings import presets as configs
+from benchmarks.runs import controllers, rows
 
 FILES = [path for entry in catalogue.CONTROLLERS.values() for path in entry.files().values()]
 NUMBERED = [path for path in FILES if re.search(r"\.s[0-9]+$", path.stem)]
@@ -150,7 +151,10 @@ def test_the_author_is_the_one_beside_the_policy(
     beside = json.loads(source.with_suffix(".json").read_text()) | {"author": "Doe, J."}
     (tmp_path / "MusclePositioning-v0.ppo.s0.json").write_text(json.dumps(beside))
     assert entry.author == "Doe, J."
-    assert controllers._entrant("ppo", entry, "agents.catalogue", "learned").author == "Doe, J."
+    assert (
+        controllers._entrant("ppo", entry, "agents.policies.catalogue", "learned").author
+        == "Doe, J."
+    )
     assert catalogue.load_pretrained("ppo").card["seed"] == 0
 
 

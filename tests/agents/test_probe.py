@@ -13,15 +13,17 @@ import numpy as np
 import pytest
 from short_runs import ID, kind, tiny
 
-from agents import catalogue, checkpoint, configs, controllers, probe
-from agents.building import make_env, signals_of
-from agents.export import facts
-from agents.onnx_file import PolicyFileError
-from agents.policy import OnnxPolicy
-from agents.residual import ResidualPolicy, ResidualState, with_controller
-from agents.residual_vec_env import ResidualVecEnv, parts_of
-from agents.settings import SettingsError
-from baselines import catalogue as baselines
+from agents.export.export import facts
+from agents.export.onnx_file import PolicyFileError
+from agents.policies import catalogue, controllers, probe
+from agents.policies.policy import OnnxPolicy
+from agents.policies.residual import ResidualPolicy, ResidualState, with_controller
+from agents.settings import presets as configs
+from agents.settings.settings import SettingsError
+from agents.training import checkpoint
+from agents.training.building import make_env, signals_of
+from agents.vec_envs.residual import ResidualVecEnv, parts_of
+from baselines.core import catalogue as baselines
 
 LAWS = ("maxwell_slip", "preisach")
 BOTH_LAWS = ("PAM/MusclePositioning-v0", "PAM/KneeTension-v0")

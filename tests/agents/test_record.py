@@ -6,7 +6,8 @@ import json
 
 from short_runs import ID, tiny
 
-from agents import configs, record
+from agents.settings import presets as configs
+from agents.training import record
 
 SPENT = {"wall": 2.0, "cpu": 1.0}
 

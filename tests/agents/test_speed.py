@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import torch
 
-from agents.speed import measure
+from agents.training.speed import measure
 
 
 def test_a_measurement_is_complete_and_leaves_torch_as_it_was() -> None:

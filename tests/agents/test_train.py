@@ -22,14 +22,15 @@ from rich.console import Console
 from short_runs import ID, KINDS, kind, tiny, trained
 from stable_baselines3.common.evaluation import evaluate_policy
 
-from agents import checkpoint, configs, seeds, sources, train
 from agents.__main__ import main
-from agents.building import make_env, make_model
-from agents.checkpoint import MARK, CheckpointError
-from agents.parts import Evaluation
-from agents.policy import OnnxPolicy
-from agents.sb3_vec_env import make_batch_vec_env
-from benchmarks import scenarios
+from agents.policies.policy import OnnxPolicy
+from agents.settings import presets as configs
+from agents.settings.parts import Evaluation
+from agents.training import checkpoint, seeds, sources, train
+from agents.training.building import make_env, make_model
+from agents.training.checkpoint import MARK, CheckpointError
+from agents.vec_envs.sb3 import make_batch_vec_env
+from benchmarks.scenarios import scenario as scenarios
 from tests.sweeps.processes_of import wait_until
 
 QUIET = Console(quiet=True)

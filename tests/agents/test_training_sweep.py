@@ -15,9 +15,11 @@ import yaml
 from rich.console import Console
 from short_runs import ID, tiny
 
-from agents import configs, export, sources, sweep, train
 from agents.__main__ import main
-from agents.settings import SettingsError
+from agents.export import export
+from agents.settings import presets as configs
+from agents.settings.settings import SettingsError
+from agents.training import sources, sweep, train
 from sweeps.engine import Cluster
 from tests.sweeps.dask_processes import DaskProcesses
 from tests.sweeps.processes_of import alive, new_family, start, wait_until
@@ -29,7 +31,8 @@ CONFIG = configs.changed(tiny(), ["steps=8_000"])
 PROGRAM = """
 import json, sys
 from pathlib import Path
-from agents import configs, sweep
+from agents.settings import presets as configs
+from agents.training import sweep
 from sweeps.engine import Cluster
 folder, jobs, address = sys.argv[1:]
 config = configs.read(Path(folder) / "tiny.yaml")
@@ -94,7 +97,7 @@ class Driver:
 
 def trainers(family: str) -> list[psutil.Process]:
     """Return the processes of a family that train."""
-    return alive(family, "agents.sweep_one")
+    return alive(family, "agents.training.sweep_one")
 
 
 def test_whoever_is_killed_the_policies_are_those_of_lone_trainings(

@@ -17,12 +17,14 @@ from optuna.trial import TrialState
 from rich.console import Console
 from short_runs import ID, KINDS, kind, tiny
 
-from agents import configs, preset_text, tune
-from agents.configs import Config
-from agents.evaluation import Score, value_of
-from agents.parts import Plants, Search
-from agents.search_spaces import as_settings, from_settings, space_of, with_settings
-from agents.settings import SettingsError
+from agents.settings import preset_text
+from agents.settings import presets as configs
+from agents.settings.parts import Plants, Search
+from agents.settings.presets import Config
+from agents.settings.search_spaces import as_settings, from_settings, space_of, with_settings
+from agents.settings.settings import SettingsError
+from agents.training import tune
+from agents.training.evaluation import Score, value_of
 
 QUIET = Console(quiet=True)
 LOOK = {"episodes": 2, "settle_seconds": 0.1}
@@ -78,7 +80,7 @@ sys.path.insert(0, {str(Path(__file__).parent)!r})
 import optuna
 optuna.logging.disable_default_handler()
 from pathlib import Path
-from agents import tune
+from agents.training import tune
 import test_tune
 tune.HEARTBEAT = 1
 def hang(*_):

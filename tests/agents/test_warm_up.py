@@ -12,11 +12,12 @@ from short_runs import tiny
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 
-from agents import configs, train
-from agents.building import learning_rate, make_env, make_model, warm_up_steps
-from agents.callbacks import WarmUp
-from agents.networks import CRITIC
-from agents.settings import SettingsError
+from agents.policies.networks import CRITIC
+from agents.settings import presets as configs
+from agents.settings.settings import SettingsError
+from agents.training import train
+from agents.training.building import learning_rate, make_env, make_model, warm_up_steps
+from agents.training.callbacks import WarmUp
 
 ROLLOUT = 128
 KINDS: dict[str, tuple[str, dict[str, Any]]] = {

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import pam_envs  # noqa: F401  registers the ids
-from baselines.catalogue import make_controller
-from baselines.controller import Controller
-from pam_envs.plants.single_muscle import SingleMuscle
+from baselines.core.catalogue import make_controller
+from baselines.core.controller import Controller
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 HOLD = 90
 """Control periods for which each level of the staircase is held."""

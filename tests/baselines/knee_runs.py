@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 
 import pam_envs  # noqa: F401  registers the ids
-from pam_envs.plants.knee_orthosis import KneeOrthosis
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from tests.baselines.conftest import built
 
 PROMPT = {"regulator.time_constant": 2e-3}

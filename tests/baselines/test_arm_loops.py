@@ -11,15 +11,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from baselines.joint_feedback import pid_system, simc_joint
-from baselines.joint_loop import pi_system, pole_cancelling
-from baselines.joint_model import nominal_motion
-from baselines.joint_poles import joint_delays, joint_poles, mean_time
-from baselines.robust import robust_controller
-from baselines.robust_design import FREQUENCIES, RobustDesign
-from baselines.simc import WAIT
-from pam_envs.plants.manipulator_rollout import simulate_manipulator
-from pam_envs.plants.redundant_manipulator import RedundantManipulator
+from baselines.joint.feedback import pid_system, simc_joint
+from baselines.joint.loop import pi_system, pole_cancelling
+from baselines.joint.model import nominal_motion
+from baselines.joint.poles import joint_delays, joint_poles, mean_time
+from baselines.linear.simc import WAIT
+from baselines.robust.loops import robust_controller
+from baselines.robust.requirements import FREQUENCIES, RobustDesign
+from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
+from pam_envs.plants.redundant_manipulator.rollout import simulate_manipulator
 
 PLANT = RedundantManipulator.paper().replace({"memory.width": 0.0})
 JOINTS, PERIOD, STEP, PERIODS = PLANT.stages, PLANT.control_period, 0.01, 500

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.branch import DEAD_BAND, first_branch, next_branch
+from baselines.positioning.branch import DEAD_BAND, first_branch, next_branch
 
 
 def _run(reference, contraction=0.0):

@@ -5,10 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.bumpless import SMALLEST, Bumpless, BumplessGains, certificate, design_bumpless
-from baselines.bumpless import make_bumpless as make
-from baselines.knee_published import printed_bumpless, printed_controller, printed_plant
-from baselines.linear import LinearSystem
+from baselines.knee.published import printed_bumpless, printed_controller, printed_plant
+from baselines.linear.bumpless import (
+    SMALLEST,
+    Bumpless,
+    BumplessGains,
+    certificate,
+    design_bumpless,
+)
+from baselines.linear.bumpless import make_bumpless as make
+from baselines.linear.systems import LinearSystem
 
 PLANT, GAINS = printed_bumpless()
 PERIOD = 0.01

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import pam_envs  # noqa: F401  registers the ids
-from baselines.catalogue import PUBLISHED, make_controller
-from baselines.elbow_catalogue import ELBOW, ELBOW_CONTROLLERS, ELBOW_MAKERS
-from baselines.elbow_friction import make_elbow_friction
-from baselines.elbow_valves import make_pressure_loop
-from baselines.elbow_view import make_elbow_signal_map
-from baselines.torque_stiffness import Allocation
-from pam_envs.plants.elbow_orthosis import ElbowOrthosis
-from pam_envs.plants.single_muscle import SingleMuscle
+from baselines.core.catalogue import PUBLISHED, make_controller
+from baselines.elbow.catalogue import ELBOW, ELBOW_CONTROLLERS, ELBOW_MAKERS
+from baselines.elbow.friction import make_elbow_friction
+from baselines.elbow.torque_stiffness import Allocation
+from baselines.elbow.valves import make_pressure_loop
+from baselines.elbow.view import make_elbow_signal_map
+from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 NAMES = [name for name, entry in PUBLISHED.items() if set(ELBOW) & set(entry.envs)]
 VALVES = ("proportional", "on_off")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.inverse import aims_of, preview_weights
-from pam_envs.plants.single_muscle import SingleMuscle
+from baselines.positioning.inverse import aims_of, preview_weights
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 from tests.baselines.conftest import QUIET, SECONDS, built, make_env, quiet, rollout
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.redundancy import POSE, InverseKinematics, compare
+from baselines.manipulator.redundancy import POSE, InverseKinematics, compare
 from pam_envs.mechanics.redundancy import LIMIT, UnreachablePose, resolve
 from pam_envs.mechanics.serial_chain import SerialChain
 from pam_envs.parameters import Signal, Signals

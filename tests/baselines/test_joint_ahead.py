@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.joint_ahead import MOST, ahead_by, double_lags, present
-from baselines.joint_catalogue import JOINT_CONTROLLERS
-from baselines.joint_feedback import (
+from baselines.joint.catalogue import JOINT_CONTROLLERS
+from baselines.joint.feedback import (
     make_joint_feedback,
     pid_delay,
     pid_system,
     reference_filter,
     simc_joint,
 )
-from baselines.joint_loop import pi_system, pole_cancelling
-from baselines.joint_model import POLE, nominal_motion
-from baselines.model_following import make_model_following
-from benchmarks.joint_studies import ACTIONS, RANGE, ReducedRig
+from baselines.joint.loop import pi_system, pole_cancelling
+from baselines.joint.model import POLE, nominal_motion
+from baselines.joint.model_following import make_model_following
+from baselines.joint.preview import MOST, ahead_by, double_lags, present
+from benchmarks.papers.joint_studies import ACTIONS, RANGE, ReducedRig
 from pam_envs.parameters import Signal, Signals
 
 PERIOD, TIMES = 0.01, (0.0, 0.04, 0.08, 0.12)

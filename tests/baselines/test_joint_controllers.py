@@ -7,12 +7,12 @@ import copy
 import numpy as np
 import pytest
 
-from baselines.catalogue import CONTROLLERS, make_controller
-from baselines.joint_catalogue import ARM, JOINT, JOINT_CONTROLLERS, JOINT_MAKERS
-from baselines.joint_gravity import Gravity
-from baselines.joint_poles import FREQUENCIES, phase
-from baselines.joint_view import make_joint_signal_map
-from benchmarks.joint_studies import (
+from baselines.core.catalogue import CONTROLLERS, make_controller
+from baselines.joint.catalogue import ARM, JOINT, JOINT_CONTROLLERS, JOINT_MAKERS
+from baselines.joint.gravity import Gravity
+from baselines.joint.poles import FREQUENCIES, phase
+from baselines.joint.view import make_joint_signal_map
+from benchmarks.papers.joint_studies import (
     ACTIONS,
     DEGREE,
     RANGE,
@@ -21,10 +21,11 @@ from benchmarks.joint_studies import (
     controller,
     run,
 )
-from pam_envs.envs import antagonistic_joint, redundant_manipulator
+from pam_envs.envs.joint import env as antagonistic_joint
+from pam_envs.envs.manipulator import env as redundant_manipulator
 from pam_envs.parameters import Signal, Signals
-from pam_envs.plants.antagonistic_joint import AntagonisticJoint
-from pam_envs.plants.redundant_manipulator import RedundantManipulator
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 
 BOUND = [n for n in JOINT_CONTROLLERS if n.endswith(("_gravity", "_ahead", "_kinematics"))]
 """Need a plant that knows its weight, or its chain."""

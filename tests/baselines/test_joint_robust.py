@@ -7,11 +7,11 @@ import importlib.util
 import numpy as np
 import pytest
 
-from baselines import joint_synthesis as synthesis
-from baselines.linear import LinearSystem
-from baselines.reduction import residualised, split, with_integrator, without_fast
-from baselines.robust import frozen, frozen_loop, robust_controller
-from baselines.robust_design import FREQUENCIES, RobustDesign, sensitivity
+from baselines.linear.reduction import residualised, split, with_integrator, without_fast
+from baselines.linear.systems import LinearSystem
+from baselines.robust import synthesis
+from baselines.robust.loops import frozen, frozen_loop, robust_controller
+from baselines.robust.requirements import FREQUENCIES, RobustDesign, sensitivity
 
 DESIGN = RobustDesign()
 

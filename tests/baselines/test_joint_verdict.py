@@ -6,8 +6,8 @@ import warnings
 
 import pytest
 
-from baselines.joint_model import joint_model
-from pam_envs.plants.antagonistic_joint import AntagonisticJoint
+from baselines.joint.model import joint_model
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
 
 def test_a_memory_that_fails_the_symmetry_is_warned_of_with_value_and_bound() -> None:

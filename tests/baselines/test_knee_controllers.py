@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.catalogue import PUBLISHED, make_controller
-from baselines.knee_catalogue import KNEE, KNEE_CONTROLLERS, KNEE_MAKERS
-from pam_envs.plants.single_muscle import SingleMuscle
+from baselines.core.catalogue import PUBLISHED, make_controller
+from baselines.knee.catalogue import KNEE, KNEE_CONTROLLERS, KNEE_MAKERS
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 from tests.baselines.conftest import built, check_form, observations_of
 from tests.baselines.knee_runs import make_knee, quiet, run
 

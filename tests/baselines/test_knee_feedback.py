@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines import knee_identification
-from baselines.bumpless import BumplessGains, certificate
-from baselines.knee_design import BANDWIDTHS, design, make_loop
-from baselines.knee_identification import FREQUENCIES, frequency_response, identify
-from baselines.linear import LinearSystem
-from baselines.ltr import plant_system
-from benchmarks.metrics_knee import landings
-from pam_envs.plants.knee_orthosis import KneeOrthosis
+from baselines.knee import identification as knee_identification
+from baselines.knee.design import BANDWIDTHS, design, make_loop
+from baselines.knee.identification import FREQUENCIES, frequency_response, identify
+from baselines.linear.bumpless import BumplessGains, certificate
+from baselines.linear.ltr import plant_system
+from baselines.linear.systems import LinearSystem
+from benchmarks.scoring.knee import landings
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from tests.baselines.conftest import built
 from tests.baselines.knee_runs import make_knee, quiet, run, walked
 

@@ -13,12 +13,14 @@ import pytest
 import yaml
 
 import pam_envs  # noqa: F401  registers the ids
-from baselines import catalogue, joint_model, knee_design, tuned
-from baselines.catalogue import CONTROLLERS, PUBLISHED, make_controller
-from baselines.joint_tracking import make_model_loop
-from baselines.simc import simc_rule
-from benchmarks.canonical import object_digest
-from benchmarks.joint_studies import ReducedRig
+from baselines.core import catalogue, tuned
+from baselines.core.catalogue import CONTROLLERS, PUBLISHED, make_controller
+from baselines.joint import model as joint_model
+from baselines.joint.tracking import make_model_loop
+from baselines.knee import design as knee_design
+from baselines.linear.simc import simc_rule
+from benchmarks.identity.hashing import object_digest
+from benchmarks.papers.joint_studies import ReducedRig
 from pam_envs.identification.frequency import fit_rational
 
 FREQUENCIES = np.geomspace(0.5, 60.0, 24)

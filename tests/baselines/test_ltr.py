@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from baselines.knee_published import printed_controller, printed_plant
-from baselines.linear import LinearSystem
-from baselines.ltr import closed_loop_poles, design_ltr, loop_figures, sampled_figures
+from baselines.knee.published import printed_controller, printed_plant
+from baselines.linear.ltr import closed_loop_poles, design_ltr, loop_figures, sampled_figures
+from baselines.linear.systems import LinearSystem
 from pam_envs.identification.frequency import fit_rational
 
 PLANT = printed_plant()

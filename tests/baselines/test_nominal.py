@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.nominal import Nominal
-from pam_envs.plants.single_muscle import SingleMuscle
+from baselines.positioning.nominal import Nominal
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.pneumatics.regulator import regulator_step
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.pid import Gains, pid_start, pid_step, simc
-from pam_envs.plants.single_muscle import SingleMuscle
+from baselines.positioning.pid import Gains, pid_start, pid_step, simc
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 from tests.baselines.conftest import QUIET, built, make_env, rollout
 
 GAINS = Gains(1e7, 2e8, 1e5, 0.005, 0.05)

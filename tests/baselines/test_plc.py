@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.contraction_tables import pchip_inverse, published_inverse, table_6_inverse
+from baselines.positioning.contraction_tables import (
+    pchip_inverse,
+    published_inverse,
+    table_6_inverse,
+)
 from tests.baselines.conftest import built, make_env, quiet, rollout
 
 

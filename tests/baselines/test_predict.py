@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from baselines.catalogue import PUBLISHED, make_controller
+from baselines.core.catalogue import PUBLISHED, make_controller
 from tests.baselines.conftest import ID, built, check_form, make_env, observations_of
 
 CONTROLLERS = {name: entry for name, entry in PUBLISHED.items() if ID in entry.envs}

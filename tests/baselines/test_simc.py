@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.joint_feedback import closed_loop_time, pid_system, simc_joint
-from baselines.joint_model import nominal_motion
-from baselines.ltr import loop_figures
-from baselines.simc import WAIT, simc_rule
+from baselines.joint.feedback import closed_loop_time, pid_system, simc_joint
+from baselines.joint.model import nominal_motion
+from baselines.linear.ltr import loop_figures
+from baselines.linear.simc import WAIT, simc_rule
 
 PERIOD, POLE = 0.01, 23.0
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import rows, traces
+from benchmarks.board import traces
+from benchmarks.runs import rows
 
 CONTENT: dict[str, Any] = {
     "schema": 1,

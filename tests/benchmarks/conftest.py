@@ -9,7 +9,9 @@ import board_fakes
 import pytest
 import yaml
 
-from benchmarks import artefacts, audit, controllers, scenarios, tasks
+from benchmarks.identity import artefacts, audit, tasks
+from benchmarks.runs import controllers
+from benchmarks.scenarios import scenario as scenarios
 
 CONTENT = board_fakes.CONTENT | {
     "name": "short",

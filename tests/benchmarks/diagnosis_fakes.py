@@ -6,7 +6,7 @@ import json
 from collections.abc import Collection
 from typing import Any
 
-from benchmarks.diagnosis_cases import Case
+from benchmarks.diagnosis.cases import Case
 
 
 def record(

@@ -12,11 +12,13 @@ import bench_fakes
 import pytest
 import yaml
 
-from benchmarks import artefacts, audit, controllers, provenance, scenarios
-from benchmarks.artefacts import uncommitted
-from benchmarks.controllers import find
-from benchmarks.runner import Options, run
-from benchmarks.scenarios import ScenarioSet
+from benchmarks.identity import artefacts, audit
+from benchmarks.identity.artefacts import uncommitted
+from benchmarks.runs import controllers, provenance
+from benchmarks.runs.controllers import find
+from benchmarks.runs.runner import Options, run
+from benchmarks.scenarios import scenario as scenarios
+from benchmarks.scenarios.scenario import ScenarioSet
 from tests.benchmarks.conftest import CONTENT
 
 GAINS = (0.02, 0.05)

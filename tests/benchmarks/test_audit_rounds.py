@@ -17,17 +17,19 @@ import pytest
 from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
-from agents.policy import OnnxPolicy
-from agents.residual import ResidualPolicy
-from baselines import tuned
-from baselines.trivial import Constant
-from benchmarks import artefacts, audit, controllers, provenance, rows, scenarios, tasks
+from agents.policies.policy import OnnxPolicy
+from agents.policies.residual import ResidualPolicy
+from baselines.core import tuned
+from baselines.positioning.trivial import Constant
 from benchmarks.__main__ import main
-from benchmarks.canonical import digest
-from benchmarks.controllers import Entrant, find
-from benchmarks.source_code import needed
-from benchmarks.store import comparable, read_record, write_record
-from benchmarks.verify import verify
+from benchmarks.identity import artefacts, audit, tasks
+from benchmarks.identity.hashing import digest
+from benchmarks.identity.source_code import needed
+from benchmarks.identity.verify import verify
+from benchmarks.runs import controllers, provenance, rows
+from benchmarks.runs.controllers import Entrant, find
+from benchmarks.runs.store import comparable, read_record, write_record
+from benchmarks.scenarios import scenario as scenarios
 from tests.benchmarks.row_helpers import commit, draw, git, place, run_row, tiny
 
 
@@ -171,7 +173,7 @@ def test_what_git_does_not_know_gets_no_salt(board: Path, monkeypatch: pytest.Mo
     with pytest.raises(ValueError, match=r"tiny\.yaml"):
         draw(board, "trained")
     git(board, "checkout", "--", "tiny.yaml")
-    monkeypatch.setattr(provenance, "changed", lambda: ["pam_envs/kernels.py"])
+    monkeypatch.setattr(provenance, "changed", lambda: ["pam_envs/kernels/build.py"])
     with pytest.raises(ValueError, match=r"tiny: not as in the last commit: pam_envs/kernels\.py"):
         draw(board, "trained")
     assert audit.rounds() == []
@@ -227,7 +229,7 @@ def test_knobs_that_a_search_found_are_of_the_artefact() -> None:
         if entrant.kind == "classical":
             assert entrant.tuned == (name if name in found else "")
     some = Constant(None)
-    plain = Entrant("zero", "", "nothing", "", (), "classical", "baselines.catalogue")
+    plain = Entrant("zero", "", "nothing", "", (), "classical", "baselines.core.catalogue")
     codes = {
         artefacts.controller_code(replace(plain, knobs=knobs), some)
         for knobs in ((), (("lead", 1.0),), (("lead", 1.0 + 1e-15),))
@@ -242,14 +244,16 @@ NEEDED = {"policy.py", "residual.py", "catalogue.py", "controllers.py", "onnx_fi
 def test_a_policy_needs_the_agents_that_answer_and_the_controller_that_it_corrects(
     kind: str,
 ) -> None:
-    entrant = Entrant("any", "", "nothing", "", (), kind, "agents.catalogue", ((0, Path("any")),))
+    entrant = Entrant(
+        "any", "", "nothing", "", (), kind, "agents.policies.catalogue", ((0, Path("any")),)
+    )
     policy = OnnxPolicy.__new__(OnnxPolicy)
     learned = policy if kind == "learned" else ResidualPolicy(policy, Constant(None))
     found = [needed(*part) for part in artefacts.code_files(entrant, learned)]
     names = [{file.relative_to(controllers.ROOT).as_posix() for file in part} for part in found]
     assert {f"agents/{name}" for name in NEEDED} < names[0]
     assert all(name.startswith("agents/") for name in names[0])
-    assert [part for part in names[1:] if "baselines/trivial.py" in part] == names[1:]
+    assert [part for part in names[1:] if "baselines/positioning/trivial.py" in part] == names[1:]
     assert len(names) == 1 + (kind == "residual")
 
 
@@ -416,7 +420,7 @@ def test_where_git_cannot_say_a_design_is_in_no_round(
 
 def test_a_policy_is_designed_by_none() -> None:
     entrant = Entrant(
-        "any", "", "nothing", "", (), "learned", "agents.catalogue", ((0, Path("any")),)
+        "any", "", "nothing", "", (), "learned", "agents.policies.catalogue", ((0, Path("any")),)
     )
     assert audit._designer(entrant) is None
     corrects = audit._designer(replace(entrant, kind="residual"))

@@ -7,8 +7,11 @@ from pathlib import Path
 
 import bench_fakes
 
-from benchmarks import leaderboard, site_build, standings, verified, views
-from benchmarks.store import CHECKSUM
+from benchmarks.board import accessors as views
+from benchmarks.board import leaderboard, site_build
+from benchmarks.identity import verified
+from benchmarks.runs.store import CHECKSUM
+from benchmarks.scoring import standings
 from tests.benchmarks.row_helpers import commit, draw, place, run_row
 
 

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import cells, making, provenance, rollout, scenarios
-from benchmarks.canonical import canonical_text
-from benchmarks.controllers import find
-from benchmarks.scenarios import ScenarioSet
+from benchmarks.identity.hashing import canonical_text
+from benchmarks.runs import cells, provenance, rollout
+from benchmarks.runs.controllers import find
+from benchmarks.scenarios import scenario as scenarios
+from benchmarks.scenarios import scenario_env as making
+from benchmarks.scenarios.scenario import ScenarioSet
 from sweeps import worker
 
 

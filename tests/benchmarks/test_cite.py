@@ -10,13 +10,13 @@ import board_fakes as fakes
 import pytest
 import yaml
 
-from baselines.entry import Entry
-from benchmarks import cite
+from baselines.core.entry import Entry
 from benchmarks.__main__ import main
-from benchmarks.controllers import available
-from benchmarks.provenance import ROOT
-from benchmarks.scenarios import ScenarioSet
-from benchmarks.store import write_record
+from benchmarks.board import cite
+from benchmarks.runs.controllers import available
+from benchmarks.runs.provenance import ROOT
+from benchmarks.runs.store import write_record
+from benchmarks.scenarios.scenario import ScenarioSet
 from tests.benchmarks.test_harness import options, score
 
 SIMC = "S. Skogestad, Simple analytic rules for model reduction and PID controller tuning, 2003"
@@ -93,7 +93,7 @@ def test_the_package_is_cited_as_it_says() -> None:
 def test_a_row_is_cited_with_what_runs_it_again(
     track: ScenarioSet, folder: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from benchmarks import rows
+    from benchmarks.runs import rows
 
     (path,) = score(track, folder, "integral").rows
     row = rows.load(path)

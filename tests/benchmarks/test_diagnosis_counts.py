@@ -7,8 +7,8 @@ import pytest
 from diagnosis_fakes import counted, failed, loop, record, sample
 from scipy import stats
 
-from benchmarks.diagnosis_counts import Told, exact_interval, share, upper_bound
-from benchmarks.diagnosis_report import figures, page
+from benchmarks.diagnosis.counts import Told, exact_interval, share, upper_bound
+from benchmarks.diagnosis.report import figures, page
 
 # --- shares --------------------------------------------------------------------------------------
 

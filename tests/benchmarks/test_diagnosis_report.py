@@ -8,7 +8,7 @@ from typing import Any
 
 from diagnosis_fakes import counted, loop, record, sample, trace
 
-from benchmarks.diagnosis_report import figures, page, targets, write
+from benchmarks.diagnosis.report import figures, page, targets, write
 from tests.diagnosis.hidden import EFFECTS
 
 

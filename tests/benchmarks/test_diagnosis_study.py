@@ -15,13 +15,14 @@ import pytest
 from diagnosis_fakes import counted, loop, record
 from joblib.externals.loky import get_reusable_executor
 
-from benchmarks import diagnosis, diagnosis_study
-from benchmarks.diagnosis import Options, retold, run, select
-from benchmarks.diagnosis_cases import NOISE, Case, cases, make
-from benchmarks.diagnosis_next import DrivenRig, OracleRig
-from benchmarks.diagnosis_report import figures
-from benchmarks.diagnosis_study import study, trace_errors
-from pam_envs.diagnosis.gain import COMPENSABLE
+from benchmarks.diagnosis import run as diagnosis
+from benchmarks.diagnosis import study as diagnosis_study
+from benchmarks.diagnosis.cases import NOISE, Case, cases, make
+from benchmarks.diagnosis.next import DrivenRig, OracleRig
+from benchmarks.diagnosis.report import figures
+from benchmarks.diagnosis.run import Options, retold, run, select
+from benchmarks.diagnosis.study import study, trace_errors
+from pam_envs.diagnosis.closed_loop.gain import COMPENSABLE
 from tests.diagnosis import hidden
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -13,24 +13,16 @@ import bench_fakes
 import numpy as np
 import pytest
 
-from benchmarks import (
-    audit,
-    cells,
-    metrics,
-    provenance,
-    replay,
-    rows,
-    tasks,
-    traces,
-    verified,
-    verify,
-)
 from benchmarks.__main__ import main
-from benchmarks.canonical import digest, plain
-from benchmarks.controllers import available
-from benchmarks.metrics import of_track
-from benchmarks.store import read_record, write_record
-from pam_envs.envs import muscle_positioning
+from benchmarks.board import traces
+from benchmarks.identity import audit, tasks, verified, verify
+from benchmarks.identity.hashing import digest, plain
+from benchmarks.runs import cells, provenance, replay, rows
+from benchmarks.runs.controllers import available
+from benchmarks.runs.store import read_record, write_record
+from benchmarks.scoring import metrics
+from benchmarks.scoring.metrics import of_track
+from pam_envs.envs.positioning import env as muscle_positioning
 from pam_envs.pneumatics.regulator import Regulator
 from tests.benchmarks.row_helpers import draw, place, run_row
 
@@ -691,12 +683,12 @@ def test_the_command_notes_nothing_where_code_is_not_committed(
     assert main(["verify", path, "--jobs", "1"]) == 0
     before = noted.read_bytes()
     assert json.loads(before)["tiny--integral"]["mode"] == "bits"
-    monkeypatch.setattr(provenance, "changed", lambda: ["pam_envs/kernels.py"])
+    monkeypatch.setattr(provenance, "changed", lambda: ["pam_envs/kernels/build.py"])
     assert main(["verify", path, "--compare", "elsewhere", "--jobs", "1"]) == 2
     said = capsys.readouterr()
     assert "tiny--integral: holds" in said.out
     assert said.err == (
-        "error: not noted in verified.json, since pam_envs/kernels.py is not as in the last "
+        "error: not noted in verified.json, since pam_envs/kernels/build.py is not as in the last "
         "commit: commit or stash it and verify again\n"
     )
     assert noted.read_bytes() == before

@@ -16,11 +16,14 @@ import pytest
 from joblib.externals.loky import get_reusable_executor
 from scipy import stats
 
-from benchmarks import leaderboard, metrics, rows, statistics, verify
-from benchmarks.controllers import find
-from benchmarks.runner import Options, Report, run
-from benchmarks.scenarios import ScenarioSet
-from benchmarks.store import Store, comparable, read_record, seal
+from benchmarks.board import leaderboard
+from benchmarks.identity import verify
+from benchmarks.runs import rows
+from benchmarks.runs.controllers import find
+from benchmarks.runs.runner import Options, Report, run
+from benchmarks.runs.store import Store, comparable, read_record, seal
+from benchmarks.scenarios.scenario import ScenarioSet
+from benchmarks.scoring import metrics, statistics
 from tests.sweeps.processes_of import wait_until
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -98,7 +101,7 @@ def test_a_killed_worker_costs_its_cell_and_nothing_else(
 _WRITER = """
 import os, sys, time
 from pathlib import Path
-from benchmarks.store import write_record
+from benchmarks.runs.store import write_record
 path, half = Path(sys.argv[1]), len(sys.argv) > 2
 replace = os.replace
 os.replace = lambda *names: time.sleep(600) if half and path.exists() else replace(*names)
@@ -132,9 +135,10 @@ _RUNNER = """
 import sys
 from pathlib import Path
 import yaml
-from benchmarks import controllers, scenarios
-from benchmarks.controllers import find
-from benchmarks.runner import Options, run
+from benchmarks.runs import controllers
+from benchmarks.scenarios import scenario as scenarios
+from benchmarks.runs.controllers import find
+from benchmarks.runs.runner import Options, run
 controllers.SOURCES = (("bench_fakes", "bench_fakes", "classical"),)
 folder = Path(sys.argv[1])
 track = scenarios.load(folder / "short.yaml")

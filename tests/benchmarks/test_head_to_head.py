@@ -13,10 +13,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from benchmarks import head_to_head, head_to_head_page, mass_spring_damper_rig
-from benchmarks.head_to_head import Case, diagnose
-from benchmarks.mass_spring_damper import BASE, CAUSES, NEUTRAL, MassSpringDamper
-from benchmarks.mass_spring_damper_rig import NOISE, PERIOD, Oscillator, another, campaign
+from benchmarks.head_to_head import page as head_to_head_page
+from benchmarks.head_to_head import rig as mass_spring_damper_rig
+from benchmarks.head_to_head import run as head_to_head
+from benchmarks.head_to_head.mass_spring_damper import BASE, CAUSES, NEUTRAL, MassSpringDamper
+from benchmarks.head_to_head.rig import NOISE, PERIOD, Oscillator, another, campaign
+from benchmarks.head_to_head.run import Case, diagnose
 
 SEED = 7
 

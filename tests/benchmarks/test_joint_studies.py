@@ -7,14 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from baselines.joint_loop import pi_system, pole_cancelling
-from baselines.robust import robust_controller
-from benchmarks import joint_loops, joint_plants, papers_joint, plots_joint
-from benchmarks import joint_studies as studies
-from benchmarks.joint_inverses import width_ratio
-from benchmarks.joint_studies import Setting, step
-from pam_envs.plants.antagonistic_joint import AntagonisticJoint
-from pam_envs.plants.joint_memory import joint_memory
+from baselines.joint.loop import pi_system, pole_cancelling
+from baselines.robust.loops import robust_controller
+from benchmarks.board import plots_joint
+from benchmarks.papers import joint as papers_joint
+from benchmarks.papers import joint_loops, joint_plants
+from benchmarks.papers import joint_studies as studies
+from benchmarks.papers.joint_inverses import width_ratio
+from benchmarks.papers.joint_studies import Setting, step
+from pam_envs.plants.antagonistic_joint.hysteresis import joint_memory
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
 
 def test_exact_figures_of_the_pi():

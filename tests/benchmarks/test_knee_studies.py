@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks import knee_studies as studies
+from benchmarks.papers import knee_studies as studies
 
 
 def test_inverse_and_straight_line_of_the_stiffness() -> None:

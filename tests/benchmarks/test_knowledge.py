@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks import knowledge, runner
-from benchmarks.controllers import available, find
-from benchmarks.making import make_env
-from benchmarks.scenarios import available as tracks
+from benchmarks.runs import knowledge, runner
+from benchmarks.runs.controllers import available, find
+from benchmarks.scenarios.scenario import available as tracks
+from benchmarks.scenarios.scenario_env import make_env
 
 IDS = sorted({track.env for track in tracks().values()})
 CLAIMS = [

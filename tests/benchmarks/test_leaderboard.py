@@ -10,21 +10,15 @@ from types import SimpleNamespace
 import board_fakes as fakes
 import pytest
 
-from benchmarks import (
-    audit,
-    cells,
-    claims,
-    leaderboard,
-    plots,
-    rows,
-    standings,
-    verified,
-    views,
-)
-from benchmarks.board_format import duration, number, table
-from benchmarks.board_tables import with_costs
-from benchmarks.controllers import available, find
-from benchmarks.metrics import of_track
+from benchmarks.board import accessors as views
+from benchmarks.board import leaderboard, plots
+from benchmarks.board.format import duration, number, table
+from benchmarks.board.tables import with_costs
+from benchmarks.identity import audit, verified
+from benchmarks.runs import cells, rows
+from benchmarks.runs.controllers import available, find
+from benchmarks.scoring import claims, standings
+from benchmarks.scoring.metrics import of_track
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import metrics
-from benchmarks.leaderboard import columns_of
-from benchmarks.metrics_elbow import ELBOW, NEAR
-from benchmarks.scenarios import available
+from benchmarks.board.leaderboard import columns_of
+from benchmarks.scenarios.scenario import available
+from benchmarks.scoring import metrics
+from benchmarks.scoring.elbow import ELBOW, NEAR
 
 PERIOD, N = 0.01, 400
 TIME = PERIOD * np.arange(1, N + 1)

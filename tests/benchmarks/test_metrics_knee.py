@@ -8,9 +8,11 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from baselines.trivial import Constant
-from benchmarks import metrics, metrics_knee, rollout, rows
-from benchmarks.scenarios import ScenarioSet, available
+from baselines.positioning.trivial import Constant
+from benchmarks.runs import rollout, rows
+from benchmarks.scenarios.scenario import ScenarioSet, available
+from benchmarks.scoring import knee as metrics_knee
+from benchmarks.scoring import metrics
 
 PERIOD = 0.01
 N = 1000

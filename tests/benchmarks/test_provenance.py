@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import provenance
-from benchmarks.source_code import needed
+from benchmarks.identity.source_code import needed
+from benchmarks.runs import provenance
 from tests.benchmarks.row_helpers import commit, git
 
 CODE = ("pam_envs", "sweeps", "baselines", "agents", "benchmarks", "benchmarks/scenarios")
@@ -42,7 +42,7 @@ def test_what_a_run_writes_does_not(checkout: Path) -> None:
 def test_the_commit_has_a_mark_then(monkeypatch: pytest.MonkeyPatch) -> None:
     found = provenance.commit.__wrapped__
     monkeypatch.setattr(provenance, "git", lambda *_: "c" * 40)
-    monkeypatch.setattr(provenance, "changed", lambda: ["pam_envs/kernels.py"])
+    monkeypatch.setattr(provenance, "changed", lambda: ["pam_envs/kernels/build.py"])
     assert found() == "c" * 40 + "+"
     monkeypatch.setattr(provenance, "changed", lambda: [])
     assert found() == "c" * 40

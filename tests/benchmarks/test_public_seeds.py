@@ -7,8 +7,9 @@ import hashlib
 import numpy as np
 import pytest
 
-from benchmarks import scenarios, statistics
-from benchmarks.scenarios import ScenarioSet, available, public_seeds
+from benchmarks.scenarios import scenario as scenarios
+from benchmarks.scenarios.scenario import ScenarioSet, available, public_seeds
+from benchmarks.scoring import statistics
 from tests.benchmarks.conftest import CONTENT
 
 TRACKS = sorted(available())

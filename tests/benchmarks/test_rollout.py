@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from benchmarks import controllers, rollout
-from benchmarks.making import make_batch, make_env
+from benchmarks.runs import controllers, rollout
+from benchmarks.scenarios.scenario_env import make_batch, make_env
 
 SHORT = {"episode_seconds": 0.2}
 

@@ -14,12 +14,14 @@ import bench_fakes
 import gymnasium as gym
 import pytest
 
-from benchmarks import artefacts, cells, rows, scenarios, tasks
-from benchmarks.cells import cells_of
-from benchmarks.controllers import BY_RULE, available, find
-from benchmarks.metrics import GROUPS
-from benchmarks.provenance import METRICS, SCORING
-from benchmarks.store import read_record, write_record
+from benchmarks.identity import artefacts, tasks
+from benchmarks.runs import cells, rows
+from benchmarks.runs.cells import cells_of
+from benchmarks.runs.controllers import BY_RULE, available, find
+from benchmarks.runs.provenance import METRICS, SCORING
+from benchmarks.runs.store import read_record, write_record
+from benchmarks.scenarios import scenario as scenarios
+from benchmarks.scoring.metrics import GROUPS
 from tests.benchmarks.row_helpers import place, run_row, tiny
 
 HEX = re.compile(r"[0-9a-f]{64}")
@@ -82,7 +84,7 @@ def test_every_training_seed_is_run_in_every_episode(trained: dict[str, Any], bo
 
 
 def test_the_interval_is_over_training_seeds_too(trained: dict[str, Any]) -> None:
-    from benchmarks import statistics
+    from benchmarks.scoring import statistics
 
     episodes = rows.episodes_of(trained)
     values = rows.scores_of(episodes, "rms_error")

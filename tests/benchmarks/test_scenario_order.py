@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from benchmarks.scenarios import ScenarioSet, available
+from benchmarks.scenarios.scenario import ScenarioSet, available
 
 
 @pytest.mark.parametrize("name", sorted(available()))

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import scenarios
 from benchmarks.__main__ import main
-from benchmarks.controllers import available
-from benchmarks.rows import shown
+from benchmarks.runs.controllers import available
+from benchmarks.runs.rows import shown
+from benchmarks.scenarios import scenario as scenarios
 
 TRACKS = {track.env: track for track in scenarios.available().values()}
 CLASSICAL = [(n, made) for n, made in available().items() if made.kind == "classical"]

@@ -13,11 +13,11 @@ from typing import Any
 import board_fakes as fakes
 import pytest
 
-from benchmarks import leaderboard, site_build, site_data, traces
 from benchmarks.__main__ import main
-from benchmarks.controllers import find
-from benchmarks.runner import Options, run
-from benchmarks.scenarios import ScenarioSet
+from benchmarks.board import leaderboard, site_build, site_data, traces
+from benchmarks.runs.controllers import find
+from benchmarks.runs.runner import Options, run
+from benchmarks.scenarios.scenario import ScenarioSet
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 BROWSER = next((path for path in map(shutil.which, BROWSERS) if path), None)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.provenance import ROOT
-from benchmarks.source_code import code_digest, code_text, needed
+from benchmarks.identity.source_code import code_digest, code_text, needed
+from benchmarks.runs.provenance import ROOT
 
 PLAIN = '''def f(x):
     y = """kept

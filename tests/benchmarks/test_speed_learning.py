@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from benchmarks import speed_learning
+from benchmarks.speed import learning as speed_learning
 
 
 @pytest.mark.parametrize(
@@ -39,9 +39,11 @@ def test_a_share_is_of_the_whole_rollout(
 
 @pytest.mark.parametrize("variant", ["", "residual"])
 def test_all_batches_of_a_preset_are_found(variant: str) -> None:
-    building = pytest.importorskip("agents.building", reason="the extra 'agents' is not there")
-    from agents.configs import preset
-    from agents.sb3_vec_env import BatchVecEnv
+    building = pytest.importorskip(
+        "agents.training.building", reason="the extra 'agents' is not there"
+    )
+    from agents.settings.presets import preset
+    from agents.vec_envs.sb3 import BatchVecEnv
 
     wanted = preset("PAM/KneeTension-v0", "ppo", variant)
     env = building.make_env(wanted)

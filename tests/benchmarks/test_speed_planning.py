@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks import speed, speed_planning
+from benchmarks.speed import planning as speed_planning
+from benchmarks.speed import rates as speed
 
 
 @pytest.mark.parametrize(("rate", "verdict"), [(1999.0, "MISSED"), (2001.0, "pass"), (3e4, "aim")])

@@ -8,7 +8,8 @@ import board_fakes as fakes
 import numpy as np
 import pytest
 
-from benchmarks import standings, views
+from benchmarks.board import accessors as views
+from benchmarks.scoring import standings
 
 
 def places(rows: list[dict]) -> dict[str, str]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from benchmarks import statistics
+from benchmarks.scoring import statistics
 
 
 def test_interquartile_mean_by_hand() -> None:

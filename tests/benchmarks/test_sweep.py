@@ -13,11 +13,12 @@ import psutil
 import pytest
 import yaml
 
-from benchmarks import cells, rows, scenarios
 from benchmarks.__main__ import main
-from benchmarks.controllers import find
-from benchmarks.runner import Options, run
-from benchmarks.scenarios import ScenarioSet
+from benchmarks.runs import cells, rows
+from benchmarks.runs.controllers import find
+from benchmarks.runs.runner import Options, run
+from benchmarks.scenarios import scenario as scenarios
+from benchmarks.scenarios.scenario import ScenarioSet
 from sweeps import engine
 from sweeps.engine import Done
 from tests.benchmarks.conftest import CONTENT
@@ -31,9 +32,10 @@ NAMES = ("low", "middle", "integral")
 PROGRAM = """
 import sys
 from pathlib import Path
-from benchmarks import controllers, scenarios
-from benchmarks.controllers import find
-from benchmarks.runner import Options, run
+from benchmarks.runs import controllers
+from benchmarks.scenarios import scenario as scenarios
+from benchmarks.runs.controllers import find
+from benchmarks.runs.runner import Options, run
 controllers.SOURCES = (("bench_fakes", "bench_fakes", "classical"),)
 folder, jobs, address, *names = sys.argv[1:]
 folder = Path(folder)

@@ -6,8 +6,8 @@ import board_fakes as fakes
 import numpy as np
 import pytest
 
-from benchmarks import traces
-from benchmarks.scenarios import ScenarioSet
+from benchmarks.board import traces
+from benchmarks.scenarios.scenario import ScenarioSet
 
 
 def test_a_packed_signal_comes_back_to_within_its_grid_and_gaps_stay_gaps() -> None:

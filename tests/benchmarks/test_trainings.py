@@ -9,10 +9,11 @@ from pathlib import Path
 import bench_fakes
 import pytest
 
-from benchmarks import rows, trainings
-from benchmarks.controllers import find
-from benchmarks.runner import Options, run
-from benchmarks.verify import verify
+from benchmarks.identity import trainings
+from benchmarks.identity.verify import verify
+from benchmarks.runs import rows
+from benchmarks.runs.controllers import find
+from benchmarks.runs.runner import Options, run
 from tests.benchmarks.row_helpers import GAINS, commit, draw, place, run_row, tiny
 
 

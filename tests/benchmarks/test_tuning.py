@@ -8,12 +8,13 @@ from typing import Any
 
 import pytest
 
-from agents import seeds
-from baselines import tuned
-from baselines.knobs import Knobs
-from benchmarks import scenarios, tuning
-from benchmarks.scenarios import ScenarioSet
-from benchmarks.tuning import Course, Job, Measured, job_of, seeds_of, worth
+from agents.training import seeds
+from baselines.core import tuned
+from baselines.core.knobs import Knobs
+from benchmarks.runs import tuning
+from benchmarks.runs.tuning import Course, Job, Measured, job_of, seeds_of, worth
+from benchmarks.scenarios import scenario as scenarios
+from benchmarks.scenarios.scenario import ScenarioSet
 
 POSITIONING = "PAM/MusclePositioning-v0"
 COSTS = {"pressure_travel": 2.0, "air_use": 1.0, "constraint_cost": 0.0}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pam_envs.data.readings import one_path
-from pam_envs.data.recording import (
+from pam_envs.data.recording.recording import (
     COLUMNS,
     Recording,
     RecordingError,

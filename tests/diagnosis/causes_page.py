@@ -13,9 +13,9 @@ from pathlib import Path
 
 from pam_envs.diagnosis.cause import NEEDS, Cause, Form, Term
 from pam_envs.diagnosis.causes import catalogue
-from pam_envs.diagnosis.single_muscle import BASE, declared
-from pam_envs.plants import single_muscle_rows as R
-from pam_envs.plants.single_muscle import SingleMuscle
+from pam_envs.diagnosis.fit.single_muscle import BASE, declared
+from pam_envs.plants.single_muscle import rows as R
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 PAGE = Path(__file__).parents[2] / "docs/diagnosis_causes.md"
 EXAMPLE = Path(__file__).with_name("users_cause.py")

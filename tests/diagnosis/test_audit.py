@@ -9,13 +9,13 @@ import pytest
 from scipy.signal import lfilter
 
 from pam_envs.data.readings import load_readings
-from pam_envs.data.recording import Recording, Rig
+from pam_envs.data.recording.recording import Recording, Rig
 from pam_envs.data.tables import ContractionTable, load_contraction_table
-from pam_envs.diagnosis.audit import audit, undecidable
-from pam_envs.diagnosis.audit_tables import repeat_trend, scatter, scatter_homogeneity
+from pam_envs.diagnosis.audit.audit import audit, undecidable
+from pam_envs.diagnosis.audit.noise import hold_ends, noise_floor, resolution, white_noise
+from pam_envs.diagnosis.audit.tables import repeat_trend, scatter, scatter_homogeneity
 from pam_envs.diagnosis.cause import NEEDS, Cause
 from pam_envs.diagnosis.causes import catalogue
-from pam_envs.diagnosis.noise import hold_ends, noise_floor, resolution, white_noise
 
 PERIOD = 0.02
 NOISE = {"contraction": 3e-5, "pressure": 800.0}

@@ -12,12 +12,12 @@ from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis import causes as package
 from pam_envs.diagnosis.cause import NEEDS
 from pam_envs.diagnosis.causes import by_name, catalogue, chosen
-from pam_envs.diagnosis.gain import COMPENSABLE
-from pam_envs.diagnosis.search import frees_of
-from pam_envs.diagnosis.single_muscle import BASE, MuscleFamily, declared, start_plant
-from pam_envs.plants import single_muscle_rows as R
-from pam_envs.plants.replay import Inputs, replay
-from pam_envs.plants.single_muscle import SingleMuscle
+from pam_envs.diagnosis.closed_loop.gain import COMPENSABLE
+from pam_envs.diagnosis.decide.search import frees_of
+from pam_envs.diagnosis.fit.single_muscle import BASE, MuscleFamily, declared, start_plant
+from pam_envs.plants.single_muscle import rows as R
+from pam_envs.plants.single_muscle.plant import SingleMuscle
+from pam_envs.plants.single_muscle.replay import Inputs, replay
 from tests.diagnosis import causes_page as page
 from tests.diagnosis import users_cause
 

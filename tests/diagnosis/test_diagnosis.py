@@ -14,15 +14,15 @@ import yaml
 
 import pam_envs  # noqa: F401 (registers)
 from pam_envs.__main__ import main
-from pam_envs.data.recording import Recording, load_recording
+from pam_envs.data.recording.recording import Recording, load_recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis import Diagnosis, diagnose
-from pam_envs.diagnosis.audit import undecidable
+from pam_envs.diagnosis.audit.audit import undecidable
 from pam_envs.diagnosis.causes import catalogue
-from pam_envs.diagnosis.isolability import ALIKE
-from pam_envs.diagnosis.troubles import explained
-from pam_envs.kernels import COMPILED
-from pam_envs.plants.single_muscle import UnstableParameters
+from pam_envs.diagnosis.decide.isolability import ALIKE
+from pam_envs.diagnosis.fit.fit_errors import explained
+from pam_envs.kernels.build import COMPILED
+from pam_envs.plants.single_muscle.plant import UnstableParameters
 from tests.diagnosis import hidden
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")

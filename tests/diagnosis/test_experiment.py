@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pam_envs.data.recording import Recording, Rig
+from pam_envs.data.recording.recording import Recording, Rig
 from pam_envs.diagnosis.causes import by_name, catalogue
-from pam_envs.diagnosis.experiment import (
+from pam_envs.diagnosis.experiment.experiment import (
     ENOUGH,
     Rival,
     Sensors,
@@ -16,11 +16,11 @@ from pam_envs.diagnosis.experiment import (
     rival_of,
     separations,
 )
-from pam_envs.diagnosis.fitting import Fit
-from pam_envs.diagnosis.plans import PERIOD, Means, plans
-from pam_envs.diagnosis.single_muscle import MuscleFamily, start_plant
-from pam_envs.kernels import COMPILED
-from pam_envs.plants.single_muscle import SingleMuscle
+from pam_envs.diagnosis.experiment.plans import PERIOD, Means, plans
+from pam_envs.diagnosis.fit.least_squares import Fit
+from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, start_plant
+from pam_envs.kernels.build import COMPILED
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 compiled = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")
 

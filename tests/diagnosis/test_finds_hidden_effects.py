@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 
 import pam_envs
-from benchmarks.diagnosis_cases import Case, make
-from benchmarks.diagnosis_study import diagnosed, study
-from pam_envs.kernels import COMPILED
+from benchmarks.diagnosis.cases import Case, make
+from benchmarks.diagnosis.study import diagnosed, study
+from pam_envs.kernels.build import COMPILED
 from tests.diagnosis.hidden import EFFECTS
 
 pytestmark = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pam_envs.diagnosis.gain import (
+from pam_envs.diagnosis.closed_loop.gain import (
     COMPENSABLE,
     ReplayedRig,
     Residuals,
@@ -15,8 +15,7 @@ from pam_envs.diagnosis.gain import (
     segment_squares,
     sentence,
 )
-from pam_envs.diagnosis.gain_references import HIGH, LOW, fixed_references
-from pam_envs.diagnosis.plant_inverse import (
+from pam_envs.diagnosis.closed_loop.plant_inverse import (
     AUTHORITY,
     PREVIEW,
     Gains,
@@ -29,10 +28,11 @@ from pam_envs.diagnosis.plant_inverse import (
     feed_forward,
     stroke,
 )
-from pam_envs.kernels import COMPILED
-from pam_envs.plants.replay import Inputs, replay
-from pam_envs.plants.single_muscle import SingleMuscle
-from pam_envs.plants.stepping import PlantBatch, PlantStepper
+from pam_envs.diagnosis.closed_loop.references import HIGH, LOW, fixed_references
+from pam_envs.kernels.build import COMPILED
+from pam_envs.plants.core.stepper import PlantBatch, PlantStepper
+from pam_envs.plants.single_muscle.plant import SingleMuscle
+from pam_envs.plants.single_muscle.replay import Inputs, replay
 
 compiled = pytest.mark.skipif(not COMPILED, reason="too many control periods for plain Python")
 LOAD = 2.0

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
-from pam_envs.diagnosis.fitting import Fit, Free
-from pam_envs.diagnosis.held_out import LEAST_BLOCKS, Choice, HeldOut, choose
-from pam_envs.diagnosis.rule import Rule
-from pam_envs.diagnosis.search import Blocks, Candidate
-from pam_envs.diagnosis.summary_causes import EXCLUDED, reasons, span
-from pam_envs.diagnosis.verdict import Decision
+from pam_envs.diagnosis.decide.held_out import LEAST_BLOCKS, Choice, HeldOut, choose
+from pam_envs.diagnosis.decide.rule import Rule
+from pam_envs.diagnosis.decide.search import Blocks, Candidate
+from pam_envs.diagnosis.decide.verdict import Decision
+from pam_envs.diagnosis.fit.least_squares import Fit, Free
+from pam_envs.diagnosis.report.summary_causes import EXCLUDED, reasons, span
 
 PERIOD = 0.05
 

@@ -7,17 +7,17 @@ import dataclasses
 import numpy as np
 import pytest
 
-from pam_envs.data.recording import Recording, Rig
+from pam_envs.data.recording.recording import Recording, Rig
+from pam_envs.diagnosis.audit.noise import noise_floor
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.causes import by_name, catalogue
+from pam_envs.diagnosis.decide.isolability import Isolability, ends, isolability, twins
+from pam_envs.diagnosis.decide.search import begun
+from pam_envs.diagnosis.decide.testable import LEAST_SIZE, not_testable, too_few
 from pam_envs.diagnosis.diagnosis import Study
-from pam_envs.diagnosis.isolability import Isolability, ends, isolability, twins
-from pam_envs.diagnosis.noise import noise_floor
-from pam_envs.diagnosis.search import begun
-from pam_envs.diagnosis.single_muscle import start_plant
-from pam_envs.diagnosis.testable import LEAST_SIZE, not_testable, too_few
-from pam_envs.diagnosis.tolerance import inside, limit_of, released
-from pam_envs.kernels import COMPILED
+from pam_envs.diagnosis.fit.single_muscle import start_plant
+from pam_envs.diagnosis.fit.tolerance import inside, limit_of, released
+from pam_envs.kernels.build import COMPILED
 from tests.diagnosis import hidden, users_cause
 
 needs_kernels = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")

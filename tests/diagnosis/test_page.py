@@ -10,13 +10,13 @@ import jsonschema
 import numpy as np
 import pytest
 
-from pam_envs.diagnosis import page as page_module
 from pam_envs.diagnosis.figures import draw
 from pam_envs.diagnosis.figures.matrix import alike
 from pam_envs.diagnosis.figures.traces import View, elapsed, envelope, worst_window
-from pam_envs.diagnosis.page import headline, page
-from pam_envs.diagnosis.page_parts import number
-from pam_envs.diagnosis.report import report_json
+from pam_envs.diagnosis.report import page as page_module
+from pam_envs.diagnosis.report.page import headline, page
+from pam_envs.diagnosis.report.page_parts import number
+from pam_envs.diagnosis.report.report import report_json
 from tests.diagnosis import report_fakes as fakes
 from tests.diagnosis.page_reader import SECTIONS, Page
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from pam_envs.data.tables import load_contraction_table
-from pam_envs.diagnosis.readings import audit_polynomials, diagnose_readings
-from pam_envs.diagnosis.readings_cells import THRESHOLDS, cells_of, stops
-from pam_envs.diagnosis.readings_compare import Study
-from pam_envs.diagnosis.readings_fit import Fit, check_nested
-from pam_envs.diagnosis.readings_models import SHIFT, TERMS, predict, units
+from pam_envs.diagnosis.static.cells import THRESHOLDS, cells_of, stops
+from pam_envs.diagnosis.static.compare import Study
+from pam_envs.diagnosis.static.diagnosis import audit_polynomials, diagnose_readings
+from pam_envs.diagnosis.static.fit import Fit, check_nested
+from pam_envs.diagnosis.static.models import SHIFT, TERMS, predict, units
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from tests.diagnosis.synthetic_readings import PRESSURES, table
 

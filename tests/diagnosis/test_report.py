@@ -12,10 +12,10 @@ import jsonschema
 import numpy as np
 import pytest
 
-from pam_envs.diagnosis import page as page_module
-from pam_envs.diagnosis.report import dumps, plain, report_json, write
-from pam_envs.diagnosis.rule import Rule
-from pam_envs.diagnosis.summary_text import sentence
+from pam_envs.diagnosis.decide.rule import Rule
+from pam_envs.diagnosis.report import page as page_module
+from pam_envs.diagnosis.report.report import dumps, plain, report_json, write
+from pam_envs.diagnosis.report.summary_text import sentence
 from tests.diagnosis import report_fakes as fakes
 from tests.diagnosis.page_reader import SECTIONS, Page
 

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 import yaml
 
-from pam_envs.data.recording import Recording, load_recording
+from pam_envs.data.recording.recording import Recording, load_recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis import Diagnosis, diagnose
-from pam_envs.kernels import COMPILED
-from pam_envs.plants.single_muscle import SingleMuscle
+from pam_envs.kernels.build import COMPILED
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 from tests.diagnosis import hidden
 from tests.diagnosis.page_reader import Page
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pam_envs.diagnosis.fitting import Fit, Problem
-from pam_envs.diagnosis.held_out import kind_of
-from pam_envs.diagnosis.rule import Rule, judge
-from pam_envs.diagnosis.search import Blocks, Candidate
-from pam_envs.diagnosis.structure import spectral_peak
-from pam_envs.diagnosis.verdict import unsure
+from pam_envs.diagnosis.decide.held_out import kind_of
+from pam_envs.diagnosis.decide.rule import Rule, judge
+from pam_envs.diagnosis.decide.search import Blocks, Candidate
+from pam_envs.diagnosis.decide.structure import spectral_peak
+from pam_envs.diagnosis.decide.verdict import unsure
+from pam_envs.diagnosis.fit.least_squares import Fit, Problem
 
 RULE = Rule()
 

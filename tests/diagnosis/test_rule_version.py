@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from pam_envs.diagnosis import causes
-from pam_envs.diagnosis.rule import Rule
+from pam_envs.diagnosis.decide.rule import Rule
 
 MODULES = (
     *("calibrate", "diagnosis", "experiment", "first_guess", "fitting", "held_out", "isolability"),

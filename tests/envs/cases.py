@@ -8,12 +8,12 @@ import gymnasium as gym
 import numpy as np
 
 import pam_envs  # noqa: F401 (registers)
-from pam_envs.kernels import COMPILED
+from pam_envs.kernels.build import COMPILED
 from pam_envs.mechanics.serial_chain import SerialChain
-from pam_envs.plants.antagonistic_joint import AntagonisticJoint
-from pam_envs.plants.knee_orthosis import KneeOrthosis
-from pam_envs.plants.redundant_manipulator import RedundantManipulator
-from pam_envs.plants.single_muscle import SingleMuscle
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
+from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 IDS = sorted(name for name in gym.registry if name.startswith("PAM/"))
 

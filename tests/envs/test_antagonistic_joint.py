@@ -9,8 +9,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from pam_envs.plants.antagonistic_joint import AntagonisticJoint
-from pam_envs.plants.bearing import UnbearableLoad
+from pam_envs.plants.antagonistic_joint.bearing import UnbearableLoad
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
 NAME = "PAM/AntagonisticJoint-v0"
 STILL: dict[str, Any] = {

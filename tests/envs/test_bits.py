@@ -12,7 +12,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from pam_envs.kernels import COMPILED
+from pam_envs.kernels.build import COMPILED
 from tests.envs.cases import CASES, IDS, SHARED, VARIANTS, actions_for, trajectory
 
 ROOT = Path(__file__).resolve().parents[2]

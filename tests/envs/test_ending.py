@@ -8,10 +8,10 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from baselines.joint_catalogue import JOINT_MAKERS
-from benchmarks.rollout import run
-from pam_envs.plants.antagonistic_joint import AntagonisticJoint
-from pam_envs.plants.redundant_manipulator import RedundantManipulator
+from baselines.joint.catalogue import JOINT_MAKERS
+from benchmarks.runs.rollout import run
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 
 PERIODS = 150
 CASES: dict[str, tuple[Any, dict[str, Any]]] = {

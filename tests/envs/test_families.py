@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pam_envs.envs.arguments import common
-from pam_envs.envs.env_kernels import PERIOD, write_references
-from pam_envs.envs.families import Kernels
-from pam_envs.envs.plant_env import PlantEnv
-from pam_envs.envs.setup import Setup, compose
-from pam_envs.envs.vector_env import PlantVectorEnv
-from pam_envs.kernels import LANES, kernel, normal, routine, uniform
+from pam_envs.envs.core.arguments import common
+from pam_envs.envs.core.families import Kernels
+from pam_envs.envs.core.plant_env import PlantEnv
+from pam_envs.envs.core.setup import Setup, compose
+from pam_envs.envs.core.step import PERIOD, write_references
+from pam_envs.envs.core.vector_env import PlantVectorEnv
+from pam_envs.kernels.build import LANES, kernel, routine
+from pam_envs.kernels.random import normal, uniform
 from pam_envs.parameters import Signal, Signals
 
 CARTS = 3

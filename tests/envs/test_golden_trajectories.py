@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pam_envs.kernels import COMPILED
+from pam_envs.kernels.build import COMPILED
 from tests.envs import golden
 
 UNCOMPILED = pytest.mark.skipif(COMPILED, reason="machine code for each case takes minutes")

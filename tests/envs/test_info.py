@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import pam_envs  # noqa: F401
-from pam_envs.envs.info import Info
+from pam_envs.envs.core.info import Info
 
 PLAIN = {"a": 1.0, "b": 2.0}
 

@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from pam_envs.plants.knee_orthosis import KneeOrthosis
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 
 def series(name: str, seconds: float, pressure: float, **arguments: Any) -> dict[str, np.ndarray]:

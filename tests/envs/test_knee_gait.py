@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pam_envs.muscle.emg import calibration, emg_proxy
-from pam_envs.plants.knee_orthosis import KneeOrthosis
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.sensing.butterworth import filtered
 from tests.envs.cases import actions_for
 

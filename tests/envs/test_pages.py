@@ -10,14 +10,12 @@ from pathlib import Path
 import gymnasium as gym
 import pytest
 
-from pam_envs.envs import (
-    antagonistic_joint,
-    elbow_orthosis,
-    knee_brace,
-    knee_gait,
-    muscle_positioning,
-    redundant_manipulator,
-)
+from pam_envs.envs.elbow import env as elbow_orthosis
+from pam_envs.envs.joint import env as antagonistic_joint
+from pam_envs.envs.knee import brace as knee_brace
+from pam_envs.envs.knee import gait as knee_gait
+from pam_envs.envs.manipulator import env as redundant_manipulator
+from pam_envs.envs.positioning import env as muscle_positioning
 from tests.envs.cases import IDS
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "envs"

@@ -9,12 +9,12 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from pam_envs.envs.manipulator_layout import POSE
-from pam_envs.envs.manipulator_paths import DRAWN, USUAL_PAYLOAD, paths_for
+from pam_envs.envs.manipulator.layout import POSE
+from pam_envs.envs.manipulator.paths import DRAWN, USUAL_PAYLOAD, paths_for
 from pam_envs.mechanics.redundancy import UnreachablePose
 from pam_envs.mechanics.serial_chain import SerialChain
-from pam_envs.plants.bearing import UnbearableLoad, bearable_payload
-from pam_envs.plants.redundant_manipulator import RedundantManipulator
+from pam_envs.plants.antagonistic_joint.bearing import UnbearableLoad, bearable_payload
+from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.references.path import PATHS
 
 NAME = "PAM/RedundantManipulator-v0"

@@ -295,7 +295,7 @@ def test_rows_of_steps_have_the_bits_of_a_simulation(operator, rows):
 FIXED = """
 import numpy as np
 from pam_envs.hysteresis import MaxwellSlip, PlayOperator
-from pam_envs.kernels import COMPILED
+from pam_envs.kernels.build import COMPILED
 play = PlayOperator((0.1, 0.7, 1.9), (0.3, 0.21, 0.4), 0.17)
 slip = MaxwellSlip(0.13, (0.3, 0.21, 0.4), (0.1, 0.7, 1.9))
 t = np.arange(400)

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from pam_envs.hysteresis import MaxwellSlip
 from pam_envs.hysteresis.modified_maxwell_slip import ModifiedMaxwellSlip, even_model
-from pam_envs.kernels import COMPILED
+from pam_envs.kernels.build import COMPILED
 
 ROOT = Path(__file__).resolve().parents[2]
 RIG = even_model(4.5e5, 7110.0, 0.5e5)

@@ -548,7 +548,7 @@ def test_a_step_leaves_the_given_state_alone():
 FIXED = """
 import numpy as np
 from pam_envs.hysteresis import Preisach
-from pam_envs.kernels import COMPILED
+from pam_envs.kernels.build import COMPILED
 t = np.arange(400)
 x = ((t * 7919) % 1009) / 450.0 - 1.1
 print(COMPILED)

@@ -10,8 +10,8 @@ import pytest
 from pam_envs.data.tables import load_contraction_table
 from pam_envs.identification import contraction_cycles as cc
 from pam_envs.identification.mas10 import minor_loops
-from pam_envs.plants.memory import KINDS
-from pam_envs.plants.single_muscle import SingleMuscle
+from pam_envs.plants.single_muscle.hysteresis import KINDS
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 TABLE = load_contraction_table()
 CYCLES = cc.mean_cycles(TABLE)

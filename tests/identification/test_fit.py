@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from pam_envs.identification.fit import FREE, fit_record, jacobian, weights
-from pam_envs.kernels import COMPILED
-from pam_envs.plants.rollout import simulate
-from pam_envs.plants.single_muscle import SingleMuscle
+from pam_envs.kernels.build import COMPILED
+from pam_envs.plants.single_muscle.plant import SingleMuscle
+from pam_envs.plants.single_muscle.rollout import simulate
 
 RANDOM = np.random.default_rng(0)
 SET_POINTS = np.repeat(RANDOM.uniform(0, 6e5, 20), 100 if COMPILED else 6)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.nominal import LoadedMuscle
-from benchmarks.joint_inverses import inhomogeneous, inverse_error
-from benchmarks.joint_studies import RANGE, assumed_memory
+from baselines.positioning.nominal import LoadedMuscle
+from benchmarks.papers.joint_inverses import inhomogeneous, inverse_error
+from benchmarks.papers.joint_studies import RANGE, assumed_memory
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.identification.everett_series import series_inverse
 from pam_envs.identification.joint_forc import measure_joint, measure_memory, symmetrised
-from pam_envs.plants.single_muscle import SingleMuscle
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 
 def _rig(model):

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.joint_verdicts import verdicts
+from benchmarks.papers.joint_verdicts import verdicts
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.identification.joint_forc import CONGRUENCY, SYMMETRY
 from pam_envs.identification.joint_muscle import HangingMuscle
-from pam_envs.plants.antagonistic_joint import AntagonisticJoint
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
 
 def test_the_joints_pass_and_one_of_their_muscles_fails_the_symmetry() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pam_envs.kernels import interpreted
+from pam_envs.kernels.build import interpreted
 from pam_envs.mechanics import redundancy
 from pam_envs.mechanics.redundancy import LIMIT, Resolution, UnreachablePose, nearest, resolve
 from pam_envs.mechanics.redundancy_equations import (

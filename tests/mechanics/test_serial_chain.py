@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pam_envs.kernels import COMPILED, build, interpreted, kernel
+from pam_envs.kernels.build import COMPILED, build, interpreted, kernel
 from pam_envs.mechanics.serial_chain import FORM, STANDARD_GRAVITY, SerialChain
 from pam_envs.mechanics.serial_chain_dynamics import chain_solve, chain_terms
 from pam_envs.mechanics.serial_chain_kinematics import place_chain

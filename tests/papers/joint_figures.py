@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from functools import cache
 
-from benchmarks import papers_joint, papers_joint_steps
-from benchmarks.papers import Figure
+from benchmarks.papers import joint as papers_joint
+from benchmarks.papers import joint_steps as papers_joint_steps
+from benchmarks.papers.figures import Figure
 
 REACHED = {
     ("study", 5.0, True),

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import pam_envs  # noqa: F401 (registers)
-from baselines.catalogue import make_controller
-from benchmarks import papers_elbow as figures
-from benchmarks.rollout import run
+from baselines.core.catalogue import make_controller
+from benchmarks.papers import elbow as figures
+from benchmarks.runs.rollout import run
 from tests.test_readme import run_snippets
 
 DOCS = Path(__file__).parents[2] / "docs"

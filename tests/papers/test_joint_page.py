@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import joint_loops, papers_manipulator
-from benchmarks.joint_inverses import width_ratio
-from benchmarks.joint_plants import CASES, PLANTS, plant_step
-from benchmarks.joint_studies import Setting, step
-from benchmarks.joint_verdicts import verdicts
-from pam_envs.plants.antagonistic_joint import AntagonisticJoint
+from benchmarks.papers import joint_loops
+from benchmarks.papers import manipulator as papers_manipulator
+from benchmarks.papers.joint_inverses import width_ratio
+from benchmarks.papers.joint_plants import CASES, PLANTS, plant_step
+from benchmarks.papers.joint_studies import Setting, step
+from benchmarks.papers.joint_verdicts import verdicts
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from tests.papers.joint_figures import REACHED, figures
 from tests.test_readme import run_snippets
 

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from baselines import knee_published as seed
-from baselines.ltr import closed_loop_poles, design_ltr, loop_figures
-from benchmarks import papers
-from benchmarks import papers_gait as gait
-from benchmarks import papers_knee as figures
-from benchmarks import papers_knee_envs as envs
+from baselines.knee import published as seed
+from baselines.linear.ltr import closed_loop_poles, design_ltr, loop_figures
+from benchmarks.papers import figures as papers
+from benchmarks.papers import gait
+from benchmarks.papers import knee as figures
+from benchmarks.papers import knee_envs as envs
 
 PLANT, CONTROLLER = seed.printed_plant(), seed.printed_controller()
 

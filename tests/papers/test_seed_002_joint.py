@@ -6,9 +6,11 @@ import re
 
 import pytest
 
-from benchmarks import papers, papers_joint, papers_joint_steps
-from benchmarks.joint_plants import CASES
-from benchmarks.papers import Figure
+from benchmarks.papers import figures as papers
+from benchmarks.papers import joint as papers_joint
+from benchmarks.papers import joint_steps as papers_joint_steps
+from benchmarks.papers.figures import Figure
+from benchmarks.papers.joint_plants import CASES
 from tests.papers.joint_figures import REACHED, figures
 
 pytestmark = pytest.mark.xdist_group("seed_002_joint")
@@ -87,7 +89,7 @@ def test_inverse_shrinks_the_loop_of_the_muscles() -> None:
 
 
 def test_every_loop_shows_what_it_withstands_beside_how_fast_it_is() -> None:
-    from benchmarks.joint_studies import STEPPED
+    from benchmarks.papers.joint_studies import STEPPED
 
     for name in STEPPED:
         note = figures()[f"mu of the loop of {name}"].note

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import papers_manipulator as figures
+from benchmarks.papers import manipulator as figures
 from pam_envs.mechanics.redundancy import LIMIT
 from pam_envs.references.path import PATHS, POINTS
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines import contraction_errors as errors
-from baselines import contraction_tables as curves
+from baselines.positioning import contraction_errors as errors
+from baselines.positioning import contraction_tables as curves
 from pam_envs.data.tables import BAR, MM, load_contraction_table
 
 TABLE = load_contraction_table()

@@ -12,12 +12,12 @@ import pytest
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.identification.joint_static import fit_angle_plays
-from pam_envs.plants import antagonistic_joint_rows as K
-from pam_envs.plants.antagonistic_joint import AntagonisticJoint
-from pam_envs.plants.antagonistic_pair import feed_forward
-from pam_envs.plants.joint_memory import contraction_plays, joint_memory
-from pam_envs.plants.joint_rollout import simulate_joint
-from pam_envs.plants.memory import KINDS
+from pam_envs.plants.antagonistic_joint import rows as K
+from pam_envs.plants.antagonistic_joint.hysteresis import contraction_plays, joint_memory
+from pam_envs.plants.antagonistic_joint.pair import feed_forward
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from pam_envs.plants.antagonistic_joint.rollout import simulate_joint
+from pam_envs.plants.single_muscle.hysteresis import KINDS
 
 PRESETS = ("paper", "measured", "reduced")
 ANGLES = np.radians(np.linspace(-28.0, 28.0, 29))

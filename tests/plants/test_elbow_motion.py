@@ -8,22 +8,17 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pam_envs.kernels import COMPILED, interpreted
-from pam_envs.plants.elbow_orthosis import MAKES, ElbowOrthosis
-from pam_envs.plants.elbow_rollout import (
+from pam_envs.kernels.build import COMPILED, interpreted
+from pam_envs.plants.elbow_orthosis.plant import MAKES, ElbowOrthosis
+from pam_envs.plants.elbow_orthosis.rollout import (
     OUTPUTS,
     arrays_for,
     kernel_names,
     run_elbow,
     simulate_elbow,
 )
-from pam_envs.plants.memory import KINDS
-from pam_envs.pneumatics.on_off_pair import (
-    ATMOSPHERE,
-    GAS,
-    OnOffValve,
-    mass_flow,
-)
+from pam_envs.plants.single_muscle.hysteresis import KINDS
+from pam_envs.pneumatics.on_off_pair import ATMOSPHERE, GAS, OnOffValve, mass_flow
 
 slow = pytest.mark.skipif(not COMPILED, reason="too many sub-steps for plain Python")
 PERIOD = ElbowOrthosis.control_period

@@ -10,8 +10,8 @@ import pytest
 
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.mechanics import allocation
-from pam_envs.plants import elbow_orthosis_rows as K
-from pam_envs.plants.elbow_bundles import (
+from pam_envs.plants.elbow_orthosis import rows as K
+from pam_envs.plants.elbow_orthosis.bundles import (
     contraction_at,
     factors_of,
     friction_of,
@@ -20,9 +20,9 @@ from pam_envs.plants.elbow_bundles import (
     volume_of,
     weight_of,
 )
-from pam_envs.plants.elbow_memory import ElbowMemory, elbow_memory, travel_plays
-from pam_envs.plants.elbow_orthosis import MAKES, ElbowOrthosis
-from pam_envs.plants.memory import KINDS
+from pam_envs.plants.elbow_orthosis.hysteresis import ElbowMemory, elbow_memory, travel_plays
+from pam_envs.plants.elbow_orthosis.plant import MAKES, ElbowOrthosis
+from pam_envs.plants.single_muscle.hysteresis import KINDS
 
 FULL = 6e5
 ANGLES = np.radians([0.0, 60.0, 120.0])

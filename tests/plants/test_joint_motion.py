@@ -9,16 +9,16 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from pam_envs.kernels import COMPILED, interpreted
-from pam_envs.plants.antagonistic_joint import AntagonisticJoint
-from pam_envs.plants.joint_rollout import (
+from pam_envs.kernels.build import COMPILED, interpreted
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from pam_envs.plants.antagonistic_joint.rollout import (
     OUTPUTS,
     arrays_for,
     kernel_names,
     run_joint,
     simulate_joint,
 )
-from pam_envs.plants.memory import KINDS
+from pam_envs.plants.single_muscle.hysteresis import KINDS
 
 slow = pytest.mark.skipif(not COMPILED, reason="too many sub-steps for plain Python")
 PERIOD = AntagonisticJoint.control_period

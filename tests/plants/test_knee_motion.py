@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pam_envs.kernels import COMPILED, interpreted
+from pam_envs.kernels.build import COMPILED, interpreted
 from pam_envs.mechanics.leg import GRAVITY
 from pam_envs.muscle.emg import MuscleActivation, emg_proxy
-from pam_envs.plants.knee_orthosis import KneeOrthosis
-from pam_envs.plants.knee_rollout import (
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
+from pam_envs.plants.knee_orthosis.rollout import (
     OUTPUTS,
     arrays_for,
     kernel_names,

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pam_envs.plants import knee_orthosis_rows as K
-from pam_envs.plants.knee_memory import FULL_STIFFNESS, knee_memory, preisach_of
-from pam_envs.plants.knee_orthosis import KneeOrthosis
-from pam_envs.plants.memory import KINDS
+from pam_envs.plants.knee_orthosis import rows as K
+from pam_envs.plants.knee_orthosis.hysteresis import FULL_STIFFNESS, knee_memory, preisach_of
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
+from pam_envs.plants.single_muscle.hysteresis import KINDS
 
 POINTS = ((0.5e5, 56.7), (0.75e5, 80.6), (2e5, 158.0), (4.5e5, 211.5))
 """Pressure [Pa] and tension [N] of the brace without load and without hysteresis."""

@@ -9,21 +9,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pam_envs.kernels import COMPILED, interpreted
+from pam_envs.kernels.build import COMPILED, interpreted
 from pam_envs.mechanics.redundancy import resolve
 from pam_envs.mechanics.serial_chain import SerialChain
-from pam_envs.plants import redundant_manipulator_rows as M
-from pam_envs.plants.antagonistic_joint import AntagonisticJoint
-from pam_envs.plants.joint_rollout import simulate_joint
-from pam_envs.plants.manipulator_rollout import (
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from pam_envs.plants.antagonistic_joint.rollout import simulate_joint
+from pam_envs.plants.redundant_manipulator import rows as M
+from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
+from pam_envs.plants.redundant_manipulator.rollout import (
     JOINT_OUTPUTS,
     MUSCLE_OUTPUTS,
     run_arm,
     simulate_manipulator,
 )
-from pam_envs.plants.memory import KINDS
-from pam_envs.plants.redundant_manipulator import RedundantManipulator
-from pam_envs.plants.redundant_manipulator_kernels import memory_rows, replacements, work_rows
+from pam_envs.plants.redundant_manipulator.step import memory_rows, replacements, work_rows
+from pam_envs.plants.single_muscle.hysteresis import KINDS
 from pam_envs.references.path import PATHS
 
 DEGREE = np.radians(1.0)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pam_envs.kernels import COMPILED
-from pam_envs.plants.replay import TILE, Inputs, alike, replay, replay_rows
-from pam_envs.plants.single_muscle import SingleMuscle
+from pam_envs.kernels.build import COMPILED
+from pam_envs.plants.single_muscle.plant import SingleMuscle
+from pam_envs.plants.single_muscle.replay import TILE, Inputs, alike, replay, replay_rows
 from tests.envs.cases import EVERY_EFFECT
 
 SAMPLES = 200 if COMPILED else 40

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pam_envs.kernels import COMPILED
+from pam_envs.kernels.build import COMPILED
 from pam_envs.mechanics.hanging_mass import GRAVITY
-from pam_envs.plants.memory import KINDS
-from pam_envs.plants.rollout import simulate
-from pam_envs.plants.single_muscle import SingleMuscle
+from pam_envs.plants.single_muscle.hysteresis import KINDS
+from pam_envs.plants.single_muscle.plant import SingleMuscle
+from pam_envs.plants.single_muscle.rollout import simulate
 from pam_envs.pneumatics.regulator import regulator_step
 
 LOADS = (0.0, 0.5, 1.5, 2.55, 4.55)

@@ -5,14 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pam_envs.references.path import (
-    PATHS,
-    POINTS,
-    along,
-    draw_ends,
-    joint_line,
-    least_jerk,
-)
+from pam_envs.references.path import PATHS, POINTS, along, draw_ends, joint_line, least_jerk
 
 LIMIT = np.deg2rad(30.0)
 

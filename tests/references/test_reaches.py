@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pam_envs.kernels import entry, seed_words
+from pam_envs.kernels.build import entry
+from pam_envs.kernels.random import seed_words
 from pam_envs.references.path import least_jerk
 from pam_envs.references.reaches import (
     KIND,

@@ -5,32 +5,33 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pam_envs.diagnosis.cause import Cause
-from pam_envs.diagnosis.causes import (
+from pam_envs.diagnosis.causes.mechanics import payload_error, resonance, stick_slip, wire_slack
+from pam_envs.diagnosis.causes.muscle import (
     creep,
-    dead_time,
-    exhaust_asymmetry,
     first_cycle_softening,
     hysteresis_drive,
     hysteresis_shape,
-    leak,
     load_dependent_compliance,
     load_dependent_hysteresis,
-    payload_error,
     pressure_dependent_friction,
-    resonance,
+    temperature,
+    threshold_pressure,
+    viscous_loss,
+)
+from pam_envs.diagnosis.causes.pneumatics import (
+    dead_time,
+    exhaust_asymmetry,
+    leak,
+    slew_limit,
+    supply_droop,
+    valve_dead_band,
+)
+from pam_envs.diagnosis.causes.sensing import (
     sensor_bias,
     sensor_delay,
     sensor_drift,
     sensor_nonlinearity,
-    slew_limit,
     slip_step,
-    stick_slip,
-    supply_droop,
-    temperature,
-    threshold_pressure,
-    valve_dead_band,
-    viscous_loss,
-    wire_slack,
 )
 from pam_envs.wording import near
 

@@ -24,14 +24,7 @@ from pam_envs.diagnosis.figures.canvas import (
     Canvas,
     Picture,
 )
-from pam_envs.diagnosis.figures.quantities import (
-    MINUS,
-    TIMES,
-    Report,
-    changed,
-    floor,
-    short,
-)
+from pam_envs.diagnosis.figures.quantities import MINUS, TIMES, Report, changed, floor, short
 from pam_envs.diagnosis.figures.traces import limits
 
 PANELS = 4

@@ -1,0 +1,286 @@
+"""From a trained model to a policy file: the deterministic action as a graph of arithmetic."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Iterator, Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import onnx
+from onnx import TensorProto
+from sb3_contrib import TQC, RecurrentPPO
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.torch_layers import FlattenExtractor
+from torch import nn
+
+import pam_envs
+from agents.export.graph import Graph, array
+from agents.export.onnx_file import CARD, CONTROLLER, INPUT, SCHEMA, check_graph
+from agents.policies import controllers, probe
+from agents.policies.networks import LayersAndInputs, LinearFeatures, MemoryAndInputs
+from agents.policies.policy import describe
+from agents.training.checkpoint import write_atomically
+from agents.vec_envs.history import HistoryVecEnv
+from agents.vec_envs.residual import ResidualVecEnv
+
+ALGORITHMS: dict[type[BaseAlgorithm], str] = {
+    PPO: "ppo",
+    SAC: "sac",
+    TQC: "tqc",
+    RecurrentPPO: "recurrent_ppo",
+}
+OWN = ("info", "num_envs", "vectorization_mode", "threads")
+"""Arguments of the batch, which decide nothing that is learned."""
+L = TypeVar("L")
+
+
+def export_policy(
+    model: BaseAlgorithm,
+    path: str | Path,
+    card: Mapping[str, Any] | None = None,
+    beside: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Write the model's deterministic action as a policy file, and its card beside it.
+
+    The card is written first, so that a policy that is there has one, whenever a process is killed.
+
+    Parameters
+    ----------
+    model : PPO, RecurrentPPO, SAC or TQC
+        With its environment (a :class:`agents.vec_envs.sb3.BatchVecEnv`, wrapped or not), from
+        which come the signals and the observation's normaliser.
+    path : str or Path
+        ``policy.onnx``; the card is written to ``policy.json``.
+    card : mapping, optional
+        Further entries of the card: seed, steps, command.
+    beside : mapping, optional
+        Entries of the JSON file alone, which differ from one occasion to the next: times, machine.
+
+    Returns
+    -------
+    dict
+        The card, as in the file.
+
+    Raises
+    ------
+    ValueError
+        If the model has layers that have no counterpart here, or corrects a controller that is
+        mostly at a limit.
+    """
+    path = Path(path)
+    full = {**facts(model), **(card or {})}
+    data = policy_bytes(model, full)
+    text = json.dumps({**full, **(beside or {})}, indent=1, sort_keys=True) + "\n"
+    write_atomically(path.with_suffix(".json"), text.encode())
+    write_atomically(path, data)
+    return full
+
+
+def policy_bytes(model: Any, card: Mapping[str, Any]) -> bytes:
+    """Return the policy file's bytes: a function of weights, normaliser and card alone."""
+    graph = Graph()
+    env = model.get_env()
+    corrects, past = _layer(env, ResidualVecEnv), _layer(env, HistoryVecEnv)
+    if corrects is not None:
+        graph.join("Concat", [INPUT, CONTROLLER], axis=1)
+    if past is not None:
+        graph.past(past.columns, past.frames)
+    _normaliser(graph, model)
+    _action(graph, model)
+    _limits(graph, model.action_space)
+    if corrects is not None:
+        graph.add("Mul", np.full(1, corrects.scale, np.float32))
+        graph.join("Add", [CONTROLLER, graph.last])
+        _limits(graph, corrects.range)
+    signals, actions = len(card["signals"]), len(card["action_signals"])
+    made = graph.model(signals, actions, corrects is not None)
+    made.metadata_props.add(key=CARD, value=json.dumps(dict(card), sort_keys=True))
+    onnx.checker.check_model(made)
+    check_graph(made)
+    data: bytes = made.SerializeToString(deterministic=True)
+    return data
+
+
+def _layer(env: Any, kind: type[L]) -> L | None:
+    """Return the wrapper of a kind around the environment, if there is one."""
+    while hasattr(env, "venv"):
+        if isinstance(env, kind):
+            return env
+        env = env.venv
+    return None
+
+
+def facts(model: BaseAlgorithm) -> dict[str, Any]:
+    """Return what a card says of a model: where it was trained, what it reads, versions."""
+    env = model.get_env()
+    if env is None:
+        raise ValueError("the model has no environment; call model.set_env(env) first")
+    spec = env.get_attr("spec")[0]
+    names = ("torch", "stable_baselines3", "sb3_contrib", "gymnasium", "numpy", "onnx")
+    made = {
+        "schema": SCHEMA,
+        "env": spec.id,
+        "env_kwargs": _in_common([kind for kind, _ in _kinds(env)]),
+        "plants": plants_of(env),
+        "signals": describe(env.get_attr("signals")[0]),
+        "action_signals": describe(env.get_attr("action_signals")[0]),
+        "algo": ALGORITHMS.get(type(model), type(model).__name__.lower()),
+        "steps": int(model.num_timesteps),
+        "seed": model.seed,
+        "versions": {
+            "pam_envs": pam_envs.__version__,
+            "python": platform.python_version(),
+            **{name: version(name) for name in names},
+        },
+    }
+    corrects = _layer(env, ResidualVecEnv)
+    return made if corrects is None else {**made, "baseline": _baseline(corrects, spec.id)}
+
+
+def plants_of(env: Any) -> list[str]:
+    """Return the digests of the nominal plants that the rows are on, each once."""
+    return list(dict.fromkeys(plant.digest() for _, plant in _kinds(env)))
+
+
+def _kinds(env: Any) -> Iterator[tuple[dict[str, Any], Any]]:
+    """Yield the environment's arguments and the nominal plant of each kind of row."""
+    base = env.unwrapped
+    for batch in getattr(base, "batches", (base,)):
+        given = batch.get_attr("spec")[0].kwargs
+        kind = {name: value for name, value in given.items() if name not in OWN}
+        yield kind, batch.get_attr("plant")[0]
+
+
+def _in_common(kinds: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the arguments that all kinds have alike."""
+    first, *others = ({name: _plain(value) for name, value in kind.items()} for kind in kinds)
+    return {
+        name: value
+        for name, value in first.items()
+        if all(name in other and other[name] == value for other in others)
+    }
+
+
+def _baseline(layer: ResidualVecEnv, env: str) -> dict[str, Any]:
+    """Return what the card says of the controller that the policy corrects."""
+    kinds: dict[str, list[dict[str, Any]]] = {}
+    for kind, plant in _kinds(layer):
+        kinds.setdefault(plant.digest(), []).append(kind)
+    made = {_plant_at(layer, rows): controller for rows, controller in layer.controllers}
+    told = []
+    for digest, controller in made.items():
+        found = probe.record(env, kinds[digest], controller, layer.name)
+        parameters = controllers.parameters(controller)
+        told.append({"plant": digest, "parameters": parameters, "probe": found.as_dict()})
+    return {"name": layer.name, "scale": float(layer.scale), "told": told}
+
+
+def _plant_at(layer: ResidualVecEnv, rows: slice) -> str:
+    """Return the digest of the plant of some rows, which is the same for all of them."""
+    digest: str = layer.get_attr("plant", [rows.start or 0])[0].digest()
+    return digest
+
+
+def _plain(value: Any) -> Any:
+    """Return an argument of the environment as JSON can hold it."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, Mapping):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if callable(getattr(value, "digest", None)):
+        return {"digest": value.digest()}
+    plain = value is None or isinstance(value, (bool, int, float, str))
+    return value if plain else str(value)
+
+
+def _normaliser(graph: Graph, model: BaseAlgorithm) -> None:
+    """Append VecNormalize's arithmetic, in double precision as there."""
+    env = model.get_vec_normalize_env()
+    if env is None or not env.norm_obs:
+        return
+    moments: Any = env.obs_rms
+    graph.add("Cast", to=TensorProto.DOUBLE)
+    graph.add("Sub", np.asarray(moments.mean, np.float64))
+    graph.add("Div", np.sqrt(np.asarray(moments.var, np.float64) + env.epsilon))
+    graph.add("Clip", np.array(-env.clip_obs), np.array(env.clip_obs))
+    graph.add("Cast", to=TensorProto.FLOAT)
+
+
+def _features(graph: Graph, extractor: nn.Module) -> str:
+    """Append the fixed differences; return the name of the inputs."""
+    if isinstance(extractor, LinearFeatures):
+        matrix: Any = extractor.matrix
+        return graph.add("Gemm", array(matrix), transB=1)
+    if isinstance(extractor, FlattenExtractor):
+        return graph.last
+    raise ValueError(f"the features of {type(extractor).__name__} cannot be exported")
+
+
+def _action(graph: Graph, model: Any) -> None:
+    if isinstance(model, RecurrentPPO):
+        _recurrent_action(graph, model.policy)
+    elif isinstance(model, PPO):
+        _ppo_action(graph, model.policy)
+    elif isinstance(model, (SAC, TQC)):
+        _squashed_action(graph, model)
+    else:
+        raise ValueError(f"{type(model).__name__} cannot be exported; PPO, SAC and TQC can")
+
+
+def _ppo_action(graph: Graph, policy: Any) -> None:
+    _check_plain(policy)
+    inputs = _features(graph, policy.pi_features_extractor)
+    layers = policy.mlp_extractor
+    graph.layers(layers.policy_net)
+    if isinstance(layers, LayersAndInputs):
+        graph.join("Concat", [graph.last, inputs], axis=1)
+    graph.linear(policy.action_net)
+
+
+def _check_plain(policy: Any) -> None:
+    if policy.squash_output or not isinstance(policy.action_net, nn.Linear):
+        raise ValueError("only PPO with a plain Gaussian action can be exported")
+
+
+def _recurrent_action(graph: Graph, policy: Any) -> None:
+    _check_plain(policy)
+    if policy.lstm_actor.num_layers != 1:
+        raise ValueError(
+            f"n_lstm_layers = {policy.lstm_actor.num_layers}: only one layer can be exported"
+        )
+    inputs = _features(graph, policy.pi_features_extractor)
+    output = graph.lstm(policy.lstm_actor)
+    layers = policy.mlp_extractor
+    beside = isinstance(layers, MemoryAndInputs)
+    if beside:
+        graph.join("Concat", [output, inputs], axis=1)
+    graph.layers(layers.policy_net)
+    if beside:
+        graph.join("Concat", [graph.last, inputs], axis=1)
+    graph.linear(policy.action_net)
+
+
+def _squashed_action(graph: Graph, model: SAC | TQC) -> None:
+    actor: Any = model.policy.actor
+    space: Any = model.action_space
+    _features(graph, actor.features_extractor)
+    graph.layers(actor.latent_pi)
+    graph.layers([actor.mu])
+    graph.add("Tanh")
+    graph.add("Add", np.full(1, 1.0, np.float32))
+    graph.add("Mul", np.full(1, 0.5, np.float32))
+    graph.add("Mul", np.asarray(space.high - space.low, np.float32))
+    graph.add("Add", np.asarray(space.low, np.float32))
+
+
+def _limits(graph: Graph, space: Any) -> None:
+    """Hold the action within a range."""
+    graph.add("Max", np.asarray(space.low, np.float32))
+    graph.add("Min", np.asarray(space.high, np.float32))

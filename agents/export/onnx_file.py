@@ -1,0 +1,176 @@
+"""Policy files: what is checked before a runtime sees one, and the card that each carries.
+
+An ONNX file is data: a graph of arithmetic and its numbers. Checked here are the ways in which one
+could still reach beyond itself: weights in other files, operators of other vendors, loops, size.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import onnx
+import onnx.shape_inference
+
+MOST_BYTES = 5_000_000
+MOST_NUMBERS = 100_000
+CARD = "pam_policy"
+SCHEMA = 1
+INPUT, OUTPUT = "observation", "action"
+CONTROLLER = "controller"
+"""Input of a policy that corrects a controller: the controller's action."""
+STATE, START, AFTER = "state", "start", "state_after"
+"""Inputs and output of a policy that remembers: numbers a row, and 1 where an episode begins."""
+OPERATORS = frozenset(
+    (
+        *("Abs", "Add", "Cast", "Clip", "Concat", "Constant", "Div", "Elu", "Exp", "Flatten"),
+        *("Gather", "Gelu", "Gemm", "HardSigmoid", "Identity", "LayerNormalization", "LeakyRelu"),
+        *("Log", "MatMul", "Max", "Min", "Mul", "Neg", "Relu", "Reshape", "Selu", "Sigmoid"),
+        *("Slice", "Softplus", "Softsign", "Split", "Sqrt", "Squeeze", "Sub", "Tanh"),
+        *("Transpose", "Unsqueeze"),
+    )
+)
+"""Operators of policies: none loops, and none can make a tensor from a size. A policy that
+remembers does so from call to call, by what it is given back."""
+
+
+class PolicyFileError(ValueError):
+    """A file that is not a policy, or not one that may be run; the message says what to do."""
+
+
+@dataclass(frozen=True)
+class PolicyFile:
+    """Bytes of a checked policy and its card, see :func:`agents.export.export.export_policy`."""
+
+    data: bytes
+    card: dict[str, Any]
+
+
+def read(path: str | Path) -> PolicyFile:
+    """Return the checked file.
+
+    Raises
+    ------
+    PolicyFileError
+        If it is anything but a small ONNX policy of plain arithmetic with its card.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise PolicyFileError(f"{path} cannot be read: {error.strerror}") from error
+    if len(data) > MOST_BYTES:
+        raise PolicyFileError(f"{path.name} is larger than {MOST_BYTES:,} bytes; export less")
+    _refuse_code(path.name, data)
+    try:
+        model = onnx.load_model_from_string(data)
+    except Exception as error:
+        raise PolicyFileError(f"{path.name} is not an ONNX file, or a damaged one") from error
+    try:
+        check_graph(model)
+        return PolicyFile(data, _card(model))
+    except PolicyFileError as error:
+        raise PolicyFileError(f"{path.name}: {error}") from error
+
+
+def finished(path: str | Path) -> dict[str, Any] | None:
+    """Return the card of a policy that is there whole, None where a file is missing or older.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the policy; its card lies beside it, with what the training cost.
+    """
+    path = Path(path)
+    try:
+        beside = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+        inside = read(path).card
+    except (OSError, ValueError):
+        return None
+    known = isinstance(beside, dict) and {key: beside.get(key) for key in inside} == inside
+    return inside if known else None
+
+
+def _refuse_code(name: str, data: bytes) -> None:
+    """Refuse files that run code when they are opened, before anything looks inside."""
+    kinds = {b"PK": "a zip file (as of stable-baselines3 or torch)", b"\x80": "a pickle"}
+    for mark, kind in kinds.items():
+        if data.startswith(mark):
+            raise PolicyFileError(
+                f"{name} is {kind}, which can run any code when it is opened, so it was not. "
+                "Policies are ONNX files here. If the file is your own, load it with the program "
+                "that wrote it and call agents.export.export.export_policy(model, 'policy.onnx')"
+            )
+
+
+def check_graph(model: onnx.ModelProto) -> None:
+    """Raise unless the model is plain arithmetic within its own file."""
+    domains = {entry.domain for entry in model.opset_import} | {n.domain for n in model.graph.node}
+    foreign = sorted(domains - {"", "ai.onnx"})
+    if foreign:
+        raise PolicyFileError(f"uses operators of {', '.join(foreign)}; only standard ones are run")
+    if model.functions or model.training_info:
+        raise PolicyFileError("has functions or training parts; export the bare policy")
+    if model.graph.sparse_initializer:
+        raise PolicyFileError("has sparse weights; store them dense")
+    for node in model.graph.node:
+        if node.op_type not in OPERATORS:
+            raise PolicyFileError(
+                f"uses the operator {node.op_type}; policies are made of "
+                + ", ".join(sorted(OPERATORS))
+            )
+        for attribute in node.attribute:
+            if attribute.HasField("g") or attribute.graphs:
+                raise PolicyFileError(f"{node.op_type} has a graph inside; policies do not loop")
+            _check_tensors([attribute.t, *attribute.tensors])
+    _check_tensors(model.graph.initializer)
+    _check_sizes(model)
+
+
+def _check_tensors(tensors: Any) -> None:
+    for tensor in tensors:
+        if tensor.data_location == onnx.TensorProto.EXTERNAL or tensor.external_data:
+            raise PolicyFileError(
+                f"the weights {tensor.name!r} lie in another file, which is not opened; "
+                "export with the weights inside"
+            )
+
+
+def _check_sizes(model: onnx.ModelProto) -> None:
+    """Refuse values that could grow beyond memory: one batch axis, the rest known and small."""
+    try:
+        inferred = onnx.shape_inference.infer_shapes(model, check_type=True, strict_mode=True)
+    except Exception as error:
+        raise PolicyFileError(f"its shapes do not fit together: {error}") from error
+    known = {v.name: v for v in [*inferred.graph.value_info, *inferred.graph.output]}
+    for node in model.graph.node:
+        for name in node.output:
+            dims = known[name].type.tensor_type.shape.dim if name in known else None
+            sizes = [d.dim_value for d in dims or () if d.HasField("dim_value")]
+            if dims is None or len(dims) - len(sizes) > 1 or math.prod(sizes) > MOST_NUMBERS:
+                raise PolicyFileError(
+                    f"the size of {name!r} (operator {node.op_type}) is not known beforehand or "
+                    f"above {MOST_NUMBERS:,} numbers a row; export a plain feed-forward network"
+                )
+
+
+def _card(model: onnx.ModelProto) -> dict[str, Any]:
+    texts = {entry.key: entry.value for entry in model.metadata_props}
+    if CARD not in texts:
+        raise PolicyFileError(
+            "does not say which signals it reads; export it with agents.export.export.export_policy"
+        )
+    try:
+        card = json.loads(texts[CARD])
+    except (ValueError, RecursionError) as error:
+        raise PolicyFileError(f"its card is not JSON: {error}") from error
+    if not isinstance(card, dict) or card.get("schema") != SCHEMA:
+        raise PolicyFileError(f"its card is not of schema {SCHEMA}; export it with this version")
+    wanted = {"env", "env_kwargs", "signals", "action_signals", "algo", "steps", "seed"}
+    if wanted - set(card):
+        raise PolicyFileError(f"its card lacks {', '.join(sorted(wanted - set(card)))}")
+    return card

@@ -1,0 +1,260 @@
+"""A trained policy as a controller: an ONNX file, run by onnxruntime on one thread.
+
+Needs neither torch nor stable-baselines3, and loading one cannot run code.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnxruntime  # type: ignore[import-untyped]
+from numpy.typing import NDArray
+
+from agents.export.onnx_file import (
+    AFTER,
+    CONTROLLER,
+    INPUT,
+    OUTPUT,
+    START,
+    STATE,
+    PolicyFileError,
+    read,
+)
+from pam_envs.parameters import Signal, Signals
+
+FIELDS = tuple(field.name for field in dataclasses.fields(Signal))
+
+
+def describe(signals: Signals) -> list[dict[str, Any]]:
+    """Return signals as plain values, as they stand on a policy's card."""
+    return [dataclasses.asdict(signal) for signal in signals]
+
+
+class OnnxPolicy:
+    """A controller (``predict`` as in stable-baselines3) that is data.
+
+    The normaliser, the past and the limits of the action are inside the file. Each row of a batch
+    is computed as if it were alone, to the last bit. A policy that corrects a controller answers
+    with one: see :class:`agents.policies.residual.ResidualPolicy`.
+
+    Attributes
+    ----------
+    memory : int
+        Numbers a row that it remembers from call to call; 0 for none.
+    corrects : str
+        Name of the controller that it corrects; empty for none.
+    card : dict
+        Environment, signals, algorithm, steps, seed, versions and command of the training.
+    signals, action_signals : Signals
+        What it reads and what it writes.
+    """
+
+    def __init__(self, data: bytes, card: dict[str, Any], name: str = "the policy") -> None:
+        self.card = card
+        self.name = name
+        self.signals = _signals(card["signals"], name)
+        self.action_signals = _signals(card["action_signals"], name)
+        self.corrects = _corrects(card, name)
+        self._digest = hashlib.sha256(data).hexdigest()
+        self._session = _session(data, name)
+        self.memory = self._check_shapes()
+
+    @classmethod
+    def load(
+        cls,
+        path: str | Path,
+        signals: Signals | None = None,
+        action_signals: Signals | None = None,
+    ) -> OnnxPolicy:
+        """Return the policy in a file, for an environment with these signals.
+
+        Parameters
+        ----------
+        path : str or Path
+            An ONNX file of :func:`agents.export.export.export_policy`.
+        signals, action_signals : Signals, optional
+            The environment's (``env.unwrapped.signals``); given, they must be those of the
+            training.
+
+        Raises
+        ------
+        PolicyFileError
+            If the file may not be run (see :mod:`agents.export.onnx_file`) or the signals differ.
+        """
+        file = read(path)
+        made = cls(file.data, file.card, Path(path).name)
+        made.check(signals, action_signals)
+        return made
+
+    def check(self, signals: Signals | None, action_signals: Signals | None = None) -> None:
+        """Raise a clear error unless the signals are those of the training."""
+        for mine, theirs, kind in (
+            (self.signals, signals, "observation"),
+            (self.action_signals, action_signals, "action"),
+        ):
+            if theirs is not None:
+                _compare(mine, theirs, f"{self.name} and the environment differ in the {kind}")
+
+    def predict(
+        self,
+        observation: NDArray[Any],
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.float32], Any]:
+        """Return the action for an observation.
+
+        Parameters
+        ----------
+        observation : array, shape (n_signals,) or (n_env, n_signals)
+        state : array, shape (1 or n_env, memory), optional
+            As the last call returned it; None begins an episode in every row. A policy without
+            memory does not look at it.
+        episode_start : bool or array, shape (n_env,), optional
+            Rows that begin an episode: their state is forgotten.
+        deterministic : bool
+            The file holds the deterministic action; False gives the same.
+
+        Returns
+        -------
+        array, shape (n_actions,) or (n_env, n_actions), and the state for the next call
+
+        Raises
+        ------
+        ValueError
+            If the observation has another shape, or the policy corrects a controller.
+        """
+        if self.corrects:
+            raise ValueError(
+                f"{self.name} corrects the controller {self.corrects!r} and does not act alone; "
+                "make it with agents.policies.residual.with_controller(policy, plant)"
+            )
+        return self.answer(observation, state, episode_start)
+
+    def answer(
+        self,
+        observation: NDArray[Any],
+        state: Any = None,
+        episode_start: Any = None,
+        controller: NDArray[np.float32] | None = None,
+    ) -> tuple[NDArray[np.float32], Any]:
+        """Return the action, given a controller's action where the policy corrects one.
+
+        Parameters
+        ----------
+        observation, state, episode_start
+            See :meth:`predict`.
+        controller : array of float32, shape of the action, optional
+            What the controller answers to the same observation.
+        """
+        made = np.asarray(observation, np.float32)
+        rows = made if made.ndim == 2 else made[None]
+        if made.ndim not in (1, 2) or rows.shape[1] != len(self.signals):
+            raise ValueError(
+                f"the observation has shape {made.shape}, expected ({len(self.signals)},) or "
+                f"(n_env, {len(self.signals)}): {', '.join(self.signals.names())}"
+            )
+        fed = {INPUT: np.ascontiguousarray(rows)}
+        if controller is not None:
+            fed[CONTROLLER] = np.ascontiguousarray(controller).reshape(len(rows), -1)
+        if self.memory:
+            fed |= self._remembered(state, episode_start, len(rows))
+            action, state = self._session.run([OUTPUT, AFTER], fed)
+        else:
+            action = self._session.run([OUTPUT], fed)[0]
+        return (action if made.ndim == 2 else action[0]), state
+
+    def _remembered(self, state: Any, episode_start: Any, rows: int) -> dict[str, NDArray[Any]]:
+        """Return the state and where episodes begin, as the file wants them."""
+        starts = np.zeros((rows, 1), np.float32)
+        if state is None:
+            starts[:] = 1.0
+            return {STATE: np.zeros((rows, self.memory), np.float32), START: starts}
+        if episode_start is not None:
+            starts[:, 0] = episode_start
+        if np.shape(state) != (rows, self.memory):
+            raise ValueError(
+                f"the state has shape {np.shape(state)}, expected ({rows}, {self.memory}); give "
+                "back what the last call returned, or None to begin"
+            )
+        return {STATE: state, START: starts}
+
+    def digest(self) -> str:
+        """Return the SHA-256 of the file, 16 hexadecimal digits."""
+        return self._digest[:16]
+
+    def _check_shapes(self) -> int:
+        """Raise unless inputs and outputs are a policy's; return the width of its memory."""
+        actions = len(self.action_signals)
+        memory = _width(self._session.get_inputs(), STATE)
+        inputs = {INPUT: len(self.signals)}
+        outputs = {OUTPUT: actions}
+        if self.corrects:
+            inputs[CONTROLLER] = actions
+        if memory:
+            inputs |= {STATE: memory, START: 1}
+            outputs[AFTER] = memory
+        for wanted, found in (
+            (inputs, self._session.get_inputs()),
+            (outputs, self._session.get_outputs()),
+        ):
+            shapes = {node.name: (node.type, node.shape[1:]) for node in found}
+            if shapes != {name: ("tensor(float)", [width]) for name, width in wanted.items()}:
+                raise PolicyFileError(
+                    f"{self.name} has {shapes}, but by its card it should have float32 numbers a "
+                    f"row as follows: {wanted}; export it with agents.export.export.export_policy"
+                )
+        return memory
+
+
+def _width(nodes: Any, name: str) -> int:
+    """Return the number of columns of an input, 0 if it is not there."""
+    shapes = [node.shape for node in nodes if node.name == name]
+    return shapes[0][1] if shapes and len(shapes[0]) == 2 and isinstance(shapes[0][1], int) else 0
+
+
+def _corrects(card: dict[str, Any], name: str) -> str:
+    try:
+        return str(card["baseline"]["name"]) if "baseline" in card else ""
+    except (TypeError, KeyError) as error:
+        raise PolicyFileError(
+            f"{name}: its card does not name the controller that it corrects"
+        ) from error
+
+
+def _session(data: bytes, name: str) -> onnxruntime.InferenceSession:
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.execution_mode = onnxruntime.ExecutionMode.ORT_SEQUENTIAL
+    options.log_severity_level = 4
+    try:
+        return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
+    except Exception as error:
+        raise PolicyFileError(f"{name} is no graph that can be run: {error}") from error
+
+
+def _signals(described: Any, name: str) -> Signals:
+    try:
+        return Signals(Signal(**entry) for entry in described)
+    except (TypeError, KeyError, ValueError) as error:
+        raise PolicyFileError(f"{name}: its card describes no signals ({error})") from error
+
+
+def _compare(mine: Signals, theirs: Signals, what: str) -> None:
+    a, b = list(mine.names()), list(theirs.names())
+    if a != b:
+        raise PolicyFileError(
+            f"{what}: it was trained with {', '.join(a)}, but there is {', '.join(b)}; make the "
+            "environment with the arguments on the policy's card (env_kwargs)"
+        )
+    for trained, given in zip(mine, theirs, strict=True):
+        for field in FIELDS:
+            if getattr(trained, field) != getattr(given, field):
+                raise PolicyFileError(
+                    f"{what}: {trained.name} had {field} = {getattr(trained, field)!r} in "
+                    f"training, now {getattr(given, field)!r}; make the environment alike"
+                )

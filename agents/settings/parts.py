@@ -1,0 +1,244 @@
+"""The parts of a training's settings, each with its bounds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from agents.settings.settings import choice, number
+
+
+@dataclass(frozen=True)
+class Network:
+    """The policy's network.
+
+    Attributes
+    ----------
+    hidden : tuple of int
+        Width of each hidden layer, of the policy and of the critic alike.
+    activation : {"tanh", "relu", "elu"}
+    log_std_init : float
+        PPO: logarithm of the first standard deviation of the action, in its range [-1, 1].
+    differences : tuple of str
+        ``"a - b"`` with names of inputs: fixed extra inputs ``gain * (a - b)``. A millimetre is a
+        thirtieth of the range, so that errors are small numbers among the plain signals. Inputs
+        are the signals, a residual's ``controller_<action>``, and ``<signal>@1`` for what
+        ``history`` keeps of one period ago.
+    gain : float
+        That factor.
+    linear : bool
+        PPO: a linear path from the inputs to the action beside the layers, as in structured
+        control nets (Srouji, Zhang, Salakhutdinov, ICML 2018).
+    hold : tuple of str
+        PPO with ``linear``: a signal for each action. The untrained policy returns its value, so
+        that learning starts from "keep the last set-point".
+    """
+
+    hidden: tuple[int, ...] = number((64, 64), 1, 4096)
+    activation: str = choice("tanh", "tanh", "relu", "elu")
+    log_std_init: float = number(0.0, -10.0, 3.0)
+    differences: tuple[str, ...] = ()
+    gain: float = number(10.0, 0.0, 1e4)
+    linear: bool = False
+    hold: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Normalize:
+    """Running normalisation during training; the exported policy contains it."""
+
+    observation: bool = False
+    reward: bool = True
+    clip_observation: float = number(10.0, 0.1, 1e6)
+    clip_reward: float = number(10.0, 0.1, 1e6)
+
+
+@dataclass(frozen=True)
+class PPO:
+    """Proximal policy optimisation (Schulman et al. 2017), names as in stable-baselines3.
+
+    Attributes
+    ----------
+    learning_rate : tuple of float
+        Runs linearly from the first value to the second over the training.
+    warm_up : int
+        Rollouts at the beginning in which the critic alone learns, so that a policy that starts
+        as a controller is not led away by an untrained critic (Silver et al., Residual policy
+        learning, arXiv:1812.06298, 2018). In as many rollouts after them the rate rises from 0.
+    """
+
+    n_steps: int = number(32, 2, 100_000)
+    batch_size: int = number(2048, 2, 1_000_000)
+    n_epochs: int = number(4, 1, 100)
+    learning_rate: tuple[float, float] = number((3e-4, 3e-4), 0.0, 1.0)
+    gamma: float = number(0.97, 0.0, 1.0)
+    gae_lambda: float = number(0.95, 0.0, 1.0)
+    clip_range: float = number(0.2, 1e-3, 10.0)
+    ent_coef: float = number(0.0, 0.0, 10.0)
+    vf_coef: float = number(0.5, 0.0, 100.0)
+    max_grad_norm: float = number(0.5, 1e-3, 1e3)
+    target_kl: float | None = number(None, 1e-6, 10.0)
+    warm_up: int = number(0, 0, 10_000)
+
+
+@dataclass(frozen=True)
+class RecurrentPPO:
+    """PPO with a long short-term memory before the layers (sb3-contrib), otherwise as ``PPO``.
+
+    Attributes
+    ----------
+    lstm_size : int
+        Width of the memory.
+    critic_lstm : bool
+        Whether the critic has a memory of its own; without, it sees the present inputs only.
+    """
+
+    lstm_size: int = number(32, 1, 1024)
+    critic_lstm: bool = True
+    n_steps: int = number(64, 2, 100_000)
+    batch_size: int = number(2048, 2, 1_000_000)
+    n_epochs: int = number(4, 1, 100)
+    learning_rate: tuple[float, float] = number((3e-4, 3e-4), 0.0, 1.0)
+    gamma: float = number(0.97, 0.0, 1.0)
+    gae_lambda: float = number(0.95, 0.0, 1.0)
+    clip_range: float = number(0.2, 1e-3, 10.0)
+    ent_coef: float = number(0.0, 0.0, 10.0)
+    vf_coef: float = number(0.5, 0.0, 100.0)
+    max_grad_norm: float = number(0.5, 1e-3, 1e3)
+    target_kl: float | None = number(None, 1e-6, 10.0)
+    warm_up: int = number(0, 0, 10_000)
+
+
+@dataclass(frozen=True)
+class SAC:
+    """Soft actor-critic (Haarnoja et al. 2018), names as in stable-baselines3."""
+
+    buffer_size: int = number(200_000, 100, 100_000_000)
+    learning_starts: int = number(5_000, 0, 100_000_000)
+    batch_size: int = number(256, 1, 1_000_000)
+    learning_rate: tuple[float, float] = number((1e-3, 1e-3), 0.0, 1.0)
+    gamma: float = number(0.97, 0.0, 1.0)
+    tau: float = number(0.005, 0.0, 1.0)
+    train_freq: int = number(1, 1, 100_000)
+    gradient_steps: int = number(8, 1, 100_000)
+    ent_coef: float | Literal["auto"] = number("auto", 0.0, 100.0)
+
+
+@dataclass(frozen=True)
+class TQC:
+    """Truncated quantile critics (Kuznetsov et al. 2020), names as in sb3-contrib."""
+
+    buffer_size: int = number(200_000, 100, 100_000_000)
+    learning_starts: int = number(5_000, 0, 100_000_000)
+    batch_size: int = number(256, 1, 1_000_000)
+    learning_rate: tuple[float, float] = number((1e-3, 1e-3), 0.0, 1.0)
+    gamma: float = number(0.97, 0.0, 1.0)
+    tau: float = number(0.005, 0.0, 1.0)
+    train_freq: int = number(1, 1, 100_000)
+    gradient_steps: int = number(8, 1, 100_000)
+    ent_coef: float | Literal["auto"] = number("auto", 0.0, 100.0)
+    top_quantiles_to_drop_per_net: int = number(2, 0, 24)
+
+
+@dataclass(frozen=True)
+class History:
+    """What the policy sees of the past: hysteresis hides a state that one observation lacks.
+
+    Attributes
+    ----------
+    frames : int
+        Control periods that it looks back; 0 for none.
+    signals : tuple of str
+        Which signals it keeps, by name.
+    """
+
+    frames: int = number(0, 0, 256)
+    signals: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Residual:
+    """A policy that corrects a controller: controller's action + ``scale`` * policy, clipped.
+
+    Attributes
+    ----------
+    controller : str
+        Name in :data:`baselines.core.catalogue.CONTROLLERS`. It is told the nominal plant, and the
+        policy sees its action beside the observation.
+    scale : float
+        Share of the half of the action's range that the policy can add or take.
+    """
+
+    controller: str = ""
+    scale: float = number(0.1, 1e-4, 1.0)
+
+
+@dataclass(frozen=True)
+class Plants:
+    """What plants are trained on.
+
+    Attributes
+    ----------
+    randomize : bool
+        Whether every episode draws the assumed parameters within their declared ranges.
+    hysteresis : tuple of str
+        Kinds of memory among which the rows are shared out; empty for the environment's default.
+    """
+
+    randomize: bool = False
+    hysteresis: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Evaluation of the policy during training, on tuning seeds (:mod:`agents.training.seeds`).
+
+    Attributes
+    ----------
+    interval : int
+        Control periods of training between evaluations; 0 for none but the first and the last.
+    episodes : int
+        Episodes each time, as many for each kind of row and on the same seeds; 0 for no evaluation
+        at all: then the last policy is shipped, otherwise the best that was looked at.
+    settle_seconds : float
+        Start [s] of each episode that is not counted.
+    gate : tuple of str
+        Entries of ``info`` that are all 1 where the output is tracked; everywhere without.
+    objective : {"rms", "geometric", "return"}
+        What policies and settings are chosen by: the error's RMS, the geometric mean of the kinds'
+        RMS (each counts by its ratio), or the return where a task is more than one error.
+    env_kwargs : dict
+        Arguments of the environment that differ from the training's.
+    """
+
+    interval: int = number(0, 0, 10**12)
+    episodes: int = number(0, 0, 1000)
+    settle_seconds: float = number(2.0, 0.0, 1e4)
+    gate: tuple[str, ...] = ()
+    objective: str = choice("rms", "rms", "geometric", "return")
+    env_kwargs: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Search:
+    """The search that chose the settings: its budget, as a comparison has to state it.
+
+    Attributes
+    ----------
+    trials : int or None
+        Settings that were tried; None where they were set by hand, and nobody counted.
+    earlier : int
+        Settings that searches before it tried, from whose result it began.
+    steps : int
+        Control periods of each training of a trial.
+    seed : int
+        Of the sampler.
+    note : str
+        What was searched, and on what.
+    """
+
+    trials: int | None = number(None, 0, 10**6)
+    earlier: int = number(0, 0, 10**6)
+    steps: int = number(0, 0, 10**12)
+    seed: int = number(0, 0, 2**31)
+    note: str = "by hand"

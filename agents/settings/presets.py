@@ -1,0 +1,335 @@
+"""Training presets, one YAML file per environment and algorithm, with a checked schema.
+
+A file is named ``ENV.ALGO.yaml`` or ``ENV.ALGO-VARIANT.yaml``. With ``extends: ENV.ALGO`` it
+states only what differs from another preset; the other's search is left behind, and its algorithm
+where that differs.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import yaml
+
+import pam_envs  # noqa: F401  (registers the environments)
+from agents.settings import parts
+from agents.settings.parts import Evaluation, History, Network, Normalize, Plants, Residual, Search
+from agents.settings.settings import SettingsError, build, choice, number
+from pam_envs.wording import near
+
+FOLDER = Path(__file__).resolve().parents[1] / "configs"
+ALGORITHMS: tuple[str, ...] = ("ppo", "sac", "tqc", "recurrent_ppo")
+ON_POLICY = ("ppo", "recurrent_ppo")
+OPTIONAL = ("share", "per_reference", "history", "residual", "plants", "evaluation", "search")
+"""Parts that are left out of the plain form where they hold their defaults."""
+NAME = re.compile(r"[A-Za-z0-9]+-v[0-9]+\.[a-z_]+(-[a-z_]+)?")
+ENV = re.compile(r"PAM/[A-Za-z0-9]+-v[0-9]+")
+"""Ids of environments here. In ``module:id`` Gymnasium imports the module, which runs its code."""
+
+
+@dataclass(frozen=True)
+class Config:
+    """A training run: what is learnt, where, and how.
+
+    Attributes
+    ----------
+    env : str
+        Id of a registered environment of this package.
+    algo : {"ppo", "sac", "tqc", "recurrent_ppo"}
+    steps : int
+        Control periods of all rows together.
+    num_envs : int
+        Rows of the batched environment.
+    checkpoint_steps : int
+        Control periods between checkpoints.
+    env_kwargs : dict
+        Arguments of the environment.
+    share : dict
+        Arguments of the environment that differ among the rows, each a list: every combination
+        gets as many rows.
+    per_reference : dict
+        Further arguments by the kind's reference, as in scenario files: a reward in which
+        references that are followed to a hundredth of a millimetre count as much as steps.
+    network, normalize, history, residual, plants, evaluation, search
+        The parts, see :mod:`agents.settings.parts`.
+    ppo, sac, tqc, recurrent_ppo
+        The algorithms' parts; the one that ``algo`` names is used.
+    schema : int
+        Version of this schema.
+    """
+
+    env: str
+    algo: str = choice("ppo", *ALGORITHMS)
+    steps: int = number(1_000_000, 1, 10**12)
+    num_envs: int = number(256, 1, 1_000_000)
+    checkpoint_steps: int = number(500_000, 1, 10**12)
+    env_kwargs: dict[str, Any] = field(default_factory=dict)
+    share: dict[str, Any] = field(default_factory=dict)
+    per_reference: dict[str, Any] = field(default_factory=dict)
+    network: Network = field(default_factory=Network)
+    normalize: Normalize = field(default_factory=Normalize)
+    history: History = field(default_factory=History)
+    residual: Residual = field(default_factory=Residual)
+    plants: Plants = field(default_factory=Plants)
+    evaluation: Evaluation = field(default_factory=Evaluation)
+    search: Search = field(default_factory=Search)
+    ppo: parts.PPO = field(default_factory=parts.PPO)
+    sac: parts.SAC = field(default_factory=parts.SAC)
+    tqc: parts.TQC = field(default_factory=parts.TQC)
+    recurrent_ppo: parts.RecurrentPPO = field(default_factory=parts.RecurrentPPO)
+    schema: int = number(1, 1, 1)
+
+    def __post_init__(self) -> None:
+        """Refuse foreign environments and combinations that cannot train."""
+        check_env(self.env)
+        self._check_rollout()
+        network = self.network
+        if network.hold and not network.linear:
+            raise SettingsError("network.hold needs network.linear: true")
+        if self.algo not in ON_POLICY and network.linear:
+            raise SettingsError(f"network.linear is for ppo; leave it out for {self.algo}")
+        if self.residual.controller and network.hold:
+            raise SettingsError(
+                "network.hold is not for a residual, which starts from its controller; leave it out"
+            )
+        if bool(self.history.frames) != bool(self.history.signals):
+            raise SettingsError("history needs both frames and signals, or neither")
+        self._check_kinds()
+
+    def _check_kinds(self) -> None:
+        given = {"randomize", "hysteresis"} & {*self.env_kwargs, *self.share}
+        if self.plants != Plants() and given:
+            raise SettingsError(
+                f"env_kwargs or share and plants both say {', '.join(sorted(given))}; keep plants"
+            )
+        for name, values in self.share.items():
+            if not isinstance(values, list) or not values:
+                raise SettingsError(f"share.{name} = {values!r} must be a list of values")
+        unknown = set(self.per_reference) - set(self.share.get("reference", ()))
+        if unknown:
+            raise SettingsError(
+                f"per_reference names {', '.join(sorted(unknown))}, which share.reference lacks"
+            )
+        kinds = len(self.kinds())
+        if self.num_envs % kinds:
+            raise SettingsError(
+                f"num_envs = {self.num_envs} is no multiple of the {kinds} kinds that share and "
+                "plants.hysteresis make; choose one"
+            )
+
+    def kinds(self) -> tuple[dict[str, Any], ...]:
+        """Return the environment's arguments of each kind that the rows are shared out among."""
+        laws = {"hysteresis": list(self.plants.hysteresis)} if self.plants.hysteresis else {}
+        shared = {**laws, **self.share}
+        base = {**self.env_kwargs, **({"randomize": True} if self.plants.randomize else {})}
+        kinds = [
+            {**base, **dict(zip(shared, values, strict=True))}
+            for values in itertools.product(*shared.values())
+        ]
+        own = self.per_reference
+        return tuple({**kind, **own.get(str(kind.get("reference")), {})} for kind in kinds)
+
+    def _check_rollout(self) -> None:
+        if self.algo not in ON_POLICY:
+            return
+        rollout = self.chosen.n_steps * self.num_envs
+        if rollout % min(self.chosen.batch_size, rollout):
+            raise SettingsError(
+                f"{self.algo}.batch_size = {self.chosen.batch_size} does not divide the {rollout} "
+                f"samples of a rollout ({self.algo}.n_steps * num_envs); choose a divisor"
+            )
+
+    @property
+    def chosen(self) -> Any:
+        """The part of the algorithm in use."""
+        return getattr(self, self.algo)
+
+    def decisive(self) -> Config:
+        """Return the settings that decide which policy is shipped: also how it is looked at."""
+        usual: Any = Config.checkpoint_steps
+        return dataclasses.replace(self, search=Search(), checkpoint_steps=usual)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values, without the other algorithms' parts and those left at rest."""
+        plain = _plain(dataclasses.asdict(self))
+        idle = [a for a in ALGORITHMS if a != self.algo]
+        idle += [name for name in OPTIONAL if getattr(self, name) == _fresh(name)]
+        for name in idle:
+            del plain[name]
+        made: dict[str, Any] = plain
+        return made
+
+
+def check_env(name: str) -> None:
+    """Raise unless a name is that of an environment of this package.
+
+    Raises
+    ------
+    SettingsError
+        Naming the nearest.
+    """
+    if not (ENV.fullmatch(name) and name in gym.registry):
+        known = [env for env in gym.registry if ENV.fullmatch(env)]
+        raise SettingsError(f"env = {name!r} is no environment here{near(name, known)}")
+
+
+def _fresh(name: str) -> Any:
+    kinds = {f.name: f.default_factory for f in dataclasses.fields(Config)}
+    return kinds[name]()  # type: ignore[operator, misc]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    return [_plain(v) for v in value] if isinstance(value, (list, tuple)) else value
+
+
+def presets() -> dict[tuple[str, str, str], Path]:
+    """Return the presets' files by environment id, algorithm and variant ("" for the plain)."""
+    found = {}
+    for path in sorted(FOLDER.glob("*.yaml")):
+        name, _, kind = path.stem.rpartition(".")
+        algo, _, variant = kind.partition("-")
+        found[f"PAM/{name}", algo, variant] = path
+    return found
+
+
+def preset_path(env: str, algo: str, variant: str = "") -> Path:
+    """Return the file of a preset; see :func:`preset`."""
+    found = presets()
+    if algo not in ALGORITHMS:
+        raise SettingsError(f"algo = {algo!r} is not known{near(algo, ALGORITHMS)}")
+    if (env, algo, variant) not in found:
+        ids = [e for e, a, v in found if (a, v) == (algo, variant)]
+        what = f"{algo}-{variant}" if variant else algo
+        raise SettingsError(
+            f"no {what} preset for {env!r}{near(env, ids)} A file of your own: --config FILE"
+        )
+    return found[env, algo, variant]
+
+
+def preset(env: str, algo: str, variant: str = "") -> Config:
+    """Return the preset of an environment, algorithm and variant.
+
+    Raises
+    ------
+    SettingsError
+        If there is none, naming the nearest.
+    """
+    return read(preset_path(env, algo, variant))
+
+
+def read(path: str | Path) -> Config:
+    """Return the configuration in a YAML file, or on the card beside a policy.
+
+    Raises
+    ------
+    SettingsError
+        If the file is no YAML mapping or a setting is unknown or out of bounds.
+    """
+    path = Path(path)
+    given = _mapping(path)
+    if isinstance(given, Mapping) and "action_signals" in given:
+        given = given.get("config")
+    try:
+        return from_mapping(given)
+    except SettingsError as error:
+        raise SettingsError(f"{path.name}: {error}") from error
+
+
+def _mapping(path: Path) -> Any:
+    try:
+        text = path.read_text(encoding="utf-8")
+        return json.loads(text) if path.suffix == ".json" else yaml.safe_load(text)
+    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
+        raise SettingsError(f"{path.name} cannot be read as YAML: {error}") from error
+
+
+def from_text(text: str) -> Config:
+    """Return the configuration that a YAML text describes; see :func:`read`."""
+    return from_mapping(yaml.safe_load(text))
+
+
+def from_mapping(given: Any) -> Config:
+    """Return the configuration that a mapping describes; see :func:`read`."""
+    if isinstance(given, Mapping) and "extends" in given:
+        given = _extended(given)
+    made: Config = build(Config, given)
+    return made
+
+
+def _extended(given: Mapping[str, Any], above: tuple[str, ...] = ()) -> Any:
+    """Return a mapping laid over the preset that it extends, whose search is not its own.
+
+    Parameters
+    ----------
+    given : mapping
+    above : tuple of str
+        Presets that lead here, each extending the next.
+    """
+    name = given["extends"]
+    under = _mapping(_extendable(name, above))
+    own = {key: value for key, value in given.items() if key != "extends"}
+    if "extends" in under:
+        under = _extended(under, (*above, name))
+    foreign = ["search"]
+    if own.get("algo", under.get("algo")) != under.get("algo"):
+        foreign += ALGORITHMS
+    under = {key: value for key, value in under.items() if key not in foreign}
+    return _laid_over(under, own)
+
+
+def _extendable(name: Any, above: tuple[str, ...]) -> Path:
+    """Return the file of a preset that another extends."""
+    if not isinstance(name, str) or not NAME.fullmatch(name):
+        raise SettingsError(f"extends = {name!r} must name a preset, for example KneeWalk-v0.ppo")
+    if name in above:
+        circle = " -> ".join((*above[above.index(name) :], name))
+        raise SettingsError(f"extends = {name!r} goes in a circle ({circle}); take one out")
+    path = FOLDER / f"{name}.yaml"
+    if not path.is_file():
+        names = [p.stem for p in presets().values()]
+        raise SettingsError(f"extends = {name!r} is no preset{near(name, names)}")
+    return path
+
+
+def _laid_over(under: Any, over: Any) -> Any:
+    if not (isinstance(under, Mapping) and isinstance(over, Mapping)):
+        return over
+    return {**under, **{k: _laid_over(under.get(k), v) for k, v in over.items()}}
+
+
+def changed(config: Config, assignments: Sequence[str]) -> Config:
+    """Return the configuration with ``"ppo.gamma=0.95"`` and the like applied.
+
+    Raises
+    ------
+    SettingsError
+        If an assignment has no ``=`` or names no setting.
+    """
+    plain = config.as_dict()
+    for assignment in assignments:
+        name, equals, text = assignment.partition("=")
+        if not equals:
+            raise SettingsError(f"{assignment!r} must read name=value, for example ppo.gamma=0.95")
+        put(plain, name, yaml.safe_load(text))
+    return from_mapping(plain)
+
+
+def put(plain: dict[str, Any], name: str, value: Any) -> None:
+    """Set an entry of nested mappings by its dotted name."""
+    at: Any = plain
+    *above, last = name.strip().split(".")
+    for part in above:
+        at = at.setdefault(part, {}) if isinstance(at, dict) else None
+        if not isinstance(at, Mapping):
+            raise SettingsError(f"{name!r} names no setting")
+    at[last] = value

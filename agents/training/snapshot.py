@@ -1,0 +1,185 @@
+"""All that a training's future depends on: taken at the start of a rollout, and put back there.
+
+Policy, optimisers, normalisation, replay buffer, environment, random numbers and counters. A
+training that is put back continues bit for bit as if it had never stopped, with the same
+libraries, the same processor type and one torch thread.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+from collections import deque
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+from stable_baselines3.common.running_mean_std import RunningMeanStd
+from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
+
+from agents.vec_envs.history import HistoryVecEnv
+from agents.vec_envs.residual import ResidualVecEnv
+
+COUNTERS = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_remaining")
+LAST = ("_last_obs", "_last_episode_starts", "_last_original_obs")
+BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+
+
+def take(model: BaseAlgorithm) -> dict[str, Any]:
+    """Return a snapshot, in arrays, tensors, numbers and text."""
+    env = model.get_env()
+    assert env is not None
+    tensors = model._get_torch_save_params()[1]
+    return {
+        "parameters": model.get_parameters(),
+        "tensors": {name: getattr(model, name).detach().clone() for name in tensors},
+        "counters": {name: getattr(model, name) for name in COUNTERS},
+        "last": {name: getattr(model, name) for name in LAST},
+        "episodes": _episodes(model),
+        "replay": _replay(model),
+        "lstm": [part.clone() for pair in _lstm(model) for part in pair],
+        "layers": {type(layer).__name__: _layer(layer) for layer in _layers(env)},
+        "env": env.unwrapped.get_state(),  # type: ignore[attr-defined]
+        "random": _random_state(model),
+    }
+
+
+def put_back(model: BaseAlgorithm, snapshot: dict[str, Any]) -> None:
+    """Put a snapshot back into a model that was built with the same settings."""
+    env = model.get_env()
+    assert env is not None
+    model.set_parameters(snapshot["parameters"], exact_match=True, device="cpu")
+    for name, tensor in snapshot["tensors"].items():
+        getattr(model, name).data.copy_(tensor)
+    for name, value in snapshot["counters"].items():
+        setattr(model, name, value)
+    for name, value in snapshot["last"].items():
+        setattr(model, name, None if value is None else value.numpy().copy())
+    rows = snapshot["episodes"].tolist()
+    model.ep_info_buffer = deque(
+        ({"r": r, "l": int(length), "t": t} for r, length, t in rows), maxlen=100
+    )
+    model.ep_success_buffer = deque(maxlen=100)
+    _put_replay(model, snapshot["replay"])
+    places = [part for pair in _lstm(model) for part in pair]
+    for place, tensor in zip(places, snapshot["lstm"], strict=True):
+        place.copy_(tensor)
+    for layer in _layers(env):
+        _put_layer(layer, snapshot["layers"][type(layer).__name__])
+    state = {name: value.numpy().copy() for name, value in snapshot["env"].items()}
+    env.unwrapped.set_state(state)  # type: ignore[attr-defined]
+    _put_random_state(model, snapshot["random"])
+
+
+def _episodes(model: BaseAlgorithm) -> np.ndarray[Any, Any]:
+    rows = [(e["r"], e["l"], e["t"]) for e in model.ep_info_buffer or ()]
+    return np.array(rows, np.float64).reshape(-1, 3)
+
+
+def _lstm(model: BaseAlgorithm) -> tuple[Any, ...]:
+    """Return the states of a recurrent policy's memories at the rollout's start."""
+    states = getattr(model, "_last_lstm_states", None)
+    return () if states is None else (states.pi, states.vf)
+
+
+def _layers(env: VecEnv) -> Iterator[VecEnv]:
+    """Yield the wrappers that remember something."""
+    while hasattr(env, "venv"):
+        if isinstance(env, (VecMonitor, VecNormalize, HistoryVecEnv, ResidualVecEnv)):
+            yield env
+        env = env.venv
+
+
+def _layer(layer: VecEnv) -> dict[str, Any]:
+    if isinstance(layer, (HistoryVecEnv, ResidualVecEnv)):
+        return layer.snapshot()
+    if isinstance(layer, VecMonitor):
+        return {
+            "returns": layer.episode_returns.copy(),
+            "lengths": layer.episode_lengths.copy(),
+            "count": layer.episode_count,
+        }
+    assert isinstance(layer, VecNormalize)
+    made: dict[str, Any] = {
+        "returns": layer.returns.copy(),
+        "old_obs": np.asarray(layer.old_obs).copy(),
+        "old_reward": layer.old_reward.copy(),
+        "ret_rms": _moments(layer.ret_rms),
+    }
+    if layer.norm_obs:
+        made["obs_rms"] = _moments(layer.obs_rms)  # type: ignore[arg-type]
+    return made
+
+
+def _put_layer(layer: VecEnv, saved: dict[str, Any]) -> None:
+    if isinstance(layer, (HistoryVecEnv, ResidualVecEnv)):
+        layer.put_back(saved)
+        return
+    if isinstance(layer, VecMonitor):
+        layer.episode_returns = saved["returns"].numpy().copy()
+        layer.episode_lengths = saved["lengths"].numpy().copy()
+        layer.episode_count = saved["count"]
+        return
+    assert isinstance(layer, VecNormalize)
+    layer.returns = saved["returns"].numpy().copy()
+    layer.old_obs = saved["old_obs"].numpy().copy()
+    layer.old_reward = saved["old_reward"].numpy().copy()
+    _put_moments(layer.ret_rms, saved["ret_rms"])
+    if layer.norm_obs:
+        _put_moments(layer.obs_rms, saved["obs_rms"])  # type: ignore[arg-type]
+
+
+def _moments(moments: RunningMeanStd) -> dict[str, Any]:
+    return {"mean": np.array(moments.mean), "var": np.array(moments.var), "count": moments.count}
+
+
+def _put_moments(moments: RunningMeanStd, saved: dict[str, Any]) -> None:
+    moments.mean, moments.var = saved["mean"].numpy().copy(), saved["var"].numpy().copy()
+    moments.count = float(saved["count"])
+
+
+def _replay(model: BaseAlgorithm) -> dict[str, Any] | None:
+    """Return the filled part of the replay buffer."""
+    if not isinstance(model, OffPolicyAlgorithm):
+        return None
+    buffer = model.replay_buffer
+    assert buffer is not None
+    filled = buffer.buffer_size if buffer.full else buffer.pos
+    made: dict[str, Any] = {name: getattr(buffer, name)[:filled] for name in BUFFER}
+    made["pos"], made["full"] = buffer.pos, buffer.full
+    return made
+
+
+def _put_replay(model: BaseAlgorithm, saved: dict[str, Any] | None) -> None:
+    if saved is None:
+        return
+    assert isinstance(model, OffPolicyAlgorithm)
+    buffer = model.replay_buffer
+    assert buffer is not None
+    for name in BUFFER:
+        getattr(buffer, name)[: len(saved[name])] = saved[name].numpy()
+    buffer.pos, buffer.full = saved["pos"], saved["full"]
+
+
+def _random_state(model: BaseAlgorithm) -> dict[str, Any]:
+    """Return the state of every generator that training draws from."""
+    _, keys, position, has_gauss, cached = np.random.get_state(legacy=True)  # noqa: NPY002
+    return {
+        "torch": torch.get_rng_state(),
+        "numpy": [np.asarray(keys, np.int64), int(position), int(has_gauss), float(cached)],
+        "python": json.dumps(random.getstate()),
+        "actions": json.dumps(model.action_space.np_random.bit_generator.state),
+    }
+
+
+def _put_random_state(model: BaseAlgorithm, saved: dict[str, Any]) -> None:
+    torch.set_rng_state(saved["torch"])
+    keys, position, has_gauss, cached = saved["numpy"]
+    state = ("MT19937", keys.numpy().astype(np.uint32), position, has_gauss, cached)
+    np.random.set_state(state)  # noqa: NPY002
+    version, words, gauss = json.loads(saved["python"])
+    random.setstate((version, tuple(words), gauss))
+    model.action_space.np_random.bit_generator.state = json.loads(saved["actions"])

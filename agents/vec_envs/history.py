@@ -1,0 +1,64 @@
+"""Observations joined by what some signals were in the last control periods."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
+
+
+class HistoryVecEnv(VecEnvWrapper):
+    """Appends the past of some columns, the latest first; an episode begins as if at rest.
+
+    The exported policy does the same inside its graph (see :mod:`agents.export.export`).
+
+    Parameters
+    ----------
+    venv : VecEnv
+    columns : sequence of int
+        What is kept.
+    frames : int
+        For how many control periods.
+    """
+
+    def __init__(self, venv: VecEnv, columns: Sequence[int], frames: int) -> None:
+        self.columns = list(columns)
+        self.frames = frames
+        box: Any = venv.observation_space
+        low, high = (np.concatenate([v, *[v[self.columns]] * frames]) for v in (box.low, box.high))
+        super().__init__(venv, spaces.Box(low, high, dtype=np.float32))
+        self.past = np.zeros((venv.num_envs, frames * len(self.columns)), np.float32)
+        self.last = np.zeros((venv.num_envs, len(self.columns)), np.float32)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Start all episodes; see stable-baselines3."""
+        observation = np.asarray(self.venv.reset())
+        self.last = observation[:, self.columns]
+        self.past = np.tile(self.last, self.frames)
+        return np.concatenate([observation, self.past], 1)
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Step all rows; see stable-baselines3."""
+        raw, reward, done, infos = self.venv.step_wait()
+        observation = np.asarray(raw)
+        kept = len(self.columns) * (self.frames - 1)
+        self.past = np.concatenate([self.last, self.past[:, :kept]], 1)
+        self.last = observation[:, self.columns]
+        for row in np.flatnonzero(done).tolist():
+            ended = infos[row]["terminal_observation"]
+            infos[row]["terminal_observation"] = np.concatenate([ended, self.past[row]])
+            self.past[row] = np.tile(self.last[row], self.frames)
+        return np.concatenate([observation, self.past], 1), reward, done, infos
+
+    def snapshot(self) -> dict[str, Any]:
+        """Return what the future depends on."""
+        return {"past": self.past.copy(), "last": self.last.copy()}
+
+    def put_back(self, saved: dict[str, Any]) -> None:
+        """Go back to a snapshot."""
+        self.past, self.last = saved["past"].numpy().copy(), saved["last"].numpy().copy()

@@ -1,0 +1,60 @@
+"""The bundles' friction as a nominal memory tells it from the angle.
+
+Friction inside the bundles is driven by their contraction, and so by the angle, which is sensed: a
+memory that follows it says by how much the bundles pull more on one way and less on the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from baselines.core.controller import Array
+from baselines.elbow.view import ElbowView
+from baselines.positioning.nominal import MemoryRows, MemoryState, NoMemory, PlayRows, PreisachRows
+from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
+
+Shares = tuple[Array, Array]
+
+
+@dataclass(frozen=True)
+class ElbowFriction:
+    """Friction of a nominal orthosis.
+
+    Attributes
+    ----------
+    plant : ElbowOrthosis
+    memory : MemoryRows
+        Nothing lags and nothing is taken if it is none.
+    """
+
+    plant: ElbowOrthosis
+    memory: MemoryRows
+
+    def initial(self, rows: int) -> MemoryState:
+        """Return the memory of bundles that were never moved."""
+        return self.memory.initial(rows)
+
+    def taken(self, view: ElbowView, state: MemoryState) -> tuple[Shares, MemoryState]:
+        """Return what friction takes of both bundles' shapes [m^2], and the memory after it."""
+        travel = self.plant.pulley.travel(view.angle)
+        follows, after = self.memory.forward(travel, state)
+        return self.plant.friction(travel - follows), after
+
+    def torque(self, view: ElbowView, taken: Shares) -> Array:
+        """Return the torque [N m] that friction adds at the pressures as sensed."""
+        factor_a, factor_b = self.plant.coefficients(*view.pressure)
+        return self.plant.pulley.torque(-factor_a * taken[0], -factor_b * taken[1])
+
+
+def _rows(operator: Any) -> MemoryRows:
+    if isinstance(operator, PlayOperator):
+        return PlayRows(operator)
+    return PreisachRows(operator) if isinstance(operator, Preisach) else NoMemory()
+
+
+def make_elbow_friction(plant: ElbowOrthosis, known: bool) -> ElbowFriction:
+    """Return the friction of a nominal plant, or none if it is not ``known``."""
+    return ElbowFriction(plant, _rows(plant.memory.operator if known else None))

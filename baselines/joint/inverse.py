@@ -1,0 +1,96 @@
+"""Set-points of joints without feedback: the reference itself, or the inverse of the memory.
+
+    u = H^-1(r)                                              seed 002, section 3.2, Fig. 10
+
+``H^-1`` is the exact recursive inverse of the memory as identified on the nominal plant, in the
+history of what was commanded: ``E(u_next, u_turn) = f_next - f_turn``. The printed sum (3.5) is
+exact only up to the first turn (:mod:`pam_envs.identification.everett_series`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from baselines.core.controller import Answer, beginning, choose
+from baselines.core.knobs import AS_DESIGNED, Knobs
+from baselines.joint.gravity import Gravity
+from baselines.joint.hysteresis_rows import JointMemories
+from baselines.joint.model import JointModel, joint_model
+from baselines.joint.poles import joint_delays
+from baselines.joint.preview import Lookahead, lookahead_for
+from baselines.joint.view import JointSignalMap, make_joint_signal_map
+from baselines.positioning.nominal import MemoryState
+from pam_envs.parameters import Signals
+
+
+@dataclass(frozen=True)
+class JointInverse:
+    """The inverse of the memory as feed-forward.
+
+    Attributes
+    ----------
+    model : JointModel
+    signals : JointSignalMap
+    gravity : Gravity
+    lookahead : Lookahead
+    """
+
+    model: JointModel
+    signals: JointSignalMap
+    gravity: Gravity
+    lookahead: Lookahead
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: MemoryState | None = None,
+        episode_start: ArrayLike | None = None,
+        deterministic: bool = True,
+    ) -> Answer:
+        """Return the set-points; see :class:`~baselines.core.controller.Controller`."""
+        view, memories = self.signals.read(observation), JointMemories(self.model)
+        begin = beginning(state, episode_start, len(view.angle))
+        if state is None or begin.any():
+            held = view.set_point - self.gravity.shift(view.angle, view.payload)
+            state = choose(begin, memories.start(held)[1], state)
+        shift = self.gravity.shift(view.reference, view.payload)
+        found = memories.inverse(self.lookahead.wanted(view.samples), state) + shift
+        set_point = np.minimum(np.maximum(found, self.model.low), self.model.high)
+        after = memories.forward(set_point - shift, state)[1]
+        return self.signals.write(set_point, observation), after
+
+
+def make_joint_inverse(
+    plant: Any,
+    signals: Signals,
+    action_signals: Signals,
+    inverse: float = 1.0,
+    gravity: bool = False,
+    ahead: bool = False,
+    knobs: Knobs = AS_DESIGNED,
+) -> JointInverse:
+    """Return the controller.
+
+    Parameters
+    ----------
+    plant : AntagonisticJoint or RedundantManipulator
+        Nominal plant.
+    signals, action_signals : Signals
+    inverse : float
+        Width of the memory that is inverted over the identified one; 0: the reference goes through
+        the line between the tips of the loop.
+    gravity : bool
+        Whether the set-points carry the weight of the links and the payload that is told.
+    ahead : bool
+        Whether the previewed reference is inverted, ahead by the delay of each joint.
+    knobs : mapping
+        Of :data:`baselines.joint.preview.KNOBS`.
+    """
+    model = joint_model(plant).narrowed(inverse)
+    made = make_joint_signal_map(signals, action_signals)
+    lookahead = lookahead_for(made, joint_delays(plant) if ahead else None, model.period, knobs)
+    return JointInverse(model, made, Gravity(plant if gravity else None), lookahead)

@@ -1,0 +1,144 @@
+"""What the controllers of joints know of a nominal plant: its memory, and a model of its motion.
+
+The memory is identified on the nominal plant as seed 002 (section 3.2) does it on the rig, by
+first-order descending curves (:mod:`pam_envs.identification.joint_forc`), and made symmetric. The
+motion behind it is the paper's nominal model (section 4), two real poles at 23 rad/s. For a
+manipulator it is one stage, without the others.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from baselines.core.controller import Array
+from baselines.joint.bank import Bank
+from baselines.linear.systems import LinearSystem
+from baselines.positioning.nominal import MemoryRows, MemoryState, PreisachRows
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.identification.joint_forc import measure_joint
+
+POLE = 23.0
+"""Both poles of the nominal model [rad/s] (seed 002, section 4)."""
+LEVELS = 21
+"""Levels of the identified map."""
+
+_MEMORIES: dict[str, Preisach] = {}
+
+
+def nominal_motion(pole: float = POLE) -> LinearSystem:
+    """Return ``pole^2 / (s + pole)^2``, from the memory's output to the angle."""
+    a = np.array([[-pole, pole], [0.0, -pole]])
+    return LinearSystem(a, np.array([0.0, pole]), np.array([1.0, 0.0]))
+
+
+@dataclass(frozen=True)
+class LineRows:
+    """A line through 0, worked by rows like a memory."""
+
+    slope: float
+
+    def initial(self, rows: int) -> MemoryState:
+        """Return no state."""
+        return ()
+
+    def forward(self, felt: Array, state: MemoryState) -> tuple[Array, MemoryState]:
+        """Return the output of an input."""
+        return self.slope * felt, state
+
+    def inverse(self, wanted: Array, state: MemoryState) -> Array:
+        """Return the input of an output."""
+        return wanted / self.slope
+
+
+@dataclass(frozen=True)
+class JointModel:
+    """Nominal model of a joint.
+
+    Attributes
+    ----------
+    memory : Preisach or None
+        From set-point [rad] to angle at rest [rad]; None for a line.
+    low, high : float
+        Range of the set-point [rad].
+    period : float
+        Control period [s].
+    poles : tuple of float
+        Of each joint [rad/s], double.
+    slope : float
+        Of the line where there is no memory.
+    """
+
+    memory: Preisach | None
+    low: float
+    high: float
+    period: float
+    poles: tuple[float, ...] = (POLE,)
+    slope: float = 1.0
+
+    @cached_property
+    def motion(self) -> Bank:
+        """The motion at the control period, exact for an input that is held."""
+        return Bank.of([nominal_motion(pole).discrete(self.period, "zoh") for pole in self.poles])
+
+    @cached_property
+    def gain(self) -> float:
+        """Angle over set-point between the tips of the major loop: the nominal gain ``K``."""
+        if self.memory is None:
+            return self.slope
+        return float(self.memory.everett[-1, 0]) / (self.memory.high - self.memory.low)
+
+    @cached_property
+    def rows(self) -> MemoryRows:
+        """The memory worked by rows."""
+        return LineRows(self.slope) if self.memory is None else PreisachRows(self.memory)
+
+    @cached_property
+    def reach(self) -> tuple[float, float]:
+        """Angles at rest [rad] at the ends of the set-point's range, coming from the other end."""
+        ends = np.array([self.low, self.high])
+        state = self.rows.initial(2)
+        for u in (ends[::-1], ends):
+            found, state = self.rows.forward(u, state)
+        return float(found[0]), float(found[1])
+
+    def virgin(self, set_point: Array) -> tuple[Array, MemoryState]:
+        """Return angles at rest [rad] under first set-points (n,), and the memory they leave."""
+        return self.rows.forward(set_point, self.rows.initial(len(set_point)))
+
+    def narrowed(self, width: float) -> JointModel:
+        """Return the model with a memory ``width`` times as wide, the tips the same; 0: a line."""
+        if self.memory is None or width == 0.0:
+            return replace(self, memory=None, slope=self.gain)
+        return replace(self, memory=self.memory.scaled(width, self.gain))
+
+
+def joint_model(plant: Any, levels: int = LEVELS, poles: tuple[float, ...] = (POLE,)) -> JointModel:
+    """Return the nominal model of a plant with ``rest_angles``, identified once for each plant.
+
+    Parameters
+    ----------
+    plant : AntagonisticJoint or RedundantManipulator
+        Nominal plant.
+    levels : int
+        Levels of the identified map.
+    poles : tuple of float
+        Of each joint [rad/s].
+
+    Warns
+    -----
+    UserWarning
+        If the memory is no symmetric Preisach operator; the model is then the map as measured.
+    """
+    key = f"{plant.digest()} {levels}"
+    low, high = plant.angle_range
+    if key not in _MEMORIES:
+        found = measure_joint(plant.rest_angles, high, levels)
+        if not (found.symmetric and found.preisach):
+            warnings.warn(f"the memory of the nominal plant {found.verdict}", stacklevel=2)
+        _MEMORIES[key] = found.model
+    return JointModel(_MEMORIES[key], low, high, plant.control_period, poles)

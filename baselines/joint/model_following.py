@@ -1,0 +1,195 @@
+"""Model-following control of joints with an inverse of the memory: seed 002, section 4, Fig. 11.
+
+    model loop         u_mod = C_t (r - phi_mod),      phi_mod = G u_mod
+    disturbance loop   u_dis = C_d (phi_mod - phi)
+    command            u = H^-1(u_mod + u_dis)         (+ what carries gravity)
+
+The model loop has no disturbance, so that its PI (pole cancelled, ``D = 1/sqrt(2)``) is designed
+for tracking alone; the disturbance loop compares the joint with the model and not with the
+reference, and is designed for rejection alone (:mod:`baselines.robust.loops`). With an exact
+inverse and motion the joint is its model, and the disturbance loop rests.
+
+``H^-1`` is the exact recursive inverse of the memory as identified on the nominal plant
+(:mod:`baselines.joint.model`), in the history of what was commanded. Left out, ``u = (u_mod +
+u_dis) / K``. Limits: ``u_mod`` keeps within the angles that can be held, so that the model
+saturates as the joint does, ``u_dis`` within what is left; the disturbance loop is told what was
+applied (:mod:`baselines.joint.loop`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from baselines.core.controller import Answer, Array, beginning, choose
+from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
+from baselines.joint.gravity import Gravity
+from baselines.joint.hysteresis_rows import JointMemories
+from baselines.joint.loop import DAMPING, JointLoop, LoopState, make_loop
+from baselines.joint.model import JointModel, joint_model
+from baselines.joint.poles import joint_poles
+from baselines.joint.preview import Lookahead, double_lags, lookahead_for
+from baselines.joint.tracking import ModelLoop, make_model_loop
+from baselines.joint.view import JointSignalMap, JointView, make_joint_signal_map
+from baselines.positioning.nominal import MemoryState
+from baselines.robust.loops import Kind, robust_controller
+from pam_envs.parameters import Signals
+
+KNOBS: Bounds = {"damping": (0.5, 1.5), "disturbance": (0.5, 2.0)}
+"""On the damping of the model loop and on the bandwidth of the disturbance loop."""
+
+
+class FollowingState(NamedTuple):
+    """Memories of model, loops and inverse, shapes (n_env, n_joints, ...).
+
+    Attributes
+    ----------
+    model : ndarray
+        States of the model of the motion.
+    tracking : ndarray
+        States of the model loop.
+    disturbance : LoopState
+    memory : tuple of ndarray
+        Of the inverse.
+    """
+
+    model: Array
+    tracking: Array
+    disturbance: LoopState
+    memory: MemoryState
+
+
+@dataclass(frozen=True)
+class ModelFollowing:
+    """Model loop, inverse and disturbance loop; see this module's page.
+
+    Attributes
+    ----------
+    model : JointModel
+        Whose memory is inverted.
+    tracking : ModelLoop
+    disturbance : JointLoop
+    signals : JointSignalMap
+    gravity : Gravity
+    lookahead : Lookahead
+        On the reference of the model loop.
+    """
+
+    model: JointModel
+    tracking: ModelLoop
+    disturbance: JointLoop
+    signals: JointSignalMap
+    gravity: Gravity
+    lookahead: Lookahead
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: FollowingState | None = None,
+        episode_start: ArrayLike | None = None,
+        deterministic: bool = True,
+    ) -> Answer:
+        """Return the set-points; see :class:`~baselines.core.controller.Controller`."""
+        view = self.signals.read(observation)
+        begin = beginning(state, episode_start, len(view.angle))
+        if state is None or begin.any():
+            state = choose(begin, self._start(view), state)
+        shift = self.gravity.shift(view.reference, view.payload)
+        wanted = self._wanted(view, state)
+        set_point = self._inverse(sum(wanted), state.memory) + shift
+        set_point = np.minimum(np.maximum(set_point, self.model.low), self.model.high)
+        return self.signals.write(set_point, observation), self._after(
+            view, state, wanted[0], set_point - shift
+        )
+
+    def model_output(self, state: FollowingState) -> Array:
+        """Return the model's angles [rad], shape (n_env, n_joints), when the action has acted."""
+        return self.model.motion.output(np.zeros(state.model.shape[:-1]), state.model)
+
+    def _start(self, view: JointView) -> FollowingState:
+        """Return the state of a joint that rests where it is, at the set-point that it has."""
+        shift = self.gravity.shift(view.angle, view.payload)
+        held, memory = JointMemories(self.model).start(view.set_point - shift)
+        angle = view.angle
+        return FollowingState(
+            self.model.motion.rest(angle),
+            self.tracking.start(angle),
+            self.disturbance.start(held - angle),
+            memory,
+        )
+
+    def _wanted(self, view: JointView, state: FollowingState) -> tuple[Array, Array]:
+        """Return what both loops want: angles at rest [rad]."""
+        low, high = self.model.reach
+        angle = self.model_output(state)
+        aim = self.lookahead.wanted(view.samples)
+        tracking = self.tracking.output(aim, state.tracking, low, high)
+        more = self.disturbance.output(
+            angle, view.angle, state.disturbance, low - tracking, high - tracking
+        )
+        return tracking, more
+
+    def _inverse(self, wanted: Array, memory: MemoryState) -> Array:
+        return JointMemories(self.model).inverse(wanted, memory)
+
+    def _after(
+        self, view: JointView, state: FollowingState, tracking: Array, applied: Array
+    ) -> FollowingState:
+        angle = self.model_output(state)
+        held, memory = JointMemories(self.model).forward(applied, state.memory)
+        disturbance = self.disturbance.advance(
+            angle, view.angle, held - tracking, state.disturbance
+        )
+        return FollowingState(
+            self.model.motion.advance(tracking, state.model),
+            self.tracking.advance(self.lookahead.wanted(view.samples), state.tracking),
+            disturbance,
+            memory,
+        )
+
+
+def make_model_following(
+    plant: Any,
+    signals: Signals,
+    action_signals: Signals,
+    kind: Kind = "mu",
+    inverse: float = 1.0,
+    gravity: bool = False,
+    ahead: bool = False,
+    knobs: Knobs = AS_DESIGNED,
+) -> ModelFollowing:
+    """Return the controller.
+
+    Parameters
+    ----------
+    plant : AntagonisticJoint or RedundantManipulator
+        Nominal plant.
+    signals, action_signals : Signals
+    kind : {"mu", "hinf"}
+        Of the disturbance loop.
+    inverse : float
+        Width of the memory that is inverted over the identified one: 1 is the exact inverse, 0
+        none.
+    gravity : bool
+        Whether the set-points carry the weight of the links and the payload that is told.
+    ahead : bool
+        Whether the model loop is given the previewed reference in place of the present one.
+    knobs : mapping
+        Of ``KNOBS`` and of :data:`baselines.joint.preview.KNOBS`. The model loop's delay goes with
+        the square of its damping.
+    """
+    model = joint_model(plant, poles=joint_poles(plant)).narrowed(inverse)
+    made = make_joint_signal_map(signals, action_signals)
+    damping, pace = knob(knobs, "damping"), knob(knobs, "disturbance")
+    delays = [damping**2 * delay for delay in double_lags(model.poles)]
+    return ModelFollowing(
+        model,
+        make_model_loop(model, damping * DAMPING),
+        make_loop(model, lambda pole: robust_controller(kind, pole=pace * pole)),
+        made,
+        Gravity(plant if gravity else None),
+        lookahead_for(made, delays if ahead else None, model.period, knobs),
+    )

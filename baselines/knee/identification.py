@@ -1,0 +1,133 @@
+"""Frequency response tests of a nominal knee orthosis, as seed 000 (section 4.1) makes them.
+
+The set-point swings about 2 bar, one sine a run, and tension or angle is measured. What the
+orthosis is mounted on in the test is part of what is identified:
+
+- tension of the brace alone: free to move, as in the paper;
+- tension in a rig or on a leg: at the nominal length, as a leg that bears weight holds it;
+- angle on a leg: with the inertia, damping and hold of a leg that hangs.
+
+The paper's tests are all without a leg. Its angle controller would then meet 25 times the inertia
+that it was designed for.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.core.controller import Array
+from pam_envs.identification.frequency import RationalFit, fit_rational
+from pam_envs.mechanics.leg import GRAVITY
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
+from pam_envs.plants.knee_orthosis.rollout import simulate_knee
+
+Output = Literal["tension", "angle"]
+
+CENTRE = 2e5
+"""Pressure [Pa] that the sines swing about."""
+AMPLITUDE = 0.5e5
+"""[Pa]; smaller, and the muscle's friction lets less through."""
+FREQUENCIES = np.geomspace(0.5, 60.0, 24)
+"""[rad/s]."""
+SETTLING, MEASURED = 4.0, 26.0
+"""Seconds before a measurement, and of it, rounded to whole periods of each sine."""
+ORDERS: dict[tuple[str, str, str], tuple[int, int]] = {
+    ("no_load", "tension", "lag"): (3, 2),
+    ("rig", "tension", "lag"): (1, 1),
+    ("no_load", "angle", "lag"): (3, 3),
+    ("no_load", "tension", "measured"): (3, 3),
+    ("rig", "tension", "measured"): (5, 3),
+    ("no_load", "angle", "measured"): (6, 5),
+}
+"""Order and relative degree of the fit, by mounting in the test, output and dynamics."""
+
+
+def tested(plant: KneeOrthosis, output: Output) -> KneeOrthosis:
+    """Return the orthosis as it is mounted in the test of an output; see the module."""
+    quiet = plant.without_noise()
+    if output == "tension":
+        mounting = "no_load" if plant.mounting == "no_load" else "rig"
+        return dataclasses.replace(quiet, mounting=mounting)
+    if plant.mounting != "leg":
+        return dataclasses.replace(quiet, mounting="no_load")
+    leg, lever = plant.leg, plant.lever
+    held = leg.stiffness + leg.hold_stiffness + leg.mass * leg.centre * GRAVITY
+    angle = float(lever.angle(plant.fixture.length))
+    stiffness = lever.stiffness + held
+    hanging = quiet.replace(
+        {
+            "lever.inertia": leg.inertia,  # the brace has 4 % of it
+            "lever.damping": lever.damping + leg.damping + leg.hold_damping,
+            "lever.stiffness": stiffness,
+            "lever.relaxed_angle": angle
+            + lever.stiffness * (lever.relaxed_angle - angle) / stiffness,
+        }
+    )
+    return dataclasses.replace(hanging, mounting="no_load")
+
+
+def frequency_response(
+    plant: KneeOrthosis,
+    output: Output,
+    frequencies: Array = FREQUENCIES,
+    amplitude: float = AMPLITUDE,
+) -> NDArray[np.complex128]:
+    """Return the response from pressure set-point [kPa] to an output, one sine after the other.
+
+    Parameters
+    ----------
+    plant : KneeOrthosis
+        As mounted in the test.
+    output : {"tension", "angle"}
+        [N] or [rad].
+    frequencies : ndarray, shape (m,)
+        Angular frequencies [rad/s].
+    amplitude : float
+        [Pa].
+
+    Returns
+    -------
+    ndarray of complex, shape (m,)
+        Of the first harmonic; the hold of the control period is divided out.
+    """
+    h = plant.control_period
+    time = np.arange(round((SETTLING + MEASURED) / h)) * h
+    swing = amplitude * np.sin(np.multiply.outer(time, frequencies))
+    record = simulate_knee(plant, CENTRE + swing, pressure=CENTRE)[output]
+    found = [
+        _harmonic(time + h, record[:, k], w) / _harmonic(time, swing[:, k], w)
+        for k, w in enumerate(frequencies)
+    ]
+    hold = (1.0 - np.exp(-1j * frequencies * h)) / (1j * frequencies * h)
+    return np.asarray(1e3 * np.array(found) / hold)
+
+
+def _harmonic(time: Array, signal: Array, w: float) -> complex:
+    """Return the first harmonic over as many whole periods as were measured."""
+    period = 2.0 * np.pi / w
+    start = time[-1] - np.floor((time[-1] - time[0] - SETTLING) / period) * period
+    kept = time > start
+    columns = np.exp(1j * w * time[kept])
+    basis = np.stack([columns.real, columns.imag, np.ones(kept.sum()), time[kept]], axis=1)
+    a, b, _, _ = np.linalg.lstsq(basis, signal[kept], rcond=None)[0]
+    return complex(a, -b)
+
+
+_FITS: dict[tuple[str, str], RationalFit] = {}
+
+
+def identify(plant: KneeOrthosis, output: Output) -> RationalFit:
+    """Return the transfer function from set-point [kPa] to tension [N] or angle [rad].
+
+    The test and its fit are made once for each plant.
+    """
+    test = tested(plant, output)
+    key = (test.digest(), output)
+    if key not in _FITS:
+        order, degree = ORDERS[test.mounting, output, test.dynamics]
+        _FITS[key] = fit_rational(FREQUENCIES, frequency_response(test, output), order, degree)
+    return _FITS[key]

@@ -1,0 +1,145 @@
+"""A nominal knee orthosis, worked by rows: what the model-based controllers of the knee know.
+
+Everything is computed from the nominal :class:`~pam_envs.plants.knee_orthosis.plant.KneeOrthosis`
+alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from baselines.core.controller import Array
+from baselines.positioning.nominal import MemoryRows, MemoryState, NoMemory, PreisachRows
+from pam_envs.hysteresis.modified_maxwell_slip import ModifiedMaxwellSlip
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
+
+SHORTEST_STRETCH = 1e-3
+"""Length [m] above the shortest below which a muscle is not divided by its stretch."""
+CURVE_POINTS = 451
+
+
+@dataclass(frozen=True)
+class SlipRows:
+    """A modified Maxwell-slip model: pressure [Pa] in, stiffness [N/m] out."""
+
+    operator: ModifiedMaxwellSlip
+
+    def initial(self, rows: int) -> MemoryState:
+        """Return slip positions, shape (rows, n), of muscles that were vented."""
+        return (self.operator.initial_state((rows,)),)
+
+    def forward(self, felt: Array, state: MemoryState) -> tuple[Array, MemoryState]:
+        """Advance to a pressure."""
+        stiffness, after = self.operator.step(felt, state[0])
+        return stiffness, (after,)
+
+    def inverse(self, wanted: Array, state: MemoryState) -> Array:
+        """Return the pressure of a stiffness; the state stays."""
+        return self.operator.inverse_step(wanted, state[0])[0]
+
+
+@dataclass(frozen=True)
+class KneeNominal:
+    """The nominal orthosis.
+
+    Attributes
+    ----------
+    plant : KneeOrthosis
+        What the controller believes.
+    """
+
+    plant: KneeOrthosis
+
+    @property
+    def full_pressure(self) -> float:
+        """Capacity [Pa]."""
+        return float(self.plant.regulator.max_pressure)
+
+    @cached_property
+    def memory(self) -> MemoryRows:
+        """From pressure [Pa] to stiffness [N/m] of a muscle with gain 1."""
+        operator = self.plant.memory.scaled
+        if operator is None:
+            return NoMemory()
+        if isinstance(operator, ModifiedMaxwellSlip):
+            return SlipRows(operator)
+        return PreisachRows(operator)
+
+    @cached_property
+    def _per_output(self) -> float:
+        """Stiffness [N/m] over the memory's output."""
+        muscle = self.plant.muscle
+        return muscle.gain * (1.0 if self.plant.memory.operator else muscle.stiffness_ratio)
+
+    def stretch(self, angle: Array) -> Array:
+        """Return the muscle's length above its shortest [m] at an angle [rad], at least 1 mm."""
+        length = self.plant.lever.length(angle)
+        if self.plant.mounting == "rig":
+            length = np.full_like(length, self.plant.fixture.length)
+        return np.maximum(SHORTEST_STRETCH, length - self.plant.muscle.shortest_length)
+
+    def free_tension(self, angle: Array) -> Array:
+        """Return the tension [N] that takes the wire's torque off the knee, not below 0."""
+        return np.maximum(0.0, self.plant.tension_for(angle))
+
+    # --- stiffness and pressure -----------------------------------------------------------------
+
+    def line(self, stiffness: Array) -> Array:
+        """Return the pressure [Pa] of a stiffness [N/m] on the line between the loop's tips."""
+        return np.asarray(stiffness * (self.full_pressure / self._full_stiffness))
+
+    @cached_property
+    def _full_stiffness(self) -> float:
+        full = np.array([self.full_pressure])
+        return self._per_output * float(self.memory.forward(full, self.memory.initial(1))[0][0])
+
+    def rested(self, pressure: Array) -> MemoryState:
+        """Return the memory of muscles that were inflated from none to a pressure [Pa]."""
+        _, state = self.memory.forward(np.zeros_like(pressure), self.memory.initial(len(pressure)))
+        return self.felt(pressure, state)
+
+    def felt(self, pressure: Array, state: MemoryState) -> MemoryState:
+        """Return the memory after a pressure [Pa]."""
+        return self.memory.forward(pressure, state)[1]
+
+    def pressure_for(self, stiffness: Array, state: MemoryState) -> Array:
+        """Return the pressure [Pa], within the capacity, of a stiffness [N/m] after a history."""
+        found = self.memory.inverse(stiffness / self._per_output, state)
+        return np.minimum(np.maximum(found, 0.0), self.full_pressure)
+
+    # --- rest -------------------------------------------------------------------------------------
+
+    def tension_at_rest(self, pressure: Array) -> Array:
+        """Return the tension [N] at rest without hysteresis: held in a rig, or free to move.
+
+        On a leg, that of the rig: a leg that bears weight holds the muscle's length.
+        """
+        stiffness = pressure * (self._full_stiffness / self.full_pressure)
+        if self.plant.mounting == "no_load":
+            angle = self.plant.angle_at(stiffness)
+        else:
+            angle = self.angle_of(stiffness)
+        return stiffness * self.stretch(angle)
+
+    @cached_property
+    def _balance(self) -> tuple[Array, Array]:
+        """Tensions [N] at rest, rising, and the angles [rad] of the brace alone."""
+        stiffness = np.linspace(0.0, 1.2 * self._full_stiffness, CURVE_POINTS)
+        angle = self.plant.angle_at(stiffness)
+        return stiffness * self.stretch(angle), angle
+
+    def angle_of(self, tension: Array) -> Array:
+        """Return the angle [rad] at which a tension [N] rests: of the brace alone, or the rig."""
+        if self.plant.mounting != "no_load":
+            angle = self.plant.lever.angle(np.asarray(self.plant.fixture.length))
+            return np.full_like(tension, float(angle))
+        return np.interp(tension, *self._balance)
+
+    @cached_property
+    def steepest_gain(self) -> float:
+        """Largest tension per pressure [N/Pa] at rest, from a tenth of the capacity on."""
+        pressure = np.linspace(0.1 * self.full_pressure, self.full_pressure, CURVE_POINTS)
+        return float(np.max(np.diff(self.tension_at_rest(pressure)) / np.diff(pressure)))

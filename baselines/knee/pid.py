@@ -1,0 +1,103 @@
+"""PI control of the knee's tension, tuned by a rule from the nominal plant.
+
+Tuning rule: SIMC for a lag with dead time (:mod:`baselines.linear.simc`) and ``tau_c = theta``,
+with K the steepest tension per pressure of the nominal orthosis at rest. For a regulator that lags,
+tau_1 is its time constant and theta one and a half control periods. For the published dynamics,
+whose 0.3 s are spread over seven poles, the rule's half rule gives half of their sum to each.
+
+The tension's reference is followed in stance and in swing: there is no second controller.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+
+from baselines.core.controller import Answer, answer, beginning, choose
+from baselines.core.knobs import AS_DESIGNED, Knobs
+from baselines.knee.nominal import KneeNominal
+from baselines.knee.published import printed_plant
+from baselines.knee.view import Eyes, make_eyes
+from baselines.linear.simc import WAIT, simc_rule
+from baselines.positioning.pid import Gains, PidState, pid_start, pid_step
+from pam_envs.parameters import Signal, Signals
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
+
+
+def simc_tension(plant: KneeOrthosis, knobs: Knobs = AS_DESIGNED) -> Gains:
+    """Return the gains [Pa/N] of the SIMC rule for a nominal orthosis; see the module.
+
+    Its ``knobs`` are those of :data:`baselines.linear.simc.PI_KNOBS`.
+    """
+    period = plant.control_period
+    theta, tau = WAIT * period, plant.regulator.time_constant
+    if plant.dynamics == "measured":
+        tau = 0.5 * _sum_of_lags()
+        theta = theta + tau
+    gain, reset, _ = simc_rule(KneeNominal(plant).steepest_gain, tau, 0.0, theta, knobs=knobs)
+    return Gains(
+        proportional=gain,
+        integral=gain / reset,
+        derivative=0.0,
+        filter_time=period,
+        tracking_time=reset,
+    )
+
+
+def _sum_of_lags() -> float:
+    """Return the lag [s] of the published dynamics at low frequencies."""
+    plant = printed_plant()
+    return float((sum(1.0 / -p for p in plant.poles) - sum(1.0 / -z for z in plant.zeros)).real)
+
+
+@dataclass(frozen=True)
+class KneePid:
+    """PI from the tension as sensed.
+
+    Attributes
+    ----------
+    gains : Gains
+    eyes : Eyes
+    action_signal : Signal
+    period : float
+        Control period [s].
+    """
+
+    gains: Gains
+    eyes: Eyes
+    action_signal: Signal
+    period: float
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: PidState | None = None,
+        episode_start: ArrayLike | None = None,
+        deterministic: bool = True,
+    ) -> Answer:
+        """Return the PI's set-point; see :class:`~baselines.core.controller.Controller`."""
+        view = self.eyes.look(observation)
+        begin = beginning(state, episode_start, len(view.tension))
+        if state is None or begin.any():
+            state = choose(begin, pid_start(view.set_point, view.tension), state)
+        low, high = self.action_signal.low, self.action_signal.high
+        error = view.wanted - view.tension
+        output, after = pid_step(self.gains, state, error, view.tension, low, high, self.period)
+        return answer(self.action_signal, output, observation), after
+
+
+def make_knee_pid(
+    plant: KneeOrthosis,
+    signals: Signals,
+    action_signals: Signals,
+    gains: Gains | None = None,
+    knobs: Knobs = AS_DESIGNED,
+) -> KneePid:
+    """Return the controller, with the gains of :func:`simc_tension` unless others are given."""
+    return KneePid(
+        simc_tension(plant, knobs) if gains is None else gains,
+        make_eyes(KneeNominal(plant), signals),
+        action_signals["pressure_set_point"],
+        plant.control_period,
+    )

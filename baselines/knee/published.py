@@ -1,0 +1,138 @@
+"""The orthosis paper's printed tension plant and controller, and the plant behind the controller.
+
+Seed 000 (T.-J. Yeh et al., "Control of McKibben pneumatic muscles for a power-assist, lower-limb
+orthosis", Mechatronics 20, 2010), equations (10), (11) and section 4.2. Both transfer functions
+are between kPa and N, about 2 bar, 22 cm and 158 N.
+
+The controller (11) is not a design on the plant (10): loop transfer recovery puts zeros of the
+controller on the poles of the plant, and they are elsewhere. Read the other way round, its zeros
+are the poles of another fit of the same muscle, here called the *inferred plant*. Four unknowns of
+that plant and its design (gain, one zero, bandwidth and control weight) then give back the nine
+coefficients that are left (:func:`refit_controller`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from baselines.core.controller import Array
+from baselines.linear.bumpless import BumplessGains
+from baselines.linear.ltr import LtrDesign, design_ltr
+from baselines.linear.systems import LinearSystem
+
+NOMINAL_PRESSURE = 2e5
+"""Pressure [Pa] that deviations are counted from (section 4.1)."""
+
+CONTROLLER_NUMERATOR = (
+    6.418e4, 6.679e6, 2.892e8, 6.714e9, 8.96e10, 6.816e11, 2.713e12, 4.343e12,
+)  # fmt: skip
+CONTROLLER_DENOMINATOR = (
+    1.0, 215.7, 2.038e4, 1.138e6, 4.213e7, 1.054e9, 1.623e10, 1.304e11, 3.948e11, 0.0,
+)  # fmt: skip
+"""Equation (11), highest power first [kPa/N]."""
+
+BUMPLESS_STATE_GAIN = (
+    -4.7554e-6, -1.8426e-4, -0.0028, -0.0221, -0.0977, -0.2285, -0.2198,
+)  # fmt: skip
+BUMPLESS_DIRECT_GAIN = -1.4758
+"""Printed ``K`` and ``L`` of the bumpless compensator, section 4.2."""
+
+CANCELLED_POLES = (-19.94664586, -15.06844573, -7.00013042)
+"""Real poles [rad/s] of (11) that are taken as zeros of the inferred plant."""
+
+
+def printed_plant_polynomials() -> tuple[Array, Array]:
+    """Return numerator and denominator of (10), highest power first [N/kPa]."""
+    top = 572.157 * np.polymul([1.0, 17.45, 75.79], [1.0, 7.39, 13.41])
+    low = np.array([1.0, 12.33])
+    for factor in ([1.0, 17.97, 78.51], [1.0, 13.78, 47.43], [1.0, 8.11, 17.12]):
+        low = np.polymul(low, factor)
+    return top, low
+
+
+def printed_plant() -> LinearSystem:
+    """Return (10): from pressure [kPa] to tension [N]."""
+    return LinearSystem.from_polynomials(*printed_plant_polynomials())
+
+
+def printed_controller() -> LinearSystem:
+    """Return (11): from reference less tension [N] to pressure [kPa]."""
+    return LinearSystem.from_polynomials(CONTROLLER_NUMERATOR, CONTROLLER_DENOMINATOR)
+
+
+def printed_bumpless() -> tuple[LinearSystem, BumplessGains]:
+    """Return (10) in companion form, and the printed compensator's gains in its coordinates."""
+    top, low = printed_plant_polynomials()
+    n = len(low) - 1
+    a = np.vstack([-low[1:], np.eye(n - 1, n)])
+    c = np.concatenate([np.zeros(n - len(top)), top])
+    gains = BumplessGains(np.array(BUMPLESS_STATE_GAIN), BUMPLESS_DIRECT_GAIN)
+    return LinearSystem(a, np.eye(n)[0], c), gains
+
+
+@dataclass(frozen=True)
+class Refit:
+    """The inferred plant, and the printed controller as its design.
+
+    Attributes
+    ----------
+    design : LtrDesign
+        Of the inferred plant.
+    fourth_zero : float
+        [rad/s].
+    largest_error : float
+        Of the nine coefficients, relative.
+    """
+
+    design: LtrDesign
+    fourth_zero: float
+    largest_error: float
+
+
+def refit_controller(bandwidth: float | None = None) -> Refit:
+    """Return the plant and the design that give back the printed controller.
+
+    Parameters
+    ----------
+    bandwidth : float, optional
+        ``1/sqrt(mu)`` [rad/s], held at this value; free if not given.
+    """
+    start = [0.0, 0.0, 0.0] if bandwidth else [0.0, 0.0, 0.0, 0.0]
+    found = least_squares(
+        lambda q: np.log(_coefficients(_design(q, bandwidth)) / _printed_coefficients()),
+        start, xtol=1e-14, ftol=1e-14, gtol=1e-14,
+    )  # fmt: skip
+    return Refit(
+        _design(found.x, bandwidth),
+        _fourth_zero(found.x),
+        float(np.max(np.abs(np.expm1(found.fun)))),
+    )
+
+
+def _fourth_zero(unknowns: Array) -> float:
+    return -70.0 * float(np.exp(unknowns[1]))
+
+
+def _design(unknowns: Array, bandwidth: float | None) -> LtrDesign:
+    """Return the design for logarithms of gain, zero, control weight and bandwidth over guesses."""
+    poles = np.roots(CONTROLLER_NUMERATOR)
+    zeros = [*CANCELLED_POLES, _fourth_zero(unknowns)]
+    gain = 0.79 * float(np.exp(unknowns[0]))
+    wide = bandwidth or 62.0 * float(np.exp(unknowns[3]))
+    plant = LinearSystem.from_roots(zeros, poles, gain)
+    return design_ltr(plant, wide, 1e-6 * float(np.exp(unknowns[2])))
+
+
+def _coefficients(design: LtrDesign) -> Array:
+    """Return the leading coefficient of the numerator and eight of the denominator."""
+    controller = design.controller
+    lead = controller.c @ controller.a @ controller.b  # relative degree 2: c b = 0
+    poles = controller.poles[1:]
+    return np.concatenate([[lead], np.poly(poles).real[1:]])
+
+
+def _printed_coefficients() -> Array:
+    return np.array([CONTROLLER_NUMERATOR[0], *CONTROLLER_DENOMINATOR[1:-1]])

@@ -1,0 +1,76 @@
+"""The SIMC tuning rule for PI and PID, once for all plants.
+
+S. Skogestad, "Simple analytic rules for model reduction and PID controller tuning", J. Process
+Control 13 (2003) 291-309. A plant of two lags and a dead time, ``K exp(-theta s) / ((tau_1 s + 1)
+(tau_2 s + 1))``, gets the cascade form
+
+    K_c = tau_1 / (K (tau_c + theta)),  tau_I = min(tau_1, 4 (tau_c + theta)),  tau_D = tau_2
+
+The rule's one choice is the time constant ``tau_c`` of the closed loop; its own recommendation,
+"fast, with good robustness", is ``tau_c = theta``.
+
+``theta`` counts one and a half control periods besides what the plant itself waits: half a period
+for the hold, and one in which the computer of a real rig works out its answer. The environments
+have no such delay (an action acts from the instant of its observation on), so that there the whole
+period is margin.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
+
+WAIT = 1.5
+"""Control periods of dead time: hold and computing."""
+PI_KNOBS: Bounds = {"closed_loop_time": (0.25, 4.0), "integral_time": (0.25, 4.0)}
+PID_KNOBS: Bounds = {**PI_KNOBS, "derivative_time": (0.25, 4.0)}
+"""On ``tau_c``, ``tau_I`` and ``tau_D``."""
+
+
+class Simc(NamedTuple):
+    """Parameters of the cascade form.
+
+    Attributes
+    ----------
+    gain : float
+        ``K_c`` [unit of the command over that of the output].
+    integral_time, derivative_time : float
+        [s].
+    """
+
+    gain: float
+    integral_time: float
+    derivative_time: float
+
+
+def simc_rule(
+    gain: float,
+    slow: float,
+    fast: float,
+    dead_time: float,
+    closed_loop_time: float | None = None,
+    knobs: Knobs = AS_DESIGNED,
+) -> Simc:
+    """Return the parameters of the rule; see this module's page.
+
+    Parameters
+    ----------
+    gain : float
+        ``K`` of the plant.
+    slow, fast : float
+        ``tau_1`` and ``tau_2`` [s]; a ``fast`` of 0 gives a PI.
+    dead_time : float
+        ``theta`` [s].
+    closed_loop_time : float, optional
+        ``tau_c`` [s]; default ``theta``.
+    knobs : mapping
+        Of ``PID_KNOBS``; a factor on ``tau_c`` acts on all that the rule makes of it.
+    """
+    wanted = dead_time if closed_loop_time is None else closed_loop_time
+    pace = dead_time + knob(knobs, "closed_loop_time") * wanted
+    return Simc(
+        slow / (gain * pace),
+        knob(knobs, "integral_time") * min(slow, 4.0 * pace),
+        knob(knobs, "derivative_time") * fast,
+    )

@@ -1,0 +1,244 @@
+"""Feed-forward through the exact inverse of the identified muscle.
+
+    reference, a lead ahead -> inverse static law -> inverse memory -> inverse regulator
+
+The memory is not that of the *commanded* pressures but of the pressures that the nominal
+regulator makes of them (first-order lag, slew limit): a pressure that was commanded but not
+reached leaves no trace in the muscle. Its start is the simplest history that explains the first
+measurement of an episode; from then on nothing is measured.
+
+Lead. A set-point acts on the contraction after the dead time, the horizon in which the regulator
+is driven to its target and the lag of the mass. With a preview, the controller aims at the
+reference that far ahead, straight between the samples of the preview. Without one it aims at the
+present reference, and what is left is the delay.
+
+Early start. A step takes the regulator, at its slew limit, longer than the lead. The error of the
+transit is least when half of it comes before the step. So a later sample of the preview becomes
+the aim as soon as the travel to it takes ``EARLY`` times what is left of the time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from baselines.core.controller import Answer, Array, Reader, answer, beginning, choose, reader
+from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
+from baselines.positioning.nominal import MemoryState, Nominal
+from pam_envs.parameters import Signal, Signals
+from pam_envs.plants.single_muscle.plant import SingleMuscle
+
+HORIZON = 0.02
+"""Time [s] in which the set-point would take the nominal pressure to where it should be."""
+EARLY = 1.6
+"""Travel time over time left at which a step is begun. 2 would centre the transit on the step if
+it lay at the sample that first shows it; it lies up to a preview spacing before."""
+KNOBS: Bounds = {"horizon": (0.5, 4.0), "lead": (0.5, 2.0), "early": (0.5, 2.0)}
+
+
+class InverseState(NamedTuple):
+    """What the nominal muscle has gone through.
+
+    Attributes
+    ----------
+    pressure : ndarray, shape (n_env,)
+        Nominal pressure [Pa], one dead time from now: all that is under way has arrived.
+    drive : ndarray, shape (n_env,)
+        Nominal effective pressure [Pa] then.
+    memory : tuple of ndarray, first axis n_env
+        Nominal memory then.
+    """
+
+    pressure: Array
+    drive: Array
+    memory: MemoryState
+
+
+def preview_weights(samples: int, spacing: float, ahead: float) -> Array:
+    """Return weights of the reference and its preview that give the reference at a later time.
+
+    Parameters
+    ----------
+    samples : int
+        Preview samples there are; 0 gives the weight 1 for the present reference.
+    spacing : float
+        Time [s] between them; the reference counts as straight in between.
+    ahead : float
+        The later time [s]; beyond the preview's end the end is taken.
+
+    Returns
+    -------
+    ndarray, shape (samples + 1,)
+        They add up to 1.
+    """
+    nodes = spacing * np.arange(samples + 1)
+    return np.array([np.interp(ahead, nodes, row) for row in np.eye(samples + 1)])
+
+
+def preview_count(signals: Signals) -> int:
+    """Return how many preview samples an observation has."""
+    return sum(name.startswith("reference_") for name in signals.names())
+
+
+@dataclass(frozen=True)
+class Inverse:
+    """Exact inverse of the nominal muscle; see this module's page.
+
+    Attributes
+    ----------
+    nominal : Nominal
+    reader : Reader
+        Of contraction, set-point, load, reference and its preview.
+    action_signal : Signal
+    aims : ndarray, shape (n_aims, n_preview + 1)
+        Weights of reference and preview that give each aim, the nearest first.
+    due : ndarray, shape (n_aims,)
+        Travel time [s] from which an aim is taken rather than the ones before it.
+    horizon : float
+        Time [s], above 0, in which the set-point would take the nominal pressure to the wanted
+        one: the regulator's inverse. The longer, the calmer the set-point.
+    """
+
+    nominal: Nominal
+    reader: Reader
+    action_signal: Signal
+    aims: Array
+    due: Array
+    horizon: float = HORIZON
+
+    @cached_property
+    def _haste(self) -> float:
+        return 1.0 / self.nominal.arrival(self.horizon)
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: InverseState | None = None,
+        episode_start: ArrayLike | None = None,
+        deterministic: bool = True,
+    ) -> Answer:
+        """Return the inverse's set-point; see :class:`~baselines.core.controller.Controller`."""
+        measured = self.reader.rows(observation)
+        now = self.begin(measured, state, episode_start)
+        set_point = self.feed_forward(measured, now)
+        return answer(self.action_signal, set_point, observation), self.move(
+            now, set_point, measured[2]
+        )
+
+    def begin(
+        self, measured: Array, state: InverseState | None, episode_start: ArrayLike | None
+    ) -> InverseState:
+        """Return the state, new in rows that begin an episode."""
+        begin = beginning(state, episode_start, measured.shape[1])
+        if state is not None and not begin.any():
+            return state
+        contraction, pressure, load = measured[:3]
+        memory: Any = None
+        for muscle, rows in self.nominal.groups(load):
+            part = muscle.explain(contraction[rows], pressure[rows])
+            memory = _placed(memory, part, rows, len(load))
+        drive = np.empty(len(load))
+        for muscle, rows in self.nominal.groups(load):
+            drive[rows] = muscle.felt(pressure[rows], _taken(memory, rows))[0]
+        return choose(begin, InverseState(pressure, drive, memory), state)
+
+    def feed_forward(self, measured: Array, now: InverseState) -> Array:
+        """Return the set-point [Pa], shape (n_env,), that the reference needs."""
+        wanted = self._wanted(measured, now)
+        set_point = now.pressure + self._haste * (wanted - now.pressure)
+        signal = self.action_signal
+        return np.asarray(np.minimum(np.maximum(set_point, signal.low), signal.high))
+
+    def _wanted(self, measured: Array, now: InverseState) -> Array:
+        """Return the pressure [Pa] to go for: that of the last aim that is due."""
+        load = measured[2]
+        aims = np.add.reduce(self.aims[:, :, None] * measured[3:], axis=1)
+        wanted = np.empty_like(aims)
+        for muscle, rows in self.nominal.groups(load):
+            drive = muscle.drive_for(aims[:, rows]).ravel()
+            memory = tuple(np.concatenate([a] * len(aims)) for a in _taken(now.memory, rows))
+            wanted[:, rows] = muscle.pressure_for(drive, memory).reshape(len(aims), -1)
+        travel = np.abs(wanted - now.pressure) / self.nominal.plant.regulator.slew_rate
+        due = travel >= self.due[:, None]
+        last = len(aims) - 1 - np.argmax(due[::-1], axis=0)
+        return np.asarray(wanted[last, np.arange(len(load))])
+
+    def move(self, now: InverseState, set_point: Array, load: Array) -> InverseState:
+        """Return the nominal muscle's state one control period on."""
+        pressure = self.nominal.next_pressure(now.pressure, set_point)
+        drive = np.empty(len(load))
+        memory: Any = None
+        for muscle, rows in self.nominal.groups(load):
+            drive[rows], part = muscle.felt(pressure[rows], _taken(now.memory, rows))
+            memory = _placed(memory, part, rows, len(load))
+        return InverseState(pressure, drive, memory)
+
+
+def _taken(memory: MemoryState, rows: Any) -> MemoryState:
+    return memory if isinstance(rows, slice) else tuple(a[rows] for a in memory)
+
+
+def _placed(whole: Any, part: MemoryState, rows: Any, n: int) -> MemoryState:
+    if isinstance(rows, slice):
+        return part
+    if whole is None:
+        whole = tuple(np.empty((n, *a.shape[1:]), a.dtype) for a in part)
+    for to, a in zip(whole, part, strict=True):
+        to[rows] = a
+    return tuple(whole)
+
+
+def aims_of(samples: int, spacing: float, lead: float, early: float = EARLY) -> tuple[Array, Array]:
+    """Return the aims of :class:`Inverse` and when they are due, for a preview."""
+    aims, due = [preview_weights(samples, spacing, lead)], [0.0]
+    for i in range(1, samples + 1):
+        left = i * spacing - lead
+        if left > 0.0:
+            aims.append(np.eye(samples + 1)[i])
+            due.append(early * left)
+    return np.array(aims), np.array(due)
+
+
+def make_inverse(
+    plant: SingleMuscle,
+    signals: Signals,
+    action_signals: Signals,
+    preview: bool = True,
+    horizon: float = HORIZON,
+    knobs: Knobs = AS_DESIGNED,
+) -> Inverse:
+    """Return the controller for a nominal plant.
+
+    Parameters
+    ----------
+    plant : SingleMuscle
+        Nominal plant.
+    signals, action_signals : Signals
+    preview : bool
+        Whether to look ahead; without, the present reference is the aim.
+    horizon : float
+        See :class:`Inverse`.
+    knobs : mapping
+        Of ``KNOBS``: factors on the horizon, on the lead that goes with it, and on ``EARLY``.
+    """
+    nominal = Nominal(plant)
+    samples = preview_count(signals) if preview else 0
+    horizon = knob(knobs, "horizon") * horizon
+    delay = plant.regulator.dead_time + horizon + nominal.mechanical_lag
+    lead, early = knob(knobs, "lead") * delay, knob(knobs, "early") * EARLY
+    names = ["contraction", "set_point", "load", "reference"]
+    names += [f"reference_{i + 1}" for i in range(samples)]
+    spacing = signals["reference_1"].ahead if samples else 0.0
+    aims, due = aims_of(samples, spacing, lead, early)
+    return Inverse(
+        nominal,
+        reader(signals, names),
+        action_signals["pressure_set_point"],
+        aims,
+        due,
+        horizon,
+    )

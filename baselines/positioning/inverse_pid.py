@@ -1,0 +1,133 @@
+"""Inverse feed-forward with a PID for what the nominal model does not know.
+
+The PID does not compare the contraction with the reference, which would have it fight the dead
+time, the slew limit and every early start. It compares the contraction with what the *nominal*
+muscle would do under the same commands: dead time, regulator, memory and static law, the lag of
+the mass counted as delay. While the model is right the PID rests, and the feed-forward acts alone;
+what it corrects is a wrong history, a wrong parameter or an unannounced load. (Two degrees of
+freedom with an internal model; K. J. Astrom, T. Hagglund, "Advanced PID Control", ISA 2006,
+chapter 5.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from baselines.core.controller import Answer, Array, answer, beginning, choose
+from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs
+from baselines.linear.simc import PID_KNOBS
+from baselines.positioning.inverse import HORIZON, Inverse, InverseState, make_inverse
+from baselines.positioning.inverse import KNOBS as INVERSE_KNOBS
+from baselines.positioning.pid import Gains, PidState, pid_start, pid_step, simc
+from pam_envs.parameters import Signals
+from pam_envs.plants.single_muscle.plant import SingleMuscle
+
+KNOBS: Bounds = {**INVERSE_KNOBS, "closed_loop_time": PID_KNOBS["closed_loop_time"]}
+
+
+class InversePidState(NamedTuple):
+    """State of the feed-forward, of the PID, and what is under way.
+
+    Attributes
+    ----------
+    inverse : InverseState
+    pid : PidState
+    expected : ndarray, shape (n_env, n_delay)
+        Nominal contraction at rest [m] under the pressures under way, newest first.
+    """
+
+    inverse: InverseState
+    pid: PidState
+    expected: Array
+
+
+@dataclass(frozen=True)
+class InversePid:
+    """Feed-forward and PID; see this module's page.
+
+    Attributes
+    ----------
+    inverse : Inverse
+    gains : Gains
+    """
+
+    inverse: Inverse
+    gains: Gains
+
+    @cached_property
+    def _delay(self) -> tuple[int, float]:
+        """Delay from the model's pressure to the contraction: whole periods, and the rest."""
+        nominal = self.inverse.nominal
+        plant = nominal.plant
+        age = (plant.regulator.dead_time + nominal.mechanical_lag) / plant.control_period
+        return int(age), age - int(age)
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: InversePidState | None = None,
+        episode_start: ArrayLike | None = None,
+        deterministic: bool = True,
+    ) -> Answer:
+        """Return the sum's set-point; see :class:`~baselines.core.controller.Controller`."""
+        measured = self.inverse.reader.rows(observation)
+        now = self._begin(measured, state, episode_start)
+        contraction, load = measured[0], measured[2]
+        forward = self.inverse.feed_forward(measured, now.inverse)
+        whole, part = self._delay
+        expected = (1.0 - part) * now.expected[:, whole] + part * now.expected[:, whole + 1]
+        signal = self.inverse.action_signal
+        correction, pid = pid_step(
+            self.gains,
+            now.pid,
+            expected - contraction,
+            contraction - expected,
+            signal.low - forward,
+            signal.high - forward,
+            self.inverse.nominal.plant.control_period,
+        )
+        inverse = self.inverse.move(now.inverse, forward, load)
+        newest = self._at_rest(inverse, load)[:, None]
+        after = InversePidState(inverse, pid, np.hstack([newest, now.expected[:, :-1]]))
+        return answer(signal, forward + correction, observation), after
+
+    def _begin(
+        self, measured: Array, state: InversePidState | None, episode_start: ArrayLike | None
+    ) -> InversePidState:
+        begin = beginning(state, episode_start, measured.shape[1])
+        if state is not None and not begin.any():
+            return state
+        inverse = self.inverse.begin(measured, None, None)
+        expected = self._at_rest(inverse, measured[2])
+        fresh = InversePidState(
+            inverse,
+            pid_start(np.zeros_like(expected), measured[0] - expected),
+            np.repeat(expected[:, None], self._delay[0] + 2, axis=1),
+        )
+        return choose(begin, fresh, state)
+
+    def _at_rest(self, state: InverseState, load: Array) -> Array:
+        """Return the nominal contraction at rest [m], shape (n_env,)."""
+        value = np.empty(len(load))
+        for muscle, rows in self.inverse.nominal.groups(load):
+            value[rows] = muscle.contraction_at(state.drive[rows])
+        return value
+
+
+def make_inverse_pid(
+    plant: SingleMuscle,
+    signals: Signals,
+    action_signals: Signals,
+    preview: bool = True,
+    horizon: float = HORIZON,
+    gains: Gains | None = None,
+    knobs: Knobs = AS_DESIGNED,
+) -> InversePid:
+    """Return the controller; the parameters are those of ``make_inverse`` and ``make_pid``."""
+    inverse = make_inverse(plant, signals, action_signals, preview, horizon, knobs)
+    return InversePid(inverse, simc(plant, knobs=knobs) if gains is None else gains)

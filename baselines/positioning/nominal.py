@@ -1,0 +1,278 @@
+"""A nominal plant, worked by rows: what the model-based controllers know.
+
+Everything here is computed from the nominal
+:class:`~pam_envs.plants.single_muscle.plant.SingleMuscle` alone. Rows may hang different loads:
+they are worked load by load, and what a load needs (the memory at that load, its inverse, the
+static curve) is prepared once, when it is first met.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.core.controller import Array, by_load
+from baselines.positioning.contraction_tables import LOADS
+from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.hysteresis.preisach import Preisach, PreisachState
+from pam_envs.mechanics.hanging_mass import GRAVITY
+from pam_envs.plants.single_muscle.plant import SingleMuscle
+
+MemoryState = tuple[NDArray[Any], ...]
+CURVE_POINTS = 1001
+"""Points of the tabulated static curve; straight in between to 0.05 um."""
+
+
+class MemoryRows(Protocol):
+    """A memory on the stretched scale, one row an environment; states have the row first."""
+
+    def initial(self, rows: int) -> MemoryState:
+        """Return the state of muscles that were never inflated."""
+        ...
+
+    def forward(self, felt: Array, state: MemoryState) -> tuple[Array, MemoryState]:
+        """Return the output for an input, and the state it leaves."""
+        ...
+
+    def inverse(self, wanted: Array, state: MemoryState) -> Array:
+        """Return the input that gives an output; the state stays."""
+        ...
+
+
+@dataclass(frozen=True)
+class NoMemory:
+    """The output is the input."""
+
+    def initial(self, rows: int) -> MemoryState:
+        """Return no state."""
+        return ()
+
+    def forward(self, felt: Array, state: MemoryState) -> tuple[Array, MemoryState]:
+        """Return the input."""
+        return felt, state
+
+    def inverse(self, wanted: Array, state: MemoryState) -> Array:
+        """Return the output."""
+        return wanted
+
+
+@dataclass(frozen=True)
+class PlayRows:
+    """Play operators and their dual, the Maxwell-slip model that undoes them, as arrays.
+
+    The same numbers as :meth:`PlayOperator.step`, :meth:`PlayOperator.inverse_state` and
+    ``PlayOperator.inverse().step``, without rebuilding the inverse at each sample.
+    """
+
+    operator: PlayOperator
+
+    @cached_property
+    def _arrays(self) -> tuple[Array, Array, Array, Array, Array]:
+        undo = self.operator.inverse()
+        n = len(self.operator.thresholds)
+        mirror = self.operator.inverse_state(np.eye(n)).T  # inverse_state is linear in the state
+        return (
+            np.array(self.operator.thresholds),
+            np.array(self.operator.weights),
+            mirror,
+            np.array(undo.break_displacements),
+            np.array(undo.stiffnesses),
+        )
+
+    @cached_property
+    def _spring(self) -> float:
+        return self.operator.inverse().spring
+
+    def initial(self, rows: int) -> MemoryState:
+        """Return plays at 0, shape (rows, n)."""
+        return (self.operator.initial_state((rows,)),)
+
+    def forward(self, felt: Array, state: MemoryState) -> tuple[Array, MemoryState]:
+        """Advance the plays."""
+        thresholds, weights, *_ = self._arrays
+        x = felt[:, None]
+        plays = np.maximum(x - thresholds, np.minimum(x + thresholds, state[0]))
+        return self.operator.linear * felt + np.add.reduce(weights * plays, axis=1), (plays,)
+
+    def inverse(self, wanted: Array, state: MemoryState) -> Array:
+        """Return the input by the dual model, in the state that mirrors this one."""
+        _, _, mirror, breaks, stiffnesses = self._arrays
+        slips = np.add.reduce(mirror * state[0][:, None, :], axis=2)
+        y = wanted[:, None]
+        slips = np.maximum(y - breaks, np.minimum(y + breaks, slips))
+        return np.asarray(self._spring * wanted + np.add.reduce(stiffnesses * (y - slips), axis=1))
+
+
+@dataclass(frozen=True)
+class PreisachRows:
+    """A Preisach operator; its state is kept with the row first."""
+
+    operator: Preisach
+
+    def initial(self, rows: int) -> MemoryState:
+        """Return virgin stacks: extrema and outputs, shapes (rows, depth), and counts, (rows,)."""
+        return _row_first(self.operator.initial_state((rows,)))
+
+    def forward(self, felt: Array, state: MemoryState) -> tuple[Array, MemoryState]:
+        """Advance the stacks."""
+        output, after = self.operator.step(felt, _row_last(state))
+        return output, _row_first(after)
+
+    def inverse(self, wanted: Array, state: MemoryState) -> Array:
+        """Return the input by the recursion over the stack."""
+        return self.operator.inverse_step(wanted, _row_last(state))[0]
+
+
+def _row_first(state: PreisachState) -> MemoryState:
+    stack, sums, counts = state
+    return stack.T, sums.T, counts
+
+
+def _row_last(state: MemoryState) -> PreisachState:
+    stack, sums, counts = state
+    return PreisachState(np.ascontiguousarray(stack.T), np.ascontiguousarray(sums.T), counts)
+
+
+@dataclass(frozen=True)
+class LoadedMuscle:
+    """The nominal muscle with one load [kg] on it."""
+
+    plant: SingleMuscle
+    load: float
+
+    @cached_property
+    def memory(self) -> MemoryRows:
+        """The memory at this load."""
+        operator = self.plant.memory.at_load(self.load)
+        if operator is None:
+            return NoMemory()
+        return PlayRows(operator) if isinstance(operator, PlayOperator) else PreisachRows(operator)
+
+    @cached_property
+    def _rest_strain(self) -> float:
+        """Strain at rest without pressure, from which the contraction is counted."""
+        muscle, force, low, high = self.plant.muscle, self.load * GRAVITY, -0.3, 0.6
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if muscle.tension(0.0, middle) > force else (low, middle)
+        return 0.5 * (low + high)
+
+    @cached_property
+    def _curve(self) -> tuple[Array, Array]:
+        drive = np.linspace(0.0, self.plant.regulator.max_pressure, CURVE_POINTS)
+        return drive, self.plant.contraction_at(drive, self.load)
+
+    def drive_for(self, contraction: Array) -> Array:
+        """Return the effective pressure [Pa] that holds a contraction [m]."""
+        strain = contraction / self.plant.muscle.rest_length + self._rest_strain
+        return self.plant.muscle.drive(self.load * GRAVITY, strain)
+
+    def contraction_at(self, drive: Array) -> Array:
+        """Return the contraction [m] at rest under an effective pressure [Pa]."""
+        return np.interp(drive, *self._curve)
+
+    def felt(self, drive: Array, state: MemoryState) -> tuple[Array, MemoryState]:
+        """Return the effective pressure [Pa] at a pressure [Pa], and the memory it leaves."""
+        law, full = self.plant.memory, self.plant.regulator.max_pressure
+        output, after = self.memory.forward(law.stretched(drive, full), state)
+        return law.unstretched(output, full), after
+
+    def pressure_for(self, drive: Array, state: MemoryState) -> Array:
+        """Return the pressure [Pa] that gives an effective pressure [Pa] after this history."""
+        law, full = self.plant.memory, self.plant.regulator.max_pressure
+        found = self.memory.inverse(law.stretched(drive, full), state)
+        return law.unstretched(np.minimum(np.maximum(found, 0.0), full), full)
+
+    def explain(self, contraction: Array, pressure: Array) -> MemoryState:
+        """Return the memory of the simplest history that explains a first measurement.
+
+        That history is: from no pressure up to a peak, and down to the present pressure. The
+        higher the peak, the more contraction is left; it is found by bisection. What is out of
+        reach gets the nearest end (never above the present pressure, or the full pressure).
+        """
+        wanted = self.drive_for(contraction)
+        low = np.array(pressure, float)
+        high = np.full_like(low, self.plant.regulator.max_pressure)
+        for _ in range(14):
+            middle = 0.5 * (low + high)
+            more = self._after(middle, pressure)[0] < wanted
+            low, high = np.where(more, middle, low), np.where(more, high, middle)
+        return self._after(low, pressure)[1]
+
+    def _after(self, peak: Array, pressure: Array) -> tuple[Array, MemoryState]:
+        _, state = self.felt(peak, self.memory.initial(len(peak)))
+        return self.felt(pressure, state)
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """The nominal plant by rows, each with its own load.
+
+    Attributes
+    ----------
+    plant : SingleMuscle
+        What the controller believes.
+    """
+
+    plant: SingleMuscle
+
+    @cached_property
+    def _met(self) -> dict[float, LoadedMuscle]:
+        return {}
+
+    def at(self, load: float) -> LoadedMuscle:
+        """Return the plant with a load [kg] on it; prepared once."""
+        if load not in self._met:
+            self._met[load] = LoadedMuscle(self.plant, load)
+        return self._met[load]
+
+    def groups(self, load: Array) -> Iterator[tuple[LoadedMuscle, Any]]:
+        """Yield each load's plant with the index of its rows."""
+        for key, rows in by_load(load):
+            yield self.at(key), rows
+
+    # --- constants of the motion ------------------------------------------------------------
+
+    @cached_property
+    def mechanical_lag(self) -> float:
+        """Lag [s] of the mass behind the static curve: damping over stiffness, at mid-stroke."""
+        plant, load = self.plant, self.plant.mass.load
+        full = plant.regulator.max_pressure
+        low, high = plant.contraction_at(np.array([0.45, 0.55]) * full, load)
+        slope = (high - low) / (0.1 * full)
+        return float(plant.mass.damping * slope / plant.muscle.area)
+
+    @cached_property
+    def steepest_gain(self) -> float:
+        """Largest contraction per effective pressure [m/Pa], over the loads measured."""
+        full, gains = self.plant.regulator.max_pressure, []
+        for load in LOADS:
+            drive = np.linspace(0.0, full, 61)
+            gains.append(np.max(np.diff(self.plant.contraction_at(drive, load))) * 60.0 / full)
+        return float(max(gains))
+
+    @cached_property
+    def slowest_swing(self) -> float:
+        """Lowest natural frequency [rad/s] of the mass on the muscle: heaviest load, softest."""
+        stiffness = self.plant.muscle.area / self.steepest_gain
+        return math.sqrt(stiffness / (max(LOADS) + self.plant.mass.moving_mass))
+
+    def next_pressure(self, pressure: Array, set_point: Array) -> Array:
+        """Return the regulator's pressure [Pa] one control period on, its dead time left out."""
+        law, period = self.plant.regulator, self.plant.control_period
+        gap = set_point - pressure
+        size = np.abs(gap)
+        ramp = (size - law.slew_rate * law.time_constant) / law.slew_rate
+        ramp = np.minimum(np.maximum(ramp, 0.0), period)
+        left = (size - law.slew_rate * ramp) * np.exp((ramp - period) / law.time_constant)
+        return np.asarray(set_point - np.copysign(left, gap))
+
+    def arrival(self, seconds: float) -> float:
+        """Return the share of a gap that the regulator closes in so many seconds."""
+        return -math.expm1(-seconds / self.plant.regulator.time_constant)

@@ -1,0 +1,222 @@
+"""PID control of the contraction, tuned by a rule from the nominal plant.
+
+Tuning rule: SIMC for a second-order plant with dead time (:mod:`baselines.linear.simc`), with K the
+steepest static gain of the nominal muscle over its stroke (so that the loop is stable where the
+muscle is most willing), tau_1 the regulator's lag, tau_2 the lag of the mass, and theta the
+regulator's dead time, half a control period of the hold, and one of computing. The rule's one
+choice is tau_c = theta, made longer only where the loop would otherwise come within a factor of
+``SWING`` of the natural frequency of the load on the muscle, which the rule's real lags do not
+describe. :func:`simc` is a pure function of the plant.
+
+The regulator's slew limit winds an integral up as its range does. So the set-point is held within
+reach of the *measured* pressure: ``REACH`` times the least lead that keeps the nominal regulator
+at its slew limit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from baselines.core.controller import Answer, Array, Reader, answer, beginning, choose, reader
+from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
+from baselines.linear.simc import PID_KNOBS, WAIT, simc_rule
+from baselines.positioning.nominal import Nominal
+from pam_envs.parameters import Signal, Signals
+from pam_envs.plants.single_muscle.plant import SingleMuscle
+
+FILTER = 8.0
+"""Derivative time over the time constant of its filter."""
+SWING = 4.0
+"""Least natural frequency of the load over the loop's bandwidth ``1 / (tau_c + theta)``."""
+
+REACH = 1.5
+"""Margin for a regulator that is slower than the nominal one; the overshoot of a step grows with
+it (0.5 % of the step at 1, 10 % at 1.5, 25 % at 2)."""
+KNOBS: Bounds = {**PID_KNOBS, "reach": (0.67, 2.0)}
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains of the parallel form, SI.
+
+    Attributes
+    ----------
+    proportional : float
+        [Pa/m].
+    integral : float
+        [Pa/(m s)].
+    derivative : float
+        [Pa s/m]; on the measurement, so that a step of the reference gives no kick.
+    filter_time : float
+        Time constant [s] of the first-order filter on the derivative.
+    tracking_time : float
+        Time constant [s] with which the integral is pulled back while the output is saturated.
+    """
+
+    proportional: float
+    integral: float
+    derivative: float
+    filter_time: float
+    tracking_time: float
+
+
+def simc(
+    plant: SingleMuscle, closed_loop_time: float | None = None, knobs: Knobs = AS_DESIGNED
+) -> Gains:
+    """Return the gains of the SIMC rule for a nominal plant; see this module's page.
+
+    Parameters
+    ----------
+    plant : SingleMuscle
+        Nominal plant.
+    closed_loop_time : float, optional
+        ``tau_c`` [s]; default: see this module's page.
+    knobs : mapping
+        Of :data:`baselines.linear.simc.PID_KNOBS`.
+    """
+    nominal, period = Nominal(plant), plant.control_period
+    theta = plant.regulator.dead_time + WAIT * period
+    tau_1, tau_2 = plant.regulator.time_constant, nominal.mechanical_lag
+    tau_c = max(theta, SWING / nominal.slowest_swing - theta)
+    if closed_loop_time is not None:
+        tau_c = closed_loop_time
+    gain, reset, rate = simc_rule(nominal.steepest_gain, tau_1, tau_2, theta, tau_c, knobs)
+    return Gains(
+        proportional=gain * (1.0 + rate / reset),
+        integral=gain / reset,
+        derivative=gain * rate,
+        filter_time=max(tau_2 / FILTER, 0.5 * period),
+        tracking_time=reset,
+    )
+
+
+class PidState(NamedTuple):
+    """Memory of a PID, shapes (n_env,).
+
+    Attributes
+    ----------
+    integral : ndarray
+        Integral part of the output [Pa].
+    measured : ndarray
+        Last measurement [m].
+    slope : ndarray
+        Its filtered derivative [m/s].
+    """
+
+    integral: Array
+    measured: Array
+    slope: Array
+
+
+def pid_start(output: Array, measured: Array) -> PidState:
+    """Return the state at rest with an output [Pa] and a measurement [m], shapes (n_env,)."""
+    return PidState(output, measured, np.zeros_like(measured))
+
+
+def pid_step(
+    gains: Gains,
+    state: PidState,
+    error: Array,
+    measured: Array,
+    low: ArrayLike,
+    high: ArrayLike,
+    period: float,
+) -> tuple[Array, PidState]:
+    """Return the output [Pa], held between ``low`` and ``high``, and the next state.
+
+    Anti-windup by back-calculation: what the limits cut off flows out of the integral with the
+    tracking time, and the integral itself never leaves the limits.
+
+    Parameters
+    ----------
+    gains : Gains
+    state : PidState
+        Not changed.
+    error, measured : ndarray, shape (n_env,)
+        Wanted less measured, and measured contraction [m].
+    low, high : float or ndarray, shape (n_env,)
+        Limits [Pa] of the output.
+    period : float
+        Control period [s].
+    """
+    pole = gains.filter_time / (gains.filter_time + period)
+    slope = pole * state.slope + (1.0 - pole) * (measured - state.measured) / period
+    wanted = gains.proportional * error + state.integral - gains.derivative * slope
+    output = np.minimum(np.maximum(wanted, low), high)
+    back = (output - wanted) * min(1.0, period / gains.tracking_time)
+    integral = state.integral + gains.integral * period * error + back
+    integral = np.minimum(np.maximum(integral, low), high)
+    return output, PidState(integral, measured, slope)
+
+
+@dataclass(frozen=True)
+class Pid:
+    """PID from the present reference and the measured contraction and pressure.
+
+    Attributes
+    ----------
+    gains : Gains
+    reader : Reader
+        Of contraction, pressure, set-point and reference.
+    action_signal : Signal
+    period : float
+        Control period [s].
+    reach : float
+        Largest distance [Pa] of the set-point from the measured pressure.
+    """
+
+    gains: Gains
+    reader: Reader
+    action_signal: Signal
+    period: float
+    reach: float = math.inf
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: PidState | None = None,
+        episode_start: ArrayLike | None = None,
+        deterministic: bool = True,
+    ) -> Answer:
+        """Return the PID's set-point; see :class:`~baselines.core.controller.Controller`."""
+        contraction, pressure, set_point, reference = self.reader.rows(observation)
+        begin = beginning(state, episode_start, len(contraction))
+        if state is None or begin.any():
+            state = choose(begin, pid_start(set_point, contraction), state)
+        signal = self.action_signal
+        output, after = pid_step(
+            self.gains,
+            state,
+            reference - contraction,
+            contraction,
+            np.maximum(pressure - self.reach, signal.low),
+            np.minimum(pressure + self.reach, signal.high),
+            self.period,
+        )
+        return answer(signal, output, observation), after
+
+
+def make_pid(
+    plant: SingleMuscle,
+    signals: Signals,
+    action_signals: Signals,
+    gains: Gains | None = None,
+    knobs: Knobs = AS_DESIGNED,
+) -> Pid:
+    """Return the controller, with the gains of :func:`simc` unless others are given.
+
+    Its ``knobs`` are those of ``KNOBS``: "reach" is a factor on the margin ``REACH``.
+    """
+    law = plant.regulator
+    return Pid(
+        simc(plant, knobs=knobs) if gains is None else gains,
+        reader(signals, ["contraction", "pressure", "set_point", "reference"]),
+        action_signals["pressure_set_point"],
+        plant.control_period,
+        reach=knob(knobs, "reach") * REACH * law.slew_rate * (law.dead_time + law.time_constant),
+    )

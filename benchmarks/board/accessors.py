@@ -1,0 +1,264 @@
+"""What tables, claims and the page read of a row: the one place that knows a row's keys."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from benchmarks.runs import rows
+from benchmarks.runs.cells import AUDIT, PUBLIC
+from benchmarks.runs.rows import Row, episodes_of, scores_of, shown
+from benchmarks.scenarios.scenario import ScenarioSet
+from benchmarks.scoring import statistics
+from benchmarks.scoring.metrics import headline_of
+from benchmarks.scoring.statistics import Array, Interval
+
+LISTED_SEEDS = 5
+"""Training seeds that a learned row needs to be ranked."""
+VERIFIED = "verified"
+"""Key under which :func:`benchmarks.board.leaderboard.load` puts a row's verification."""
+
+
+@dataclass(frozen=True)
+class Scores:
+    """One metric of a row.
+
+    Attributes
+    ----------
+    table : (runs, n) array
+        A row a training seed (one for a classical controller), a column an episode.
+    pairs : tuple of (scenario, seed)
+        Of each column, ascending.
+    runs : tuple of int or None
+        Training seed of each row, ascending.
+    """
+
+    table: Array
+    pairs: tuple[tuple[str, int], ...]
+    runs: tuple[int | None, ...] = (None,)
+
+    @property
+    def strata(self) -> list[str]:
+        """Scenario of each column."""
+        return [scenario for scenario, _ in self.pairs]
+
+
+def name_of(row: Mapping[str, Any]) -> str:
+    """Return the controller's name."""
+    return str(row["controller"]["name"])
+
+
+def content_of(row: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the content of the row's scenario file."""
+    return dict(row["scenarios"]["content"])
+
+
+def track_of(row: Mapping[str, Any]) -> str:
+    """Return the name of the row's track."""
+    return str(row["scenarios"]["name"])
+
+
+def factor_of(row: Mapping[str, Any]) -> float:
+    """Return the factor from SI in which the row's headline is shown."""
+    return shown(content_of(row))[1]
+
+
+def is_audited(row: Mapping[str, Any]) -> bool:
+    """Return whether the row is in the audit round of its track."""
+    return row["audit"] is not None
+
+
+def round_of(row: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the audit round that a row is in: number, salt, day, and its entrants' names."""
+    return dict(row["audit"])
+
+
+def published_split(row: Mapping[str, Any]) -> str:
+    """Return which episodes the row's score is of: the audit's if it is in the round."""
+    return AUDIT if is_audited(row) else PUBLIC
+
+
+def training_seeds(row: Mapping[str, Any]) -> int:
+    """Return the number of training seeds, 0 for a classical controller."""
+    if row["controller"]["kind"] == "classical":
+        return 0
+    return len({episode.get("training_seed") for episode in episodes_of(row)})
+
+
+def is_listed(row: Mapping[str, Any]) -> bool:
+    """Return whether the row has as many training seeds as a rank needs."""
+    return row["controller"]["kind"] == "classical" or training_seeds(row) >= LISTED_SEEDS
+
+
+def scores(row: Mapping[str, Any], metric: str = "", split: str = "") -> Scores:
+    """Return a metric of the episodes of a row: a table of training seeds by paired episodes.
+
+    Parameters
+    ----------
+    row : Row
+    metric : str
+        The headline if none is named.
+    split : str
+        The published one if none is named.
+    """
+    episodes = episodes_of(row, split or published_split(row))
+    values = scores_of(episodes, metric or headline_of(content_of(row)))
+    runs = [episode["training_seed"] for episode in episodes]
+    pairs = [(str(episode["scenario"]), int(episode["seed"])) for episode in episodes]
+    table, order = statistics.crossed(values, runs, pairs)
+    return Scores(table, tuple(order), tuple(sorted(set(runs))))
+
+
+def mean_of(row: Mapping[str, Any], metric: str = "", split: str = "") -> float:
+    """Return the mean of a metric over the published episodes, NaN where it never applies."""
+    table = scores(row, metric, split).table
+    kept = table[:, statistics.applying(table)]
+    return float(kept.mean()) if kept.size else float("nan")
+
+
+def interval(row: Mapping[str, Any], metric: str = "", split: str = "") -> Interval:
+    """Return the mean of a metric over the published episodes with its 95 % interval."""
+    found = scores(row, metric, split)
+    return statistics.of_table(found.table, found.strata)
+
+
+def middle(row: Mapping[str, Any]) -> Interval:
+    """Return the interquartile mean of the headline over the published episodes."""
+    found = scores(row)
+    return statistics.of_table(found.table, found.strata, statistics.interquartile_mean)
+
+
+def by_training_seed(row: Mapping[str, Any], split: str = "") -> dict[int, float]:
+    """Return the headline's mean of each training seed, nothing for a classical controller."""
+    found = scores(row, split=split)
+    means = found.table.mean(axis=1).tolist()
+    return {run: mean for run, mean in zip(found.runs, means, strict=True) if run is not None}
+
+
+def gap(row: Mapping[str, Any]) -> Interval | None:
+    """Return the headline's audit mean less its public mean, ``None`` where there is no audit."""
+    if not is_audited(row):
+        return None
+    audit, public = scores(row, split=AUDIT), scores(row, split=PUBLIC)
+    return statistics.difference_of_splits(audit.table, audit.strata, public.table, public.strata)
+
+
+def artefacts_audited(row: Mapping[str, Any]) -> int:
+    """Return how many artefacts of this name the rounds of the track have had, 0 without one."""
+    return int(row["audit"]["entry"]) if is_audited(row) else 0
+
+
+def is_worse_unseen(row: Mapping[str, Any]) -> bool:
+    """Return whether the audit mean lies above the public one by more than its interval."""
+    found = gap(row)
+    return found is not None and found.low > 0.0
+
+
+def failures_of(row: Mapping[str, Any], split: str = "") -> tuple[int, int]:
+    """Return how many of the published episodes failed, and their number."""
+    episodes = episodes_of(row, split or published_split(row))
+    return sum(bool(episode["failed"]) for episode in episodes), len(episodes)
+
+
+def is_verified(row: Mapping[str, Any]) -> bool:
+    """Return whether the row was run again with the code as it is and held, nearly at least."""
+    found = row.get(VERIFIED)
+    return bool(found) and not found["older"]
+
+
+def verified_words(row: Mapping[str, Any]) -> str:
+    """Return whether and when the row was run again and came out the same, and with which code."""
+    found = row.get(VERIFIED)
+    if not found:
+        return "not verified yet"
+    where = " elsewhere" if found["mode"] == "elsewhere" else ""
+    return f"verified {found['date']}{where}" + (", at an older code" if found["older"] else "")
+
+
+JUMPING = ("steps", "staircase")
+"""References that jump: the mean over a track may be mostly the error of their edges."""
+
+
+def references_of(row: Mapping[str, Any]) -> dict[str, str]:
+    """Return the family of the reference of each scenario, empty where it has no name."""
+    made = ScenarioSet(content_of(row)).scenarios()
+    return {scenario.name: str(scenario.kwargs.get("reference", "")) for scenario in made}
+
+
+def smooth(row: Mapping[str, Any]) -> Interval | None:
+    """Return the headline over smooth references, ``None`` where none or all of them are."""
+    families = references_of(row)
+    kept = {name for name, family in families.items() if family not in JUMPING}
+    if len(kept) in (0, len(families)):
+        return None
+    found = scores(row)
+    columns = [k for k, scenario in enumerate(found.strata) if scenario in kept]
+    return statistics.of_table(found.table[:, columns], [found.strata[k] for k in columns])
+
+
+def by_setting(row: Mapping[str, Any]) -> dict[tuple[str, str], float]:
+    """Return the headline's mean for each value of each axis of the grid."""
+    episodes = episodes_of(row, published_split(row))
+    found = rows.breakdown(ScenarioSet(content_of(row)), episodes)
+    return {(axis, point): value for axis, of in found.items() for point, value in of.items()}
+
+
+def pairs_of(row: Mapping[str, Any], split: str) -> frozenset[tuple[str, int]]:
+    """Return scenario and seed of the episodes of a split, the same for all training seeds."""
+    return frozenset((e["scenario"], e["seed"]) for e in episodes_of(row, split))
+
+
+def common_split(first: Row, second: Row) -> str | None:
+    """Return which episodes two rows are compared on, ``None`` if they have not run the same.
+
+    The audit's if both are in the round, the public ones otherwise.
+    """
+    split = AUDIT if is_audited(first) and is_audited(second) else PUBLIC
+    same = first["task"] == second["task"] and pairs_of(first, split) == pairs_of(second, split)
+    return split if same else None
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a controller cost to make.
+
+    Attributes
+    ----------
+    tuning : str
+        How it was tuned.
+    trials : int or None
+        Settings that were tried; None where nobody counted.
+    steps, seconds : float or None
+        Of one training seed, the mean over the seeds [1], [s].
+    hardware : str
+    command : str
+        What trains the first seed again.
+    """
+
+    tuning: str
+    trials: int | None
+    steps: float | None
+    seconds: float | None
+    hardware: str
+    command: str
+
+
+def cost_of(row: Mapping[str, Any]) -> Cost:
+    """Return what a controller cost to make, as its row states it."""
+    tuning = row["controller"]["tuning"]
+    records = row["controller"].get("training") or []
+    hardware = dict.fromkeys(str(r["hardware"]) for r in records if r.get("hardware"))
+    return Cost(
+        tuning=str(tuning["how"]),
+        trials=tuning["trials"],
+        steps=_average(records, "steps"),
+        seconds=_average(records, "seconds"),
+        hardware=", ".join(hardware),
+        command=next((str(r["command"]) for r in records if r.get("command")), ""),
+    )
+
+
+def _average(records: Sequence[Mapping[str, Any]], name: str) -> float | None:
+    known = [float(record[name]) for record in records if record.get(name) is not None]
+    return sum(known) / len(known) if known else None

@@ -1,0 +1,157 @@
+"""BibTeX of a row: the row itself, this package, and the methods that the controller is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from benchmarks.board import accessors as views
+from benchmarks.board.format import bounded
+from benchmarks.identity import audit
+from benchmarks.runs.provenance import ROOT
+from benchmarks.runs.rows import shown
+from benchmarks.runs.store import CHECKSUM
+
+REFERENCES = Path(__file__).resolve().parent / "references.yaml"
+"""Entries by key: type, and BibTeX's fields. Braces and commands in a value are BibTeX's own."""
+SEPARATOR = "; "
+"""Between the parts of a citation."""
+
+Fields = Mapping[str, Any]
+
+
+def bibtex(row: Mapping[str, Any]) -> str:
+    """Return the BibTeX of a row.
+
+    Parameters
+    ----------
+    row : mapping
+        Of :func:`benchmarks.runs.rows.load`.
+
+    Raises
+    ------
+    ValueError
+        If a method has no entry in ``references.yaml``.
+    """
+    found = methods(str(row["controller"]["citation"]))
+    parts = [_row_entry(row), package(), *(entry(key, references()[key]) for key in found)]
+    return "\n".join(parts)
+
+
+def methods(citation: str) -> list[str]:
+    """Return the keys of the methods in a citation, in its order.
+
+    Raises
+    ------
+    ValueError
+        If a part holds the title of no entry, or of several.
+    """
+    keys = []
+    for part in filter(None, citation.split(SEPARATOR)):
+        held = [key for key, fields in references().items() if _held(fields["title"], part)]
+        if len(held) != 1:
+            raise ValueError(
+                f"{part!r} holds the title of {' and '.join(held) or 'no entry'} in "
+                f"{REFERENCES.name}; add the entry, or write its title in the citation"
+            )
+        keys += held
+    return list(dict.fromkeys(keys))
+
+
+def _held(title: str, text: str) -> bool:
+    """Return whether a text holds a title, small and capital letters alike."""
+    return title.casefold() in text.casefold()
+
+
+@lru_cache(maxsize=1)
+def references() -> dict[str, dict[str, Any]]:
+    """Return the entries of methods by key."""
+    return dict(yaml.safe_load(REFERENCES.read_text(encoding="utf-8")))
+
+
+def entry(key: str, fields: Fields) -> str:
+    """Return one BibTeX entry.
+
+    Parameters
+    ----------
+    key : str
+    fields : mapping
+        ``type`` and the fields in their order. Capital letters of a title are kept.
+    """
+    lines = [f"@{fields['type']}{{{key},"]
+    for name, value in fields.items():
+        if name != "type":
+            shown = f"{{{_text(value)}}}" if name == "title" else _text(value)
+            lines.append(f"  {name} = {{{shown}}},")
+    return "\n".join([*lines, "}"]) + "\n"
+
+
+_SPECIAL = {"&": r"\&", "%": r"\%", "#": r"\#", "_": r"\_", "$": r"\$"}
+
+
+def _text(value: Any) -> str:
+    return "".join(_SPECIAL.get(letter, letter) for letter in str(value))
+
+
+def package() -> str:
+    """Return the entry of this package, from CITATION.cff."""
+    about = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    names = [
+        author.get("name") or f"{author['family-names']}, {author['given-names']}"
+        for author in about["authors"]
+    ]
+    fields: dict[str, Any] = {
+        "type": "software",
+        "author": " and ".join(f"{{{name}}}" for name in names),
+        "title": about["title"],
+        "version": about["version"],
+    }
+    optional = {"year": str(about.get("date-released", ""))[:4]}
+    optional |= {name: about.get(key) for name, key in (("url", "repository-code"), ("doi", "doi"))}
+    return entry("pam_envs", fields | {name: text for name, text in optional.items() if text})
+
+
+AUTHORS = "The pam-envs authors"
+"""Of a row whose controller names none."""
+
+
+def _row_entry(row: Mapping[str, Any]) -> str:
+    """Return the entry of the row: what it scored, on what, and what runs it again."""
+    env, about, found = row["env"], row["controller"], row["audit"]
+    unit, factor = shown(row["scenarios"]["content"])
+    score = bounded(views.interval(row), factor)
+    split = views.published_split(row)
+    said = [
+        f"RMS {score} {unit} (mean and 95 % interval over {split} episodes)",
+        f"audit round {found['round']}, salt {found['salt']}" if found else "not audited",
+        f"environment {env['id']}",
+        f"scenarios {row['scenarios']['name']} version {row['scenarios']['version']}",
+        f"task {row['task'][:16]}",
+        f"artefact {audit.artefact_of(row)[:16]}",
+        f"commit {row['made_with']['commit']}",
+        f"SHA-256 of the row {row[CHECKSUM]}",
+    ]
+    title = f"{about['name']} in {row['scenarios']['content']['title']}"
+    fields = {
+        "type": "misc",
+        "author": f"{{{_unbraced(about.get('author') or AUTHORS)}}}",
+        "title": f"Leaderboard row {row['row']}: {title}",
+        "year": (found["drawn"] if found else str(row["volatile"]["date"]))[:4],
+        "note": ", ".join(map(_unbraced, said)),
+        "howpublished": f"python -m benchmarks verify {row['row']}",
+    }
+    return entry(f"{_key(row['row'])}-{audit.artefact_of(row)[:8]}", fields)
+
+
+def _unbraced(text: str) -> str:
+    """Return a maker's words without what BibTeX would read as its own."""
+    return "".join(letter for letter in text if letter not in "{}\\")
+
+
+def _key(name: str) -> str:
+    """Return a BibTeX key: letters, digits, - and _ of a row's name."""
+    return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in name)

@@ -1,0 +1,96 @@
+"""Numbers and tables as the board prints them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmarks.scoring.statistics import Interval
+
+LEFT = {
+    *("controller", "environment", "track", "knows", "verdict", "kind", "state", "episodes"),
+    *("best paper controller", "best learned", "first here", "largest fall", "largest rise"),
+    *("tuning", "hardware"),
+}
+"""Columns of words."""
+
+
+def number(value: float | None) -> str:
+    """Return a number with three significant digits, or a dash."""
+    if value is None or not np.isfinite(value):
+        return "-"
+    if value == 0.0:
+        return "0"
+    digits = int(np.floor(np.log10(abs(value))))
+    return f"{value:.{max(0, 2 - digits)}f}" if digits >= -3 else f"{value:.2g}"
+
+
+def bounded(interval: Interval | None, factor: float = 1.0) -> str:
+    """Return a number with its interval behind it, or a dash."""
+    if interval is None or not np.isfinite(interval.value):
+        return "-"
+    bounds = f"[{number(factor * interval.low)}, {number(factor * interval.high)}]"
+    return f"{number(factor * interval.value)} {bounds}"
+
+
+def signed(interval: Interval | None, factor: float = 1.0) -> str:
+    """Return a difference with its sign and interval, or a dash."""
+    if interval is None or not np.isfinite(interval.value):
+        return "-"
+    value, low, high = (_signed(factor * x) for x in (interval.value, interval.low, interval.high))
+    return f"{value} [{low}, {high}]"
+
+
+def _signed(value: float) -> str:
+    text = number(value)
+    return text if text.startswith("-") or text == "0" else f"+{text}"
+
+
+def chance(interval: Interval | None) -> str:
+    """Return a probability with its interval, or a dash."""
+    if interval is None:
+        return "-"
+    return f"{interval.value:.2f} [{interval.low:.2f}, {interval.high:.2f}]"
+
+
+def percent(interval: Interval) -> str:
+    """Return a share with its interval in percent, signs and all."""
+    value, low, high = (f"{100.0 * x:+.2g}" for x in (interval.value, interval.low, interval.high))
+    return f"{value} % [{low}, {high}]"
+
+
+def duration(seconds: float | None) -> str:
+    """Return a time in the unit that suits it, or a dash."""
+    if seconds is None or not np.isfinite(seconds):
+        return "-"
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2.0 * size:
+            return f"{number(seconds / size)} {unit}"
+    return f"{number(seconds)} s"
+
+
+def millions(count: float | None) -> str:
+    """Return a large number in millions, or a dash."""
+    return "-" if count is None else f"{count / 1e6:.3g} M"
+
+
+def table(heading: Sequence[str], lines: Sequence[Sequence[str]]) -> list[str]:
+    """Return the lines of a Markdown table; columns of words to the left."""
+    rule = [":--" if name in LEFT else "--:" for name in heading]
+    return [_line(heading), _line(rule), *(_line(line) for line in lines)]
+
+
+def _line(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def folded(title: str, lines: Sequence[str]) -> list[str]:
+    """Return lines that a reader opens by a click."""
+    return ["<details>", f"<summary>{title}</summary>", "", *lines, "", "</details>", ""]
+
+
+def linked(row: Mapping[str, Any], results: str = "results") -> str:
+    """Return a controller's name as a link to its row."""
+    return f"[`{row['controller']['name']}`]({results}/{row['row']}.json)"

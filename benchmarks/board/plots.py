@@ -1,0 +1,173 @@
+"""Figures of the board and of single episodes. Matplotlib is imported when one is drawn."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmarks.board import accessors as views
+from benchmarks.runs.rows import Row, shown
+from benchmarks.scoring import profiles, standings
+
+_FIXED: dict[str, Any] = {
+    "svg.hashsalt": "benchmarks",
+    "svg.fonttype": "none",
+    "font.family": ["DejaVu Sans"],
+    "font.size": 8.0,
+}
+
+
+MARKS = {"classical": "o", "residual": "D", "learned": "s"}
+DRAWN = 8
+"""Classical controllers that are drawn, the best of a track, beside all learned ones."""
+
+
+def track_figure(ordered: Sequence[Row]) -> str:
+    """Return an SVG of a track: error against effort, and performance profiles.
+
+    Of the rows that are compared with each other, over the episodes that they are compared on.
+
+    The same bytes for equal rows.
+
+    Parameters
+    ----------
+    ordered : sequence of rows
+        Of one track, best first.
+    """
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    drawn = drawn_rows(ordered)
+    with matplotlib.rc_context(_FIXED):
+        figure = Figure(figsize=(9.6, 3.6), layout="constrained")
+        effort, share = figure.subplots(1, 2)
+        _draw_effort(effort, drawn)
+        _draw_profiles(share, drawn)
+        effort.set_title(f"{views.published_split(drawn[0])} episodes", loc="left", fontsize=8.0)
+        figure.legend(*share.get_legend_handles_labels(), loc="outside right center", frameon=False)
+        buffer = io.StringIO()
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    return "\n".join(line.rstrip() for line in buffer.getvalue().splitlines()) + "\n"
+
+
+def drawn_rows(ordered: Sequence[Row]) -> list[Row]:
+    """Return the rows of a track that are drawn, best first."""
+    inside = standings.ordered(standings.listing(ordered).inside)
+    best = [r["row"] for r in inside if r["controller"]["kind"] == "classical"][:DRAWN]
+    return [r for r in inside if r["controller"]["kind"] != "classical" or r["row"] in best]
+
+
+def _style(number: int, row: Row) -> dict[str, Any]:
+    learned = row["controller"]["kind"] != "classical"
+    return {"color": f"C{number % 10}", "linestyle": "--" if learned else "-"}
+
+
+def _draw_effort(axes: Any, drawn: Sequence[Row]) -> None:
+    unit, factor = shown(drawn[0]["scenarios"]["content"])
+    for number, row in enumerate(drawn):
+        head = views.interval(row)
+        x, y = 1e-5 * views.mean_of(row, "pressure_travel"), factor * head.value
+        bounds = factor * np.array([[head.value - head.low], [head.high - head.value]])
+        mark = MARKS.get(row["controller"]["kind"], "s")
+        style = {
+            "fmt": mark,
+            "markersize": 5,
+            "linewidth": 1,
+            "color": _style(number, row)["color"],
+        }
+        axes.errorbar(x, y, np.maximum(bounds, 0.0), **style)
+    _plain_log(axes.yaxis)
+    axes.set_xlabel("pressure travel [bar/s]")
+    axes.set_ylabel(f"RMS [{unit}], mean and 95 % interval")
+
+
+def _draw_profiles(axes: Any, drawn: Sequence[Row]) -> None:
+    unit, factor = shown(drawn[0]["scenarios"]["content"])
+    errors = profiles.thresholds(drawn)
+    for number, row in enumerate(drawn):
+        shares, band = profiles.profile(row, errors)
+        label, style = row["controller"]["name"], _style(number, row)
+        axes.plot(factor * errors, 100.0 * shares, linewidth=1.1, label=label, **style)
+        bounds = {"facecolor": style["color"], "alpha": 0.12, "linewidth": 0.0}
+        axes.fill_between(factor * errors, *(100.0 * band), **bounds)
+    _plain_log(axes.xaxis)
+    axes.set_xlabel(f"RMS of an episode [{unit}]")
+    axes.set_ylabel("episodes with at most this RMS [%], 95 % band")
+
+
+def _plain_log(axis: Any) -> None:
+    """Make an axis logarithmic, its ticks plain numbers."""
+    from matplotlib import ticker
+
+    axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+    axis.set_major_locator(ticker.LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(ticker.NullLocator())
+    axis.axes.grid(True, linewidth=0.3)
+
+
+def episode_figure(
+    signals: Mapping[str, Any],
+    set_points: Mapping[str, Any],
+    title: str,
+    shown: tuple[str, float] = ("mm", 1e3),
+) -> Any:
+    """Return a figure of an episode: tracking, error, set-points, and the loop with the pressure.
+
+    Where no one pressure is recorded there is no loop.
+
+    Parameters
+    ----------
+    signals : mapping of (n,) array
+        Recorded ``info``, SI.
+    set_points : mapping of (n,) array
+        By name, SI: pressures, or angles.
+    title : str
+    shown : tuple of str and float
+        Unit of the output, and its factor from SI.
+    """
+    from matplotlib.figure import Figure
+
+    t, (unit, factor) = signals["time"], shown
+    figure = Figure(figsize=(10.0, 6.0), layout="constrained")
+    grid = figure.add_gridspec(3, 2, width_ratios=[2.0, 1.0], height_ratios=[2.0, 1.0, 1.2])
+    columns = 0 if "state/pressure" in signals else slice(None)
+    track = figure.add_subplot(grid[0, columns])
+    error = figure.add_subplot(grid[1, columns], sharex=track)
+    inputs = figure.add_subplot(grid[2, columns], sharex=track)
+    track.plot(t, factor * signals["reference"], color="0.3", linestyle="--", label="reference")
+    track.plot(t, factor * signals["output"], color="#0072b2", label="output")
+    track.set_ylabel(f"output [{unit}]")
+    track.legend(frameon=False, ncols=2)
+    error.plot(t, factor * (signals["output"] - signals["reference"]), color="#d55e00")
+    error.axhline(0.0, color="0.7", linewidth=0.6)
+    error.set_ylabel(f"error [{unit}]")
+    _draw_inputs(inputs, signals, set_points)
+    if "state/pressure" in signals:
+        loop = figure.add_subplot(grid[:, 1])
+        loop.plot(1e-5 * signals["state/pressure"], factor * signals["output"], color="#0072b2")
+        loop.set_xlabel("pressure [bar]")
+        loop.set_ylabel(f"output [{unit}]")
+        loop.set_title("loop")
+    figure.suptitle(title)
+    return figure
+
+
+def _draw_inputs(axes: Any, signals: Mapping[str, Any], set_points: Mapping[str, Any]) -> None:
+    """Draw set-points, and of a single muscle its pressure and drive."""
+    angles = all(name.startswith("angle") for name in set_points)
+    unit, factor = ("deg", np.rad2deg(1.0)) if angles else ("bar", 1e-5)
+    single = {"color": "0.6"} if len(set_points) == 1 else {}
+    for name, asked in set_points.items():
+        label = "set-point" if single else name.replace("_set_point", "")
+        axes.plot(signals["time"], factor * asked, linewidth=0.8, label=label, **single)
+    for name, color, width in (("pressure", "#009e73", 1.5), ("drive", "#cc79a7", 0.8)):
+        if f"state/{name}" in signals:
+            pressure = 1e-5 * signals[f"state/{name}"]
+            axes.plot(signals["time"], pressure, color=color, linewidth=width, label=name)
+    axes.set_ylabel(f"{'angle' if angles else 'pressure'} [{unit}]")
+    axes.set_xlabel("time [s]")
+    axes.legend(frameon=False, ncols=3)

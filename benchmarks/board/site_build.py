@@ -1,0 +1,72 @@
+"""The static page: one folder that any browser opens, without a server and without a network."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.board import leaderboard, plots, site_data
+from benchmarks.identity.hashing import plain
+from benchmarks.runs import rows
+from benchmarks.runs.rows import Row
+from benchmarks.runs.store import write_text
+from benchmarks.scoring import standings
+
+ASSETS = Path(__file__).parent / "site_assets"
+OUT = Path(__file__).parents[1] / "site"
+_OWNED = ("data/*.js", "data/traces/*.js", "figures/*.svg", "rows/*.json")
+
+
+def build(results: Path = rows.RESULTS, out: Path = OUT) -> list[Path]:
+    """Write the page from the rows of a folder, the same bytes for the same rows.
+
+    Parameters
+    ----------
+    results : Path
+        Folder of the rows.
+    out : Path
+        Folder of the page; what an earlier build left there is replaced.
+
+    Returns
+    -------
+    list of Path
+        What was written, ``index.html`` first.
+
+    Raises
+    ------
+    ValueError
+        If there is no such folder, or a row of it is refused.
+    """
+    all_rows = leaderboard.load(results)
+    texts = page(all_rows)
+    for row in all_rows:
+        name = f"{row['row']}.json"
+        texts[f"rows/{name}"] = (results / name).read_text(encoding="utf-8")
+    stale = {path for pattern in _OWNED for path in out.glob(pattern)}
+    written = [out / name for name in texts]
+    for path, text in zip(written, texts.values(), strict=True):
+        write_text(path, text)
+    for path in stale - set(written):
+        path.unlink()
+    return written
+
+
+def page(all_rows: Sequence[Row]) -> dict[str, str]:
+    """Return the page's files by their names, ``index.html`` first."""
+    names = ("index.html", "page.css", "draw.js", "detail.js", "page.js")
+    texts = {name: (ASSETS / name).read_text() for name in names}
+    texts["data/board.js"] = f"const BOARD = {_json(site_data.board(all_rows))};\n"
+    for name, ordered in standings.tracks(all_rows).items():
+        texts[f"figures/{name}.svg"] = plots.track_figure(ordered)
+    for row in sorted(all_rows, key=lambda row: str(row["row"])):
+        if row.get("traces"):
+            call = f"loadTraces({_json(row['row'])}, {_json(row['traces'])});\n"
+            texts[f"data/traces/{row['row']}.js"] = call
+    return texts
+
+
+def _json(value: Any) -> str:
+    """Return JSON that is also a script: keys in their order, no letters beyond ASCII."""
+    return json.dumps(plain(value), separators=(",", ":"), allow_nan=False)

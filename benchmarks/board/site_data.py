@@ -1,0 +1,226 @@
+"""What the page shows, as plain data: a pure function of the rows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmarks.board import accessors as views
+from benchmarks.board import cite
+from benchmarks.board import summary as board_summary
+from benchmarks.board import tables as board_tables
+from benchmarks.board.format import percent
+from benchmarks.board.leaderboard import columns_of
+from benchmarks.board.tables import Column, with_costs
+from benchmarks.identity import audit
+from benchmarks.runs.rows import Row, shown
+from benchmarks.runs.store import CHECKSUM
+from benchmarks.scoring import claims, standings
+from benchmarks.scoring.claims import Claim
+from benchmarks.scoring.standings import Changes, Listing, Track
+from benchmarks.scoring.statistics import Interval
+
+GROUPS = {
+    "ranked": "",
+    "few": f"Not ranked: fewer than {views.LISTED_SEEDS} training seeds",
+    "outside": "Not ranked, not in the audit round: all numbers are of the public episodes",
+}
+"""Parts of a track's table with their titles; that of the first is the track's round."""
+
+
+def board(rows: Sequence[Row]) -> dict[str, Any]:
+    """Return all that the page shows but the trajectories.
+
+    Parameters
+    ----------
+    rows : sequence of rows
+        In any order.
+    """
+    tracks = standings.tracks(rows)
+    changes = standings.changes(board_summary.ranked_rows(tracks))
+    kinds = {views.name_of(row): row["controller"]["kind"] for row in rows}
+    return {
+        "groups": [{"name": name, "title": title} for name, title in GROUPS.items()],
+        "tracks": [_track(name, ordered) for name, ordered in tracks.items()],
+        "winners": [_winner(found) for found in board_summary.nominal(tracks).values()],
+        "changes": [_change(found, kinds) for found in changes],
+    }
+
+
+def rounded(value: float | None) -> float | None:
+    """Return a number with six digits, ``None`` for what is none."""
+    return None if value is None or not np.isfinite(value) else float(f"{value:.6g}")
+
+
+def _numbers(interval: Interval | None, factor: float = 1.0) -> list[float | None] | None:
+    if interval is None or not np.isfinite(interval.value):
+        return None
+    return [rounded(factor * x) for x in (interval.value, interval.low, interval.high)]
+
+
+def _track(name: str, ordered: Track) -> dict[str, Any]:
+    first, listing = ordered[0], standings.listing(ordered)
+    content = views.content_of(first)
+    unit, factor = shown(content)
+    columns = with_costs(columns_of(content))
+    paper = claims.best_paper(ordered)
+    return {
+        "name": name,
+        "title": str(content["title"]),
+        "env": str(first["env"]["id"]),
+        "about": board_tables.about(first).replace("`", ""),
+        "round": board_tables.round_words(listing),
+        "split": listing.split,
+        "digest": first["scenarios"]["digest"],
+        "unit": unit,
+        "factor": factor,
+        "paper": "" if paper is None else views.name_of(paper),
+        "figure": f"figures/{name}.svg",
+        "columns": [title for _, title, _ in columns],
+        "costs": [k for k, (metric, _, _) in enumerate(columns) if metric in claims.COSTS],
+        "settings": [f"{axis} {point}" for axis, point in views.by_setting(first)],
+        "rows": _rows(listing, columns, claims.learned_claims(ordered)),
+    }
+
+
+def _rows(
+    listing: Listing, columns: Sequence[Column], made: Sequence[Claim]
+) -> list[dict[str, Any]]:
+    found = {views.name_of(entry.row): entry for entry in made}
+    places = dict(
+        zip(map(views.name_of, listing.ranked), standings.ranks(listing.ranked), strict=True)
+    )
+    shown_rows = []
+    for group, rows in zip(GROUPS, (listing.ranked, listing.few, listing.outside), strict=True):
+        for row in rows:
+            place = places.get(views.name_of(row))
+            shown_rows.append(
+                {
+                    "group": group,
+                    "rank": "-" if place is None else str(place),
+                    "place": None if place is None else place.first,
+                    **_row(row, columns, found.get(views.name_of(row))),
+                }
+            )
+    return shown_rows
+
+
+def _row(row: Row, columns: Sequence[Column], against: Claim | None) -> dict[str, Any]:
+    controller, factor = row["controller"], views.factor_of(row)
+    times = row["volatile"].get("predict_us") or {}
+    split = views.published_split(row)
+    return {
+        "row": row["row"],
+        "controller": controller["name"],
+        "kind": controller["kind"],
+        "seeds": views.training_seeds(row),
+        "knows": controller["knowledge"],
+        "state": "audited" if views.is_audited(row) else "self-reported",
+        "verified": views.verified_words(row),
+        "split": split,
+        "preview": rounded(controller["preview_seconds"]),
+        "score": _numbers(views.interval(row), factor),
+        "iqm": _numbers(views.middle(row), factor),
+        "public": _numbers(views.interval(row, split=views.PUBLIC), factor),
+        "gap": _numbers(views.gap(row), factor),
+        "worse": views.is_worse_unseen(row),
+        "smooth": _numbers(views.smooth(row), factor),
+        "chance": _numbers(against.probability) if against else None,
+        "claim": board_summary.plain_verdict(against) if against else "",
+        "metrics": [rounded(f * views.mean_of(row, metric)) for metric, _, f in columns],
+        "settings": [rounded(factor * value) for value in views.by_setting(row).values()],
+        "trainings": {
+            str(seed): rounded(factor * value)
+            for seed, value in views.by_training_seed(row).items()
+        },
+        "failures": list(views.failures_of(row)),
+        "step_us": [rounded(times.get("median")), rounded(times.get("p99"))],
+        "traces": bool(row.get("traces")),
+        **_origin(row),
+    }
+
+
+def _origin(row: Row) -> dict[str, Any]:
+    """Return what the row was made from and how it is run again."""
+    controller, cost = row["controller"], views.cost_of(row)
+    made = row["made_with"]
+    return {
+        "summary": controller["summary"],
+        "citation": controller["citation"],
+        "cost": {
+            "tuning": cost.tuning,
+            "trials": cost.trials,
+            "steps": rounded(cost.steps),
+            "seconds": rounded(cost.seconds),
+            "hardware": cost.hardware,
+        },
+        "audit": _audit_words(row),
+        "task": row.get("task", ""),
+        "artefact": audit.artefact_of(row) if controller.get("artefact") else "",
+        "checksum": row.get(CHECKSUM, ""),
+        "made_with": ", ".join(f"{name} {v}" for name, v in sorted(made["packages"].items())),
+        "commit": made["commit"],
+        "again": again(row, cost),
+        "bibtex": cite.bibtex(row),
+    }
+
+
+def _audit_words(row: Row) -> str:
+    if not views.is_audited(row):
+        return ""
+    found = views.round_of(row)
+    return (
+        f"round {found['round']}, drawn {found['drawn']}, salt {found['salt']}; artefact number "
+        f"{views.artefacts_audited(row)} of this name in the rounds of this track"
+    )
+
+
+def again(row: Row, cost: views.Cost) -> list[str]:
+    """Return the commands that check the row, score the controller anew and train it again."""
+    return [
+        f"python -m benchmarks verify {row['row']}",
+        f"python -m benchmarks run --env {row['env']['id']} --controller {views.name_of(row)} "
+        f"--track {views.track_of(row)}",
+        *([cost.command] if cost.command else []),
+    ]
+
+
+def _winner(found: board_summary.Winner) -> dict[str, Any]:
+    paper, entry = found.paper, found.claim
+    return {
+        "env": found.env,
+        "track": found.track,
+        "split": found.split,
+        "paper": views.name_of(paper) if paper else "none",
+        "paper_score": board_summary.score_words(paper, found.split),
+        "learned": views.name_of(entry.row) if entry else "none",
+        "learned_score": board_summary.score_words(entry.row if entry else None, found.split),
+        "chance": _numbers(entry.probability) if entry else None,
+        "gain": percent(entry.gain) if entry else "-",
+        "cost": board_summary.largest_cost(entry) if entry else "-",
+        "verdict": board_summary.plain_verdict(entry) if entry else found.silence,
+        "better": entry is not None and entry.verdict == claims.BETTER,
+    }
+
+
+def _change(found: Changes, kinds: Mapping[str, str]) -> dict[str, Any]:
+    names = list(found.places)
+    count = range(len(found.tracks))
+
+    def order(k: int) -> list[str]:
+        return sorted(names, key=lambda name: found.places[name][k].first)
+
+    return {
+        "env": found.env,
+        "tracks": [board_summary.short_name(name, found.tracks) for name in found.tracks],
+        "places": {n: [[p.first, p.shared] for p in places] for n, places in found.places.items()},
+        "order": [order(k) for k in count],
+        "agreement": [rounded(tau) for tau in found.agreement],
+        "learned": [name for name in names if kinds[name] != "classical"],
+        "lines": [
+            [cell.replace("`", "") for cell in board_summary.change_line(found, k)]
+            for k in count[1:]
+        ],
+    }

@@ -1,0 +1,419 @@
+"""Cases of the diagnosis benchmark: a drawn rig, what is hidden in it and how large, its recording.
+
+The *size* of an effect is the RMS of what remains of it once the plant's base has been refitted
+to the noise-free clean rig, over the noise, on the output where that is largest. A case wants a
+size; the amplitude that gives it is solved for. Nothing of the rig but its recording and its
+owner's sheet reaches the diagnosis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.data.recording.recording import Recording
+from pam_envs.data.rig_file import BAR, MM, Rig
+from pam_envs.diagnosis.decide.isolability import complement, projected
+from pam_envs.diagnosis.decide.search import Blocks
+from pam_envs.diagnosis.fit.calibrate import calibrate
+from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, inputs_of, start_plant
+from tests.diagnosis import hidden
+
+Array = NDArray[np.float64]
+
+NOISE = np.array([hidden.CONTRACTION_NOISE_MM * MM, hidden.PRESSURE_NOISE_BAR * BAR])
+"""RMS of the sensors' noise [m], [Pa]."""
+CAMPAIGNS = {
+    "standard": hidden.campaign_standard,
+    "short": hidden.campaign_short,
+    "idle": hidden.campaign_idle,
+}
+SETS = {"small": 0, "tune": 1, "final": 2}
+LARGE, WEAK = (1.0, 5.0), (0.1, 1.0)
+"""Ranges of sizes."""
+LOUDER = 3.0
+"""Noise of the louder cases, over the usual."""
+BRIEF = (30.0, 60.0, 120.0)
+"""Durations [s] of brief recordings."""
+MOST_AMPLITUDE = 20.0
+NEAR = 0.03
+"""How near, in the logarithm, a size has to come to what is wanted."""
+ROUNDS, DRAWS = 16, 12
+"""Trials of an amplitude, and of a rig whose effect cannot be made so large."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is to be drawn; equal cases give equal recordings.
+
+    Attributes
+    ----------
+    kind : {"single", "weak", "loud", "clean", "decoy", "pair", "unknown", "idle", "brief"}
+        ``loud`` is a single one under three times the noise, with the same absolute size; in an
+        ``idle`` one nothing is hidden and nothing moves, so that nothing can be decided; a
+        ``brief`` one is a clean rig of which there is little.
+    seed : int
+        Of all draws.
+    names : tuple of str
+        Effects to hide.
+    sizes : tuple of float
+        Wanted, over the usual noise.
+    campaign : str
+        One of :data:`CAMPAIGNS`.
+    noise : float
+        Over the usual noise.
+    seconds : float
+        Of the campaign that were recorded; 0: all.
+    """
+
+    kind: str
+    seed: int
+    names: tuple[str, ...] = ()
+    sizes: tuple[float, ...] = ()
+    campaign: str = "standard"
+    noise: float = 1.0
+    seconds: float = 0.0
+
+    def record(self) -> dict[str, Any]:
+        """Return the case in plain types."""
+        return asdict(self)
+
+    @property
+    def title(self) -> str:
+        """A few words for messages."""
+        parts = [f"{n} {s:.2g}" for n, s in zip(self.names, self.sizes, strict=True)]
+        return f"{self.kind} {' + '.join(parts)} seed {self.seed}".replace("  ", " ")
+
+
+@dataclass(frozen=True)
+class Truth:
+    """One hidden effect.
+
+    Attributes
+    ----------
+    effect : Effect
+        Its shape.
+    amplitude : float
+        What was solved for.
+    size, raw : float
+        What remains of it after the refit, and all of it, over the usual noise.
+    trace : ndarray, shape (2, T)
+        What it adds to the outputs beside the case's other effects [m], [Pa].
+    """
+
+    effect: hidden.Effect
+    amplitude: float
+    size: float
+    raw: float
+    trace: Array
+
+    @property
+    def name(self) -> str:
+        """Its name in the catalogue."""
+        return self.effect.name
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A clean rig under a campaign, and what refitting the plant to it can change.
+
+    Attributes
+    ----------
+    base : hidden.Base
+        The rig's constants.
+    campaign : hidden.Campaign
+        What is done to it.
+    clean : ndarray, shape (2, T)
+        Its outputs without effect and noise [m], [Pa].
+    basis : ndarray
+        Orthonormal, of what refitting can change.
+    order : ndarray of int
+        Order of a flattened trace in ``basis``.
+    """
+
+    base: hidden.Base
+    campaign: hidden.Campaign
+    clean: Array
+    basis: Array
+    order: NDArray[np.int64]
+
+    def left(self, trace: Array) -> Array:
+        """Return what refitting leaves of a trace (2, T) [m], [Pa], over the noise; same shape."""
+        flat = (trace / NOISE[:, None]).ravel()
+        rows = np.empty_like(flat)
+        rows[self.order] = projected(flat[self.order][None], self.basis)[0]
+        return rows.reshape(trace.shape)
+
+    def size(self, trace: Array) -> float:
+        """Return a trace's size."""
+        return loudest(self.left(trace)) if np.isfinite(trace).all() else np.inf
+
+
+@dataclass(frozen=True)
+class Made:
+    """A case made: what the diagnosis is given, and what it is not.
+
+    Attributes
+    ----------
+    recording : Recording
+    sheet : Rig
+        What the owner tells.
+    ground : Ground
+    truths : tuple of Truth
+        In the order of the case.
+    outputs : ndarray, shape (2, T)
+        Outputs with the effects and without noise [m], [Pa].
+    noise : ndarray, shape (2,)
+        RMS of the sensors' noise [m], [Pa].
+    """
+
+    recording: Recording
+    sheet: Rig
+    ground: Ground
+    truths: tuple[Truth, ...]
+    outputs: Array
+    noise: Array
+
+
+def loudest(rows: Array) -> float:
+    """Return the larger RMS of two rows."""
+    return float(np.sqrt((rows**2).mean(axis=1)).max())
+
+
+def outputs_of(
+    base: hidden.Base, effects: Sequence[tuple[hidden.Effect, float]], campaign: hidden.Campaign
+) -> Array:
+    """Return a rig's outputs without noise, shape (2, T) [m], [Pa]."""
+    run = hidden.simulate(base, list(effects), campaign)
+    return np.stack([run["contraction_mm"] * MM, run["pressure_bar"] * BAR])
+
+
+def sheet_of(base: hidden.Base, campaign: hidden.Campaign, noise: float = 1.0) -> Rig:
+    """Return what an honest owner tells of a rig."""
+    told = hidden.rig_yaml(base, campaign, noise)
+    return Rig(
+        plant=told["plant"],
+        rest_length=told["muscle"]["rest_length_mm"] * MM,
+        diameter=told["muscle"]["diameter_mm"] * MM,
+        max_pressure=told["regulator"]["max_pressure_bar"] * BAR,
+        load=told["load"],
+        contraction_noise=told["sensors"]["contraction_noise_mm"] * MM,
+        pressure_noise=told["sensors"]["pressure_noise_bar"] * BAR,
+        cycles_since_rest=told["history"]["cycles_since_rest"],
+        rezeroed=told["history"]["rezeroed"],
+        repeats=tuple(tuple(group) for group in told["repeats"]),
+        valve_closed=tuple(told["valve_closed"]),
+        tolerance=told["tolerance"],
+    )
+
+
+def recording_of(columns: dict[str, Any], sheet: Rig, source: str) -> Recording:
+    """Return columns of a rig's recording as the library reads them."""
+    return Recording.from_arrays(
+        columns["time_s"],
+        columns["pressure_command_bar"] * BAR,
+        pressure=columns["pressure_bar"] * BAR,
+        contraction=columns["contraction_mm"] * MM,
+        load=columns["load_N"],
+        segment=columns["segment"].tolist(),
+        temperature=columns["temperature_C"],
+        valve_closed=sheet.valve_closed,
+        source=source,
+    )
+
+
+def ground_of(base: hidden.Base, campaign: hidden.Campaign) -> Ground:
+    """Refit the plant's base to a clean rig without noise."""
+    sheet, clean = sheet_of(base, campaign), outputs_of(base, [], campaign)
+    quiet = replace(base, grain_mm=0.0, grain_bar=0.0)
+    columns = hidden.make_recording(quiet, [], campaign, 0, noise_factor=0.0)
+    recording = recording_of(columns, sheet, "clean")
+    family = MuscleFamily(start_plant(sheet), inputs_of(recording, sheet))
+    blocks = Blocks.make(recording.time, clean)
+    _, problem, fitted = calibrate(family, clean, NOISE, blocks, recording.time)
+    return Ground(base, campaign, clean, complement(fitted.fit), problem.order)
+
+
+def solve(ground: Ground, effect: hidden.Effect, wanted: float) -> tuple[float, Array] | None:
+    """Return the amplitude that gives a size, and the trace; None where there is none.
+
+    Parameters
+    ----------
+    ground : Ground
+    effect : hidden.Effect
+    wanted : float
+        Size, over the usual noise.
+    """
+    low, high, amplitude = 0.0, np.inf, min(1.0, wanted)
+    for _ in range(ROUNDS):
+        trace = outputs_of(ground.base, [(effect, amplitude)], ground.campaign) - ground.clean
+        size = ground.size(trace)
+        if abs(np.log(max(size, 1e-9) / wanted)) < NEAR:
+            return amplitude, trace
+        low, high = (amplitude, high) if size < wanted else (low, amplitude)
+        if low >= MOST_AMPLITUDE:
+            return None
+        amplitude = _next(amplitude, size, wanted, low, high)
+    return None
+
+
+def _next(amplitude: float, size: float, wanted: float, low: float, high: float) -> float:
+    """Return the amplitude to try next: in proportion, kept between what is known."""
+    guess = amplitude * wanted / max(size, 1e-6) if np.isfinite(size) else 0.5 * amplitude
+    if np.isinf(high):
+        return float(min(guess, 6.0 * amplitude, MOST_AMPLITUDE))
+    inside = low + 0.02 * (high - low) < guess < high - 0.02 * (high - low)
+    return float(guess if inside else 0.5 * (low + high))
+
+
+def _draw(
+    case: Case, attempt: int
+) -> tuple[Ground, list[tuple[hidden.Effect, float, Array]]] | None:
+    """Draw a rig and its effects; None where a size is out of reach."""
+    rng = np.random.default_rng([case.seed, attempt])
+    base = hidden.draw_base(rng, decoy=case.kind == "decoy")
+    ground = ground_of(base, _campaign(case))
+    found = []
+    for name, size in zip(case.names, case.sizes, strict=True):
+        effect = hidden.draw_effect(name, rng)
+        solved = solve(ground, effect, size)
+        if solved is None:
+            return None
+        found.append((effect, *solved))
+    return ground, found
+
+
+def _campaign(case: Case) -> hidden.Campaign:
+    """Return a case's campaign, ended where its recording ends."""
+    whole = CAMPAIGNS[case.campaign](case.seed)
+    if not case.seconds:
+        return whole
+    n = round(case.seconds / whole.period)
+    arrays = {f.name: getattr(whole, f.name)[:n] for f in fields(whole) if f.name != "period"}
+    return replace(whole, **arrays)
+
+
+def make(case: Case) -> Made:
+    """Draw a case.
+
+    Raises
+    ------
+    ValueError
+        If no rig could be drawn on which the effects have the wanted sizes.
+    """
+    drawn = next(filter(None, (_draw(case, k) for k in range(DRAWS))), None)
+    if drawn is None:
+        raise ValueError(f"{case.title}: {DRAWS} rigs drawn, on none can the effect be so large")
+    ground, found = drawn
+    effects = [(effect, amplitude) for effect, amplitude, _ in found]
+    outputs = outputs_of(ground.base, effects, ground.campaign)
+    sheet = sheet_of(ground.base, ground.campaign, case.noise)
+    columns = hidden.make_recording(
+        ground.base, effects, ground.campaign, case.seed + 7, noise_factor=case.noise
+    )
+    return Made(
+        recording_of(columns, sheet, f"case {case.seed}"),
+        sheet,
+        ground,
+        tuple(_truths(ground, found, outputs)),
+        outputs,
+        case.noise * NOISE,
+    )
+
+
+def _truths(
+    ground: Ground, found: list[tuple[hidden.Effect, float, Array]], outputs: Array
+) -> Iterator[Truth]:
+    """Return what was hidden; beside others an effect is what goes away without it."""
+    for k, (effect, amplitude, alone) in enumerate(found):
+        trace = alone
+        if len(found) > 1:
+            others = [(e, a) for i, (e, a, _) in enumerate(found) if i != k]
+            trace = outputs - outputs_of(ground.base, others, ground.campaign)
+        raw = loudest(alone / NOISE[:, None])
+        yield Truth(effect, amplitude, ground.size(alone), raw, trace)
+
+
+@dataclass(frozen=True)
+class Counts:
+    """How many cases of a kind a set has: by cause, or in all."""
+
+    single: int
+    weak: int
+    clean: int
+    decoy: int
+    pair: int
+    unknown: int
+    idle: int
+    brief: int
+    loud: int
+
+
+SMALL = Counts(single=1, weak=0, clean=3, decoy=2, pair=2, unknown=2, idle=1, brief=1, loud=0)
+FULL = Counts(
+    single=40, weak=20, clean=200, decoy=100, pair=100, unknown=60, idle=20, brief=60, loud=6
+)
+
+
+def first_seed(chosen: str, offset: int = 0) -> int:
+    """Return the first seed of a set; no two sets, and no two offsets, share any."""
+    if not 0 <= offset < 100:
+        raise ValueError(f"seed offset {offset} is outside [0, 99]; choose another")
+    return 10_000_000 * (SETS[chosen] + 1) + 100_000 * offset
+
+
+def sizes_in(low: float, high: float, number: int, rng: np.random.Generator) -> Array:
+    """Draw sizes log-uniformly, one in each of as many equal parts of the range."""
+    parts = (np.arange(number) + rng.random(number)) / max(number, 1)
+    return np.asarray(rng.permutation(low * (high / low) ** parts))
+
+
+def cases(chosen: str = "small", offset: int = 0) -> list[Case]:
+    """Return the cases of a set.
+
+    Parameters
+    ----------
+    chosen : {"small", "tune", "final"}
+    offset : int
+        Another number gives other seeds: freshly drawn cases.
+    """
+    counts = SMALL if chosen == "small" else FULL
+    unknown = hidden.FINAL_UNKNOWN if chosen == "final" else hidden.TUNING_UNKNOWN
+    start = first_seed(chosen, offset)
+    rng = np.random.default_rng(start)
+    made = list(_wanted(counts, unknown, rng))
+    numbered = [replace(case, seed=start + i) for i, case in enumerate(made)]
+    return numbered + [
+        replace(case, kind="loud", noise=LOUDER)
+        for name in hidden.EFFECTS
+        for case in [
+            case
+            for case in numbered
+            if case.kind == "single" and case.names == (name,) and case.sizes[0] >= LOUDER
+        ][: counts.loud]
+    ]
+
+
+def _wanted(counts: Counts, unknown: Sequence[str], rng: np.random.Generator) -> Iterator[Case]:
+    """Return the cases of a set, without their seeds."""
+    for name in hidden.EFFECTS:
+        for size in sizes_in(*LARGE, counts.single, rng):
+            yield Case("single", 0, (name,), (float(size),))
+        for size in sizes_in(*WEAK, counts.weak, rng):
+            yield Case("weak", 0, (name,), (float(size),))
+    yield from [Case("clean", 0)] * counts.clean
+    yield from [Case("decoy", 0)] * counts.decoy
+    pairs = list(combinations(hidden.EFFECTS, 2))
+    both = zip(*(sizes_in(*LARGE, counts.pair, rng) for _ in range(2)), strict=True)
+    for k, (one, two) in zip(rng.permutation(len(pairs)), both, strict=False):
+        yield Case("pair", 0, pairs[k], (float(one), float(two)))
+    for i, size in enumerate(sizes_in(*LARGE, counts.unknown, rng)):
+        yield Case("unknown", 0, (unknown[i % len(unknown)],), (float(size),))
+    yield from [Case("idle", 0, campaign="idle")] * counts.idle
+    for i in range(counts.brief):
+        yield Case("brief", 0, campaign="short", seconds=BRIEF[i % len(BRIEF)])

@@ -1,0 +1,391 @@
+"""What the records of the diagnosis benchmark say, counted: shares and bounds, confusions, curves.
+
+All of it is a pure function of the records. Shares have exact (Clopper-Pearson) intervals of 95 %;
+an ``upper`` is the one-sided bound of 95 %. A failed run counts as wrong wherever it counts.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from pam_envs.diagnosis.closed_loop.gain import COMPENSABLE
+from tests.diagnosis.hidden import EFFECTS
+
+VERDICTS = ("named", "ambiguous", "adequate", "unexplained", "insufficient", "failed")
+BINS = ((0.1, 0.3), (0.3, 1.0), (1.0, 2.0), (2.0, 5.0))
+"""Sizes of the tables."""
+CURVE = (0.1, 0.2, 0.35, 0.6, 1.0, 1.5, 2.2, 3.3, 5.0)
+"""Edges of the detection curve."""
+HELD_OUT = 1.1
+GAP = 0.15
+WORSE = 0.05
+LEVEL = 0.95
+
+Numbers = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Told:
+    """A record, in the words that are counted."""
+
+    kind: str
+    truth: tuple[str, ...]
+    wanted: tuple[float, ...]
+    verdict: str
+    names: tuple[str, ...]
+    others: tuple[frozenset[str], ...]
+    record: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, record: Mapping[str, Any]) -> Told:
+        """Read a record."""
+        case, failed = record["case"], bool(record["failure"])
+        return cls(
+            case["kind"],
+            tuple(case["names"]),
+            tuple(case["sizes"]),
+            "failed" if failed else record["verdict"],
+            () if failed else tuple(record["names"]),
+            () if failed else tuple(frozenset(name.split("+")) for name in record["open"]),
+            record,
+        )
+
+    @property
+    def size(self) -> float:
+        """Size of the first effect, over the usual noise."""
+        return self.wanted[0]
+
+    @property
+    def claims(self) -> bool:
+        """Whether it says what is missing, in doubt or not."""
+        return self.verdict in ("named", "ambiguous") and bool(self.names)
+
+    @property
+    def first(self) -> str:
+        """The first cause, where one is claimed; else the verdict."""
+        return self.names[0] if self.claims else self.verdict
+
+    @property
+    def right_first(self) -> bool:
+        """Whether the first cause is there."""
+        return self.first in self.truth
+
+    @property
+    def exact(self) -> bool:
+        """Whether what is there is named without doubt, and nothing else."""
+        return self.verdict == "named" and set(self.names) == set(self.truth)
+
+    @property
+    def both(self) -> bool:
+        """Whether the causes are those that are there, in doubt or not."""
+        return self.claims and set(self.names) == set(self.truth)
+
+    @property
+    def wrong(self) -> bool:
+        """Whether something that is not there is named without doubt."""
+        return self.verdict == "failed" or (
+            self.verdict == "named" and bool(set(self.names) - set(self.truth))
+        )
+
+    @property
+    def extra(self) -> bool:
+        """Whether something that is not there is named beside what is."""
+        return self.claims and set(self.names) > set(self.truth)
+
+    @property
+    def listed(self) -> bool:
+        """Whether what is there is among what is not excluded."""
+        return set(self.truth) in [set(self.names), *self.others]
+
+    @property
+    def alarm(self) -> bool:
+        """Whether something is said to be missing."""
+        return self.verdict not in ("adequate", "insufficient")
+
+    def right_answer(self, verdict: str, names: Iterable[str]) -> bool:
+        """Return whether another verdict on the same rig is the right one."""
+        if self.kind in ("clean", "decoy", "brief"):
+            return verdict == "adequate"
+        if self.kind == "idle":
+            return verdict == "insufficient"
+        if self.kind == "unknown":
+            return verdict == "unexplained"
+        return verdict == "named" and set(names) == set(self.truth)
+
+    @property
+    def held_out(self) -> float | None:
+        """Error over the noise floor on held-out kinds, of the worse output."""
+        return max(self.record.get("held_out", {}).get("error_after", {}).values(), default=None)
+
+    @property
+    def traces(self) -> Mapping[str, Any]:
+        """Errors of the traces of what is rightly named."""
+        return self.record.get("traces") or {}
+
+    @property
+    def trace_error(self) -> float | None:
+        """RMS error of the first effect's trace, over its RMS."""
+        found = self.traces.get(self.truth[0])
+        return found and found["error"]
+
+
+def exact_interval(count: int, n: int, level: float = LEVEL) -> list[float]:
+    """Return the two-sided Clopper-Pearson interval of a share."""
+    tail = 0.5 * (1.0 - level)
+    low = float(stats.beta.ppf(tail, count, n - count + 1)) if count > 0 else 0.0
+    high = float(stats.beta.ppf(1.0 - tail, count + 1, n - count)) if count < n else 1.0
+    return [low, high]
+
+
+def upper_bound(count: int, n: int, level: float = LEVEL) -> float:
+    """Return the one-sided upper Clopper-Pearson bound of a share."""
+    return float(stats.beta.ppf(level, count + 1, n - count)) if count < n else 1.0
+
+
+def share(marks: Iterable[bool]) -> Numbers:
+    """Return how many are true, of how many, with bounds; None for all where there are none."""
+    listed = [bool(mark) for mark in marks]
+    count, n = sum(listed), len(listed)
+    if n == 0:
+        return {"count": 0, "n": 0, "value": None, "interval": None, "upper": None}
+    return {
+        "count": count,
+        "n": n,
+        "value": count / n,
+        "interval": exact_interval(count, n),
+        "upper": upper_bound(count, n),
+    }
+
+
+def spread(values: Iterable[float | None]) -> Numbers:
+    """Return the median and quantiles of values."""
+    known = [float(v) for v in values if v is not None]
+    names = ("median", "q10", "q90", "q99", "most")
+    if not known:
+        return {"n": 0, **dict.fromkeys(names)}
+    found = np.quantile(known, [0.5, 0.1, 0.9, 0.99, 1.0]).tolist()
+    return {"n": len(known), **dict(zip(names, found, strict=True))}
+
+
+def without_truth(by_kind: Mapping[str, list[Told]]) -> Numbers:
+    """Return the counts of rigs in which nothing of the catalogue is hidden."""
+    clean, decoy = by_kind.get("clean", []), by_kind.get("decoy", [])
+    unknown, idle = by_kind.get("unknown", []), by_kind.get("idle", [])
+    brief = by_kind.get("brief", [])
+    named = sorted({one.truth[0] for one in unknown})
+    return {
+        "false_alarms": share(one.alarm for one in clean + decoy),
+        "false_alarms_clean": share(one.alarm for one in clean),
+        "false_alarms_decoy": share(one.alarm for one in decoy),
+        "false_names": share(one.claims or one.verdict == "failed" for one in clean + decoy),
+        "alarms": dict(Counter(one.first for one in clean + decoy if one.alarm).most_common()),
+        "false_alarms_brief": share(one.alarm for one in brief),
+        "brief": dict(Counter(one.first for one in brief).most_common()),
+        "unknown": share(one.verdict == "unexplained" for one in unknown),
+        "idle": share(one.verdict == "insufficient" for one in idle),
+        "unknown_by_kind": {
+            name: {
+                **share(o.verdict == "unexplained" for o in unknown if o.truth == (name,)),
+                "others": dict(
+                    Counter(
+                        o.first
+                        for o in unknown
+                        if o.truth == (name,) and o.verdict != "unexplained"
+                    ).most_common()
+                ),
+            }
+            for name in named
+        },
+    }
+
+
+def of_pairs(pairs: Sequence[Told]) -> Numbers:
+    """Return the counts of rigs that hide two effects."""
+    return {
+        "pair": share(one.both for one in pairs),
+        "pair_exact": share(one.exact for one in pairs),
+        "pair_one": share(one.claims and len(one.names) == 1 and one.right_first for one in pairs),
+        "pair_wrong": share(one.wrong for one in pairs),
+        "pair_first": share(one.right_first for one in pairs),
+    }
+
+
+def _bin(size: float) -> str:
+    low, high = next((pair for pair in BINS if size < pair[1]), BINS[-1])
+    return f"{low:g}-{high:g}"
+
+
+def verdicts_by_size(alone: Sequence[Told]) -> Numbers:
+    """Return how often each verdict was given, by cause and size."""
+    counts = Counter((one.truth[0], _bin(one.size), one.verdict) for one in alone)
+    return {
+        name: {
+            size: {v: counts[name, size, v] for v in VERDICTS if counts[name, size, v]}
+            for size in (f"{low:g}-{high:g}" for low, high in BINS)
+        }
+        for name in EFFECTS
+    }
+
+
+def confusion(single: Sequence[Told]) -> Numbers:
+    """Return how often each first cause, or verdict, stood for each truth; zeros are left out."""
+    counts: Numbers = {truth: Counter() for truth in EFFECTS}
+    for one in single:
+        counts[one.truth[0]][one.first] += 1
+    return {truth: dict(sorted(row.items())) for truth, row in counts.items()}
+
+
+def confused(alone: Sequence[Told]) -> Numbers:
+    """Return what stands most often for what: as the first cause, and as a rival left open."""
+    first = Counter((o.truth[0], o.first) for o in alone if o.claims and not o.right_first)
+    rivals = Counter(
+        (one.truth[0], "+".join(sorted(names)))
+        for one in alone
+        if one.verdict == "ambiguous"
+        for names in {frozenset(one.names), *one.others}
+        if names != set(one.truth)
+    )
+    extra = Counter(
+        (one.truth[0], name) for one in alone if one.extra for name in set(one.names) - {*one.truth}
+    )
+    return {
+        what: [[*pair, n] for pair, n in sorted(counts.items(), key=lambda e: (-e[1], e[0]))]
+        for what, counts in (("first", first), ("open", rivals), ("extra", extra))
+    }
+
+
+def curve(alone: Sequence[Told]) -> list[Numbers]:
+    """Return shares against size."""
+    made = []
+    for low, high in pairwise(CURVE):
+        ones = [one for one in alone if low <= one.size < high]
+        made.append(
+            {
+                "low": low,
+                "high": high,
+                "detected": share(one.alarm and one.verdict != "failed" for one in ones),
+                "right_first": share(one.right_first for one in ones),
+                "exact": share(one.exact for one in ones),
+                "wrong": share(one.wrong for one in ones),
+            }
+        )
+    return made
+
+
+def of_cause(name: str, single: Sequence[Told], weak: Sequence[Told]) -> Numbers:
+    """Return the shares of one cause: at size 1 and above, and how often it is wrong at any."""
+    ones = [one for one in single if one.truth == (name,)]
+    small = [one for one in weak if one.truth == (name,)]
+    return {
+        "right_first": share(one.right_first for one in ones),
+        "exact": share(one.exact for one in ones),
+        "ambiguous_with_truth": share(o.listed for o in ones if o.verdict == "ambiguous"),
+        "wrong": share(one.wrong for one in ones + small),
+        "weak_right_first": share(one.right_first for one in small),
+        "raw": spread(t["raw"] / t["size"] for o in ones for t in o.record.get("truths", ())),
+        "trace": spread(one.trace_error for one in ones if one.right_first),
+        "held_out": share(
+            (one.held_out or np.inf) <= HELD_OUT for one in ones if one.verdict == "named"
+        ),
+        "recovery": recovery(ones + small),
+    }
+
+
+def least_right(single: Sequence[Told]) -> Numbers:
+    """Return the cause whose first name is least often right."""
+    made = []
+    for name in EFFECTS:
+        found = share(one.right_first for one in single if one.truth == (name,))
+        if found["n"]:
+            made.append({"name": name, **found})
+    return min(made, key=lambda found: found["value"], default={"name": None, **share(())})
+
+
+def recovery(alone: Sequence[Told]) -> Numbers:
+    """Return how well the size of what was rightly named is recovered."""
+    pairs = [(t["found"], t["true"]) for one in alone for t in one.traces.values()]
+    if not pairs:
+        return {"n": 0, "rank_correlation": None, "median_ratio": None}
+    found, true = np.array(pairs).T
+    varied = len(pairs) > 2 and np.ptp(found) > 0.0 and np.ptp(true) > 0.0
+    return {
+        "n": len(pairs),
+        "rank_correlation": float(stats.spearmanr(found, true).statistic) if varied else None,
+        "median_ratio": float(np.median(found / true)),
+    }
+
+
+def following(told: Sequence[Told]) -> Numbers:
+    """Return what the proposed experiments resolved, and when none was promised."""
+    ambiguous = [one for one in told if one.verdict == "ambiguous"]
+    plans = [one.record.get("experiment") or {} for one in ambiguous]
+    done = [one for one in ambiguous if one.record.get("next")]
+    resolved = [
+        not one.record["next"].get("failure")
+        and one.right_answer(one.record["next"]["verdict"], one.record["next"]["names"])
+        for one in done
+    ]
+    return {
+        "ambiguous": len(ambiguous),
+        "promised": sum(bool(plan.get("enough")) for plan in plans),
+        "resolved": share(resolved),
+        "told_none": share(bool(plan) for plan in plans if not plan.get("enough")),
+        "unresolved": [
+            f"{line(one)}; after {one.record['next'].get('plan', 'a failure')}: "
+            f"{one.record['next'].get('verdict')} {'+'.join(one.record['next'].get('names', []))}"
+            for one, good in zip(done, resolved, strict=True)
+            if not good
+        ],
+    }
+
+
+def closed_loops(told: Sequence[Told]) -> Numbers:
+    """Return what the extended plants were worth in closed loop on the hidden rigs."""
+    ran = [one for one in told if one.record.get("loop")]
+    failed = [one for one in ran if one.record["loop"].get("failure")]
+    loops = [(one.truth[0], one.record["loop"]) for one in ran if one not in failed]
+    wide = [(name, loop) for name, loop in loops if loop["gap"] >= GAP]
+    return {
+        "n": len(ran),
+        "failed": len(failed),
+        "gap": len(wide),
+        "recovered": spread(loop["recovered"] for _, loop in wide),
+        "worse": share([_worse(loop) for _, loop in wide] + [True] * len(failed)),
+        "worse_of_all": share([_worse(loop) for _, loop in loops] + [True] * len(failed)),
+        "better_percent": spread(loop["better_percent"]["value"] for _, loop in loops),
+        "by_cause": {
+            name: {
+                "n": sum(other == name for other, _ in loops),
+                "gap": sum(other == name for other, _ in wide),
+                "recovered": spread(loop["recovered"] for other, loop in wide if other == name),
+                "better_percent": spread(
+                    loop["better_percent"]["value"] for other, loop in loops if other == name
+                ),
+            }
+            for name in COMPENSABLE
+        },
+    }
+
+
+def _worse(loop: Mapping[str, Any]) -> bool:
+    return bool(loop["after_mm"] > (1.0 + WORSE) * loop["before_mm"])
+
+
+def line(one: Told) -> str:
+    """Return a case and its outcome in a line."""
+    hidden = "+".join(f"{n}@{s:.2f}" for n, s in zip(one.truth, one.wanted, strict=True))
+    said = " ".join([one.verdict, "+".join(one.names)]).strip()
+    rivals = "".join(f" or {'+'.join(sorted(names))}" for names in one.others)
+    numbers = [f"trace {t['error']:.2f}" for t in one.traces.values()]
+    if one.held_out is not None:
+        numbers.append(f"held out {one.held_out:.2f}")
+    tail = f" ({', '.join(numbers)})" if numbers else ""
+    seed = one.record["case"]["seed"]
+    return f"{one.kind} {seed} {hidden or 'nothing'}: {said}{rivals}{tail}"

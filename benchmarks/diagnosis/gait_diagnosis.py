@@ -1,0 +1,322 @@
+"""What the orthosis' estimate of the knee torque misses, found by the diagnosis' own comparison.
+
+Eq. (1) of seed 000 takes the knee torque from the vertical ground force, its point of attack and
+the lean of the shank. :func:`diagnose` sets it beside the knee torque that a gait laboratory
+measures, refits what one may have measured wrongly with a tape (the shank's length), and lets
+rival terms compete on strides that no fit has seen, by the search and the rule that muscles are
+judged by.
+
+``python -m benchmarks.diagnosis.gait_diagnosis`` prints what is found at several paces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.diagnosis.gait_recording import GaitRecording, record
+from pam_envs.diagnosis.cause import Cause, Form, Term
+from pam_envs.diagnosis.decide.rule import Rule
+from pam_envs.diagnosis.decide.search import EVERY, Blocks, Candidate, fit_base
+from pam_envs.diagnosis.decide.structure import Regressors
+from pam_envs.diagnosis.decide.verdict import Decision, decide
+from pam_envs.diagnosis.fit.least_squares import Free, Problem
+from pam_envs.mechanics.leg import GRAVITY
+from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE
+
+Array = NDArray[np.float64]
+
+BOUNDS: dict[str, tuple[float, float, float, float]] = {
+    "shank.length": (0.43, 0.3, 0.6, 0.01),
+    "horizontal.share": (0.0, -3.0, 3.0, 0.1),
+    "weight.share": (0.0, -5.0, 5.0, 0.1),
+    "inertia.share": (0.0, -5.0, 5.0, 0.1),
+    "force.gain": (0.0, -0.9, 2.0, 0.05),
+    "sole.shift": (0.0, -0.1, 0.1, 0.005),
+    "lean.bias": (0.0, -0.3, 0.3, 0.02),
+    "foot.share": (0.0, -2.0, 2.0, 0.1),
+    "shoe.delay": (0.0, -0.1, 0.1, 0.01),
+    "knee.stiffness": (0.0, -100.0, 100.0, 2.0),
+    "knee.damping": (0.0, -20.0, 20.0, 0.5),
+    "torque.bias": (0.0, -50.0, 50.0, 1.0),
+}
+"""Every parameter: neutral value, lowest, highest, and the size of a meaningful change (SI)."""
+NAMES = tuple(BOUNDS)
+BASE = ("shank.length",)
+"""What is refitted before anything is called missing, to a tape's 1 cm."""
+
+
+@dataclass(frozen=True)
+class GaitEstimate:
+    """Eq. (1) and what may be added to it, as the diagnosis asks of a plant.
+
+    Attributes
+    ----------
+    recording : GaitRecording
+        What it is computed from.
+    """
+
+    recording: GaitRecording
+
+    channels = ("torque",)
+    units = ("N m",)
+
+    @property
+    def column(self) -> Array:
+        """Return the parameters as a column."""
+        return np.array([neutral for neutral, *_ in BOUNDS.values()])
+
+    def free(self, name: str, **changes: Any) -> Free:
+        """Return how a fit moves a parameter."""
+        start, low, high, scale = BOUNDS[name]
+        made = dict(low=low, high=high, scale=scale, start=start)
+        made["prior"] = 1.0 if name in BASE else np.inf
+        return Free(name, NAMES.index(name), **{**made, **changes})
+
+    def base(self) -> tuple[Free, ...]:
+        """Return what is refitted before anything is called missing."""
+        return tuple(self.free(name) for name in BASE)
+
+    def simulate(self, columns: Array) -> Array:
+        """Return the knee torque [N m] for parameters (n, p), shape (1, T, n)."""
+        return np.stack([self._torque(column) for column in columns], axis=-1)[None]
+
+    def _torque(self, column: Array) -> Array:
+        r, at = self.recording, dict(zip(NAMES, column, strict=True))
+        lean = r.lean + at["lean.bias"] + at["foot.share"] * (r.ankle - r.lean)
+        arm = at["shank.length"] * np.sin(lean) - r.cop - at["sole.shift"]
+        shoe = (1.0 + at["force.gain"]) * r.vertical * arm
+        if at["shoe.delay"] != 0.0:
+            shoe = np.interp(r.time - at["shoe.delay"], r.time, shoe)
+        height = r.leg.ankle_height + at["shank.length"] * np.cos(r.lean)
+        weight = r.leg.mass * r.leg.centre * GRAVITY * np.sin(r.lean)
+        passive = at["knee.stiffness"] * r.knee + at["knee.damping"] * r.knee_rate
+        more = at["inertia.share"] * r.inertial - passive + at["torque.bias"]
+        return np.asarray(
+            shoe
+            - at["horizontal.share"] * r.horizontal * height
+            - at["weight.share"] * weight
+            + more
+        )
+
+    def regressors(self) -> Regressors:
+        """Return what a residual may vary against: where the leg is and how it moves.
+
+        Of the markers, whose errors are not in the estimate: the shoe's noise is in its own
+        residual, and would explain it.
+        """
+        r = self.recording
+        k, v, a = r.knee / 0.5, r.knee_rate / 3.0, r.ankle / 0.3
+        rows = [np.ones_like(k), k, k**2, k**3, v, v**2, v**3, a, a**2, a**3]
+        rows += [k * v, k * a, v * a, k**2 * a, k * a**2, v * a**2, np.abs(v)]
+        values = {"time": r.time, "pressure": r.vertical}  # the engine asks for the motion so
+        return Regressors(values, np.array(rows))
+
+
+def _one(name: str, *starts: float) -> Term:
+    return Term(name, starts)
+
+
+CAUSES = (
+    Cause(
+        "horizontal_force",
+        "the horizontal part of the ground's force",
+        (Form("times the knee's height", (_one("horizontal.share", 0.5),)),),
+        signature="flexion while the leg brakes, extension while it drives; with the pace squared",
+        neighbours=("delay", "sole_shift"),
+        experiment="The same walk at two paces.",
+        sensor="a force plate, or an accelerometer at the waist",
+    ),
+    Cause(
+        "shank_weight",
+        "the weight of shank and foot",
+        (Form("at their centre of mass", (_one("weight.share", 0.5),)),),
+        signature="with the lean of the shank, whatever the foot bears",
+        neighbours=("lean_bias",),
+        experiment="The leg lifted and held at several leans.",
+    ),
+    Cause(
+        "inertia",
+        "the acceleration of shank and foot",
+        (Form("below a hip that moves evenly", (_one("inertia.share", 0.5),)),),
+        signature="at the heel's contact and before the toe leaves; with the pace squared",
+        experiment="The same walk at two paces.",
+    ),
+    Cause(
+        "force_gain",
+        "load cells that read too much or too little",
+        (Form("in proportion", (_one("force.gain", 0.05),)),),
+        signature="in proportion to the estimate",
+        experiment="Standing on one leg on a scale.",
+    ),
+    Cause(
+        "sole_shift",
+        "a sole that is not where it was measured",
+        (Form("along the foot", (_one("sole.shift", 0.005),)),),
+        signature="in proportion to the ground's force",
+        neighbours=("lean_bias",),
+        experiment="Standing upright: the estimate is the force times the shift.",
+    ),
+    Cause(
+        "lean_bias",
+        "a lean that is read from another zero",
+        (Form("constant", (_one("lean.bias", 0.02),)),),
+        signature="in proportion to the ground's force",
+        neighbours=("sole_shift",),
+        experiment="Standing with the shank upright.",
+    ),
+    Cause(
+        "foot_pitch",
+        "the pitch of the foot, taken to lie flat",
+        (Form("in proportion", (_one("foot.share", 0.2),)),),
+        signature="at the heel's contact and when it rises",
+        experiment="Standing on the ball of the foot.",
+    ),
+    Cause(
+        "delay",
+        "a shoe and a laboratory of two clocks",
+        (Form("constant", (_one("shoe.delay", 0.02, -0.02),)),),
+        signature="with the rate of the torque",
+        experiment="A stamp of the foot.",
+    ),
+    Cause(
+        "passive_knee",
+        "a knee that is stiff or damped by itself",
+        (
+            Form("spring", (_one("knee.stiffness", 2.0),)),
+            Form("damper", (_one("knee.damping", 0.5),)),
+        ),
+        signature="with the knee's flexion or its rate, whatever the foot bears",
+        experiment="A leg that is let swing.",
+    ),
+    Cause(
+        "torque_bias",
+        "a laboratory whose torque has another zero",
+        (Form("constant", (_one("torque.bias", 1.0),)),),
+        signature="the same at all times",
+        experiment="A recording with nobody on the plate.",
+    ),
+)
+"""What the estimate may lack, or the recording have wrong."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What was found in a recording."""
+
+    recording: GaitRecording
+    problem: Problem
+    blocks: Blocks
+    base: Candidate
+    decision: Decision
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Causes of the model that was decided on, the first found first."""
+        return self.decision.model.names
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Parameters of that model by name (SI)."""
+        return self.decision.model.fit.values()
+
+    @property
+    def ladder(self) -> list[dict[str, Any]]:
+        """Of each level, what the rule looked at: see :func:`verdict.evidence_of`."""
+        return list(self.decision.evidence["levels"])
+
+    def error(self, candidate: Candidate) -> float:
+        """Return the RMS error [N m] on strides that no fit has seen."""
+        mean = self.blocks.means(candidate.errors)[0]
+        return float(np.sqrt(mean) * self.problem.noise[0])
+
+    def gain_of(self, name: str) -> float:
+        """Return the log mean-square gain on held-out strides of a cause alone; NaN if untried."""
+        first = self.ladder[1]["rivals"] if len(self.ladder) > 1 else []
+        return next((r["gain"] for r in first if r["names"] == [name]), float("nan"))
+
+
+def white_noise(values: Array, stride: NDArray[np.int64]) -> float:
+    """Return the RMS of the white part of samples, from second differences within strides.
+
+    Parameters
+    ----------
+    values : ndarray, shape (T,)
+        NaN where there is none.
+    stride : ndarray of int, shape (T,)
+    """
+    second = np.diff(values, 2)
+    second = second[(stride[2:] == stride[:-2]) & np.isfinite(second)]
+    low, high = np.quantile(second, [0.1587, 0.8413])
+    return float(0.5 * (high - low) / np.sqrt(6.0))
+
+
+def blocks_of(recording: GaitRecording) -> Blocks:
+    """Return the strides as blocks, every third one held out."""
+    n = int(recording.stride.max()) + 1
+    seen = np.isfinite(recording.torque).astype(float)
+    counts = np.bincount(recording.stride, seen, minlength=n)[None]
+    return Blocks(recording.stride, np.arange(n) % EVERY == EVERY - 1, counts)
+
+
+def diagnose(
+    recording: GaitRecording,
+    causes: Sequence[Cause] = CAUSES,
+    rule: Rule | None = None,
+    seed: int = 0,
+) -> Outcome:
+    """Compare Eq. (1) with the laboratory's knee torque and look for what it misses.
+
+    Parameters
+    ----------
+    recording : GaitRecording
+    causes : sequence of Cause
+        Rival terms.
+    rule : Rule, optional
+        Numbers of the decision.
+    seed : int
+        Of the decision's draws.
+    """
+    family, measured = GaitEstimate(recording), recording.torque[None]
+    blocks = blocks_of(recording)
+    plain = family.simulate(family.column[None])[0, :, 0]
+    noise = np.array([white_noise(recording.torque - plain, recording.stride)])
+    problem = Problem(family.simulate, measured, noise, blocks.train, recording.time)
+    base = fit_base(problem, blocks, family.column, family.base())
+    made = (rule or Rule(), seed)
+    decision = decide(problem, family, blocks, base, causes, family.regressors(), *made)
+    return Outcome(recording, problem, blocks, base, decision)
+
+
+def line(title: str, found: Outcome) -> str:
+    """Return what was found in a line."""
+    shares = {n: v for n, v in found.values.items() if n not in BASE}
+    terms = ", ".join(f"{name} {value:.2f}" for name, value in shares.items()) or "nothing"
+    before, after = (found.error(c) for c in (found.base, found.decision.model))
+    return f"{title}: {found.decision.verdict}; {terms}; {before:.1f} -> {after:.1f} N m"
+
+
+def main(strides: int = 24, seed: int = 1) -> None:
+    """Print what is found at several paces, and in a walk at two of them."""
+    walks = {f"{p:g} s a stride": record(p, strides, seed) for p in PACES}
+    slow = record(PAPER_STRIDE, strides // 2, seed + 50)
+    for title, walk in list(walks.items())[::2]:
+        walks[f"{title} and {PAPER_STRIDE:g} s"] = walk.and_then(slow)
+    for title, walk in walks.items():
+        found = diagnose(walk)
+        print(line(title, found))
+        for k, level in enumerate(found.ladder[1:], 1):
+            told = [f"{'+'.join(r['names'])} {r['gain']:.2f}" for r in level["rivals"][:4]]
+            print(f"  {k}: {'; '.join(told)}")
+
+
+PACES = (NATURAL_STRIDE, 2.0, 3.0, PAPER_STRIDE)
+"""Duration of a stride [s]; a slow walk is added to every second one."""
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,172 @@
+"""Recordings of a walking leg as a gait laboratory and the orthosis make them at the same time.
+
+The laboratory has a force plate and follows the leg by markers: it knows the horizontal force and,
+by inverse dynamics, what the knee bears. The orthosis has the shoe and the lean of the shank, and
+makes Eq. (1) of them. No two strides are alike: pace and centre of pressure vary.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.mechanics.leg import Leg
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
+from pam_envs.plants.knee_orthosis.rollout import simulate_knee
+
+Array = NDArray[np.float64]
+
+PERIOD = KneeOrthosis.control_period
+PACE_SPREAD = 0.06
+"""Share by which a stride's duration differs from the mean at most."""
+AIM = (0.9, 1.15)
+"""Range of the height [m] that the braking force points at."""
+LAB_NOISE = 1.0
+"""Of the laboratory's knee torque [N m]."""
+PLATE_NOISE = 2.0
+"""Of the plate's horizontal force [N]."""
+LOADED = 50.0
+"""Vertical force [N] from which on a foot stands on the plate."""
+
+
+@dataclass(frozen=True)
+class GaitRecording:
+    """Strides one after the other, arrays of shape (T,) in SI.
+
+    Attributes
+    ----------
+    stride : ndarray of int
+        Which stride a sample is of.
+    torque : ndarray
+        Knee torque by inverse dynamics [N m]; NaN while the foot is in the air.
+    vertical, cop, lean : ndarray
+        What the orthosis reads: ground force [N], centre of pressure [m ahead of the ankle], lean
+        of the shank [rad].
+    horizontal : ndarray
+        Of the plate [N], ahead positive.
+    knee, knee_rate : ndarray
+        Flexion [rad], [rad/s].
+    ankle : ndarray
+        Dorsiflexion [rad].
+    inertial : ndarray
+        Knee torque [N m] that accelerates shank and foot, from the markers.
+    leg : Leg
+        Whose it is.
+    """
+
+    stride: NDArray[np.int64]
+    torque: Array
+    vertical: Array
+    cop: Array
+    lean: Array
+    horizontal: Array
+    knee: Array
+    knee_rate: Array
+    ankle: Array
+    inertial: Array
+    leg: Leg
+
+    @property
+    def time(self) -> Array:
+        """Time [s], strides put together."""
+        return np.arange(len(self.torque)) * PERIOD
+
+    def and_then(self, other: GaitRecording) -> GaitRecording:
+        """Return this recording and another one of the same leg after it."""
+        if self.leg != other.leg:
+            raise ValueError("both recordings must be of one leg; record them with one plant")
+        parts = {
+            f.name: np.concatenate([getattr(self, f.name), getattr(other, f.name)])
+            for f in fields(self)
+            if f.name not in ("leg", "stride")
+        }
+        after = other.stride + int(self.stride.max()) + 1
+        return GaitRecording(**parts, stride=np.concatenate([self.stride, after]), leg=self.leg)
+
+
+def record(pace: float, strides: int, seed: int = 0, noise: float = 1.0) -> GaitRecording:
+    """Return strides of level walking.
+
+    Parameters
+    ----------
+    pace : float
+        Mean duration of a stride [s].
+    strides : int
+        How many.
+    seed : int
+        Of all draws.
+    noise : float
+        Share of the sensors' noise that acts; 0: none.
+    """
+    rng = np.random.default_rng(seed)
+    times = pace * (1.0 + PACE_SPREAD * rng.uniform(-1.0, 1.0, strides))
+    aims = rng.uniform(*AIM, strides)
+    plants = [
+        KneeOrthosis.on_leg("walk", float(time), "none").replace({"leg.aim_height": float(aim)})
+        for time, aim in zip(times, aims, strict=True)
+    ]
+    columns = _strides(plants, times)
+    leg = KneeOrthosis.on_leg("walk").leg
+    plant = plants[0]
+    n, loaded = len(columns["lean"]), columns["vertical"] > LOADED
+    sizes = {
+        "vertical": plant.ground.noise,
+        "cop": plant.cop.noise,
+        "lean": plant.ankle.noise,
+        "horizontal": PLATE_NOISE,
+        "torque": LAB_NOISE,
+    }
+    for name, size in sizes.items():
+        columns[name] = columns[name] + noise * size * rng.standard_normal(n)
+    columns["torque"] = np.where(loaded, columns["torque"], np.nan)
+    of = columns.pop("stride").astype(np.int64)
+    return GaitRecording(**columns, stride=of, leg=leg)
+
+
+def _strides(plants: Sequence[KneeOrthosis], times: Array) -> dict[str, Array]:
+    """Return the second of three strides of each plant, one after the other, free of noise."""
+    steps = round(3.0 * float(times.max()) / PERIOD)
+    made = simulate_knee(plants, np.full(steps, 1.5e5), pressure=1.5e5)
+    turns = (np.arange(1, steps + 1) * PERIOD)[:, None] / times
+    inertial = inertial_torque(made["shank"], made["knee"], plants[0].leg)
+    source = {
+        "torque": made["demand"],
+        "vertical": made["ground_z"],
+        "cop": made["cop"],
+        "lean": made["shank"],
+        "horizontal": made["ground_x"],
+        "knee": made["knee"],
+        "knee_rate": made["knee_rate"],
+        "ankle": made["ankle"],
+        "inertial": inertial,
+        "stride": np.broadcast_to(np.arange(len(plants)), turns.shape),
+    }
+    second = ((turns >= 1.0) & (turns < 2.0)).T
+    return {name: np.asarray(values.T[second], np.float64) for name, values in source.items()}
+
+
+def inertial_torque(lean: Array, knee: Array, leg: Leg) -> Array:
+    """Return the knee torque [N m] that accelerates shank and foot below a hip that moves evenly.
+
+    Parameters
+    ----------
+    lean, knee : ndarray, shape (T, n)
+        Lean of the shank and flexion of the knee [rad], one sample a control period.
+    leg : Leg
+    """
+    first, second = (_derivatives(angle) for angle in (lean, knee))
+    thigh, rate, acceleration = knee - lean, second[0] - first[0], second[1] - first[1]
+    s, c = np.sin(thigh), np.cos(thigh)
+    ahead = leg.thigh * (c * acceleration - s * rate**2)
+    up = leg.thigh * (s * acceleration + c * rate**2)
+    lever = leg.mass * leg.centre
+    return lever * (ahead * np.cos(lean) - up * np.sin(lean)) - leg.inertia * first[1]
+
+
+def _derivatives(angle: Array) -> tuple[Array, Array]:
+    """Return first and second derivative along the first axis."""
+    after, before = np.roll(angle, -1, axis=0), np.roll(angle, 1, axis=0)
+    return (after - before) / (2.0 * PERIOD), (after - 2.0 * angle + before) / PERIOD**2

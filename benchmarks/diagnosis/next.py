@@ -1,0 +1,221 @@
+"""What is done on a hidden rig after the diagnosis: the proposed experiment, and controllers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from benchmarks.diagnosis.cases import NOISE, Case, Made, recording_of, sheet_of
+from pam_envs.data.recording.recording import Recording
+from pam_envs.data.rig_file import BAR, MM, Rig
+from pam_envs.diagnosis.closed_loop.references import DURATION
+from pam_envs.diagnosis.experiment.plans import Means, Plan, plans
+from pam_envs.plants.core.stepper import PERIOD
+from tests.diagnosis import hidden
+from tests.diagnosis.hidden.catalogue import constants
+from tests.diagnosis.hidden.kernel import begin, one_period
+from tests.diagnosis.hidden.records import STATE, blank
+from tests.diagnosis.hidden.rig import steps_in
+
+Array = NDArray[np.float64]
+
+FULL = 6.0
+"""Largest pressure [bar] of the rigs."""
+FRESH = ("cycles_after_rest",)
+"""Plans that begin with a muscle that has rested: the rig starts anew."""
+
+
+def again(case: Case, made: Made, plan_name: str) -> tuple[Recording, Rig]:
+    """Return the recording of the campaign and the experiment after it, and the owner's sheet.
+
+    Parameters
+    ----------
+    case : Case
+    made : Made
+        The case, made.
+    plan_name : str
+        As the report names the experiment.
+    """
+    means = Means.of(made.recording, made.sheet)
+    plan = {p.name: p for p in plans(means)}[plan_name]
+    before, extra = made.ground.campaign, _campaign(plan, made.ground.campaign)
+    effects = [(truth.effect, truth.amplitude) for truth in made.truths]
+    whole = _joined(before, extra)
+    sheet = sheet_of(made.ground.base, whole, case.noise)
+    if plan.name in FRESH:
+        columns = _after_rest(case, made, effects, before, extra)
+    else:
+        share = before.command_bar.size / whole.command_bar.size
+        lasting = [(_sooner(effect, share), amplitude) for effect, amplitude in effects]
+        columns = hidden.make_recording(
+            made.ground.base, lasting, whole, case.seed + 13, noise_factor=case.noise
+        )
+    return recording_of(columns, sheet, f"case {case.seed} and {plan.name}"), sheet
+
+
+def _campaign(plan: Plan, before: hidden.Campaign) -> hidden.Campaign:
+    """Return a plan as what is done to a rig, its pieces labelled by whether the valve is shut."""
+    shut = plan.command < 0.0
+    piece = np.concatenate([[0], np.cumsum(shut[1:] != shut[:-1])])
+    held = np.where(shut, 0.0, plan.command)
+    return hidden.Campaign(
+        np.round(held / BAR, 4),
+        np.array([f"next_{chr(ord('a') + k)}" for k in piece]),
+        plan.load.astype(float),
+        np.round(before.temperature_C[-1] + plan.kelvin, 2),
+        shut,
+        before.period,
+    )
+
+
+def _joined(first: hidden.Campaign, second: hidden.Campaign) -> hidden.Campaign:
+    names = ("command_bar", "segment", "load_N", "temperature_C", "valve_closed")
+    both = [np.concatenate([getattr(first, n), getattr(second, n)]) for n in names]
+    return hidden.Campaign(*both, first.period)
+
+
+def _sooner(effect: hidden.Effect, share: float) -> hidden.Effect:
+    """Keep the moment of what happens at a share of the run, where the run gets longer."""
+    if "when" not in effect.shape:
+        return effect
+    return replace(effect, shape={**effect.shape, "when": share * effect.shape["when"]})
+
+
+def _after_rest(
+    case: Case,
+    made: Made,
+    effects: list[tuple[hidden.Effect, float]],
+    before: hidden.Campaign,
+    extra: hidden.Campaign,
+) -> dict[str, np.ndarray]:
+    """Return both recordings, one after the other; time starts anew in the second."""
+    runs = [
+        hidden.make_recording(
+            made.ground.base, effects, campaign, case.seed + 13 + k, noise_factor=case.noise
+        )
+        for k, campaign in enumerate((before, extra))
+    ]
+    return {name: np.concatenate([run[name] for run in runs]) for name in runs[0]}
+
+
+# --- controllers on the rig ---------------------------------------------------------------------
+
+
+class DrivenRig:
+    """A hidden rig driven by a controller, see :class:`pam_envs.diagnosis.closed_loop.gain.Rig`."""
+
+    period = PERIOD
+
+    def __init__(self, made: Made, load: float, celsius: float) -> None:
+        effects = [(truth.effect, truth.amplitude) for truth in made.truths]
+        self._rig = hidden.Stepper(
+            made.ground.base,
+            effects,
+            load,
+            0,
+            PERIOD,
+            noise_factor=float(made.noise[0] / NOISE[0]),
+            temperature_C=celsius,
+            duration=DURATION,
+        )
+
+    @property
+    def position(self) -> float:
+        """True contraction [m]."""
+        return self._rig.position_mm * MM
+
+    def reset(self, seed: int | None = None) -> None:
+        """Bring it to rest and start its noise anew."""
+        self._rig.reset(seed or 0)
+
+    def step(self, set_point: float) -> tuple[float, float]:
+        """Hold a set-point [Pa] for a period; return contraction [m] and pressure [Pa] read."""
+        place, pressure = self._rig.step(set_point / BAR)
+        return place * MM, pressure * BAR
+
+
+@njit(cache=True)
+def _advance(
+    parameters: Any, states: Any, commands: Any, heat: float, steps: int
+) -> NDArray[np.float64]:
+    """Advance copies of a rig through ``commands[t, lane]`` [bar]; return (3, t, lane)."""
+    rows = np.empty((3, *commands.shape))
+    for lane in range(commands.shape[1]):
+        state = states[lane : lane + 1]
+        for t in range(commands.shape[0]):
+            place, pressure, true = one_period(parameters, state, commands[t, lane], heat, steps)
+            rows[0, t, lane], rows[1, t, lane], rows[2, t, lane] = place, pressure, true
+    return rows
+
+
+class OracleBatch:
+    """Copies of a hidden rig side by side, free of noise.
+
+    Attributes
+    ----------
+    position : ndarray, shape (n,)
+        True contractions [m].
+    """
+
+    def __init__(self, constants_of: Any, states: Any, celsius: float) -> None:
+        self._constants, self.states, self._celsius = constants_of, states, celsius
+        self.position = np.zeros(len(states))
+
+    def run(self, set_points: ArrayLike) -> Array:
+        """Hold set-points [Pa], shape (T, n); return readings and position, (3, T, n)."""
+        commands = np.ascontiguousarray(set_points, np.float64) / BAR
+        heat, steps = self._celsius, steps_in(PERIOD)
+        rows = _advance(self._constants, self.states, commands, heat, steps)
+        rows *= np.array([MM, BAR, MM])[:, None, None]
+        self.position = rows[2, -1]
+        return rows
+
+    def step(self, set_points: ArrayLike) -> tuple[Array, Array]:
+        """Hold set-points [Pa] for a period; return contractions [m] and pressures [Pa] read."""
+        rows = self.run(np.asarray(set_points, float)[None, :])
+        return rows[0, 0], rows[1, 0]
+
+
+class OracleRig:
+    """The rig itself, see :class:`pam_envs.diagnosis.closed_loop.plant_inverse.Simulated`."""
+
+    period = PERIOD
+    max_pressure = FULL * BAR
+
+    def __init__(self, made: Made, load: float, celsius: float) -> None:
+        self.noise = float(made.noise[0])
+        effects = [(truth.effect, truth.amplitude) for truth in made.truths]
+        self._constants = constants(made.ground.base, effects, DURATION)
+        self._rest = blank(STATE)
+        begin(self._constants, self._rest, load)
+        self._celsius = celsius
+        self.reset()
+
+    def reset(self, seed: int | None = None) -> None:
+        """Bring it to rest; it has no noise."""
+        self._one = self.batch(1)
+
+    @property
+    def position(self) -> float:
+        """True contraction [m]."""
+        return float(self._one.position[0])
+
+    def step(self, set_point: float) -> tuple[float, float]:
+        """Hold a set-point [Pa] for a period; return contraction [m] and pressure [Pa] read."""
+        rows = self._one.run([[set_point]])
+        return float(rows[0, 0, 0]), float(rows[1, 0, 0])
+
+    def try_ahead(self, set_points: ArrayLike, periods: int) -> Array:
+        """Return where copies would be [m], shape (periods, m); the rig stays as it is."""
+        given = np.asarray(set_points, float)
+        plans = np.broadcast_to(given, (periods, given.shape[-1]))
+        copies = np.repeat(self._one.states, given.shape[-1])
+        return np.asarray(OracleBatch(self._constants, copies, self._celsius).run(plans)[2])
+
+    def batch(self, n: int) -> OracleBatch:
+        """Return ``n`` copies at rest."""
+        return OracleBatch(self._constants, np.repeat(self._rest, n), self._celsius)

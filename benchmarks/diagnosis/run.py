@@ -1,0 +1,365 @@
+"""Run the diagnosis on drawn cases; the records on disk are the checkpoint.
+
+A record belongs to a case, a stage and the sources that decide it: where the engine changes, it
+is made again. A case that fails has a record too, and counts as wrong.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.diagnosis.cases import Case, cases
+from benchmarks.diagnosis.study import STAGES, loops, promised, study
+from benchmarks.identity.hashing import digest, sources_digest
+from benchmarks.runs import provenance
+from benchmarks.runs.store import Store, read_record
+from pam_envs.diagnosis.decide.rule import Rule, judge
+from sweeps import engine
+
+HERE = Path(__file__).parents[1]
+FOLDER = HERE / ".cells" / "diagnosis"
+SHUFFLE = 20_260_101
+
+LOOP_FILES = ("gain.py", "gain_references.py", "plant_inverse.py")
+NOT_DECIDING = ("page", "readings", "report", "audit_tables", "outcome", "steps", "summary_text")
+"""Beginnings of the names of files that only tell what was decided, or read tables."""
+LIBRARY = (
+    *("compiler.py", "kernels.py", "parameters.py", "wording.py", "data/mas10_maxwell_slip.yaml"),
+    *("data/rig_file.py", "data/recording_segments.py"),
+    *(f"data/{name}.py" for name in ("recording", "recording_clock", "recording_columns")),
+    *(f"hysteresis/{name}.py" for name in ("elements", "everett", "maxwell_slip", "preisach")),
+    *("hysteresis/checks.py", "hysteresis/extrema.py", "mechanics/hanging_mass.py"),
+    *("muscle/effective_area.py", "pneumatics/regulator.py", "sensing/sensor.py"),
+    *(f"plants/{name}.py" for name in ("memory", "plant", "replay", "stepping", "tiles")),
+    "plants/single_muscle.py",
+    *(f"plants/single_muscle_{name}.py" for name in ("effects", "kernels", "rows")),
+)
+"""What of the library besides the diagnosis decides: the one plant it knows, and its data."""
+OURS = ("diagnosis_cases.py", "diagnosis_study.py")
+
+Study = Callable[[Case, Collection[str]], dict[str, Any]]
+Advance = Callable[[], None]
+
+
+@lru_cache(maxsize=len(STAGES))
+def sources(stage: str) -> str:
+    """Return the digest of the code and data that a stage depends on."""
+    library = provenance.ROOT / "pam_envs"
+    engine = [p for p in sorted((library / "diagnosis").glob("*.py")) if _decides(p, stage)]
+    own = OURS if stage == "verdict" else (*OURS, "diagnosis_next.py")
+    paths = [
+        *engine,
+        library / "diagnosis" / "causes",
+        *(library / name for name in LIBRARY),
+        provenance.ROOT / "tests" / "diagnosis" / "hidden",
+        *(HERE / name for name in own),
+    ]
+    return sources_digest(paths)
+
+
+def _decides(path: Path, stage: str) -> bool:
+    if path.name in LOOP_FILES:
+        return stage == "loop"
+    return not path.name.startswith(NOT_DECIDING)
+
+
+@dataclass(frozen=True)
+class Task:
+    """A stage of a case."""
+
+    case: Case
+    stage: str
+
+    @property
+    def key(self) -> str:
+        """Digest of all that the record depends on: the name under which it is kept."""
+        parts = [self.case.record(), self.stage, sources(self.stage), provenance.packages()]
+        return digest(parts)[:32]
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to run.
+
+    Attributes
+    ----------
+    chosen : {"small", "tune", "final"}
+    offset : int
+        Another number gives freshly drawn cases.
+    fraction : float
+        Part of the cases of every kind and cause.
+    kinds, names : tuple of str
+        Only these kinds, and only cases in which one of these is hidden.
+    limit : int, optional
+        Most cases.
+    loops : int
+        Cases of every cause that are run in closed loop.
+    next : bool
+        Carry out the experiments that are proposed.
+    jobs : int
+        Processes; 1 computes in this one.
+    force : bool
+        Make again what is there already.
+    folder : Path
+        Of the records.
+    backend : {"loky", "dask"}
+        Processes of this machine, or an existing Dask cluster at ``address``.
+    address : str
+        Of the Dask scheduler.
+    """
+
+    chosen: str = "small"
+    offset: int = 0
+    fraction: float = 1.0
+    kinds: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
+    limit: int | None = None
+    loops: int = 0
+    next: bool = False
+    jobs: int = 1
+    force: bool = False
+    folder: Path = FOLDER
+    backend: str = "loky"
+    address: str = ""
+
+    @property
+    def cluster(self) -> engine.Cluster:
+        """Where to compute."""
+        return engine.Cluster(self.jobs, self.backend, self.address)
+
+    @property
+    def whole(self) -> bool:
+        """Whether every case of the set is run."""
+        part = self.fraction < 1.0 or self.limit is not None
+        return not (part or self.kinds or self.names)
+
+    @property
+    def arguments(self) -> str:
+        """Arguments of the command that gives the same records."""
+        given = [f"--chosen {self.chosen}"]
+        if self.offset:
+            given.append(f"--offset {self.offset}")
+        if self.fraction < 1.0:
+            given.append(f"--fraction {self.fraction:g}")
+        for word, listed in (("--kind", self.kinds), ("--name", self.names)):
+            given += [" ".join((word, *listed))] if listed else []
+        if self.limit is not None:
+            given.append(f"--limit {self.limit}")
+        if self.loops:
+            given.append(f"--loops {self.loops}")
+        return " ".join(given + ["--next"] * self.next)
+
+
+@dataclass
+class Report:
+    """What a run did.
+
+    Attributes
+    ----------
+    records : list of dict
+        One a case, with the sections of its further stages.
+    computed, found : int
+        Stages that were made now, and that were there already.
+    failed : list of str
+        Cases that failed, with the reason; they count as wrong.
+    quarantined : list of str
+        Corrupt records that were set aside and made again.
+    """
+
+    records: list[dict[str, Any]] = field(default_factory=list)
+    computed: int = 0
+    found: int = 0
+    failed: list[str] = field(default_factory=list)
+    quarantined: list[str] = field(default_factory=list)
+
+
+def select(options: Options) -> list[Case]:
+    """Return the cases to run, kinds and causes mixed, so that a part of a run is like the whole.
+
+    A smaller fraction is contained in a larger one.
+    """
+    if not 0.0 < options.fraction <= 1.0:
+        raise ValueError(f"fraction {options.fraction} is outside (0, 1]; give a part, like 0.1")
+    drawn = cases(options.chosen, options.offset)
+    _known("kind", options.kinds, {case.kind for case in drawn})
+    _known("effect", options.names, {name for case in drawn for name in case.names})
+    wanted = [
+        case
+        for case in drawn
+        if (not options.kinds or case.kind in options.kinds)
+        and (not options.names or set(options.names) & set(case.names))
+    ]
+    rng = np.random.default_rng(SHUFFLE)
+    totals, seen = Counter(map(_group, wanted)), Counter[tuple[str, ...]]()
+    kept = []
+    for case in wanted:
+        group = _group(case)
+        number = math.ceil(options.fraction * totals[group] - 1e-9)
+        if seen[group] < number:  # each group is spread evenly, at random within its share
+            kept.append(((seen[group] + rng.random()) / number, case))
+        seen[group] += 1
+    return [case for _, case in sorted(kept, key=lambda entry: entry[0])][: options.limit]
+
+
+def _known(what: str, given: Iterable[str], known: Collection[str]) -> None:
+    for name in given:
+        if name not in known:
+            raise ValueError(f"no {what} is called {name!r}; there are {', '.join(sorted(known))}")
+
+
+def _group(case: Case) -> tuple[str, ...]:
+    """Return what a case is one of: its kind, and its cause where it has one."""
+    return (case.kind, *(case.names if case.kind in ("single", "weak", "loud") else ()))
+
+
+def run(
+    options: Options,
+    start: Callable[[int], Advance] = lambda total: lambda: None,
+    act: Study = study,
+) -> Report:
+    """Make what is missing of the records and return them all.
+
+    Parameters
+    ----------
+    options : Options
+    start : callable
+        Called, for each stage, with the number of cases to make; returns what to call after each.
+    act : callable
+        Makes a record of a case and some stages.
+    """
+    store = Store(options.folder)
+    store.sweep()
+    chosen, report, before = select(options), Report(), set(store.quarantined())
+    made = _stage("verdict", chosen, store, options, report, start, act)
+    if options.loops:
+        _merge(made, "loop", _looped(chosen, options), store, options, report, start, act)
+    if options.next:
+        open_ones = [case for case in chosen if promised(made[case])]
+        _merge(made, "next", open_ones, store, options, report, start, act)
+    report.records = sorted(made.values(), key=_place)
+    report.failed = [
+        f"{Case(**_tuples(record['case'])).title}: {record['failure']}"
+        for record in report.records
+        if record["failure"]
+    ]
+    report.quarantined = sorted(set(store.quarantined()) - before)
+    return report
+
+
+def retold(options: Options) -> list[dict[str, Any]]:
+    """Return records that are there, of whatever sources, judged anew by the present rule.
+
+    Of several records of a case the newest; what no longer fits the names is left out.
+    """
+    newest: dict[Case, dict[str, Any]] = {}
+    for path in sorted(options.folder.glob("*.json")):
+        record = read_record(path)
+        case = Case(**_tuples(record["case"]))
+        if record["stage"] == "verdict" and _date(record) >= _date(newest.get(case, {})):
+            newest[case] = record
+    chosen = select(options)
+    return sorted((_judged(newest[case]) for case in chosen if case in newest), key=_place)
+
+
+def _date(record: dict[str, Any]) -> str:
+    return str(record.get("volatile", {}).get("date", ""))
+
+
+def _judged(record: dict[str, Any]) -> dict[str, Any]:
+    """Return a record with the verdict that the present rule gives on its evidence."""
+    if record["failure"] or not record["evidence"]:
+        return record
+    found = judge(record["evidence"], Rule())
+    rivals = record["evidence"]["levels"][found.level]["rivals"]
+    names = rivals[0]["names"] if found.level else []
+    if set(names) == set(record["names"]):
+        names = record["names"]
+    else:
+        record = {**record, "traces": {}, "held_out": {}, "experiment": None}
+    still = ["+".join(rivals[k]["names"]) for k in found.open_rivals]
+    return {**record, "verdict": found.verdict, "names": names, "open": still}
+
+
+def _place(record: dict[str, Any]) -> tuple[Any, ...]:
+    return record["case"]["seed"], record["case"]["kind"]
+
+
+def _tuples(case: dict[str, Any]) -> dict[str, Any]:
+    return {**case, "names": tuple(case["names"]), "sizes": tuple(case["sizes"])}
+
+
+def _looped(chosen: Sequence[Case], options: Options) -> list[Case]:
+    """Return the first cases of every cause, in the order of the draw."""
+    counts: Counter[tuple[str, ...]] = Counter()
+    kept = set()
+    for case in sorted(filter(loops, chosen), key=lambda case: case.seed):
+        counts[case.names] += 1
+        if counts[case.names] <= options.loops:
+            kept.add(case)
+    return [case for case in chosen if case in kept]
+
+
+def _merge(
+    made: dict[Case, dict[str, Any]], stage: str, chosen: Sequence[Case], *rest: Any
+) -> None:
+    """Add the section of a stage to the records of its cases; a failure is kept in it."""
+    for case, record in _stage(stage, chosen, *rest).items():
+        failed = record["failure"]
+        made[case][stage] = {"failure": failed} if failed else record.get(stage)
+
+
+def _stage(
+    stage: str,
+    chosen: Sequence[Case],
+    store: Store,
+    options: Options,
+    report: Report,
+    start: Callable[[int], Advance],
+    act: Study,
+) -> dict[Case, dict[str, Any]]:
+    """Return the records of a stage, by case; what is missing is made."""
+    tasks = {case: Task(case, stage) for case in chosen}
+    there = {} if options.force else {c: store.load(t.key) for c, t in tasks.items()}
+    missing = [task for case, task in tasks.items() if there.get(case) is None]
+    report.found += len(tasks) - len(missing)
+    if missing:
+        advance = start(len(missing))
+        for _ in _computed(missing, store, options.cluster, act):
+            report.computed += 1
+            advance()
+    made = {}
+    for case, task in tasks.items():
+        record = store.load(task.key)
+        assert record is not None
+        made[case] = record
+    return made
+
+
+def _computed(
+    missing: Sequence[Task], store: Store, cluster: engine.Cluster, act: Study
+) -> Iterator[None]:
+    """Make records and keep each as it comes; a case whose workers die becomes a failed one."""
+    tasks = {task.key: task for task in missing}
+    for done in engine.run(partial(_made, act), missing, cluster):
+        task = tasks[done.key]
+        if done.lost:
+            case = task.case.record()
+            store.save(done.key, {"schema": 1, "case": case, "failure": done.error})
+        elif done.error:
+            raise ValueError(f"{task.case}: {done.error}")
+        else:
+            store.save(done.key, done.value)
+        yield
+
+
+def _made(act: Study, task: Task) -> dict[str, Any]:
+    """Make a record; called in workers."""
+    return {**act(task.case, (task.stage,)), "stage": task.stage}

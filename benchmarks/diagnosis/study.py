@@ -1,0 +1,200 @@
+"""One case of the diagnosis benchmark: what was found, beside what was hidden."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Collection
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.diagnosis.cases import NOISE, Case, Made, make
+from benchmarks.diagnosis.next import DrivenRig, OracleRig, again
+from benchmarks.identity.hashing import plain
+from benchmarks.runs import provenance
+from pam_envs.diagnosis.closed_loop.gain import COMPENSABLE, closed_loop
+from pam_envs.diagnosis.diagnosis import Diagnosis, diagnose
+from pam_envs.mechanics.hanging_mass import GRAVITY
+
+Array = NDArray[np.float64]
+
+STAGES = ("verdict", "loop", "next")
+"""The diagnosis; controllers on the hidden rig; the proposed experiment, carried out."""
+OUTPUTS = ("contraction", "pressure")
+MOST_RIVALS = 6
+KELVIN = 273.15
+
+
+def study(case: Case, stages: Collection[str] = ("verdict",)) -> dict[str, Any]:
+    """Make a case, diagnose it, and return what came out beside the truth.
+
+    Parameters
+    ----------
+    case : Case
+    stages : collection of str
+        Of :data:`STAGES`; ``verdict`` is always made.
+
+    Returns
+    -------
+    dict
+        In plain types. Where anything raised, ``failure`` holds its text.
+    """
+    unknown = sorted(set(stages) - set(STAGES))
+    if unknown:
+        raise ValueError(f"no stage is called {unknown[0]!r}; there are {', '.join(STAGES)}")
+    begun = clock.perf_counter()
+    record: dict[str, Any] = {"schema": 1, "case": case.record(), "failure": None}
+    spent = record["volatile"] = provenance.occasion() | {"make_s": 0.0, "runtime_s": None}
+    try:
+        made = make(case)
+        record["truths"] = truths_of(case, made)
+        spent["make_s"] = clock.perf_counter() - begun
+        found = _timed(spent, lambda: diagnosed(made.recording, made.sheet))
+        record |= outcome(found) | {"traces": trace_errors(made, found)}
+        if "loop" in stages and loops(case):
+            record["loop"] = loop_of(made, found)
+        if "next" in stages and promised(record):
+            record["next"] = next_of(case, made, record["experiment"]["name"])
+    except Exception as error:
+        record["failure"] = f"{type(error).__name__}: {error}"
+    return dict(plain(record))
+
+
+def _timed(spent: dict[str, Any], act: Callable[[], Diagnosis]) -> Diagnosis:
+    begun = clock.perf_counter()
+    found = act()
+    spent["runtime_s"] = clock.perf_counter() - begun
+    return found
+
+
+def diagnosed(recording: Any, sheet: Any) -> Diagnosis:
+    """Return the diagnosis of what an owner hands in."""
+    return diagnose(recording, rig=sheet, closed_loop=False, progress=False)
+
+
+def loops(case: Case) -> bool:
+    """Return whether controllers are compared on a case: one hidden effect that they can meet."""
+    return case.kind == "single" and case.names[0] in COMPENSABLE
+
+
+def promised(record: dict[str, Any]) -> bool:
+    """Return whether a record proposes an experiment that shall tell its rivals apart."""
+    plan = record.get("experiment")
+    return record.get("verdict") == "ambiguous" and plan is not None and bool(plan["enough"])
+
+
+def truths_of(case: Case, made: Made) -> list[dict[str, Any]]:
+    """Return what was hidden."""
+    return [
+        {
+            "name": truth.name,
+            "wanted": wanted,
+            "size": truth.size,
+            "raw": truth.raw,
+            "amplitude": truth.amplitude,
+        }
+        for truth, wanted in zip(made.truths, case.sizes, strict=True)
+    ]
+
+
+def outcome(found: Diagnosis) -> dict[str, Any]:
+    """Return what a diagnosis says, in short."""
+    report, decision = found.report, found.study.decision
+    plan = report["experiment"]
+    return {
+        "verdict": found.verdict,
+        "names": list(found.causes),
+        "rivals": [
+            {"name": rival["name"], "gain": rival["gain"]["value"]}
+            for rival in report["rivals"][:MOST_RIVALS]
+        ],
+        "open": ["+".join(rival.names) for rival in decision.open_rivals],
+        "evidence": getattr(decision, "evidence", None),
+        "held_out": {
+            when: {name: error["times_floor"] for name, error in (report[when] or {}).items()}
+            for when in ("error_before", "error_after")
+        },
+        "calibration": {
+            flag: [entry["name"] for entry in report["calibration"] if entry[flag]]
+            for flag in ("at_bound", "outside_tolerance")
+        },
+        "not_testable": [entry["name"] for entry in report["not_testable"]],
+        "experiment": plan and {key: plan[key] for key in ("name", "separation", "enough")},
+        "rule_version": report["rule_version"],
+    }
+
+
+def trace_errors(made: Made, found: Diagnosis) -> dict[str, dict[str, Any]]:
+    """Return, for every cause rightly named, how far its trace is from the true one.
+
+    RMS of the difference over that of the truth, both without what refitting the base takes up,
+    on the output where the truth is largest. Beside it the RMS of both, over the usual noise.
+    """
+    errors = {}
+    for truth in made.truths:
+        if truth.name not in found.causes:
+            continue
+        shown = found.traces.effects[truth.name]
+        trace = np.stack([shown[name] for name in OUTPUTS])
+        true, ours = made.ground.left(truth.trace), made.ground.left(trace)
+        k = int(np.argmax((true**2).mean(axis=1)))
+        size = _rms(true[k])
+        errors[truth.name] = {
+            "output": OUTPUTS[k],
+            "error": _rms(ours[k] - true[k]) / size,
+            "found": _rms(ours[k]),
+            "true": size,
+            "found_raw": _rms(trace[k]) / NOISE[k],
+            "true_raw": _rms(truth.trace[k]) / NOISE[k],
+        }
+    return errors
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+# --- the proposed experiment ---------------------------------------------------------------------
+
+
+def next_of(case: Case, made: Made, plan: str) -> dict[str, Any]:
+    """Carry out an experiment and return what the diagnosis says then."""
+    found = diagnosed(*again(case, made, plan))
+    said = outcome(found)
+    return {"plan": plan, **{key: said[key] for key in ("verdict", "names", "open", "rivals")}}
+
+
+# --- in closed loop ------------------------------------------------------------------------------
+
+
+def loop_of(made: Made, found: Diagnosis) -> dict[str, Any] | None:
+    """Return what the extended plant is worth on the hidden rig; errors are true ones, in mm.
+
+    Under the median load and at the last temperature of the recording. Where a wrong cause was
+    named, or none, this is what the owner would get.
+    """
+    load = float(np.median(made.recording.load))
+    celsius = float(made.ground.campaign.temperature_C[-1])
+    loop = closed_loop(
+        found.base,
+        found.plant,
+        rig=DrivenRig(made, load, celsius),
+        oracle=OracleRig(made, load, celsius),
+        load=load / GRAVITY,
+        kelvin=celsius + KELVIN,
+    )
+    if loop is None:
+        return None
+    before, after = loop["before"]["value"], loop["after"]["value"]
+    best = loop["oracle"]["value"]
+    gap = before - best
+    return {
+        "before_mm": before,
+        "after_mm": after,
+        "oracle_mm": best,
+        "gap": gap / before,
+        "recovered": (before - after) / gap if gap > 0.0 else None,
+        "better_percent": loop["better_percent"],
+        "references": loop["references"],
+    }

@@ -1,0 +1,314 @@
+"""A second plant for the diagnosis: a mass on a spring and a damper, pushed by a known force.
+
+:class:`MassSpringDamper` is all that the engine asks of a plant: a column of parameters, how many
+columns are simulated at once, which parameters the base refits, and how a fit moves each. With
+the causes below it is diagnosed as a muscle is, by one output instead of two.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pam_envs.diagnosis.cause import Cause, Form, Term
+from pam_envs.diagnosis.decide.structure import FILTERS, Regressors, low_pass
+from pam_envs.diagnosis.fit.least_squares import Free
+from pam_envs.diagnosis.fit.starting_values import grid
+
+Array = NDArray[np.float64]
+
+SUBSTEPS = 4
+"""Steps of the simulation between two readings."""
+NEWTON = 12
+STRETCH = 0.05
+"""Displacement [m] at which bent springs are as much stiffer as their parameter says."""
+STRONG = 5.0
+"""Force [N] at which a bent actuator is as much weaker as its parameter says."""
+BROKEN_AWAY = 0.001
+"""Speed [m/s] at which friction has fallen from its value at rest (as in C. Canudas de Wit et al.,
+IEEE Transactions on Automatic Control 40 (1995) 419)."""
+CREEPING = 2e-4
+"""Speed [m/s] up to which friction grows from nothing."""
+FORCES = (0.1, 0.16, 0.27, 0.43, 0.7, 1.14, 1.85, 3.0)
+"""Dry friction [N] from which fits may begin: the best few do."""
+NEUTRAL = {
+    "mass": 1.0,
+    "stiffness": 100.0,
+    "damping": 2.0,
+    "friction.force": 0.0,
+    "friction.breakaway": 0.0,
+    "drag.quadratic": 0.0,
+    "spring.hardening": 0.0,
+    "spring.asymmetry": 0.0,
+    "actuator.dead_time": 0.0,
+    "actuator.lag": 0.0,
+    "actuator.bend": 0.0,
+    "position.bias": 0.0,
+    "position.drift": 0.0,
+    "position.play": 0.0,
+    "relaxation.stiffness": 0.0,
+    "relaxation.time": 1.0,
+}
+"""Every parameter, with its value in a plain plant (SI)."""
+NAMES = tuple(NEUTRAL)
+BASE = ("mass", "stiffness", "damping")
+BOUNDS = {
+    "mass": (0.05, 20.0, 0.1),
+    "stiffness": (1.0, 1e4, 10.0),
+    "damping": (0.01, 100.0, 0.2),
+    "friction.force": (0.0, 10.0, 0.1),
+    "friction.breakaway": (0.0, 1.0, 0.05),
+    "drag.quadratic": (0.0, 50.0, 0.5),
+    "spring.hardening": (-0.5, 5.0, 0.05),
+    "spring.asymmetry": (-0.8, 0.8, 0.05),
+    "actuator.dead_time": (0.0, 0.2, 0.005),
+    "actuator.lag": (0.0, 1.0, 0.01),
+    "actuator.bend": (-0.5, 0.5, 0.02),
+    "position.bias": (-0.1, 0.1, 1e-3),
+    "position.drift": (-0.01, 0.01, 1e-5),
+    "position.play": (0.0, 0.05, 5e-4),
+    "relaxation.stiffness": (0.0, 1e3, 5.0),
+    "relaxation.time": (0.02, 100.0, 0.1),
+}
+"""Lowest and highest value, and the size of a meaningful change (SI)."""
+LOGARITHMIC = ("mass", "stiffness", "damping", "relaxation.time")
+
+
+@dataclass(frozen=True)
+class MassSpringDamper:
+    """What a fit of a mass-spring-damper starts from, and the force it feels.
+
+    Attributes
+    ----------
+    force : ndarray, shape (T,)
+        Held from each reading to the next [N].
+    period : float
+        Time between two readings [s].
+    start : dict of str to float
+        Parameters that differ from :data:`NEUTRAL`, by name.
+    """
+
+    force: Array
+    period: float
+    start: dict[str, float]
+
+    channels = ("position",)
+    units = ("mm",)
+
+    @property
+    def column(self) -> Array:
+        """Return the parameters as a column."""
+        return np.array([{**NEUTRAL, **self.start}[name] for name in NAMES])
+
+    def simulate(self, columns: Array) -> Array:
+        """Return what the sensor would show [m], shape (1, T, n)."""
+        found = _positions(np.ascontiguousarray(columns), self.force, self.period)
+        return np.ascontiguousarray(found.T)[None]
+
+    def free(self, name: str, **changes: Any) -> Free:
+        """Return how a fit moves a parameter."""
+        place = NAMES.index(name)
+        low, high, scale = BOUNDS[name]
+        made = dict(low=low, high=high, scale=scale, log=name in LOGARITHMIC)
+        made["start"] = float(self.column[place])
+        return Free(name, place, **{**made, **changes})
+
+    def base(self) -> tuple[Free, ...]:
+        """Return what is refitted before anything is called missing."""
+        return tuple(self.free(name) for name in BASE)
+
+    def regressors(self, position: Array) -> Regressors:
+        """Return what a residual may vary against.
+
+        Parameters
+        ----------
+        position : ndarray, shape (T,)
+            As the refitted base has it [m].
+        """
+        time = np.arange(len(position)) * self.period
+        speed = np.gradient(position, self.period)
+        slow = [low_pass(self.force, tau, self.period) for tau in FILTERS]
+        s = time / max(float(time[-1]), 1e-9)
+        x, v, f = (u / max(float(np.std(u)), 1e-12) for u in (position, speed, self.force))
+        rows = [np.ones_like(s), s, s**2, s**3]
+        rows += [x, x**2, x**3, v, v * np.abs(v), np.tanh(v), np.tanh(5.0 * v), np.abs(v), x * v]
+        rows += [f, f * np.abs(f), *(self.force - u for u in slow)]
+        # the engine asks for the motion under this name
+        values = {"time": time, "pressure": position, "rate": speed, "load": self.force}
+        return Regressors(values, np.array(rows))
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _positions(columns: Array, force: Array, period: float) -> Array:  # pragma: no cover
+    """Return positions, shape (n, T), by a midpoint rule that takes friction implicitly."""
+    n, samples = len(columns), len(force)
+    out = np.empty((n, samples))
+    h = period / SUBSTEPS
+    for lane in range(n):
+        m, k, c, dry, rest, drag, hard, skew = columns[lane, :8]
+        dead, lag, bend, bias, drift, play, arm, relax = columns[lane, 8:]
+        x = v = arm_force = felt = shown = 0.0
+        fade = np.exp(-h / relax)
+        catch = 1.0 - np.exp(-h / lag) if lag > 1e-9 else 1.0
+        for i in range(samples):
+            shown = min(max(shown, x - play), x + play)
+            out[lane, i] = shown + bias + drift * i * period
+            for j in range(SUBSTEPS):
+                push = _late(force, i + (j * h - dead) / period, h / period)
+                push *= 1.0 - bend * abs(push) / STRONG
+                felt += catch * (push - felt)
+                middle = x + 0.5 * h * v
+                u = middle / STRETCH
+                spring = k * middle * (1.0 + skew * u + hard * u * u)
+                arm_force = fade * arm_force + arm * h * v
+                loss = 0.5 * h * (c + drag * abs(v))
+                b = (m - loss) * v + h * (felt - spring - arm_force)
+                held = dry * (1.0 + rest * np.exp(-((v / BROKEN_AWAY) ** 2)))
+                v = _with_friction(m + loss, b, h * held)
+                x = middle + 0.5 * h * v
+    return out
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _late(force: Array, start: float, length: float) -> float:  # pragma: no cover
+    """Return the mean of held forces over an interval, in samples; zero before the first."""
+    first, last = int(np.floor(start)), int(np.floor(start + length))
+    before = force[min(first, len(force) - 1)] if first >= 0 else 0.0
+    if last == first:
+        return before
+    after = force[min(last, len(force) - 1)] if last >= 0 else 0.0
+    part = (start + length - last) / length
+    return (1.0 - part) * before + part * after
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _with_friction(a: float, b: float, dry: float) -> float:  # pragma: no cover
+    """Return the v that solves ``a v + dry tanh(v / CREEPING) = b``, by Newton from below."""
+    if dry <= 0.0:
+        return b / a
+    size = abs(b)
+    v = max((size - dry) / a, 0.0)
+    for _ in range(NEWTON):
+        t = np.tanh(v / CREEPING)
+        step = (size - a * v - dry * t) / (a + dry * (1.0 - t * t) / CREEPING)
+        v += step
+        if step < 1e-9:
+            break
+    return v if b >= 0.0 else -v
+
+
+CAUSES = (
+    Cause(
+        "dry_friction",
+        "dry friction of the guide",
+        (
+            Form("sliding", (Term("friction.force", (0.5,)),), seeds=grid(FORCES)),
+            Form(
+                "sliding and breakaway",
+                (
+                    Term("friction.force", (0.5,)),
+                    Term("friction.breakaway", (0.1,), amount=False),
+                ),
+                seeds=grid(FORCES, (0.1, 0.3)),
+            ),
+        ),
+        signature="the error has the sign of the velocity, and a hold keeps it",
+        neighbours=("play", "quadratic_drag", "relaxation"),
+        experiment="Slow ramps up and down, with a hold on either way.",
+        sensor="a load cell between guide and mass",
+    ),
+    Cause(
+        "quadratic_drag",
+        "drag that grows with the square of the speed",
+        (Form("square", (Term("drag.quadratic", (1.0,)),)),),
+        signature="large swings die out faster than small ones",
+        neighbours=("dry_friction",),
+        experiment="Let it swing freely from a large and from a small displacement.",
+    ),
+    Cause(
+        "hardening_spring",
+        "a spring that hardens or softens",
+        (Form("cubic", (Term("spring.hardening", (0.05, -0.05)),)),),
+        signature="large displacements are smaller, or larger, than the force says, both ways",
+        neighbours=("actuator_bend",),
+        experiment="Settled displacements at several forces.",
+    ),
+    Cause(
+        "asymmetric_spring",
+        "a spring that is stiffer one way",
+        (Form("square", (Term("spring.asymmetry", (0.05, -0.05)),)),),
+        signature="the error has one sign and grows with the displacement",
+        neighbours=("sensor_bias",),
+        experiment="Settled displacements at forces of both signs.",
+    ),
+    Cause(
+        "dead_time",
+        "a delay between the force asked for and the reading",
+        (Form("delay", (Term("actuator.dead_time", (0.01, 0.04)),)),),
+        signature="the error goes with the speed, and is gone in a hold",
+        neighbours=("actuator_lag",),
+        experiment="A step.",
+    ),
+    Cause(
+        "actuator_lag",
+        "a force that follows its command with a lag",
+        (Form("first order", (Term("actuator.lag", (0.01, 0.05)),)),),
+        signature="the error goes with the speed, and is gone in a hold",
+        neighbours=("dead_time",),
+        experiment="A step.",
+    ),
+    Cause(
+        "actuator_bend",
+        "a force that is not in proportion to its command",
+        (Form("quadratic", (Term("actuator.bend", (0.02, -0.02)),)),),
+        signature="large forces give less, or more, than they should",
+        neighbours=("hardening_spring",),
+        experiment="Settled displacements at several forces.",
+    ),
+    Cause(
+        "sensor_bias",
+        "a bias of the sensor",
+        (Form("constant", (Term("position.bias", (1e-3,)),)),),
+        signature="the same error at all times, before the first force too",
+        neighbours=("asymmetric_spring", "sensor_drift"),
+        experiment="A rest without force.",
+    ),
+    Cause(
+        "sensor_drift",
+        "a drifting sensor",
+        (Form("straight", (Term("position.drift", (2e-5,)),)),),
+        signature="the error grows with time, whatever the mass does",
+        neighbours=("sensor_bias", "relaxation"),
+        experiment="A rest without force at the end.",
+    ),
+    Cause(
+        "play",
+        "play in the linkage of the sensor",
+        (Form("backlash", (Term("position.play", (5e-4, 3e-3)),)),),
+        signature="the error has the sign of the velocity, and a hold keeps it",
+        neighbours=("dry_friction",),
+        experiment="A free swing: play does not slow it down, friction halts it.",
+        sensor="a second position sensor on the mass itself",
+    ),
+    Cause(
+        "relaxation",
+        "a spring that relaxes",
+        (
+            Form(
+                "one arm",
+                (
+                    Term("relaxation.stiffness", (5.0, 5.0)),
+                    Term("relaxation.time", (0.3, 3.0), log=True, amount=False),
+                ),
+            ),
+        ),
+        signature="after a step the displacement goes on growing",
+        neighbours=("sensor_drift", "dry_friction"),
+        experiment="Long holds.",
+    ),
+)
+"""What a mass-spring-damper may lack."""

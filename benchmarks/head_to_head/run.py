@@ -1,0 +1,249 @@
+"""Head to head: a mass-spring-damper with hidden dry friction, by ours and by ``mujoco.sysid``.
+
+``python -m benchmarks.head_to_head.run`` runs both on the same recordings and prints the tables;
+``--write`` also puts them into ``docs/head_to_head.md`` and ``results/head_to_head.json``.
+Without the extra ``mujoco`` it says so and runs ours alone.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tyro
+from numpy.typing import NDArray
+
+from benchmarks.head_to_head import sysid as theirs
+from benchmarks.head_to_head.mass_spring_damper import CAUSES, MassSpringDamper
+from benchmarks.head_to_head.page import page
+from benchmarks.head_to_head.rig import NOISE, PERIOD, Oscillator, another, campaign
+from benchmarks.identity.hashing import plain
+from benchmarks.runs.provenance import packages
+from pam_envs.diagnosis.decide.rule import Rule
+from pam_envs.diagnosis.decide.search import Blocks, Candidate, fit_base
+from pam_envs.diagnosis.decide.verdict import Decision, decide
+from pam_envs.diagnosis.fit.least_squares import Problem, column_of
+
+Array = NDArray[np.float64]
+
+HERE = Path(__file__).parents[1]
+RESULTS = HERE / "results" / "head_to_head.json"
+PAGE = HERE.parent / "docs" / "head_to_head.md"
+FRICTIONS = (0.0, 0.5, 1.0, 2.0)
+"""Hidden dry friction [N]."""
+OTHERS: dict[str, dict[str, float]] = {
+    "dead_time": {"delay": 3},
+    "sensor_bias": {"bias": 0.003},
+    "sensor_drift": {"drift": 0.006},
+}
+"""Effects hidden instead, so that not everything is called friction."""
+FIRST = 1000
+"""Seed of the first rig; the causes and their starts were set up on seeds below."""
+START = {"mass": 1.5, "stiffness": 70.0, "damping": 3.0}
+"""Where every fit begins."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Case:
+    """A drawn rig with something hidden in it, or nothing.
+
+    Attributes
+    ----------
+    seed : int
+        Of all draws.
+    effect : str
+        Name of the cause that is right; empty where there is none.
+    hidden : dict of str to float
+        What :meth:`Oscillator.drawn` adds to the rig.
+    """
+
+    seed: int
+    effect: str
+    hidden: dict[str, float]
+
+    @property
+    def rig(self) -> Oscillator:
+        """The rig."""
+        return Oscillator.drawn(self.seed, **self.hidden)
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """A diagnosis of a mass-spring-damper."""
+
+    family: MassSpringDamper
+    problem: Problem
+    blocks: Blocks
+    base: Candidate
+    decision: Decision
+
+    def error(self, candidate: Candidate) -> float:
+        """Return the RMS residual over the noise on blocks that no fit has seen."""
+        return float(np.sqrt(self.blocks.means(candidate.errors)[0]))
+
+    def predict(self, candidate: Candidate, force: Array) -> Array:
+        """Return a candidate's positions [m] under another force, shape (T,)."""
+        family = dataclasses.replace(self.family, force=force)
+        return family.simulate(column_of(candidate.fit, candidate.fit.z)[None])[0, :, 0]
+
+
+def cases(rigs: int, others: int, first: int = FIRST) -> Iterator[Case]:
+    """Yield the cases, so many rigs for every friction and for every other effect."""
+    for seed in range(first, first + rigs):
+        for friction in FRICTIONS:
+            yield Case(seed, "dry_friction" if friction else "", {"friction": friction})
+    for seed in range(first, first + others):
+        for effect, hidden in OTHERS.items():
+            yield Case(seed, effect, hidden)
+
+
+def diagnose(force: Array, reading: Array, rule: Rule | None = None, seed: int = 0) -> Outcome:
+    """Refit a mass-spring-damper to a recording and look for what it misses.
+
+    Parameters
+    ----------
+    force : ndarray, shape (T,)
+        Held from each reading to the next [N].
+    reading : ndarray, shape (T,)
+        Of the position [m].
+    rule : Rule, optional
+        Numbers of the decision.
+    seed : int
+        Of the decision's draws.
+    """
+    family = MassSpringDamper(force, PERIOD, START)
+    time = np.arange(len(force)) * PERIOD
+    measured = reading[None]
+    blocks = Blocks.make(time, measured)
+    problem = Problem(family.simulate, measured, np.array([NOISE]), blocks.train, time)
+    base = fit_base(problem, blocks, family.column, family.base())
+    position = family.simulate(column_of(base.fit, base.fit.z)[None])[0, :, 0]
+    regressors = family.regressors(position)
+    decision = decide(problem, family, blocks, base, CAUSES, regressors, rule or Rule(), seed)
+    return Outcome(family, problem, blocks, base, decision)
+
+
+def run(case: Case, against: bool, told: bool = False) -> dict[str, Any]:
+    """Return what both tools make of a case, in plain types.
+
+    Parameters
+    ----------
+    case : Case
+    against : bool
+        Whether MuJoCo is run.
+    told : bool
+        Whether it is also run with friction among its parameters.
+    """
+    rig, force, fresh = case.rig, campaign(case.seed).force, another(case.seed).force
+    reading, truth = rig.readings(force, case.seed), rig.positions(fresh)
+    row = {**dataclasses.asdict(case), "rig": dataclasses.asdict(rig)}
+    row["ours"] = _ours(force, reading, fresh, truth)
+    if against:
+        row["sysid"] = _theirs(force, reading, fresh, truth, friction=False)
+        if told and "friction" in case.hidden:
+            row["sysid_told"] = _theirs(force, reading, fresh, truth, friction=True)
+    return row
+
+
+def _rms(values: Array) -> float:
+    """Return the RMS over the noise, of what is there."""
+    return float(np.sqrt(np.nanmean(values**2))) / NOISE
+
+
+def _ours(force: Array, reading: Array, fresh: Array, truth: Array) -> dict[str, Any]:
+    found = diagnose(force, reading)
+    decision, model = found.decision, found.decision.model
+    return {
+        "verdict": decision.verdict,
+        "causes": list(model.names),
+        "forms": [form.name for _, form in model.causes],
+        "values": model.fit.values(),
+        "base_values": found.base.fit.values(),
+        "residual": _rms(found.predict(found.base, force) - reading),
+        "held_out": [found.error(found.base), found.error(model)],
+        "gain": found.blocks.gain(found.base.errors, model.errors),
+        "rivals": [
+            {"causes": list(r.names), "gain": found.blocks.gain(found.base.errors, r.errors)}
+            for r in decision.rivals[:3]
+        ],
+        "another": [_rms(found.predict(c, fresh) - truth) for c in (found.base, model)],
+    }
+
+
+def _theirs(
+    force: Array, reading: Array, fresh: Array, truth: Array, friction: bool
+) -> dict[str, Any]:
+    found = theirs.identify(force, reading, PERIOD, START, friction)
+    return {
+        "values": found.values,
+        "intervals": found.intervals,
+        "issues": found.issues,
+        "residual": _rms(found.position - reading),
+        "another": _rms(theirs.predict(found.values, fresh, PERIOD) - truth),
+    }
+
+
+def kept(row: dict[str, Any]) -> dict[str, Any]:
+    """Return a row with what MuJoCo made of the same case when the results were written."""
+    alike = ("seed", "effect", "hidden")
+    for old in json.loads(RESULTS.read_text(encoding="utf-8"))["rows"]:
+        if all(old[key] == row[key] for key in alike):
+            return {**row, **{key: value for key, value in old.items() if key.startswith("sysid")}}
+    raise ValueError(f"{RESULTS.name} has no row of seed {row['seed']}, {row['hidden']}: run both")
+
+
+def main(
+    rigs: int = 20, others: int = 10, told: int = 5, write: bool = False, keep: bool = False
+) -> dict[str, Any]:
+    """Run both tools on the same recordings and print the tables.
+
+    Parameters
+    ----------
+    rigs : int
+        Drawn rigs for every friction.
+    others : int
+        Drawn rigs for every other hidden effect.
+    told : int
+        Rigs on which MuJoCo is also told of friction: most of its time goes into that.
+    write : bool
+        Also write ``results/head_to_head.json`` and ``docs/head_to_head.md``.
+    keep : bool
+        Take MuJoCo's side from ``results/head_to_head.json`` and run ours anew: minutes instead of
+        half an hour.
+    """
+    from rich.progress import track
+
+    version = _kept_version() if keep else theirs.version()
+    if version is None:
+        print("mujoco.sysid is not installed (pip install -e .[mujoco]): ours alone is run")
+    rows = []
+    for case in track(list(cases(rigs, others)), "head to head"):
+        against = version is not None and not keep
+        row = plain(run(case, against, case.seed < FIRST + told))
+        rows.append(kept(row) if keep else row)
+    result = {
+        "schema": 1,
+        "rule": Rule().version,
+        "noise_m": NOISE,
+        "packages": packages() | {"mujoco": version},
+        "rows": rows,
+    }
+    text = page(result)
+    print(text)
+    if write:
+        RESULTS.write_text(json.dumps(plain(result), indent=1) + "\n", encoding="utf-8")
+        PAGE.write_text(text, encoding="utf-8")
+    return result
+
+
+def _kept_version() -> str | None:
+    version: str | None = json.loads(RESULTS.read_text(encoding="utf-8"))["packages"]["mujoco"]
+    return version
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

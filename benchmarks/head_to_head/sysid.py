@@ -1,0 +1,181 @@
+"""What ``mujoco.sysid`` makes of a recording of a mass-spring-damper (extra ``mujoco``).
+
+It is given all that it needs: the mechanism, the force as it was held, free bounds as wide as ours,
+the starting values that ours begins from. Issues are what its own report lists as warnings.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+from contextlib import redirect_stdout
+from dataclasses import dataclass
+from io import StringIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.head_to_head.mass_spring_damper import BOUNDS
+
+Array = NDArray[np.float64]
+
+STEP = 0.005
+"""Step of MuJoCo's simulation [s]."""
+MECHANISM = """
+<mujoco>
+  <option timestep="{step}" integrator="RK4" gravity="0 0 0">
+    <flag contact="disable"/>
+  </option>
+  <worldbody>
+    <body name="mass">
+      <inertial pos="0 0 0" mass="1" diaginertia="0.001 0.001 0.001"/>
+      <joint name="slide" type="slide" axis="1 0 0" stiffness="100" damping="2"/>
+    </body>
+  </worldbody>
+  <actuator><motor name="push" joint="slide"/></actuator>
+  <sensor><jointpos name="position" joint="slide"/></sensor>
+</mujoco>
+"""
+LOSS = ("friction.force", 0.5)
+"""The parameter of MuJoCo's own dry friction, under our name, and where its fit begins [N]."""
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What came out.
+
+    Attributes
+    ----------
+    values : dict of str to float
+        Parameters by our names (SI).
+    intervals : dict of str to float
+        Half widths of their 95 % intervals, as ``calculate_intervals`` gives them.
+    issues : list of str
+        Warnings of its report.
+    position : ndarray, shape (T,)
+        Of the fitted model, under the force of the recording [m]; NaN where it is not compared.
+    """
+
+    values: dict[str, float]
+    intervals: dict[str, float]
+    issues: list[str]
+    position: Array
+
+
+def version() -> str | None:
+    """Return MuJoCo's version if its identification can be used, else None."""
+    try:
+        from mujoco import sysid
+
+        assert sysid.optimize
+        return importlib.metadata.version("mujoco")
+    except (ImportError, AttributeError):
+        return None
+
+
+def identify(
+    force: Array, reading: Array, period: float, start: dict[str, float], friction: bool
+) -> Identified:
+    """Fit mass, stiffness and damping, and MuJoCo's dry friction if it is asked for.
+
+    Parameters
+    ----------
+    force : ndarray, shape (T,)
+        Held from each reading to the next [N].
+    reading : ndarray, shape (T,)
+        [m].
+    period : float
+        [s].
+    start : dict of str to float
+        Where the fit begins.
+    friction : bool
+        Whether its user has thought of dry friction.
+    """
+    import mujoco
+    from mujoco import sysid
+    from mujoco.sysid.report.sections.insights import AutomatedInsights
+
+    spec = mujoco.MjSpec.from_string(MECHANISM.format(step=STEP))
+    parameters = _parameters(start | ({LOSS[0]: LOSS[1]} if friction else {}))
+    sequence = _sequence(spec, force, reading, period)
+    residual = sysid.build_residual_fn(models_sequences=[sequence], n_threads=1)
+    with redirect_stdout(StringIO()):  # it prints its iterations whatever it is told
+        found, result = sysid.optimize(parameters, residual, optimizer="mujoco", verbose=False)
+    left, (predicted,), _ = residual(found.as_vector(), found, return_pred_all=True)
+    _, widths = sysid.calculate_intervals(left, result.jac)
+    names = found.get_non_frozen_parameter_names()
+    insights = AutomatedInsights("insights", found).get_context()["insights"]
+    return Identified(
+        dict(zip(names, found.as_vector().tolist(), strict=True)),
+        dict(zip(names, np.asarray(widths).tolist(), strict=True)),
+        [f"{i['title']}: {i['message']}" for i in insights if i["type"] == "warning"],
+        _placed(predicted[0], len(force), period),
+    )
+
+
+def _parameters(start: dict[str, float]) -> Any:
+    """Return what is fitted, with what each changes in the mechanism."""
+    from mujoco import sysid
+
+    def modifier(name: str) -> Any:
+        def modify(spec: Any, parameter: Any) -> None:
+            value = float(parameter.value[0])
+            if name == "mass":
+                spec.body("mass").mass = value
+            elif name == LOSS[0]:
+                spec.joint("slide").frictionloss = value
+            else:
+                field = getattr(spec.joint("slide"), name)
+                field[0] = value
+
+        return modify
+
+    made = sysid.ParameterDict()
+    for name, value in start.items():
+        low, high, _ = BOUNDS[name]
+        made.add(sysid.Parameter(name, value, low, high, modifier=modifier(name)))
+    return made
+
+
+def _sequence(spec: Any, force: Array, reading: Array, period: float) -> Any:
+    """Return the recording as ``mujoco.sysid`` reads it: the force anew at each of its steps."""
+    from mujoco import sysid
+
+    model = spec.compile()
+    times = np.arange(len(force)) * period
+    each = round(period / STEP)
+    finely = np.arange((len(force) - 1) * each + 1) * STEP
+    held = np.repeat(force, each)[: len(finely), None]
+    # the state, not the sensor: a sensor is read before a step and stamped with the time after it
+    shown = sysid.TimeSeries.from_names(times, reading[:, None], model, ["slide_qpos"])
+    return sysid.ModelSequences(
+        "rig",
+        spec,
+        "campaign",
+        sysid.create_initial_state(model, np.zeros(1)),
+        sysid.TimeSeries.from_control_names(finely, held, model),
+        shown,
+    )
+
+
+def _placed(predicted: Any, samples: int, period: float) -> Array:
+    """Return predicted positions by sample."""
+    found = np.full(samples, np.nan)
+    found[np.round(predicted.times / period).astype(int)] = predicted.data[:, 0]
+    return found
+
+
+def predict(values: dict[str, float], force: Array, period: float) -> Array:
+    """Return the positions [m], shape (T,), of a model with given parameters under a force."""
+    import mujoco
+
+    spec = mujoco.MjSpec.from_string(MECHANISM.format(step=STEP))
+    for parameter in _parameters(values).values():
+        parameter.apply_modifier(spec)
+    model = spec.compile()
+    data, found = mujoco.MjData(model), np.empty(len(force))
+    for k, value in enumerate(force):
+        found[k] = data.qpos[0]
+        data.ctrl[0] = value
+        mujoco.mj_step(model, data, nstep=round(period / STEP))
+    return found

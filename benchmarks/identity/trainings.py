@@ -1,0 +1,129 @@
+"""The trainings behind a learned row: the first n seeds of one training, none twice or left out.
+
+How much seeds differ is what several of them are for. A policy that is copied, a seed that is
+dropped because it came out badly, or a lucky one of other settings would make that look smaller.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.identity import artefacts
+from benchmarks.identity.hashing import digest
+from benchmarks.runs.controllers import Entrant
+
+SETTINGS = (
+    *("algo", "env", "env_kwargs", "plant", "plants", "signals", "action_signals", "steps"),
+)
+"""Of a card: what seeds of one training have in common."""
+LEFT_OUT = ("search", "checkpoint_steps")
+"""Of a configuration: what changes nothing that is learned."""
+
+
+def of(entrant: Entrant) -> list[dict[str, Any]] | None:
+    """Return the training of each policy file as the card beside it says, ``None`` without any."""
+    if not entrant.files:
+        return None
+    return [{"training_seed": seed, **_beside(path)} for seed, path in entrant.files]
+
+
+def _beside(policy: Path) -> dict[str, Any]:
+    said = _json(policy)
+    known = {key: said[key] for key in ("command", "steps") if key in said}
+    return known | dict(said.get("training") or {})
+
+
+def _json(policy: Path) -> dict[str, Any]:
+    card = artefacts.located(policy).with_suffix(".json")
+    return dict(json.loads(card.read_text(encoding="utf-8"))) if card.is_file() else {}
+
+
+def card_record(controller: Any) -> dict[str, Any]:
+    """Return seed and settings of the training of a policy, as the card inside its file says."""
+    card = getattr(controller, "card", None)
+    said = dict(card) if isinstance(card, Mapping) else {}
+    config = dict(said.get("config") or {})
+    settings = {name: said.get(name) for name in SETTINGS}
+    settings["config"] = {name: v for name, v in config.items() if name not in LEFT_OUT}
+    corrected = dict(said.get("baseline") or {})  # with a probe, whose digits machines change
+    settings["baseline"] = [corrected.get(name) for name in ("name", "scale")]
+    return {"seed": said.get("seed"), "settings": digest(settings)[:16]}
+
+
+def check_files(entrant: Entrant) -> None:
+    """Raise unless the policy files are of seeds 0, 1, 2, ... and all different.
+
+    Raises
+    ------
+    ValueError
+        Saying what to do.
+    """
+    seeds = [seed for seed, _ in entrant.files]
+    if seeds != list(range(len(seeds))):
+        raise ValueError(
+            f"{entrant.name}: training seeds {', '.join(map(str, seeds))}, and they must be 0 to "
+            f"{len(seeds) - 1}: the first ones, none left out; train those that are missing"
+        )
+    first: dict[str, int] = {}
+    for seed, path in entrant.files:
+        other = first.setdefault(artefacts.file_record(path, seed)["sha256"], seed)
+        if other != seed:
+            raise ValueError(f"{entrant.name}: {_copies(other, seed)}")
+        beside = _json(path)
+        for said in (beside, beside.get("training") or {}):
+            _check_seed(entrant, seed, said.get("seed", seed))
+
+
+def check_cells(entrant: Entrant, cells: Sequence[Mapping[str, Any]]) -> None:
+    """Raise unless the policies that were run are of different seeds of one training.
+
+    Parameters
+    ----------
+    entrant : Entrant
+    cells : sequence of mapping
+        The records of a row's cells.
+
+    Raises
+    ------
+    ValueError
+        Naming the seeds.
+    """
+    check_files(entrant)
+    if not entrant.files:
+        return
+    settings = {}
+    runs: dict[int, list[str]] = {}
+    for cell in cells:
+        seed = cell["training_seed"]
+        _check_seed(entrant, seed, cell["card"]["seed"])
+        settings[seed] = cell["card"]["settings"]
+        done = [episode["trajectory"] for episode in cell["episodes"] if episode["steps"]]
+        runs.setdefault(seed, []).extend(done)
+    odd = [seed for seed, found in settings.items() if found != settings[0]]
+    if odd:
+        raise ValueError(
+            f"{entrant.name}: training seed {odd[0]} was trained with other settings than seed 0; "
+            "train all of a row's seeds by one command"
+        )
+    for first, second in itertools.combinations(runs, 2):
+        if runs[first] and runs[first] == runs[second]:
+            raise ValueError(f"{entrant.name}: {_copies(first, second)}")
+
+
+def _copies(first: int, second: int) -> str:
+    return (
+        f"training seeds {first} and {second} are one policy; a copy is no training of its own: "
+        "train it, or take it out"
+    )
+
+
+def _check_seed(entrant: Entrant, seed: int, said: Any) -> None:
+    if said != seed:
+        raise ValueError(
+            f"{entrant.name}: the file of training seed {seed} has seed {said} on its card; name "
+            "files as they were trained"
+        )

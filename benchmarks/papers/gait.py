@@ -1,0 +1,269 @@
+"""Figures of the orthosis paper that need the leg, or a switch between two controllers.
+
+The paper measured the EMG of the thigh with and without the orthosis. A simulation has no EMG: it
+has torques, and what a muscle shows for them is a reading (:mod:`pam_envs.muscle.emg`). Scored is
+the *uncalibrated* one, reported as it comes out. An assistance of 20 % that is delivered exactly
+takes 20 % off a proxy that is proportional to torque, and no more; what the paper reports is
+possible only if the true demand is less than Eq. (1) says (reading A) or if EMG grows faster than
+torque (reading B). Each of these has one constant an activity, *fitted* to the three published
+figures with 20 % of Eq. (1) delivered at once: that they are met says nothing. What is left of
+them behind the paper's own low-pass, in stance alone, is reported beside them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.papers.figures import Figure
+from benchmarks.papers.knee import BEFORE, PERIOD, SOURCE, UNKNOWN, note
+from pam_envs.identification.emg_calibration import PUBLISHED, change, stride_torques
+from pam_envs.mechanics.leg import GRAVITY
+from pam_envs.muscle.emg import MuscleActivation, Reading, calibration, emg_proxy
+from pam_envs.plants.knee_orthosis.plant import Activity, KneeOrthosis
+from pam_envs.plants.knee_orthosis.rollout import simulate_knee
+from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE
+
+Array = NDArray[np.float64]
+NAMES: dict[Activity, str] = {
+    "walk": "walking",
+    "stairs_up": "stairs up",
+    "stairs_down": "stairs down",
+}
+RMS_NORM = "change of the RMS over a stride"
+EXACT = "20 % of Eq. (1) behind the low-pass, in stance, delivered exactly"
+ASSUMED: dict[Activity, str] = {
+    "walk": ", with an assumed aim height of 1 m",
+    "stairs_up": ", with synthetic stairs",
+    "stairs_down": ", with synthetic stairs",
+}
+LEANS = ("the shank itself", "the ankle's angle, foot flat")
+"""What Eq. (1) takes for the shank's lean, ``shoe.flat_foot`` 0 and 1."""
+LEFT_OUT = ("horizontal force", "weight of the shank")
+"""What the paper says that Eq. (1) neglects, beside all acceleration."""
+MOST_ERROR = 4.0
+"""Our target [N m] for Eq. (1) at the paper's pace, where the paper takes it to be good; it gives
+no error of its own."""
+READINGS: tuple[Reading, ...] = ("A", "B")
+MISMATCH = 10.0
+"""Error [N] of the tension's reference in swing."""
+OTHER = "there with a stride of 5 s around it, so that the figures are not the same"
+SWING, AFTER = 2.0, 4.0
+"""Seconds before and after the switch."""
+
+
+def stride_record(
+    activity: Activity, stride: float, changes: Mapping[str, float] | None = None
+) -> dict[str, Array]:
+    """Return the signals of the second stride of a duration [s] under a constant pressure."""
+    n = round(stride / PERIOD)
+    plant = KneeOrthosis.on_leg(activity, stride, "none").replace(changes or {})
+    made = simulate_knee(plant, np.full(2 * n, 1.5e5), pressure=1.5e5)
+    return {name: values[-n:] for name, values in made.items()}
+
+
+def uncalibrated_change(
+    activity: Activity,
+    stride: float,
+    exact: bool = False,
+    floor: float = 0.03,
+    changes: Mapping[str, float] | None = None,
+) -> float:
+    """Return the change of the EMG proxy's RMS where the assistance is delivered exactly.
+
+    Parameters
+    ----------
+    activity : {"walk", "stairs_up", "stairs_down"}
+    stride : float
+        Duration of a stride [s].
+    exact : bool
+        The assistance is 20 % of Eq. (1) at all times, without low-pass and phases.
+    floor : float
+        Co-contraction.
+    changes : mapping, optional
+        Parameters of the plant by name.
+    """
+    made = stride_record(activity, stride, changes)
+    late = stride_torques(activity, stride, changes)[1]
+    # the record is of the ends of the periods, the curves are of their beginnings
+    helped = 0.2 * made["estimate"] if exact else np.roll(late, -1)
+    muscle = MuscleActivation(floor=floor)
+    return emg_proxy(*(np.tile(x, 2) for x in (made["demand"], helped)), PERIOD, muscle).change
+
+
+def estimator_error(
+    activity: Activity, stride: float, flat_foot: float = 0.0, added: tuple[str, ...] = ()
+) -> float:
+    """Return the RMS error [N m] of Eq. (1) in stance.
+
+    Parameters
+    ----------
+    activity : {"walk", "stairs_up", "stairs_down"}
+    stride : float
+        Duration of a stride [s].
+    flat_foot : {0.0, 1.0}
+        1: the lean is the ankle's angle.
+    added : tuple of str
+        Of ``LEFT_OUT``, what is added to Eq. (1).
+    """
+    made = stride_record(activity, stride, {"shoe.flat_foot": flat_foot})
+    leg = KneeOrthosis.on_leg(activity).leg
+    missing = {
+        "horizontal force": -made["ground_x"]
+        * (leg.ankle_height + leg.shank * np.cos(made["shank"])),
+        "weight of the shank": -leg.mass * leg.centre * GRAVITY * np.sin(made["shank"]),
+    }
+    torque = made["estimate"] + sum(missing[name] for name in added)
+    error = (torque - made["demand"])[made["stance"] > 0.0]
+    return float(np.sqrt(np.mean(error**2)))
+
+
+def emg_reductions() -> list[Figure]:
+    """EMG proxy, uncalibrated and by the two readings that are fitted to the published figures."""
+    figures, where = list[Figure](), f"{SOURCE}, sections 5.2 and 5.3"
+    for activity, name in NAMES.items():
+        published = 100.0 * PUBLISHED[activity]
+        plain = 100.0 * uncalibrated_change(activity, PAPER_STRIDE)
+        bare = 100.0 * uncalibrated_change(activity, PAPER_STRIDE, exact=True, floor=0.0)
+        why = (
+            f"20 % of Eq. (1) at all times and no co-contraction were {bare:.1f} %; the low-pass"
+            " (0.16 s late), the swing and co-contraction cost the rest; a proxy in proportion to"
+            " torque falls by the share that is borne, so that the published figure needs a reading"
+            " of its own"
+        )
+        text = note("predicted", f"preset {EXACT}{ASSUMED[activity]}", RMS_NORM, why)
+        title = f"EMG, {name}, 5 s a stride, "
+        figures.append(Figure(f"{title}uncalibrated", where, "%", published, plain, None, text))
+        for reading in READINGS:
+            figures += _calibrated(activity, reading, title)
+    return [*figures, _centre_as_measured(), *_natural_pace()]
+
+
+def _centre_as_measured() -> Figure:
+    """Return the walk's proxy without the assumption on the centre of pressure."""
+    bare = {"leg.aim_height": 0.0}
+    ours = 100.0 * uncalibrated_change("walk", PAPER_STRIDE, changes=bare)
+    text = note("predicted", f"preset {EXACT}, leg.aim_height 0", RMS_NORM,
+                "the centre of pressure as at natural pace: without the horizontal force the knee"
+                " then hardly has to be extended but at the end of stance, where the low-pass is"
+                " too late")  # fmt: skip
+    name = "EMG, walking, 5 s a stride, uncalibrated, centre of pressure as measured"
+    where = f"{SOURCE}, section 5.2"
+    return Figure(name, where, "%", 100.0 * PUBLISHED["walk"], ours, None, text)
+
+
+def _calibrated(activity: Activity, reading: Reading, title: str) -> list[Figure]:
+    """Return a reading as fitted, and what it gives behind the low-pass."""
+    constant = calibration(activity, reading)
+    means = {
+        "A": f"true demand = {constant:g} of Eq. (1)",
+        "B": f"EMG = torque to the power {constant:g}",
+    }[reading]
+    name, where = f"{title}calibrated {reading}", f"{SOURCE}, section 5"
+    published = 100.0 * PUBLISHED[activity]
+    at_once = "preset 20 % of Eq. (1) delivered exactly and at once"
+    text = note("calibrated", at_once, RMS_NORM, f"{means}, fitted to this figure")
+    ours = 100.0 * change(activity, reading, constant)
+    fit = Figure(name, where, "%", published, ours, 0.1, text)
+    text = note("predicted", f"preset {EXACT}{ASSUMED[activity]}", RMS_NORM,
+                f"{means}, fitted to exact delivery; the low-pass is late")  # fmt: skip
+    ours = 100.0 * change(activity, reading, constant, as_referred=True)
+    return [fit, Figure(f"{name}, behind the low-pass", where, "%", published, ours, None, text)]
+
+
+def _natural_pace() -> list[Figure]:
+    """Return what a quick walker would get, which the paper leaves out and warns of."""
+    where, unknown = f"{SOURCE}, section 5.2", float("nan")
+    text = note("predicted", f"preset {EXACT}", RMS_NORM,
+                "the paper: faster, Eq. (1) no longer is a good estimate")  # fmt: skip
+    quick = 100.0 * uncalibrated_change("walk", NATURAL_STRIDE)
+    title = f"EMG, walking, {NATURAL_STRIDE:g} s a stride, uncalibrated"
+    figures = [Figure(title, where, "%", unknown, quick, None, text)]
+    return [*figures, *(f for t in (PAPER_STRIDE, NATURAL_STRIDE) for f in _estimator_errors(t))]
+
+
+def _estimator_errors(stride: float) -> list[Figure]:
+    """Return the error of Eq. (1) by what the lean is taken from, and by what is added to it."""
+    where, figures = f"{SOURCE}, sections 2 and 5.2", list[Figure]()
+    tag = ("predicted", "preset full balance of the leg", "RMS in stance")
+    slow = stride == PAPER_STRIDE
+    for flat, sensed in enumerate(LEANS):
+        judged = slow and not flat
+        why = "it leaves out the ground's horizontal force and the shank's weight and inertia"
+        more = (f"our target, the paper gives none; {LATE}",) if judged else ()
+        name = f"error of Eq. (1), {stride:g} s a stride, lean from {sensed}"
+        error = estimator_error("walk", stride, float(flat))
+        text = note(*tag, why, *more)
+        figures.append(
+            Figure(name, where, "N m", UNKNOWN, error, None, text,
+                   at_most=MOST_ERROR if judged else None)
+        )  # fmt: skip
+    for added in ((LEFT_OUT[0],), (LEFT_OUT[1],), LEFT_OUT):
+        name = f"error of Eq. (1), {stride:g} s a stride, with the {' and the '.join(added)}"
+        error = estimator_error("walk", stride, added=added)
+        figures.append(Figure(name, where, "N m", UNKNOWN, error, None, note(*tag)))
+    return figures
+
+
+LATE = (
+    "most of it is of late stance, where the shank leans and its weight, which the paper takes to"
+    " be ignorable, comes to 3 N m RMS"
+)
+
+
+def linear_switch(mismatch: float, compensated: bool) -> tuple[float, float]:
+    """Return what happens when the printed controller takes over on the printed plant.
+
+    Before, the pressure is held at the nominal one by somebody else, and the controller runs on a
+    reference that is off by ``mismatch`` [N]; then it is on the true one.
+
+    Returns
+    -------
+    error, jump : float
+        Largest error of the tension [N], and jump of the pressure at the switch [kPa].
+    """
+    from baselines.knee.published import printed_bumpless, printed_controller
+    from baselines.linear.bumpless import make_bumpless
+
+    plant, gains = printed_bumpless()
+    loop = make_bumpless(plant, printed_controller(), PERIOD, -200.0, 250.0, gains)
+    loop = loop if compensated else loop.without()
+    rig, before = plant.discrete(PERIOD, "zoh"), round(SWING / PERIOD)
+    inside, state = rig.initial_state(), loop.initial_state()
+    measured, commands = list[float](), list[float]()
+    for k in range(before + round(AFTER / PERIOD)):
+        reference = mismatch if k < before else 0.0
+        measured.append(float(inside @ rig.c))
+        in_charge = k >= before
+        command = float(loop.output(reference, measured[-1], state)) if in_charge else 0.0
+        state = loop.advance(reference, measured[-1], command, state)
+        inside = rig.advance(command, inside)
+        commands.append(command)
+    return float(np.max(np.abs(measured[before:]))), abs(commands[before])
+
+
+def switching_transient() -> list[Figure]:
+    """Tension error and jump of the pressure after a switch, with and without bumpless transfer."""
+    where, figures = f"{SOURCE}, section 5.2", list[Figure]()
+    beforehand = {True: (11.4, 7.7), False: (46.0, 220.0)}
+    bounds: dict[bool, dict[str, float]] = {True: {"at_most": 15.0}, False: {"at_least": 40.0}}
+    preset = f"preset as printed, mismatch {MISMATCH:g} N, linear plant, {SWING:g} s of swing"
+    for compensated, (error_then, jump_then) in beforehand.items():
+        name = f"{'with' if compensated else 'without'} bumpless transfer"
+        error, jump = linear_switch(MISMATCH, compensated)
+        text = note("predicted", preset, "largest after the switch", BEFORE, OTHER)
+        figures.append(
+            Figure(f"tension error {name}", where, "N", UNKNOWN, error, None, text,
+                   expected=error_then, **bounds[compensated])
+        )  # fmt: skip
+        text = note("predicted", preset, "at the switch", BEFORE, OTHER)
+        figures.append(
+            Figure(f"pressure jump {name}", where, "kPa", UNKNOWN, jump, None, text,
+                   expected=jump_then)
+        )  # fmt: skip
+    return figures
+
+
+GROUPS: tuple[Callable[[], list[Figure]], ...] = (emg_reductions, switching_transient)

@@ -1,0 +1,93 @@
+"""How well inverses of a joint's memory undo it: seed 002, section 3."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.joint.model import JointModel, joint_model
+from benchmarks.papers.joint_studies import DEGREE, RANGE
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.identification.everett_series import series_inverse
+
+Array = NDArray[np.float64]
+
+
+def loop_path(
+    plant: Any, model: JointModel, amplitude: float = 20.0 * DEGREE
+) -> tuple[Array, Array]:
+    """Return wanted and reached angles [rad]: a first rise, then down and up once.
+
+    Parameters
+    ----------
+    plant : object
+        With ``rest_angles``.
+    model : JointModel
+        Its memory is inverted for the set-points.
+    amplitude : float
+        Of the wanted angles [rad].
+    """
+    up = np.linspace(-amplitude, amplitude, 81)
+    wanted = np.concatenate([np.linspace(0.0, amplitude, 41), up[::-1], up])
+    commands, state = [], model.rows.initial(1)
+    for angle in wanted:
+        command = np.clip(model.rows.inverse(np.array([angle]), state), model.low, model.high)
+        _, state = model.rows.forward(command, state)
+        commands.append(float(command[0]))
+    return wanted, plant.rest_angles(np.array(commands))
+
+
+def loop_width(plant: Any, model: JointModel, amplitude: float = 20.0 * DEGREE) -> float:
+    """Return the largest width [rad] of the loop that :func:`loop_path` goes through."""
+    reached = loop_path(plant, model, amplitude)[1]
+    return float(np.max(np.abs(reached[41:122][::-1] - reached[122:])))
+
+
+def width_ratio(plant: Any, amplitude: float = 10.0 * DEGREE) -> float:
+    """Return the loop's width with a line for the inverse, over that with the inverse.
+
+    Parameters
+    ----------
+    plant : object
+        With ``rest_angles``. On one that is a Preisach operator itself the ratio says nothing but
+        how fine the grid of the identified map is.
+    amplitude : float
+        Of the wanted angles [rad].
+    """
+    model = joint_model(plant)
+    widths = [loop_width(plant, told, amplitude) for told in (model.narrowed(0.0), model)]
+    return widths[0] / widths[1]
+
+
+def inhomogeneous() -> Preisach:
+    """Return a memory whose relays' density varies by 30 % over the range, starting low."""
+
+    def density(a: Array, b: Array) -> Array:
+        return np.asarray((1.0 + 0.3 * np.cos(0.5 * np.pi * (a + b) / RANGE)) * np.exp(-(a - b)))
+
+    half = Preisach.from_density(density, -RANGE, RANGE, levels=33)
+    share = 0.4 * 2.0 * RANGE / float(half.everett[-1, 0])
+    return half.scaled(share, 0.0).plus_linear(0.6)
+
+
+def inverse_error(histories: int = 60) -> tuple[float, float]:
+    """Return the errors of the recursion and of the printed sum (3.5), as parts of the range.
+
+    The recursion's is that of the output after its input, the sum's that of the input itself.
+    """
+    model, draw = inhomogeneous(), np.random.default_rng(2)
+    top = float(model.everett[-1, 0])
+    worst_exact = worst_series = 0.0
+    for _ in range(histories):
+        wanted = model.start_output + top * draw.uniform(0.0, 1.0, draw.integers(3, 7))
+        inputs, state = [], model.initial_state()
+        for value in wanted:
+            found, state = model.inverse_step(value, state)
+            inputs.append(float(found))
+        reached = model.simulate(np.array(inputs))[0]
+        worst_exact = max(worst_exact, float(np.max(np.abs(reached - wanted))) / top)
+        printed = series_inverse(model, wanted)
+        worst_series = max(worst_series, float(np.max(np.abs(printed - inputs))) / (2.0 * RANGE))
+    return worst_exact, worst_series

@@ -1,0 +1,85 @@
+"""What each loop on a joint's angle withstands and rejects, beside how fast it follows a step.
+
+Of a controller with model-following it is the disturbance loop, of any other the loop itself. All
+are looked at around the same nominal plant and by the same measure
+(:mod:`baselines.robust.requirements`) in continuous time, so that what one buys and what it pays
+stand in one table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.robust.requirements import FREQUENCIES, RobustDesign, sensitivity
+from benchmarks.papers.joint_studies import STEPPED, ReducedRig, StepFigures, controller, step
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+LOW = (0.1, 1.0, 4.0)
+"""Frequencies [rad/s] at which the sensitivity is shown."""
+
+
+@dataclass(frozen=True)
+class LoopFigures:
+    """Of one controller.
+
+    Attributes
+    ----------
+    name : str
+    mu : float
+        Largest structured singular value, 1 or less if the performance holds for all plants.
+    sensitivity : tuple of float
+        ``|S|`` at ``LOW``.
+    peak : float
+        Largest ``|S|``.
+    step : StepFigures
+        Of 10 degrees after a turn, with the assumed memory.
+    """
+
+    name: str
+    mu: float
+    sensitivity: tuple[float, ...]
+    peak: float
+    step: StepFigures
+
+
+def law_response(made: Any, frequency: Array) -> Complex:
+    """Return the response of a controller's loop from error to command, shape (n,).
+
+    Its discrete form is of the bilinear rule, which is undone by looking at it at ``z = (1 + s T /
+    2) / (1 - s T / 2)``.
+
+    Parameters
+    ----------
+    made : JointFeedback or ModelFollowing
+    frequency : ndarray, shape (n,)
+        [rad/s].
+    """
+    loop = made.disturbance if hasattr(made, "disturbance") else made.loop
+    bank, half = loop.controller, 0.5j * frequency * made.model.period
+    eye = np.eye(bank.a.shape[1])
+    z = (1.0 + half) / (1.0 - half)
+    found = np.linalg.solve(z[:, None, None] * eye - bank.a[0], bank.b[0][:, None])
+    return np.asarray(found[..., 0] @ bank.c[0] + bank.d[0])
+
+
+@cache
+def loop_figures(name: str) -> LoopFigures:
+    """Return the figures of a controller of the catalogue."""
+    design, made = RobustDesign(), controller(name, ReducedRig())
+    loop = design.plant.response(FREQUENCIES) * law_response(made, FREQUENCIES)
+    size = sensitivity(loop)
+    low = tuple(float(np.interp(f, FREQUENCIES, size)) for f in LOW)
+    value = float(design.structured_value(loop).max())
+    return LoopFigures(name, value, low, float(size.max()), step(name))
+
+
+def table() -> tuple[LoopFigures, ...]:
+    """Return the figures of every loop that the step is made with."""
+    return tuple(loop_figures(name) for name in STEPPED)

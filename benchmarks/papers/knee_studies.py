@@ -1,0 +1,244 @@
+"""Runs of the knee's environments that compare with what seed 000 reports.
+
+An error is a root mean square over the half-range of the reference, the first 2 s dropped as the
+paper's transient. Sensors show the truth, and the controllers know the plant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Literal
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+import pam_envs  # noqa: F401  registers the ids
+from benchmarks.runs import rollout
+from benchmarks.scoring import knee as metrics_knee
+from pam_envs.plants.knee_orthosis.plant import Activity, Dynamics, KneeOrthosis, Mounting
+from pam_envs.references.gait import PAPER_STRIDE
+
+DROPPED = 2.0
+"""Seconds left out at the beginning."""
+CYCLES = 2.0
+"""Cycles of the sine that are scored."""
+FREQUENCY = 0.1
+"""[Hz]."""
+PRESET_FRICTION = 0.5e5
+"""Pressure [Pa] that all elements of the preset's memory hold together: its loop width."""
+WIDTHS = (0.0, 0.25e5, 0.5e5)
+"""Loop widths [Pa] of the ablation."""
+IDS: dict[Activity, str] = {
+    "walk": "PAM/KneeWalk-v0",
+    "stairs_up": "PAM/KneeStairsUp-v0",
+    "stairs_down": "PAM/KneeStairsDown-v0",
+}
+Feedback = Literal["printed", "designed"]
+
+
+@dataclass(frozen=True)
+class TensionErrors:
+    """Errors [%] of tension tracking by the feedback alone, and with two feed-forwards."""
+
+    feedback: float
+    with_line: float
+    with_inverse: float
+
+    @property
+    def gain(self) -> float:
+        """Error of the feedback alone over that with the inverse."""
+        return self.feedback / self.with_inverse
+
+    @property
+    def gain_over_line(self) -> float:
+        """Error with the straight line over that with the inverse: what the hysteresis costs."""
+        return self.with_line / self.with_inverse
+
+
+@dataclass(frozen=True)
+class Switch:
+    """Transient after switches from swing to stance, the mean over strides.
+
+    Attributes
+    ----------
+    tension : float
+        Largest error [N] in the first 0.5 s.
+    at_switch : float
+        Error [N] in the first period of stance: what the swing's controller left behind.
+    excess : float
+        By how much [N] the largest error is above that: the transient of the one taking over.
+    pressure : float
+        Largest change of the pressure [Pa] in the first 0.1 s.
+    command : float
+        Largest change of the set-point [Pa] from one period to the next at the switch.
+    worst_tension : float
+        As ``tension``, the worst of the strides.
+    """
+
+    tension: float
+    at_switch: float
+    excess: float
+    pressure: float
+    command: float
+    worst_tension: float
+
+
+def tension_errors(
+    width: float = PRESET_FRICTION,
+    feedback: Feedback = "printed",
+    mounting: Mounting = "rig",
+    dynamics: Dynamics = "measured",
+) -> TensionErrors:
+    """Return the errors of tracking a tension of 0.1 Hz in ``PAM/KneeTension-v0``.
+
+    Parameters
+    ----------
+    width : float
+        Pressure [Pa] that all elements of the memory hold together; the preset's is 0.5 bar.
+    feedback : {"printed", "designed"}
+        Controller (11), or our design on the identified plant.
+    mounting : {"rig", "no_load"}
+        The isometric preset, 80 to 330 N, or the wearable one, 80 to 205 N.
+    dynamics : {"measured", "lag"}
+        The published frequency response, or the regulator's lag.
+    """
+    preset = {"rig": KneeOrthosis.rig, "no_load": KneeOrthosis.no_load}[mounting]
+    plant = preset(dynamics=dynamics, memory__width=width / PRESET_FRICTION).without_noise()
+    kinds = ("nominal", "line", "inverse")
+    return TensionErrors(*(_tension_error(plant, feedback, kind) for kind in kinds))
+
+
+def _tension_error(plant: KneeOrthosis, feedback: Feedback, forward: Any) -> float:
+    from baselines.knee.ltr import make_knee_ltr
+
+    env = _brace("PAM/KneeTension-v0", plant)
+    printed = feedback == "printed"
+    signals = (env.signals, env.action_signals)
+    return _error(env, make_knee_ltr(plant, *signals, forward=forward, printed=printed))
+
+
+def stiffness_errors() -> tuple[float, float]:
+    """Return the errors [%] of inverse and straight line in ``PAM/KneeStiffness-v0``."""
+    from baselines.knee.inverse import make_knee_forward
+
+    plant = KneeOrthosis.rig().without_noise()
+    env = _brace("PAM/KneeStiffness-v0", plant)
+    signals = (env.signals, env.action_signals)
+    inverse, line = (
+        _error(env, make_knee_forward(plant, *signals, kind=kind)) for kind in ("inverse", "line")
+    )
+    return inverse, line
+
+
+def _brace(env: str, plant: KneeOrthosis) -> Any:
+    seconds = DROPPED + CYCLES / FREQUENCY
+    how = {"start": "paper", "reference": "sine", "frequency": FREQUENCY}
+    made = gym.make(env, disable_env_checker=True, plant=plant, episode_seconds=seconds, **how)
+    return made.unwrapped
+
+
+def _error(env: Any, controller: Any) -> float:
+    signals = rollout.run(env, controller, 0).signals
+    kept = signals["time"] > DROPPED + 1e-6
+    reference = signals["reference"][kept]
+    error = signals["output"][kept] - reference
+    return 100.0 * metrics_knee.rms(error) / metrics_knee.half_range(reference)
+
+
+@lru_cache(maxsize=32)
+def stride(
+    activity: Activity = "walk",
+    mismatch: float = 0.0,
+    bumpless: bool = True,
+    preview: bool = False,
+    pace: float = PAPER_STRIDE,
+    strides: int = 3,
+) -> Mapping[str, NDArray[np.float64]]:
+    """Return the signals (SI) of strides with the paper's control system, at rest at heel contact.
+
+    Parameters
+    ----------
+    activity : {"walk", "stairs_up", "stairs_down"}
+    mismatch : float
+        By how much [N] the tension's reference is off while it is off-line.
+    bumpless : bool
+        Whether the compensators of bumpless transfer are on.
+    preview : bool
+        Whether the feed-forward looks one lag of the regulator ahead, as the paper's does not.
+    pace : float
+        Duration of a stride [s].
+    strides : int
+        How many.
+
+    Returns
+    -------
+    mapping
+        ``info`` of the environment by its keys, and ``set_point`` [Pa].
+    """
+    from baselines.knee.ltr import make_knee_ltr
+
+    plant = KneeOrthosis.on_leg(activity, stride=pace).without_noise()
+    env = gym.make(
+        IDS[activity],
+        disable_env_checker=True,
+        plant=plant,
+        mismatch=mismatch,
+        start="heel_contact",
+        episode_seconds=round((strides + 0.2) * pace, 2),
+    ).unwrapped
+    signals = (env.signals, env.action_signals)  # type: ignore[attr-defined]
+    controller = make_knee_ltr(plant, *signals, bumpless=bumpless, preview=preview)
+    episode = rollout.run(env, controller, 0)
+    command = signals[1]["pressure_set_point"].decode(episode.actions)
+    return {**episode.signals, "set_point": command}
+
+
+def switching(
+    mismatch: float = 10.0,
+    bumpless: bool = True,
+    preview: bool = False,
+    pace: float = PAPER_STRIDE,
+) -> Switch:
+    """Return the transient after the switches to stance in ``PAM/KneeWalk-v0``.
+
+    The parameters are those of :func:`stride`. A set-point of the last period of swing is compared
+    with the first that the tension's controller gives.
+    """
+    signals, period = stride("walk", mismatch, bumpless, preview, pace), KneeOrthosis.control_period
+    starts = metrics_knee.landings(signals["sensor/stance"], period)
+    error = signals["output"] - signals["reference"]
+    seconds = (metrics_knee.JUMP_SECONDS, metrics_knee.BRIEF_SECONDS)
+    long, brief = (round(s / period) for s in seconds)
+    # the signals of a step are seen at the next one, whose set-point stands one place further on
+    jumps = [abs(signals["set_point"][k + 1] - signals["set_point"][k]) for k in starts]
+    peaks = [float(np.abs(error[k : k + long]).max()) for k in starts]
+    return Switch(
+        tension=float(np.mean(peaks)),
+        at_switch=metrics_knee.largest_after(error, starts, 1),
+        excess=metrics_knee.excess_after(error, starts, long),
+        pressure=metrics_knee.pressure_jump(signals["state/pressure"], starts, brief),
+        command=float(np.mean(jumps)),
+        worst_tension=max(peaks),
+    )
+
+
+def emg_ratios(activity: Activity = "walk", pace: float = PAPER_STRIDE) -> dict[str, float]:
+    """Return the EMG proxy's assisted over unassisted RMS in its readings, over whole strides.
+
+    Parameters
+    ----------
+    activity : {"walk", "stairs_up", "stairs_down"}
+    pace : float
+        Duration of a stride [s].
+
+    Returns
+    -------
+    dict
+        The ``emg_`` metrics of :data:`benchmarks.scoring.knee.GAIT`.
+    """
+    signals = stride(activity, pace=pace)
+    window = (signals["time"] > pace) & (signals["time"] < 3.0 * pace + 1e-6)
+    return metrics_knee.emg(signals, window, KneeOrthosis.control_period, activity)

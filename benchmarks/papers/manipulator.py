@@ -1,0 +1,196 @@
+"""Figures of the manipulator paper on the planning of paths (seed 002, section 2).
+
+The paper shows two plans of one path, without numbers but the limit of 30 degrees. The numbers
+here were computed beforehand by another program, for three paths, of which one is known by its
+ends. The other two are ours, calibrated: drawn so that their peaks are those, which are therefore
+inputs and judge nothing. What the weight does where nothing was fitted is said of drawn paths.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.manipulator.redundancy import Comparison, compare
+from benchmarks.papers.figures import Figure
+from pam_envs.envs.manipulator.paths import LEAP
+from pam_envs.mechanics.redundancy import LIMIT
+from pam_envs.mechanics.serial_chain import SerialChain
+from pam_envs.references.path import PATHS, POINTS, PathEnds, draw_ends, joint_line
+
+Array = NDArray[np.float64]
+
+SOURCE = "seed 002, section 2"
+BEFORE = "not in the paper: computed beforehand by another program"
+KNOWN, OURS = "predicted; ends known", "calibrated: ends drawn for these peaks"
+UNKNOWN = float("nan")
+"""What the paper does not print."""
+UNWEIGHTED = {"path_1": 34.2, "path_2": 33.2, "path_3": 37.12}
+WEIGHTED = {"path_1": 27.6, "path_2": 26.2, "path_3": 27.77}
+"""Largest angle of a joint [degrees] in each plan."""
+MOST_ITERATIONS = 16.0
+HELD_OUT = 500
+"""Freely drawn paths."""
+
+
+@lru_cache(maxsize=1)
+def arm() -> SerialChain:
+    """Return the six-joint arm: axes x-y-x-y-x-y, links of 0.25 m."""
+    return SerialChain.uniform()
+
+
+@lru_cache(maxsize=8)
+def plans(path: PathEnds) -> Comparison:
+    """Return both plans of a path, begun from its first angles."""
+    line = path.angles()
+    return compare(arm(), arm().pose(line), start=line[0])
+
+
+def straight_poses(path: PathEnds) -> Array:
+    """Return poses from end to end of a path on a straight line of the tip, shape (41, 6).
+
+    The direction turns evenly in the plane of both ends' directions.
+    """
+    first, last = arm().pose(path.angles()[[0, -1]])
+    share = np.linspace(0.0, 1.0, POINTS)[:, None]
+    whole = np.arccos(first[3:] @ last[3:])
+    turned = np.sin((1.0 - share) * whole) * first[3:] + np.sin(share * whole) * last[3:]
+    return np.hstack([first[:3] + share * (last[:3] - first[:3]), turned / np.sin(whole)])
+
+
+def peaks() -> list[Figure]:
+    """Largest angle of a joint on each path, without and with the weight (2.1)."""
+    figures = []
+    for path in PATHS:
+        both = plans(path)
+        for name, expected, plan, bound in (
+            ("unweighted", UNWEIGHTED, both.unweighted, {"at_least": 33.0}),
+            ("weighted", WEIGHTED, both.weighted, {"at_most": 30.0}),
+        ):
+            text = f"{OURS if path.calibrated else KNOWN}; straight line of the joints; {BEFORE}"
+            figures.append(
+                Figure(f"{path.name}, {name}: largest angle", SOURCE, "deg", UNKNOWN,
+                       float(np.rad2deg(plan.peak)), 0.005, text, expected[path.name],
+                       given=path.calibrated, **bound)
+            )  # fmt: skip
+    return figures
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """What becomes of paths that are drawn freely, as shares of all.
+
+    Attributes
+    ----------
+    paths : int
+    crossed, crossed_weighted : float
+        On which a joint goes past 30 degrees.
+    leapt, leapt_weighted : float
+        On which the plan leaps from one branch of solutions to another.
+    iterations : float
+        Largest of the medians of the weighted plans.
+    """
+
+    paths: int
+    crossed: float
+    crossed_weighted: float
+    leapt: float
+    leapt_weighted: float
+    iterations: float
+
+
+@lru_cache(maxsize=4)
+def held_out(number: int = HELD_OUT, seed: int = 0) -> HeldOut:
+    """Return what becomes of freely drawn paths: both ends anywhere within 27 degrees a joint.
+
+    None is left out but those that are short or nearly straight, which are not drawn.
+
+    Parameters
+    ----------
+    number, seed : int
+        Of the draws.
+    """
+    counts, most = np.zeros(4), 0.0
+    for first, last in zip(*draw_ends(seed, number, arm().stages, LIMIT), strict=True):
+        line = joint_line(first, last)
+        both = compare(arm(), arm().pose(line), start=line[0])
+        leap = LEAP * float(np.max(np.abs(last - first))) / (POINTS - 1)
+        pair = (both.unweighted, both.weighted)
+        counts += [not plan.within_limits for plan in pair] + [p.longest_step > leap for p in pair]
+        most = max(most, float(np.median(both.weighted.iterations)))
+    return HeldOut(number, *(counts / number).tolist(), most)
+
+
+def drawn_lines() -> list[Figure]:
+    """Paths that nothing was fitted to: how many joints cross their limit on."""
+    found = held_out()
+    text = f"of {found.paths} freely drawn paths, none left out"
+    leap = f"{text}; most do so along a hundred times as many poses: the branch of solutions ends"
+    return [
+        Figure("drawn paths, unweighted: past 30 degrees", SOURCE, "%", UNKNOWN,
+               100.0 * found.crossed, None, text),
+        Figure("drawn paths, weighted: past 30 degrees", SOURCE, "%", UNKNOWN,
+               100.0 * found.crossed_weighted, None, text, at_most=0.0),
+        Figure("drawn paths, unweighted: the plan leaps", SOURCE, "%", UNKNOWN,
+               100.0 * found.leapt, None, leap),
+        Figure("drawn paths, weighted: the plan leaps", SOURCE, "%", UNKNOWN,
+               100.0 * found.leapt_weighted, None, leap),
+        Figure("drawn paths, weighted: largest median of iterations", SOURCE, "1", UNKNOWN,
+               found.iterations, None, text, at_most=MOST_ITERATIONS),
+    ]  # fmt: skip
+
+
+def other_reading() -> list[Figure]:
+    """Largest angles of path_3 if its ends were those of a straight line of tip and direction."""
+    poses, start = straight_poses(PATHS[-1]), PATHS[-1].angles()[0]
+    both = compare(arm(), poses, start=start)
+    names = ("unweighted", "weighted")
+    text = "reported: the other reading of the two ends; it misses the figures"
+    return [
+        Figure(f"path_3 as a straight line of the tip, {name}", SOURCE, "deg", UNKNOWN,
+               float(np.rad2deg(plan.peak)), None, text, expected)
+        for name, expected, plan in zip(
+            names, (37.12, 27.77), (both.unweighted, both.weighted), strict=True
+        )
+    ]  # fmt: skip
+
+
+def prices() -> list[Figure]:
+    """Growth of ``q'q`` by the weight, at the end of each path."""
+    text = f"{BEFORE}: 25 to 34 %"
+    return [
+        Figure(f"{path.name}: growth of q'q", SOURCE, "%", UNKNOWN,
+               100.0 * (plans(path).price - 1.0), None,
+               f"{OURS if path.calibrated else KNOWN}; {text}", at_least=25.0, at_most=34.0,
+               given=path.calibrated)
+        for path in PATHS
+    ]  # fmt: skip
+
+
+def newton() -> list[Figure]:
+    """Newton's method on the weighted plans: iterations, and errors left."""
+    figures = []
+    for path in PATHS:
+        plan, wanted = plans(path).weighted, arm().pose(path.angles())
+        off = float(np.max(np.abs(arm().pose(plan.angles) - wanted)))
+        figures += [
+            Figure(f"{path.name}: median iterations", SOURCE, "1", UNKNOWN,
+                   float(np.median(plan.iterations)), None,
+                   "warm start, change below 1e-10 rad", at_most=MOST_ITERATIONS),
+            Figure(f"{path.name}: largest error of a pose", SOURCE, "m", UNKNOWN, off, None,
+                   at_most=1e-12),
+        ]  # fmt: skip
+    return figures
+
+
+GROUPS: tuple[Callable[[], list[Figure]], ...] = (
+    peaks,
+    drawn_lines,
+    other_reading,
+    prices,
+    newton,
+)

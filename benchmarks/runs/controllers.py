@@ -1,0 +1,187 @@
+"""The one place where controllers come from: ``baselines`` and, where installed, ``agents``."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from benchmarks.identity.hashing import object_digest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class Controller(Protocol):
+    """What stable-baselines3 calls a policy predictor."""
+
+    def predict(
+        self,
+        observation: Any,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[Any, Any]:
+        """Return the action for an observation, and the controller's next state."""
+        ...
+
+
+BY_RULE = "by rule or as published"
+
+
+@dataclass(frozen=True)
+class Entrant:
+    """A controller as the board names it.
+
+    Attributes
+    ----------
+    name, summary, knowledge, citation : str
+        ``knowledge`` is "nothing", "tables", "nominal model" or "true model".
+    envs : tuple of str
+        Ids that it runs in; empty means any.
+    kind : {"classical", "learned", "residual"}
+        Residual ones are learned on top of a classical one.
+    source : str
+        Module whose ``make_controller`` builds it.
+    files : tuple of (int, Path)
+        Training seed and policy file (relative to the checkout), ascending; none for a controller
+        that is not trained.
+    trials : int or None
+        Settings that were tried out to choose its numbers; None where nobody counted.
+    tuning : str
+        How they were chosen.
+    author : str
+        Who made it, as BibTeX wants it; empty for the authors of this package.
+    tuned : str
+        Name in ``baselines/core/tuned.yaml``; of a residual controller that of the one it corrects.
+    knobs : tuple of (str, float)
+        The numbers that stand there under that name, none for a controller that is not tuned.
+    """
+
+    name: str
+    summary: str
+    knowledge: str
+    citation: str
+    envs: tuple[str, ...]
+    kind: str
+    source: str
+    files: tuple[tuple[int, Path], ...] = ()
+    trials: int | None = 0
+    tuning: str = BY_RULE
+    author: str = ""
+    tuned: str = ""
+    knobs: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def training_seeds(self) -> tuple[int | None, ...]:
+        """Training seeds, or ``None`` alone for a controller that is not trained."""
+        return tuple(seed for seed, _ in self.files) or (None,)
+
+    def runs_in(self, env: str) -> bool:
+        """Return whether the controller is meant for an environment."""
+        return not self.envs or env in self.envs
+
+
+SOURCES = (
+    ("baselines.core.catalogue", "baselines", "classical"),
+    ("agents.policies.catalogue", "agents", "learned"),
+)
+"""Module, its package, and the kind of its controllers. ``agents`` may be absent."""
+
+
+def _entrants(module: str, package: str, kind: str) -> dict[str, Entrant]:
+    try:
+        found = importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        if error.name in (package, module):
+            return {}
+        raise
+    made = (_entrant(name, entry, module, kind) for name, entry in found.CONTROLLERS.items())
+    return {entrant.name: entrant for entrant in made if entrant is not None}
+
+
+def _entrant(name: str, entry: Any, module: str, kind: str) -> Entrant | None:
+    """Return an entry of a catalogue, ``None`` for a policy that is not trained yet."""
+    listed = getattr(entry, "files", None)
+    found = listed() if callable(listed) else {}
+    files = tuple((seed, _movable(path)) for seed, path in sorted(found.items()))
+    knobs = tuple(sorted(getattr(entry, "found", {}).items()))
+    if callable(listed) and not files:
+        return None
+    return Entrant(
+        name=name,
+        summary=str(getattr(entry, "summary", "")),
+        knowledge=str(getattr(entry, "knowledge", "nothing")),
+        citation=str(getattr(entry, "citation", "")),
+        envs=tuple(getattr(entry, "envs", ()) or ()),
+        kind=str(getattr(entry, "kind", kind)),
+        source=module,
+        files=files,
+        trials=getattr(entry, "trials", 0),
+        tuning=str(getattr(entry, "tuning", BY_RULE)),
+        author=str(getattr(entry, "author", "")),
+        tuned=str(getattr(entry, "baseline", "") or name) if knobs else "",
+        knobs=knobs,
+    )
+
+
+def _movable(path: Path) -> Path:
+    """Return a path relative to the checkout where it is in it: another may lie elsewhere."""
+    whole = Path(path).resolve()
+    return whole.relative_to(ROOT) if whole.is_relative_to(ROOT) else whole
+
+
+def available() -> dict[str, Entrant]:
+    """Return all controllers by name.
+
+    Raises
+    ------
+    ValueError
+        If two sources use one name.
+    """
+    merged: dict[str, Entrant] = {}
+    for source in SOURCES:
+        for name, entrant in _entrants(*source).items():
+            if name in merged:
+                raise ValueError(f"controller {name!r} is in {merged[name].source} and {source[0]}")
+            merged[name] = entrant
+    return merged
+
+
+def find(name: str) -> Entrant:
+    """Return a controller by name, or raise naming the nearest ones."""
+    known = available()
+    if name not in known:
+        raise ValueError(f"no controller named {name!r}; there are: {', '.join(sorted(known))}")
+    return known[name]
+
+
+def make(
+    entrant: Entrant, model: Any, env: Any, seed: int = 0, training_seed: int | None = None
+) -> Controller:
+    """Return a controller built from a nominal plant and the named signals.
+
+    Parameters
+    ----------
+    entrant : Entrant
+    model : object
+        The plant that the controller is told.
+    env : gymnasium.Env
+        Only its named signals are used, never its plant.
+    seed : int
+        For controllers that draw.
+    training_seed : int, optional
+        Which of the policies of a learned controller.
+    """
+    maker = importlib.import_module(entrant.source).make_controller
+    base = env.unwrapped
+    told = {"plant": model, "signals": base.signals, "action_signals": base.action_signals}
+    if training_seed is not None:
+        told["training_seed"] = training_seed
+    made: Controller = maker(entrant.name, seed=seed, **told)
+    return made
+
+
+def parameters_digest(controller: Controller) -> str:
+    """Return a digest of all that the controller holds."""
+    return object_digest(controller)

@@ -1,0 +1,373 @@
+"""A row of the board: one controller over one scenario file, with all that runs it again."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.identity import artefacts, tasks, trainings
+from benchmarks.identity.audit import Audit
+from benchmarks.identity.hashing import digest
+from benchmarks.runs import knowledge, provenance
+from benchmarks.runs.cells import AUDIT, PUBLIC, Cell, cells_of, sources
+from benchmarks.runs.controllers import Entrant
+from benchmarks.runs.store import read_record, write_record
+from benchmarks.scenarios import scenario as scenarios
+from benchmarks.scenarios.scenario import ScenarioSet
+from benchmarks.scoring import statistics
+from benchmarks.scoring.metrics import METRICS, headline_of, of_track
+
+SCHEMA = 3
+RESULTS = Path(__file__).parents[1] / "results"
+KEYS: dict[str, tuple[str, ...]] = {
+    "row": (),
+    "env": ("id", "version", "digest"),
+    "task": (),
+    "controller": ("name", "kind", "digest", "parameters", "artefact"),
+    "scenarios": ("name", "version", "digest", "content"),
+    "plants": (),
+    "models": (),
+    "seeds": (),
+    "training_seeds": (),
+    "made_with": (),
+    "episodes": (),
+    "failures": (),
+    "aggregate": (),
+    "by": (),
+    "audit": (),
+    "traces": (),
+    "volatile": (),
+}
+"""What a row has, and what is in it that others look up by name."""
+_NAME = re.compile(r"[A-Za-z0-9_]+")
+
+Row = dict[str, Any]
+SHOWN: dict[str, Any] = {"unit": "mm", "factor": 1e3}
+"""How errors are shown where the scenario file does not say."""
+
+
+def shown(content: Mapping[str, Any]) -> tuple[str, float]:
+    """Return the unit in which errors are shown, and its factor from SI."""
+    how = content.get("shown") or SHOWN
+    return str(how["unit"]), float(how["factor"])
+
+
+def row_name(track: str, controller: str) -> str:
+    """Return the name of a row and of its file."""
+    return f"{track}--{controller}"
+
+
+Record = Mapping[str, Any]
+
+
+def assemble(
+    entrant: Entrant, track: ScenarioSet, cells: Sequence[Record], found: Audit | None = None
+) -> Row:
+    """Return the row of a controller from its cells, in the order of :func:`cells.cells_of`.
+
+    Parameters
+    ----------
+    entrant : Entrant
+    track : ScenarioSet
+    cells : sequence of mapping
+        The record of every cell; none may be missing, none of another environment.
+    found : Audit, optional
+        With which the cells were listed.
+    """
+    built = tasks.built(track)
+    _check_complete(entrant, track, cells, found)
+    _check_plants(entrant, built, cells)
+    trainings.check_cells(entrant, cells)
+    public = [cell for cell in cells if cell["split"] == PUBLIC]
+    episodes = [episode for cell in cells for episode in cell["episodes"]]
+    scored = [episode for episode in episodes if episode["split"] == PUBLIC]
+    unseen = [episode for episode in episodes if episode["split"] == AUDIT]
+    row: Row = {
+        "schema": SCHEMA,
+        "row": row_name(track.name, entrant.name),
+        "env": built.env,
+        "task": tasks.task_digest(track),
+        "controller": _controller(entrant, public),
+        "scenarios": {
+            "name": track.name,
+            "version": track.content["version"],
+            "digest": track.digest,
+            "content": track.content,
+        },
+        "plants": built.plants,
+        "models": built.models,
+        "seeds": {name: list(seeds) for name, seeds in track.seeds.items()},
+        "training_seeds": [seed for seed, _ in entrant.files],
+        "made_with": {
+            "packages": provenance.packages(),
+            "sources": sources(entrant),
+            "commit": provenance.commit(),
+            "cpu": provenance.cpu(),
+        },
+        "episodes": episodes,
+        "failures": failures(scored),
+        "aggregate": aggregate(scored, of_track(track.content)),
+        "by": breakdown(track, scored),
+        "audit": None,
+        "traces": [trace for cell in public for trace in cell.get("traces", ())],
+        "volatile": {
+            **provenance.occasion(),
+            "predict_us": _median_times([cell["volatile"]["predict_us"] for cell in cells]),
+        },
+    }
+    if found is not None:
+        scores = aggregate(unseen, of_track(track.content))
+        row["audit"] = found.record() | {
+            "failures": failures(unseen),
+            "aggregate": scores,
+            "gap": gap(scores, row["aggregate"]),
+        }
+    if entrant.files:
+        row["actions"] = {c["scenario"]: c["actions"] for c in public if "actions" in c}
+    return row
+
+
+def _check_complete(
+    entrant: Entrant, track: ScenarioSet, cells: Sequence[Record], found: Audit | None
+) -> None:
+    """Raise unless the records are those of the row's cells."""
+
+    def place(cell: Cell) -> tuple[Any, ...]:
+        return cell.split, cell.training_seed, cell.scenario.name
+
+    wanted = [place(cell) for cell in cells_of(entrant, track, found)]
+    if [(c["split"], c["training_seed"], c["scenario"]) for c in cells] != wanted:
+        raise ValueError(f"{entrant.name}: the cells are not those of {track.name}")
+    others = sorted({str(cell["env"]) for cell in cells} - {track.env})
+    if others:
+        raise ValueError(
+            f"{entrant.name}: cells of {', '.join(others)} among those of {track.env}; results of "
+            "different versions are not mixed: run it again with --force"
+        )
+
+
+def _check_plants(entrant: Entrant, built: tasks.Built, cells: Sequence[Record]) -> None:
+    """Raise unless the cells are of the plants and models that the track has now."""
+    for cell in cells:
+        name = cell["scenario"]
+        if (cell["plant_digest"], cell["model_digest"]) != (built.plants[name], built.models[name]):
+            raise ValueError(
+                f"{entrant.name}: a cell of {name} is of another plant or model; run it again with "
+                "--force"
+            )
+
+
+def _controller(entrant: Entrant, cells: Sequence[Record]) -> dict[str, Any]:
+    parameters = {_place(cell): cell["controller_digest"] for cell in cells}
+    code = [cell["code_digest"] for cell in cells]
+    return {
+        "name": entrant.name,
+        "kind": entrant.kind,
+        "source": entrant.source,
+        "summary": entrant.summary,
+        "knowledge": knowledge.label(entrant.knowledge, cells),
+        "claimed": entrant.knowledge,
+        "author": entrant.author,
+        "citation": entrant.citation,
+        "digest": digest(parameters)[:16],
+        "parameters": parameters,
+        "preview_seconds": max(cell.get("preview_used", 0.0) for cell in cells),
+        "tuning": {"trials": entrant.trials, "how": entrant.tuning},
+        "artefact": artefacts.combine(entrant, parameters.values(), code).record(),
+        "training": trainings.of(entrant),
+    }
+
+
+def _place(cell: Record) -> str:
+    seed = cell["training_seed"]
+    return str(cell["scenario"]) + ("" if seed is None else f"#s{seed}")
+
+
+def gap(audited: Record, public: Record) -> dict[str, float]:
+    """Return by how much the mean of each metric is higher in the audit."""
+    return {name: audited[name]["mean"] - public[name]["mean"] for name in audited}
+
+
+def failures(episodes: Sequence[Record]) -> int:
+    """Return how many episodes a limit or an error ended."""
+    return sum(bool(episode["failed"]) for episode in episodes)
+
+
+def episodes_of(row: Record, split: str = PUBLIC) -> list[Record]:
+    """Return the public or the audit episodes of a row."""
+    return [episode for episode in row["episodes"] if episode["split"] == split]
+
+
+def _median_times(times: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:
+    known = [time["median"] for time in times if time["median"] is not None]
+    high = [time["p99"] for time in times if time["p99"] is not None]
+    return {
+        "median": float(np.median(known)) if known else None,
+        "p99": float(np.median(high)) if high else None,
+    }
+
+
+def scores_of(episodes: Sequence[Mapping[str, Any]], metric: str) -> np.ndarray[Any, Any]:
+    """Return one metric of all episodes, NaN where it does not apply."""
+    values = [episode["scores"][metric] for episode in episodes]
+    return np.array([np.nan if value is None else value for value in values], float)
+
+
+def aggregate(
+    episodes: Sequence[Mapping[str, Any]], metrics: Iterable[str] = METRICS
+) -> dict[str, Any]:
+    """Return mean and interquartile mean of every metric with their intervals.
+
+    The mean leads: an interquartile mean would drop failures. An episode in which a metric does
+    not apply to one training seed counts for none.
+    """
+    strata = [episode["scenario"] for episode in episodes]
+    runs = [episode["training_seed"] for episode in episodes]
+    pairs = [(episode["scenario"], episode["seed"]) for episode in episodes]
+    table: dict[str, Any] = {}
+    for metric in metrics:
+        values = scores_of(episodes, metric)
+        middle, inner = (
+            statistics.bootstrap(values, strata, statistic, runs=runs, pairs=pairs)
+            for statistic in (statistics.mean, statistics.interquartile_mean)
+        )
+        applies, _ = statistics.crossed(np.isfinite(values), runs, pairs)
+        table[metric] = {
+            "mean": middle.value,
+            "low": middle.low,
+            "high": middle.high,
+            "iqm": inner.value,
+            "iqm_low": inner.low,
+            "iqm_high": inner.high,
+            "episodes": int(applies.all(axis=0).sum()) * len(applies),
+        }
+    return table
+
+
+def breakdown(track: ScenarioSet, episodes: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the headline's mean for each value of each axis of the grid."""
+    settings = {scenario.name: scenario.kwargs for scenario in track.scenarios()}
+    values = scores_of(episodes, headline_of(track.content))
+    table: dict[str, Any] = {}
+    for axis, points in (track.content.get("grid") or {}).items():
+        for point in points:
+            chosen = [settings[episode["scenario"]][axis] == point for episode in episodes]
+            table.setdefault(axis, {})[str(point)] = float(np.mean(values[chosen]))
+    return table
+
+
+def save(row: Row, folder: Path = RESULTS) -> Path:
+    """Write a row under its name and return the path."""
+    path = folder / f"{row['row']}.json"
+    write_record(path, row)
+    return path
+
+
+def load(path: Path) -> Row:
+    """Return a row of this schema whose checksum matches.
+
+    Raises
+    ------
+    ValueError
+        If the file is damaged, altered, of another schema, or not named as what it holds.
+    """
+    row = read_record(path)
+    check_schema(row, path)
+    return row
+
+
+def check_schema(row: Record, path: Path) -> None:
+    """Raise unless a record is a row as this version writes it, and named as its file.
+
+    Names become names of files and commands, so that nothing but plain ones may be in them.
+    """
+    again = f"run it again: {command(path.stem)}"
+    if row.get("schema") != SCHEMA:
+        raise ValueError(
+            f"{path}: not a row of schema {SCHEMA}, but of {row.get('schema')!r}; {again}"
+        )
+    missing = [key for key in KEYS if key not in row]
+    for key, inner in KEYS.items():
+        held = row.get(key)
+        missing += [f"{key}.{name}" for name in inner if name not in _mapping(held)]
+    if missing:
+        raise ValueError(f"{path}: a row without {', '.join(missing)}; {again}")
+    track, controller = str(row["scenarios"]["name"]), str(row["controller"]["name"])
+    names = {str(row["row"]), path.stem, row_name(track, controller)}
+    plain = all(_NAME.fullmatch(name) for name in (track, controller))
+    if len(names) > 1 or not plain:
+        raise ValueError(
+            f"{path}: holds {row['row']!r}, of {controller!r} in {track!r}; file, row, track and "
+            f"controller have to agree, in letters, digits and _: {again}"
+        )
+    if track not in scenarios.names():
+        raise ValueError(
+            f"{path}: this checkout has no track {track!r}; check out the row's commit"
+        )
+
+
+def _mapping(value: Any) -> Mapping[str, Any]:
+    return value if isinstance(value, Mapping) else {}
+
+
+def command(name: str) -> str:
+    """Return the command that runs a row again."""
+    track, _, controller = name.partition("--")
+    return f"python -m benchmarks run --track {track} --controller {controller}"
+
+
+def load_all(folder: Path = RESULTS) -> list[Row]:
+    """Return all rows of a folder by name.
+
+    Raises
+    ------
+    ValueError
+        If one is damaged, of an environment version that is not here, or of another task than
+        the other rows of its track: a board leaves nothing out silently and mixes nothing.
+    """
+    found = [load(path) for path in sorted(folder.glob("*--*.json"))]
+    for row in found:
+        tasks.check_version(row["env"]["id"], row["row"])
+    check_together(found)
+    return found
+
+
+def check_together(found: Sequence[Record]) -> None:
+    """Raise unless the rows of each track are of one environment, one task and one code.
+
+    Raises
+    ------
+    ValueError
+        Naming what differs and a row of each, or a row that is there twice.
+    """
+    first: dict[str, Record] = {}
+    names: set[str] = set()
+    for row in found:
+        if row["row"] in names:
+            raise ValueError(f"{row['row']} is there twice; take one of them out")
+        names.add(row["row"])
+        track = row["scenarios"]["name"]
+        other = first.setdefault(track, row)
+        for what, ours in _shared(row).items():
+            theirs = _shared(other)[what]
+            if ours != theirs:
+                raise ValueError(
+                    f"{row['row']} is of {what} {ours} and {other['row']} of {theirs}: their "
+                    "results are not compared; run the older ones again: "
+                    f"python -m benchmarks run --track {track}"
+                )
+
+
+def _shared(row: Record) -> dict[str, str]:
+    """Return what the rows of a track have to have in common, in words."""
+    made = row["made_with"].get("sources") or {}
+    return {
+        "environment": str(row["env"]["id"]),
+        "task": str(row["task"])[:12],
+        "pam_envs": str(made.get("pam_envs")),
+        "benchmarks": str(made.get("benchmarks")),
+    }

@@ -1,0 +1,144 @@
+"""Run one episode and draw it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.board import plots
+from benchmarks.runs import controllers, rollout
+from benchmarks.runs.cells import make_env
+from benchmarks.scoring import metrics
+
+
+def play(
+    env_id: str,
+    controller: str,
+    kwargs: Mapping[str, Any],
+    seed: int,
+    video: Path | None = None,
+) -> tuple[rollout.Episode, Any]:
+    """Run one episode, and film it where a path is given.
+
+    Returns
+    -------
+    Episode and mapping of (n,) array
+        The recording, and the set-points that were asked for, by name, SI.
+
+    Raises
+    ------
+    ValueError
+        If the controller is not for the environment, or that lacks an argument.
+    """
+    entrant = controllers.find(controller)
+    if not entrant.runs_in(env_id):
+        raise ValueError(f"{controller} is for {', '.join(entrant.envs)}, not for {env_id}")
+    filmed = {"render_mode": "rgb_array"} if video else {}
+    env = _made(env_id, {**kwargs, **filmed})
+    made = controllers.make(entrant, env.unwrapped.plant, env)
+    film = Film(video, env) if video else None
+    try:
+        episode = rollout.run(env, made, seed, film)
+        set_points = _set_points(env, episode.actions)
+    finally:
+        env.close()
+        if film:
+            film.close()
+    return episode, set_points
+
+
+def _made(env_id: str, kwargs: Mapping[str, Any]) -> Any:
+    """Return the environment; what it says of its arguments is told without Gymnasium's addition.
+
+    Raises
+    ------
+    ValueError
+        If an argument is unknown or out of its bounds.
+    """
+    try:
+        return make_env(env_id, kwargs)
+    except (TypeError, ValueError) as error:
+        said = str(error).partition(" was raised from the environment creator")[0]
+        raise ValueError(f"{env_id}: {said}") from error
+
+
+def _set_points(env: Any, actions: NDArray[Any]) -> dict[str, NDArray[np.float64]]:
+    """Return what was asked for of each set-point, within its range, SI."""
+    space, signals = env.action_space, env.unwrapped.action_signals
+    inside = np.clip(actions.reshape(-1, len(signals)), space.low, space.high)
+    return {name: signals.decode(inside, name) for name in signals.names()}
+
+
+class Film:
+    """Writes a frame of the environment every few steps, at the speed of life."""
+
+    def __init__(self, path: Path, env: Any) -> None:
+        import imageio_ffmpeg
+
+        self._open = imageio_ffmpeg.write_frames
+        self._path, self._frames, self._step = path, None, 0
+        self._every = max(1, round(0.04 / env.unwrapped.control_period))
+        self._fps = 1.0 / (self._every * env.unwrapped.control_period)
+
+    def __call__(self, env: Any) -> None:
+        """Take the present picture, if it is time for one."""
+        if self._step % self._every == 0:
+            self._write(env.render())
+        self._step += 1
+
+    def _write(self, picture: Any) -> None:
+        height, width = (2 * (n // 2) for n in picture.shape[:2])  # the codec wants even sizes
+        if self._frames is None:
+            frames = self._open(str(self._path), (width, height), fps=self._fps, macro_block_size=2)
+            frames.send(None)
+            self._frames = frames
+        self._frames.send(np.ascontiguousarray(picture[:height, :width]))
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._frames is not None:
+            self._frames.close()
+
+
+def summary(episode: rollout.Episode, content: Mapping[str, Any]) -> dict[str, float]:
+    """Return the scores of an episode that need no scale of a scenario file.
+
+    Parameters
+    ----------
+    episode : Episode
+    content : mapping
+        Of the scenario file whose sensor and gate count. An episode that is shorter than twice its
+        settling window is scored in its second half.
+    """
+    signals = {**episode.signals, "sensed": episode.signals[content["sensed"]]}
+    settle = min(float(content["settle_seconds"]), 0.5 * float(signals["time"][-1]))
+    gate, hold = content.get("gate") or (), float(content["hold_seconds"])
+    return metrics.score(signals, episode.period, settle, hold, {}, gate)
+
+
+def told(scores: Mapping[str, float], content: Mapping[str, Any]) -> list[str]:
+    """Return a line for each score with its unit, SI; one that no number belongs to says so."""
+    units = metrics.of_track(content)
+    lines = []
+    for name, value in scores.items():
+        unit = "" if units[name] == "1" else f" {units[name]}"
+        said = "does not apply" if np.isnan(value) else f"{value:.6g}{unit}"
+        lines.append(f"{name:20s} {said}")
+    return lines
+
+
+def draw(
+    episode: rollout.Episode,
+    set_points: Mapping[str, Any],
+    title: str,
+    path: Path,
+    shown: tuple[str, float],
+) -> None:
+    """Write the figure of an episode, its output in a unit of that factor from SI."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure = plots.episode_figure(episode.signals, set_points, title, shown)
+    figure.savefig(path, dpi=150)

@@ -1,0 +1,85 @@
+"""Environments and nominal models of a scenario.
+
+A scenario may be a stranger's: it names one of this package's environments and plants of this
+checkout, and nothing else. ``gymnasium.make`` would import what stands before a colon.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+
+from benchmarks.scenarios.scenario import Scenario
+
+PLANTS = Path(__file__).parent / "plants"
+"""Plants that scenario files name."""
+_ID = re.compile(r"PAM/[A-Za-z0-9_]+-v[0-9]+")
+_PLANT = re.compile(r"[A-Za-z0-9_]+\.yaml")
+
+
+def make_env(env: str, kwargs: Mapping[str, Any]) -> Any:
+    """Return the single environment of a scenario; a plant is the name of a file in ``PLANTS``.
+
+    Raises
+    ------
+    ValueError
+        If the id is not one of this package, or the plant is not the mere name of a file.
+    """
+    return gym.make(_checked(env), disable_env_checker=True, **_arguments(kwargs))
+
+
+def make_batch(env: str, kwargs: Mapping[str, Any], rows: int) -> Any:
+    """Return the batched environment of a scenario; see :func:`make_env`."""
+    how = {"num_envs": rows, "vectorization_mode": "vector_entry_point"}
+    return gym.make_vec(_checked(env), **how, **_arguments(kwargs))
+
+
+def _checked(env: str) -> str:
+    import pam_envs  # noqa: F401  registers the ids
+
+    if not _ID.fullmatch(env):
+        raise ValueError(f"{env!r} is no environment of this package; give one like PAM/NAME-v0")
+    return env
+
+
+def _arguments(kwargs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a scenario's arguments with the file of its plant in place of the file's name."""
+    given = dict(kwargs)
+    if isinstance(given.get("plant"), str):
+        given["plant"] = plant_file(given["plant"])
+    return given
+
+
+def plant_file(name: str) -> Path:
+    """Return the file of a plant that a scenario names.
+
+    Raises
+    ------
+    ValueError
+        If there may be a folder in the name.
+    """
+    if not _PLANT.fullmatch(name):
+        raise ValueError(f"plant {name!r} is not the mere name of a file, like arm.yaml")
+    return PLANTS / name
+
+
+def plant_digests(scenario: Scenario) -> dict[str, str]:
+    """Return the SHA-256 of the plant files that a scenario and its model name."""
+    named = (given.get("plant") for given in (scenario.kwargs, scenario.model))
+    files = {name: plant_file(name) for name in named if isinstance(name, str)}
+    return {name: hashlib.sha256(file.read_bytes()).hexdigest() for name, file in files.items()}
+
+
+def model_of(env_id: str, scenario: Scenario, env: Any) -> Any:
+    """Return the plant that a controller is told: the environment's, or the scenario's model."""
+    if not scenario.model:
+        return env.unwrapped.plant
+    other = make_env(env_id, {**scenario.kwargs, **scenario.model})
+    plant = other.unwrapped.plant
+    other.close()
+    return plant

@@ -1,0 +1,190 @@
+"""What may be said of a controller against the best paper controller of its track."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from benchmarks.board import accessors as views
+from benchmarks.runs import knowledge
+from benchmarks.runs.rows import Row
+from benchmarks.scoring import standings
+from benchmarks.scoring.metrics import of_track
+from benchmarks.scoring.statistics import NOTHING, Interval
+
+CLAIM_SEEDS = 10
+"""Training seeds that a claim needs."""
+PROBABILITY, LOWER_BOUND = 0.95, 0.5
+"""What the probability of improvement has to exceed, and its lower 95 % bound."""
+COST_RATIO = 1.1
+"""By how much effort and constraint cost may exceed the paper controller's."""
+COST_FLOOR = {"constraint_cost": 1e-3}
+"""Costs below which there is nothing to compare: a thousandth of a scale, all the time."""
+COSTS = {
+    "emg_ratio": "EMG ratio",
+    "pressure_travel": "pressure travel",
+    "air_use": "air",
+    "constraint_cost": "constraint cost",
+}
+"""Metrics that a lower error must not be bought with, where a track has them."""
+
+BETTER, DEARER, NOT_SHOWN = "better", "better error, higher cost", "not shown to be better"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A controller beside the best paper controller of its track.
+
+    Attributes
+    ----------
+    row, paper : Row
+    split : str
+        Which episodes all of it is of: the audit's if both are in the round.
+    probability : Interval
+        Of improvement of the headline over training seeds and paired episodes.
+    ratios : mapping from the name of a cost to its ratio
+        Infinite where the paper controller has none of it.
+    verdict : str
+        ``BETTER``, ``DEARER`` or ``NOT_SHOWN``.
+    reasons : tuple of str
+        What keeps the claim from being ``BETTER``.
+    gain : Interval
+        By what share of the paper controller's mean the row's is lower, paired by episode.
+    remarks : tuple of str
+        What has to be known beside the verdict: on how many settings each side was chosen.
+    """
+
+    row: Row
+    paper: Row
+    split: str
+    probability: Interval
+    ratios: dict[str, float]
+    verdict: str
+    reasons: tuple[str, ...]
+    gain: Interval
+    remarks: tuple[str, ...]
+
+
+def is_paper(row: Row) -> bool:
+    """Return whether a row is of a paper's method or a textbook rule: classical, with a source."""
+    return row["controller"]["kind"] == "classical" and bool(row["controller"]["citation"])
+
+
+def best_paper(rows: Sequence[Row]) -> Row | None:
+    """Return the best paper controller of a track, ``None`` where there is none.
+
+    That of the audit round with the lowest mean over its episodes; where none is in the round, the
+    one with the lowest mean over the public episodes.
+    """
+    return next((row for row in standings.ordered(rows) if is_paper(row)), None)
+
+
+def cost_ratios(row: Row, paper: Row, split: str) -> dict[str, float]:
+    """Return each cost over the paper controller's, means over the episodes of a split."""
+    wanted = [metric for metric in COSTS if metric in of_track(views.content_of(row))]
+    return {COSTS[metric]: _ratio(row, paper, metric, split) for metric in wanted}
+
+
+def _ratio(row: Row, paper: Row, metric: str, split: str) -> float:
+    ours, theirs = (views.mean_of(r, metric, split) for r in (row, paper))
+    floor = COST_FLOOR.get(metric, 0.0)
+    if ours <= floor:  # nothing to speak of, whatever the other has
+        return min(1.0, ours / theirs) if theirs > 0.0 else 1.0
+    return ours / max(theirs, floor) if max(theirs, floor) > 0.0 else math.inf
+
+
+def claim(row: Row, paper: Row, doubts: Sequence[str] = ()) -> Claim | None:
+    """Return what may be said of a row, ``None`` if the two have not run the same episodes.
+
+    Parameters
+    ----------
+    row, paper : Row
+    doubts : sequence of str
+        What speaks against any claim of the track.
+    """
+    split, probability = views.common_split(row, paper), standings.improvement(row, paper)
+    if split is None or probability is None:
+        return None
+    ratios, gained = cost_ratios(row, paper, split), gain(row, paper, split)
+    against = [*_doubts(row, paper, probability, gained, split), *doubts]
+    costs = [f"{name} {ratio:.2f}x" for name, ratio in ratios.items() if not ratio <= COST_RATIO]
+    verdict = NOT_SHOWN if against else DEARER if costs else BETTER
+    reasons = (*against, *costs)
+    return Claim(
+        row, paper, split, probability, ratios, verdict, reasons, gained, _budgets(row, paper)
+    )
+
+
+def gain(row: Row, paper: Row, split: str) -> Interval:
+    """Return by what share of the paper controller's mean the row's is lower."""
+    more, whole = standings.difference(row, paper), views.mean_of(paper, split=split)
+    if more is None or not whole > 0.0:
+        return NOTHING
+    return Interval(-more.value / whole, -more.high / whole, -more.low / whole)
+
+
+def _budgets(row: Row, paper: Row) -> tuple[str, ...]:
+    """Return a remark where the two were not chosen from as many settings."""
+    mine, theirs = (views.cost_of(each).trials for each in (row, paper))
+    if mine == theirs:
+        return ()
+    words = ["by hand" if count is None else str(count) for count in (mine, theirs)]
+    return (f"settings tried: {words[0]}, paper's {words[1]}",)
+
+
+def _doubts(row: Row, paper: Row, probability: Interval, gained: Interval, split: str) -> list[str]:
+    """Return what speaks against a lower error, each as a few words."""
+    doubts = []
+    if not probability.value > PROBABILITY:
+        doubts.append(f"P {probability.value:.2f}, needs more than {PROBABILITY:g}")
+    elif not probability.low > LOWER_BOUND:
+        doubts.append(f"lower bound of P {probability.low:.2f}, needs more than {LOWER_BOUND:g}")
+    elif not gained.value > 0.0:
+        doubts.append("lower in most episodes, not in the mean")
+    elif not gained.low > 0.0:
+        doubts.append("the interval of the mean's gain holds zero")
+    mine, theirs = (each["controller"]["knowledge"] for each in (row, paper))
+    if knowledge.is_ahead(mine, theirs):
+        doubts.append(f"knows the plant ({mine}) of which {views.name_of(paper)} is told another")
+    seeds = views.training_seeds(row)
+    if row["controller"]["kind"] != "classical" and seeds < CLAIM_SEEDS:
+        doubts.append(f"{seeds} training seed{'s' * (seeds != 1)}, a claim needs {CLAIM_SEEDS}")
+    (failed, total), (failed_too, of) = (views.failures_of(r, split) for r in (row, paper))
+    if failed / total > failed_too / of:
+        doubts.append(f"{failed} of {total} episodes failed")
+    if not views.is_audited(row):
+        doubts.append("not audited")
+    elif not views.is_audited(paper):
+        doubts.append(f"{views.name_of(paper)} not audited")
+    return doubts
+
+
+def learned_claims(rows: Sequence[Row]) -> list[Claim]:
+    """Return the claims of a track's learned and residual rows, the likeliest first."""
+    paper = best_paper(rows)
+    if paper is None:
+        return []
+    doubts = _doubts_of_track(rows, paper)
+    learned = [row for row in standings.ordered(rows) if row["controller"]["kind"] != "classical"]
+    made = [claim(row, paper, doubts) for row in learned]
+    order = (BETTER, DEARER, NOT_SHOWN)
+    return sorted(
+        (entry for entry in made if entry is not None),
+        key=lambda entry: (
+            order.index(entry.verdict),
+            entry.split != views.AUDIT,
+            -entry.probability.value,
+        ),
+    )
+
+
+def _doubts_of_track(rows: Sequence[Row], paper: Row) -> list[str]:
+    """Return what keeps the best paper controller from being known to be the best."""
+    listing = standings.listing(rows)
+    doubts = [f"{name} is in the audit round and has no row" for name in listing.missing]
+    best, public = views.name_of(paper), views.mean_of(paper, split=views.PUBLIC)
+    for row in filter(is_paper, listing.outside):
+        if row is not paper and views.mean_of(row) < public:
+            doubts.append(f"{views.name_of(row)}, not audited, is below {best} on public episodes")
+    return doubts

@@ -1,0 +1,218 @@
+"""Who stands where in a track, by paired differences, and how that changes between tracks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from benchmarks.board import accessors as views
+from benchmarks.runs.rows import Row
+from benchmarks.scoring import statistics
+from benchmarks.scoring.statistics import Interval
+
+Track = list[Row]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a row stands.
+
+    Attributes
+    ----------
+    first : int
+        Place of the first row of its group, from 1.
+    shared : bool
+        Whether others share it.
+    """
+
+    first: int
+    shared: bool
+
+    def __str__(self) -> str:
+        """Return the rank as the board prints it."""
+        return f"{self.first}{'=' if self.shared else ''}"
+
+
+@dataclass(frozen=True)
+class Listing:
+    """The rows of a track, the lowest error first.
+
+    Attributes
+    ----------
+    ranked, few : list of rows
+        In the audit round of the track; those with too few training seeds for a rank apart. All
+        rows where there has been no round yet.
+    outside : list of rows
+        Not in the round of a track that has one.
+    missing : tuple of str
+        Controllers that are in the round and have no row.
+    """
+
+    ranked: Track
+    few: Track
+    outside: Track
+    missing: tuple[str, ...]
+
+    @property
+    def inside(self) -> Track:
+        """The rows that are compared with each other."""
+        return [*self.ranked, *self.few]
+
+    @property
+    def split(self) -> str:
+        """Which episodes they are compared on."""
+        return views.published_split(self.inside[0])
+
+
+def tracks(rows: Sequence[Row]) -> dict[str, Track]:
+    """Return the rows of each track, best first; tracks by environment, the nominal one first."""
+    grouped: dict[str, Track] = {}
+    for row in rows:
+        grouped.setdefault(views.track_of(row), []).append(row)
+    names = sorted(grouped, key=lambda n: (_family(grouped[n][0]), "nominal" not in n, n))
+    return {name: ordered(grouped[name]) for name in names}
+
+
+def _family(row: Row) -> str:
+    """Return what tracks of one environment sort by: positioning first."""
+    env = str(row["env"]["id"])
+    return "" if "Positioning" in env else env
+
+
+def ordered(rows: Sequence[Row]) -> Track:
+    """Return the rows of a track by the mean of their headline, the lowest first.
+
+    Rows of the audit round by its episodes; after them the others, by the public ones.
+    """
+    return sorted(rows, key=_order)
+
+
+def _order(row: Row) -> tuple[bool, float, str]:
+    mean = views.mean_of(row)
+    return not views.is_audited(row), np.inf if np.isnan(mean) else mean, views.name_of(row)
+
+
+def listing(rows: Sequence[Row]) -> Listing:
+    """Return which rows of a track are compared, and which are listed apart."""
+    best_first = ordered(rows)
+    audited = [row for row in best_first if views.is_audited(row)]
+    inside = audited or best_first
+    present = {views.name_of(row) for row in inside}
+    entrants = views.round_of(audited[0])["entrants"] if audited else ()
+    return Listing(
+        ranked=[row for row in inside if views.is_listed(row)],
+        few=[row for row in inside if not views.is_listed(row)],
+        outside=best_first[len(inside) :],
+        missing=tuple(sorted(set(entrants) - present)),
+    )
+
+
+def difference(first: Row, second: Row) -> Interval | None:
+    """Return the headline of ``first`` less that of ``second``, paired by episode.
+
+    Over the audit episodes where both have them, else over the public ones; ``None`` if they have
+    not run the same.
+    """
+    split = views.common_split(first, second)
+    if split is None:
+        return None
+    a, b = (views.scores(row, split=split) for row in (first, second))
+    return statistics.difference_of_tables(a.table, b.table, a.strata)
+
+
+def improvement(first: Row, second: Row) -> Interval | None:
+    """Return how likely ``first`` has the smaller headline, over training seeds and episodes."""
+    split = views.common_split(first, second)
+    if split is None:
+        return None
+    a, b = (views.scores(row, split=split) for row in (first, second))
+    return statistics.probability_of_improvement(a.table, b.table, a.strata)
+
+
+def ranks(best_first: Sequence[Row]) -> list[Place]:
+    """Return the place of each row of a track.
+
+    A row shares the place of the first of its group where the interval of their paired difference
+    holds zero.
+    """
+    groups: list[list[Row]] = []
+    for row in best_first:
+        if groups and _tied(row, groups[-1][0]):
+            groups[-1].append(row)
+        else:
+            groups.append([row])
+    sizes = [len(group) for group in groups]
+    firsts = np.cumsum([1, *sizes[:-1]]) if sizes else ()
+    return [
+        Place(int(first), size > 1)
+        for first, size in zip(firsts, sizes, strict=True)
+        for _ in range(size)
+    ]
+
+
+def _tied(row: Row, leader: Row) -> bool:
+    found = difference(row, leader)
+    return found is not None and found.low <= 0.0 <= found.high
+
+
+@dataclass(frozen=True)
+class Changes:
+    """Ranks of the controllers that have run in all tracks of an environment.
+
+    Attributes
+    ----------
+    env : str
+    tracks : tuple of str
+        The nominal one first.
+    splits : tuple of str
+        Which episodes the places of each track are of.
+    places : mapping from controller to a place a track
+        In the order of the first track.
+    agreement : tuple of float
+        Kendall's tau of each track's means with those of the first, 1 for the same order.
+    """
+
+    env: str
+    tracks: tuple[str, ...]
+    splits: tuple[str, ...]
+    places: Mapping[str, tuple[Place, ...]]
+    agreement: tuple[float, ...]
+
+
+def changes(by_track: Mapping[str, Sequence[Row]]) -> list[Changes]:
+    """Return how ranks change between the tracks of each environment that has more than one.
+
+    Parameters
+    ----------
+    by_track : mapping from track to rows
+        The rows that are ranked, best first, tracks in the order of :func:`tracks`.
+    """
+    families: dict[str, list[str]] = {}
+    for name, rows in by_track.items():
+        if rows:
+            families.setdefault(str(rows[0]["env"]["id"]), []).append(name)
+    return [_changes(env, names, by_track) for env, names in families.items() if len(names) > 1]
+
+
+def _changes(env: str, names: list[str], by_track: Mapping[str, Sequence[Row]]) -> Changes:
+    everywhere = set.intersection(*({views.name_of(r) for r in by_track[n]} for n in names))
+    kept = {n: [r for r in by_track[n] if views.name_of(r) in everywhere] for n in names}
+    placed = {
+        n: dict(zip(map(views.name_of, rows), ranks(rows), strict=True)) for n, rows in kept.items()
+    }
+    order = [views.name_of(row) for row in kept[names[0]]]
+    means = {n: {views.name_of(r): views.mean_of(r) for r in rows} for n, rows in kept.items()}
+    first = [means[names[0]][c] for c in order]
+    agreement = [_tau(first, [means[n][c] for c in order]) for n in names]
+    places = {c: tuple(placed[n][c] for n in names) for c in order}
+    splits = tuple(views.published_split(by_track[n][0]) for n in names)
+    return Changes(env, tuple(names), splits, places, tuple(agreement))
+
+
+def _tau(first: Sequence[float], second: Sequence[float]) -> float:
+    if len(first) < 2:
+        return float("nan")
+    return float(stats.kendalltau(first, second).statistic)

@@ -1,0 +1,360 @@
+"""Means with intervals over scenarios and seeds, and who is likely to do better than whom.
+
+Interquartile mean, probability of improvement and performance profile are those of R. Agarwal et
+al., "Deep reinforcement learning at the edge of the statistical precipice", NeurIPS 34 (2021):
+runs are training seeds, tasks are paired episodes, and less is better.
+
+Episodes are drawn again within their scenario (stratified), with a fixed seed, so that the same
+scores give the same interval to the last bit. Training seeds are drawn as wholes, since one policy
+answers in all scenarios. Episodes of two scenarios have to be independent, so no seed may stand in
+both. How it is drawn stands in :mod:`benchmarks.scoring.resampling`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+from benchmarks.scoring.resampling import counts, draw_clusters, resample_indices
+
+BOOTSTRAP_SEED = 20_000_003
+RESAMPLES = 5000
+_BOUNDS = (0.025, 0.975)
+_LARGEST = 4_000_000
+"""Numbers that resamples may hold at once."""
+
+Array = NDArray[np.float64]
+Statistic = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An estimate with the bounds of its confidence interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+NOTHING = Interval(float("nan"), float("nan"), float("nan"))
+"""The estimate of a quantity that no episode has."""
+
+
+def mean(samples: Array) -> Array:
+    """Return the mean over the last axis."""
+    return np.asarray(np.mean(samples, axis=-1))
+
+
+def interquartile_mean(samples: Array) -> Array:
+    """Return the mean of the middle half over the last axis, shape (..., n) to (...).
+
+    A quarter of n, rounded down, is left out at either end. A resample of s strata has n - s
+    episodes, so that with few episodes a stratum the middle that it keeps is another share: of two
+    scenarios with five episodes each, 4 of 8 where the estimate keeps 6 of 10.
+    """
+    return np.asarray(stats.trim_mean(samples, 0.25, axis=-1))
+
+
+def crossed(
+    samples: ArrayLike, runs: Sequence[Hashable], pairs: Sequence[Hashable]
+) -> tuple[Array, list[Any]]:
+    """Return samples as a table of runs by pairs, and the pairs; both in ascending order.
+
+    Parameters
+    ----------
+    samples : (n,) array
+    runs, pairs : sequence of n
+        Training seed and paired episode of each sample. Every run must have every pair once.
+
+    Returns
+    -------
+    (number of runs, number of pairs) array, list
+
+    Raises
+    ------
+    ValueError
+        If an episode of a run is missing or there twice.
+    """
+    rows = _places(runs)
+    columns = _places(pairs)
+    values = np.asarray(samples, float)
+    table = np.empty((len(rows), len(columns)))
+    filled = np.zeros(table.shape, int)
+    for run, pair, value in zip(runs, pairs, values, strict=True):
+        table[rows[run], columns[pair]] = value
+        filled[rows[run], columns[pair]] += 1
+    if (filled != 1).any():
+        raise ValueError(
+            f"{len(values)} episodes of {len(rows)} training seeds and {len(columns)} scenarios x "
+            "seeds: every training seed must be run in every episode, once"
+        )
+    return table, list(columns)
+
+
+def _places(labels: Sequence[Any]) -> dict[Any, int]:
+    return {label: k for k, label in enumerate(sorted(set(labels)))}
+
+
+def resampled(
+    table: Array,
+    strata: ArrayLike,
+    statistic: Statistic,
+    resamples: int,
+    seed: int,
+    run_seed: int | None = None,
+) -> Array:
+    """Return a statistic of resamples of a table: of its runs, and of episodes within strata.
+
+    Parameters
+    ----------
+    table : (runs, n) array
+    strata : (n,) array
+        Of the columns. With one run the draws are those of the columns alone.
+    run_seed : int, optional
+        Of the draws of runs, ``seed + 1`` if not given. Tables of the same runs that share it are
+        resampled with the same runs.
+
+    Returns
+    -------
+    (resamples,) array
+    """
+    columns = resample_indices(strata, resamples, seed)
+    if len(table) == 1:
+        return np.asarray(statistic(table[0][columns]))
+    run_seed = seed + 1 if run_seed is None else run_seed
+    rows = resample_indices(np.zeros(len(table)), resamples, run_seed)
+    chunk = max(1, _LARGEST // (rows.shape[1] * columns.shape[1]))
+    parts = []
+    for first in range(0, resamples, chunk):
+        some = slice(first, first + chunk)
+        drawn = table[rows[some, :, None], columns[some, None, :]]
+        parts.append(statistic(drawn.reshape(len(drawn), -1)))
+    return np.concatenate(parts)
+
+
+def bootstrap(
+    samples: ArrayLike,
+    strata: ArrayLike,
+    statistic: Statistic = mean,
+    *,
+    runs: Sequence[Hashable] | None = None,
+    pairs: Sequence[Hashable] | None = None,
+    resamples: int = RESAMPLES,
+    seed: int = BOOTSTRAP_SEED,
+) -> Interval:
+    """Return a statistic with its percentile bootstrap interval, stratified.
+
+    Parameters
+    ----------
+    samples : (n,) array
+        One number per episode; NaN entries (not applicable) are left out.
+    strata : (n,) array
+        Scenario of each episode. All strata must have the same number of episodes for the
+        statistic of the resamples to weigh them as the samples do.
+    statistic : callable
+        From (..., n) to (...).
+    runs, pairs : sequence of n, optional
+        Training seed of each episode, and what is the same of one episode in all of them: then
+        the order of the episodes does not matter. Both or none.
+
+    Returns
+    -------
+    Interval
+        NaN throughout if no sample applies.
+    """
+    if (runs is None) != (pairs is None):
+        raise ValueError("samples of training seeds need `runs` and `pairs` to say which belong")
+    labels = np.asarray(strata)
+    if runs is None or pairs is None:
+        table = np.asarray(samples, float)[None, :]
+    else:
+        table, order = crossed(samples, runs, pairs)
+        of_pair = dict(zip(pairs, labels.tolist(), strict=True))
+        labels = np.array([of_pair[pair] for pair in order])
+    return of_table(table, labels, statistic, resamples=resamples, seed=seed)
+
+
+def applying(table: Array) -> NDArray[np.bool_]:
+    """Return the columns that count, shape (n,): an episode has to apply in every run."""
+    return np.asarray(np.isfinite(table).all(axis=0))
+
+
+def of_table(
+    table: Array,
+    strata: ArrayLike,
+    statistic: Statistic = mean,
+    *,
+    resamples: int = RESAMPLES,
+    seed: int = BOOTSTRAP_SEED,
+) -> Interval:
+    """Return a statistic of a table of runs by episodes with its interval.
+
+    Parameters
+    ----------
+    table : (runs, n) array
+        NaN where an episode does not apply, which leaves it out in all runs.
+    strata : (n,) array
+        Scenario of each column.
+
+    Returns
+    -------
+    Interval
+        NaN throughout if no episode applies.
+    """
+    counts = applying(table)
+    kept = table[:, counts]
+    if not kept.size:
+        return NOTHING
+    drawn = resampled(kept, np.asarray(strata)[counts], statistic, resamples, seed)
+    return between(float(statistic(kept.ravel())), drawn)
+
+
+def between(value: float, drawn: Array) -> Interval:
+    """Return an estimate with the quantiles of its resamples."""
+    low, high = np.quantile(drawn, _BOUNDS)
+    return Interval(value, float(low), float(high))
+
+
+def difference_of_tables(
+    first: Array,
+    second: Array,
+    strata: ArrayLike,
+    *,
+    resamples: int = RESAMPLES,
+    seed: int = BOOTSTRAP_SEED,
+) -> Interval:
+    """Return the mean of ``first - second`` with its interval, paired by episode.
+
+    Parameters
+    ----------
+    first, second : (runs, n) array
+        Scores of two controllers, a row a training seed (one row for a classical controller) and
+        a column an episode that both have run.
+    strata : (n,) array
+        Scenario of each column.
+    """
+    if len(first) == len(second) == 1:
+        return of_table(first - second, strata, resamples=resamples, seed=seed)
+    columns = resample_indices(strata, resamples, seed)
+    averages = []
+    for number, table in enumerate((first, second)):
+        rows = resample_indices(np.zeros(len(table)), resamples, seed + 1 + number)
+        shares = counts(rows, len(table)) / rows.shape[1]
+        averages.append(np.einsum("rt,tk->rk", shares, table))
+    drawn = np.take_along_axis(averages[0] - averages[1], columns, axis=1).mean(axis=1)
+    return between(float(np.mean(first.mean(axis=0) - second.mean(axis=0))), drawn)
+
+
+def difference_of_splits(
+    first: Array,
+    first_strata: ArrayLike,
+    second: Array,
+    second_strata: ArrayLike,
+    *,
+    resamples: int = RESAMPLES,
+    seed: int = BOOTSTRAP_SEED,
+) -> Interval:
+    """Return by how much the same runs have a larger mean in one set of episodes than in another.
+
+    Runs are paired, so that the scatter between policies cancels; episodes are not.
+
+    Parameters
+    ----------
+    first, second : (runs, n), (runs, m) array
+        A row a training seed, in the same order in both.
+    first_strata, second_strata : (n,), (m,) array
+        Scenario of each column.
+    """
+    drawn = [
+        resampled(table, strata, mean, resamples, own, seed + 1)
+        for table, strata, own in ((first, first_strata, seed), (second, second_strata, seed + 2))
+    ]
+    return between(float(first.mean() - second.mean()), drawn[0] - drawn[1])
+
+
+def probability_of_improvement(
+    first: ArrayLike,
+    second: ArrayLike,
+    strata: ArrayLike,
+    *,
+    resamples: int = RESAMPLES,
+    seed: int = BOOTSTRAP_SEED,
+) -> Interval:
+    """Return how likely a run of ``first`` is below one of ``second``, over paired episodes.
+
+    The share of pairs of runs in which the first is below, ties half (the Mann-Whitney statistic
+    over the product of the numbers of runs), averaged over episodes. Drawn again are the training
+    seeds of both, scenarios, and seeds within scenarios.
+
+    Parameters
+    ----------
+    first, second : (runs, n) array
+        A row a training seed (one for a classical controller), a column an episode.
+    strata : (n,) array
+        Scenario of each column.
+    """
+    a, b = np.atleast_2d(np.asarray(first, float)), np.atleast_2d(np.asarray(second, float))
+    below = (a[:, None] < b[None]) + 0.5 * (a[:, None] == b[None])
+    columns = draw_clusters(strata, resamples, seed)
+    # counts and halves: every sum is exact, so that its order does not matter
+    ours, theirs = (
+        counts(resample_indices(np.zeros(len(table)), resamples, seed + 1 + number), len(table))
+        for number, table in enumerate((a, b))
+    )
+    hits = np.einsum("ra,rb,abk->rk", ours, theirs, below, optimize=True)
+    total = ours[0].sum() * theirs[0].sum() * columns.shape[1]
+    drawn = np.take_along_axis(hits, columns, axis=1).sum(axis=1) / total
+    return between(float(np.mean(below)), drawn)
+
+
+def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Array:
+    """Return the share of scores that are at most each threshold.
+
+    Parameters
+    ----------
+    scores : (runs, n) array
+        A row a training seed, a column an episode.
+    thresholds : (m,) array
+
+    Returns
+    -------
+    (m,) array
+    """
+    ordered = np.sort(np.asarray(scores, float).ravel())
+    return np.searchsorted(ordered, np.asarray(thresholds, float), side="right") / len(ordered)
+
+
+def profile_band(
+    scores: Array,
+    strata: ArrayLike,
+    thresholds: ArrayLike,
+    *,
+    resamples: int = 1000,
+    seed: int = BOOTSTRAP_SEED,
+) -> Array:
+    """Return the pointwise 95 % band of a performance profile.
+
+    Parameters
+    ----------
+    scores : (runs, n) array
+    strata : (n,) array
+        Scenario of each column.
+    thresholds : (m,) array
+
+    Returns
+    -------
+    (2, m) array
+        Lower and upper bounds.
+    """
+    below = (scores[:, :, None] <= np.asarray(thresholds, float)).astype(float)
+    columns = counts(resample_indices(strata, resamples, seed), scores.shape[1])
+    rows = counts(resample_indices(np.zeros(len(scores)), resamples, seed + 1), len(scores))
+    hits = np.zeros((resamples, below.shape[2]))
+    for weights, of_run in zip(rows.T, below, strict=True):
+        hits += weights[:, None] * (columns @ of_run)
+    return np.quantile(hits / (rows[0].sum() * columns[0].sum()), _BOUNDS, axis=0)

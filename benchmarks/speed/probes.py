@@ -1,0 +1,413 @@
+"""What is measured, group by group. A library that is absent costs its line and nothing else."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.speed.diagnosis import diagnosing
+from benchmarks.speed.learning import shares
+from benchmarks.speed.planning import planning
+from benchmarks.speed.rates import Chunk, Measurement, Missing, interleaved, median, ratio
+
+ENV = "PAM/MusclePositioning-v0"
+KNEE = "PAM/KneeWalk-v0"
+ELBOW = "PAM/ElbowOrthosis-v0"
+ROOT = Path(__file__).resolve().parents[2]
+JOINT, ARM = "PAM/AntagonisticJoint-v0", "PAM/RedundantManipulator-v0"
+PENDULUM, CARTPOLE, HOPPER = "InvertedPendulum-v5", "CartPole-v1", "Hopper-v5"
+
+
+def stepping(env: Any, steps: int) -> Chunk:
+    """Return a chunk that steps a single environment with prepared random actions."""
+    env.action_space.seed(0)
+    actions = [env.action_space.sample() for _ in range(512)]
+    env.reset(seed=0)
+
+    def chunk() -> int:
+        step, reset, given = env.step, env.reset, actions
+        for i in range(steps):
+            _, _, terminated, truncated, _ = step(given[i & 511])
+            if terminated or truncated:
+                reset()
+        return steps
+
+    return chunk
+
+
+def stepping_batch(env: Any, calls: int) -> Chunk:
+    """Return a chunk that steps a batch with prepared random actions."""
+    number, shape = env.num_envs, env.single_action_space.shape
+    generator = np.random.default_rng(0)
+    actions = [generator.uniform(-1.0, 1.0, (number, *shape)).astype(np.float32) for _ in range(8)]
+    env.reset(seed=0)
+
+    def chunk() -> int:
+        for i in range(calls):
+            env.step(actions[i & 7])
+        return calls * number
+
+    return chunk
+
+
+def _gym() -> Any:
+    import gymnasium
+
+    import pam_envs  # noqa: F401  registers the ids
+
+    return gymnasium
+
+
+def _batch(number: int, mode: str = "vector_entry_point", **kwargs: Any) -> Any:
+    return _gym().make_vec(ENV, num_envs=number, vectorization_mode=mode, **kwargs)
+
+
+# --- one environment ------------------------------------------------------------------------
+
+
+def single(rounds: int) -> list[Measurement]:
+    """Single environment through gym.make, with info."""
+    gym = _gym()
+    subjects = {"ours": stepping(gym.make(ENV), 20000)}
+    preisach = gym.make(ENV, hysteresis="preisach")
+    subjects["preisach"] = stepping(preisach, 20000)
+    subjects["KneeWalk"] = stepping(gym.make(KNEE), 10000)
+    notes = {}
+    for name, steps in ((PENDULUM, 2000), (CARTPOLE, 10000)):
+        try:
+            subjects[name] = stepping(gym.make(name), steps)
+        except (ImportError, gym.error.DependencyNotInstalled) as error:
+            notes[name] = f"not installed: {error}"
+    rates = interleaved(subjects, rounds)
+    results = [
+        Measurement("single", f"{name}, steps per CPU second", median(rates[name]), "1/s")
+        for name in subjects
+    ]
+    for name, floor, aim in ((PENDULUM, 10.0, 20.0), (CARTPOLE, 3.0, 5.0)):
+        value = ratio(rates["ours"], rates[name]) if name in rates else None
+        note = notes.get(name, "")
+        results.append(Measurement("single", f"ours / {name}", value, "x", floor, aim, note=note))
+    knee = ratio(rates["KneeWalk"], rates[PENDULUM]) if PENDULUM in rates else None
+    note, title = notes.get(PENDULUM, ""), f"KneeWalk / {PENDULUM}"
+    return [*results, Measurement("single", title, knee, "x", 5.0, 10.0, note=note)]
+
+
+def single_joints(rounds: int) -> list[Measurement]:
+    """Elbow with either make of valves, one joint, and an arm of six, beside MuJoCo's hopper."""
+    gym = _gym()
+    subjects = {
+        "elbow": stepping(gym.make(ELBOW), 5000),
+        "elbow, on/off valves": stepping(gym.make(ELBOW, valves="on_off"), 5000),
+        "joint": stepping(gym.make(JOINT), 5000),
+        "arm": stepping(gym.make(ARM), 2000),
+    }
+    note = ""
+    try:
+        subjects[HOPPER] = stepping(gym.make(HOPPER), 1000)
+    except (ImportError, gym.error.DependencyNotInstalled) as error:
+        note = f"not installed: {error}"
+    rates = interleaved(subjects, rounds)
+    results = [
+        Measurement("single", f"{name}, steps per CPU second", median(rates[name]), "1/s")
+        for name in subjects
+    ]
+    for name, env, floor in (
+        ("elbow", ELBOW, 8.0),
+        ("elbow, on/off valves", ELBOW, 8.0),
+        ("joint", JOINT, 8.0),
+        ("arm", ARM, 2.0),
+    ):
+        value = ratio(rates[name], rates[HOPPER]) if HOPPER in rates else None
+        _, _, make = name.partition(", ")
+        title = f"{env[4:-3]}{make and ', ' + make} / {HOPPER}"
+        results.append(Measurement("single", title, value, "x", floor, 2 * floor, note=note))
+    return results
+
+
+# --- batches ----------------------------------------------------------------------------------
+
+
+def batch(rounds: int) -> list[Measurement]:
+    """Batch of 1,024 on one core."""
+    subjects = {
+        "ours": stepping_batch(_batch(1024, info=False, threads=1), 300),
+        "with info": stepping_batch(_batch(1024, threads=1), 300),
+    }
+    note = ""
+    try:
+        subjects["envpool"] = _envpool_chunk(1024)
+    except (ImportError, Missing) as error:
+        note = f"envpool is not installed: {error}"
+    rates = interleaved(subjects, rounds)
+    results = [
+        Measurement(
+            "batch",
+            f"N = 1024, {name}, env-steps per CPU second",
+            median(rates[name]),
+            "1/s",
+            8e6 if name == "ours" else None,
+            20e6 if name == "ours" else None,
+        )
+        for name in subjects
+    ]
+    value = ratio(rates["ours"], rates["envpool"]) if "envpool" in rates else None
+    title = f"ours / envpool {CARTPOLE}, one thread, N = 1024"
+    results.append(Measurement("batch", title, value, "x", 5.0, 20.0, note=note))
+    return results
+
+
+def variants(rounds: int) -> list[Measurement]:
+    """Batch of 1,024 on one core, other plants."""
+    kinds: dict[str, dict[str, Any]] = {
+        "maxwell_slip": {},
+        "preisach": {"hysteresis": "preisach"},
+        "none": {"hysteresis": "none"},
+        "randomised": {"randomize": True},
+    }
+    rates = interleaved(
+        {
+            name: stepping_batch(_batch(1024, info=False, threads=1, **kwargs), 200)
+            for name, kwargs in kinds.items()
+        },
+        rounds,
+    )
+    first = rates["maxwell_slip"]
+    return [
+        Measurement("batch", f"N = 1024, {name} / maxwell_slip", ratio(rates[name], first))
+        for name in list(kinds)[1:]
+    ]
+
+
+def _envpool_chunk(number: int) -> Chunk:
+    """Return a chunk that steps envpool's CartPole on one thread."""
+    import envpool
+
+    pool = envpool.make(
+        CARTPOLE, env_type="gymnasium", num_envs=number, batch_size=number, num_threads=1
+    )
+    pool.reset()
+    generator = np.random.default_rng(0)
+    actions = [generator.integers(0, 2, number).astype(np.int32) for _ in range(8)]
+
+    def chunk() -> int:
+        for i in range(200):
+            pool.step(actions[i & 7])
+        return 200 * number
+
+    return chunk
+
+
+def growth(rounds: int) -> list[Measurement]:
+    """Cost of a step from 256 to 131,072 environments on one core."""
+    small = stepping_batch(_batch(256, info=False, threads=1), 1024)
+    large = stepping_batch(_batch(131072, info=False, threads=1), 4)
+    rates = interleaved({"small": small, "large": large}, rounds)
+    value = ratio(rates["small"], rates["large"])
+    title = "cost per env-step, N = 131,072 / N = 256"
+    return [Measurement("batch", title, value, "x", 1.2, 1.05, "less")]
+
+
+def cores(rounds: int) -> list[Measurement]:
+    """All cores over one, from 4,096 environments on."""
+    number = len(os.sched_getaffinity(0))
+    if number < 2:
+        raise Missing("there is one core only")
+    results = []
+    for size in (4096, 16384, 65536):
+        calls = max(4, 4_000_000 // size)
+        subjects = {
+            "one": stepping_batch(_batch(size, info=False, threads=1), calls),
+            "all": stepping_batch(_batch(size, info=False), calls),
+        }
+        rates = interleaved(subjects, rounds, time.perf_counter)
+        value = ratio(rates["all"], rates["one"])
+        floor = 1.7 if number == 2 else None
+        title = f"{number} cores / one, N = {size}, wall"
+        results.append(Measurement("batch", title, value, "x", floor))
+    return results
+
+
+def processes(rounds: int) -> list[Measurement]:
+    """Against AsyncVectorEnv of the same environment, wall."""
+    pool = _batch(16, "async")
+    try:
+        subjects = {
+            "async": stepping_batch(pool, 300),
+            "ours": stepping_batch(_batch(1024, info=False, threads=1), 300),
+            "ours of 16": stepping_batch(_batch(16, info=False, threads=1), 3000),
+        }
+        rates = interleaved(subjects, min(rounds, 5), time.perf_counter)
+    finally:
+        pool.close()
+    small = ratio(rates["ours of 16"], rates["async"])
+    title = "ours N = 1024 / AsyncVectorEnv N = 16, wall"
+    return [
+        Measurement("batch", "AsyncVectorEnv N = 16, wall", median(rates["async"]), "1/s"),
+        Measurement("batch", title, ratio(rates["ours"], rates["async"]), "x", 300.0, 1000.0),
+        Measurement("batch", "ours N = 16 / AsyncVectorEnv N = 16, wall", small),
+    ]
+
+
+# --- uncompiled, and fitting --------------------------------------------------------------------
+
+_UNCOMPILED = """
+import json, sys
+import gymnasium as gym
+import pam_envs
+from benchmarks.speed.rates import interleaved
+from benchmarks.speed.probes import ENV, PENDULUM, stepping
+subjects = {"ours": stepping(gym.make(ENV), 600)}
+subjects["peer"] = stepping(gym.make(PENDULUM), 600)
+print(json.dumps(interleaved(subjects, int(sys.argv[1]))))
+"""
+
+
+def _python(code: str, *arguments: str, **environment: str) -> str:
+    """Run code in a fresh interpreter and return what it prints."""
+    paths = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        check=False,
+        env={**os.environ, "PYTHONPATH": paths, **environment},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    if done.returncode:
+        raise Missing((done.stderr.strip().splitlines() or ["no output"])[-1])
+    return done.stdout.strip().splitlines()[-1]
+
+
+def uncompiled(rounds: int) -> list[Measurement]:
+    """Uncompiled single step against InvertedPendulum-v5."""
+    rates = json.loads(_python(_UNCOMPILED, str(rounds), PAM_ENVS_COMPILE="0"))
+    return [
+        Measurement("plain", "uncompiled, steps per CPU second", median(rates["ours"]), "1/s"),
+        Measurement(
+            "plain",
+            f"uncompiled / {PENDULUM}",
+            ratio(rates["ours"], rates["peer"]),
+            "x",
+            1.0,
+            2.0,
+        ),
+    ]
+
+
+def jacobian(rounds: int) -> list[Measurement]:
+    """Jacobian of a 60 s record over all free parameters."""
+    from pam_envs.identification import fit
+    from pam_envs.plants.single_muscle.plant import SingleMuscle
+
+    plant = SingleMuscle.mas10()
+    names = (*fit.FREE, *fit.weights(plant))
+    set_points = np.repeat(np.random.default_rng(0).uniform(0.0, 6e5, 60), 100)
+    fit.jacobian(plant, set_points, names)  # compiles
+    spent = []
+    for _ in range(rounds):
+        begin = time.process_time()
+        fit.jacobian(plant, set_points, names)
+        spent.append(1e3 * (time.process_time() - begin))
+    title = f"Jacobian of a 60 s record, {len(names)} parameters"
+    return [Measurement("plain", title, median(spent), "ms", 150.0, 20.0, "less")]
+
+
+# --- start-up -------------------------------------------------------------------------------------
+
+_START = """
+import sys, time
+import gymnasium as gym
+import pam_envs
+env = gym.make(sys.argv[1])
+env.reset(seed=0)
+for _ in range(int(sys.argv[2])):
+    env.step(env.action_space.sample())
+print(time.process_time())
+"""
+
+
+def start_up(rounds: int) -> list[Measurement]:
+    """Import and first step in a fresh interpreter, and the way to machine code.
+
+    An environment begins in plain Python and changes to machine code after some steps; what that
+    takes is measured beside the first step, and has no target.
+    """
+    from pam_envs.envs.core.plant_env import INTERPRETED_CALLS
+
+    tries, many = max(3, min(rounds, 5)), str(INTERPRETED_CALLS + 1)
+    note, results = "CPU seconds of the whole process", []
+    with tempfile.TemporaryDirectory() as folder:
+        for steps, title in (("1", "first step"), (many, "first step in machine code")):
+            caches = [f"{folder}/{steps}-{i}" for i in range(tries)]
+            cold = [float(_python(_START, ENV, steps, PAM_ENVS_CACHE=c)) for c in caches]
+            again = [float(_python(_START, ENV, steps, PAM_ENVS_CACHE=c)) for c in caches]
+            for state, times, floor, aim in (("warm", again, 0.7, 0.35), ("cold", cold, 1.5, 1.0)):
+                name = f"interpreter, import and {title}, {state}"
+                limits = (floor, aim) if steps == "1" else (None, None)
+                results.append(
+                    Measurement("start", name, median(times), "s", *limits, "less", note)
+                )
+    return results
+
+
+# --- learning -----------------------------------------------------------------------------------
+
+
+def learning(rounds: int) -> list[Measurement]:
+    """PPO at 256 environments against the default on one Pendulum."""
+    try:
+        module = importlib.import_module("agents.training.speed")
+    except ModuleNotFoundError as error:
+        raise Missing(
+            f"agents.training.speed is not there, or {error.name} is not installed"
+        ) from error
+    import torch
+    from stable_baselines3 import PPO
+
+    torch.set_num_threads(1)
+    peer = PPO("MlpPolicy", "Pendulum-v1", seed=0, device="cpu")
+
+    def default() -> int:
+        peer.learn(2048, reset_num_timesteps=False)
+        return 2048
+
+    subjects: dict[str, Chunk] = {"ours": module.ppo_chunk(256), "peer": default}
+    rates = interleaved(subjects, min(rounds, 3))
+    return [
+        Measurement(
+            "learning", "PPO, N = 256, frames per CPU second", median(rates["ours"]), "1/s"
+        ),
+        Measurement(
+            "learning", "PPO default, one Pendulum, the same", median(rates["peer"]), "1/s"
+        ),
+        Measurement(
+            "learning",
+            "PPO N = 256 / default on one Pendulum",
+            ratio(rates["ours"], rates["peer"]),
+            "x",
+            25.0,
+            60.0,
+        ),
+    ]
+
+
+GROUPS: dict[str, tuple[Callable[[int], list[Measurement]], ...]] = {
+    "single": (single, single_joints),
+    "batch": (batch, variants, growth, cores, processes),
+    "planning": (planning,),
+    "plain": (uncompiled, jacobian),
+    "start": (start_up,),
+    "learning": (learning, shares),
+    "diagnosis": (diagnosing,),
+}
+"""Probes of each group; a probe takes the number of rounds."""

@@ -1,0 +1,296 @@
+"""The time of a recording: is it whole, and the even steps that it is put on."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.data.recording.columns import rows_text
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+
+SLOWEST = 0.2
+"""Longest period [s] at which the motion of a muscle is still seen."""
+FASTEST = 0.01
+"""Shortest period [s] that is worth replaying; faster recordings are averaged to it or above."""
+GAP = 3.0
+"""Periods without a sample that make a gap."""
+LONGEST_GAP = 600.0
+"""Longest time [s] between two segments over which a command can be taken as held."""
+HELD = 500.0
+"""Commands [Pa] closer than this are the same."""
+ON_GRID = 0.1
+"""Periods by which a sample may miss an even step and still be taken as on it."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Clock:
+    """What the column of time says.
+
+    Attributes
+    ----------
+    period : float
+        Mean time from sample to sample [s].
+    restart : ndarray of bool, shape (n,)
+        Rows at which the muscle starts anew from rest.
+    gap : ndarray of bool, shape (n,)
+        Rows after which nothing was recorded for a while, the command held.
+    """
+
+    period: float
+    restart: Flags
+    gap: Flags
+
+
+def read_clock(
+    time: Array, command: Array, segment: Indices, segments: Sequence[str], rows: Indices
+) -> tuple[Clock | None, list[str]]:
+    """Check the time of a recording.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        [s].
+    command : ndarray, shape (n,)
+        [Pa].
+    segment : ndarray of int, shape (n,)
+        Index into ``segments``.
+    segments : sequence of str
+        Labels.
+    rows : ndarray of int, shape (n,)
+        Rows in the file, for messages.
+
+    Returns
+    -------
+    clock : Clock or None
+        None where there are problems.
+    problems : list of str
+        What is wrong, with rows and remedy.
+    """
+    step = np.diff(time)
+    new = np.diff(segment) != 0
+    restart = np.r_[True, new & (step < 0.0)]
+    stuck = (step <= 0.0) & ~restart[1:]
+    if stuck.any():
+        return None, [_backwards(time, stuck, rows)]
+    inside = step[~new]
+    if not len(inside):
+        return None, ["no segment has two rows; give the samples of one experiment one label"]
+    period = _period(time, inside, restart)
+    problems = _pace(period) or _paces(step, new, segment, segments, period)
+    gap = np.r_[(step > GAP * period) & ~restart[1:], False]
+    problems += _gaps(time, command, gap, np.r_[new, False], segment, segments, rows, period)
+    return (None if problems else Clock(period, restart, gap)), problems
+
+
+def _period(time: Array, inside: Array, restart: Flags) -> float:
+    """Return the mean step: the slope of time over the count of steps, with those that were lost.
+
+    The median alone would be 17 ms for samples at 60 Hz whose times are rounded to milliseconds.
+    """
+    usual = float(inside[inside < 1.5 * np.median(inside)].mean())
+    counts = np.round(np.diff(time) / usual)
+    whole = (counts <= GAP) & ~restart[1:]
+    stretch = np.r_[0, np.cumsum(~whole)]
+    places = np.r_[0.0, np.cumsum(np.where(whole, counts, 0.0))]
+    size = np.bincount(stretch)
+    x = places - (np.bincount(stretch, places) / size)[stretch]
+    y = time - (np.bincount(stretch, time) / size)[stretch]
+    return float(np.round(np.sum(x * y) / np.sum(x * x), 9))
+
+
+def _backwards(time: Array, stuck: Flags, rows: Indices) -> str:
+    at = np.flatnonzero(stuck)
+    return (
+        f"time_s does not go up inside a segment at {rows_text(rows[at + 1])} (the first from "
+        f"{time[at[0]]:g} s to {time[at[0] + 1]:g} s); sort the rows, or give what was recorded "
+        "from rest with a clock of its own a new segment"
+    )
+
+
+def _pace(period: float) -> list[str]:
+    if period <= SLOWEST * (1.0 + 1e-6):
+        return []
+    sentence = (
+        f"one sample every {period:g} s does not show how the muscle moves; sample at 20 to 100 Hz "
+        f"(at least {1 / SLOWEST:g} Hz), or give settled readings as a quasi-static table "
+        "(load_kg, pressure_bar, direction, repeat, contraction_mm)"
+    )
+    if 1.0 <= period <= 200.0:
+        sentence += ". Steps like these are often milliseconds: then divide time_s by 1000"
+    return [sentence]
+
+
+def _paces(
+    step: Array, new: Flags, segment: Indices, segments: Sequence[str], period: float
+) -> list[str]:
+    """Return what is wrong where segments were sampled at different rates."""
+    for i, label in enumerate(segments):
+        mine = step[~new & (segment[1:] == i)]
+        if len(mine) and abs(np.median(mine) / period - 1.0) > 0.2:
+            return [
+                f"segment {label!r} is sampled every {np.median(mine):g} s, the recording on "
+                f"average every {period:g} s; record all segments at one rate"
+            ]
+    return []
+
+
+def _gaps(
+    time: Array,
+    command: Array,
+    gap: Flags,
+    new: Flags,
+    segment: Indices,
+    segments: Sequence[str],
+    rows: Indices,
+    period: float,
+) -> list[str]:
+    problems = []
+    inside = np.flatnonzero(gap & ~new)
+    for i in inside[:5]:
+        lost = time[i + 1] - time[i]
+        problems.append(
+            f"nothing was recorded for {lost:g} s ({lost / period:.0f} periods) between rows "
+            f"{rows[i]} and {rows[i + 1]}, inside segment {segments[segment[i]]!r}; give what "
+            "follows a label and, if it starts from rest, a clock of its own, or leave it out"
+        )
+    if len(inside) > 5:
+        problems.append(f"there are {len(inside) - 5} more gaps inside segments")
+    for i in np.flatnonzero(gap & new):
+        lost = time[i + 1] - time[i]
+        between = f"the {lost:g} s between rows {rows[i]} and {rows[i + 1]}, before segment "
+        between += repr(segments[segment[i + 1]])
+        if abs(command[i + 1] - command[i]) > HELD:
+            problems.append(
+                f"the command changes in {between}, from {command[i] / 1e5:g} to "
+                f"{command[i + 1] / 1e5:g} bar, and nothing was recorded; record without a break, "
+                "or let the segment start from rest with time_s at 0"
+            )
+        elif lost > LONGEST_GAP:
+            problems.append(
+                f"nothing was recorded in {between}: more than {LONGEST_GAP:g} s; let the segment "
+                "start from rest with time_s at 0"
+            )
+    return problems
+
+
+@dataclasses.dataclass(frozen=True)
+class Grid:
+    """Even steps, and which rows each is made of.
+
+    Attributes
+    ----------
+    time : ndarray, shape (m,)
+        [s].
+    held : ndarray of int, shape (m,)
+        Row whose command (and label, and load) is in force.
+    left, right : ndarray of int, shape (m,)
+        Rows on both sides.
+    share : ndarray, shape (m,)
+        Weight of the right one.
+    restart : ndarray of bool, shape (m,)
+    filled : ndarray of bool, shape (m,)
+        Steps inside a gap.
+    missing : ndarray of int
+        Rows after which single samples were missing.
+    moved : bool
+        Whether samples were off the steps, so that values had to be interpolated.
+    """
+
+    time: Array
+    held: Indices
+    left: Indices
+    right: Indices
+    share: Array
+    restart: Flags
+    filled: Flags
+    missing: Indices
+    moved: bool
+
+    def linear(self, values: Array) -> Array:
+        """Return a measured column on the even steps."""
+        there = values[self.left]
+        return np.where(self.share > 0.0, there + self.share * (values[self.right] - there), there)
+
+
+def make_grid(time: Array, clock: Clock) -> Grid:
+    """Put the rows of a recording on even steps.
+
+    A run (from one start at rest to the next) whose samples all lie near even steps keeps its
+    values as they are; else measured values are interpolated. A held value changes at the step
+    that is nearest, so that on average it is neither early nor late.
+    """
+    starts = np.flatnonzero(clock.restart).tolist()
+    ends = [*starts[1:], len(time)]
+    runs = [_run(time, clock, a, b) for a, b in zip(starts, ends, strict=True)]
+    fields = [field.name for field in dataclasses.fields(Grid) if field.name != "moved"]
+    joined = {name: np.concatenate([getattr(run, name) for run in runs]) for name in fields}
+    return Grid(**joined, moved=any(run.moved for run in runs))
+
+
+def _run(time: Array, clock: Clock, start: int, end: int) -> Grid:
+    place = (time[start:end] - time[start]) / clock.period
+    near = np.round(place)
+    moved = bool(np.any(np.abs(place - near) > ON_GRID) or np.any(np.diff(near) < 1.0))
+    if not moved:
+        place = near
+    steps = np.arange(int(np.floor(place[-1] + 1e-6)) + 1, dtype=np.float64)
+    left = np.searchsorted(place, steps + 1e-9, side="right") - 1
+    right = np.minimum(left + 1, len(place) - 1)
+    width = np.where(right > left, place[right] - place[left], 1.0)
+    share = (steps - place[left]) / width
+    held = np.searchsorted(place, steps + 0.5, side="left") - 1
+    held = np.where(held < left, left, held)
+    lost = np.r_[np.diff(place) > 1.5, False] & ~clock.gap[start:end]
+    return Grid(
+        time=time[start] + clock.period * steps,
+        held=start + held,
+        left=start + left,
+        right=start + right,
+        share=np.where(share < 1e-9, 0.0, share),
+        restart=steps == 0.0,
+        filled=clock.gap[start:end][left] & (steps > place[left] + 0.5),
+        missing=start + np.flatnonzero(lost),
+        moved=moved,
+    )
+
+
+def block_size(period: float) -> int:
+    """Return how many samples make one of 50 to 100 Hz; 1 for a recording that is not faster."""
+    return max(1, int(np.ceil(FASTEST / period * (1.0 - 1e-3))))
+
+
+def block_means(values: Array, starts: Indices, size: int) -> Array:
+    """Return means over blocks that lie evenly around every ``size``-th sample of each run.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+    starts : ndarray of int
+        First sample of each run.
+    size : int
+        Samples from one block to the next.
+    """
+    weights = np.ones(size) if size % 2 else np.r_[0.5, np.ones(size - 1), 0.5]
+    pieces = []
+    for run in np.split(values, starts[1:]):
+        total = np.convolve(run, weights)[len(weights) // 2 :][: len(run)]
+        count = np.convolve(np.ones(len(run)), weights)[len(weights) // 2 :][: len(run)]
+        pieces.append((total / count)[::size])
+    return np.concatenate(pieces)
+
+
+def block_places(n: int, starts: Indices, size: int, offset: int = 0) -> Indices:
+    """Return the samples at (or ``offset`` after) which the blocks of :func:`block_means` stand."""
+    ends = np.r_[starts[1:], n]
+    return np.concatenate(
+        [
+            np.minimum(np.arange(a, b, size) + offset, b - 1)
+            for a, b in zip(starts, ends, strict=True)
+        ]
+    )

@@ -1,0 +1,395 @@
+"""A recording of a rig: what was commanded, and what the sensors read, on even steps of time.
+
+    time_s,segment,pressure_command_bar,pressure_bar,contraction_mm,load_N
+    0.00,staircase,0.0,0.004,0.01,25.0
+
+:func:`read_input` also takes settled readings without time, see :mod:`pam_envs.data.readings`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.data.readings import READINGS, load_readings
+from pam_envs.data.recording import clock as clocks
+from pam_envs.data.recording.columns import (
+    RecordingError,
+    Sheet,
+    read_header,
+    read_sheet,
+    refuse,
+    rows_text,
+)
+from pam_envs.data.recording.segments import check_rig, load_changes, repeat_rows, returns
+from pam_envs.data.rig_file import BAR, MM, Rig
+from pam_envs.data.tables import ContractionTable
+from pam_envs.wording import near
+
+__all__ = [
+    "Recording",
+    "RecordingError",
+    "Rig",
+    "check_rig",
+    "load_readings",
+    "load_recording",
+    "read_input",
+    "repeat_rows",
+]
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+
+COLUMNS = (
+    "time_s",
+    "segment",
+    "pressure_command_bar",
+    "pressure_bar",
+    "contraction_mm",
+    "load_N",
+    "temperature_C",
+    "supply_pressure_bar",
+    "force_N",
+)
+REQUIRED = ("time_s", "pressure_command_bar")
+FIELDS = {
+    "time_s": ("time", 1.0),
+    "pressure_command_bar": ("command", BAR),
+    "pressure_bar": ("pressure", BAR),
+    "contraction_mm": ("contraction", MM),
+    "load_N": ("load", 1.0),
+    "temperature_C": ("temperature", 1.0),
+    "supply_pressure_bar": ("supply", BAR),
+    "force_N": ("force", 1.0),
+}
+"""The field of :class:`Recording` that a column becomes, and the column's unit in its own."""
+FORGIVEN = ("temperature_C", "supply_pressure_bar", "force_N")
+"""Columns of which a few cells may be empty."""
+FORGIVEN_SHARE = 0.05
+MEASURED = ("pressure", "contraction", "temperature", "supply", "force")
+LEAST_ROWS = 10
+
+
+@dataclasses.dataclass(frozen=True)
+class Recording:
+    """Signals on even steps; sample k is read at ``time[k]``.
+
+    Every array has shape (n,) and is read-only.
+
+    Attributes
+    ----------
+    time : ndarray
+        [s]; it starts anew where ``restart`` is set.
+    segment : ndarray of int
+        Index into ``segments``.
+    segments : tuple of str
+        Labels, one experiment each, in the order of the recording.
+    command : ndarray
+        Set-point of the pressure [Pa], in force from ``time[k]`` to ``time[k + 1]``.
+    pressure, contraction : ndarray or None
+        Measured gauge pressure [Pa] and contraction [m].
+    load : ndarray
+        External pull on the muscle [N].
+    temperature, supply, force : ndarray or None
+        [deg C], [Pa], [N].
+    restart : ndarray of bool
+        Where the muscle starts anew from rest: the first sample, and each new segment whose time
+        starts anew.
+    valve_closed : ndarray of bool
+        Where the valve is shut, so that the command has no effect.
+    period : float
+        [s].
+    source : str
+        Where the recording comes from.
+    digest : str
+        Hash of the contents.
+    filled : ndarray of bool
+        Where nothing was recorded, between two segments under one command: the measured values
+        are interpolated there and say nothing.
+    row : ndarray of int
+        Row of the file that a sample comes from (the header is row 1), for messages.
+    notes : tuple of str
+        What had to be mended while reading.
+    raw : Recording or None
+        Before the averaging of a recording faster than 100 Hz.
+    """
+
+    time: Array
+    segment: Indices
+    segments: tuple[str, ...]
+    command: Array
+    pressure: Array | None
+    contraction: Array | None
+    load: Array
+    temperature: Array | None
+    supply: Array | None
+    force: Array | None
+    restart: Flags
+    valve_closed: Flags
+    period: float
+    source: str
+    digest: str
+    filled: Flags
+    row: Indices
+    notes: tuple[str, ...] = ()
+    raw: Recording | None = dataclasses.field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        time: ArrayLike,
+        command: ArrayLike,
+        *,
+        pressure: ArrayLike | None = None,
+        contraction: ArrayLike | None = None,
+        load: ArrayLike = 0.0,
+        segment: Sequence[str] | None = None,
+        temperature: ArrayLike | None = None,
+        supply: ArrayLike | None = None,
+        force: ArrayLike | None = None,
+        valve_closed: Sequence[str] = (),
+        source: str = "arrays",
+    ) -> Recording:
+        """Make a recording of arrays in SI, checked as a file is.
+
+        Parameters
+        ----------
+        time, command : array_like, shape (n,)
+            [s], [Pa].
+        pressure, contraction : array_like, shape (n,), optional
+            [Pa], [m]; at least one.
+        load : array_like, shape () or (n,)
+            [N].
+        segment : sequence of str, length n, optional
+            Label of each sample; default: all belong to one segment ``"all"``.
+        temperature, supply, force : array_like, shape (n,), optional
+            [deg C], [Pa], [N].
+        valve_closed : sequence of str
+            Segments with the valve shut.
+        source : str
+            A name for messages. They count rows as if the arrays stood in a file with a header.
+
+        Raises
+        ------
+        RecordingError
+            Naming column, rows and remedy.
+        """
+        given = {
+            "time": time,
+            "command": command,
+            "pressure": pressure,
+            "contraction": contraction,
+            "temperature": temperature,
+            "supply": supply,
+            "force": force,
+        }
+        columns = {k: np.array(v, dtype=np.float64) for k, v in given.items() if v is not None}
+        n = columns["time"].size
+        columns["load"] = np.array(np.broadcast_to(np.asarray(load, np.float64), (n,)))
+        labels = ["all"] * n if segment is None else [str(label) for label in segment]
+        problems = [
+            f"{name} has the shape {values.shape}, time has ({n},); give one value a sample"
+            for name, values in columns.items()
+            if values.shape != (n,)
+        ]
+        problems += [] if len(labels) == n else [f"{len(labels)} labels for {n} samples"]
+        rows = np.arange(2, n + 2)
+        problems = problems or [
+            f"{name} is not finite in {rows_text(rows[~np.isfinite(values)])}; correct the values"
+            for name, values in columns.items()
+            if not np.isfinite(values).all()
+        ]
+        if pressure is None and contraction is None:
+            problems.append("give at least one of pressure and contraction")
+        if problems:
+            refuse(source, *problems)
+        return _recording(columns, labels, rows, [], tuple(valve_closed), source)
+
+    def rows_of(self, label: str) -> Indices:
+        """Return the samples of a segment at which something was recorded."""
+        if label not in self.segments:
+            raise ValueError(f"no segment {label!r}{near(label, self.segments)}")
+        mine = (self.segment == self.segments.index(label)) & ~self.filled
+        return np.flatnonzero(mine).astype(np.int64)
+
+
+def load_recording(path: str | Path, rig: Rig | None = None) -> Recording:
+    """Read a recording from a CSV file, put on even steps.
+
+    Parameters
+    ----------
+    path : str or Path
+        Columns as in ``docs/recording.md``, in any order.
+    rig : Rig, optional
+        Says during which segments the valve is shut; the segments that it names must be there.
+
+    Raises
+    ------
+    RecordingError
+        With everything that is wrong, naming column, rows and remedy.
+    """
+    sheet = read_sheet(path, COLUMNS, REQUIRED, "a recording")
+    _need_output(sheet)
+    n = len(sheet.rows)
+    labels = sheet.text("segment") if "segment" in sheet.cells else ["all"] * n
+    columns, notes = _columns(sheet)
+    recording = _recording(
+        columns, labels, sheet.rows, notes, rig.valve_closed if rig else (), str(path)
+    )
+    if rig is not None:
+        problems = check_rig(recording, rig)
+        if problems:
+            refuse(str(path), *problems)
+    return recording
+
+
+def read_input(path: str | Path, rig: Rig | None = None) -> Recording | ContractionTable:
+    """Read a recording, or a table of settled readings, whichever its columns say it is."""
+    header = set(read_header(path))
+    if header & set(READINGS) and not header & (set(COLUMNS) - set(READINGS)):
+        return load_readings(path)
+    return load_recording(path, rig)
+
+
+def _need_output(sheet: Sheet) -> None:
+    if "pressure_bar" in sheet.cells or "contraction_mm" in sheet.cells:
+        return
+    text = "give at least one of the columns pressure_bar and contraction_mm"
+    if "force_N" in sheet.cells:
+        text += "; force_N is not supported as the only output"
+    refuse(sheet.where, text)
+
+
+def _columns(sheet: Sheet) -> tuple[dict[str, Array], list[str]]:
+    """Return the columns that are numbers, by field and in SI, and what was mended."""
+    columns, notes, problems = {}, [], []
+    for name in [name for name in FIELDS if name in sheet.cells]:
+        values, empty, wrong = sheet.numbers(name)
+        problems += wrong
+        if empty.any() and not wrong:
+            where = rows_text(sheet.rows[empty])
+            if name in FORGIVEN and empty.mean() < FORGIVEN_SHARE:
+                notes.append(f"column {name} is empty in {where}; interpolated")
+                there = np.flatnonzero(~empty)
+                values = np.interp(np.arange(len(values)), there, values[there])
+            else:
+                problems.append(f"column {name} is empty in {where}; {_remedy(name)}")
+        field, unit = FIELDS[name]
+        columns[field] = values * unit
+    if problems:
+        refuse(sheet.where, *problems)
+    if "load" not in columns:
+        columns["load"] = np.zeros(len(sheet.rows))
+        notes.append("there is no column load_N; the load is taken as 0 N throughout")
+    return columns, notes
+
+
+def _remedy(name: str) -> str:
+    if name in FORGIVEN:
+        return f"fewer than {FORGIVEN_SHARE:.0%} may be; fill the cells or leave the column out"
+    return "fill the cells or leave the rows out"
+
+
+def _recording(
+    columns: dict[str, Array],
+    labels: Sequence[str],
+    rows: Indices,
+    notes: list[str],
+    valve_closed: tuple[str, ...],
+    source: str,
+) -> Recording:
+    """Return columns of a file (by field, in SI) as a recording."""
+    if len(rows) < LEAST_ROWS:
+        refuse(source, f"{len(rows)} rows are no recording; give at least {LEAST_ROWS}")
+    segments = tuple(dict.fromkeys(labels))
+    index = {label: i for i, label in enumerate(segments)}
+    segment = np.array([index[label] for label in labels], dtype=np.int64)
+    problems = returns(segment, segments, rows)
+    clock, wrong = clocks.read_clock(columns["time"], columns["command"], segment, segments, rows)
+    if clock is None or problems:
+        refuse(source, *problems, *wrong)
+    grid = clocks.make_grid(columns["time"], clock)
+    notes = notes + _mended(grid, rows) + load_changes(columns["load"], segment, segments, rows)
+    shut = np.isin(segment, [index[label] for label in valve_closed if label in index])
+    measured: dict[str, Any] = {
+        name: grid.linear(columns[name]) if name in columns else None for name in MEASURED
+    }
+    even = Recording(
+        time=grid.time,
+        segment=segment[grid.held],
+        segments=segments,
+        command=columns["command"][grid.held],
+        load=columns["load"][grid.held],
+        **measured,
+        restart=grid.restart,
+        valve_closed=shut[grid.held],
+        period=clock.period,
+        source=source,
+        digest="",
+        filled=grid.filled,
+        row=rows[grid.left],
+        notes=tuple(notes),
+    )
+    thinned = _thinned(even, clocks.block_size(clock.period))
+    return dataclasses.replace(thinned, digest=_digest(thinned))
+
+
+def _mended(grid: clocks.Grid, rows: Indices) -> list[str]:
+    notes = []
+    if grid.moved:
+        notes.append("the samples are not evenly spaced; measured values were interpolated")
+    if len(grid.missing):
+        notes.append(f"samples are missing after {rows_text(rows[grid.missing])}; interpolated")
+    starts = grid.filled & ~np.r_[False, grid.filled[:-1]]
+    for row in rows[grid.left[starts]]:
+        notes.append(f"nothing was recorded after row {row}; the command is taken as held")
+    return notes
+
+
+def _thinned(recording: Recording, size: int) -> Recording:
+    """Return a recording averaged over blocks of ``size`` samples."""
+    if size == 1:
+        return recording
+    n, starts = len(recording.time), np.flatnonzero(recording.restart)
+    at = clocks.block_places(n, starts, size)
+    middle = clocks.block_places(n, starts, size, (size - 1) // 2)
+    means: dict[str, Any] = {
+        name: None if values is None else clocks.block_means(values, starts, size)
+        for name, values in ((name, getattr(recording, name)) for name in MEASURED)
+    }
+    names = ("time", "segment", "load", "restart", "valve_closed", "filled", "row")
+    kept: dict[str, Any] = {name: getattr(recording, name)[at] for name in names}
+    note = f"{1 / recording.period:g} Hz is faster than needed; every {size} samples were averaged"
+    return dataclasses.replace(
+        recording,
+        command=recording.command[middle],
+        **means,
+        **kept,
+        period=size * recording.period,
+        notes=(*recording.notes, note),
+        raw=recording,
+    )
+
+
+def _digest(recording: Recording) -> str:
+    """Return a hash over the signals, not over where they come from."""
+    made = hashlib.sha256("\0".join(recording.segments).encode())
+    for field in dataclasses.fields(recording):
+        value = getattr(recording, field.name)
+        if isinstance(value, np.ndarray) and field.name != "row":
+            made.update(field.name.encode() + np.ascontiguousarray(value).tobytes())
+    return made.hexdigest()[:16]

@@ -1,0 +1,273 @@
+"""What to know of a recording before anything is concluded from it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.data.recording.recording import Recording, check_rig, repeat_rows
+from pam_envs.data.rig_file import Rig
+from pam_envs.data.tables import ContractionTable
+from pam_envs.diagnosis.audit import channels
+from pam_envs.diagnosis.audit.noise import Floor, holds, noise_floor
+from pam_envs.diagnosis.audit.tables import audit_table
+from pam_envs.diagnosis.audit.units import wrong_units
+from pam_envs.diagnosis.cause import Cause
+from pam_envs.diagnosis.causes import catalogue
+from pam_envs.diagnosis.fit.tolerance import LOAD, unknown_names, unused
+
+BAR = 1e5
+LOAD_STEP = 0.5
+"""Loads [N] closer than this are one level."""
+REST_PRESSURE = 0.1e5
+REST_SECONDS = 2.0
+WARMING = 1.0
+"""Kelvin by which the temperature must vary for its effect to be told."""
+SHUT_SECONDS = 2.0
+MANY_CYCLES = 5
+
+
+@dataclasses.dataclass(frozen=True)
+class Audit:
+    """What the checks found.
+
+    Attributes
+    ----------
+    problems : tuple of str
+        Why no diagnosis can be made; empty if one can.
+    warnings : tuple of str
+        What to bear in mind.
+    """
+
+    problems: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def audit(recording: Recording | ContractionTable, rig: Rig | None = None) -> Audit:
+    """Check a recording, or a table of settled readings.
+
+    Parameters
+    ----------
+    recording : Recording or ContractionTable
+    rig : Rig, optional
+
+    Returns
+    -------
+    Audit
+        Sentences with rows of the file and remedies.
+    """
+    if isinstance(recording, ContractionTable):
+        return Audit((), tuple(audit_table(recording)))
+    rig = rig or Rig()
+    problems = [*check_rig(recording, rig), *unknown_names(rig.tolerance)]
+    if problems:
+        return Audit(tuple(problems), recording.notes)
+    floor = noise_floor(recording, rig)
+    wrong, warnings = wrong_units(recording, rig)
+    problems = _empty_outputs(recording) + wrong
+    seen = recording if recording.raw is None else recording.raw
+    for name in channels.UNITS:
+        if getattr(seen, name) is not None:
+            stuck, still = channels.stuck(seen, name) if name in _outputs(seen) else ([], [])
+            problems += stuck
+            warnings += still + channels.clipped(seen, name) + channels.spikes(seen, name)
+    noise = {name: _noise(floor, name) for name in _outputs(seen)}
+    for name, rms in noise.items():
+        warnings += channels.coarse(seen, name, rms)
+    warnings += channels.copies(seen, noise)
+    warnings += [*floor.warnings, *_repeats(recording, rig), *_lacks(recording, rig)]
+    warnings += _not_used(recording, rig)
+    return Audit(tuple(problems), tuple(dict.fromkeys((*recording.notes, *warnings))))
+
+
+def undecidable(
+    recording: Recording, rig: Rig | None = None, causes: Sequence[Cause] | None = None
+) -> dict[str, str]:
+    """Return the causes that need what a recording does not hold, and what that is.
+
+    Parameters
+    ----------
+    recording : Recording
+    rig : Rig, optional
+    causes : sequence of Cause, optional
+        Default: :func:`pam_envs.diagnosis.causes.catalogue`.
+
+    Returns
+    -------
+    dict of str to str
+        Reason by name of the cause. A cause that is not listed may still not be excited.
+    """
+    missing = {word: lack(recording, rig or Rig()) for word, lack in LACKS.items()}
+    reasons = {}
+    for cause in catalogue() if causes is None else causes:
+        lacks = [missing[word] for word in cause.needs if missing[word]]
+        if lacks:
+            reasons[cause.name] = lacks[0]
+    return dict(sorted(reasons.items()))
+
+
+def _lack_of_column(values: NDArray[np.float64] | None, name: str) -> str:
+    return f"the {name} was not recorded" if values is None else ""
+
+
+def _lack_of_loads(recording: Recording, rig: Rig) -> str:
+    levels = load_levels(recording)
+    return f"the load was {levels[0]:.3g} N throughout" if len(levels) < 2 else ""
+
+
+def _lack_of_warmth(recording: Recording, rig: Rig) -> str:
+    if recording.temperature is None:
+        return "the temperature was not recorded"
+    span = float(np.ptp(recording.temperature))
+    return f"the temperature varied by only {span:.2g} K" if span < WARMING else ""
+
+
+def _lack_of_shutting(recording: Recording, rig: Rig) -> str:
+    if _longest_shut(recording) > SHUT_SECONDS:
+        return ""
+    return f"the valve was never shut for more than {SHUT_SECONDS:g} s (valve_closed in RIG.yaml)"
+
+
+def _lack_of_rest(recording: Recording, rig: Rig) -> str:
+    if rig.cycles_since_rest <= MANY_CYCLES:
+        return ""
+    return f"the muscle had already made {rig.cycles_since_rest} cycles since it rested"
+
+
+def _lack_of_weighing(recording: Recording, rig: Rig) -> str:
+    if LOAD in rig.tolerance:
+        return ""
+    return (
+        "no tolerance of the loads is declared; add tolerance: {mass.load: 0.02} to RIG.yaml if "
+        "they were weighed to 2 %"
+    )
+
+
+LACKS: dict[str, Callable[[Recording, Rig], str]] = {
+    "contraction": lambda r, _: _lack_of_column(r.contraction, "contraction"),
+    "pressure": lambda r, _: _lack_of_column(r.pressure, "pressure"),
+    "loads": _lack_of_loads,
+    "weighed": _lack_of_weighing,
+    "temperature": _lack_of_warmth,
+    "valve_closed": _lack_of_shutting,
+    "rest": _lack_of_rest,
+    "exhaust": lambda r, _: "" if _falls(r) else "the command never falls by more than 0.5 bar",
+}
+"""What a recording lacks, by what a cause may need (:data:`pam_envs.diagnosis.cause.NEEDS`)."""
+
+
+def load_levels(recording: Recording) -> list[float]:
+    """Return the loads [N] that were hung, ascending."""
+    levels: list[float] = []
+    for load in np.unique(recording.load):
+        if not levels or load - levels[-1] > LOAD_STEP:
+            levels.append(float(load))
+    return levels
+
+
+def _outputs(recording: Recording) -> list[str]:
+    pair = ("contraction", "pressure")
+    return [name for name in pair if getattr(recording, name) is not None]
+
+
+def _empty_outputs(recording: Recording) -> list[str]:
+    return [
+        f"{channels.UNITS[name][0]} holds one value in all rows; connect the sensor, or leave the "
+        "column out"
+        for name in _outputs(recording)
+        if np.ptp(getattr(recording, name)) == 0.0
+    ]
+
+
+def _noise(floor: Floor, channel: str) -> float:
+    """Return the noise to judge a resolution by; what rounding adds to it does not count."""
+    found = floor[channel]
+    return found.reading if found.declared is None else found.declared
+
+
+def _repeats(recording: Recording, rig: Rig) -> list[str]:
+    """Return which segments do not repeat one another though the rig says so."""
+    warnings = []
+    for names, group in zip(rig.repeats, repeat_rows(recording, rig), strict=True):
+        for label, rows in zip(names[1:], group[1:], strict=True):
+            apart = np.abs(recording.command[rows] - recording.command[group[0]])
+            other = np.mean(apart > 0.05 * BAR)
+            if other > 0.02:
+                warnings.append(
+                    f"segments {names[0]!r} and {label!r} should repeat one another, but their "
+                    f"commands differ in {other:.0%} of the samples; correct repeats"
+                )
+    return warnings
+
+
+def _lacks(recording: Recording, rig: Rig) -> list[str]:
+    """Return what the campaign leaves out, and what cannot be decided for it."""
+    warnings = []
+    levels = load_levels(recording)
+    if len(levels) < 2:
+        warnings.append(
+            f"the load was {levels[0]:.3g} N throughout: causes that act with the load cannot be "
+            "decided; record segments with at least two loads"
+        )
+    if not rig.repeats:
+        warnings.append(
+            "no segments repeat one another: the noise floor rests on holds; record one segment "
+            "twice and name both under repeats in RIG.yaml"
+        )
+    for field, column, loss in (
+        ("temperature", "temperature_C", "an effect of temperature cannot be told from drift"),
+        (
+            "pressure",
+            "pressure_bar",
+            "what the valve does cannot be told from what the muscle does",
+        ),
+        ("contraction", "contraction_mm", "only the valve and the air can be judged"),
+    ):
+        if getattr(recording, field) is None:
+            warnings.append(f"there is no column {column}: {loss}")
+    if not _rests(recording):
+        warnings.append(
+            f"the command never rests near 0 bar for {REST_SECONDS:g} s: the sensors' zeros cannot "
+            "be checked; start each run with a rest"
+        )
+    return warnings
+
+
+def _not_used(recording: Recording, rig: Rig) -> list[str]:
+    """Return what was told, but does not enter the replay."""
+    warnings = [
+        f"tolerance of {name} is not used: no refit moves it" for name in unused(rig.tolerance)
+    ]
+    if recording.supply is not None:
+        warnings.append(
+            "supply_pressure_bar is not used: the replay takes the supply as constant but for the "
+            "droop that it fits"
+        )
+    if rig.cycles_since_rest > 0:
+        warnings.append(
+            f"history.cycles_since_rest = {rig.cycles_since_rest} does not enter the replay, which "
+            "begins with a muscle that has rested"
+        )
+    return warnings
+
+
+def _rests(recording: Recording) -> bool:
+    return any(
+        len(rows) * recording.period >= REST_SECONDS - 1e-9
+        and recording.command[rows].max() <= REST_PRESSURE
+        for rows in holds(recording)
+    )
+
+
+def _longest_shut(recording: Recording) -> float:
+    shut = recording.valve_closed & ~recording.filled
+    same = shut[1:] & shut[:-1] & ~recording.restart[1:]
+    return max((b - a + 1 for a, b in channels.runs(same)), default=0) * recording.period
+
+
+def _falls(recording: Recording) -> bool:
+    free = recording.command[~recording.valve_closed]
+    return len(free) > 0 and bool(np.any(np.maximum.accumulate(free) - free > 0.5 * BAR))

@@ -1,0 +1,373 @@
+"""The noise floor: how far a sensor's readings scatter where nothing else changes.
+
+Three estimates, best first: what differs between segments that repeat one another; what is left of
+the end of each hold once a straight line is taken off; and the white part alone, from second
+differences where the command is quiet. A declared noise is compared with them. Repeats that differ
+by more than noise, since something changed between them, give way: what changed is for the
+diagnosis to explain.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from pam_envs.data.recording.recording import Recording, repeat_rows
+from pam_envs.data.rig_file import BAR, MM, Rig
+from pam_envs.diagnosis.audit.repeats import DISAGREE, Source, Trust, best, detrended
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+CHANNELS = {"contraction": ("mm", MM), "pressure": ("bar", BAR)}
+"""Measured outputs, with the unit that people read them in."""
+SETTLING = 1.5
+"""Seconds after a change of the command that are never taken for noise."""
+SHORTEST = 1.0
+LONGEST = 10.0
+"""Seconds of a hold's end that are used."""
+WINDOWS = (1.0, 1.5, 2.5, 5.0, 10.0)
+"""Lengths [s] that the ends of holds are cut to."""
+CORRELATIONS = (0.1, 0.2, 0.4, 0.7, 1.2, 2.0)
+"""Correlation times [s] that coloured noise may have."""
+TOLERANCE = 1.1
+"""Misfit over the best one up to which a correlation time is as good as the best."""
+SAME = 10.0
+"""Commands [Pa] closer than this are one hold."""
+START = 2.0
+"""Seconds at the start of a repeat in which what was done before may still show."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ChannelFloor:
+    """Noise of one channel.
+
+    Attributes
+    ----------
+    value : float
+        RMS of the noise of a sample [m] or [Pa].
+    reading : float
+        RMS of the noise of a single reading, above ``value`` where readings were averaged.
+    source : {"repeats", "holds", "innovations", "declared"}
+        Where it comes from.
+    estimates : mapping of str to float
+        Every estimate that the recording allows, by source.
+    declared : float or None
+        What the rig's owner says.
+    correlation_time : float or None
+        Lag at which the autocorrelation of the noise falls below 1/e [s].
+    warnings : tuple of str
+        Sentences.
+    """
+
+    value: float
+    reading: float
+    source: Source
+    estimates: Mapping[str, float]
+    declared: float | None
+    correlation_time: float | None
+    warnings: tuple[str, ...] = ()
+
+
+@dataclasses.dataclass(frozen=True)
+class Floor:
+    """Noise of the channels that were recorded."""
+
+    contraction: ChannelFloor | None
+    pressure: ChannelFloor | None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the owner of the rig should look at."""
+        both = (self.contraction, self.pressure)
+        return tuple(text for floor in both if floor is not None for text in floor.warnings)
+
+    def __getitem__(self, channel: str) -> ChannelFloor:
+        """Return the floor of a channel that was recorded."""
+        floor = {"contraction": self.contraction, "pressure": self.pressure}[channel]
+        if floor is None:
+            raise KeyError(f"{channel} was not recorded")
+        return floor
+
+
+def noise_floor(recording: Recording, rig: Rig | None = None) -> Floor:
+    """Estimate the noise of the measured outputs.
+
+    Parameters
+    ----------
+    recording : Recording
+    rig : Rig, optional
+        Which segments repeat one another, and the noise its owner declares.
+
+    Returns
+    -------
+    Floor
+        In SI.
+    """
+    rig = rig or Rig()
+    declared = {"contraction": rig.contraction_noise, "pressure": rig.pressure_noise}
+    floors = {
+        channel: None
+        if getattr(recording, channel) is None
+        else _channel(recording, rig, channel, declared[channel])
+        for channel in CHANNELS
+    }
+    return Floor(**floors)
+
+
+def _channel(recording: Recording, rig: Rig, channel: str, declared: float | None) -> ChannelFloor:
+    values = getattr(recording, channel)
+    differences = _differences(recording, rig, values)
+    ends = [values[rows] for rows in hold_ends(recording)]
+    found = {
+        "repeats": _scatter(differences) / np.sqrt(2.0),
+        "holds": _hold_scatter(ends, recording.period),
+        "innovations": white_noise(recording, values),
+    }
+    least = 1e-9 * float(np.ptp(values))
+    estimates = {name: float(v) for name, v in found.items() if np.isfinite(v) and v > least}
+    second = round(1.0 / recording.period)
+    trust = Trust.of(differences, ends, second, found["innovations"])
+    source = best(estimates, declared, trust)
+    time = _correlation_time(
+        differences if source == "repeats" else [detrended(e) for e in ends], recording.period
+    )
+    rounding = float(resolution(values) / np.sqrt(12.0))  # which a hold does not show
+    value = max(estimates.get(source, declared or 0.0), rounding)
+    reading = _reading(recording, channel, estimates.get(source, 0.0))
+    warnings = (
+        *_weak(channel, estimates, source, declared),
+        *_misdeclared(channel, reading, source, declared, rounding),
+    )
+    return ChannelFloor(value, reading, source, estimates, declared, time, warnings)
+
+
+def _reading(recording: Recording, channel: str, value: float) -> float:
+    """Return the noise before the averaging, which lowers the white part alone."""
+    raw = recording.raw
+    if raw is None:
+        return value
+    less = white_noise(recording, getattr(recording, channel)) ** 2
+    more = white_noise(raw, getattr(raw, channel)) ** 2
+    return float(np.sqrt(value**2 + max(0.0, more - less)))
+
+
+def resolution(values: Array) -> float:
+    """Return the step between neighbouring readings, or 0 where they have none in common.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+
+    Returns
+    -------
+    float
+        In the unit of ``values``.
+    """
+    levels = np.unique(values)
+    if len(levels) < 3:
+        return float(levels[-1] - levels[0])
+    steps = np.diff(levels)
+    steps = steps[steps > 1e-9 * (levels[-1] - levels[0])]
+    least = float(np.quantile(steps, 0.1))
+    counts = steps / least
+    whole = np.abs(counts - np.round(counts)) < 0.05
+    return least if whole.mean() > 0.95 else 0.0
+
+
+def _weak(
+    channel: str, estimates: Mapping[str, float], source: Source, declared: float | None
+) -> list[str]:
+    """Return warnings on a floor that rests on less than the rig's owner meant it to."""
+    unit, scale = CHANNELS[channel]
+    if source != "repeats" and "repeats" in estimates:
+        value = declared if source == "declared" else estimates[source]
+        assert value is not None
+        what = "declared is" if source == "declared" else f"the {source} scatter by"
+        return [
+            f"{channel}: the repeats differ by more than noise, by "
+            f"{estimates['repeats'] / scale:.3g} {unit}, while {what} {value / scale:.3g} {unit}; "
+            "the muscle or the rig changed between the repeats, so they do not count"
+        ]
+    if not estimates:
+        more = "the declared noise is used" if declared is not None else "declare the sensor's"
+        return [f"{channel}: no noise can be seen in the recording; {more}"]
+    return []
+
+
+def _misdeclared(
+    channel: str, reading: float, source: Source, declared: float | None, rounding: float
+) -> list[str]:
+    if declared is None or reading == 0.0:
+        return []
+    unit, scale = CHANNELS[channel]
+    ratio = reading / float(np.hypot(declared, rounding))
+    if 1.0 / DISAGREE <= ratio <= DISAGREE:
+        return []
+    return [
+        f"{channel}: the declared noise is {declared / scale:.3g} {unit}, the {source} say "
+        f"{reading / scale:.3g} {unit} ({ratio:.2g} times); check the sensor or RIG.yaml"
+    ]
+
+
+def _differences(recording: Recording, rig: Rig, values: Array) -> list[Array]:
+    """Return the differences between segments that repeat one another, without large offsets."""
+    found = []
+    for group in repeat_rows(recording, rig):
+        n = len(group[0])
+        skipped = min(int(START / recording.period), n // 10)
+        for i, one in enumerate(group):
+            for other in group[:i]:
+                difference = (values[one] - values[other])[skipped:]
+                if np.ptp(difference) > 0.0:  # else a copy, which says nothing
+                    found.append(_without_offset(difference))
+    return found
+
+
+def _without_offset(difference: Array) -> Array:
+    """Return a difference less its middle, if that is more than slow noise would leave."""
+    middle = float(np.median(difference))
+    low, high = np.quantile(difference, [0.1587, 0.8413])
+    return difference - middle if abs(middle) > 0.25 * (high - low) else difference
+
+
+def _scatter(pieces: list[Array]) -> float:
+    """Return the standard deviation of what is left after far outliers are left out."""
+    if not pieces:
+        return float("nan")
+    joined = np.concatenate(pieces)
+    low, high = np.quantile(joined, [0.1587, 0.8413])
+    width = 0.5 * (high - low)
+    if width > 0.0:
+        joined = joined[np.abs(joined) <= 4.0 * width]
+    return float(np.sqrt(np.mean(joined**2)))
+
+
+def holds(recording: Recording) -> Iterator[Indices]:
+    """Yield the samples of each stretch under one command (or with the valve shut)."""
+    shut, segment = recording.valve_closed, recording.segment
+    changed = (np.abs(np.diff(recording.command)) > SAME) & ~(shut[1:] & shut[:-1])
+    changed |= (np.diff(recording.load) != 0.0) | (shut[1:] != shut[:-1])
+    changed |= recording.restart[1:] | (recording.filled[1:] != recording.filled[:-1])
+    changed |= shut[1:] & (segment[1:] != segment[:-1])
+    for rows in np.split(np.arange(len(segment)), np.flatnonzero(changed) + 1):
+        if not recording.filled[rows[0]]:
+            yield rows
+
+
+def hold_ends(recording: Recording) -> list[Indices]:
+    """Return the samples of the settled second half of each hold that is long enough."""
+    ends = []
+    for rows in holds(recording):
+        seconds = len(rows) * recording.period
+        used = min(seconds - max(SETTLING, 0.5 * seconds), LONGEST)
+        if used >= SHORTEST - 1e-9:
+            ends.append(rows[-round(used / recording.period) :])
+    return ends
+
+
+def _hold_scatter(ends: list[Array], period: float) -> float:
+    """Return the RMS of the noise in the ends of holds, without those that still move."""
+    if not ends:
+        return float("nan")
+    variances = np.array([np.sum(detrended(end) ** 2) / (len(end) - 2) for end in ends])
+    quiet = variances <= 4.0 * np.median(variances)
+    kept = [end for end, good in zip(ends, quiet, strict=True) if good]
+    plain = float(np.sqrt(np.mean(variances[quiet])))
+    return max(plain, _coloured(kept, period))
+
+
+def _coloured(ends: list[Array], period: float) -> float:
+    """Return the RMS of white noise with first-order coloured noise, of which a line was taken off.
+
+    Taking off a line takes most of the slow part with it. The expected autocovariance of what is
+    left is linear in the two variances, for each of a few correlation times; windows of several
+    lengths are taken together.
+    """
+    windows = _windows(ends, period)
+    if not windows:
+        return 0.0
+    lags = {n: np.r_[0, np.unique(np.geomspace(1, n // 2, 10).astype(int))] for n in windows}
+    weights = np.concatenate([np.full(len(lags[n]), np.sqrt(len(windows[n]) * n)) for n in windows])
+    seen = np.concatenate([_autocovariance(windows[n], lags[n]) for n in windows])
+    white = np.concatenate([_expected(np.eye(n), lags[n]) for n in windows])
+    fits = []
+    for time in CORRELATIONS:
+        slow = np.concatenate([_expected(_first_order(n, period / time), lags[n]) for n in windows])
+        sides = np.column_stack([white, slow]) * weights[:, None]
+        parts, misfit = nnls(sides, seen * weights)
+        fits.append((misfit, float(np.sqrt(parts.sum()))))
+    enough = TOLERANCE * min(misfit for misfit, _ in fits)
+    return float(np.mean([value for misfit, value in fits if misfit <= enough]))
+
+
+def _windows(ends: list[Array], period: float) -> dict[int, list[Array]]:
+    """Return the ends cut to a few lengths, by length, each less its straight line."""
+    sizes = [round(seconds / period) for seconds in WINDOWS]
+    windows: dict[int, list[Array]] = {}
+    for end in ends:
+        n = max((size for size in sizes if size <= len(end) + 1e-9), default=0)
+        if n >= 10:
+            windows.setdefault(n, []).append(detrended(end[-n:]))
+    return dict(sorted(windows.items()))
+
+
+def _autocovariance(pieces: list[Array], lags: Indices) -> Array:
+    n = len(pieces[0])
+    return np.array([np.mean([p[: n - h] @ p[h:] / (n - h) for p in pieces]) for h in lags])
+
+
+def _first_order(n: int, step: float) -> Array:
+    return np.asarray(np.exp(-step * np.abs(np.subtract.outer(np.arange(n), np.arange(n)))))
+
+
+def _expected(covariance: Array, lags: Indices) -> Array:
+    """Return the mean autocovariance at some lags once a line is taken off."""
+    n = len(covariance)
+    x = np.column_stack([np.ones(n), np.arange(n) - 0.5 * (n - 1)])
+    x /= np.linalg.norm(x, axis=0)
+    left = covariance - x @ (x.T @ covariance)
+    left -= (left @ x) @ x.T
+    return np.array([np.trace(left, offset=int(h)) / (n - h) for h in lags])
+
+
+def white_noise(recording: Recording, values: Array) -> float:
+    """Return the RMS of the white part of a channel, from second differences.
+
+    Only the third of the recording with the quietest command counts, in windows of a second.
+    """
+    size = max(25, round(1.0 / recording.period))
+    n = len(values) // size * size
+    if n < 3 * size:
+        size, n = len(values), len(values)
+    windows = np.arange(n).reshape(-1, size)
+    before = np.r_[windows[:1], windows[:-1]]  # what has just moved has not settled
+    moved = np.ptp(recording.command[np.hstack([before, windows])], axis=1)
+    broken = recording.restart[windows[:, 1:]].any(axis=1) | recording.filled[windows].any(axis=1)
+    whole = np.flatnonzero(~broken)
+    if not len(whole):
+        return float("nan")
+    quiet = whole[moved[whole] <= np.quantile(moved[whole], 1 / 3)]
+    second = np.diff(values[windows[quiet]], 2, axis=1).ravel()
+    return _scatter([second - np.median(second)]) / np.sqrt(6.0)
+
+
+def _correlation_time(pieces: list[Array], period: float) -> float | None:
+    """Return the lag at which the autocorrelation falls below 1/e, between two samples' lags."""
+    pieces = [p - p.mean() for p in pieces if len(p) >= 25]
+    if not pieces or not any(np.any(p) for p in pieces):
+        return None
+    longest = min(len(p) for p in pieces) // 2
+    power = sum(float(p @ p) for p in pieces) / sum(len(p) for p in pieces)
+    before = 1.0
+    for h in range(1, longest):
+        total = sum(float(p[h:] @ p[:-h]) for p in pieces)
+        now = total / sum(len(p) - h for p in pieces) / power
+        if now < np.exp(-1.0):
+            return float(period * (h - 1 + (before - np.exp(-1.0)) / (before - now)))
+        before = now
+    return period * longest

@@ -1,0 +1,46 @@
+"""Stick-slip: the guide sticks, breaks away and sticks again.
+
+Dry friction of a guide is larger at rest than in motion, so that slow motion goes in jumps. The
+load stays where it is until the force on it exceeds the breakaway force, then jumps to where the
+friction of motion holds it. Weak sticking looks like a loss that depends on direction.
+"""
+
+from __future__ import annotations
+
+from pam_envs.diagnosis.cause import Cause, Form, Term
+from pam_envs.diagnosis.fit.starting_values import grid
+
+_BREAKS = (0.8, 1.3, 2.1, 3.4, 5.0, 7.2, 10.0, 15.0)
+_HOLDS = (0.45, 0.7)
+_SPEEDS = (5e-4, 3e-3)
+
+CAUSE = Cause(
+    name="stick_slip",
+    title="stick-slip in the guide",
+    forms=(
+        Form(
+            "Stribeck",
+            (
+                Term("mass.stick", (4.0,), scale=4.0),
+                Term("mass.stick_kinetic", (0.4,), high=0.95, scale=1.0, amount=False),
+                Term("mass.stick_speed", (5e-3,), high=0.3, log=True, amount=False),
+            ),
+            seeds=grid(_BREAKS, _HOLDS, _SPEEDS, best=5),
+        ),
+    ),
+    signature=(
+        "in slow motion the contraction stands still and jumps; the error is a saw-tooth with the "
+        "sign of the direction, whatever the speed"
+    ),
+    neighbours=("viscous_loss", "hysteresis_drive", "hysteresis_shape", "valve_dead_band"),
+    experiment=(
+        "A very slow triangle, 10 s or more for each way: stick-slip draws stairs where everything "
+        "else draws a line; the pressure stays smooth, which a valve's dead band does not."
+    ),
+    source=(
+        "Armstrong-Hélouvry, Dupont and Canudas de Wit 1994, Automatica 30(7); sizes are assumed, "
+        "within what guides of small rigs show."
+    ),
+    needs=("contraction",),
+    sensor="a position sensor of higher resolution, or a load cell between muscle and load",
+)

@@ -1,0 +1,48 @@
+"""Droop of the supply: the reservoir empties faster than it is filled.
+
+A small reservoir or a long feed loses pressure as air is taken and recovers slowly. High commands
+are then missed or reached late, the more the busier the rig has been; below the supply's pressure
+nothing is felt. In the plant filling runs through a throat from a supply that falls with what is
+filled and comes back through an orifice.
+"""
+
+from __future__ import annotations
+
+from pam_envs.diagnosis.cause import Cause, Form, Term
+from pam_envs.diagnosis.fit.starting_values import grid
+
+_SUPPLIES, _DROOPS = (5.6e5, 6.1e5, 6.4e5, 6.8e5, 7.2e5), (0.1, 0.4)
+_TIMES, _RECOVERIES = (0.02, 0.06, 0.2), (2.0, 6.0)
+
+CAUSE = Cause(
+    name="supply_droop",
+    title="the droop of the supply",
+    forms=(
+        Form(
+            "reservoir",
+            (
+                Term("regulator.supply_pressure", (6.5e5,), low=3e5, high=2e6, log=True),
+                Term("regulator.supply_droop", (0.2,), scale=0.05, amount=False),
+                Term("regulator.supply_time", (0.05,), log=True, amount=False),
+                Term("regulator.supply_recovery", (4.0,), log=True, amount=False),
+            ),
+            seeds=grid(_SUPPLIES, _DROOPS, _TIMES, _RECOVERIES),
+        ),
+    ),
+    signature=(
+        "peaks of the pressure are clipped or late near the top, worse after a busy spell; "
+        "deflating fits"
+    ),
+    neighbours=("slew_limit", "exhaust_asymmetry"),
+    experiment=(
+        "Fill to the top again and again, then once after a rest: a droop grows with the number of "
+        "fillings and is gone after the rest, a limited rate is the same every time and at every "
+        "level."
+    ),
+    source=(
+        "A public record of a DMSP-10-250 on a pressure regulator: peaks of 5.65 falling to 5.11 "
+        "bar over four cycles at the same command."
+    ),
+    sensor="a pressure sensor before the valve",
+    compensable=True,
+)

@@ -1,0 +1,38 @@
+"""Slip: a clamp gave way once.
+
+A sleeve, a knot or a sensor's clamp moves under load by a fraction of a millimetre and holds again.
+From then on the position reads off by a constant; before, nothing is wrong.
+"""
+
+from __future__ import annotations
+
+from pam_envs.diagnosis.cause import Cause, Form, Term
+from pam_envs.diagnosis.fit.starting_values import step_starts
+
+CAUSE = Cause(
+    name="slip_step",
+    title="the step of a clamp that slipped",
+    forms=(
+        Form(
+            "step",
+            (
+                Term("position.slip", (1e-4,), scale=1e-4),
+                Term("position.slip_at", (100.0,), scale=0.1, amount=False),
+            ),
+            seeds=step_starts,
+        ),
+    ),
+    signature=(
+        "one step of the contraction within a second, which the pressure does not show; a constant "
+        "error after it"
+    ),
+    neighbours=("sensor_bias", "sensor_drift", "creep"),
+    experiment=(
+        "Look at the zero before and after, and repeat the segment in which it happened: a step "
+        "that has happened stays and does not come back, a drift goes on."
+    ),
+    source="Assumed: what clamps and sleeves of rigs do; no figure was found.",
+    needs=("contraction",),
+    once=True,
+    sensor="a second position sensor on the other side of the clamp",
+)

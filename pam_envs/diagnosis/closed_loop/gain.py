@@ -1,0 +1,341 @@
+"""What the better model is worth in closed loop.
+
+The same design routine makes a controller of the plant before and one of the extended plant; both
+are run against the rig where it is simulated, otherwise against the extended plant with residuals
+of held-out experiments replayed on it. What counts is the true position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.diagnosis.causes import catalogue
+from pam_envs.diagnosis.closed_loop.plant_inverse import PREVIEW, Controller, Simulated
+from pam_envs.diagnosis.closed_loop.plant_inverse import design as default_design
+from pam_envs.diagnosis.closed_loop.references import DURATION, fixed_references
+from pam_envs.plants.core.stepper import PERIOD, PlantStepper
+from pam_envs.plants.single_muscle.plant import SingleMuscle
+
+Array = NDArray[np.float64]
+Design = Callable[[Any], Controller]
+"""From a plant to a controller; ``mass.load`` and ``muscle.temperature`` are those of the runs."""
+
+# What a controller can do about a cause that its plant knows, decided before any was tried.
+#
+# It can: everything between set-point and true position, be it static, slow or a known delay.
+#   creep, leak, valve_dead_band, dead_time, slew_limit, viscous_loss, temperature (measured),
+#   first_cycle_softening (runs begin with it), load_dependent_hysteresis,
+#   load_dependent_compliance, hysteresis_shape, hysteresis_drive, supply_droop,
+#   threshold_pressure, exhaust_asymmetry, pressure_dependent_friction, wire_slack, payload_error
+#   sensor_delay: the loop compares the reading with one that is as late
+# It cannot:
+#   sensor_bias, sensor_drift: the loop follows the reading wherever the sensor goes
+#   sensor_nonlinearity: the recording is read through the same sensor, there is no true position
+#       to learn its bow from; that of the pressure sensor does not matter to a position loop
+#   slip_step: happened once; when the clamp will give way next is not in the plant
+#   stick_slip: below the breakaway nothing moves, and where it sticks depends on the noise
+#   resonance: at or above the bandwidth of regulator and loop, which can only avoid it
+COMPENSABLE: tuple[str, ...] = tuple(cause.name for cause in catalogue() if cause.compensable)
+"""Causes that a controller can compensate."""
+
+SETTLING = 2.0
+"""Time [s] at the start of a reference that does not count."""
+SEGMENT = 2.0
+"""Length [s] of what is drawn anew for an interval, and of the pieces of a replayed residual."""
+DRAWS = 2000
+LEVEL = 0.95
+LEAST_STROKE = 1e-3
+LEAST_GAP = 0.05
+"""Gap to the oracle, over the error, below which no share of it is reported."""
+MM = 1e3
+
+
+class Rig(Protocol):
+    """A rig to run controllers on, or a simulation of one."""
+
+    @property
+    def position(self) -> float:
+        """True contraction [m]."""
+        ...
+
+    def reset(self, seed: int | None = None) -> None:
+        """Bring it to rest without pressure and start its noise anew."""
+        ...
+
+    def step(self, set_point: float) -> tuple[float, float]:
+        """Hold a set-point [Pa] for a period; return contraction [m] and pressure [Pa] read."""
+        ...
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """What the extended plant leaves of held-out experiments.
+
+    Attributes
+    ----------
+    contraction : ndarray, shape (n,)
+        Measured less simulated [m].
+    period : float
+        Sampling period [s].
+    """
+
+    contraction: Array
+    period: float
+
+    def resampled(self, seed: int, period: float, samples: int) -> Array:
+        """Return pieces of ``SEGMENT`` seconds drawn at random and put together, (samples,)."""
+        rng = np.random.default_rng(seed)
+        every = np.arange(0.0, (len(self.contraction) - 1) * self.period + 1e-9, period)
+        trace = np.interp(every, np.arange(len(self.contraction)) * self.period, self.contraction)
+        size = min(len(trace), round(SEGMENT / period))
+        starts = rng.integers(0, len(trace) - size + 1, -(-samples // size))
+        return np.concatenate([trace[s : s + size] for s in starts])[:samples]
+
+
+class ReplayedRig:
+    """A plant on which held-out residuals are replayed, in the reading and in the position.
+
+    Parameters
+    ----------
+    plant : SingleMuscle
+        Its sensor noise is in the residuals; without any, the plant's own noise acts.
+    residuals : Residuals, optional
+    """
+
+    def __init__(self, plant: SingleMuscle, residuals: Residuals | None) -> None:
+        self._stepper = PlantStepper(plant, plant.mass.load)
+        self._residuals = residuals
+        self.reset(0)
+
+    def reset(self, seed: int | None = None) -> None:
+        """Bring the plant to rest and draw the residuals anew."""
+        given = self._residuals
+        self._stepper.reset(seed if given is None else None)
+        self._count, self._extra = 0, np.zeros(1)
+        if given is not None and len(given.contraction) > 0:
+            samples = round(2.0 * DURATION / self._stepper.period)
+            self._extra = given.resampled(seed or 0, self._stepper.period, samples)
+
+    @property
+    def position(self) -> float:
+        """Return the true contraction [m]."""
+        return self._stepper.position + float(self._extra[self._count % len(self._extra)])
+
+    def step(self, set_point: float) -> tuple[float, float]:
+        """Hold a set-point [Pa] for a period; return contraction [m] and pressure [Pa] read."""
+        reading, pressure = self._stepper.step(set_point)
+        self._count += 1
+        return reading + float(self._extra[self._count % len(self._extra)]), pressure
+
+
+# --- runs and scores ----------------------------------------------------------------------------
+
+
+def reach(rig: Rig, full: float, period: float) -> float:
+    """Return the contraction [m] at which a rig is after two seconds of full pressure."""
+    rig.reset(0)
+    for _ in range(round(2.0 / period)):
+        rig.step(full)
+    return rig.position
+
+
+def run(controller: Controller, rig: Rig, reference: Array, load: float, seed: int) -> Array:
+    """Return the error [m] of the true position after each control period.
+
+    Parameters
+    ----------
+    controller : Controller
+    rig : Rig
+    reference : ndarray, shape (n + PREVIEW,)
+        Wanted contraction [m].
+    load : float
+        Load [kg].
+    seed : int
+        Of the rig's noise.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    rig.reset(seed)
+    controller.reset()
+    reading = pressure = 0.0
+    errors = np.empty(len(reference) - PREVIEW)
+    for k in range(len(errors)):
+        set_point = controller.act(reference[k : k + PREVIEW], reading, pressure, load)
+        reading, pressure = rig.step(set_point)
+        errors[k] = rig.position - reference[k + 1]
+    return errors
+
+
+def segment_squares(errors: Array, period: float) -> Array:
+    """Return mean squares [m2] over the segments after settling, shape (segments,)."""
+    size, first = round(SEGMENT / period), round(SETTLING / period)
+    whole = (len(errors) - first) // size
+    return np.asarray((errors[first : first + whole * size].reshape(whole, size) ** 2).mean(axis=1))
+
+
+def rms(squares: Array) -> Array:
+    """Return the root of the mean over the last axis."""
+    return np.asarray(np.sqrt(squares.mean(axis=-1)))
+
+
+def spread(values: Array) -> list[float]:
+    """Return the interval of level ``LEVEL``."""
+    tail = 50.0 * (1.0 - LEVEL)
+    low, high = np.percentile(values, [tail, 100.0 - tail])
+    return [float(low), float(high)]
+
+
+def prepared(plant: Any, load: float, kelvin: float | None) -> Any:
+    """Return a plant at the load and temperature of the runs; what slipped once is left out."""
+    if not isinstance(plant, SingleMuscle):
+        return plant
+    values = {"mass.load": load, "position.slip": 0.0}
+    if kelvin is not None:
+        values["muscle.temperature"] = kelvin
+    return plant.replace(values)
+
+
+def shortest_reach(plants: list[Any], rig: Rig, full: float, period: float) -> float:
+    """Return the smallest stroke [m] among the plants and the rig."""
+    muscles = [PlantStepper(p, p.mass.load) for p in plants if isinstance(p, SingleMuscle)]
+    return min(reach(r, full, period) for r in (*muscles, rig))
+
+
+def closed_loop(
+    before: SingleMuscle,
+    after: SingleMuscle,
+    design: Design | None = None,
+    rig: Rig | None = None,
+    oracle: SingleMuscle | Simulated | None = None,
+    references: Mapping[str, Array] | None = None,
+    residuals: Residuals | None = None,
+    load: float = 0.0,
+    kelvin: float | None = None,
+    seed: int = 0,
+) -> dict[str, Any] | None:
+    """Compare controllers designed on the plant before and on the extended plant.
+
+    Parameters
+    ----------
+    before, after : SingleMuscle
+        The refitted plant without and with the effects.
+    design : callable, optional
+        From a plant to a :class:`Controller`; default
+        :func:`~pam_envs.diagnosis.closed_loop.plant_inverse.design`.
+    rig : Rig, optional
+        Where the controllers run; default: the extended plant with ``residuals`` replayed.
+    oracle : SingleMuscle or Simulated, optional
+        What the rig really is: what a third controller is designed on.
+    references : mapping of str to ndarray, shape (n + PREVIEW,), optional
+        Wanted contractions [m], one sample a control period; default :func:`fixed_references`.
+    residuals : Residuals, optional
+        What the extended plant leaves of held-out experiments.
+    load : float
+        Load [kg] of the runs.
+    kelvin : float, optional
+        Temperature [K] of the runs; default: that of each plant.
+    seed : int
+        Of the noise and of the intervals; the same for every controller.
+
+    Returns
+    -------
+    dict or None
+        As under ``closed_loop`` in the report, and ``references`` with the errors on each. None
+        where the stroke is less than ``LEAST_STROKE`` under this load.
+    """
+    make = default_design if design is None else design
+    plants = [prepared(p, load, kelvin) for p in (before, after, oracle) if p is not None]
+    where = ReplayedRig(plants[1], residuals) if rig is None else rig
+    period = float(getattr(where, "period", PERIOD))
+    if references is None:
+        top = shortest_reach(plants, where, plants[0].regulator.max_pressure, period)
+        if top < LEAST_STROKE:
+            return None
+        references = fixed_references(top, period)
+    squares = np.array(
+        [
+            [
+                segment_squares(run(controller, where, r, load, seed + i), period)
+                for i, r in enumerate(references.values())
+            ]
+            for controller in map(make, plants)
+        ]
+    )
+    found = scores(squares, list(references), seed)
+    found["controller"] = "inverse by simulation with a PI loop" if design is None else _name(make)
+    found["where"] = "the rig" if rig is not None else REPLAYED if residuals else NOISY
+    return {**found, "text": sentence(found)}
+
+
+REPLAYED = "the extended plant with held-out residuals replayed"
+NOISY = "the extended plant with its sensor noise"
+
+
+def _name(design: Design) -> str:
+    return str(getattr(design, "__name__", type(design).__name__)).replace("_", " ")
+
+
+def scores(squares: Array, names: list[str], seed: int) -> dict[str, Any]:
+    """Return errors and gain with intervals.
+
+    Parameters
+    ----------
+    squares : ndarray, shape (2 or 3, references, segments)
+        Mean squares [m2] of before, after and the oracle.
+    names : list of str
+        Of the references.
+    seed : int
+        Of the draws: of segments, the same ones for each controller.
+    """
+    flat = squares.reshape(len(squares), -1)
+    rng = np.random.default_rng(seed)
+    drawn = rms(flat[:, rng.integers(0, flat.shape[1], (DRAWS, flat.shape[1]))]) * MM
+    old, new, *best = (rms(flat) * MM).tolist()
+    gap = old - best[0] if best else 0.0
+    each = rms(squares) * MM
+    labels = ("before", "after", "oracle")[: len(squares)]
+    return {
+        "controller": "",
+        "where": "",
+        "unit": "mm",
+        "before": {"value": old, "interval": spread(drawn[0])},
+        "after": {"value": new, "interval": spread(drawn[1])},
+        "oracle": {"value": best[0]} if best else None,
+        "better_percent": {
+            "value": 100.0 * (1.0 - new / old),
+            "interval": spread(100.0 * (1.0 - drawn[1] / drawn[0])),
+        },
+        "recovered": (old - new) / gap if gap > LEAST_GAP * old else None,
+        "references": [
+            {"name": name, **dict(zip(labels, each[:, i].tolist(), strict=True))}
+            for i, name in enumerate(names)
+        ],
+    }
+
+
+def sentence(found: Mapping[str, Any]) -> str:
+    """Return what was found in words."""
+    old, new = found["before"]["value"], found["after"]["value"]
+    better, (low, high) = found["better_percent"]["value"], found["better_percent"]["interval"]
+    text = (
+        f"Designed on the extended plant instead of the plant before, the same controller misses "
+        f"the reference on {found['where']} by {new:.3g} instead of {old:.3g} mm RMS: "
+    )
+    if low <= 0.0 <= high:
+        text += f"no difference that these runs could show ({low:.0f} to {high:.0f} %)."
+    else:
+        word = "less" if better > 0.0 else "more"
+        ends = sorted((abs(low), abs(high)))
+        text += f"{abs(better):.0f} % {word} (95 % interval {ends[0]:.0f} to {ends[1]:.0f} %)."
+    if found["oracle"] is not None:
+        text += f" Designed on the rig itself it misses by {found['oracle']['value']:.3g} mm"
+        share = found["recovered"]
+        text += "." if share is None else f"; {100.0 * share:.0f} % of the way there is gone."
+    return text

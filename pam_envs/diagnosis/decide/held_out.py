@@ -1,0 +1,250 @@
+"""What is left out for the reported errors and gains, and the models fitted without it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.data.recording.recording import Recording
+from pam_envs.diagnosis.decide.search import (
+    Blocks,
+    Candidate,
+    fresh,
+    less_one,
+    polish,
+    refit,
+    whole,
+)
+from pam_envs.diagnosis.fit.least_squares import FEW_DAMPINGS, Problem, evaluate, improve, share
+
+Array = NDArray[np.float64]
+
+SHARE = (0.15, 0.4)
+"""Part of a record that is held out."""
+LEAST_BLOCKS = 8
+"""With fewer held-out blocks no interval is given."""
+ROUNDS = 3
+"""Rounds of a rival's fit without what is held out."""
+DRAWS = 400
+LEVEL = (0.025, 0.975)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is held out.
+
+    Attributes
+    ----------
+    rows : ndarray of bool, shape (T,)
+        Samples.
+    by : {"kinds", "blocks"}
+        Whole kinds of experiment, or interleaved blocks of time.
+    kinds : tuple of str
+        Which kinds; empty for blocks.
+    """
+
+    rows: NDArray[np.bool_]
+    by: str
+    kinds: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Models fitted without some samples, and what they do on those.
+
+    Errors of the candidates are sums over what is held out alone.
+
+    Attributes
+    ----------
+    choice : Choice
+        What none of the fits has seen.
+    problem : Problem
+        With the other samples to train on.
+    blocks : Blocks
+        Those that hold held-out samples.
+    seed : int
+        Of the blocks drawn again.
+    base, model : Candidate
+        The base, and that with the causes named.
+    rivals : list of Candidate or None
+        As those of the decision; None for one that kinds of experiment cannot judge.
+    without : dict of str to Candidate
+        The model less one of its causes.
+    """
+
+    choice: Choice
+    problem: Problem
+    blocks: Blocks
+    seed: int
+    base: Candidate
+    model: Candidate
+    rivals: list[Candidate | None] = field(default_factory=list)
+    without: dict[str, Candidate] = field(default_factory=dict)
+
+    @property
+    def rows(self) -> NDArray[np.bool_]:
+        """Samples that are held out, shape (T,)."""
+        return self.choice.rows
+
+    @cached_property
+    def draws(self) -> NDArray[np.int64]:
+        """How often each block is drawn in bootstrap samples."""
+        return self.blocks.draws(DRAWS, self.seed)
+
+    def interval(self, values: Array) -> list[float] | None:
+        """Return the 95 % interval of what was found in bootstrap samples, if blocks suffice."""
+        if int(self.blocks.held_out.sum()) < LEAST_BLOCKS:
+            return None
+        return [float(v) for v in np.quantile(values, LEVEL)]
+
+    def gain(self, before: Candidate, after: Candidate) -> dict[str, Any]:
+        """Return the gain of one candidate over another, with a paired interval."""
+        gains = self.blocks.gains(before.errors, after.errors, self.draws)
+        value = self.blocks.gain(before.errors, after.errors)
+        return {"value": value, "interval": self.interval(gains)}
+
+
+def kind_of(label: str) -> str:
+    """Return the kind of experiment that a label names: ``random_b`` is of the kind random."""
+    return re.sub(r"[\s_.-]+(?:[A-Za-z]|\d+)$|(?<=[A-Za-z])\d+$", "", label) or label
+
+
+def choose(recording: Recording, blocks: Blocks) -> Choice:
+    """Return what is held out.
+
+    Whole kinds of experiment, so that a model is judged on another kind of motion than it was
+    fitted to; those that hold much but not most of the record. Where a recording has fewer than
+    three kinds the interleaved blocks are held out.
+    """
+    kinds = [kind_of(label) for label in recording.segments]
+    names = sorted(set(kinds))
+    of = np.array([names.index(k) for k in kinds])[recording.segment]
+    moving = np.bincount(of, np.abs(np.gradient(recording.command)), minlength=len(names)) > 0
+    counts = np.bincount(of, minlength=len(names)) / len(of)
+    candidates = [k for k in np.argsort(-counts, kind="stable") if moving[k]]
+    rows, left = np.zeros(len(of), bool), []
+    if len(candidates) < 3:
+        return interleaved(blocks)
+    for k in candidates[1::2]:  # every second one by length: the longest kind stays
+        if rows.mean() + counts[k] <= SHARE[1]:
+            rows |= of == k
+            left.append(names[k])
+    return Choice(rows, "kinds", tuple(left)) if rows.mean() >= SHARE[0] else interleaved(blocks)
+
+
+def interleaved(blocks: Blocks) -> Choice:
+    """Return the blocks on which causes are compared as what is held out."""
+    return Choice(np.asarray(~blocks.train), "blocks")
+
+
+def compared(
+    problem: Problem, blocks: Blocks, base: Candidate, model: Candidate, seed: int = 0
+) -> HeldOut:
+    """Return base and model as causes were compared: by fits without the interleaved blocks."""
+    part = _held_blocks(problem, blocks, interleaved(blocks).rows)
+    return HeldOut(interleaved(blocks), problem, part, seed, base, model)
+
+
+def _held_blocks(problem: Problem, blocks: Blocks, rows: NDArray[np.bool_]) -> Blocks:
+    """Return the blocks with what they hold of some samples."""
+    some, n = np.isfinite(problem.measured) & rows, len(blocks.held_out)
+    counts = np.stack([np.bincount(blocks.of, s, minlength=n) for s in some])
+    return replace(blocks, held_out=counts.sum(axis=0) > 0, counts=counts.astype(np.float64))
+
+
+def hold_out(
+    problem: Problem,
+    blocks: Blocks,
+    choice: Choice,
+    base: Candidate,
+    model: Candidate,
+    rivals: Sequence[Candidate],
+    close: Sequence[Candidate] = (),
+    seed: int = 0,
+) -> HeldOut:
+    """Fit all candidates without what is held out.
+
+    The base begins where its fit to other samples ended, all others at the base so found with what
+    they add; model and close rivals also where theirs ended, and what fits better the samples it
+    sees counts. What happens once cannot be told from kinds of experiment that were left out: a
+    rival with such a cause is left to the interleaved blocks.
+
+    Parameters
+    ----------
+    problem, blocks : Problem, Blocks
+        Of the whole record.
+    choice : Choice
+        What is held out.
+    base, model : Candidate
+        The base, and that with the causes named.
+    rivals : sequence of Candidate
+        To be compared with the model, which may be among them.
+    close : sequence of Candidate
+        Those of them that are fitted as thoroughly as the model.
+    seed : int
+        Of the blocks drawn again.
+    """
+    rows, again = choice.rows, replace(problem, train=~choice.rows)
+    part = _held_blocks(problem, blocks, rows)
+    old = refit(again, blocks, base)
+    new = _thoroughly(again, blocks, old, model) if model.causes else old
+    by_kind = choice.by == "kinds"
+    found: list[Candidate | None] = [new if r is model else None for r in rivals]
+    others = [
+        k
+        for k, rival in enumerate(rivals)
+        if found[k] is None and not (by_kind and any(cause.once for cause, _ in rival.causes))
+    ]
+    fitted = _side_by_side(again, old, [rivals[k] for k in others])
+    for k, candidate in zip(others, fitted, strict=True):
+        thorough = any(rivals[k] is c for c in close)
+        found[k] = _thoroughly(again, blocks, old, rivals[k]) if thorough else candidate
+    less = less_one(again, blocks, old, new) if len(model.causes) > 1 else {}
+
+    def scored(candidate: Candidate) -> Candidate:
+        left = np.where(rows, again.rows(candidate.fit.residual), 0.0)
+        return replace(candidate, errors=part.errors(left))
+
+    return HeldOut(
+        choice,
+        again,
+        part,
+        seed,
+        scored(old),
+        scored(new),
+        [None if c is None else scored(c) for c in found],
+        {name: scored(c) for name, c in less.items()},
+    )
+
+
+def _side_by_side(
+    problem: Problem, base: Candidate, candidates: Sequence[Candidate]
+) -> list[Candidate]:
+    """Return candidates fitted anew, by the base's Jacobian for the base's parameters."""
+    if not candidates:
+        return []
+    whole(problem, base.fit)
+    shared = share(problem, base.fit)
+    fits = [fresh(c.fit, z=_begun_at(base, c), shared=shared) for c in candidates]
+    evaluate(problem, fits)
+    improve(problem, fits, ROUNDS, 1e-4, FEW_DAMPINGS)
+    return [replace(c, fit=fit) for c, fit in zip(candidates, fits, strict=True)]
+
+
+def _thoroughly(problem: Problem, blocks: Blocks, base: Candidate, model: Candidate) -> Candidate:
+    """Return a candidate fitted anew; also from the base, where that looks better."""
+    there, here = refit(problem, blocks, model), _side_by_side(problem, base, [model])[0]
+    if here.fit.cost < there.fit.cost:
+        polish(problem, [here.fit])
+    return min(there, here, key=lambda c: c.fit.cost)
+
+
+def _begun_at(base: Candidate, candidate: Candidate) -> Array:
+    """Return where a candidate's fit begins if its base is another one."""
+    return np.concatenate([base.fit.z, candidate.fit.z[len(base.fit.z) :]])

@@ -1,0 +1,174 @@
+"""Which causes a recording can tell apart, before any residual is looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.diagnosis.cause import Cause
+from pam_envs.diagnosis.decide.search import begun
+from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, column_of
+
+Array = NDArray[np.float64]
+
+DIRECTIONS = 1e-8
+"""Directions of the base's Jacobian below this part of the largest are not fitted away."""
+TOGETHER = 96
+"""Columns that are simulated in one replay."""
+NO_TRACE = 1e-3
+"""Size over the noise below which an effect shows nothing."""
+FAR, FAR_LOG = 30.0, 6.0
+"""How far beyond its start a parameter is tried, as a factor and as a power."""
+ALIKE = 0.9
+"""Cosine from which two causes are told apart by nothing but a further sensor."""
+
+
+def complement(base: Fit) -> Array:
+    """Return an orthonormal basis of what refitting the base can change, shape (k, m)."""
+    j = base.slopes
+    spreads = np.array([1.0 / f.prior if np.isfinite(f.prior) else 0.0 for f in base.frees])
+    values, vectors = np.linalg.eigh(j @ j.T + np.diag(spreads**2))
+    keep = values > DIRECTIONS * values[-1]
+    basis = (vectors[:, keep].T @ j) / np.sqrt(values[keep])[:, None]
+    return np.asarray(basis)
+
+
+def projected(traces: Array, basis: Array) -> Array:
+    """Return traces, shape (n, m), without what refitting the base would take up."""
+    return np.asarray(traces - (traces @ basis.T) @ basis)
+
+
+@dataclass(frozen=True)
+class Isolability:
+    """Cosines between what is left of the effects once the base is refitted.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Causes.
+    cosine : ndarray, shape (n, n)
+        Absolute cosines.
+    absorbed : ndarray, shape (n,)
+        Part of each effect's RMS that refitting the base takes up; NaN where it shows nothing.
+    reach : ndarray, shape (n,)
+        Largest size, over the noise of the channel where it is largest: where its fits begin, or
+        at the bounds.
+    """
+
+    names: tuple[str, ...]
+    cosine: Array
+    absorbed: Array
+    reach: Array
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What one column shows beside the base.
+
+    Attributes
+    ----------
+    left : ndarray, shape (m,)
+        What refitting the base does not take up.
+    size : float
+        Of that, over the noise of the channel where it is largest.
+    raw : float
+        RMS before the refit, over the noise.
+    """
+
+    left: Array
+    size: float
+    raw: float
+
+    @property
+    def absorbed(self) -> float:
+        """Part of the RMS that refitting takes up; NaN where there is nothing."""
+        rms = float(np.linalg.norm(self.left)) / np.sqrt(self.left.size)
+        return 1.0 - rms / self.raw if self.raw > NO_TRACE else np.nan
+
+
+def isolability(problem: Problem, family: Any, base: Fit, causes: Sequence[Cause]) -> Isolability:
+    """Simulate each cause where its fits begin and at its bounds, and compare what is left."""
+    columns: list[Array] = []
+    begins: dict[str, list[int]] = {}
+    bounds: dict[str, list[int]] = {}
+    for cause in causes:
+        for form in cause.forms:
+            fits = begun(problem, family, base, cause, form)
+            for at, more in ((begins, [column_of(f, f.z) for f in fits]), (bounds, ends(fits))):
+                places = range(len(columns), len(columns) + len(more))
+                at.setdefault(cause.name, []).extend(places)
+                columns += more
+    if not columns:
+        return Isolability((), np.zeros((0, 0)), np.zeros(0), np.zeros(0))
+    shown = list(_shown(problem, base, columns))
+    names = tuple(name for name, places in begins.items() if places)
+    kept, absorbed, reach = [], [], []
+    for name in names:
+        best = max((shown[k] for k in begins[name]), key=lambda s: s.size)
+        ends_of = max((shown[k] for k in bounds[name]), key=lambda s: s.size)
+        kept.append(best.left if best.raw > NO_TRACE else ends_of.left)
+        absorbed.append(best.absorbed)
+        reach.append(max(best.size, ends_of.size))
+    rows = np.array([row / max(float(np.linalg.norm(row)), 1e-12) for row in kept])
+    return Isolability(names, np.abs(rows @ rows.T), np.array(absorbed), np.array(reach))
+
+
+def ends(fits: Sequence[Fit]) -> list[Array]:
+    """Return columns with all amounts of a form at their bounds, and far from where it starts.
+
+    Not every effect grows all the way: far beyond its usual size it may be taken up by the refit.
+    """
+    if not fits:
+        return []
+    fit = fits[0]
+    terms = fit.label[1].terms
+    frees = fit.frees[len(fit.frees) - len(terms) :]
+    made = []
+    for place_of in (lambda f: f.low, lambda f: f.high, lambda f: far(f, fit.column[f.place])):
+        column = column_of(fit, fit.z)
+        for term, free in zip(terms, frees, strict=True):
+            if term.amount:
+                column[free.place] = place_of(free)
+        made.append(column)
+    return made
+
+
+def far(free: Free, here: float) -> float:
+    """Return a value far beyond where a fit starts, seen from the base's, within the bounds."""
+    value = FAR * free.start
+    if free.log:
+        value = here * (free.start / here) ** FAR_LOG if here > 0.0 else free.start
+    return float(np.clip(value, free.low, free.high))
+
+
+def _shown(problem: Problem, base: Fit, columns: Sequence[Array]) -> Iterator[Shown]:
+    """Yield what each column shows beside the base."""
+    basis, without = complement(base), problem.residuals(column_of(base, base.z)[None])[0]
+    for at in range(0, len(columns), TOGETHER):
+        traces = problem.residuals(np.array(columns[at : at + TOGETHER])) - without
+        for trace, left in zip(traces, projected(traces, basis), strict=True):
+            raw = float(np.linalg.norm(trace)) / np.sqrt(trace.size)
+            yield Shown(left, channel_size(left, problem), raw)
+
+
+def twins(found: Isolability, causes: Sequence[Cause]) -> dict[str, str]:
+    """Return, for causes of the valve or line, another one that looks the same without pressure."""
+    names = {cause.name: k for k, cause in enumerate(causes)}
+    made = {}
+    for k, name in enumerate(found.names):
+        cosines = np.delete(found.cosine[k], k)
+        if causes[names[name]].in_valve and len(cosines) and cosines.max() >= ALIKE:
+            made[name] = np.delete(np.array(found.names), k)[np.argmax(cosines)]
+    return {name: str(other) for name, other in made.items()}
+
+
+def channel_size(trace: Array, problem: Problem) -> float:
+    """Return the RMS over the noise on the channel where it is largest."""
+    good = np.isfinite(problem.measured)
+    rows = problem.rows(trace)
+    sizes = [float(np.sqrt(np.mean(r[g] ** 2))) for r, g in zip(rows, good, strict=True) if g.any()]
+    return max(sizes, default=0.0)

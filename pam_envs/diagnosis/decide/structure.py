@@ -1,0 +1,240 @@
+"""What is left in a residual: against what it varies, how much a flexible model explains, peaks.
+
+None of this names a cause. It says whether there is anything left to name.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.signal import lfilter, welch
+from scipy.stats import chi2
+
+from pam_envs.diagnosis.decide.search import Blocks
+
+Array = NDArray[np.float64]
+
+BINS = 12
+LAGS = 20
+FILTERS = (0.05, 0.2, 1.0, 5.0, 20.0, 60.0)
+"""Time constants [s] of the flexible model's filters."""
+LOWEST_PEAK = 0.15
+"""Peaks of the spectrum are looked for above this frequency [Hz]."""
+WINDOW, NEAR, LEAST_WINDOWS = 80.0, 12, 4
+"""Longest window [s] of a spectrum, bins on either side of a peak's neighbourhood, and how many
+windows a record has at least: a spectrum that is not averaged has peaks of noise."""
+MOVED = 6.0
+"""Height of a peak in the spectrum of the motion above which the experiment put it there."""
+CYCLE = 5e4
+"""A turn of the pressure counts when it is so large [Pa]."""
+
+
+@dataclass(frozen=True)
+class Regressors:
+    """What a residual may vary against, each of shape (T,); absent ones are left out."""
+
+    values: dict[str, Array]
+    features: Array
+
+    @classmethod
+    def make(
+        cls,
+        time: Array,
+        command: Array,
+        outputs: Array,
+        load: Array,
+        temperature: Array | None,
+    ) -> Regressors:
+        """Return the regressors of a recording and the simulated outputs (2, T)."""
+        x, p = outputs
+        period = float(time[1] - time[0])
+        rate = np.gradient(p, period)
+        turns = turning_points(p)
+        cycle = np.cumsum(turns) / 2.0
+        values = {
+            "direction": direction_of(p),
+            "rate": rate,
+            "pressure": p,
+            "load": load,
+            "time_since_reversal": since(turns, period),
+            "time": time,
+            "cycle": cycle,
+        }
+        if temperature is not None:
+            values["temperature"] = temperature
+        return cls(values, _features(time, command, x, p, load, temperature, values))
+
+
+def direction_of(pressure: Array) -> Array:
+    """Return +1 while inflating and -1 while deflating, by play of 2 kPa."""
+    state, out = pressure[0], np.empty(len(pressure))
+    way = 1.0
+    for i, value in enumerate(pressure):
+        if value > state + 2e3:
+            state, way = value - 2e3, 1.0
+        elif value < state - 2e3:
+            state, way = value + 2e3, -1.0
+        out[i] = way
+    return out
+
+
+def turning_points(pressure: Array) -> NDArray[np.bool_]:
+    """Return where the pressure has turned by at least :data:`CYCLE`."""
+    turned = np.zeros(len(pressure), bool)
+    top = bottom = pressure[0]
+    up = True
+    for i, value in enumerate(pressure):
+        top, bottom = max(top, value), min(bottom, value)
+        if up and value < top - CYCLE:
+            turned[i], up, bottom = True, False, value
+        elif not up and value > bottom + CYCLE:
+            turned[i], up, top = True, True, value
+    return turned
+
+
+def since(marks: NDArray[np.bool_], period: float) -> Array:
+    """Return the time [s] since the last mark."""
+    index = np.arange(len(marks))
+    last = np.maximum.accumulate(np.where(marks, index, 0))
+    return np.asarray((index - last) * period, np.float64)
+
+
+def low_pass(signal: Array, tau: float, period: float) -> Array:
+    """Return a first-order low-pass that starts at the first value."""
+    a = np.exp(-period / tau)
+    filtered, _ = lfilter([1.0 - a], [1.0, -a], signal, zi=[a * signal[0]])
+    return np.asarray(filtered)
+
+
+def _features(
+    time: Array,
+    command: Array,
+    x: Array,
+    p: Array,
+    load: Array,
+    temperature: Array | None,
+    values: dict[str, Array],
+) -> Array:
+    period = float(time[1] - time[0])
+    way = values["direction"]
+    span = max(float(time[-1] - time[0]), 1e-9)
+    s = (time - time[0]) / span
+    u, f = p / 6e5, load / 50.0
+    e = x / max(float(np.ptp(x)), 1e-9)
+    rows = [np.ones_like(s), s, s**2, s**3]
+    rows += [(s > k / 8.0).astype(float) for k in range(1, 8)]
+    for signal in (command / 6e5, e):
+        slow = [low_pass(signal, tau, period) for tau in FILTERS]
+        rows += [signal, *(signal - v for v in slow)]
+    rows += [u, u**2, u**3, way, way * u, way * u**2, way * e * (1.0 - e)]
+    rows += [f, f**2, f * u, f * u**2, f * way, f**2 * u, f * e]
+    pace = np.gradient(e, period)
+    rows += [pace, np.abs(pace), np.tanh(pace / (np.std(pace) + 1e-9)), pace * u, pace * way]
+    rows += [np.exp(-values["time_since_reversal"] / t) * way for t in (0.1, 0.5, 2.0)]
+    rows += [np.exp(-values["cycle"] / c) for c in (1.0, 4.0)]
+    rows += [np.exp(-values["cycle"] / c) * u for c in (1.0, 4.0)]
+    rows += [np.maximum(0.0, u - k) for k in (0.1, 0.25, 0.75, 0.9)]
+    if temperature is not None:
+        warm = (temperature - temperature.mean()) / 5.0
+        rows += [warm, warm * u, warm * e]
+    return np.array(rows)
+
+
+def flexible_r2(residual: Array, regressors: Regressors, blocks: Blocks) -> tuple[float, Array]:
+    """Return what ridge regression on generic features explains on held-out blocks.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (T,)
+        NaN where there is no reading.
+
+    Returns
+    -------
+    r2 : float
+        At least 0.
+    prediction : ndarray, shape (T,)
+        What it would add.
+    """
+    good = np.isfinite(residual)
+    train, test = good & blocks.train, good & ~blocks.train
+    if train.sum() < 100 or test.sum() < 50:
+        return 0.0, np.zeros(len(residual))
+    a = regressors.features.T
+    mean, scale = a[train].mean(axis=0), a[train].std(axis=0) + 1e-9
+    a = (a - mean) / scale
+    inner = a[train].T @ a[train]
+    outer = a[train].T @ residual[train]
+    ridge = 1e-3 * train.sum()
+    weights = np.linalg.solve(inner + ridge * np.eye(len(inner)), outer)
+    prediction = a @ weights + residual[train].mean()
+    error = residual[test] - prediction[test]
+    spread = float(np.mean(residual[test] ** 2))
+    return float(max(0.0, 1.0 - float(np.mean(error**2)) / max(spread, 1e-30))), prediction
+
+
+def binned_r2(residual: Array, variable: Array, blocks: Blocks) -> float:
+    """Return what a table of means over a variable explains on held-out blocks, at least 0."""
+    good = np.isfinite(residual) & np.isfinite(variable)
+    train, test = good & blocks.train, good & ~blocks.train
+    if train.sum() < 100 or test.sum() < 50 or np.ptp(variable[good]) == 0.0:
+        return 0.0
+    edges = np.unique(np.quantile(variable[train], np.linspace(0.0, 1.0, BINS + 1)[1:-1]))
+    at = np.searchsorted(edges, variable)
+    n = len(edges) + 1
+    counts = np.bincount(at[train], minlength=n)
+    means = np.bincount(at[train], residual[train], minlength=n) / np.maximum(counts, 1)
+    error = residual[test] - means[at[test]]
+    return float(
+        max(0.0, 1.0 - float(np.mean(error**2)) / max(float(np.mean(residual[test] ** 2)), 1e-30))
+    )
+
+
+def spectral_peak(
+    residual: Array, period: float, motion: Array | None = None
+) -> tuple[float, float]:
+    """Return frequency [Hz] and height, over its neighbourhood, of the sharpest spectral peak.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (T,)
+        NaN where there is no reading.
+    period : float
+        [s].
+    motion : ndarray, shape (T,), optional
+        Where its own spectrum has a peak none is looked for: an experiment's sines leave lines in
+        every residual, an outside vibration does not care for them.
+    """
+    frequency, heights = _heights(residual, period)
+    usable = frequency > LOWEST_PEAK
+    if motion is not None:
+        usable &= _heights(motion, period)[1] < MOVED
+    heights = np.where(usable, heights, 0.0)
+    k = int(np.argmax(heights))
+    return float(frequency[k]), float(heights[k])
+
+
+def _heights(signal: Array, period: float) -> tuple[Array, Array]:
+    """Return frequencies and the power there over the median of the neighbourhood."""
+    r = np.nan_to_num(signal - np.nanmean(signal))
+    length = max(4 * NEAR, min(int(WINDOW / period), len(r) // LEAST_WINDOWS))
+    frequency, power = welch(r, 1.0 / period, nperseg=length, noverlap=length // 2)
+    near = median_filter(power, 2 * NEAR + 1, mode="reflect")
+    heights = power / np.maximum(near, 1e-300)
+    heights[-NEAR:] = 0.0  # what is next to half the sampling rate has no neighbourhood
+    return frequency, heights
+
+
+def ljung_box(residual: Array, lags: int = LAGS) -> float:
+    """Return the p-value of the Ljung-Box test of whiteness."""
+    r = residual[np.isfinite(residual)]
+    n = len(r)
+    if n < 10 * lags:
+        return float("nan")
+    r = r - r.mean()
+    power = float(r @ r)
+    rho = np.array([float(r[k:] @ r[:-k]) for k in range(1, lags + 1)]) / max(power, 1e-300)
+    statistic = n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1)))
+    return float(chi2.sf(statistic, lags))

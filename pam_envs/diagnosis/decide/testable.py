@@ -1,0 +1,72 @@
+"""Which causes a recording can decide, and why not the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from pam_envs.data.recording.recording import Recording
+from pam_envs.data.rig_file import Rig
+from pam_envs.diagnosis.audit.audit import undecidable
+from pam_envs.diagnosis.cause import Cause
+from pam_envs.diagnosis.decide.isolability import Isolability, isolability, twins
+from pam_envs.diagnosis.decide.search import BLOCK_SECONDS, EVERY
+from pam_envs.diagnosis.fit.least_squares import Fit, Problem
+from pam_envs.diagnosis.report.summary_text import SHORT
+
+LEAST_SIZE = 1.0
+"""A cause that cannot reach this size over the noise within its bounds is not testable."""
+LEAST_TESTABLE, LEAST_SHARE = 5, 0.5
+"""With fewer testable causes, and a smaller share of those asked for, nothing is decided."""
+
+
+def not_testable(
+    problem: Problem,
+    family: Any,
+    base: Fit,
+    causes: Sequence[Cause],
+    recording: Recording,
+    sheet: Rig,
+) -> tuple[Isolability, dict[str, str]]:
+    """Return how alike the causes look here, and the reason for each that cannot be decided."""
+    reasons = undecidable(recording, sheet, causes)
+    present = {f.name for f in base.frees}
+    for cause in causes:
+        if all(any(t.name in present for t in form.terms) for form in cause.forms):
+            reasons[cause.name] = "it is a parameter of the plant already: see calibration"
+    left = [c for c in causes if c.name not in reasons]
+    found = isolability(problem, family, base, left)
+    reasons |= _too_small(found, left)
+    if recording.pressure is None:
+        for name, other in twins(found, left).items():
+            reasons.setdefault(name, f"cannot be told from {other} without pressure_bar")
+    return found, {c.name: reasons[c.name] for c in causes if c.name in reasons}
+
+
+def _too_small(found: Isolability, causes: Sequence[Cause]) -> dict[str, str]:
+    reach = dict(zip(found.names, found.reach, strict=True))
+    return {
+        cause.name: (
+            f"within its bounds it shows at most {reach.get(cause.name, 0.0):.2g} times the noise "
+            "here, once the plant is refitted"
+        )
+        for cause in causes
+        # where something happens once is looked for in the residual
+        if not (cause.once and cause.forms[0].seeds is not None)
+        and reach.get(cause.name, 0.0) < LEAST_SIZE
+    }
+
+
+def too_few(testable: int, asked: int) -> bool:
+    """Return whether so few causes can be tested that a recording decides nothing."""
+    few = testable < LEAST_TESTABLE and testable < LEAST_SHARE * asked
+    return testable == 0 or few
+
+
+def too_short(moved: int, least: int) -> str:
+    """Return what to say of a recording in which little moves."""
+    return (
+        f"{SHORT}: the command moves in {moved} of the {BLOCK_SECONDS:g} s blocks that are held "
+        f"out, and {least} are needed; record at least {EVERY * least * BLOCK_SECONDS:.0f} s of "
+        "varied motion."
+    )

@@ -1,0 +1,218 @@
+"""The next experiment: which of a list tells the fitted rivals apart best.
+
+Two rivals count as apart in an experiment by what the one predicts and the other cannot follow,
+however its own parameters are refitted to the new data, seen by the sensors that there are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.diagnosis.cause import Cause
+from pam_envs.diagnosis.experiment.plans import PERIOD, Means, Plan, plans
+from pam_envs.diagnosis.fit.least_squares import Fit, column_of
+from pam_envs.mechanics.hanging_mass import GRAVITY
+from pam_envs.plants.single_muscle.plant import SingleMuscle
+from pam_envs.plants.single_muscle.replay import LONGEST_STEP, Inputs, replay_rows
+
+Array = NDArray[np.float64]
+
+ENOUGH = 1.0
+"""Mean squared difference of the rivals, in noise variances, that an experiment has to promise."""
+KELVIN = 293.15
+RANK = 1e-6
+"""Directions of a rival's parameters below this part of the largest say nothing."""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A fitted model.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of its causes.
+    column : ndarray, shape (p,)
+        Its parameters.
+    nearby : ndarray, shape (k, p)
+        The same with one parameter of its causes moved a little each.
+    """
+
+    names: tuple[str, ...]
+    column: Array
+    nearby: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def label(self) -> str:
+        """Its name in the report."""
+        return "+".join(self.names)
+
+    @property
+    def columns(self) -> Array:
+        """All of it, shape (1 + k, p)."""
+        return (
+            np.vstack([self.column[None], self.nearby]) if len(self.nearby) else self.column[None]
+        )
+
+
+def rival_of(names: tuple[str, ...], fit: Fit, base: int, tie: Callable[[Array], None]) -> Rival:
+    """Return a fit as a rival; its parameters after the first ``base`` are its own."""
+    places = np.tile(fit.z, (1 + len(fit.z) - base, 1))
+    for row, k in enumerate(range(base, len(fit.z)), 1):
+        free = fit.frees[k]
+        up = fit.z[k] + free.step < free.span[1]
+        places[row, k] += free.step if up else -free.step
+    columns = np.array([column_of(fit, z) for z in places])
+    tie(columns)
+    return Rival(names, columns[0], columns[1:])
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """What is measured.
+
+    Attributes
+    ----------
+    noise : ndarray, shape (channels,)
+        RMS, in SI; infinite where nothing is measured.
+    """
+
+    noise: Array
+
+    def shown(self, outputs: Array) -> Array:
+        """Return what outputs (channels, T, n) show over the noise, shape (n, channels * T).
+
+        Without their means: a constant offset goes away where the sensors are zeroed again.
+        """
+        flat = (outputs - outputs.mean(axis=1, keepdims=True)) / self.noise[:, None, None]
+        return np.asarray(flat.transpose(2, 0, 1).reshape(outputs.shape[2], -1))
+
+
+def inputs_of(plan: Plan, longest_step: float = LONGEST_STEP) -> Inputs:
+    """Return a plan's inputs."""
+    n = len(plan.command)
+    fresh = np.zeros(n, bool)
+    fresh[0] = True
+    return Inputs(
+        PERIOD,
+        plan.command,
+        plan.load / GRAVITY,
+        plan.kelvin + KELVIN,
+        fresh,
+        np.zeros(n),
+        np.zeros(n, bool),
+        longest_step,
+    )
+
+
+def separations(
+    plant: SingleMuscle, rivals: Sequence[Rival], inputs: Inputs, sensors: Sensors
+) -> list[float]:
+    """Return how far the first of some rivals is from each other one in an experiment.
+
+    Parameters
+    ----------
+    plant : SingleMuscle
+        Of the kind of all of them.
+    rivals : sequence of Rival
+        Fitted.
+    inputs : Inputs
+        Of the experiment.
+    sensors : Sensors
+        What is measured, and how well.
+
+    Returns
+    -------
+    list of float
+        Mean squares in noise variances, summed over the outputs: what is left of the difference
+        once one of the two is refitted to the other, the smaller of both ways.
+    """
+    found = sensors.shown(replay_rows(plant, np.vstack([r.columns for r in rivals]), inputs))
+    samples, traces, at = len(inputs.command), [], 0
+    for rival in rivals:
+        n = 1 + len(rival.nearby)
+        traces.append((found[at], found[at + 1 : at + n] - found[at]))
+        at += n
+    (here, moves), *others = traces
+    return [
+        min(_left(here - there, own) for own in (moves, theirs)) / samples
+        for there, theirs in others
+    ]
+
+
+def _left(difference: Array, moves: Array) -> float:
+    """Return the sum of squares of a difference that small moves of parameters cannot follow."""
+    sizes = np.linalg.norm(moves, axis=1)
+    moves = moves[sizes > 0.0] / sizes[sizes > 0.0, None]
+    if len(moves):
+        values, vectors = np.linalg.eigh(moves @ moves.T)
+        keep = values > RANK * values[-1]
+        basis = (vectors[:, keep].T @ moves) / np.sqrt(values[keep])[:, None]
+        difference = difference - (basis @ difference) @ basis
+    return float(difference @ difference)
+
+
+def propose(
+    plant: SingleMuscle,
+    first: Rival,
+    seconds: Sequence[Rival],
+    noise: Array,
+    means: Means,
+    causes: Sequence[Cause],
+    longest_step: float = LONGEST_STEP,
+) -> dict[str, Any]:
+    """Return the experiment that tells the best model from all its rivals, for the report.
+
+    The one in which the rival that is nearest to the best model is furthest from it.
+
+    Parameters
+    ----------
+    plant : SingleMuscle
+        Of the kind of the rivals.
+    first : Rival
+        The best model.
+    seconds : sequence of Rival
+        Those that are not excluded.
+    noise : ndarray, shape (channels,)
+        Of the sensors; infinite where there is none.
+    means : Means
+        What the rig can do.
+    causes : sequence of Cause
+        Where the sensor that would measure one directly is looked up.
+    longest_step : float
+        Of the simulation [s].
+    """
+    rivals = (first, *seconds)
+    scored = [
+        (separations(plant, rivals, inputs_of(p, longest_step), Sensors(noise)), p)
+        for p in plans(means)
+    ]
+    apart, plan = max(scored, key=lambda pair: min(pair[0]))
+    least = min(apart)
+    nearest = seconds[int(np.argmin(apart))]
+    return {
+        "between": [r.label for r in rivals],
+        "name": plan.name,
+        "description": plan.description
+        if least >= ENOUGH
+        else f"no experiment of the list tells {first.label} from {nearest.label}; a further "
+        "sensor would",
+        "segments": plan.segments,
+        "separation": least,
+        "enough": bool(least >= ENOUGH),
+        "sensor": sensors_for(rivals, causes),
+    }
+
+
+def sensors_for(rivals: Sequence[Rival], causes: Sequence[Cause]) -> str:
+    """Return what would measure directly what is not in all of the rivals."""
+    by_name = {c.name: c for c in causes}
+    names = dict.fromkeys(n for r in rivals for n in r.names)
+    differing = [n for n in names if not all(n in r.names for r in rivals)]
+    found = [by_name[n].sensor for n in differing if n in by_name and by_name[n].sensor]
+    return "; ".join(dict.fromkeys(found))

@@ -1,0 +1,246 @@
+"""Experiments to choose from, as far as a rig can do them.
+
+Loads, pressures, a shut valve and a warmer muscle are proposed only where the recording shows that
+the rig has them; nothing goes beyond the loads and the largest command that were recorded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.data.recording.recording import Recording
+from pam_envs.data.rig_file import BAR, Rig
+from pam_envs.diagnosis.audit.audit import load_levels
+
+Array = NDArray[np.float64]
+
+PERIOD = 0.02
+WARMER = 10.0
+"""Kelvin by which a muscle is warmed."""
+STAIRS = tuple(v / 10.0 for v in (*range(1, 10), *range(8, 0, -1)))
+
+
+@dataclass(frozen=True)
+class Means:
+    """What a rig can do.
+
+    Attributes
+    ----------
+    full : float
+        Largest set-point [Pa].
+    loads : tuple of float
+        What can be hung [N], ascending.
+    shut : bool
+        Whether the valve can be shut.
+    warm : bool
+        Whether the muscle's temperature is measured.
+    """
+
+    full: float
+    loads: tuple[float, ...]
+    shut: bool
+    warm: bool
+
+    @classmethod
+    def of(cls, recording: Recording, rig: Rig) -> Means:
+        """Return what a recording shows of a rig."""
+        return cls(
+            full=float(recording.command.max()),
+            loads=tuple(load_levels(recording)),
+            shut=bool(rig.valve_closed) or bool(recording.valve_closed.any()),
+            warm=recording.temperature is not None,
+        )
+
+    def near(self, share: float) -> float:
+        """Return the load nearest to a share of the way from the lightest to the heaviest."""
+        wanted = self.loads[0] + share * (self.loads[-1] - self.loads[0])
+        return min(self.loads, key=lambda load: abs(load - wanted))
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A straight or swinging stretch of an experiment.
+
+    Attributes
+    ----------
+    seconds : float
+        How long.
+    start, end : float
+        Set-points over the largest; for a swing the lowest and the highest.
+    hertz : float
+        Of a swing; 0 for a straight line.
+    shut : bool
+        Whether the valve is shut, so that no set-point acts.
+    """
+
+    seconds: float
+    start: float
+    end: float
+    hertz: float = 0.0
+    shut: bool = False
+
+    @property
+    def samples(self) -> int:
+        """How many."""
+        return round(self.seconds / PERIOD)
+
+    @property
+    def command(self) -> Array:
+        """Set-points over the largest, shape (n,); below zero: valve shut."""
+        n = self.samples
+        if self.shut:
+            return np.full(n, -1.0)
+        if self.hertz == 0.0:
+            return np.linspace(self.start, self.end, n)
+        swing = 0.5 * (self.end - self.start)
+        phase = 2.0 * np.pi * self.hertz * PERIOD * np.arange(n)
+        return np.asarray(self.start + swing * (1.0 - np.cos(phase)))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """An experiment that may be done.
+
+    Attributes
+    ----------
+    name, description : str
+        In words.
+    pieces : tuple of tuple of Piece
+        Of the command, for each of ``loads`` in turn.
+    loads : tuple of float
+        [N].
+    full : float
+        Largest set-point [Pa].
+    warmer : float
+        Kelvin by which the muscle is warmed by the middle of it.
+    """
+
+    name: str
+    description: str
+    pieces: tuple[Piece, ...]
+    loads: tuple[float, ...]
+    full: float
+    warmer: float = 0.0
+
+    @property
+    def command(self) -> Array:
+        """Set-points [Pa], shape (n,); below zero: valve shut."""
+        one = np.concatenate([p.command for p in self.pieces])
+        return np.tile(np.where(one < 0.0, -1.0, self.full * one), len(self.loads))
+
+    @property
+    def load(self) -> Array:
+        """[N], shape (n,)."""
+        return np.repeat(self.loads, sum(p.samples for p in self.pieces))
+
+    @property
+    def kelvin(self) -> Array:
+        """Temperature over the usual [K], shape (n,)."""
+        n = len(self.load)
+        return self.warmer * np.minimum(1.0, np.arange(n) / max(1, n // 2))
+
+    @property
+    def segments(self) -> list[dict[str, Any]]:
+        """What to run, piece by piece, as the report holds it."""
+        kelvin, made, at = self.kelvin, [], 0
+        for load in self.loads:
+            for piece in self.pieces:
+                at += piece.samples
+                made.append(
+                    {
+                        "seconds": piece.seconds,
+                        "from_bar": round(piece.start * self.full / BAR, 4),
+                        "to_bar": round(piece.end * self.full / BAR, 4),
+                        **({"swing_hz": piece.hertz} if piece.hertz else {}),
+                        "load_N": load,
+                        "valve": "closed" if piece.shut else "open",
+                        "warmer_by_K": round(float(kelvin[at - 1]), 2),
+                    }
+                )
+        return made
+
+
+def hold(level: float, seconds: float) -> Piece:
+    """Return a hold."""
+    return Piece(seconds, level, level)
+
+
+def swing(middle: float, size: float, hertz: float, seconds: float) -> Piece:
+    """Return a sine about a level."""
+    return Piece(seconds, middle - size, middle + size, hertz)
+
+
+def closed(level: float, seconds: float) -> Piece:
+    """Return a hold with the valve shut."""
+    return Piece(seconds, level, level, shut=True)
+
+
+REST = hold(0.0, 3.0)
+TRIANGLE = (Piece(10.0, 0.0, 0.95), Piece(10.0, 0.95, 0.0))
+CYCLE = (Piece(1.5, 0.0, 0.9), Piece(1.5, 0.9, 0.0))
+SMALL = (Piece(3.0, 0.45, 0.55), Piece(3.0, 0.55, 0.45))
+STEPS = tuple(hold(v, 2.0) for v in (0.1, 0.2, 0.1, 0.4, 0.1, 0.7, 0.1, 0.95, 0.1))
+FILLS = (hold(0.98, 1.0), hold(0.1, 0.8))
+LIST: tuple[tuple[str, str, Sequence[Piece]], ...] = (
+    ("long_hold", "hold half the pressure for 60 s", (hold(0.5, 60.0), REST)),
+    (
+        "both_sides",
+        "hold one pressure, reached from below and from above",
+        (hold(0.2, 5.0), hold(0.5, 25.0), hold(0.9, 5.0), hold(0.5, 25.0)),
+    ),
+    ("slow_triangle", "ramp up and down slowly", TRIANGLE * 2),
+    ("minor_loops", "small triangles about half the pressure", (*TRIANGLE, *SMALL * 4)),
+    ("cycles_after_rest", "rest overnight, then cycle", CYCLE * 12),
+    ("three_step_sizes", "steps of several sizes", STEPS * 2),
+    ("staircase", "stairs of 4 s up and down", tuple(hold(v, 4.0) for v in STAIRS)),
+    (
+        "frequencies",
+        "one swing at 0.2, 0.5, 1 and 2 Hz",
+        tuple(swing(0.5, 0.35, f, 12.0) for f in (0.2, 0.5, 1.0, 2.0)),
+    ),
+    (
+        "amplitudes",
+        "1 Hz at four small swings",
+        tuple(swing(0.5, s, 1.0, 10.0) for s in (0.02, 0.05, 0.1, 0.2)),
+    ),
+    ("full_pressure", "fill to the top again and again", FILLS * 16),
+)
+"""What any rig can do: name, in words, and the pieces after a rest."""
+
+
+def plans(means: Means) -> tuple[Plan, ...]:
+    """Return the experiments of 35 to 120 s that a rig can do."""
+    return tuple(_plans(means))
+
+
+def _plans(means: Means) -> Iterator[Plan]:
+    usual = (means.near(0.5),)
+    for name, words, pieces in LIST:
+        yield Plan(name, words, (REST, *pieces), usual, means.full)
+    slow = Plan("slow", "", (REST, *TRIANGLE * 2), usual, means.full)
+    if means.shut:
+        pieces = (REST, hold(0.4, 3.0), closed(0.4, 30.0), hold(0.8, 3.0), closed(0.8, 30.0))
+        words = "shut the valve for 30 s at two pressures"
+        yield Plan("valve_shut", words, pieces, usual, means.full)
+    if means.warm:
+        pieces = (REST, *(hold(v, 4.0) for v in STAIRS))
+        words = f"stairs while the muscle is warmed by {WARMER:g} K"
+        yield Plan("warm_muscle", words, pieces, usual, means.full, WARMER)
+    if len(means.loads) > 1:
+        least, most = means.loads[0], means.loads[-1]
+        for name, load in (("heavy_load", most), ("light_load", least)):
+            words = f"slow triangles under {load:g} N"
+            yield replace(slow, name=name, description=words, loads=(load,))
+        several = tuple(dict.fromkeys(means.near(k / 4) for k in range(5)))
+        words = f"the same slow triangle under {_listed(several)} N"
+        pieces = (REST, *TRIANGLE)
+        yield Plan("several_loads", words, pieces, several, means.full)
+
+
+def _listed(loads: Sequence[float]) -> str:
+    return " and ".join((", ".join(f"{load:g}" for load in loads[:-1]), f"{loads[-1]:g}"))

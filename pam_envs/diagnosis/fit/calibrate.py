@@ -1,0 +1,98 @@
+"""Refit the plant's present parameters, so that a wrong number is not called a missing effect."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.diagnosis.decide.search import Blocks, Candidate, fit_base
+from pam_envs.diagnosis.fit.first_guess import balance, guessed
+from pam_envs.diagnosis.fit.least_squares import Fit, Problem, column_of, evaluate, improve
+from pam_envs.diagnosis.fit.single_muscle import MuscleFamily
+from pam_envs.hysteresis.maxwell_slip import PlayOperator
+
+Array = NDArray[np.float64]
+
+PRESSURE = ("regulator.gain", "regulator.time_constant")
+FAST = 0.04
+"""Below this lag [s] the replay takes finer steps."""
+FINE_STEP = 0.0101
+GUESS_ROUNDS, ROUNDS = 6, 12
+FAR = 8.0
+"""Cost a reading above which a fit may have ended in the wrong place."""
+
+
+def calibrate(
+    family: MuscleFamily, measured: Array, noise: Array, blocks: Blocks, time: Array
+) -> tuple[MuscleFamily, Problem, Candidate]:
+    """Return the family, the problem and the fitted base.
+
+    The regulator is fitted first, on the pressure alone; then the static map and the friction by a
+    regression of the force balance; then everything by simulation. Where that ends far from the
+    readings the fit begins anew at the plant as it was given, and the better of the two stays.
+
+    Parameters
+    ----------
+    family : MuscleFamily
+        With the plant to refit.
+    measured : ndarray, shape (channels, T)
+        NaN where there is no reading.
+    noise : ndarray, shape (channels,)
+        Its standard deviation.
+    blocks : Blocks
+        Of the record.
+    time : ndarray, shape (T,)
+        [s].
+    """
+    problem = Problem(family.simulate, measured, noise, blocks.train, time, family.tie)
+    frees, column = family.base(), family.column
+    found: dict[str, float] = {}
+    if np.isfinite(measured[1]).any():
+        fit = _regulator(problem, family)
+        found |= fit.values()
+        column = column_of(fit, fit.z)
+        if found["regulator.time_constant"] < FAST:
+            family = family.finer(FINE_STEP)
+            problem = dataclasses.replace(problem, simulate=family.simulate)
+    tried = [frees]
+    operator = family.plant.memory.operator
+    if np.isfinite(measured[0]).any() and isinstance(operator, PlayOperator):
+        law = balance(
+            _from_rest(family, measured[0]),
+            family.simulate(column[None])[1, :, 0],
+            family.inputs.load,
+            family.inputs.period,
+            family.plant.muscle.rest_length,
+            family.plant.muscle.braid_strain,
+            operator.thresholds,
+            np.isfinite(measured[0]),
+        )
+        tried = [guessed(frees, found | law), frees] if law else [guessed(frees, found)]
+    best = fit_base(problem, blocks, column, tried[0], ROUNDS)
+    for start in tried[1:]:
+        if best.fit.cost < FAR * problem.seen:
+            break
+        other = fit_base(problem, blocks, column, start, ROUNDS)
+        best = min(best, other, key=lambda c: c.fit.cost)
+    return family, problem, best
+
+
+def _from_rest(family: MuscleFamily, contraction: Array) -> Array:
+    """Return positions counted from the unloaded rest length."""
+    first = float(family.inputs.load[0])
+    below = float(family.plant._absolute(np.zeros(1), np.array([first]))[0]) if first > 0 else 0.0
+    return contraction + below
+
+
+def _regulator(problem: Problem, family: MuscleFamily) -> Fit:
+    """Return a fit of gain and lag to the pressure."""
+    frees = tuple(f for f in family.base() if f.name in PRESSURE)
+    alone = problem.measured.copy()
+    alone[0] = np.nan
+    only = dataclasses.replace(problem, measured=alone)
+    fit = Fit(frees, np.array([f.inner(f.start) for f in frees]), family.column)
+    evaluate(only, [fit])
+    improve(only, [fit], GUESS_ROUNDS, 1e-4)
+    return fit

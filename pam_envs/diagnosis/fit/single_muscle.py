@@ -1,0 +1,256 @@
+"""The single muscle as the diagnosis sees it: inputs of a recording, base parameters, columns."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.diagnosis.fit.least_squares import Free
+from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.mechanics.hanging_mass import GRAVITY
+from pam_envs.parameters import declarations
+from pam_envs.plants.single_muscle import rows as R
+from pam_envs.plants.single_muscle.plant import NEUTRAL, SingleMuscle, UnstableParameters
+from pam_envs.plants.single_muscle.replay import CHANNELS, Inputs, replay_rows
+
+Array = NDArray[np.float64]
+
+THRESHOLDS = (3e3, 7e3, 1.2e4, 1.8e4, 2.5e4, 3.3e4, 4.2e4, 5.2e4, 6.3e4, 7.6e4, 9.1e4, 1.1e5)
+"""Thresholds [Pa] of the base's play operators."""
+LEAST_LINEAR = 0.02
+KELVIN = 273.15
+STATIC = (
+    "muscle.area",
+    "muscle.area_taper",
+    "muscle.area_curve",
+    "muscle.braid_force",
+    "muscle.stiffness",
+    "muscle.softening",
+    "muscle.hardening",
+    "muscle.stiffening",
+)
+BASE = ("regulator.gain", "regulator.time_constant", *STATIC, "mass.moving_mass", "mass.damping")
+LOGARITHMIC = (
+    "regulator.time_constant",
+    "muscle.area",
+    "mass.moving_mass",
+    "mass.damping",
+)
+PRIORS = {
+    "muscle.area_taper": 60.0,
+    "muscle.area_curve": 60.0,
+    "muscle.softening": 60.0,
+    "muscle.hardening": 60.0,
+    "muscle.stiffening": 60.0,
+    "muscle.braid_force": 60.0,
+    "muscle.stiffness": 60.0,
+    "mass.moving_mass": 0.7,
+    "mass.damping": 1.0,
+}
+SCALES = {
+    "muscle.braid_force": 5.0,
+    "muscle.stiffness": 100.0,
+    "regulator.gain": 0.01,
+    "muscle.area_taper": 0.1,
+    "muscle.area_curve": 0.5,
+    "muscle.softening": 500.0,
+    "muscle.hardening": 2e3,
+    "muscle.stiffening": 1e4,
+    "memory.weight": 0.02,
+}
+
+
+def declared(plant: SingleMuscle, name: str) -> Any:
+    """Return the declaration of a parameter by dotted name."""
+    component, _, field = name.partition(".")
+    return declarations(getattr(plant, component))[field]
+
+
+@dataclass(frozen=True)
+class MuscleFamily:
+    """A plant, what its base consists of, and how it is simulated.
+
+    Attributes
+    ----------
+    plant : SingleMuscle
+        Whose parameters are refitted.
+    inputs : Inputs
+        Of the recording.
+    """
+
+    plant: SingleMuscle
+    inputs: Inputs
+
+    channels = CHANNELS
+    fallback_noise = (5e-5, 1e3)
+    scales = (1e-3, 1e5)
+    units = ("mm", "bar")
+
+    def finer(self, step: float) -> MuscleFamily:
+        """Return the family simulated with another longest sub-step [s]."""
+        return dataclasses.replace(self, inputs=dataclasses.replace(self.inputs, longest_step=step))
+
+    @property
+    def column(self) -> Array:
+        """Return the plant's parameters as a column."""
+        return self.plant.parameter_rows()
+
+    def simulate(self, columns: Array) -> Array:
+        """Return what the sensors would show, shape (2, T, n)."""
+        return replay_rows(self.plant, columns, self.inputs)
+
+    def tie(self, columns: Array) -> None:
+        """Keep the memory's total slope at 1."""
+        n = self.plant.elements
+        if n == 0:
+            return
+        weights = columns[:, R.WEIGHT : R.WEIGHT + n]
+        total = weights.sum(axis=1)
+        weights *= np.minimum(1.0, (1.0 - LEAST_LINEAR) / np.maximum(total, 1e-12))[:, None]
+        columns[:, R.LINEAR] = 1.0 - weights.sum(axis=1)
+
+    def free(self, name: str, **changes: Any) -> Free:
+        """Return how a fit moves a parameter."""
+        if name.startswith("memory.weight["):
+            k = int(name[14:-1])
+            start = float(self.column[R.WEIGHT + k])
+            made = dict(low=0.0, high=1.0, scale=SCALES["memory.weight"], start=start, prior=25.0)
+            return Free(name, R.WEIGHT + k, **{**made, **changes})
+        d = declared(self.plant, name)
+        value = self.plant.value(name)
+        log = name in LOGARITHMIC
+        made = dict(
+            low=d.low,
+            high=d.high,
+            log=log,
+            start=value,
+            scale=SCALES.get(name, max(abs(value), 0.01 * (d.high - d.low)) * 0.1),
+            prior=PRIORS.get(name, 1.5 if log else np.inf),
+        )
+        return Free(name, R.place(name), **{**made, **changes})
+
+    def base(self) -> tuple[Free, ...]:
+        """Return what is refitted before anything is called missing."""
+        names = [*BASE, *(f"memory.weight[{k}]" for k in range(self.plant.elements))]
+        present = [
+            name
+            for name, neutral in NEUTRAL.items()
+            if name not in names and self.plant.value(name) != neutral and name not in DECLARED
+        ]
+        for name, neutral in OLD_NEUTRAL.items():
+            if self.plant.value(name) != neutral:
+                present.append(name)
+        present = [name for name in present if name not in names]
+        return tuple(self.free(name) for name in (*names, *present))
+
+    def plant_of(self, column: Array) -> SingleMuscle:
+        """Return the plant with the parameters of a column."""
+        values: dict[str, Any] = {n: float(column[R.place(n)]) for n in R.NAMES}
+        n = self.plant.elements
+        if n:
+            operator = self.plant.memory.operator
+            assert isinstance(operator, PlayOperator)
+            weights = tuple(float(w) for w in column[R.WEIGHT : R.WEIGHT + n])
+            values["memory.operator"] = PlayOperator(
+                operator.thresholds, weights, 1.0 - sum(weights)
+            )
+        for substeps in (self.plant.substeps, *FINER):
+            try:
+                return dataclasses.replace(self.plant, substeps=substeps).replace(values)
+            except UnstableParameters as error:
+                unstable = error
+        raise unstable
+
+
+FINER = (6, 8, 12, 20, 40)
+"""Sub-steps for a fitted plant whose motion is too fast for those of the plant it came from."""
+DECLARED = ("mass.carried",)
+OLD_NEUTRAL = {
+    "regulator.dead_time": 0.0,
+    "regulator.slew_rate": 1e9,
+    "memory.stretch": 0.0,
+    "memory.width_per_load": 0.0,
+}
+"""Effects that were parameters of the plant from the beginning."""
+
+
+def start_plant(rig: Any) -> SingleMuscle:
+    """Return the plant to begin with: the measured muscle, scaled, without any effect."""
+    stock = SingleMuscle.mas10("maxwell_slip")
+    weights = np.full(len(THRESHOLDS), 0.7 / len(THRESHOLDS))
+    values: dict[str, Any] = {
+        "regulator.dead_time": 0.0,
+        "regulator.slew_rate": 1e9,
+        "memory.stretch": 0.0,
+        "memory.width_per_load": 0.0,
+        "memory.operator": PlayOperator(THRESHOLDS, tuple(weights), 1.0 - float(weights.sum())),
+        "mass.load": 0.0,
+        "muscle.area_taper": 1.0,
+        "muscle.braid_strain": 0.03,
+        "mass.carried": 0.0 if rig.load == "constant_force" else 1.0,
+    }
+    if rig.rest_length is not None:
+        values["muscle.rest_length"] = rig.rest_length
+    if rig.diameter is not None:
+        ratio = (rig.diameter / stock.muscle.diameter) ** 2
+        values["muscle.diameter"] = rig.diameter
+        for name in ("muscle.area", "muscle.braid_force", "muscle.stiffness", "muscle.hardening"):
+            values[name] = stock.value(name) * ratio
+    if rig.max_pressure is not None:
+        values["regulator.max_pressure"] = rig.max_pressure
+    made = dataclasses.replace(stock, ensemble=()).replace(values)
+    return dataclasses.replace(made, provenance=known_of(rig, values))
+
+
+GIVEN = {
+    "muscle.rest_length": "rest_length",
+    "muscle.diameter": "diameter",
+    "regulator.max_pressure": "max_pressure",
+}
+"""Parameters that a rig file can give, with the rig's attribute."""
+
+
+def known_of(rig: Any, values: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
+    """Return provenance and source of what a plant to begin with takes for granted.
+
+    None of it is a published number of the rig at hand, even where it is one of the shipped muscle.
+    """
+    made = {name: ("assumed", TAKEN) for name in values if name != "memory.operator"}
+    for name, attribute in GIVEN.items():
+        given = getattr(rig, attribute) is not None
+        made[name] = ("assumed", "declared, RIG.yaml" if given else TAKEN)
+    made["mass.carried"] = ("assumed", f"load: {rig.load}, RIG.yaml or its default")
+    return made
+
+
+TAKEN = "taken for granted by pam-envs diagnose, not refitted"
+
+
+def identified(plant: SingleMuscle, frees: Iterable[Free], source: str) -> SingleMuscle:
+    """Return a plant whose refitted parameters say so."""
+    found = {f.name: ("identified", source) for f in frees if f.name in R.NAMES}
+    return dataclasses.replace(plant, provenance={**plant.provenance, **found})
+
+
+def inputs_of(recording: Any, rig: Any) -> Inputs:
+    """Return a recording's inputs as the replay reads them."""
+    n = len(recording.time)
+    command = np.where(recording.valve_closed, -1.0, recording.command)
+    first = np.zeros(n, bool)
+    if rig is not None and rig.rezeroed:
+        first[1:] = recording.segment[1:] != recording.segment[:-1]
+    kelvin = np.full(n, 20.0) if recording.temperature is None else recording.temperature
+    return Inputs(
+        recording.period,
+        command,
+        recording.load / GRAVITY,
+        kelvin + KELVIN,
+        recording.restart.copy(),
+        np.maximum(0.0, recording.command),
+        first,
+    )

@@ -1,0 +1,108 @@
+"""Where fits begin whose starting values have to be looked for.
+
+A step or a drift begins where it explains most of the base's residual; an effect
+of events (a valve that opens, a guide that breaks away) has many local optima, and begins at the
+best points of a grid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from pam_envs.diagnosis.fit.least_squares import Fit, Problem, column_of
+
+Starts = Sequence[tuple[float, ...]]
+
+EARLIEST = 0.03
+"""Part of a record at either end in which a step is not looked for: there it is a bias."""
+SLOW = (30.0, 120.0)
+"""Durations [s] that a slow drift is first given."""
+APART = 0.02
+"""Part of a record by which two candidates differ."""
+CANDIDATES = 2
+
+
+def step_starts(problem: Problem, family: Any, base: Fit, form: Any, output: int = 0) -> Starts:
+    """Return sizes [m], [Pa] and times [s] of steps of an output, the best explanations first.
+
+    For every sample the step from there on is projected on what refitting the base cannot take up;
+    the sums over all tails cost one pass.
+    """
+    samples = problem.measured.shape[1]
+    good = problem.train & np.isfinite(problem.measured[output])
+    residual = np.where(good, problem.rows(base.residual)[output], 0.0)
+    slopes = base.slopes[:, : problem.seen]
+    every = np.array([problem.rows(row)[output] for row in base.slopes])
+    moved = np.where(good, every, 0.0)
+    normal = np.einsum("im,jm->ij", slopes, slopes)
+    inverse = np.linalg.pinv(normal, rcond=1e-9)
+    tails = np.cumsum(residual[::-1])[::-1]
+    counts = np.cumsum(good[::-1])[::-1].astype(float)
+    along = np.cumsum(moved[:, ::-1], axis=1)[:, ::-1]
+    norm = counts - np.einsum("it,ij,jt->t", along, inverse, along)
+    edge = max(1, round(EARLIEST * samples))
+    score = np.where(norm > 1.0, tails**2 / np.maximum(norm, 1.0), 0.0)
+    score[:edge] = score[samples - edge :] = 0.0
+    starts = []
+    for _ in range(CANDIDATES):
+        k = int(np.argmax(score))
+        if score[k] <= 0.0:
+            break
+        size = float(-tails[k] / norm[k] * problem.noise[output])
+        starts.append((size, float(problem.time[k])))
+        reach = round(APART * samples)
+        score[max(0, k - reach) : k + reach] = 0.0
+    return starts
+
+
+step_starts.looks = 100  # type: ignore[attr-defined]
+
+
+def ramp_starts(problem: Problem, family: Any, base: Fit, form: Any, output: int = 0) -> Starts:
+    """Return sizes [m], middles [s] and durations [s] of slow drifts, about the best steps."""
+    found = step_starts(problem, family, base, form, output)[:1]
+    return [(size, middle, slow) for size, middle in found for slow in SLOW]
+
+
+ramp_starts.looks = 200  # type: ignore[attr-defined]
+
+
+def pressure_ramp_starts(problem: Problem, family: Any, base: Fit, form: Any) -> Starts:
+    """Return sizes [Pa], middles [s] and durations [s] of slow drifts of the pressure's reading."""
+    return ramp_starts(problem, family, base, form, output=1)
+
+
+pressure_ramp_starts.looks = 200  # type: ignore[attr-defined]
+
+
+def grid(*values: Sequence[float], best: int = 3) -> Callable[..., Starts]:
+    """Return a function that looks for starts on a grid, all points in one replay.
+
+    Parameters
+    ----------
+    *values : sequence of float
+        Of each term of the form, in SI.
+    best : int
+        How many points to begin at.
+    """
+
+    def starts(problem: Problem, family: Any, base: Fit, form: Any) -> Starts:
+        points = list(product(*values))
+        places = [family.free(t.name, log=False).place for t in form.terms]
+        columns = np.tile(column_of(base, base.z), (len(points), 1))
+        for column, point in zip(columns, points, strict=True):
+            column[places] = point
+        found = problem.residuals(columns)[:, : problem.seen]
+        slopes = base.slopes[:, : problem.seen]
+        normal = np.einsum("im,jm->ij", slopes, slopes)
+        pulls = np.einsum("im,nm->in", slopes, found)
+        taken = np.einsum("in,in->n", pulls, np.linalg.pinv(normal, rcond=1e-9) @ pulls)
+        left = np.einsum("nm,nm->n", found, found) - taken
+        return [points[k] for k in np.argsort(left, kind="stable")[:best]]
+
+    starts.looks = int(np.prod([len(v) for v in values]))  # type: ignore[attr-defined]
+    return starts

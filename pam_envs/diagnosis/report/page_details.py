@@ -1,0 +1,271 @@
+"""The tables of the page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from html import escape
+from typing import Any
+
+from pam_envs.diagnosis.figures.quantities import changed
+from pam_envs.diagnosis.report.page_parts import (
+    bullets,
+    enumeration,
+    interval,
+    number,
+    paragraph,
+    quantity,
+    table,
+    words,
+)
+
+Report = Mapping[str, Any]
+
+
+def left_over(report: Report) -> str:
+    """Return the table of what is left in the residuals."""
+    rows = []
+    for side in ("before", "after") if changed(report) else ("before",):
+        for channel, found in ((report.get("residual_structure") or {}).get(side) or {}).items():
+            if not found:
+                continue
+            peak = found.get("peak") or {}
+            rows.append(
+                (
+                    f"{channel}, {side}" if changed(report) else channel,
+                    number(found.get("ljung_box_p")),
+                    number(found.get("flexible_r2")),
+                    quantity({"value": peak.get("frequency_hz"), "unit": "Hz"}),
+                    number(peak.get("ratio")),
+                )
+            )
+    heads = ("residual", "whiteness p", "flexible model r²", "spectral peak", "over neighbours")
+    return table(heads, rows, numbers=(1, 2, 3, 4))
+
+
+def held_out(report: Report) -> str:
+    """Return what errors and gains are of, in words."""
+    found = report.get("held_out")
+    if not found:
+        return "on what was left out of the fits"
+    share = f"{100.0 * (found.get('share') or 0.0):.0f} % of the recording"
+    if found["by"] == "blocks":
+        return f"on blocks of a few seconds left out of the fits, {share}"
+    kinds = enumeration([str(k) for k in found["kinds"]])
+    return f"on kinds of experiment left out of the fits ({kinds}), {share}"
+
+
+def why(report: Report) -> str:
+    """Return the table of what became of each rival."""
+    rows = [
+        (
+            r.get("title") or r["name"],
+            r.get("form") or "",
+            _gain(r.get("gain")),
+            _gain(r.get("behind")),
+            str(r.get("held_out") or ""),
+            str(r.get("why") or ""),
+        )
+        for r in report.get("rivals") or []
+    ]
+    return table(("rival", "form", "gain", "behind the best", "held out", ""), rows, (2, 3))
+
+
+def _flags(entry: Report) -> str:
+    """Return what is to be said of a fitted parameter."""
+    return ", ".join(
+        text
+        for key, text in (
+            ("outside_tolerance", "outside its tolerance"),
+            ("at_bound", "at its bound"),
+            ("not_identified", "hardly identified"),
+        )
+        if entry.get(key)
+    )
+
+
+def parameters(report: Report) -> str:
+    """Return the tables of the named causes."""
+    rows = [
+        (
+            c.get("title") or c["name"],
+            p["name"],
+            quantity(p),
+            interval(p.get("interval")),
+            number(p.get("neutral")),
+            _flags(p),
+        )
+        for c in report.get("causes") or []
+        for p in c.get("parameters") or []
+    ]
+    heads: tuple[str, ...] = ("cause", "parameter", "value", "95 % interval", "switched off at", "")
+    body = table(heads, rows, (2, 3, 4), (1,), flags=5)
+    sizes = [
+        (
+            c.get("title") or c["name"],
+            c.get("form") or "",
+            _gain(c.get("gain")),
+            quantity((c.get("effect") or {}).get("contraction")),
+            quantity((c.get("effect") or {}).get("pressure")),
+            number(c.get("size")),
+        )
+        for c in report.get("causes") or []
+    ]
+    heads = ("cause", "form", "gain", "on contraction", "on pressure", "over the noise")
+    body += table(heads, sizes, (2, 3, 4, 5))
+    return f"<h3>What was found</h3>\n{body or paragraph('No cause was named.')}"
+
+
+def _gain(gain: Report | None) -> str:
+    spread = interval((gain or {}).get("interval"))
+    return f"{number((gain or {}).get('value'))} {spread}".strip()
+
+
+def experiment(report: Report) -> str:
+    """Return the next experiment, nothing where none is proposed."""
+    found = report.get("experiment")
+    if not found:
+        return ""
+    lines = [paragraph(str(found.get("description") or found.get("name") or ""))]
+    between = " and ".join(str(b) for b in found.get("between") or [])
+    apart = number(found.get("separation"))
+    if found.get("enough"):
+        lines.append(paragraph(f"It puts {between} {apart} noise variances apart."))
+    else:
+        lines.append(
+            paragraph(
+                f"No experiment of the list will do: {between} would be only {apart} noise "
+                f"variances apart. A sensor would: {found.get('sensor') or 'none is known'}."
+            )
+        )
+    segments = found.get("segments") or []
+    if segments:
+        lines.append(bullets([words(s) for s in segments]))
+    title = str(found.get("name") or "").replace("_", " ")
+    heading = f'<h3 id="experiment">The next experiment: {escape(title)}</h3>'
+    return f'{heading}\n<div class="box">{"".join(lines)}</div>'
+
+
+def closed_loop(report: Report) -> str:
+    """Return the gain of a controller."""
+    found = report.get("closed_loop")
+    if not found:
+        reason = report.get("closed_loop_reason")
+        text = f"No controller was compared: {reason}." if reason else "No controller was compared."
+        return "<h3>In closed loop</h3>\n" + paragraph(text)
+    unit = found.get("unit") or "mm"
+    rows = [
+        (
+            label,
+            quantity({**(found.get(key) or {}), "unit": unit}),
+            interval((found.get(key) or {}).get("interval")),
+        )
+        for key, label in (
+            ("before", "designed on the plant before"),
+            ("after", "designed on the extended plant"),
+            ("oracle", "designed on the rig itself"),
+        )
+        if found.get(key)
+    ]
+    better = found.get("better_percent") or {}
+    if better.get("value") is not None:
+        spread = interval(better.get("interval"))
+        rows.append(("better by", quantity({**better, "unit": "%"}), spread))
+    if found.get("recovered") is not None:
+        rows.append(("of the gap to the oracle", f"{number(100 * found['recovered'])} %", ""))
+    heads = (f"{found.get('controller', 'controller')}, run on {found.get('where', 'the plant')}",)
+    text = paragraph(str(found.get("text") or ""))
+    return (
+        "<h3>In closed loop</h3>\n" + text + table((*heads, "error", "95 % interval"), rows, (1, 2))
+    )
+
+
+def calibration(report: Report) -> str:
+    """Return the table of refitted parameters."""
+    rows = []
+    for entry in report.get("calibration") or []:
+        rows.append(
+            (
+                entry["name"],
+                entry.get("unit") or "",
+                number(entry.get("before")),
+                number(entry.get("after")),
+                interval(entry.get("interval")),
+                _flags(entry),
+            )
+        )
+    heads = ("parameter", "unit", "before", "after", "95 % interval", "")
+    body = table(heads, rows, (2, 3, 4), (0,), flags=5)
+    return "<h3>Calibration</h3>\n" + (body or paragraph("Nothing was refitted."))
+
+
+def not_testable(report: Report) -> str:
+    """Return what the recording cannot decide, and why."""
+    reasons: dict[str, list[str]] = {}
+    for entry in report.get("not_testable") or []:
+        reasons.setdefault(entry["reason"], []).append(entry["name"])
+    rows = [(", ".join(names), reason) for reason, names in reasons.items()]
+    body = table(("causes", "why this recording cannot decide them"), rows, codes=(0,))
+    return "<h3>Not testable</h3>\n" + (body or paragraph("Every cause could be tested."))
+
+
+def warnings(report: Report) -> str:
+    """Return the warnings."""
+    found = [str(w) for w in report.get("warnings") or []]
+    return "<h3>Warnings</h3>\n" + (bullets(found) if found else paragraph("None."))
+
+
+def readings(report: Report) -> str:
+    """Return the models and load laws that were tried on settled readings."""
+    found = report.get("readings")
+    if not found:
+        return ""
+    rows = [
+        (
+            ", ".join(rung["model"]) or "load-blind",
+            number(rung.get("parameters")),
+            number(rung.get("cells_mm")),
+            number(rung.get("left_out_mm")),
+            number(rung.get("load_left_out_mm")),
+        )
+        for rung in found.get("ladder") or []
+    ]
+    heads = ("model", "parameters", "fitted [mm]", "left out [mm]", "load left out [mm]")
+    laws = [
+        (
+            law["law"],
+            quantity(law),
+            interval(law.get("interval")),
+            number(law.get("load_left_out_mm")),
+            law.get("status") or "",
+        )
+        for law in found.get("load_laws") or []
+    ]
+    left = found.get("loads_left_out") or {}
+    body = table(heads, rows, (1, 2, 3, 4))
+    if left.get("cut_percent"):
+        body += paragraph(
+            f"A load left out is predicted to {quantity(left['after'])} instead of "
+            f"{quantity(left['before'])}, {number(left['cut_percent']['value'])} % less "
+            f"{interval(left['cut_percent'].get('interval'))}."
+        )
+    law_heads = ("load law", "value", "95 % interval", "load left out [mm]", "")
+    return f"<h3>Models in steps</h3>\n{body}{table(law_heads, laws, (1, 2, 3))}"
+
+
+DETAILS: Sequence[Callable[[Report], str]] = (
+    parameters,
+    readings,
+    calibration,
+    closed_loop,
+    experiment,
+    not_testable,
+    warnings,
+)
+
+
+def provenance(report: Report) -> str:
+    """Return the table of what went in."""
+    rows = [(k.replace("_", " "), words(v)) for k, v in (report.get("provenance") or {}).items()]
+    rows.append(("decision rule", f"version {report.get('rule_version')}"))
+    rows.append(("report", f"schema {report.get('schema')}"))
+    return table(("", ""), rows, codes=(1,))

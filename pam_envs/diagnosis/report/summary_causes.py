@@ -1,0 +1,242 @@
+"""What a report says of causes, rivals and fitted parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from pam_envs.diagnosis.decide.isolability import channel_size, complement, projected
+from pam_envs.diagnosis.decide.rule import Rule, not_excluded
+from pam_envs.diagnosis.decide.search import Blocks, Candidate
+from pam_envs.diagnosis.decide.verdict import Decision, traces_of
+from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, differentiate, normal_equations
+from pam_envs.diagnosis.fit.single_muscle import declared
+
+Array = NDArray[np.float64]
+Json = dict[str, Any]
+
+LEAST_LEFT = 2
+"""Degrees of freedom that are assumed where there are hardly more blocks than parameters."""
+UNITS = {"contraction": "mm", "pressure": "bar"}
+SCALE = {"contraction": 1e-3, "pressure": 1e5}
+WIDE_LOG, WIDE = 10.0, 0.5
+"""An interval over a wider factor, or a larger part of the bounds, identifies nothing."""
+BEST, OPEN, IMITATES = "the best", "not excluded", "imitates it"
+FEWER, MORE, SAME = "fewer causes", "more causes", "the same causes"
+LESS, WORSE, LITTLE = "gains less", "surely worse", "gains too little"
+EXCLUDED = (LESS, WORSE, LITTLE)
+"""Words for which a rival counts as excluded."""
+
+
+def seen(study: Any) -> list[tuple[int, str]]:
+    """Return the channels that were measured, with their rows."""
+    return [
+        (k, c)
+        for k, c in enumerate(study.family.channels)
+        if np.isfinite(study.problem.measured[k]).any()
+    ]
+
+
+def at_bound(free: Free, value: float) -> bool:
+    """Return whether a fit stopped at a bound of a parameter."""
+    return bool(value <= free.low or value >= free.high)
+
+
+def half_widths(problem: Problem, blocks: Blocks, fit: Fit) -> Array:
+    """Return half the widths of the 95 % intervals of a fit's internal coordinates.
+
+    From the curvature of the fit and the scatter of the blocks' gradients, so that noise that is
+    correlated within a block counts as it should; never less than what white noise of the declared
+    size gives. Each parameter takes a block's worth of freedom, and Student's t has what is left.
+    What stands at a bound does not widen the rest.
+    """
+    if fit.shared is not None or len(fit.slopes) != len(fit.frees):
+        fit.shared = None
+        differentiate(problem, [fit])
+    normal, _ = normal_equations(problem, fit)
+    n = problem.seen
+    of = np.tile(blocks.of, len(problem.measured))[problem.order[:n]]
+    pulls = fit.slopes[:, :n] * fit.residual[:n]
+    sums = np.stack([np.bincount(of, row, minlength=len(blocks.held_out)) for row in pulls])
+    scatter, values = sums @ sums.T, fit.values()
+    inside = np.array([not at_bound(f, values[f.name]) for f in fit.frees])
+    number = len(np.unique(of))
+    found = np.zeros(len(fit.frees))
+    for places in (np.arange(len(found)), np.flatnonzero(inside)):
+        part = np.ix_(places, places)
+        inverse = np.linalg.pinv(normal[part], rcond=1e-12, hermitian=True)
+        left = max(number - len(places), LEAST_LEFT)
+        spread = np.diag(inverse @ scatter[part] @ inverse) * number / left
+        wide = np.sqrt(np.maximum(spread, np.diag(inverse)))
+        found[places] = float(stdtrit(left, 0.975)) * wide
+    return found
+
+
+def spans(problem: Problem, blocks: Blocks, fit: Fit) -> dict[str, Json]:
+    """Return, by parameter, its 95 % interval in SI and what is to be said of it."""
+    made, values = {}, fit.values()
+    for free, z, half in zip(fit.frees, fit.z, half_widths(problem, blocks, fit), strict=True):
+        made[free.name] = span(free, values[free.name], float(z), float(half))
+    return made
+
+
+def span(free: Free, value: float, z: float, half: float) -> Json:
+    """Return the interval of one parameter; open on the side on which the fit hit a bound."""
+    low, high = (float(v) for v in free.outer(np.array([z - half, z + half])))
+    if free.log:
+        wide = low <= 0.0 or high > WIDE_LOG * low
+    else:
+        wide = high - low > WIDE * (free.high - free.low)
+    return {
+        "interval": [None if value <= free.low else low, None if value >= free.high else high],
+        "at_bound": at_bound(free, value),
+        "not_identified": bool(wide),
+    }
+
+
+def causes(study: Any) -> list[Json]:
+    """Return what was added to the plant, in the order of evidence."""
+    model, problem, family, held = study.model, study.problem, study.family, study.held
+    if not model.causes:
+        return []
+    found = spans(problem, study.blocks, model.fit)
+    values = model.fit.values()
+    traces = traces_of(problem, family, study.base, model)
+    basis = complement(study.base.fit)
+    made = []
+    for cause, form in model.causes:
+        trace = traces[cause.name]
+        flat = np.where(np.isfinite(problem.measured), trace, 0.0) / problem.noise[:, None]
+        left = projected(flat.ravel()[problem.order][None], basis)[0]
+        made.append(
+            {
+                "name": cause.name,
+                "title": cause.title,
+                "form": form.name,
+                "parameters": [
+                    _parameter(family, t.name, values[t.name], found[t.name]) for t in form.terms
+                ],
+                "gain": held.gain(held.without.get(cause.name, held.base), held.model),
+                "effect": {
+                    c: {
+                        "value": float(np.sqrt(np.mean(trace[k] ** 2))) / SCALE[c],
+                        "unit": UNITS[c],
+                    }
+                    for k, c in seen(study)
+                },
+                "size": channel_size(left, problem),
+            }
+        )
+    return sorted(made, key=lambda c: -c["gain"]["value"])
+
+
+def _parameter(family: Any, name: str, value: float, found: Json) -> Json:
+    d = declared(family.plant, name)
+    return {"name": name, "value": value, "unit": d.unit, "neutral": d.neutral, **found}
+
+
+def calibration(study: Any) -> list[Json]:
+    """Return the refitted parameters, those of the final model."""
+    found = spans(study.problem, study.blocks, study.model.fit)
+    after, made = study.model.fit.values(), []
+    column = study.family.column
+    for free in study.base.fit.frees:
+        value, before = after[free.name], float(column[free.place])
+        unit = "1" if free.name.startswith("memory.weight") else ""
+        if not unit:
+            unit = declared(study.family.plant, free.name).unit
+        tolerance = study.sheet.tolerance.get(free.name)
+        outside = tolerance is not None and abs(value - before) > tolerance * abs(before)
+        made.append(
+            {
+                "name": free.name,
+                "unit": unit,
+                "before": before,
+                "after": value,
+                **found[free.name],
+                "outside_tolerance": bool(outside),
+            }
+        )
+    return made
+
+
+# --- rivals -------------------------------------------------------------------------------------
+
+
+def judged(decision: Decision) -> list[tuple[Candidate, Mapping[str, Any]]]:
+    """Return the rivals that the rule looked at, each with what it saw."""
+    levels = decision.evidence.get("levels", [])
+    if len(levels) < 2:
+        return []
+    rows = levels[max(len(decision.model.causes), 1)]["rivals"]
+    by_name = {(tuple(r["names"]), tuple(r.get("forms", ()))): r for r in rows}
+    found = [
+        (c, by_name.get((c.names, tuple(f.name for _, f in c.causes)))) for c in decision.rivals
+    ]
+    return [(c, row) for c, row in found if row is not None]
+
+
+def reasons(decision: Decision, rule: Rule) -> list[str]:
+    """Return in a few words, for each judged rival, why it stays or goes."""
+    found = judged(decision)
+    rows = [row for _, row in found]
+    if not decision.model.causes:
+        return [LITTLE] * len(found)
+    close = set(not_excluded(rows, rule)) if rows else set()
+    still = {id(c) for c in decision.open_rivals}
+    return [
+        _reason(c, row, decision.model, rule, id(c) in still or k in close)
+        for k, (c, row) in enumerate(found)
+    ]
+
+
+def _reason(
+    rival: Candidate,
+    row: Mapping[str, Any],
+    best: Candidate,
+    rule: Rule,
+    stays: bool,
+) -> str:
+    number = len(rival.names) - len(best.names)
+    for applies, word in (
+        (rival is best, BEST),
+        (stays, OPEN),
+        (number < 0, FEWER),
+        (number > 0, MORE),
+        (set(rival.names) == set(best.names), SAME),
+        (row["imitates"], IMITATES),
+        (row["better"] <= rule.doubt, WORSE),
+    ):
+        if applies:
+            return word
+    return LESS
+
+
+def rivals(study: Any, rule: Rule) -> list[Json]:
+    """Return what was fitted beside the model, in the order of the decision."""
+    found, words = judged(study.decision), reasons(study.decision, rule)
+    return [
+        _rival(study, k, rival, row, word)
+        for k, ((rival, row), word) in enumerate(zip(found, words, strict=True))
+    ]
+
+
+def _rival(study: Any, k: int, rival: Candidate, row: Mapping[str, Any], why: str) -> Json:
+    where, again = study.held, study.held.rivals[k]
+    if again is None:
+        where, again = study.compared, rival
+    return {
+        "name": "+".join(rival.names),
+        "title": " and ".join(c.title for c, _ in rival.causes),
+        "form": ", ".join(f.name for _, f in rival.causes),
+        "held_out": where.choice.by,
+        "gain": where.gain(where.base, again),
+        "behind": where.gain(again, where.model),
+        "judged": {key: row[key] for key in ("gain", "better")},
+        "why": why,
+        "excluded": why in EXCLUDED,
+    }

@@ -1,0 +1,131 @@
+"""The verdict in a few sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pam_envs.diagnosis.decide.rule import Rule
+from pam_envs.diagnosis.decide.search import BLOCK_SECONDS
+
+Report = Mapping[str, Any]
+
+SHORT = "The recording is too short to decide anything"
+"""Beginning of the warning that says so."""
+GOES_WITH = 0.05
+"""Share of a residual that goes with one variable, from which on it is said."""
+
+
+def sentence(report: Report, rule: Rule) -> str:
+    """Return the verdict in a few sentences."""
+    verdict = report["verdict"]
+    if verdict == "insufficient":
+        return _insufficient(report)
+    if verdict == "adequate":
+        return (
+            f"The plant is adequate: the held-out error is {_errors(report, 'error_before')}, "
+            f"{_where(report)}, and nothing is left that this recording could show."
+        )
+    if verdict == "unexplained":
+        return _unexplained(report, rule)
+    text = f"Your simulation misses {_listed(_titles(report))}: with it {_fell(report)}."
+    text += _doubts(report)
+    if verdict == "ambiguous":
+        text += _not_excluded(report)
+    if report["closed_loop"] is not None:
+        text += f" {report['closed_loop']['text']}"
+    return text
+
+
+def _insufficient(report: Report) -> str:
+    short = [w for w in report["warnings"] if w.startswith(SHORT)]
+    if short:
+        return short[0]
+    text = "The recording does not excite what would have to be decided"
+    return f"{text}: {len(report['not_testable'])} causes cannot be tested on it."
+
+
+def _titles(report: Report) -> list[str]:
+    return [c["title"] for c in report["causes"]]
+
+
+def _listed(items: Sequence[str]) -> str:
+    return " and ".join(part for part in (", ".join(items[:-1]), *items[-1:]) if part)
+
+
+def _where(report: Report) -> str:
+    """Return what the errors are of."""
+    held = report["held_out"]
+    if held["by"] == "blocks":
+        return f"in blocks of {BLOCK_SECONDS:g} s left out of the fits"
+    word = "kind" if len(held["kinds"]) == 1 else "kinds"
+    return f"in experiments of the {word} {_listed(held['kinds'])}, left out of the fits"
+
+
+def _errors(report: Report, key: str) -> str:
+    floors = report["noise_floor"]
+    return " and ".join(
+        f"{e['value']:.3g} {e['unit']} (noise floor {floors[c]['value']:.3g})"
+        for c, e in report[key].items()
+    )
+
+
+def _fell(report: Report) -> str:
+    before, after, floors = report["error_before"], report["error_after"], report["noise_floor"]
+    worst = max(before, key=lambda c: before[c]["value"] / max(after[c]["value"], 1e-12))
+    a, b = before[worst], after[worst]
+    word = "falls" if b["value"] < a["value"] else "goes"
+    return (
+        f"the held-out error of the {worst} {word} from {a['value']:.3g} to {b['value']:.3g} "
+        f"{a['unit']} (noise floor {floors[worst]['value']:.3g}), {_where(report)}"
+    )
+
+
+def _doubts(report: Report) -> str:
+    """Return which of several causes may gain nothing on what was held out."""
+    text = ""
+    for cause in report["causes"]:
+        low, high = cause["gain"]["interval"] or (None, None)
+        if low is not None and low <= 0.0:
+            text += (
+                f" Of {cause['title']} this is not sure: without it as much would be gained there, "
+                f"but for {cause['gain']['value']:.2g} (95 % interval {low:.2g} to {high:.2g})."
+            )
+    return text
+
+
+def _not_excluded(report: Report) -> str:
+    others = [r["name"] for r in report["rivals"] if r["why"] == "not excluded"]
+    text = f" Not excluded: {', '.join(others)}." if others else ""
+    plan = report["experiment"]
+    if plan is None:
+        return text
+    if plan["enough"]:
+        return f"{text} To tell them apart, {plan['description']}."
+    return (
+        f"{text} No experiment of the list tells them apart; "
+        f"{plan['sensor'] or 'another sensor'} would."
+    )
+
+
+def _unexplained(report: Report, rule: Rule) -> str:
+    text = (
+        "Something is missing that no candidate carries: the held-out error is "
+        f"{_errors(report, 'error_before')}, {_where(report)}."
+    )
+    if report["causes"]:
+        text += (
+            f" What {_listed(_titles(report))} can carry was added, which makes it "
+            f"{_errors(report, 'error_after')} and does not suffice: no name is given."
+        )
+    after = report["residual_structure"]["after"]
+    flexible = max((s["flexible_r2"] for s in after.values()), default=0.0)
+    text += f" A flexible model could explain {100 * flexible:.0f} % of what is left"
+    share, name = max(
+        ((v or 0.0, n) for s in after.values() for n, v in s["r2"].items()), default=(0.0, "")
+    )
+    text += f", which goes most with {name.replace('_', ' ')}." if share > GOES_WITH else "."
+    peaks = [(s["peak"]["ratio"], s["peak"]["frequency_hz"]) for s in after.values()]
+    if peaks and max(peaks)[0] > rule.peak:
+        text += f" Its spectrum has a line at {max(peaks)[1]:.3g} Hz."
+    return text

@@ -1,0 +1,257 @@
+"""Faults of a table that its repeats cannot show, and published curves held against the readings.
+
+A set-point that was missed is missed in every repeat. It shows as a cell that a model fitted to
+all other pressures gets wrong, by much more than its neighbours and at several loads alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.data.tables import BAR, MM, ContractionTable
+from pam_envs.diagnosis.static.compare import Model, Study, pure_error
+from pam_envs.diagnosis.static.fit import fit
+
+Array = NDArray[np.float64]
+
+OUTLYING = 3.5
+"""Robust standard deviations from which a left-out cell stands out."""
+SIZABLE = 2.0
+"""A missed set-point is worth telling from so many standard deviations of a reading on,"""
+SIZABLE_SHARE = 0.01
+"""or, where that is not known, from such a share of the largest contraction."""
+FEWEST_STEPS = 10
+"""With fewer pressures than this the ordinary size of an error is not known."""
+MOST_OUTLIERS = 3
+POOR_FIT = 1.3
+"""A curve that misses its readings by so much more than its own refit is of other readings."""
+
+
+@dataclass(frozen=True)
+class SetPoint:
+    """A pressure at which several loads read wrong alike.
+
+    Attributes
+    ----------
+    pressure : float
+        [bar].
+    falling : bool
+        Whether the pressure had been lowered to it.
+    loads : tuple of float
+        Where it stands out [kg].
+    missed : tuple of float
+        Reading less prediction from all other pressures there [mm].
+    others : tuple of float
+        The same at the loads where it does not stand out [mm].
+    """
+
+    pressure: float
+    falling: bool
+    loads: tuple[float, ...]
+    missed: tuple[float, ...]
+    others: tuple[float, ...]
+
+    @property
+    def sentence(self) -> str:
+        """What to make of it."""
+        way = "deflating" if self.falling else "inflating"
+        where = " and ".join(f"{load:g}" for load in self.loads)
+        size = " and ".join(f"{abs(miss):.2f}" for miss in self.missed)
+        side = "low" if self.missed[0] < 0.0 else "high"
+        rest = f", the other loads by {_listed(self.others)} mm" if self.others else ""
+        why = "a set-point that was missed, which repeats cannot show"
+        if not self.others:
+            why += ", or something that every model here lacks"
+        return (
+            f"at {self.pressure:g} bar {way} the readings at {where} kg are {size} mm {side} of "
+            f"what all other pressures predict{rest}: probably {why}; measure this pressure again"
+        )
+
+
+def _listed(values: Sequence[float]) -> str:
+    return " and ".join(f"{value:+.2f}" for value in values)
+
+
+def missed_set_points(study: Study, model: Model) -> tuple[SetPoint, ...]:
+    """Return pressures that stand out when the model is fitted without them, the worst first.
+
+    After each find its cells are left out for good, since a wrong cell bends its neighbours'
+    predictions.
+    """
+    cells, found = study.cells, list[SetPoint]()
+    kept = study.lanes.weight[0].copy()
+    while len(found) < MOST_OUTLIERS:
+        keys = sorted({*zip(cells.falling[kept > 0], cells.pressure[kept > 0], strict=True)})
+        if len(keys) < FEWEST_STEPS:
+            break
+        here = np.array([(cells.falling == f) & np.isclose(cells.pressure, p) for f, p in keys])
+        missed = _left_out(study, model, kept, here)
+        worst = _worst(study, keys, here, missed)
+        if worst is None:
+            break
+        at, point = worst
+        found.append(point)
+        kept = np.where(here[at], 0.0, kept)
+    return tuple(found)
+
+
+def _left_out(study: Study, model: Model, kept: Array, here: NDArray[np.bool_]) -> Array:
+    """Return reading less prediction [mm] where a pressure is left out, (keys, C), else NaN."""
+    cells = study.cells
+    data = np.broadcast_to(cells.mean, here.shape)
+    fitted = fit(cells, model.terms, data, kept * ~here, [model.fit.theta[0]])
+    missed = (cells.mean - fitted.predict(cells)) * cells.millimetres
+    return np.asarray(np.where(here & (kept > 0.0), missed, np.nan))
+
+
+def _worst(
+    study: Study, keys: Sequence[tuple[bool, float]], here: NDArray[np.bool_], missed: Array
+) -> tuple[int, SetPoint] | None:
+    """Return the pressure that stands out most, at two loads or the only one, if any does."""
+    cells, size = study.cells, np.full(missed.shape, np.nan)
+    for group in range(len(cells.loads)):
+        of = (cells.group == group) & np.isfinite(missed)
+        values = missed[of]
+        if len(values) < FEWEST_STEPS:
+            continue
+        middle = np.median(values)
+        spread = 1.4826 * np.median(np.abs(values - middle))
+        size[of] = (values - middle) / max(spread, 1e-12)
+    noise, _ = pure_error(cells)
+    least = SIZABLE_SHARE * cells.millimetres if np.isnan(noise) else SIZABLE * noise
+    needed = min(2, len(cells.loads))
+    best, found = 0.0, None
+    for at, (falling, pressure) in enumerate(keys):
+        for sign in (-1.0, 1.0):
+            out = np.nan_to_num(sign * size[at]) > OUTLYING
+            out &= np.nan_to_num(sign * missed[at]) > least
+            groups = np.unique(cells.group[out])
+            total = float(np.sum(np.abs(size[at][out])))
+            if len(groups) < needed or total <= best:
+                continue
+            rest = np.isfinite(missed[at]) & ~np.isin(cells.group, groups)
+            best = total
+            found = (
+                at,
+                SetPoint(
+                    float(pressure * cells.scale[1] / BAR),
+                    bool(falling),
+                    tuple(cells.loads[g] for g in groups),
+                    tuple(float(np.mean(missed[at][out & (cells.group == g)])) for g in groups),
+                    tuple(float(value) for value in missed[at][rest]),
+                ),
+            )
+    return found
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A published curve: contraction [mm] over pressure [bar], highest power first."""
+
+    load: float
+    inflating: bool
+    coefficients: tuple[float, ...]
+
+
+def audit_polynomials(
+    table: ContractionTable, curves: Mapping[str, Curve | tuple[float, bool, Sequence[float]]]
+) -> dict[str, object]:
+    """Hold published polynomials against the readings that they claim to describe.
+
+    Parameters
+    ----------
+    table : ContractionTable
+        The readings.
+    curves : mapping of str to Curve or (load [kg], inflating, coefficients)
+        Contraction [mm] over pressure [bar], highest power first, by the equation's name.
+
+    Returns
+    -------
+    dict
+        ``equations``: for each its ``rms`` [mm] on the mean readings that it claims, that of its
+        ``refit``, the readings that it fits best (``best``), and of which other equation it is a
+        ``copy``; ``discrepancies``: sentences.
+
+    Raises
+    ------
+    ValueError
+        If a curve is of a load that the table lacks.
+    """
+    named = {name: _curve(curve) for name, curve in curves.items()}
+    places = [(load, way) for load in table.loads for way in (True, False)]
+    equations = [_equation(table, name, curve, places) for name, curve in named.items()]
+    for equation in equations:
+        equation["copy_of"] = _copied(equation, equations)
+    return {
+        "equations": equations,
+        "discrepancies": [told for told in map(_discrepancy, equations) if told],
+    }
+
+
+def _curve(curve: Curve | tuple[float, bool, Sequence[float]]) -> Curve:
+    return curve if isinstance(curve, Curve) else Curve(curve[0], curve[1], tuple(curve[2]))
+
+
+def _mean_branch(table: ContractionTable, load: float, inflating: bool) -> tuple[Array, Array]:
+    pressure, values = table.branch(load, inflating)
+    return pressure / BAR, values.mean(axis=1) / MM
+
+
+def _missed(
+    table: ContractionTable, coefficients: Sequence[float], place: tuple[float, bool]
+) -> float:
+    pressure, mean = _mean_branch(table, *place)
+    return float(np.sqrt(np.mean(np.square(np.polyval(coefficients, pressure) - mean))))
+
+
+def _equation(
+    table: ContractionTable, name: str, curve: Curve, places: Sequence[tuple[float, bool]]
+) -> dict[str, object]:
+    place = (curve.load, curve.inflating)
+    errors = {other: _missed(table, curve.coefficients, other) for other in places}
+    refit = np.polyfit(*_mean_branch(table, *place), len(curve.coefficients) - 1)
+    best = min(errors, key=lambda other: errors[other])
+    return {
+        "name": name,
+        **asdict(curve),
+        "rms": _missed(table, curve.coefficients, place),
+        "refit": _missed(table, refit.tolist(), place),
+        "best": {"load": best[0], "inflating": best[1], "rms": errors[best]},
+    }
+
+
+def _copied(equation: dict[str, object], others: Sequence[dict[str, object]]) -> str | None:
+    """Return the equation with the same coefficients that fits its own readings better."""
+    for other in others:
+        same = other["coefficients"] == equation["coefficients"]
+        if same and other is not equation and _ratio(other) < _ratio(equation):
+            return str(other["name"])
+    return None
+
+
+def _ratio(equation: Mapping[str, object]) -> float:
+    return float(equation["rms"]) / max(float(equation["refit"]), 1e-9)  # type: ignore[arg-type]
+
+
+def _discrepancy(equation: Mapping[str, object]) -> str | None:
+    way = "inflating" if equation["inflating"] else "deflating"
+    claim = f"{equation['load']:g} kg {way}"
+    best = equation["best"]
+    assert isinstance(best, dict)
+    missed = f"misses the readings at {claim} by {equation['rms']:.2f} mm RMS"
+    if equation["copy_of"]:
+        return (
+            f"equation {equation['name']} is a copy of {equation['copy_of']}: it {missed}, those "
+            f"at {best['load']:g} kg by {best['rms']:.2f} mm, and a refit by "
+            f"{equation['refit']:.2f} mm"
+        )
+    if _ratio(equation) > POOR_FIT:
+        return (
+            f"equation {equation['name']} {missed}, a refit by {equation['refit']:.2f} mm: it was "
+            "fitted to something else, or its coefficients lost digits"
+        )
+    return None

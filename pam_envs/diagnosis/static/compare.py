@@ -1,0 +1,348 @@
+"""Rival static models compared: on repeats and loads left out, and by a test that heeds blocks.
+
+A repeat left out shows what noise does to a fit, a load left out what a load law is worth. What a
+model gets wrong is alike in neighbouring cells, so neither tests nor intervals take the cells for
+independent: a block of neighbours is one draw.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from pam_envs.diagnosis.static.cells import Cells
+from pam_envs.diagnosis.static.fit import Fit, base_starts, extend, fit, improve, jacobian
+from pam_envs.diagnosis.static.models import Term, predict
+
+Array = NDArray[np.float64]
+Interval = tuple[float, float]
+
+PRESSURE_FOLDS = 6
+"""Every so many-th cell is left out together where there are no repeats to leave out."""
+DRAWS = 2000
+"""Resamplings of the blocks for an interval of an error."""
+REFITS = 200
+"""Refits to resampled residuals for an interval of a parameter."""
+REFIT_GOOD = 1e-5
+"""When such a refit is done, as in :func:`improve`."""
+
+
+@dataclass(frozen=True)
+class Lanes:
+    """The data sets that every model is fitted to, side by side: all, then one part left out.
+
+    Attributes
+    ----------
+    kind : str
+        What the first parts left out are: "repeats", or "pressures" if there is one repeat.
+    data, weight : ndarray, shape (1 + F + G, C)
+        Means of what stays, and the root of the number of readings behind each, 0 for none.
+    target : ndarray, shape (F, C)
+        What was left out; NaN elsewhere.
+    loads : int
+        G, how many loads are left out in turn; 0 with fewer than three.
+    """
+
+    kind: str
+    data: Array
+    weight: Array
+    target: Array
+    loads: int
+
+
+def lanes_of(cells: Cells) -> Lanes:
+    """Return the folds of a table."""
+    mean, root = cells.mean, np.sqrt(cells.counts) * cells.used
+    kind, data, weight, target = _repeat_folds(cells)
+    if not len(data):
+        kind, data, weight, target = _pressure_folds(cells, root)
+    groups = range(len(cells.loads)) if len(cells.loads) >= 3 else range(0)
+    without = np.array([root * (cells.group != g) for g in groups]).reshape(-1, len(mean))
+    return Lanes(
+        kind,
+        np.concatenate([mean[None], data, np.broadcast_to(mean, without.shape)]),
+        np.concatenate([root[None], weight, without]),
+        target,
+        len(without),
+    )
+
+
+Folds = tuple[str, Array, Array, Array]
+
+
+def _repeat_folds(cells: Cells) -> Folds:
+    rows = range(len(cells.readings)) if np.all(cells.counts[cells.used] > 1) else range(0)
+    data, weight, target = [], [], []
+    for row in rows:
+        kept = np.delete(cells.readings, row, axis=0)
+        data.append(np.nanmean(kept, axis=0))
+        weight.append(np.sqrt(np.isfinite(kept).sum(axis=0)) * cells.used)
+        target.append(np.where(cells.used, cells.readings[row], np.nan))
+    return "repeats", np.array(data), np.array(weight), np.array(target)
+
+
+def _pressure_folds(cells: Cells, root: Array) -> Folds:
+    place = np.cumsum(cells.used) % PRESSURE_FOLDS
+    out = np.array([(place == k) & cells.used for k in range(PRESSURE_FOLDS)])
+    data = np.broadcast_to(cells.mean, out.shape)
+    return "pressures", data, root * ~out, np.where(out, data, np.nan)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A fitted model and how well it predicts what it has not seen.
+
+    Attributes
+    ----------
+    fit : Fit
+        Lanes as in :class:`Lanes`.
+    residual : ndarray, shape (C,)
+        Reading mean minus model, fitted to everything [mm]; NaN where not used.
+    held : ndarray, shape (C,)
+        Mean squared error [mm2] on the parts left out, cell by cell.
+    load_errors : ndarray, shape (G, C)
+        Reading mean minus model on a load left out [mm]; NaN elsewhere.
+    """
+
+    fit: Fit
+    residual: Array
+    held: Array
+    load_errors: Array
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """What the base is extended by."""
+        return self.fit.terms
+
+    @property
+    def rms(self) -> float:
+        """Root mean square residual over the cells [mm]."""
+        return float(np.sqrt(np.nanmean(np.square(self.residual))))
+
+    @property
+    def held_out(self) -> float:
+        """Root mean square error on the parts left out [mm]."""
+        return float(np.sqrt(np.nanmean(self.held)))
+
+    @property
+    def by_load(self) -> Array:
+        """Root mean square error on each load when left out [mm], shape (G,)."""
+        return np.asarray(np.sqrt(np.nanmean(np.square(self.load_errors), axis=1)))
+
+    @property
+    def left_load(self) -> float:
+        """The mean of :attr:`by_load`; NaN with fewer than three loads."""
+        return float(self.by_load.mean()) if len(self.load_errors) else float("nan")
+
+
+@dataclass(frozen=True)
+class Study:
+    """A table, its folds, and what is fitted to them."""
+
+    cells: Cells
+    seed: int = 0
+
+    @cached_property
+    def lanes(self) -> Lanes:
+        """The folds."""
+        return lanes_of(self.cells)
+
+    @cached_property
+    def base(self) -> Model:
+        """The load-blind model."""
+        lanes = self.lanes
+        return self.judged(fit(self.cells, (), lanes.data, lanes.weight, base_starts()))
+
+    def extended(self, parents: Sequence[Model], terms: Sequence[Term], n: int = 0) -> Model:
+        """Return a model that contains all of ``parents``, fitted to the first ``n`` lanes.
+
+        With ``n`` of 0 it is fitted to all lanes; with 1 it has no errors on what was left out.
+        """
+        lanes, n = self.lanes, n or len(self.lanes.data)
+        fits = [parent.fit.first(n) for parent in parents]
+        return self.judged(extend(self.cells, fits, terms, lanes.data[:n], lanes.weight[:n]))
+
+    def refitted(self, terms: Sequence[Term], start: Array) -> Model:
+        """Return a model fitted from one start, shape (n,) or (lanes, n)."""
+        lanes = self.lanes
+        return self.judged(fit(self.cells, terms, lanes.data, lanes.weight, [start]))
+
+    def judged(self, fitted: Fit) -> Model:
+        """Return the fit with its errors."""
+        cells, lanes, mm = self.cells, self.lanes, self.cells.millimetres
+        made = fitted.predict(cells)
+        inside = 1 + len(lanes.target)
+        if len(made) < len(lanes.data):
+            made = np.concatenate([made[:1], np.full((len(lanes.data) - 1, made.shape[1]), np.nan)])
+        held = np.square(lanes.target - made[1:inside])
+        missed = np.where(cells.used, cells.mean - made, np.nan) * mm
+        out = np.arange(lanes.loads)[:, None] == cells.group
+        seen = np.isfinite(held).sum(axis=0)
+        mean = np.where(seen > 0, np.nansum(held, axis=0) / np.maximum(seen, 1), np.nan)
+        left = np.where(out, missed[inside:], np.nan)
+        return Model(fitted, missed[0], mm**2 * mean, left)
+
+
+def blocked(cells: Cells, values: Array) -> Array:
+    """Return sums over the blocks, shape (..., blocks), of values of the cells, (..., C)."""
+    n = int(cells.block.max()) + 1
+    member = np.zeros((len(cells.block), n))
+    used = np.flatnonzero(cells.used)
+    member[used, cells.block[used]] = 1.0
+    return np.asarray(np.where(cells.used, values, 0.0) @ member)
+
+
+def _resampled(study: Study, values: Array, name: str) -> Array:
+    """Return sums over resampled blocks, shape (DRAWS, ...), of values of the cells (..., C)."""
+    sums = blocked(study.cells, values)
+    n = sums.shape[-1]
+    random = np.random.default_rng([study.seed, *name.encode()])
+    counts = random.multinomial(n, np.full(n, 1.0 / n), DRAWS)
+    return np.asarray(counts @ np.moveaxis(sums, -1, 0).reshape(n, -1)).reshape(
+        DRAWS, *sums.shape[:-1]
+    )
+
+
+def _middle(draws: Array) -> Interval:
+    low, high = np.quantile(draws, [0.025, 0.975])
+    return float(low), float(high)
+
+
+def error_interval(study: Study, squares: Array) -> Interval:
+    """Return a 95 % interval of the root mean of squares (C,), its blocks resampled."""
+    both = np.array([np.nan_to_num(squares), np.isfinite(squares)])
+    sums = _resampled(study, both, "error")
+    return _middle(np.sqrt(sums[:, 0] / np.maximum(sums[:, 1], 1e-12)))
+
+
+def gain(study: Study, before: Model, after: Model) -> tuple[float, Interval]:
+    """Return the log ratio of mean squared held-out errors, and its 95 % interval, paired."""
+    both = np.array([before.held, after.held])
+    sums = _resampled(study, both, "gain")
+    value = float(np.log(np.nanmean(before.held) / np.nanmean(after.held)))
+    return value, _middle(np.log(sums[:, 0] / sums[:, 1]))
+
+
+def load_cut(study: Study, before: Model, after: Model) -> tuple[float, Interval]:
+    """Return by which part the mean error on loads left out falls, and its 95 % interval."""
+    errors = np.array([before.load_errors, after.load_errors])
+    both = np.array([np.nan_to_num(np.square(errors)), np.isfinite(errors)])
+    sums = _resampled(study, both, "loads")
+    means = np.sqrt(sums[:, 0] / np.maximum(sums[:, 1], 1e-12)).mean(axis=-1)
+    return 1.0 - after.left_load / before.left_load, _middle(1.0 - means[:, 1] / means[:, 0])
+
+
+def slopes(study: Study, model: Model) -> Array:
+    """Return the Jacobian [1] of the fit to everything, shape (C, n), rows weighted."""
+    theta = model.fit.theta[:1]
+    numbers = model.fit.numbers
+    at = predict(study.cells, {n.name: theta[:, [i]] for i, n in enumerate(numbers)})
+    return np.asarray(jacobian(study.cells, numbers, theta, at)[0] * study.lanes.weight[0][:, None])
+
+
+def beyond(base: Array, columns: Array) -> Array:
+    """Return what is left of columns after the span of ``base`` is taken out."""
+    u, s, _ = np.linalg.svd(base, full_matrices=False)
+    u = u[:, s > 1e-7 * s[0]]
+    return np.asarray(columns - u @ (u.T @ columns))
+
+
+def spread(study: Study, model: Model) -> Array:
+    """Return weighted residuals (C,), enlarged for the parameters that were fitted."""
+    used, n = study.cells.used, len(model.fit.numbers)
+    free = max(1.0, float(used.sum()) - n)
+    residual = np.nan_to_num(model.residual) * study.lanes.weight[0]
+    return np.asarray(residual * np.sqrt(used.sum() / free))
+
+
+def p_value(study: Study, parent: Model, child: Model) -> float:
+    """Return how likely a term that does nothing fits so much better.
+
+    The coefficients of the added directions, orthogonal to the parent's, over their scatter: as
+    the blocks of the child's residual give it (a cluster-robust test, for residuals that are alike
+    in neighbours), and as the cells give it (an F test, for blocks that agree by luck). The larger
+    of both p-values holds.
+    """
+    old = {n.name for n in parent.fit.numbers}
+    names = [n.name for n in child.fit.numbers]
+    steep = slopes(study, child)
+    fresh = [i for i, name in enumerate(names) if name not in old]
+    rest = [i for i, name in enumerate(names) if name in old]
+    added, _ = np.linalg.qr(beyond(steep[:, rest], steep[:, fresh]))
+    better = float(parent.fit.cost[0] - child.fit.cost[0]) * study.cells.millimetres**2
+    scores = blocked(study.cells, added.T * spread(study, child))
+    scatter = scores @ scores.T
+    q, blocks = len(fresh), scores.shape[1]
+    free = int(study.cells.used.sum()) - len(names)
+    if better <= 1e-12 or np.trace(scatter) <= 0.0 or blocks <= q + 1 or free < 1:
+        return 1.0
+    robust = stats.f.sf(better / np.trace(scatter), q, blocks - q)
+    left_over = float(child.fit.cost[0]) * study.cells.millimetres**2 / free
+    return float(max(robust, stats.f.sf(better / q / left_over, q, free)))
+
+
+def parameter_draws(study: Study, model: Model) -> Array:
+    """Return parameters refitted to residuals whose blocks changed sign at random, (REFITS, n)."""
+    cells, weight = study.cells, study.lanes.weight[:1]
+    random = np.random.default_rng([study.seed, 7])
+    signs = random.choice([-1.0, 1.0], (REFITS, int(cells.block.max()) + 1))
+    root = np.where(weight[0] > 0.0, weight[0], 1.0)
+    moved = signs[:, np.maximum(cells.block, 0)] * spread(study, model) / root
+    made = model.fit.predict(cells)[0]
+    data = made + moved / cells.millimetres
+    begin = np.broadcast_to(model.fit.theta[0], (REFITS, len(model.fit.numbers)))
+    weights = np.broadcast_to(weight, data.shape)
+    return improve(cells, model.fit.numbers, begin, data, weights, REFIT_GOOD)[0]
+
+
+def intervals(draws: Array) -> list[Interval]:
+    """Return the 95 % interval of each column."""
+    return [_middle(column) for column in draws.T]
+
+
+def lack_of_fit(study: Study, model: Model) -> tuple[float, float, float]:
+    """Return F and p of the lack of fit against the repeats, and its size [mm].
+
+    The size is the part of the residual that the scatter of a cell's mean does not explain; all
+    are NaN without repeats.
+    """
+    cells, weight = study.cells, study.lanes.weight[0]
+    pure, free = pure_error(cells)
+    left = max(1.0, float(cells.used.sum()) - len(model.fit.numbers))
+    if np.isnan(pure):
+        return float("nan"), float("nan"), float("nan")
+    mean_square = float(np.nansum(np.square(weight * model.residual))) / left
+    per_cell = float(np.mean(cells.counts[cells.used]))
+    size = np.sqrt(max(0.0, mean_square - pure**2) / per_cell)
+    ratio = mean_square / pure**2
+    return ratio, float(stats.f.sf(ratio, left, free)), float(size)
+
+
+def pure_error(cells: Cells) -> tuple[float, int]:
+    """Return the standard deviation of repeats about their cell's mean [mm], and its freedom.
+
+    The deviation is NaN where there is one repeat, or copies of one.
+    """
+    apart = (cells.readings - cells.mean)[:, cells.used] * cells.millimetres
+    free = int(np.maximum(cells.counts[cells.used] - 1, 0).sum())
+    size = float(np.sqrt(np.nansum(apart**2) / max(free, 1)))
+    return size if size > 1e-9 else float("nan"), free
+
+
+def floor(study: Study) -> Array:
+    """Return the mean squared difference [mm2] of a repeat from the mean of the others, (C,).
+
+    It is NaN where there is one repeat, or copies of one.
+    """
+    cells, lanes = study.cells, study.lanes
+    if lanes.kind != "repeats" or np.isnan(pure_error(cells)[0]):
+        return np.full(len(cells.load), np.nan)
+    apart = np.square(lanes.target - lanes.data[1 : 1 + len(lanes.target)])
+    seen = np.isfinite(apart).sum(axis=0)
+    mean = np.nansum(apart, axis=0) / np.maximum(seen, 1)
+    return np.asarray(np.where(seen > 0, mean, np.nan) * cells.millimetres**2)

@@ -1,0 +1,154 @@
+"""How the effects of a load grow with it, and which loads to hang next to find out.
+
+The law is fixed beforehand as linear: that is what a load left out is predicted with. An exponent
+or a dead zone fitted afterwards has seen the load it is judged on, unless there are loads enough
+to fit it anew without each; with fewer it is labelled *post hoc*.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.diagnosis.static.cells import Cells
+from pam_envs.diagnosis.static.compare import (
+    Interval,
+    Model,
+    Study,
+    gain,
+    intervals,
+    p_value,
+    parameter_draws,
+    pure_error,
+)
+from pam_envs.diagnosis.static.models import DEAD_LOAD, EXPONENT, Term, units
+
+Array = NDArray[np.float64]
+
+LOADS_FOR_A_LAW = 5
+"""From so many loads on a law is fitted without the load that it is judged on."""
+GRID = 24
+"""Loads at which rivals are compared, up to the heaviest measured."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """A load law other than linear, shared by all effects of the load.
+
+    Attributes
+    ----------
+    term : Term
+        Which.
+    model : Model
+        The named causes with it.
+    value, interval : float, tuple
+        Its parameter in its own unit, and 95 % interval.
+    p : float
+        Chance that it does nothing, against the linear law.
+    left_load : float
+        Mean error on loads left out [mm].
+    post_hoc : bool
+        Whether its parameter had seen the load left out.
+    """
+
+    term: Term
+    model: Model
+    value: float
+    interval: Interval
+    p: float
+    left_load: float
+    post_hoc: bool
+
+
+def load_laws(study: Study, model: Model) -> tuple[Law, ...]:
+    """Return the laws that the table's loads allow to be fitted, if an effect needs one."""
+    acts = any(term.loads > 1 for term in model.terms)
+    if not acts or len(study.cells.loads) < EXPONENT.loads:
+        return ()
+    return tuple(_law(study, model, term) for term in (EXPONENT, DEAD_LOAD))
+
+
+def _law(study: Study, model: Model, term: Term) -> Law:
+    free = study.extended([model], (*model.terms, term))
+    scale = units(term.numbers[0], study.cells.scale)
+    draws = parameter_draws(study, free)
+    (low, high), value = intervals(draws[:, -1:])[0], float(free.fit.theta[0, -1])
+    seen = len(study.cells.loads) < LOADS_FOR_A_LAW
+    judged = _fixed(study, model, free, term, value) if seen else free
+    return Law(
+        term,
+        judged,
+        value * scale,
+        (low * scale, high * scale),
+        p_value(study, model, free),
+        judged.left_load,
+        seen,
+    )
+
+
+def _fixed(study: Study, model: Model, free: Model, term: Term, value: float) -> Model:
+    """Return the model with the law's parameter held, as it was chosen on everything."""
+    number = replace(term.numbers[0], neutral=value, low=value, high=value)
+    start = free.fit.theta.copy()
+    start[:, -1] = value
+    return study.refitted((*model.terms, replace(term, numbers=(number,))), start)
+
+
+def told_apart(study: Study, laws: Sequence[Law]) -> bool:
+    """Return whether the readings prefer one of two laws."""
+    if len(laws) < 2:
+        return True
+    _, (low, high) = gain(study, laws[0].model, laws[1].model)
+    return max(low, -high) > 1e-3
+
+
+@dataclass(frozen=True)
+class NextLoads:
+    """What other loads would tell two models apart.
+
+    Attributes
+    ----------
+    loads : ndarray, shape (GRID,)
+        [kg].
+    separation : ndarray, shape (GRID,)
+        Mean square difference of the models over a cycle, in variances of a cell's mean with as
+        many repeats as the table has.
+    apart : ndarray, shape (GRID,)
+        Root mean square difference [mm].
+    best : tuple of float
+        Loads [kg] to hang next, the most telling first.
+    """
+
+    loads: Array
+    separation: Array
+    apart: Array
+    best: tuple[float, ...]
+
+
+def next_loads(study: Study, one: Model, other: Model) -> NextLoads:
+    """Return where two models that were fitted to the same readings differ most."""
+    cells = study.cells
+    heaviest = cells.scale[0]
+    loads = heaviest * np.arange(1, GRID + 1) / GRID
+    apart = np.array([_apart(cells, one, other, load / heaviest) for load in loads])
+    noise, _ = pure_error(cells)
+    repeats = float(np.mean(cells.counts[cells.used]))
+    separation = repeats * (apart / noise) ** 2
+    return NextLoads(loads, separation, apart, _peaks(cells.loads, loads, apart))
+
+
+def _apart(cells: Cells, one: Model, other: Model, load: float) -> float:
+    there = replace(cells, load=np.full(len(cells.load), load))
+    difference = (one.fit.predict(there)[0] - other.fit.predict(there)[0])[cells.used]
+    return float(np.sqrt(np.mean(difference**2)) * cells.millimetres)
+
+
+def _peaks(measured: Sequence[float], loads: Array, apart: Array) -> tuple[float, ...]:
+    """Return the most telling load of each gap between measured ones, best first, two at most."""
+    gap = np.searchsorted(measured, loads - 1e-9)
+    gaps = [np.flatnonzero(gap == g) for g in np.unique(gap)]
+    peaks = sorted((int(i[np.argmax(apart[i])]) for i in gaps), key=lambda i: -float(apart[i]))
+    return tuple(float(loads[i]) for i in peaks[:2])

@@ -1,0 +1,289 @@
+"""Static models of a muscle led through pressure cycles: a load-blind base, and what may be added.
+
+The base: the pressure passes play operators (its memory), and a spring with a stiff start and a
+hardening end turns the effective pressure into contraction,
+
+    c (1 - exp(-x / x0)) + k1 x + k3 x^3 = p - sum(weights * stop_i(p)).
+
+It knows nothing of the load. A *term* adds one parameter or two, neutral at a stated value, so that
+every model with a term contains the one without. Inside, pressures, contractions and loads are
+fractions of the largest of the table; :func:`units` gives the way back.
+
+All cells of a table are computed at once, for many parameter sets (lanes) side by side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.data.tables import BAR, MM
+from pam_envs.diagnosis.static.cells import THRESHOLDS, Cells, stops
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+WEIGHTS = tuple(f"weight_{i}" for i in range(1, len(THRESHOLDS) + 1))
+SPRING = ("start_force", "start_length", "stiffness", "hardening")
+CREEP_READINGS = 4.0
+"""Time constant of residual creep, in readings; what creeps faster is over before a reading."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """A parameter of a model, in fractions of the table's largest values.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    neutral : float
+        The value at which it does nothing (a plausible one for the base's own).
+    low, high : float
+        Bounds.
+    size : float
+        A meaningful change: the step of differences, and the offset of starts.
+    unit : str
+        Unit for people: ``bar``, ``mm``, ``1``, or one of these with ``/kg``, ``/mm``, ``/mm3``.
+    """
+
+    name: str
+    neutral: float
+    low: float
+    high: float
+    size: float
+    unit: str = "1"
+
+
+@dataclass(frozen=True)
+class Term:
+    """One form of a cause.
+
+    Attributes
+    ----------
+    cause : str
+        Name of the cause.
+    form : str
+        Which form of it.
+    title : str
+        A short sentence.
+    numbers : tuple of Number
+        The parameters it adds.
+    loads : int
+        How many different loads it takes to fit it.
+    both_ways : bool
+        Whether it takes readings at rising and at falling pressure.
+    """
+
+    cause: str
+    form: str
+    title: str
+    numbers: tuple[Number, ...]
+    loads: int = 1
+    both_ways: bool = False
+
+
+BASE = (
+    Number("start_force", 0.2, 0.0, 1.0, 0.1, "bar"),
+    Number("start_length", 0.12, 0.02, 2.0, 0.05, "mm"),
+    Number("stiffness", 0.6, 0.02, 4.0, 0.2, "bar/mm"),
+    Number("hardening", 0.1, 0.0, 4.0, 0.1, "bar/mm3"),
+    *(Number(name, 0.15, 0.0, 0.9, 0.1) for name in WEIGHTS),
+)
+"""The load-blind base."""
+
+SHIFT = Term(
+    "load_dependent_compliance",
+    "pressure shift",
+    "The load takes a part of the pressure, as read from a zero common to all loads",
+    (Number("shift", 0.0, -1.0, 1.0, 0.05, "bar/kg"),),
+    2,
+)
+SHIFT_ZEROED = Term(
+    "load_dependent_compliance",
+    "pressure shift, zeroed at each load",
+    "The load takes a part of the pressure, and each load's rest length is its zero",
+    (Number("zeroed_shift", 0.0, -1.0, 1.0, 0.05, "bar/kg"),),
+    2,
+)
+STRETCH = Term(
+    "load_dependent_compliance",
+    "stretch at rest",
+    "The load lengthens the muscle by the same at every pressure",
+    (Number("stretch", 0.0, -2.0, 2.0, 0.05, "mm/kg"),),
+    2,
+)
+STROKE = Term(
+    "load_dependent_compliance",
+    "smaller stroke",
+    "Contraction is divided by a factor that grows with the load",
+    (Number("stroke", 0.0, -0.4, 2.0, 0.05, "1/kg"),),
+    2,
+)
+STIFFENING = Term(
+    "load_dependent_compliance",
+    "stiffness growing with load",
+    "The spring stiffens with the load",
+    (Number("stiffening", 0.0, -0.4, 2.0, 0.05, "1/kg"),),
+    2,
+)
+WIDTH = Term(
+    "load_dependent_hysteresis",
+    "width linear in load",
+    "The hysteresis loop widens or narrows with the load",
+    (Number("width", 0.0, -0.95, 2.0, 0.1, "1/kg"),),
+    2,
+    True,
+)
+FRICTION = Term(
+    "pressure_dependent_friction",
+    "bent pressure scale",
+    "Friction changes along the pressure range, uniform on a scale bent by this much",
+    (Number("bend", 0.0, -0.8, 0.8, 0.1),),
+    both_ways=True,
+)
+CREEP = Term(
+    "creep",
+    "residual creep over readings",
+    "A part of each step arrives only in the next readings",
+    (Number("creep", 0.0, -0.5, 0.5, 0.02),),
+)
+THRESHOLD = Term(
+    "threshold_pressure",
+    "soft threshold",
+    "The first part of the pressure does nothing",
+    (Number("threshold", 0.0, 0.0, 0.3, 0.03, "bar"),),
+)
+TERMS = (SHIFT, SHIFT_ZEROED, STRETCH, STROKE, STIFFENING, WIDTH, FRICTION, CREEP, THRESHOLD)
+"""All forms of all causes that a table of readings can show, best known first within a cause."""
+
+EXPONENT = Term(
+    "load law", "power", "Effects grow with a power", (Number("exponent", 1.0, 0.3, 6.0, 0.3),), 3
+)
+DEAD_LOAD = Term(
+    "load law",
+    "dead zone",
+    "Effects start at some load",
+    (Number("dead_load", 0.0, 0.0, 0.95, 0.1, "kg"),),
+    3,
+)
+
+
+Values = Mapping[str, Array]
+"""Parameters by name, each of shape (L, 1); those left out are neutral."""
+
+
+def numbers_of(terms: Sequence[Term]) -> tuple[Number, ...]:
+    """Return the parameters of the base with some terms, the base's first."""
+    return (*BASE, *(n for term in terms for n in term.numbers))
+
+
+def _bent(pressure: Array, bend: Array) -> Array:
+    return np.asarray(pressure * (1.0 + bend * (1.0 - pressure)))
+
+
+def _straight(value: Array, bend: Array) -> Array:
+    s = 1.0 + bend
+    root = np.sqrt(np.maximum(s * s - 4.0 * bend * value, 1e-12))
+    return np.asarray(2.0 * value / (s + root))
+
+
+def load_law(load: Array, values: Values) -> Array:
+    """Return how strongly each cell's load acts: 0 at no load, 1 at the largest."""
+    dead, exponent = values.get("dead_load"), values.get("exponent")
+    if dead is not None:
+        load = np.maximum(load - dead, 0.0) / (1.0 - dead)
+    return np.asarray(load if exponent is None else load**exponent)
+
+
+def lags_of(cells: Cells, values: Values) -> Array:
+    """Return how far the plays lag behind the bent pressure, shape (plays, L or 1, C)."""
+    bend = values.get("bend")
+    return cells.lags if bend is None else stops(_bent(cells.pressure, bend), cells.order)
+
+
+def effective_pressure(cells: Cells, values: Values, lags: Array) -> Array:
+    """Return the pressure after the memory, shape (L, C), before any load acts."""
+    bend = values.get("bend")
+    lost = sum(values[name] * lag for name, lag in zip(WEIGHTS, lags, strict=True))
+    if "width" in values:
+        lost = lost * np.maximum(0.0, 1.0 + values["width"] * load_law(cells.load, values))
+    if bend is None:
+        return np.asarray(cells.pressure - lost)
+    return _straight(_bent(cells.pressure, bend) - lost, bend)
+
+
+def contraction(force: Array, values: Values, start: Array | None = None) -> Array:
+    """Return the contraction at which the spring balances ``force`` (both relative), by Newton."""
+    c, x0, k1, k3 = (values[name] for name in SPRING)
+    x = np.maximum(force, 0.0) if start is None else start
+    for _ in range(60):
+        decay = c * np.exp(np.minimum(-x / x0, 40.0))
+        square = x * x
+        miss = c - decay + (k1 + k3 * square) * x - force
+        step = miss / (decay / x0 + k1 + 3.0 * k3 * square)
+        x = x - np.clip(step, -0.3, 0.3)
+        if np.abs(step).max() < 1e-9:
+            break
+    return x
+
+
+def _above(force: Array, values: Values) -> Array:
+    """Return the force less a soft threshold, which takes nothing where there is no force."""
+    if "threshold" not in values:
+        return force
+    level = np.maximum(values["threshold"], 1e-9)
+    return np.asarray(force + level * np.expm1(-np.maximum(force, 0.0) / level))
+
+
+def crept(cells: Cells) -> Array:
+    """Return what turns contractions into the part that has crept by each reading, (C, C)."""
+    behind = np.subtract.outer(np.arange(len(cells.load)), np.arange(len(cells.load)))
+    keep = np.exp(-1.0 / CREEP_READINGS)
+    seen = (behind >= 0) & (cells.group[:, None] == cells.group[None, :])
+    return np.where(seen, (1.0 - keep) * keep ** np.abs(behind), 0.0)
+
+
+def predict(
+    cells: Cells, values: Values, start: Array | None = None, lags: Array | None = None
+) -> Array:
+    """Return the model's contractions of all cells, shape (L, C), relative.
+
+    ``start`` holds contractions near by, ``lags`` those of :func:`lags_of`: both save time.
+    """
+    acts = load_law(cells.load, values)
+    force = effective_pressure(cells, values, lags_of(cells, values) if lags is None else lags)
+    for name in ("shift", "zeroed_shift"):
+        if name in values:
+            force = force - values[name] * acts
+    if "stiffening" in values:
+        force = force / (1.0 + values["stiffening"] * acts)
+    x = contraction(_above(force, values), values, start)
+    if "zeroed_shift" in values:
+        x = x - contraction(_above(-values["zeroed_shift"] * acts, values), values)
+    if "stroke" in values:
+        x = x / (1.0 + values["stroke"] * acts)
+    if "stretch" in values:
+        x = x - values["stretch"] * acts
+    if "creep" in values:
+        x = x + values["creep"] * (x @ crept(cells).T - x)
+    return x
+
+
+def units(number: Number, scale: tuple[float, float, float]) -> float:
+    """Return what a value of 1 of a parameter is in its own unit (bar, mm, kg)."""
+    load, pressure, length = scale[0], scale[1] / BAR, scale[2] / MM
+    return {
+        "1": 1.0,
+        "kg": load,
+        "mm": length,
+        "bar": pressure,
+        "bar/mm": pressure / length,
+        "bar/mm3": pressure / length**3,
+        "bar/kg": pressure / load,
+        "mm/kg": length / load,
+        "1/kg": 1.0 / load,
+    }[number.unit]

@@ -1,0 +1,398 @@
+"""The diagnosis of a table of readings as a report: numbers with units and intervals."""
+
+from __future__ import annotations
+
+import hashlib
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.data.tables import BAR, MM, ContractionTable
+from pam_envs.diagnosis.audit.tables import audit_table
+from pam_envs.diagnosis.static.compare import (
+    Model,
+    error_interval,
+    lack_of_fit,
+    load_cut,
+    pure_error,
+)
+from pam_envs.diagnosis.static.findings import Findings, verdict
+from pam_envs.diagnosis.static.law import Law, told_apart
+from pam_envs.diagnosis.static.models import TERMS, Number, Term, predict, units
+from pam_envs.diagnosis.static.search import RULE, Pair, Stage, Trial
+from pam_envs.diagnosis.static.structure import isolability, structure
+from pam_envs.diagnosis.static.text import sentences
+
+Array = NDArray[np.float64]
+Json = dict[str, Any]
+
+NO_TIME = (
+    "valve_dead_band",
+    "dead_time",
+    "slew_limit",
+    "sensor_delay",
+    "sensor_drift",
+    "viscous_loss",
+    "leak",
+    "supply_droop",
+    "stick_slip",
+    "slip_step",
+    "exhaust_asymmetry",
+    "resonance",
+)
+OTHERWISE = {
+    "temperature": "no temperature was recorded",
+    "sensor_bias": "contractions count from each load's own rest length: a bias is gone",
+    "sensor_nonlinearity": "the static law absorbs it exactly",
+    "hysteresis_shape": "whole cycles hold no minor loops",
+    "hysteresis_drive": "whole cycles do not tell length- from pressure-driven friction",
+    "first_cycle_softening": "cycles before the table are not known; see the warnings for a drift",
+    "wire_slack": "the static law absorbs it at a constant load",
+    "payload_error": "needs loads declared with a tolerance",
+}
+STATIC = (
+    "a table of settled readings has no time and no measured pressure: of the pressure channel, "
+    "delays, rates and the closed loop nothing is said"
+)
+
+
+def report(f: Findings, seed: int) -> Json:
+    """Return the report, all keys but ``runtime_s``."""
+    cells = f.study.cells
+    return {
+        "schema": 1,
+        "verdict": verdict(f),
+        "text": sentences(f),
+        "causes": causes(f),
+        "rivals": rivals(f),
+        "noise_floor": {"contraction": noise_floor(f), "pressure": None},
+        "held_out": None,
+        "error_before": error(f, f.base),
+        "error_after": error(f, f.model),
+        "residual_structure": {
+            "before": structure(cells, f.base),
+            "after": structure(cells, f.model),
+        },
+        "isolability": isolability(f.study),
+        "experiment": experiment(f),
+        "closed_loop": None,
+        "closed_loop_reason": "settled readings have no time",
+        "calibration": [calibrated(f, number) for number in f.base.fit.numbers],
+        "not_testable": not_testable(f),
+        "warnings": warnings(f),
+        "rule_version": RULE,
+        "provenance": provenance(f.table, seed),
+        "readings": {
+            "ladder": [rung(stage) for stage in f.search.stages],
+            "pairs": [paired(pair) for pair in f.search.pairs],
+            "loads_left_out": loads_left_out(f),
+            "load_laws": [load_law(law) for law in f.laws],
+            "lack_of_fit": {"before": lacking(f, f.base), "after": lacking(f, f.model)},
+            "set_points": [vars(point) for point in f.set_points],
+            "curves": curves(f),
+        },
+    }
+
+
+def _value(value: float, unit: str, **more: Any) -> Json:
+    return {"value": value, "unit": unit, **more}
+
+
+def _number(f: Findings, number: Number) -> Json:
+    scale = units(number, f.study.cells.scale)
+    low, high = f.interval(number.name)
+    return {
+        "name": number.name,
+        "value": f.value(number.name) * scale,
+        "unit": number.unit,
+        "interval": [low * scale, high * scale],
+        "neutral": number.neutral * scale,
+    }
+
+
+def noise_floor(f: Findings) -> Json:
+    """Return the error of a repeat against the mean of the others, null if there is one repeat."""
+    return _value(f.floor, "mm", **{"from": "repeats" if np.isfinite(f.floor) else None})
+
+
+def effect(f: Findings, term: Term) -> Array:
+    """Return what a cause adds to the contraction [mm], cell by cell."""
+    theta, cells = f.model.fit.theta[:1], f.study.cells
+    values = {n.name: theta[:, [i]] for i, n in enumerate(f.model.fit.numbers)}
+    without = {k: v for k, v in values.items() if k not in {n.name for n in term.numbers}}
+    return np.asarray((predict(cells, values) - predict(cells, without))[0] * cells.millimetres)
+
+
+def causes(f: Findings) -> list[Json]:
+    """Return the named causes in the order of evidence."""
+    noise, _ = pure_error(f.study.cells)
+    made = []
+    for trial in f.search.accepted:
+        size = float(np.sqrt(np.mean(effect(f, trial.term)[f.study.cells.used] ** 2)))
+        made.append(
+            {
+                "name": trial.term.cause,
+                "title": trial.term.title,
+                "form": trial.term.form,
+                "parameters": [_number(f, number) for number in trial.term.numbers],
+                "gain": _gain(trial),
+                "effect": {"contraction": _value(size, "mm")},
+                "size": size / noise,
+            }
+        )
+    return made
+
+
+def _gain(trial: Trial) -> Json:
+    return {"value": trial.gain, "interval": list(trial.interval)}
+
+
+def rivals(f: Findings) -> list[Json]:
+    """Return the forms beside the named ones, each at the stage that decided on it."""
+    named = {trial.term.cause for trial in f.search.accepted}
+    stages, made = f.search.stages, dict[str, Json]()
+    for stage in stages:
+        here = stage.chosen.term.cause if stage.chosen else None
+        for trial in stage.trials:
+            last = stage is stages[-1] and trial.term.cause not in named
+            if trial.term.cause == here or last:
+                made.setdefault(trial.term.form, _rival(trial, trial is stage.chosen))
+    return list(made.values())
+
+
+def _rival(trial: Trial, chosen: bool) -> Json:
+    return {
+        "name": trial.term.cause,
+        "title": trial.term.title,
+        "form": trial.term.form,
+        "gain": _gain(trial),
+        "behind": {"value": trial.behind, "interval": list(trial.behind_interval)},
+        "why": _why(trial, chosen),
+        "excluded": not chosen and (trial.excluded or not trial.passes),
+    }
+
+
+def _why(trial: Trial, chosen: bool) -> str:
+    """Return why a form stays or goes, in the words of the report."""
+    if chosen:
+        return "the best"
+    if not trial.passes:
+        return "gains too little"
+    return "surely worse" if trial.excluded else "not excluded"
+
+
+def error(f: Findings, model: Model) -> Json:
+    """Return the error on readings and on loads left out."""
+    loads = f.study.cells.loads[: f.study.lanes.loads]
+    kinds = {f"{f.study.lanes.kind}, one left out": model.held_out, "cells, fitted": model.rms}
+    for load, value in zip(loads, model.by_load.tolist(), strict=True):
+        kinds[f"{load:g} kg left out"] = value
+    if loads:
+        kinds["loads, one left out (mean)"] = model.left_load
+    more = {
+        "interval": list(error_interval(f.study, model.held)),
+        "times_floor": model.held_out / f.floor,
+        "kinds": kinds,
+    }
+    return {"contraction": _value(model.held_out, "mm", **more), "pressure": None}
+
+
+def experiment(f: Findings) -> Json | None:
+    """Return which loads to hang next, where two models are not told apart."""
+    if f.next is None:
+        return None
+    names = [law.term.form for law in f.laws] if f.bent else [t.term.cause for t in f.tied]
+    at = int(np.argmax(f.next.apart))
+    loads = " and ".join(f"{load:.1f} kg" for load in f.next.best)
+    separation = float(f.next.separation[at])
+    return {
+        "between": names[:2],
+        "name": "more loads",
+        "description": (
+            f"hang {loads}, cycles and repeats as before: there the two differ most, by "
+            f"{f.next.apart[at]:.2f} mm RMS over a cycle at {f.next.loads[at]:.1f} kg (the "
+            "separation is in variances of a cell's mean)"
+        ),
+        "segments": [],
+        "separation": separation,
+        "enough": bool(separation >= 1.0),
+        "sensor": None,
+    }
+
+
+def calibrated(f: Findings, number: Number) -> Json:
+    """Return a parameter of the load-blind part as fitted; no earlier value exists."""
+    made, scale = _number(f, number), units(number, f.study.cells.scale)
+    value, span = made["value"], (number.high - number.low) * scale
+    near = min(value - number.low * scale, number.high * scale - value)
+    return {
+        "name": number.name,
+        "unit": number.unit,
+        "before": None,
+        "after": value,
+        "interval": made["interval"],
+        "at_bound": bool(near < 1e-6 * span),
+        "outside_tolerance": False,
+    }
+
+
+def not_testable(f: Findings) -> list[Json]:
+    """Return the causes that no such table, or not this one, can show."""
+    reasons = dict.fromkeys(NO_TIME, "settled readings have no time") | OTHERWISE
+    have = len(f.study.cells.loads)
+    for term in TERMS:
+        if term.both_ways and not f.study.cells.falling.any():
+            reasons[term.cause] = "the pressure was never lowered"
+        if term.loads > have:
+            reasons[term.cause] = "there is one load"
+    return [{"name": name, "reason": reasons[name]} for name in sorted(reasons)]
+
+
+def warnings(f: Findings) -> list[str]:
+    """Return what to bear in mind."""
+    told = [*audit_table(f.table), *(point.sentence for point in f.set_points), STATIC]
+    told += [_zeros(f)] if _zeros(f) else []
+    if not np.isfinite(f.floor):
+        told.append("without repeats that differ no floor is known to hold the errors against")
+    if f.bent and f.laws[0].post_hoc:
+        told.append(
+            "an exponent of the load or a dead zone was chosen after seeing all loads: its error "
+            "on a load left out is post hoc, not held out"
+        )
+    if f.bent and not told_apart(f.study, f.laws):
+        one, other = f.laws[:2]
+        told.append(
+            f"a power {one.value:.2f} of the load and a dead zone of {other.value:.2f} kg fit "
+            f"alike ({one.model.rms:.3f} and {other.model.rms:.3f} mm on the cells): the readings "
+            "do not tell them apart"
+        )
+    return told
+
+
+def _zeros(f: Findings) -> str:
+    """Return the warning that the load's parameter depends on where contraction is zero."""
+    accepted = {trial.term.form for trial in f.search.accepted}
+    for stage in f.search.stages:
+        for trial in stage.trials:
+            other = trial.term.numbers[0]
+            same = trial.term.cause == "load_dependent_compliance" and other.unit == "bar/kg"
+            if same and trial.passes and not trial.excluded and trial.term.form not in accepted:
+                value = float(trial.model.fit.theta[0, -1]) * units(other, f.study.cells.scale)
+                return (
+                    f"the form '{trial.term.form}' does as well, with {value:.3f} bar/kg: how far "
+                    "a load alone stretches the muscle was not measured"
+                )
+    return ""
+
+
+def provenance(table: ContractionTable, seed: int) -> Json:
+    """Return where the numbers come from."""
+    columns = (table.load_kg, table.inflating, table.pressure_pa, table.repeat, table.contraction_m)
+    digest = hashlib.sha256(b"".join(column.tobytes() for column in columns)).hexdigest()
+    return {
+        "recording": f"{len(table.load_kg)} readings, sha256 {digest[:16]}",
+        "rig": None,
+        "plant_before": None,
+        "plant_after": None,
+        "package": _package(),
+        "seed": seed,
+    }
+
+
+def _package() -> str:
+    try:
+        return f"pam-envs {metadata.version('pam-envs')}"
+    except metadata.PackageNotFoundError:
+        return "pam-envs, not installed"
+
+
+def rung(stage: Stage) -> Json:
+    """Return a stage of the search: the model so far, and every form tried on it."""
+    return {
+        "model": [term.form for term in stage.parent.terms],
+        **_errors(stage.parent),
+        "chosen": stage.chosen.term.form if stage.chosen else None,
+        "tried": [
+            {
+                "name": trial.term.cause,
+                "form": trial.term.form,
+                **_errors(trial.model),
+                "p": trial.p,
+                "p_adjusted": trial.adjusted,
+                "gain": _gain(trial),
+                "accepted": trial.passes,
+                "excluded": trial.excluded or not trial.passes,
+            }
+            for trial in stage.trials
+        ],
+    }
+
+
+def _errors(model: Model) -> Json:
+    return {
+        "parameters": len(model.fit.numbers),
+        "cells_mm": model.rms,
+        "left_out_mm": model.held_out,
+        "load_left_out_mm": model.left_load,
+        "by_load_mm": model.by_load.tolist(),
+    }
+
+
+def paired(pair: Pair) -> Json:
+    """Return two causes fitted together, and which shows only beside the other."""
+    return {
+        "names": [term.cause for term in pair.terms],
+        "p_alone": list(pair.alone),
+        "p_beside": list(pair.beside),
+        "masked": [term.cause for term in pair.masked],
+    }
+
+
+def loads_left_out(f: Findings) -> Json | None:
+    """Return by how much effects linear in load cut the mean error on loads left out."""
+    if not f.study.lanes.loads:
+        return None
+    cut, (low, high) = load_cut(f.study, f.base, f.model)
+    return {
+        "before": _value(f.base.left_load, "mm"),
+        "after": _value(f.model.left_load, "mm"),
+        "cut_percent": {"value": 100.0 * cut, "interval": [100.0 * low, 100.0 * high]},
+    }
+
+
+def load_law(law: Law) -> Json:
+    """Return a load law other than linear."""
+    return {
+        "law": law.term.form,
+        "value": law.value,
+        "unit": law.term.numbers[0].unit,
+        "interval": list(law.interval),
+        "p": law.p,
+        **_errors(law.model),
+        "status": "post hoc, not held out" if law.post_hoc else "held out",
+    }
+
+
+def lacking(f: Findings, model: Model) -> Json:
+    """Return the lack of fit: F and p against the repeats, and its size."""
+    ratio, p, size = lack_of_fit(f.study, model)
+    return {"F": ratio, "p": p, "size": _value(size, "mm")}
+
+
+def curves(f: Findings) -> Json:
+    """Return what the figures show, cell by cell: bar, kg and mm."""
+    cells, mm = f.study.cells, f.study.cells.millimetres
+    return {
+        "load_kg": [cells.loads[g] for g in cells.group],
+        "pressure_bar": (cells.pressure * cells.scale[1] / BAR).tolist(),
+        "deflating": cells.falling.tolist(),
+        "used": cells.used.tolist(),
+        "path": cells.path.tolist(),
+        "measured_mm": (cells.mean * mm).tolist(),
+        "readings_mm": (cells.readings * (cells.scale[2] / MM)).tolist(),
+        "base_mm": (f.base.fit.predict(cells)[0] * mm).tolist(),
+        "extended_mm": (f.model.fit.predict(cells)[0] * mm).tolist(),
+        "effects_mm": {t.term.cause: effect(f, t.term).tolist() for t in f.search.accepted},
+    }

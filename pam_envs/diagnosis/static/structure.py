@@ -1,0 +1,125 @@
+"""Against what the residual of a static model varies, and how alike its causes look."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from pam_envs.diagnosis.static.cells import Cells
+from pam_envs.diagnosis.static.compare import Model, Study, beyond, slopes
+from pam_envs.diagnosis.static.models import Term, predict
+from pam_envs.diagnosis.static.search import available
+
+Array = NDArray[np.float64]
+Json = dict[str, Any]
+
+LAGS = 6
+"""Neighbours that the test of whiteness looks at."""
+DEGREE = 3
+"""Degree of the flexible model, one polynomial for each load and way."""
+
+
+def whiteness(cells: Cells, model: Model) -> float:
+    """Return the p-value that neighbouring residuals of a path are unrelated (Ljung-Box)."""
+    paths = [model.residual[(cells.path == k) & cells.used] for k in np.unique(cells.path)]
+    paths = [path - path.mean() for path in paths if len(path) > LAGS]
+    n = sum(len(path) for path in paths)
+    power = sum(float(path @ path) for path in paths)
+    if power <= 0.0:
+        return float("nan")
+    lags = range(1, LAGS + 1)
+    rho = [sum(float(path[k:] @ path[:-k]) for path in paths) / power for k in lags]
+    statistic = sum(n * (n + 2) * r**2 / (n - k) for k, r in zip(lags, rho, strict=True))
+    return float(chi2.sf(statistic, LAGS))
+
+
+def explained(values: Array, labels: NDArray[Any]) -> float:
+    """Return the adjusted share of variance that means by label explain, at least 0."""
+    _, member = np.unique(labels, return_inverse=True)
+    count = np.bincount(member)
+    means = np.bincount(member, values) / count
+    return _adjusted(float(np.sum((values - means[member]) ** 2)), len(count), values)
+
+
+def _adjusted(left: float, fitted: int, values: Array) -> float:
+    total, free = float(np.sum((values - values.mean()) ** 2)), len(values) - fitted
+    if free < 1 or total <= 0.0:
+        return 0.0
+    return max(0.0, 1.0 - left / free / (total / (len(values) - 1)))
+
+
+def explained_by_polynomials(cells: Cells, residual: Array) -> float:
+    """Return the adjusted share of variance that polynomials by load and way explain."""
+    left, fitted = 0.0, 0
+    for group in range(len(cells.loads)):
+        for falling in (False, True):
+            here = cells.used & (cells.group == group) & (cells.falling == falling)
+            degree = min(DEGREE, len(np.unique(cells.pressure[here])) - 1)
+            if degree >= 0:
+                x, y = cells.pressure[here], residual[here]
+                left += float(np.sum((y - np.polyval(np.polyfit(x, y, degree), x)) ** 2))
+                fitted += degree + 1
+    return _adjusted(left, fitted, residual[cells.used])
+
+
+def since_reversal(cells: Cells) -> NDArray[np.int64]:
+    """Return how many readings ago the pressure turned, or the path began, shape (C,)."""
+    fresh = np.ones(len(cells.path), bool)
+    fresh[1:] = (np.diff(cells.path) != 0) | (cells.falling[1:] != cells.falling[:-1])
+    start = np.maximum.accumulate(np.where(fresh, np.arange(len(fresh)), 0))
+    return np.asarray(np.arange(len(fresh)) - start)
+
+
+def structure(cells: Cells, model: Model) -> Json:
+    """Return the ``residual_structure`` of a model: whiteness and shares of variance."""
+    used, residual = cells.used, model.residual[cells.used]
+    readings = (cells.readings - cells.mean)[:, used] * cells.millimetres + residual
+    number = np.broadcast_to(np.arange(len(readings))[:, None], readings.shape)
+    seen = np.isfinite(readings)
+    r2 = {
+        "direction": explained(residual, cells.falling[used]),
+        "rate": None,
+        "pressure": explained(residual, cells.pressure[used]),
+        "load": explained(residual, cells.load[used]),
+        "time_since_reversal": explained(residual, since_reversal(cells)[used]),
+        "time": None,
+        "temperature": None,
+        "cycle": explained(readings[seen], number[seen]),
+    }
+    contraction = {
+        "ljung_box_p": whiteness(cells, model),
+        "r2": r2,
+        "flexible_r2": explained_by_polynomials(cells, model.residual),
+        "peak": None,
+    }
+    return {"contraction": contraction, "pressure": None}
+
+
+def isolability(study: Study) -> Json:
+    """Return how alike small causes look once the base has been refitted.
+
+    Each cause is added to the base at its meaningful size, in its best known form; what a refit of
+    the base would swallow is taken out.
+    """
+    first = dict[str, Term]()
+    for term in available(study):
+        first.setdefault(term.cause, term)
+    fitted, weight = study.base.fit, study.lanes.weight[0]
+    values = {n.name: fitted.theta[:1, [i]] for i, n in enumerate(fitted.numbers)}
+    at = predict(study.cells, values)
+    columns = np.empty((len(weight), len(first)))
+    for i, term in enumerate(first.values()):
+        added = {n.name: np.array([[n.neutral + n.size]]) for n in term.numbers}
+        columns[:, i] = (predict(study.cells, values | added) - at)[0] * weight
+    left = beyond(slopes(study, study.base), columns)
+    size = np.linalg.norm(left, axis=0)
+    absorbed = 1.0 - size / np.maximum(np.linalg.norm(columns, axis=0), 1e-30)
+    unit = left / np.maximum(size, 1e-30)
+    return {
+        "names": list(first),
+        "cosine": np.abs(unit.T @ unit).tolist(),
+        "absorbed": dict(zip(first, absorbed.tolist(), strict=True)),
+    }

@@ -1,0 +1,272 @@
+"""The single environment: the only ``step`` there is."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.envs.core.info import Info
+from pam_envs.envs.core.setup import BEGIN, STEP, Setup, check_seed, check_state, saved
+from pam_envs.kernels.build import COMPILED, address_book
+from pam_envs.kernels.random import seed_words
+from pam_envs.parameters import Signals
+
+INTERPRETED_CALLS = 50
+"""Steps after which an environment changes from plain Python to machine code."""
+
+
+def space_of(signals: Signals) -> gym.spaces.Box[np.float32]:
+    """Return the Box of a vector of signals."""
+    low = [-1.0 if s.normalized else s.low for s in signals]
+    high = [1.0 if s.normalized else s.high for s in signals]
+    return gym.spaces.Box(np.array(low, np.float32), np.array(high, np.float32), dtype=np.float32)
+
+
+def fresh_seed() -> int:
+    """Return a seed from the operating system's entropy."""
+    return int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 1)
+
+
+class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
+    """An environment around a plant: a batch of one, run by the kernels that run a batch.
+
+    ``reset(seed=s)`` starts episode 0 of the seed; ``reset()`` starts the next one. All random
+    numbers are a function of seed, episode, stream and draw; ``np_random`` is never drawn from.
+    """
+
+    metadata = {"render_modes": ["rgb_array", "human"], "render_fps": 100}
+
+    def __init__(self, setup: Setup) -> None:
+        self.setup = setup
+        self.plant = setup.plant
+        self.signals = setup.signals
+        self.action_signals = setup.action_signals
+        self.render_mode = setup.render_mode
+        self.observation_space: gym.spaces.Box[np.float32] = space_of(setup.signals)
+        self.action_space: gym.spaces.Box[np.float32] = space_of(setup.action_signals)
+        self.control_period = setup.control_period
+        self._seed: int | None = None
+        self._steps = -1
+        self._renderer: Any = None
+        self._n_actions = len(setup.action_signals)
+        self._keys = setup.info_keys
+        self._run: Any = None
+        self._all: Any = None
+        self._action_cells: Any = None
+        self._warming = INTERPRETED_CALLS if COMPILED else 0
+        self._use(setup.kernels.interpreted, compiled=False)
+
+    def _use(self, function: Any, compiled: bool) -> None:
+        """Run on ``function`` from here on: plain Python on lists, or machine code on arrays.
+
+        A new environment begins in plain Python, which is ready at once, and changes to machine
+        code, which takes a while to load or to compile, when it has been stepped a few times. The
+        bits are the same.
+        """
+        setup = self.setup
+        arrays = [
+            *(setup.state(1, 1) if self._run is None else map(np.array, self._all)),
+            *setup.shared,
+            np.zeros((1, len(setup.action_signals))),
+            np.zeros((2, 1, len(setup.signals)), np.float32),
+            np.zeros((2, len(setup.info_keys) + 1, 1)),
+            np.zeros((2, 1), np.int8),
+        ]
+        held = arrays if compiled else [a.tolist() for a in arrays]
+        self._all = tuple(held[:4])
+        self._counts = self._all[2][0]
+        *_, self._actions, self._observations, self._infos, self._flags = held
+        self._run, self._compiled = function, compiled
+        self._arguments: tuple[Any, ...] = (*held, 1)
+        if compiled:
+            self._held, self._arguments = held, (address_book(held),)
+            self._action_cells = memoryview(self._actions.ravel())
+            self._reward_cell = memoryview(self._infos[0, 0])
+            self._info_cells = memoryview(self._infos[0, 1:].ravel())
+            self._flag_cells = memoryview(self._flags.ravel())
+            self._observation = self._observations[0, 0]
+        else:
+            self._action_cells = self._actions[0]
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], Info]:
+        """Start an episode; see Gymnasium."""
+        a, b, episode = self.setup.seed_rows
+        if seed is not None or self._seed is None:
+            self._seed = fresh_seed() if seed is None else check_seed(seed)
+            super().reset(seed=self._seed % 2**63)
+            self._counts[a][0], self._counts[b][0] = seed_words(self._seed)
+            self._counts[episode][0] = 0
+        else:
+            self._counts[episode][0] += 1
+        self._flags[0][0], self._flags[1][0] = 1, 0
+        self._run(*self._arguments, BEGIN)
+        self._steps = 0
+        observation, info, _, _, _ = self._read()
+        if self.render_mode is not None:
+            self._draw(info, start=True)
+        return observation, info
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], float, bool, bool, Info]:
+        """Apply an action for one control period; see Gymnasium.
+
+        Raises
+        ------
+        ValueError
+            If the action is not finite or has the wrong shape; nothing has changed then.
+        """
+        if self._steps < 0:
+            raise gym.error.ResetNeeded("call reset() before step()")
+        self._take(action)
+        self._run(*self._arguments, STEP)
+        self._steps += 1
+        observation, info, reward, terminated, truncated = self._read()
+        if self.render_mode is not None:
+            self._draw(info)
+        return observation, reward, terminated, truncated, info
+
+    def _take(self, action: Any) -> None:
+        """Check an action and hand it to the kernel."""
+        if self._warming:
+            self._warm()
+        cells, i = self._action_cells, 0
+        try:
+            for value in action.tolist():
+                if not isfinite(value):
+                    raise TypeError
+                cells[i] = value
+                i += 1
+        except (AttributeError, TypeError, IndexError):
+            i = -1
+        if i != self._n_actions:
+            for i, value in enumerate(self._as_action(action)):
+                cells[i] = value
+
+    def _warm(self) -> None:
+        """Count a step in plain Python, and change to machine code after enough of them."""
+        self._warming -= 1
+        if not self._warming:
+            self._use(self.setup.kernels.single, compiled=True)
+
+    def _as_action(self, action: Any) -> list[float]:
+        """Return an action as a list of numbers, or say what is wrong with it."""
+        shape = (self._n_actions,)
+        try:
+            if np.iscomplexobj(action):
+                raise TypeError("complex numbers")
+            made = np.asarray(action, np.float64)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise ValueError(
+                f"the action {str(action)[:60]!r} is not an array of {shape[0]} numbers: {error}"
+            ) from error
+        if made.shape != shape:
+            raise ValueError(
+                f"the action has shape {made.shape}, expected {shape}: one number for each of "
+                + ", ".join(self.action_signals.names())
+            )
+        for i, value in enumerate(made.tolist()):
+            if not isfinite(value):
+                low, high = self.action_space.low[i], self.action_space.high[i]
+                raise ValueError(
+                    f"action[{i}] ({self.action_signals[i].name}) is {value}; "
+                    f"give a finite number between {low:g} and {high:g}"
+                )
+        values: list[float] = made.tolist()
+        return values
+
+    def _read(self) -> tuple[NDArray[np.float32], Info, float, bool, bool]:
+        """Return observation, info, reward and flags of the last call."""
+        if self._compiled:
+            flags, cells = self._flag_cells, self._info_cells
+            info = Info(self._keys, cells[0], cells.tobytes())
+            given: float = self._reward_cell[0]
+            return self._observation.copy(), info, given, flags[0] == 1, flags[1] == 1
+        reward, *values = (float(row[0]) for row in self._infos[0])
+        observation = np.array(self._observations[0][0], np.float32)
+        ended = [row[0] == 1 for row in self._flags]
+        info = Info(self._keys, values[0], np.array(values).tobytes())
+        return observation, info, reward, ended[0], ended[1]
+
+    def _draw(self, info: Info, start: bool = False) -> None:
+        """Keep what a picture needs, and show it at once in the ``human`` mode."""
+        if self._renderer is None:
+            from pam_envs.envs.rendering.renderer import make_renderer
+
+            self._renderer = make_renderer(self)
+        self._renderer.record(info, start)
+        if self.render_mode == "human":
+            self._renderer.show()
+
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """Return a picture, shape (height, width, 3), in the mode ``"rgb_array"``."""
+        if self.render_mode is None:
+            gym.logger.warn("render() needs render_mode='rgb_array' or 'human' in gym.make")
+            return None
+        if self._steps < 0:
+            raise gym.error.ResetNeeded("call reset() before render()")
+        if self._renderer is None:  # a copy, or closed in between: the past is not known
+            self._draw(self._read()[1], start=True)
+        if self.render_mode == "human":
+            return None
+        picture: NDArray[np.uint8] = self._renderer.picture()
+        return picture
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def get_state(self) -> dict[str, NDArray[Any]]:
+        """Return everything that the future depends on, as arrays that own their data."""
+        seed = -1 if self._seed is None else self._seed
+        return {
+            **saved(self._all),
+            "infos": np.array(self._infos, np.float64),
+            "steps": np.array(self._steps),
+            "seed": np.frombuffer(str(seed).encode(), np.uint8).copy(),
+        }
+
+    def set_state(self, state: dict[str, NDArray[Any]]) -> None:
+        """Go back to a state of :meth:`get_state`, to the last bit.
+
+        Raises
+        ------
+        ValueError
+            If the state is of another kind of environment; nothing has changed then.
+        """
+        parts = check_state(state, self.setup.state(1, 1))
+        try:
+            steps = int(state["steps"])
+            seed = int(np.asarray(state["seed"], np.uint8).tobytes().decode())
+            infos = np.asarray(state["infos"], np.float64).reshape(np.shape(self._infos))
+        except (KeyError, ValueError, TypeError) as error:
+            raise ValueError(f"the state was not made by get_state: {error!r}") from error
+        for to, part in zip(self._all, parts, strict=True):
+            for i, value in enumerate(part[0].tolist()):
+                to[0][i][0] = value[0]
+        for to, part in zip(self._infos, infos, strict=True):  # the last report, for a picture
+            for k, value in enumerate(part.tolist()):
+                to[k][0] = value[0]
+        self._steps, self._seed = steps, None if seed < 0 else seed
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Pickle and deepcopy through :meth:`get_state`."""
+        return {
+            "setup": self.setup,
+            "state": self.get_state(),
+            "spec": self.spec,
+        }
+
+    def __setstate__(self, pickled: dict[str, Any]) -> None:
+        """Rebuild the environment in the pickled state."""
+        PlantEnv.__init__(self, pickled["setup"])
+        self.spec = pickled["spec"]
+        self.set_state(pickled["state"])

@@ -1,0 +1,266 @@
+"""What an environment is made of, checked and laid out for the kernels.
+
+A :class:`Setup` is built once from the keyword arguments. The single environment and the batched
+one hold the same setup and differ only in the number of lanes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.envs.core.step import EPISODE, N_SEED
+from pam_envs.kernels.build import COMPILED, LANES
+from pam_envs.parameters import Signals
+
+STEP, STEP_AND_RESTART, BEGIN = 0, 1, 2
+"""Modes of the kernels: step; step and start what has ended anew; start what is flagged."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A checked configuration.
+
+    Attributes
+    ----------
+    plant : object
+        The plant that is simulated.
+    signals, action_signals : Signals
+        What the observation and the action hold.
+    kernels : object
+        With ``single``, ``batch`` and ``parallel``, which take the arrays of a batch and a mode.
+    rows, fixed, counts : int
+        Rows of state, of parameters and of integer state of one environment.
+    drawn : bool
+        Whether environments differ in their parameters; otherwise all tiles share them.
+    ring : int
+        References that are kept for the previews: a power of two for each channel.
+    seed_rows : tuple of int
+        Integer rows of the two key words and of the episode number.
+    info_keys : tuple of str
+        Keys of ``info``, in the order in which the kernels write them.
+    shared : tuple of arrays
+        What all environments share, in the order of the kernels' arguments.
+    control_period, episode_seconds : float
+        Seconds.
+    render_mode : str or None
+        As Gymnasium means it.
+    view : str
+        What pictures show, by its name in ``rendering_scene``.
+    """
+
+    plant: Any
+    signals: Signals
+    action_signals: Signals
+    kernels: Any
+    rows: int
+    fixed: int
+    drawn: bool
+    counts: int
+    ring: int
+    seed_rows: tuple[int, int, int]
+    info_keys: tuple[str, ...]
+    shared: tuple[Any, ...]
+    control_period: float
+    episode_seconds: float
+    render_mode: str | None = None
+    view: str = ""
+
+    def state(self, tiles: int, lanes: int) -> tuple[NDArray[Any], ...]:
+        """Return zeroed state, parameters, integers and previews for tiles of ``lanes`` lanes."""
+        return (
+            np.zeros((tiles, self.rows, lanes)),
+            np.zeros((tiles if self.drawn else 1, self.fixed, lanes)),
+            np.zeros((tiles, self.counts, lanes), np.int64),
+            np.zeros((tiles, self.ring, lanes)),
+        )
+
+
+def compose(
+    plant: Any,
+    kernels: Any,
+    given: Any,
+    *,
+    signals: Signals,
+    actions: Signals,
+    config: Sequence[float],
+    choices: Sequence[int],
+    own: NDArray[np.float64],
+    samples: NDArray[np.float64],
+    tables: NDArray[np.float64],
+    spread: NDArray[np.float64],
+    drawn: bool,
+    view: str | None = None,
+) -> Setup:
+    """Return the setup of an environment from what its family adds to what all share.
+
+    Parameters
+    ----------
+    plant : object
+        With ``control_period``, ``substeps``, ``members``, ``parameter_rows``, ``family``.
+    kernels : Kernels
+        Of :mod:`pam_envs.envs.core.families`.
+    given : Common
+        Of :mod:`pam_envs.envs.core.arguments`.
+    signals, actions : Signals
+        Of observation and action.
+    config, choices : sequence of numbers
+        The family's own, behind those that all families share.
+    own : ndarray, shape (n, m)
+        The family's own rows of the settings.
+    samples : ndarray, shape (channels, n)
+        References that are given as samples.
+    tables : ndarray, shape (members, n, m)
+        What the memories of the plant and its members are made of.
+    spread : ndarray, shape (n, 3)
+        Row, low and high of each parameter that is drawn.
+    drawn : bool
+        Whether episodes differ in their parameters.
+    view : str, optional
+        What pictures show; default: the plant's family.
+    """
+    members = plant.members() if drawn else (plant,)
+    blocks = [
+        np.array([(plant.control_period, given.seconds, *config)]),
+        np.array([_action_scale(signal) for signal in actions]),
+        scales_of(signals),
+        spread,
+        np.array([member.parameter_rows() for member in members]),
+        own,
+    ]
+    first = np.cumsum([0, *map(len, blocks)]).tolist()
+    settings = np.zeros((first[-1], max(block.shape[1] for block in blocks)))
+    for begin, block in zip(first, blocks, strict=False):
+        settings[begin : begin + len(block), : block.shape[1]] = block
+    sizes = (plant.substeps, len(actions), len(signals), given.preview, given.stride)
+    whole = (*sizes, len(spread), len(members), *first[1:6], *choices)
+    ring = 1 << (given.preview * given.stride).bit_length()
+    return Setup(
+        plant=plant,
+        signals=signals,
+        action_signals=actions,
+        kernels=kernels,
+        rows=kernels.n_rows,
+        fixed=kernels.n_parameters,
+        drawn=drawn,
+        counts=kernels.n_counts,
+        ring=kernels.channels * ring,
+        seed_rows=(kernels.n_counts - N_SEED, kernels.n_counts - N_SEED + 1, EPISODE),
+        info_keys=kernels.info,
+        shared=(tables[: len(members)], samples, settings, np.array(whole, np.int64)),
+        control_period=plant.control_period,
+        episode_seconds=given.seconds,
+        render_mode=given.render_mode,
+        view=view or plant.family,
+    )
+
+
+def _action_scale(signal: Any) -> tuple[float, float, float, float]:
+    """Return ``scale, offset, low, high``: the set-point is ``scale * clip(action) + offset``."""
+    a, b = signal.scale
+    low, high = (-1.0, 1.0) if signal.normalized else (signal.low, signal.high)
+    return 1.0 / a, -b / a, low, high
+
+
+def for_kernels(array: Any) -> Any:
+    """Return an array as the kernels want it: itself, or nested lists when uncompiled."""
+    return array if COMPILED else array.tolist()
+
+
+def tiles_for(number: int) -> int:
+    """Return how many tiles hold ``number`` environments."""
+    return -(-number // LANES)
+
+
+def scales_of(signals: Signals) -> NDArray[np.float64]:
+    """Return ``a, b, low, high`` of each signal: its entry is ``clip(a * si + b, low, high)``.
+
+    The bounds are rounded to single precision inwards, so that a clipped value lies in the space.
+    """
+    table = np.empty((len(signals), 4))
+    for i, signal in enumerate(signals):
+        low, high = (-1.0, 1.0) if signal.normalized else (signal.low, signal.high)
+        table[i] = *signal.scale, float(np.float32(low)), float(np.float32(high))
+    return table
+
+
+def check_choice(name: str, value: Any, choices: Sequence[Any]) -> None:
+    """Raise a clear error if ``value`` is not one of ``choices``."""
+    if not any(value is c or (type(value) is type(c) and value == c) for c in choices):
+        listed = ", ".join(repr(c) for c in choices)
+        raise ValueError(f"{name} = {value!r} is not known; choose one of {listed}")
+
+
+def check_number(name: str, value: Any, low: float, high: float, unit: str) -> float:
+    """Return ``value`` as a float, or raise naming value, bounds and remedy."""
+    good = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    if not good or not math.isfinite(value) or not low <= value <= high:
+        raise ValueError(
+            f"{name} = {value!r} must be a number from {low:g} to {high:g} {unit}".rstrip()
+            + "; change it to lie within"
+        )
+    return float(value)
+
+
+def check_whole(name: str, value: Any, low: int, high: int) -> int:
+    """Return ``value`` as an int, or raise naming value, bounds and remedy."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
+        raise ValueError(f"{name} = {value!r} must be a whole number from {low} to {high}")
+    if not low <= value <= high:
+        raise ValueError(f"{name} = {value} must be from {low} to {high}; change it to lie within")
+    return int(value)
+
+
+def check_seed(seed: Any) -> int:
+    """Return a seed as a non-negative int, or raise."""
+    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise ValueError(f"seed = {seed!r} must be a non-negative whole number")
+    return int(seed)
+
+
+STATE_KEYS = ("rows", "fixed", "counts", "ahead")
+
+
+def saved(parts: tuple[Any, ...]) -> dict[str, NDArray[Any]]:
+    """Return copies of the parts of a state, as arrays by name."""
+    kinds = {"counts": np.int64}
+    return {
+        name: np.array(part, kinds.get(name, np.float64))
+        for name, part in zip(STATE_KEYS, parts, strict=True)
+    }
+
+
+def check_state(state: Any, wanted: tuple[NDArray[Any], ...]) -> list[NDArray[Any]]:
+    """Return the parts of a saved state as new arrays.
+
+    Raises
+    ------
+    ValueError
+        If a part is missing, has the shape of other arguments, or holds what no state holds.
+    """
+    parts = []
+    for name, like in zip(STATE_KEYS, wanted, strict=True):
+        if name not in state:
+            raise ValueError(f"the state has no {name!r}: it was not made by get_state")
+        shape = np.shape(state[name])
+        if shape != like.shape:
+            raise ValueError(
+                f"the state's {name!r} has shape {shape}, this environment {like.shape}: it was "
+                "taken with other arguments"
+            )
+        try:
+            part = np.array(state[name], like.dtype)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise ValueError(f"the state's {name!r} are not numbers: {error}") from error
+        wrong = part < 0 if name == "counts" else ~np.isfinite(part)
+        if wrong.any():
+            raise ValueError(
+                f"the state's {name!r} hold {part[wrong][0]}, which no state of get_state does"
+            )
+        parts.append(part)
+    return parts

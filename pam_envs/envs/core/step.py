@@ -1,0 +1,319 @@
+"""One step of any environment: actions, plant, references, observation, reward, end, reset.
+
+The same functions serve one environment (a tile of one lane) and a batch (tiles of 32 lanes). What
+sets a family apart is five functions and a few sizes, which take the place of the placeholders
+below when the kernels are built (see :mod:`pam_envs.envs.core.families`).
+
+Layout that all families share:
+
+* ``counts``: KEY_A, KEY_B, EPISODE, STEP, the family's own, and last the two words of the seed.
+* ``rows``: the family's; the set-points stand in one block, those of the period before in another.
+* ``work``: the plant's scratch, ``info`` (time, reference, output, the reward's terms, ...,
+  saturated), whether a limit has been broken, the observation in SI.
+* ``settings``: row 0 the configuration; the rows of ``choices[AT_...]``: ``scale, offset, low,
+  high`` of each action, ``a, b, low, high`` of each signal, ``row, low, high`` of each drawn
+  parameter, the parameters of each member, and the family's own.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pam_envs.kernels.build import LANES, array_at, kernel, prange, routine, scratch, tile_view
+from pam_envs.kernels.random import episode_key, uniform
+
+KEY_A, KEY_B, EPISODE, STEP = range(4)
+"""Integer rows that every family begins with."""
+N_SEED = 2
+"""Integer rows that every family ends with: the key words of the seed."""
+
+CONFIG = ("period", "episode_seconds")
+"""Numbers that every configuration begins with."""
+PERIOD, EPISODE_SECONDS = range(len(CONFIG))
+FIRST_CONFIG = len(CONFIG)
+"""First number of the configuration that is the family's own."""
+
+CHOICES = (
+    "substeps",
+    "actions",
+    "signals",
+    "preview",
+    "stride",
+    "spread",
+    "members",
+    "at_actions",
+    "at_scales",
+    "at_spread",
+    "at_members",
+    "at_own",
+)
+(
+    SUBSTEPS,
+    N_ACTIONS,
+    N_SIGNALS,
+    PREVIEW,
+    STRIDE,
+    N_SPREAD,
+    N_MEMBERS,
+    AT_ACTIONS,
+    AT_SCALES,
+    AT_SPREAD,
+    AT_MEMBERS,
+    AT_OWN,
+) = range(len(CHOICES))
+FIRST_CHOICE = len(CHOICES)
+"""First whole number of the configuration that is the family's own."""
+MOST_PREVIEW = 20
+
+TIME, REFERENCE, OUTPUT, REWARDS = range(4)
+"""Places in ``info`` that every family begins with; ``saturated`` is the last one."""
+
+RANDOM = 4
+"""Random stream of member and parameters; families number theirs around it."""
+
+N_ROWS = N_PARAMETERS = N_COUNTS = N_WORK_ROWS = 0  # placeholders, filled in for each family
+FIRST_INFO = N_INFO = N_REWARDS = CHANNELS = FIRST_SET_POINT = FIRST_OLD_SET_POINT = 0
+env_apply: Any = None
+env_advance: Any = None
+env_reference: Any = None
+env_evaluate: Any = None
+env_begin: Any = None
+
+
+@kernel
+def nothing_happens(
+    rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any
+) -> None:
+    """Leave the world as it is: an ``env_apply`` for plants that carry their world inside."""
+
+
+@kernel
+def take_actions(
+    rows: Any, settings: Any, choices: Any, work: Any, actions: Any, start: int
+) -> None:
+    """Turn actions into set-points."""
+    saturated, last = work[FIRST_INFO + N_INFO - 1], len(actions) - 1
+    for k in range(choices[N_ACTIONS]):
+        scale = settings[choices[AT_ACTIONS] + k]
+        set_point, older = rows[FIRST_SET_POINT + k], rows[FIRST_OLD_SET_POINT + k]
+        for j in range(LANES):
+            wanted = float(actions[min(start + j, last)][k])
+            held = max(scale[2], min(scale[3], wanted))
+            clipped = 0.0 if held == wanted else 1.0
+            saturated[j] = clipped if k == 0 else max(saturated[j], clipped)
+            older[j] = set_point[j]
+            set_point[j] = scale[0] * held + scale[1]
+
+
+@kernel
+def look_ahead(
+    rows: Any, fixed: Any, counts: Any, ahead: Any, samples: Any, settings: Any, choices: Any
+) -> None:
+    """Add the newest previewed references to the rings of those to come."""
+    step, ring, far = counts[STEP], len(ahead) // CHANNELS, choices[PREVIEW] * choices[STRIDE]
+    for channel in range(CHANNELS):
+        first = channel * ring
+        for j in range(LANES):
+            k = step[j] + far
+            ahead[first + (k & (ring - 1))][j] = env_reference(
+                rows, fixed, samples, settings, choices, k, j, channel
+            )
+
+
+@kernel
+def write_references(counts: Any, ahead: Any, choices: Any, work: Any, first: int) -> None:
+    """Write each channel's reference and its preview to ``work``, channel after channel."""
+    step, ring, stride = counts[STEP], len(ahead) // CHANNELS, choices[STRIDE]
+    count = choices[PREVIEW] + 1
+    for channel in range(CHANNELS):
+        for i in range(count):
+            sample = work[first + channel * count + i]
+            for j in range(LANES):
+                sample[j] = ahead[channel * ring + ((step[j] + i * stride) & (ring - 1))][j]
+
+
+@routine
+def reset_lane(
+    rows: Any,
+    fixed: Any,
+    counts: Any,
+    ahead: Any,
+    tables: Any,
+    samples: Any,
+    settings: Any,
+    choices: Any,
+    work: Any,
+    j: int,
+) -> None:
+    """Start the episode of lane ``j`` that its episode counter names."""
+    seed = N_COUNTS - N_SEED
+    key_a = episode_key(counts[seed][j], counts[EPISODE][j])
+    key_b = episode_key(counts[seed + 1][j], counts[EPISODE][j])
+    counts[KEY_A][j], counts[KEY_B][j], counts[STEP][j] = key_a, key_b, 0
+    member = int(uniform(key_a, key_b, RANDOM, 0) * choices[N_MEMBERS])
+    for k in range(N_PARAMETERS):
+        fixed[k][j] = settings[choices[AT_MEMBERS] + member][k]
+    for k in range(choices[N_SPREAD]):
+        drawn = settings[choices[AT_SPREAD] + k]
+        u = uniform(key_a, key_b, RANDOM, 1 + k)
+        fixed[int(drawn[0])][j] = drawn[1] + (drawn[2] - drawn[1]) * u
+    work[FIRST_INFO + N_INFO - 1][j] = 0.0
+    env_begin(rows, fixed, counts, tables, samples, settings, choices, work, member, j)
+    ring = len(ahead) // CHANNELS
+    for channel in range(CHANNELS):
+        for k in range(choices[PREVIEW] * choices[STRIDE] + 1):
+            ahead[channel * ring + k][j] = env_reference(
+                rows, fixed, samples, settings, choices, k, j, channel
+            )
+
+
+@routine
+def copy_lane(rows: Any, fixed: Any, counts: Any, ahead: Any, source: int, to: int) -> None:
+    """Make one lane of a tile a copy of another."""
+    for k in range(len(rows)):
+        rows[k][to] = rows[k][source]
+    for k in range(len(fixed)):
+        fixed[k][to] = fixed[k][source]
+    for k in range(len(counts)):
+        counts[k][to] = counts[k][source]
+    for k in range(len(ahead)):
+        ahead[k][to] = ahead[k][source]
+
+
+@routine
+def write_lane(
+    work: Any, settings: Any, choices: Any, observation: Any, info: Any, row: int, j: int
+) -> None:
+    """Copy lane ``j`` of ``work`` to row ``row`` of the outputs."""
+    for i in range(choices[N_SIGNALS]):
+        scale = settings[choices[AT_SCALES] + i]
+        value = scale[0] * work[FIRST_INFO + N_INFO + 1 + i][j] + scale[1]
+        observation[row][i] = max(scale[2], min(scale[3], value))
+    for k in range(1, len(info)):
+        info[k][row] = work[FIRST_INFO + k - 1][j]
+
+
+@kernel
+def write_tile(
+    work: Any,
+    settings: Any,
+    choices: Any,
+    observation: Any,
+    info: Any,
+    flags: Any,
+    start: int,
+    lanes: int,
+) -> int:
+    """Copy a tile to the outputs; return how many of its episodes are over."""
+    over = 0
+    config, reward, time, ended = settings[0], info[0], work[FIRST_INFO], work[FIRST_INFO + N_INFO]
+    last = config[EPISODE_SECONDS] - 0.5 * config[PERIOD]
+    for j in range(lanes):
+        terminated = 1 if ended[j] > 0.0 else 0
+        truncated = 1 if time[j] >= last else 0
+        flags[0][start + j] = terminated
+        flags[1][start + j] = truncated
+        over = over + terminated + truncated
+        total = work[FIRST_INFO + REWARDS][j]
+        for k in range(1, N_REWARDS):
+            total = total + work[FIRST_INFO + REWARDS + k][j]
+        reward[start + j] = total
+    for i in range(choices[N_SIGNALS]):
+        value, scale = work[FIRST_INFO + N_INFO + 1 + i], settings[choices[AT_SCALES] + i]
+        a, b, low, high = scale[0], scale[1], scale[2], scale[3]
+        for j in range(lanes):
+            observation[start + j][i] = max(low, min(high, a * value[j] + b))
+    for k in range(1, len(info)):
+        report, value = info[k], work[FIRST_INFO + k - 1]
+        for j in range(lanes):
+            report[start + j] = value[j]
+    return over
+
+
+@kernel
+def step_tiles(
+    all_rows: Any,
+    all_fixed: Any,
+    all_counts: Any,
+    all_ahead: Any,
+    tables: Any,
+    samples: Any,
+    settings: Any,
+    choices: Any,
+    actions: Any,
+    observations: Any,
+    infos: Any,
+    flags: Any,
+    number: int,
+    mode: int,
+) -> None:
+    """Step or reset a batch, tile by tile.
+
+    ``mode`` 0 steps; 1 steps and starts the next episode of what has ended; 2 starts the episodes
+    of the environments whose ``flags[0]`` is set, and does not step. ``observations[0]`` and
+    ``infos[0]`` are the present ones, ``[1]`` those at the end of an episode that has been
+    followed by the next. ``infos[...][0]`` is the reward.
+    """
+    observation, info = observations[0], infos[0]
+    for tile in prange(len(all_rows)):
+        rows = tile_view(all_rows, tile, N_ROWS, LANES)
+        fixed = tile_view(all_fixed, min(tile, len(all_fixed) - 1), N_PARAMETERS, LANES)
+        counts = tile_view(all_counts, tile, N_COUNTS, LANES)
+        ahead = all_ahead[tile]
+        work = scratch(N_WORK_ROWS, LANES)
+        start = tile * LANES
+        lanes = min(LANES, number - start)
+        if mode < 2:
+            take_actions(rows, settings, choices, work, actions, start)
+            env_apply(rows, fixed, counts, settings, choices, work)
+            env_advance(rows, fixed, counts, tables, samples, settings, choices, work)
+            for j in range(LANES):
+                counts[STEP][j] = counts[STEP][j] + 1
+            look_ahead(rows, fixed, counts, ahead, samples, settings, choices)
+        else:
+            for j in range(lanes):
+                if flags[0][start + j] > 0:
+                    reset_lane(
+                        rows, fixed, counts, ahead, tables, samples, settings, choices, work, j
+                    )
+            for j in range(lanes, LANES):  # the rest of the last tile computes along, unseen
+                copy_lane(rows, fixed, counts, ahead, lanes - 1, j)
+        for again in range(2):
+            env_evaluate(rows, fixed, counts, ahead, settings, choices, work)
+            if mode == 2 or again == 1:
+                for j in range(lanes):
+                    if flags[0][start + j] + flags[1][start + j] > 0:
+                        write_lane(work, settings, choices, observation, info, start + j, j)
+                break
+            over = write_tile(work, settings, choices, observation, info, flags, start, lanes)
+            if mode == 0 or over == 0:
+                break
+            for j in range(lanes):
+                if flags[0][start + j] + flags[1][start + j] > 0:
+                    write_lane(work, settings, choices, observations[1], infos[1], start + j, j)
+                    infos[1][0][start + j] = info[0][start + j]
+                    counts[EPISODE][j] = counts[EPISODE][j] + 1
+                    reset_lane(
+                        rows, fixed, counts, ahead, tables, samples, settings, choices, work, j
+                    )
+
+
+@kernel
+def step_by_address(book: Any, mode: int) -> None:
+    """Step or reset one environment whose arrays stand in an address book."""
+    step_tiles(
+        array_at(book, 0, 3, 0),
+        array_at(book, 1, 3, 0),
+        array_at(book, 2, 3, 1),
+        array_at(book, 3, 3, 0),
+        array_at(book, 4, 3, 0),
+        array_at(book, 5, 2, 0),
+        array_at(book, 6, 2, 0),
+        array_at(book, 7, 1, 1),
+        array_at(book, 8, 2, 0),
+        array_at(book, 9, 3, 2),
+        array_at(book, 10, 3, 0),
+        array_at(book, 11, 2, 3),
+        1,
+        mode,
+    )

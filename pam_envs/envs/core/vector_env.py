@@ -1,0 +1,282 @@
+"""The batched environment: the same step over rows, in tiles of lanes and over cores."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from pam_envs.envs.core.plant_env import fresh_seed, space_of
+from pam_envs.envs.core.setup import (
+    BEGIN,
+    STEP_AND_RESTART,
+    Setup,
+    check_choice,
+    check_seed,
+    check_state,
+    check_whole,
+    for_kernels,
+    saved,
+    tiles_for,
+)
+from pam_envs.kernels.build import COMPILED, LANES
+from pam_envs.kernels.random import seed_words
+
+PARALLEL_FROM = 4096
+"""Environments from which a batch is spread over the cores."""
+
+
+class PlantVectorEnv(VectorEnv[Any, Any, Any]):
+    """``num_envs`` environments stepped by one kernel call.
+
+    Row ``i`` of a batch reset with seed ``s`` is the single environment reset with ``s + i``, bit
+    for bit, through every automatic reset. Resets happen in the same step: the observation of a
+    row that has ended is the first of its next episode, and ``infos["final_obs"]`` and
+    ``infos["final_info"]`` hold the last of the ended one.
+
+    Parameters
+    ----------
+    setup : Setup
+        The configuration.
+    num_envs : int
+        Number of rows.
+    info : bool
+        Whether steps report ``info``; learning needs none, and it is faster without.
+    threads : int or None
+        1 keeps to one core; None spreads batches of 4,096 and more over all.
+    """
+
+    metadata = {
+        "render_modes": ["rgb_array"],
+        "render_fps": 100,
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }
+
+    def __init__(
+        self, setup: Setup, num_envs: int, info: bool = True, threads: int | None = None
+    ) -> None:
+        self.num_envs = check_whole("num_envs", num_envs, 1, 2**24)
+        check_choice("a batch's render_mode", setup.render_mode, (None, "rgb_array"))
+        if setup.render_mode is not None and not info:
+            raise ValueError("render_mode = 'rgb_array' draws what steps report; leave info=True")
+        self.setup = setup
+        self.plant = setup.plant
+        self.signals = setup.signals
+        self.action_signals = setup.action_signals
+        self.render_mode = setup.render_mode
+        self.control_period = setup.control_period
+        self.with_info = bool(info)
+        self._renderers: list[Any] = []
+        self.single_observation_space = space_of(setup.signals)
+        self.single_action_space = space_of(setup.action_signals)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._seeded = False
+        self._last_observation = np.zeros((self.num_envs, len(setup.signals)), np.float32)
+        self._all = tuple(for_kernels(a) for a in setup.state(tiles_for(num_envs), LANES))
+        self._shared = tuple(for_kernels(a) for a in setup.shared)
+        self._keys = len(setup.info_keys)
+        spread_out = COMPILED and threads != 1 and num_envs >= PARALLEL_FROM
+        self._kernel = setup.kernels.parallel if spread_out else setup.kernels.batch
+
+    def reset(
+        self,
+        *,
+        seed: int | list[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Start episodes; see Gymnasium. ``options["reset_mask"]`` resets some rows only."""
+        mask = np.ones(self.num_envs, np.bool_)
+        if options is not None and "reset_mask" in options:
+            mask = np.asarray(options["reset_mask"])
+            if mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
+                raise ValueError(
+                    f"reset_mask has shape {mask.shape} and type {mask.dtype}, expected "
+                    f"({self.num_envs},) of bool"
+                )
+        if not self._seeded and not mask.all():
+            raise ValueError("the first reset must reset every row; leave reset_mask out")
+        self._seed_rows(self._seeds(seed), mask)
+        outputs = self._outputs()
+        observations, infos, flags = outputs
+        observations[0], infos[0], flags[0], flags[1] = self._last_observation, 0.0, mask, False
+        self._call(np.zeros((self.num_envs, len(self.action_signals))), outputs, BEGIN)
+        self._seeded = True
+        self._last_observation = observations[0].copy()
+        if self.render_mode is not None:
+            self._record(infos[0], np.flatnonzero(mask), mask)
+        return observations[0], self._infos(infos[0])
+
+    def _seed_rows(self, seeds: list[int | None] | None, mask: NDArray[np.bool_]) -> None:
+        a, b, episode = self.setup.seed_rows
+        for row in np.flatnonzero(mask).tolist():
+            tile, lane = divmod(row, LANES)
+            counts, seed = self._all[2][tile], None if seeds is None else seeds[row]
+            if seed is None:
+                counts[episode][lane] += 1
+            else:
+                counts[a][lane], counts[b][lane] = seed_words(seed)
+                counts[episode][lane] = 0
+
+    def _outputs(self) -> tuple[NDArray[Any], ...]:
+        """Return fresh arrays: observations, reward with info (both with a final part), flags."""
+        n, keys = self.num_envs, self._keys if self.with_info else 0
+        return (
+            np.empty((2, n, len(self.signals)), np.float32),
+            np.empty((2, keys + 1, n)),
+            np.empty((2, n), np.bool_),
+        )
+
+    def _call(self, actions: NDArray[Any], outputs: tuple[NDArray[Any], ...], mode: int) -> None:
+        if COMPILED:
+            self._kernel(*self._all, *self._shared, actions, *outputs, self.num_envs, mode)
+            return
+        views = [a.tolist() for a in outputs]
+        arguments = (actions.tolist(), *views, self.num_envs, mode)
+        self._kernel(*self._all, *self._shared, *arguments)
+        for array, view in zip(outputs, views, strict=True):
+            array[...] = np.array(view, array.dtype).reshape(array.shape)
+
+    def _seeds(self, seed: Any) -> list[int | None] | None:
+        if seed is None:
+            if self._seeded:
+                return None
+            seed = fresh_seed()
+        if isinstance(seed, (int, np.integer)) and not isinstance(seed, bool):
+            first = check_seed(seed)
+            return [first + i for i in range(self.num_envs)]
+        if not isinstance(seed, (list, tuple)) or len(seed) != self.num_envs:
+            raise ValueError(
+                f"seed = {str(seed)[:60]} must be a non-negative whole number or a list of "
+                f"{self.num_envs} of them"
+            )
+        made: list[int | None] = [None if s is None else check_seed(s) for s in seed]
+        if not self._seeded:
+            return [fresh_seed() if s is None else s for s in made]
+        return made
+
+    def step(
+        self, actions: NDArray[Any]
+    ) -> tuple[
+        NDArray[np.float32],
+        NDArray[np.float64],
+        NDArray[np.bool_],
+        NDArray[np.bool_],
+        dict[str, Any],
+    ]:
+        """Apply one action a row; see Gymnasium.
+
+        Raises
+        ------
+        ValueError
+            If an action is not finite or the shape is wrong; nothing has changed then.
+        """
+        if not self._seeded:
+            raise gym.error.ResetNeeded("call reset() before step()")
+        actions = self._checked(actions)
+        outputs = self._outputs()
+        observations, reports, flags = outputs
+        self._call(actions, outputs, STEP_AND_RESTART)
+        self._last_observation = observations[0].copy()
+        infos = self._infos(reports[0])
+        ended = flags[0] | flags[1]
+        if self.render_mode is not None:
+            self._record(reports[0], np.arange(self.num_envs), ended)
+        if ended.any():
+            self._add_final(infos, ended, observations[1], reports[1])
+        return observations[0], reports[0, 0], flags[0], flags[1], infos
+
+    def _checked(self, actions: Any) -> NDArray[np.float64]:
+        wanted = (self.num_envs, len(self.action_signals))
+        try:
+            if np.iscomplexobj(actions):
+                raise TypeError("complex numbers")
+            made = np.asarray(actions, np.float64)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise ValueError(f"the actions are not an array of shape {wanted}: {error}") from error
+        if made.shape != wanted:
+            raise ValueError(f"the actions have shape {made.shape}, expected {wanted}")
+        if not np.isfinite(made).all():
+            row, column = np.argwhere(~np.isfinite(made))[0]
+            raise ValueError(
+                f"actions[{row}, {column}] ({self.action_signals[int(column)].name}) is "
+                f"{made[row, column]}; give finite numbers"
+            )
+        return made
+
+    def _infos(self, info: NDArray[np.float64]) -> dict[str, Any]:
+        return dict(zip(self.setup.info_keys, info[1:], strict=True)) if self.with_info else {}
+
+    def _add_final(
+        self,
+        infos: dict[str, Any],
+        ended: NDArray[np.bool_],
+        final: NDArray[np.float32],
+        final_info: NDArray[np.float64],
+    ) -> None:
+        last = np.full(self.num_envs, None, object)
+        for row in np.flatnonzero(ended):
+            last[row] = final[row].copy()
+        infos["final_obs"], infos["_final_obs"] = last, ended
+        if self.with_info:
+            values = np.where(ended, final_info, 0.0)
+            infos["final_info"] = self._infos(values)
+            infos["_final_info"] = ended
+
+    def _record(
+        self, report: NDArray[np.float64], rows: NDArray[np.int64], starts: NDArray[np.bool_]
+    ) -> None:
+        """Keep what the pictures of some rows need; ``starts`` tells which begin an episode."""
+        if not self._renderers:
+            from pam_envs.envs.rendering.renderer import make_renderer
+
+            first = make_renderer(self)
+            others = [make_renderer(self, first.canvas) for _ in range(self.num_envs - 1)]
+            self._renderers = [first, *others]
+        for row in rows.tolist():
+            info = dict(zip(self.setup.info_keys, report[1:, row].tolist(), strict=True))
+            self._renderers[row].record(info, bool(starts[row]))
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Return a picture of every row, each of shape (height, width, 3)."""
+        if self.render_mode is None:
+            gym.logger.warn("render() needs render_mode='rgb_array' in gym.make_vec")
+            return None
+        drawn = [renderer for renderer in self._renderers if renderer.info is not None]
+        if len(drawn) < self.num_envs:
+            raise gym.error.ResetNeeded("call reset() (after set_state: step()) before render()")
+        return tuple(renderer.picture() for renderer in drawn)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Forget the pictures."""
+        self._renderers = []
+
+    def get_state(self) -> dict[str, NDArray[Any]]:
+        """Return everything that the future depends on, as arrays that own their data."""
+        return {
+            **saved(self._all),
+            "last": self._last_observation.copy(),
+            "seeded": np.array(self._seeded),
+        }
+
+    def set_state(self, state: dict[str, NDArray[Any]]) -> None:
+        """Go back to a state of :meth:`get_state`, to the last bit.
+
+        Raises
+        ------
+        ValueError
+            If the state is of another kind of batch; nothing has changed then.
+        """
+        parts = check_state(state, self.setup.state(tiles_for(self.num_envs), LANES))
+        try:
+            last = np.array(state["last"], np.float32).reshape(self._last_observation.shape)
+            seeded = bool(state["seeded"])
+        except (KeyError, ValueError, TypeError) as error:
+            raise ValueError(f"the state was not made by get_state: {error!r}") from error
+        self._all = tuple(map(for_kernels, parts))
+        self._last_observation, self._seeded = last, seeded
+        self._renderers = []

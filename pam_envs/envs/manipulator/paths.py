@@ -1,0 +1,163 @@
+"""The paths that a manipulator's tool follows, with the joint angles that are planned for them."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.envs.core.setup import check_choice
+from pam_envs.envs.manipulator.layout import N_POSE
+from pam_envs.kernels.build import interpreted
+from pam_envs.mechanics.redundancy import UnreachablePose, resolve
+from pam_envs.mechanics.serial_chain import SerialChain
+from pam_envs.mechanics.serial_chain_kinematics import place_chain
+from pam_envs.mechanics.serial_chain_rows import pointing_row, tip_row, work_rows
+from pam_envs.plants.antagonistic_joint.bearing import bearable_payload
+from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
+from pam_envs.references.path import PATHS, draw_ends, joint_line
+
+Array = NDArray[np.float64]
+
+NAMES = tuple(path.name for path in PATHS)
+REFERENCES = (*NAMES, "paths", "drawn")
+"""One of the presets; an episode draws one of them; it draws one of a pool of random ones."""
+DRAWN, DRAW_SEED = 16, 2
+"""How many paths the pool has, and their seed."""
+TRIED, LEAP = 48, 5.0
+"""How many are drawn for it; a plan leaps where a joint moves by more than so many even steps."""
+PRESET_JOINTS = len(PATHS[0].start_degrees)
+LONGEST = 10_000
+"""Most poses of a given path."""
+USUAL_PAYLOAD = 0.03
+"""Drawn paths are such that this payload [kg] is borne on them."""
+
+
+def paths_for(plant: RedundantManipulator, reference: Any, weighted: bool) -> dict[str, Array]:
+    """Return poses and planned angles of all paths that episodes draw from, by their names.
+
+    Parameters
+    ----------
+    plant : RedundantManipulator
+        The arm; no planned angle is beyond ``plant.angle_range``.
+    reference : str or array_like, shape (k, 6)
+        As given by the user.
+    weighted : bool
+        Whether angles are planned with the weight of Eq. (2.1).
+
+    Returns
+    -------
+    dict of ndarray, shape (6 + n, points)
+        x, y, z [m], the direction [1], and the planned angles [rad].
+
+    Raises
+    ------
+    UnreachablePose
+        If there are no joint angles for a given pose.
+    ValueError
+        If the reference is none, or one that is not for this arm.
+    """
+    chain, limit = plant.nominal_chain, plant.angle_range[1]
+    if not isinstance(reference, str):
+        return {"reference": planned(chain, _given(reference), limit, weighted)}
+    check_choice("reference", reference, REFERENCES)
+    if reference == "drawn":
+        return _drawn(plant, weighted)
+    if plant.stages != PRESET_JOINTS:
+        raise ValueError(
+            f"reference = {reference!r} is for an arm of {PRESET_JOINTS} joints and this one "
+            f"has {plant.stages}; take reference = 'drawn', or give poses"
+        )
+    names = NAMES if reference == "paths" else (reference,)
+    return {name: _preset(chain, limit, name, weighted) for name in names}
+
+
+def _given(reference: Any) -> Array:
+    """Return the poses that a user gave, shape (k, 6)."""
+    try:
+        poses = np.array(reference, np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(
+            f"reference = {str(reference)[:60]!r} must be one of {', '.join(REFERENCES)}, or poses"
+        ) from error
+    fits = poses.ndim == 2 and poses.shape[1] == N_POSE and 2 <= len(poses) <= LONGEST
+    if not fits or not np.isfinite(poses).all():
+        raise ValueError(
+            f"reference has shape {poses.shape}; give from 2 to {LONGEST} finite poses, each x, y, "
+            "z [m] and a unit vector"
+        )
+    return poses
+
+
+@lru_cache(maxsize=64)
+def _preset(chain: SerialChain, limit: float, name: str, weighted: bool) -> Array:
+    line = PATHS[NAMES.index(name)].angles()
+    try:
+        return planned(chain, poses_of(chain, line), limit, weighted)
+    except UnreachablePose as error:
+        hint = (
+            f"; reference {name!r} is not for this arm: take 'drawn', whose paths are made for it, "
+            "or give poses"
+        )
+        raise UnreachablePose(
+            error.index, error.pose, error.distance, error.turn, limit, hint
+        ) from error
+
+
+def _drawn(plant: RedundantManipulator, weighted: bool) -> dict[str, Array]:
+    """Return the first of the paths drawn on which the plan does not leap and weights are borne."""
+    chain, limit = plant.nominal_chain, plant.angle_range[1]
+    kept: dict[str, Array] = {}
+    for i in range(TRIED):
+        found = _drawn_path(chain, limit, i)
+        if found is None:
+            continue
+        if bearable_payload(plant, found[N_POSE:].T) < USUAL_PAYLOAD:
+            continue
+        if not weighted:
+            found = planned(chain, found[:N_POSE].T, limit, weighted)
+        kept[f"drawn path {i}"] = found
+        if len(kept) == DRAWN:
+            return kept
+    raise ValueError(
+        f"of {TRIED} paths drawn within {np.degrees(limit):.1f} degrees a joint only {len(kept)} "
+        f"have a plan without a leap on which {USUAL_PAYLOAD:g} kg are borne, and {DRAWN} are "
+        "needed; take lighter links, or give poses"
+    )
+
+
+@lru_cache(maxsize=128)
+def _drawn_path(chain: SerialChain, limit: float, i: int) -> Array | None:
+    """Return path ``i`` of those drawn, or None if its plan leaps where a minimum vanishes."""
+    first, last = (ends[i] for ends in _ends(chain.stages, limit))
+    line = joint_line(first, last)
+    found = planned(chain, poses_of(chain, line), limit, True)
+    even = np.abs(last - first).max() / (len(line) - 1)
+    return found if np.abs(np.diff(found[N_POSE:])).max() <= LEAP * even else None
+
+
+@lru_cache(maxsize=16)
+def _ends(stages: int, limit: float) -> tuple[Array, Array]:
+    return draw_ends(DRAW_SEED, TRIED, stages, limit)
+
+
+def planned(chain: SerialChain, poses: Array, limit: float, weighted: bool) -> Array:
+    """Return poses (k, 6) with the planned angles below them, shape (6 + n, k)."""
+    angles = resolve(chain, poses, limit, weighted).angles
+    return np.ascontiguousarray(np.hstack([poses, angles]).T)
+
+
+def poses_of(chain: SerialChain, angles: Array) -> Array:
+    """Return the poses (k, 6) of joint angles (k, n) [rad], the same bits on every machine."""
+    n = chain.stages
+    place = interpreted(place_chain, {"N_STAGES": n, "LANES": 1})
+    fixed = chain.rows()[:, None].tolist()
+    tip, pointing, poses = tip_row(n), pointing_row(n), []
+    for line in angles.tolist():
+        work = np.zeros((work_rows(n), 1)).tolist()
+        place([[angle] for angle in line], fixed, work, 0, 0, 0)
+        rows = (*work[tip : tip + 3], *work[pointing : pointing + 3])
+        poses.append([row[0] for row in rows])
+    return np.array(poses)

@@ -1,0 +1,65 @@
+"""A camera for three-dimensional scenes: where a point of the world stands in the picture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.envs.rendering.scene import Point
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera far away that looks at a world whose z points down.
+
+    Attributes
+    ----------
+    azimuth, elevation : float
+        Where it stands [rad]: around the vertical, and above the horizontal.
+    scale : float
+        Pixels for a metre.
+    middle : tuple of float
+        Where the world's origin stands [pixels].
+    """
+
+    azimuth: float
+    elevation: float
+    scale: float = 1.0
+    middle: Point = (0.0, 0.0)
+
+    def flat(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Return points (..., 3) [m] as (..., 2) pixels: right and down."""
+        x, y, z = np.moveaxis(np.asarray(points, float), -1, 0)
+        sine, cosine = math.sin(self.azimuth), math.cos(self.azimuth)
+        right, near = cosine * x + sine * y, cosine * y - sine * x
+        down = math.cos(self.elevation) * z + math.sin(self.elevation) * near
+        flat = np.stack([right, down], -1)
+        return np.asarray(self.scale * flat + np.array(self.middle))
+
+    def line(self, points: ArrayLike) -> list[Point]:
+        """Return points (n, 3) [m] as a list of places in the picture."""
+        return [(float(x), float(y)) for x, y in self.flat(points)]
+
+    def at(self, point: Iterable[float]) -> Point:
+        """Return the place of one point [m]."""
+        return self.line([tuple(point)])[0]
+
+    def fitted(self, points: ArrayLike, box: tuple[float, float, float, float]) -> Camera:
+        """Return the camera that sees points (n, 3) [m] as large as a box allows.
+
+        Parameters
+        ----------
+        points : array_like, shape (n, 3)
+        box : tuple of float
+            Left, top, width and height [pixels].
+        """
+        plain = Camera(self.azimuth, self.elevation).flat(points)
+        low, high = plain.min(axis=0), plain.max(axis=0)
+        scale = float(min(np.array(box[2:]) / np.maximum(high - low, 1e-9)))
+        centre = np.array(box[:2]) + 0.5 * np.array(box[2:])
+        across, down = (centre - 0.5 * scale * (low + high)).tolist()
+        return Camera(self.azimuth, self.elevation, scale, (across, down))

@@ -1,0 +1,267 @@
+"""Pictures of an environment: the plant at work, its loop, and the last seconds.
+
+Drawn with pygame-ce on a plain surface, so that ``rgb_array`` needs no display. Drawing reads what
+``step`` returned and touches neither the simulation nor its random numbers. What is drawn of a
+family stands in its view (``VIEWS`` names the modules); frame, loop and strips are common.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import os
+from collections import deque
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.envs.rendering.scene import (
+    INK,
+    MUTED,
+    OUTPUT,
+    PAPER,
+    PRESSURE,
+    REFERENCE,
+    Axes,
+    Color,
+    Point,
+    Strip,
+    View,
+    pressure_loop,
+)
+
+SIZE = (800, 600)
+SCALE = 2
+"""Everything is drawn this many times larger and smoothed down: anti-aliased edges everywhere."""
+STRIP_SECONDS = 8.0
+LOOP_SAMPLES = 1500
+VIEWS = {
+    "single_muscle": "positioning",
+    "knee_tension": "knee",
+    "knee_stiffness": "knee",
+    "knee_gait": "knee",
+    "elbow_orthosis": "elbow",
+    "antagonistic_joint": "joint",
+    **{f"redundant_manipulator_{n}": "manipulator" for n in range(1, 9)},
+}
+"""Folder whose module ``view`` holds what is shown of an environment, by the view in its setup."""
+
+
+def view_of(name: str) -> View:
+    """Return the view of that name."""
+    found: View = importlib.import_module(f"pam_envs.envs.{VIEWS[name]}.view").VIEWS[name]
+    return found
+
+
+def _pygame() -> Any:
+    """Import the drawing library, or say how to get it.
+
+    Its import sets variables of the process's environment; they are put back.
+    """
+    before = dict(os.environ)
+    try:
+        import pygame
+    except ImportError as error:
+        raise ImportError(
+            'rendering needs pygame-ce, which is not installed: pip install "pam-envs[plot]"'
+        ) from error
+    for name in set(os.environ) - set(before):
+        del os.environ[name]
+    return pygame
+
+
+WINDOW_FPS = 50
+"""Pictures a second in the window, at the pace of the plant."""
+
+
+class Canvas:
+    """A surface with lines, polygons and text in the coordinates of the final picture."""
+
+    def __init__(self) -> None:
+        self.pygame = _pygame()
+        self.pygame.font.init()
+        self.surface = self.pygame.Surface((SIZE[0] * SCALE, SIZE[1] * SCALE))
+        self._fonts: dict[int, Any] = {}
+
+    def clear(self) -> None:
+        """Start a new picture."""
+        self.surface.fill(PAPER)
+
+    def line(self, points: Iterable[Point], color: Color, width: float = 1.5) -> None:
+        """Draw a line through points."""
+        scaled = [(x * SCALE, y * SCALE) for x, y in points]
+        if len(scaled) > 1:
+            self.pygame.draw.lines(self.surface, color, False, scaled, max(1, round(width * SCALE)))
+
+    def polygon(self, points: Iterable[Point], color: Color) -> None:
+        """Fill a polygon."""
+        self.pygame.draw.polygon(self.surface, color, [(x * SCALE, y * SCALE) for x, y in points])
+
+    def rectangle(
+        self, box: tuple[float, float, float, float], color: Color, round_: int = 0
+    ) -> None:
+        """Fill a rectangle given by left, top, width and height."""
+        self.pygame.draw.rect(
+            self.surface, color, [v * SCALE for v in box], border_radius=round_ * SCALE
+        )
+
+    @contextmanager
+    def within(self, box: tuple[int, int, int, int]) -> Iterator[None]:
+        """Draw nothing outside of a box given by left, top, width and height."""
+        self.surface.set_clip(self.pygame.Rect([v * SCALE for v in box]))
+        yield
+        self.surface.set_clip(None)
+
+    def disc(self, centre: Point, radius: float, color: Color) -> None:
+        """Fill a circle."""
+        middle = (centre[0] * SCALE, centre[1] * SCALE)
+        self.pygame.draw.circle(self.surface, color, middle, radius * SCALE)
+
+    def dashed(self, a: Point, b: Point, color: Color) -> None:
+        """Draw a dashed line."""
+        length = math.dist(a, b)
+        for start in np.arange(0.0, length, 10.0):
+            ends = [min(length, start + d) / length for d in (0.0, 6.0)]
+            self.line(
+                [(a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1])) for s in ends], color, 2
+            )
+
+    def text(
+        self, words: str, place: Point, color: Color = INK, size: int = 13, align: str = "left"
+    ) -> None:
+        """Write words, with ``place`` at the left, centre or right of their upper edge."""
+        if size not in self._fonts:
+            self._fonts[size] = self.pygame.font.Font(None, round(1.45 * size * SCALE))
+        drawn = self._fonts[size].render(words, True, color)
+        shift = {"left": 0.0, "center": 0.5, "right": 1.0}[align] * drawn.get_width()
+        self.surface.blit(drawn, (place[0] * SCALE - shift, place[1] * SCALE))
+
+    def picture(self) -> Any:
+        """Return the surface in its final size."""
+        return self.pygame.transform.smoothscale(self.surface, SIZE)
+
+
+class Renderer:
+    """Keeps the recent past of one environment and draws it."""
+
+    def __init__(self, env: Any, canvas: Canvas | None = None) -> None:
+        self.env = env
+        self.canvas = Canvas() if canvas is None else canvas
+        self.view = view_of(env.setup.view)
+        plant, strips = env.plant, self.view.strips
+        self._keys = ("time", *dict.fromkeys(key for strip in strips for key, _, _ in strip.lines))
+        self.strip: deque[tuple[float, ...]] = deque(
+            maxlen=round(STRIP_SECONDS / env.control_period) + 1
+        )
+        self.loop: deque[tuple[float, ...]] = deque(maxlen=LOOP_SAMPLES)
+        self.info: Any = None
+        self._spans = [(strip.span(plant), tuple(strip.ticks(plant))) for strip in strips]
+        self._window: Any = None
+        self._clock: Any = None
+        self._dismissed = False
+
+    def record(self, info: Any, start: bool) -> None:
+        """Take note of a step (or, at the start of an episode, forget the one before)."""
+        if start:
+            self.strip.clear()
+            self.loop.clear()
+        self.info = info
+        self.strip.append(tuple([info[key] for key in self._keys]))
+        self.loop.append(self.view.trace(info))
+
+    def _draw(self) -> Any:
+        self.canvas.clear()
+        self.view.scene(self.canvas, self.env, self.info)
+        self._draw_numbers()
+        self._draw_panel()
+        self._draw_strips()
+        return self.canvas.picture()
+
+    def _draw_numbers(self) -> None:
+        info, text, first = self.info, self.canvas.text, self.view.strips[0]
+        error = first.scale * (info["output"] - info["reference"])
+        what, unit, number = self.view.number
+        for x, name, value, color in (
+            (360, "time", f"{info['time']:.2f} s", INK),
+            (475, "error", f"{error:+.2f} {first.unit}", INK),
+            (600, what, f"{number(info):.2f} {unit}", PRESSURE),
+        ):
+            text(name, (x, 14), MUTED, 11)
+            text(value, (x, 29), color, 16)
+        if info["saturated"]:
+            text("action", (770, 14), REFERENCE, 11, "right")
+            text("clipped", (770, 29), REFERENCE, 16, "right")
+
+    def _draw_panel(self) -> None:
+        points = list(self.loop)
+        if self.view.panel is None:
+            pressure_loop(self.canvas, self.env.plant, self.view.strips[0], points)
+        else:
+            self.view.panel(self.canvas, self.env, self.info, points)
+
+    def _draw_strips(self) -> None:
+        first = max(0.0, self.strip[-1][0] - STRIP_SECONDS)
+        for i, strip in enumerate(self.view.strips):
+            self._draw_strip(strip, i, (first, first + STRIP_SECONDS))
+        top = self.view.strips[0].top - 21
+        self.canvas.text("reference", (712, top), REFERENCE, 12, "right")
+        self.canvas.text("output", (770, top), OUTPUT, 12, "right")
+
+    def _draw_strip(self, strip: Strip, number: int, seconds: Point) -> None:
+        """Draw one plot of the last seconds; the lowest one has the numbers of the time."""
+        lowest, (span, across) = number == len(self.view.strips) - 1, self._spans[number]
+        whole = range(2 * math.ceil(0.5 * seconds[0]), math.floor(seconds[1]) + 1, 2)
+        axes = Axes(self.canvas, (360, strip.top, 410, strip.height), seconds, span)
+        name = f"{strip.name} [{strip.unit}]"
+        axes.frame(whole, across, "time [s]" if lowest else "", name, numbers=lowest)
+        for key, color, width in strip.lines:
+            k = self._keys.index(key)
+            points = [axes.at(past[0], strip.scale * past[k]) for past in self.strip]
+            self.canvas.line(points, color, width)
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Return the picture, shape (600, 800, 3)."""
+        array = self.canvas.pygame.surfarray.array3d(self._draw())
+        return np.ascontiguousarray(np.transpose(array, (1, 0, 2)))
+
+    def show(self) -> None:
+        """Show the picture in a window, at the pace of the plant, until the window is closed."""
+        if self._dismissed:
+            return
+        pygame = self.canvas.pygame
+        if self._window is None:
+            self._open()
+        if any(event.type == pygame.QUIT for event in pygame.event.get()):
+            self._dismissed = True
+            self.close()
+            return
+        period, fps = self.env.control_period, WINDOW_FPS
+        if round(self.info["time"] / period) % max(1, round(1.0 / (period * fps))) == 0:
+            self._window.blit(self._draw(), (0, 0))
+            pygame.display.flip()
+            self._clock.tick(fps)
+
+    def _open(self) -> None:
+        """Open the window."""
+        pygame = self.canvas.pygame
+        pygame.display.init()
+        self._window = pygame.display.set_mode(SIZE)
+        pygame.display.set_caption(str(getattr(self.env.spec, "id", "pam-envs")))
+        self._clock = pygame.time.Clock()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            self.canvas.pygame.display.quit()
+            self._window = None
+
+
+def make_renderer(env: Any, canvas: Canvas | None = None) -> Renderer:
+    """Return a renderer for an environment (see ``PlantEnv.render``).
+
+    Those of a batch may share the ``canvas`` of one of them: a picture is a copy.
+    """
+    return Renderer(env, canvas)

@@ -1,0 +1,1 @@
+"""antagonistic_joint."""

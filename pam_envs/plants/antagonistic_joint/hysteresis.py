@@ -1,0 +1,105 @@
+"""The memory of the muscles of a joint: friction driven by their contraction.
+
+The threads of the braid slide on each other as the length changes, not as the pressure does. An
+operator of slope 1 follows the contraction; what it lags behind, times a friction stiffness that
+grows with the pressure pressing the threads together, is the friction force:
+
+    F = F(p, e) - width (base + rate p) (e - operator(e))
+
+With plays, the lag is a sum of Maxwell-slip elements. The contraction is counted from that of the
+straight joint, at which a virgin memory is at rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.parameters import parameter
+from pam_envs.plants.single_muscle.hysteresis import Kind
+
+WIDEST = 0.22
+"""Contraction on either side of the straight joint's that a Preisach memory spans."""
+LEVELS = 89
+"""Of its map: cells of half a per cent."""
+ELEMENTS = 8
+"""Most plays of a memory."""
+ANGLES = 0.62
+"""Angle [rad] that the reduced plant's memory spans on either side."""
+ANGLE_LEVELS = 63
+
+_SIZE = "half-gap of the joint's loop 10 % of an amplitude of 15 to 20 degrees"
+_SHARE = "friction in proportion to the pressure but for a rest of the empty muscle"
+
+
+@dataclass(frozen=True)
+class JointMemory:
+    """Thread-on-thread friction of the muscles.
+
+    ``operator`` turns contraction into the contraction that is felt (of the reduced plant: the
+    commanded angle [rad] into the angle at rest): a :class:`PlayOperator` of total slope 1, a
+    :class:`Preisach` operator with a virgin start, or None.
+    """
+
+    operator: PlayOperator | Preisach | None = None
+    width: float = parameter(
+        1.0,
+        "1",
+        0.0,
+        2.0,
+        "assumed",
+        "friction over that of the preset",
+        neutral=0.0,
+        spread=(0.6, 1.4),
+    )
+    base: float = parameter(100.0, "N", 0.0, 1e5, "assumed", _SHARE)
+    rate: float = parameter(1.7e-3, "N/Pa", 0.0, 1.0, "assumed", _SIZE)
+
+    @property
+    def kind(self) -> Kind:
+        """Which operator this is."""
+        if self.operator is None:
+            return "none"
+        return "preisach" if isinstance(self.operator, Preisach) else "maxwell_slip"
+
+
+def contraction_plays() -> PlayOperator:
+    """Return the preset: eight plays, thresholds 0.3 % to 4.5 % of contraction, of equal weight.
+
+    Evenly spread on a logarithmic scale, so that loops of any amplitude look alike.
+    """
+    thresholds = np.geomspace(3e-3, 4.5e-2, ELEMENTS)
+    return PlayOperator(tuple(thresholds), (0.1,) * ELEMENTS, 0.2)
+
+
+def angle_plays() -> PlayOperator:
+    """Return the reduced plant's preset, identified on loops of the plant with muscles."""
+    return PlayOperator(ANGLE_THRESHOLDS, ANGLE_WEIGHTS, 1.0 - sum(ANGLE_WEIGHTS))
+
+
+ANGLE_THRESHOLDS = (0.02, 0.04, 0.08, 0.12, 0.16, 0.2)
+ANGLE_WEIGHTS = (0.052, 0.0721, 0.105, 0.0207, 0.0809, 0.033)
+
+
+@lru_cache(maxsize=8)
+def joint_memory(kind: Kind, reduced: bool = False) -> JointMemory:
+    """Return the preset memory of a kind; both operators have the same loops.
+
+    Raises
+    ------
+    ValueError
+        If there is no such kind.
+    """
+    if kind == "none":
+        return JointMemory()
+    plays = angle_plays() if reduced else contraction_plays()
+    if kind == "maxwell_slip":
+        return JointMemory(plays)
+    if kind == "preisach":
+        high, levels = (ANGLES, ANGLE_LEVELS) if reduced else (WIDEST, LEVELS)
+        return JointMemory(Preisach.from_play(plays, -high, high, levels, start="virgin"))
+    raise ValueError(f"hysteresis = {kind!r}; choose 'maxwell_slip', 'preisach' or 'none'")

@@ -1,0 +1,296 @@
+"""One stage of seed 002: a joint between two antagonistic pneumatic muscles.
+
+    (angle, co-contraction) -> feed-forward -> set-points -> regulators -> pressures
+    F = F(p, e) - friction(e)          of each muscle, 0 where it would push
+    J phi'' + D phi' = -F_A dL_A/dphi - F_B dL_B/dphi - m g c sin(phi) + disturbance
+
+Without memory, gravity and load the feed-forward makes the angle at rest the commanded one; the
+regulators' lag and the damped stiffness of the muscles are then two real poles near 23 rad/s. The
+paper's reduced plant, a Preisach operator and two poles, is the make ``dynamics="reduced"``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.mechanics.antagonistic_lever import AntagonisticLever
+from pam_envs.mechanics.hanging_mass import LARGEST_PHASE
+from pam_envs.muscle.force_map import FULL_PRESSURE, ForceMap, paper_stretch
+from pam_envs.plants.antagonistic_joint import rows as K
+from pam_envs.plants.antagonistic_joint import statics as pair_statics
+from pam_envs.plants.antagonistic_joint.hysteresis import JointMemory, joint_memory
+from pam_envs.plants.antagonistic_joint.hysteresis_tables import (
+    check_operator,
+    map_tables,
+    model_rows,
+    plays_of,
+)
+from pam_envs.plants.antagonistic_joint.link import Link, NominalPoint
+from pam_envs.plants.core.plant import Plant
+from pam_envs.plants.single_muscle.hysteresis import Kind
+from pam_envs.pneumatics.joint_regulator import JointRegulator
+from pam_envs.sensing.joint import JointEncoder
+from pam_envs.sensing.orthosis import GaugeSensor
+
+Dynamics = Literal["muscles", "reduced"]
+Array = NDArray[np.float64]
+
+STRETCHED = (
+    "assumed",
+    "contraction axis of the measured map stretched: the force at 6.5 bar ends at 25 %, which "
+    "+-30 degrees take with this lever",
+)
+REACHED = ("derived", "largest angle that 6.5 bar reach at the nominal co-contraction")
+PRESTRESS_RANGE = (20.0, 120.0)
+"""Co-contractions [N] that the preset takes: more and the buckling lever leaves no stiffness."""
+
+
+@dataclass(frozen=True)
+class AntagonisticJoint(Plant):
+    """The plant; another one is :meth:`replace` of it.
+
+    Attributes
+    ----------
+    dynamics : {"muscles", "reduced"}
+        First principles, or the paper's reduced plant.
+    regulator, memory, muscle, lever, link, nominal
+        The components; both muscles and both regulators are alike but for ``muscle.imbalance``.
+    angle, pressure
+        The sensors.
+    """
+
+    family: ClassVar[str] = "antagonistic_joint"
+    components: ClassVar[tuple[str, ...]] = (
+        "regulator",
+        "memory",
+        "muscle",
+        "lever",
+        "link",
+        "nominal",
+        "angle",
+        "pressure",
+    )
+    names: ClassVar[tuple[str, ...]] = K.NAMES
+    choices: ClassVar[tuple[str, ...]] = ("dynamics",)
+    extended: ClassVar[bool] = False
+    stages: ClassVar[int] = 1
+
+    dynamics: Dynamics = "muscles"
+    regulator: JointRegulator = field(default_factory=JointRegulator)
+    memory: JointMemory = field(default_factory=JointMemory)
+    muscle: ForceMap = field(default_factory=ForceMap)
+    lever: AntagonisticLever = field(default_factory=AntagonisticLever)
+    link: Link = field(default_factory=Link)
+    nominal: NominalPoint = field(default_factory=NominalPoint)
+    angle: JointEncoder = field(default_factory=JointEncoder)
+    pressure: GaugeSensor = field(default_factory=GaugeSensor)
+
+    def __post_init__(self) -> None:
+        """Check every parameter, and that the motion can be followed."""
+        if self.dynamics not in ("muscles", "reduced"):
+            raise ValueError(f"dynamics = {self.dynamics!r}; choose one of muscles, reduced")
+        self.check_components()
+        check_operator(self.memory.operator)
+        pair_statics.check_angles(self, self.link)
+        self._check_motion()
+
+    def _check_motion(self) -> None:
+        """Refuse a motion that the sub-steps cannot follow (see ``mechanics.hanging_mass``)."""
+        h, link = self.control_period / self.substeps, self.link
+        full = float(np.max(pair_statics.stiffness(self, link.stop, *2 * (FULL_PRESSURE,))))
+        k = (full + link.stop_stiffness) / link.inertia
+        phase = max(k, (0.5 * link.damping / link.inertia) ** 2) * h * h
+        if phase > LARGEST_PHASE:
+            raise ValueError(
+                f"link.inertia = {link.inertia:g} kg m2 with link.damping = {link.damping:g} "
+                f"N m s/rad moves too fast for {self.substeps} sub-steps: phase {phase:.1f} "
+                f"against at most {LARGEST_PHASE:g}; use more sub-steps or a larger inertia"
+            )
+
+    # --- presets --------------------------------------------------------------------------------
+
+    @classmethod
+    def paper(cls, hysteresis: Kind = "maxwell_slip", **changes: float) -> AntagonisticJoint:
+        """Return the joint whose muscles end at 25 % contraction, as seed 002 has it.
+
+        Parameters
+        ----------
+        hysteresis : {"maxwell_slip", "preisach", "none"}
+            Which memory; both operators have the same loops.
+        **changes : float
+            Parameters to replace, with ``__`` for the dot (``memory__width=0.5``).
+        """
+        plant = cls(
+            memory=joint_memory(hysteresis),
+            muscle=ForceMap(stretch=paper_stretch()),
+            provenance={"muscle.stretch": STRETCHED},
+        )
+        return plant._changed(changes)
+
+    @classmethod
+    def measured(cls, hysteresis: Kind = "maxwell_slip", **changes: float) -> AntagonisticJoint:
+        """Return the joint with muscles as measured; what it reaches is its limit.
+
+        The limit is the angle that full pressure reaches at the nominal co-contraction, against
+        the link's weight; other parameters are those of :meth:`paper`.
+        """
+        plant = cls(memory=joint_memory(hysteresis), provenance={"link.limit": REACHED})
+        plant = plant._changed(changes)
+        if "link__limit" in changes:
+            return plant
+        return plant.replace({"link.limit": plant.reachable_angle()})
+
+    @classmethod
+    def reduced(cls, hysteresis: Kind = "maxwell_slip", **changes: float) -> AntagonisticJoint:
+        """Return the paper's reduced plant: a memory, then two real poles."""
+        plant = cls.paper("none")
+        plant = dataclasses.replace(
+            plant, memory=joint_memory(hysteresis, True), dynamics="reduced"
+        )
+        return plant._changed(changes)
+
+    def _changed(self, changes: Mapping[str, float]) -> AntagonisticJoint:
+        return self.replace({k.replace("__", "."): v for k, v in changes.items()})
+
+    def without_noise(self) -> AntagonisticJoint:
+        """Return the plant with sensors that show the truth."""
+        sensors = ("angle", "pressure")
+        return self.replace(
+            {f"{s}.{what}": 0.0 for s in sensors for what in ("noise", "resolution")}
+        )
+
+    # --- ranges ---------------------------------------------------------------------------------
+
+    @property
+    def angle_range(self) -> tuple[float, float]:
+        """Lowest and highest set-point [rad]."""
+        return -self.link.limit, self.link.limit
+
+    @property
+    def largest_angle(self) -> float:
+        """Where the mechanical stop stands [rad]."""
+        return self.link.stop
+
+    @property
+    def prestress(self) -> float:
+        """Usual co-contraction [N]."""
+        return self.nominal.prestress
+
+    @property
+    def prestress_range(self) -> tuple[float, float]:
+        """Lowest and highest co-contraction [N] that is a set-point."""
+        return PRESTRESS_RANGE
+
+    # --- statics --------------------------------------------------------------------------------
+
+    def forces_for(
+        self, angle: ArrayLike, prestress: ArrayLike, torque: ArrayLike = 0.0
+    ) -> tuple[Array, Array]:
+        """Return the forces [N] of both muscles whose mean is ``prestress`` [N].
+
+        ``torque`` [N m] is what they exert together, at an angle [rad].
+        """
+        return pair_statics.forces_for(self, angle, prestress, torque)
+
+    def pressures_for(
+        self, angle: ArrayLike, prestress: ArrayLike | None = None, torque: ArrayLike = 0.0
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return both pressures [Pa] for an angle [rad], co-contraction [N] and torque [N m].
+
+        The exact inverse of the static law, without memory. Where a muscle would need more than
+        full pressure the co-contraction gives way; the last value says where even without any the
+        angle is out of reach.
+        """
+        stress = self.prestress if prestress is None else prestress
+        return pair_statics.pressures_for(self, angle, stress, torque)
+
+    def torque(self, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
+        """Return the muscles' torque [N m] at an angle [rad] and pressures [Pa], without memory."""
+        return pair_statics.pull(self, angle, pressure_a, pressure_b)
+
+    def stiffness_at(self, angle: ArrayLike, prestress: ArrayLike | None = None) -> Array:
+        """Return the stiffness [N m/rad] at rest, pressures held, without memory."""
+        pressures = self.pressures_for(angle, prestress)[:2]
+        return pair_statics.stiffness(self, angle, *pressures)
+
+    def reachable_angle(
+        self, prestress: float | None = None, torque: float = 0.0, payload: float = 0.0
+    ) -> float:
+        """Return the largest angle [rad] up to the stop that the regulators' range reaches.
+
+        The co-contraction is held, and so are the weights of link and payload.
+
+        Parameters
+        ----------
+        prestress : float, optional
+            Co-contraction [N]; default: the nominal one.
+        torque : float
+            Against which the muscles hold it beside the weights [N m].
+        payload : float
+            Mass at the link's end [kg].
+        """
+        stress = self.prestress if prestress is None else prestress
+
+        def load(angle: float) -> float:
+            return torque + float(self.weight_torque(angle, payload))
+
+        return pair_statics.reachable_angle(self, self.link.stop, stress, load)
+
+    def weight_torque(self, angle: ArrayLike, payload: ArrayLike = 0.0) -> Array:
+        """Return the torque [N m] that holds link and payload [kg] at an angle [rad]."""
+        moment = self.link.mass * self.link.centre + np.asarray(payload) * self.link.length
+        return np.asarray(self.link.gravity * moment * np.sin(angle))
+
+    def torque_range(self, angles: ArrayLike, by_pressure: bool = False) -> tuple[Array, Array]:
+        """Return the least and the largest torque [N m] at angles [rad].
+
+        Set-points of angles end at their limit, and so does what they exert; pressures do not.
+        """
+        if self.dynamics == "reduced":
+            low, high = (
+                self.nominal.stiffness * (end - np.asarray(angles)) for end in self.angle_range
+            )
+            return low, high
+        limit = None if by_pressure else self.link.limit
+        return pair_statics.torque_range(self, angles, limit, self.prestress)
+
+    def gravity_shift(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
+        """Return what to add to set-points [rad] so that gravity is borne, shape (..., 1).
+
+        ``angles`` (..., 1) [rad] are those at which link and payload [kg] shall rest.
+        """
+        phi = np.asarray(angles, float)
+        weight = self.weight_torque(phi, np.asarray(payload)[..., None])
+        held = np.clip(phi, *self.angle_range)
+        return pair_statics.shift_for(self, held, self.prestress, weight, self.link.limit)
+
+    # --- rows, files, identity --------------------------------------------------------------------
+
+    def parameter_rows(self) -> Array:
+        """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
+        named = [self.value(name) for name in K.NAMES]
+        return np.array(named + model_rows(self.memory.operator))
+
+    @property
+    def elements(self) -> int:
+        """Plays of a muscle's memory."""
+        return plays_of(self.memory.operator)
+
+    def memory_tables(self) -> Array:
+        """Return the Everett maps of all members, shape (members, n, n), or zeros."""
+        return map_tables([m.memory.operator for m in self.members()])
+
+    def rest_angles(self, commands: ArrayLike, prestress: float | None = None) -> Array:
+        """Return where the joint rests [rad] after each of a series of set-points [rad], (T,).
+
+        Quasi-static, memory included, from the straight virgin state, without gravity and load.
+        """
+        from pam_envs.plants.antagonistic_joint.rollout import rest_angles
+
+        return rest_angles(self, commands, prestress)

@@ -1,0 +1,152 @@
+"""Where each number of the antagonistic joint stands in its rows (see ``single_muscle_rows``).
+
+A plant's numbers are rows of two matrices whose columns are environments (lanes): ``rows`` is the
+state, followed by that of the memory, and ``fixed`` the parameters, which all tiles of a batch
+share unless they are drawn. This page is the only one that counts. Of what stands twice, the
+first is muscle A's.
+"""
+
+from __future__ import annotations
+
+from pam_envs.plants.antagonistic_joint.hysteresis_kernels import MODEL_ROWS
+
+(
+    ANGLE,
+    VELOCITY,
+    PRESSURE_A,
+    PRESSURE_B,
+    SET_POINT_A,
+    SET_POINT_B,
+    COMMAND,
+    PRESTRESS,
+    DISTURBANCE,
+    PAYLOAD,
+    FORCE_A,
+    FORCE_B,
+    CONTRACTION_A,
+    CONTRACTION_B,
+    LAG_A,
+    LAG_B,
+    SLACK,
+    TORQUE,
+    STIFFNESS,
+    AIR,
+    AT_A,
+    AT_B,
+    STICK_A,
+    STICK_B,
+    STRAIGHT,
+) = range(25)
+"""``AT``: contraction beyond that of the straight joint (``STRAIGHT``), the memory's input."""
+END = 25
+"""First row after the plant's state; the memory's state follows."""
+
+MUSCLE_PARAMETERS = (
+    "regulator.max_pressure",
+    "regulator.time_constant",
+    "regulator.slew_rate",
+    "memory.width",
+    "memory.base",
+    "memory.rate",
+    "muscle.area",
+    "muscle.taper",
+    "muscle.threshold",
+    "muscle.braid_force",
+    "muscle.braid_strain",
+    "muscle.stiffness",
+    "muscle.stretch",
+    "muscle.gain",
+    "muscle.imbalance",
+    "muscle.viscosity",
+    "muscle.rest_length",
+    "muscle.diameter",
+    "lever.r_u",
+    "lever.r_o",
+    "lever.l_u",
+    "lever.l_o",
+    "lever.fittings",
+    "link.damping",
+    "link.limit",
+    "link.stop",
+    "link.stop_stiffness",
+    "nominal.prestress",
+    "angle.noise",
+    "angle.resolution",
+    "angle.bias",
+    "pressure.noise",
+    "pressure.resolution",
+    "pressure.bias",
+)
+"""What a stage has alone and in a chain."""
+(
+    MAX_PRESSURE,
+    TIME_CONSTANT,
+    SLEW_RATE,
+    LOOP_WIDTH,
+    FRICTION_BASE,
+    FRICTION_RATE,
+    AREA,
+    TAPER,
+    THRESHOLD,
+    BRAID_FORCE,
+    BRAID_STRAIN,
+    MUSCLE_STIFFNESS,
+    STRETCH,
+    GAIN,
+    IMBALANCE,
+    VISCOSITY,
+    REST_LENGTH,
+    DIAMETER,
+    R_U,
+    R_O,
+    L_U,
+    L_O,
+    FITTINGS,
+    DAMPING,
+    LIMIT,
+    STOP,
+    STOP_STIFFNESS,
+    NOMINAL_PRESTRESS,
+    ANGLE_NOISE,
+    ANGLE_RESOLUTION,
+    ANGLE_BIAS,
+    PRESSURE_NOISE,
+    PRESSURE_RESOLUTION,
+    PRESSURE_BIAS,
+) = range(len(MUSCLE_PARAMETERS))
+
+PARAMETERS = (
+    *MUSCLE_PARAMETERS,
+    "link.length",
+    "link.mass",
+    "link.centre",
+    "link.gyration",
+    "link.gravity",
+    "nominal.pole",
+    "nominal.stiffness",
+)
+(
+    PAYLOAD_ARM,
+    LINK_MASS,
+    LINK_CENTRE,
+    LINK_GYRATION,
+    GRAVITY,
+    NOMINAL_POLE,
+    NOMINAL_STIFFNESS,
+) = range(len(MUSCLE_PARAMETERS), len(PARAMETERS))
+
+MODEL = len(PARAMETERS)
+"""First row of the memory's operator: thresholds and weights, or half the range of a map."""
+N_PARAMETERS = MODEL + MODEL_ROWS
+NAMES = PARAMETERS
+"""Every parameter by name; :func:`place` says where it stands."""
+
+# integer rows
+KEY_A, KEY_B, EPISODE, STEP, MEMBER, STACK_COUNT = range(6)
+"""``STACK_COUNT`` has a row for each muscle."""
+N_COUNTS = 7
+
+
+def place(name: str) -> int:
+    """Return where a parameter stands in the column that the kernels read."""
+    return PARAMETERS.index(name)

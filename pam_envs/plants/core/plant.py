@@ -1,0 +1,111 @@
+"""What all plants have in common: named parameters in components, members, files, identity."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+from pam_envs.parameters import check
+from pam_envs.plants.core import plant_file
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A plant made of components; a family of plants derives from it.
+
+    Attributes
+    ----------
+    family : str
+        Name in files.
+    control_period : float
+        Seconds.
+    components : tuple of str
+        Names of the components, in the order of a file.
+    names : tuple of str
+        Dotted names of the parameters that the kernels read.
+    choices : tuple of str
+        What else a file names, where the plants of a family come in several makes.
+    effects : tuple of tuple of str
+        Parameters that switch an effect on, each with those that shape it. A file leaves out what
+        is off, so that a plant's digest stays when a new effect is added.
+    provenance : mapping
+        Parameter name (``"muscle.area"``) to ``(provenance, source)`` where it differs from the
+        declaration.
+    ensemble : tuple of mapping
+        Other parameter sets that fit the data equally well (parameter name to value; operators of
+        the memory under ``"memory.operator"``), for domain randomisation.
+    substeps : int
+        Steps of the integrator in a control period.
+    """
+
+    family: ClassVar[str]
+    control_period: ClassVar[float] = 0.01
+    components: ClassVar[tuple[str, ...]]
+    names: ClassVar[tuple[str, ...]]
+    choices: ClassVar[tuple[str, ...]] = ()
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = ()
+
+    provenance: Mapping[str, tuple[str, str]] = field(
+        default_factory=dict, compare=False, kw_only=True
+    )
+    ensemble: tuple[Mapping[str, Any], ...] = field(default=(), compare=False, kw_only=True)
+    substeps: int = field(default=4, kw_only=True)
+
+    def check_components(self) -> None:
+        """Raise if a parameter is out of bounds, or the number of sub-steps is none."""
+        for name in self.components:
+            check(getattr(self, name), name)
+        if not isinstance(self.substeps, int) or not 1 <= self.substeps <= 100:
+            raise ValueError(
+                f"substeps = {self.substeps!r} must be a whole number from 1 to 100; "
+                "4 is the default"
+            )
+
+    def replace(self, values: Mapping[str, Any]) -> Self:
+        """Return the plant with parameters replaced by dotted name (``"mass.load"``)."""
+        changed: dict[str, dict[str, Any]] = {}
+        for name, value in values.items():
+            component, _, entry = name.partition(".")
+            if name not in self.names and name != "memory.operator":
+                raise ValueError(f"no parameter named {name!r}; there are: {', '.join(self.names)}")
+            changed.setdefault(component, {})[entry] = value
+        parts: dict[str, Any] = {
+            c: dataclasses.replace(getattr(self, c), **v) for c, v in changed.items()
+        }
+        return dataclasses.replace(self, **parts)
+
+    def value(self, name: str) -> float:
+        """Return a parameter by dotted name, in SI."""
+        component, _, entry = name.partition(".")
+        return float(getattr(getattr(self, component), entry))
+
+    def members(self) -> tuple[Self, ...]:
+        """Return this plant and the equally good fits beside it."""
+        return (self, *(self.replace(values) for values in self.ensemble))
+
+    def to_yaml(self, path: str | Path) -> None:
+        """Write the plant to a file that :meth:`from_yaml` and ``gym.make(plant=...)`` read."""
+        plant_file.write(self, Path(path))
+
+    @classmethod
+    def from_yaml(cls, path: str | Path) -> Self:
+        """Read a plant; what the file leaves out keeps its default.
+
+        Raises
+        ------
+        ValueError
+            If the file cannot be read, or a value is unknown or out of bounds.
+        """
+        return plant_file.read(cls, Path(path))
+
+    def digest(self) -> str:
+        """Return a hash of family, make, parameters and memory, 16 hexadecimal digits."""
+        return self._digest
+
+    @cached_property
+    def _digest(self) -> str:
+        return plant_file.digest(self)

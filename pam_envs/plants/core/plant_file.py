@@ -1,0 +1,294 @@
+"""Plants as YAML: ``schema: 1``, SI values with unit, provenance and source.
+
+    schema: 1
+    family: single_muscle
+    substeps: 4
+    parameters:
+      muscle.area: {value: 8.7e-4, unit: m2, provenance: identified, source: "..."}
+    memory: {kind: maxwell_slip, linear: 0.2, thresholds: [1.0e4, ...], weights: [0.1, ...]}
+    ensemble: [{muscle.area: 8.8e-4, memory: {...}}, ...]
+    notes: {...}
+
+Everything but ``schema`` and ``family`` may be missing. Notes are free text and not hashed. Of a
+family whose plants come in several makes, the file names the choices too (``mounting: leg``).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+
+import numpy as np
+import yaml
+
+from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.hysteresis.modified_maxwell_slip import ModifiedMaxwellSlip
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.parameters import PROVENANCES, Declaration, declarations
+
+if TYPE_CHECKING:
+    from pam_envs.plants.core.plant import Plant
+
+    Operator: TypeAlias = PlayOperator | ModifiedMaxwellSlip | Preisach | None
+
+P = TypeVar("P", bound="Plant")
+KEYS = ("schema", "family", "substeps", "parameters", "memory", "ensemble", "notes")
+ENTRY_KEYS = ("value", "unit", "provenance", "source")
+_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+def _memory_record(operator: Any) -> dict[str, Any]:
+    if isinstance(operator, PlayOperator):
+        return {
+            "kind": "maxwell_slip",
+            "linear": float(operator.linear),
+            "thresholds": [float(v) for v in operator.thresholds],
+            "weights": [float(v) for v in operator.weights],
+        }
+    if isinstance(operator, ModifiedMaxwellSlip):
+        return {
+            "kind": "modified_maxwell_slip",
+            "stiffnesses": [float(v) for v in operator.stiffnesses],
+            "break_stiffnesses": [float(v) for v in operator.break_stiffnesses],
+            "spring": [float(v) for v in operator.spring],
+            "segment": float(operator.segment),
+        }
+    if isinstance(operator, Preisach):
+        table = [[float(v) for v in row] for row in np.asarray(operator.table)]
+        return {
+            "kind": "preisach",
+            "low": float(operator.low),
+            "high": float(operator.high),
+            "table": table,
+        } | ({} if operator.start == "virgin" else {"start": operator.start})
+    return {"kind": "none"}
+
+
+def _memory(record: Any, where: str) -> Operator:
+    fields = {
+        "none": set(),
+        "maxwell_slip": {"linear", "thresholds", "weights"},
+        "modified_maxwell_slip": {"stiffnesses", "break_stiffnesses", "spring", "segment"},
+        "preisach": {"low", "high", "table"},
+    }
+    if not isinstance(record, Mapping) or record.get("kind") not in fields:
+        raise ValueError(
+            f"{where}: memory must be a mapping with kind maxwell_slip, modified_maxwell_slip, "
+            f"preisach or none, got {record!r}"
+        )
+    kind = record["kind"]
+    optional = {"start"} if kind == "preisach" else set()
+    if set(record) - {"kind"} - optional != fields[kind]:
+        raise ValueError(
+            f"{where}: a {kind} memory needs exactly the keys {sorted(fields[kind])}, "
+            f"got {sorted(set(record) - {'kind'})}"
+        )
+    try:
+        if kind == "maxwell_slip":
+            return PlayOperator(
+                tuple(float(v) for v in record["thresholds"]),
+                tuple(float(v) for v in record["weights"]),
+                float(record["linear"]),
+            )
+        if kind == "modified_maxwell_slip":
+            return ModifiedMaxwellSlip(
+                tuple(float(v) for v in record["stiffnesses"]),
+                tuple(float(v) for v in record["break_stiffnesses"]),
+                tuple(float(v) for v in record["spring"]),
+                float(record["segment"]),
+            )
+        if kind == "preisach":
+            return Preisach(
+                float(record["low"]),
+                float(record["high"]),
+                tuple(tuple(float(v) for v in row) for row in record["table"]),
+                start=record.get("start", "virgin"),
+            )
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{where}: memory: {error}") from error
+    return None
+
+
+def record(plant: Plant) -> dict[str, Any]:
+    """Return a plant as plain data, in the layout of the file."""
+    parameters = {}
+    absent = _absent(plant)
+    parts = {component: getattr(plant, component) for component in plant.components}
+    for component, part in parts.items():
+        for name, declared in declarations(part).items():
+            key = f"{component}.{name}"
+            if key in absent:
+                continue
+            kind, source = plant.provenance.get(key, (declared.provenance, declared.source))
+            parameters[key] = {
+                "value": float(getattr(part, name)),
+                "unit": declared.unit,
+                "provenance": kind,
+                "source": source,
+            }
+    ensemble = []
+    for member in plant.ensemble:
+        values: dict[str, Any] = {k: float(v) for k, v in member.items() if k != "memory.operator"}
+        if "memory.operator" in member:
+            values["memory"] = _memory_record(member["memory.operator"])
+        ensemble.append(values)
+    return {
+        "schema": 1,
+        "family": plant.family,
+        **{choice: getattr(plant, choice) for choice in plant.choices},
+        "substeps": plant.substeps,
+        "parameters": parameters,
+        "memory": _memory_record(parts["memory"].operator),
+        "ensemble": ensemble,
+    }
+
+
+def _absent(plant: Plant) -> set[str]:
+    """Return the parameters of effects that are off, which a file need not name."""
+    absent = set()
+    for names in plant.effects:
+        amounts = [n for n in names if _declared(plant, n).neutral is not None]
+        if all(plant.value(n) == _declared(plant, n).neutral for n in amounts):
+            absent |= set(names)
+    return absent
+
+
+def _declared(plant: Plant, name: str) -> Declaration:
+    component, _, field = name.partition(".")
+    return declarations(getattr(plant, component))[field]
+
+
+def digest(plant: Plant) -> str:
+    """Return a hash over the canonical values (not provenance, sources or notes)."""
+
+    def exact(value: Any) -> Any:
+        if isinstance(value, float):
+            return value.hex()
+        if isinstance(value, Mapping):
+            return {k: exact(v) for k, v in value.items()}
+        if isinstance(value, list):
+            return [exact(v) for v in value]
+        return value
+
+    data = record(plant)
+    data["parameters"] = {k: v["value"] for k, v in data["parameters"].items()}
+    text = json.dumps(exact(data), sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def write(plant: Plant, path: Path, notes: Mapping[str, Any] | None = None) -> None:
+    """Write a plant, whole or not at all."""
+    data = record(plant)
+    if notes:
+        data["notes"] = dict(notes)
+    text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=100)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    with open(temporary, "w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(temporary, path)
+
+
+def read(cls: type[P], path: Path) -> P:
+    """Read a plant file; every complaint names the file, the key and what to do."""
+    try:
+        with open(path, encoding="utf-8") as file:
+            data = yaml.load(file, Loader=_LOADER)
+    except OSError as error:
+        raise ValueError(f"plant file {path} cannot be read: {error.strerror or error}") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ValueError(f"plant file {path} is not YAML: {error}") from error
+    where = f"plant file {path}"
+    if not isinstance(data, Mapping):
+        raise ValueError(f"{where}: must hold a mapping with the keys {', '.join(KEYS)}")
+    keys = (*KEYS, *cls.choices)
+    unknown = [str(k) for k in data if k not in keys]
+    if unknown:
+        raise ValueError(f"{where}: unknown key {unknown[0]!r}; known: {', '.join(keys)}")
+    if data.get("schema") != 1:
+        raise ValueError(f"{where}: schema is {data.get('schema')!r}; this version reads schema 1")
+    if data.get("family") != cls.family:
+        raise ValueError(f"{where}: family is {data.get('family')!r}, expected {cls.family!r}")
+    try:
+        return _build(cls, data, where)
+    except (TypeError, AttributeError) as error:
+        raise ValueError(f"{where}: malformed: {error}") from error
+    except ValueError as error:
+        text = str(error)
+        raise type(error)(text if text.startswith(where) else f"{where}: {text}") from error
+
+
+def _build(cls: type[P], data: Mapping[str, Any], where: str) -> P:
+    values: dict[str, Any] = {}
+    provenance: dict[str, tuple[str, str]] = {}
+    given = data.get("parameters") or {}
+    known = {
+        f"{c}.{name}": d
+        for c in cls.components
+        for name, d in declarations(getattr(cls(), c)).items()
+    }
+    if not isinstance(given, Mapping):
+        raise ValueError(f"{where}: parameters must be a mapping, got {given!r}")
+    for name, entry in given.items():
+        if name not in known:
+            raise ValueError(
+                f"{where}: unknown parameter {name!r}; known parameters: {', '.join(known)}"
+            )
+        values[name] = _entry(name, entry, known[name].unit, where)
+        if isinstance(entry, Mapping) and "provenance" in entry:
+            provenance[name] = (str(entry["provenance"]), str(entry.get("source", "")))
+    if "memory" in data:
+        values["memory.operator"] = _memory(data["memory"], where)
+    ensemble = []
+    for i, member in enumerate(data.get("ensemble") or []):
+        place = f"{where}: ensemble[{i}]"
+        if not isinstance(member, Mapping):
+            raise ValueError(f"{place} must be a mapping from parameter to value")
+        other: dict[str, Any] = {
+            k: _entry(k, v, "", place) for k, v in member.items() if k != "memory"
+        }
+        if "memory" in member:
+            other["memory.operator"] = _memory(member["memory"], place)
+        ensemble.append(other)
+    substeps = data.get("substeps", 4)
+    choices: Any = {choice: data[choice] for choice in cls.choices if choice in data}
+    plant = cls(substeps=substeps, provenance=provenance).replace(values)
+    made = dataclasses.replace(plant, ensemble=tuple(ensemble), **choices)
+    made.members()  # every member must be a valid plant
+    return made
+
+
+def _entry(name: str, entry: Any, unit: str, where: str) -> float:
+    value = entry
+    if isinstance(entry, Mapping):
+        unknown = [str(k) for k in entry if k not in ENTRY_KEYS]
+        if unknown:
+            raise ValueError(
+                f"{where}: {name} has an unknown key {unknown[0]!r}; known: {', '.join(ENTRY_KEYS)}"
+            )
+        if "value" not in entry:
+            raise ValueError(f"{where}: {name} has no value; give value: in {unit}")
+        value = entry["value"]
+        if unit and entry.get("unit", unit) != unit:
+            raise ValueError(
+                f"{where}: {name} is given in {entry['unit']!r}, expected {unit!r} (SI); convert it"
+            )
+        if "provenance" in entry and entry["provenance"] not in PROVENANCES:
+            raise ValueError(
+                f"{where}: {name} has provenance {entry['provenance']!r}; "
+                f"choose one of {', '.join(PROVENANCES)}"
+            )
+    if isinstance(value, str):  # YAML reads 1e5 without a sign as text
+        with contextlib.suppress(ValueError):
+            value = float(value)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError(f"{where}: {name} must be a number in {unit or 'SI'}, got {value!r}")
+    return float(value)

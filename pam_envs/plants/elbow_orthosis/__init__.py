@@ -1,0 +1,1 @@
+"""elbow_orthosis."""

@@ -1,0 +1,177 @@
+"""The air of the elbow's bundles as kernels: proportional regulators, or on/off valves.
+
+``breathe`` lets the air of a sub-step in and out and writes, for the middle of its motion, the
+pressures before and after, and by how much they fall as a bundle contracts; ``settle`` writes
+pressures and air at its end. ``begin_period`` hands the valves their pulses.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pam_envs.kernels.arithmetic import clip
+from pam_envs.kernels.build import LANES, kernel
+from pam_envs.plants.elbow_orthosis.bundles import contraction_at, factors_of, shape_of, volume_of
+from pam_envs.plants.elbow_orthosis.rows import (
+    AIR_A,
+    ANGLE,
+    CLOCK,
+    CLOSING_TIME,
+    COMMAND_A,
+    CONDUCTANCE,
+    CRITICAL_RATIO,
+    FREQUENCY,
+    LEFT,
+    LIFT,
+    MAX_PRESSURE,
+    OPENED,
+    OPENING_TIME,
+    PRESSURE_A,
+    SLEW_RATE,
+    SUPPLY_PRESSURE,
+    SWITCHES,
+    TIME_CONSTANT,
+    USED,
+    VALVES,
+)
+from pam_envs.pneumatics.on_off_pair import ATMOSPHERE, GAS, coil_window, emptied, filled
+from pam_envs.pneumatics.regulator import regulator_step
+
+MIDDLE, WAS_A, WAS_B, NOW_A, NOW_B, GIVES_A, GIVES_B, DRIVE_WAS = range(8)
+"""Rows of scratch: angle at the middle; pressures before and after; their fall with contraction;
+torque of the intended motion at the start of the period."""
+N_WORK = 8
+STILL_ON = 1.0 - 1e-6
+"""Lift of a valve whose coil was on until a moment ago."""
+
+
+@kernel
+def begin_regulated(rows: Any, fixed: Any, j: int, period: float) -> None:
+    """Regulators take their set-points as they come."""
+
+
+@kernel
+def breathe_regulated(rows: Any, fixed: Any, h: float, work: Any) -> None:
+    """Advance both pressures of a tile towards their set-points."""
+    for side in range(2):
+        pressure, command = rows[PRESSURE_A + side], rows[COMMAND_A + side]
+        was, now, gives = work[WAS_A + side], work[NOW_A + side], work[GIVES_A + side]
+        for j in range(LANES):
+            time, slew = fixed[TIME_CONSTANT][j], fixed[SLEW_RATE][j]
+            target = max(0.0, min(fixed[MAX_PRESSURE][j], command[j]))
+            was[j] = pressure[j]
+            now[j] = regulator_step(pressure[j], target, time, 1.0 / time, slew, 1.0 / slew, h)
+            gives[j] = 0.0
+
+
+@kernel
+def settle_regulated(rows: Any, fixed: Any, work: Any) -> None:
+    """Keep the pressures; what the air inside grows by comes from the supply."""
+    for side in range(2):
+        for j in range(LANES):
+            rows[PRESSURE_A + side][j] = work[NOW_A + side][j]
+            air = air_at(rows, fixed, j, side)
+            rows[USED][j] = rows[USED][j] + max(0.0, air - rows[AIR_A + side][j])
+            rows[AIR_A + side][j] = air
+
+
+@kernel
+def air_at(rows: Any, fixed: Any, j: int, side: int) -> float:
+    """Return the air [kg] in a bundle at its pressure."""
+    space = volume_of(fixed, j, side, contraction_at(fixed, j, side, rows[ANGLE][j]))
+    return (rows[PRESSURE_A + side][j] + ATMOSPHERE) * space / GAS
+
+
+@kernel
+def begin_pulsed(rows: Any, fixed: Any, j: int, period: float) -> None:
+    """Hand the coils of one lane their pulses where a cycle begins: filling above 0."""
+    latches = rows[CLOCK][j] < 0.5 * period
+    cycle = 1.0 / fixed[FREQUENCY][j]
+    for valve in range(VALVES):
+        side, sign = valve // 2, 1.0 - 2.0 * (valve % 2)
+        width = clip(sign * rows[COMMAND_A + side][j], 0.0, cycle)
+        left = rows[LEFT + valve][j]
+        starts = latches and width > 0.0 and left <= 0.0 and rows[LIFT + valve][j] < STILL_ON
+        rows[SWITCHES][j] = rows[SWITCHES][j] + (1.0 if starts else 0.0)
+        rows[LEFT + valve][j] = width if latches else left
+    rows[CLOCK][j] = rows[CLOCK][j] + (cycle if latches else 0.0) - period
+
+
+@kernel
+def breathe_pulsed(rows: Any, fixed: Any, h: float, work: Any) -> None:
+    """Let air through the valves of a tile, at the volumes of the middle of the sub-step."""
+    for side in range(2):
+        for j in range(LANES):
+            contraction = contraction_at(fixed, j, side, work[MIDDLE][j])
+            per_volume = GAS / volume_of(fixed, j, side, contraction)
+            was = rows[AIR_A + side][j]
+            come = inflow(rows, fixed, j, side, per_volume, h)
+            left = outflow(rows, fixed, j, side, was + come, per_volume, h)
+            now = was + come - left
+            shape, _ = shape_of(fixed, j, side, contraction)
+            _, pressed = factors_of(fixed, j, side)
+            work[WAS_A + side][j] = was * per_volume - ATMOSPHERE
+            work[NOW_A + side][j] = now * per_volume - ATMOSPHERE
+            mean = 0.5 * (was + now) * per_volume
+            work[GIVES_A + side][j] = mean * pressed * shape * per_volume / GAS
+            rows[AIR_A + side][j] = now
+            rows[USED][j] = rows[USED][j] + come
+
+
+@kernel
+def open_time(rows: Any, fixed: Any, j: int, valve: int, h: float) -> float:
+    """Return how long [s] a valve is open in a sub-step, and advance it."""
+    duration, left, lift, opened = coil_window(
+        rows[LEFT + valve][j],
+        rows[LIFT + valve][j],
+        rows[OPENED + valve][j],
+        fixed[OPENING_TIME][j],
+        fixed[CLOSING_TIME][j],
+        h,
+    )
+    rows[LEFT + valve][j], rows[LIFT + valve][j] = left, lift
+    rows[OPENED + valve][j] = opened
+    return duration
+
+
+@kernel
+def inflow(rows: Any, fixed: Any, j: int, side: int, per_volume: float, h: float) -> float:
+    """Return the air [kg] that a fill valve lets into a bundle in a sub-step."""
+    duration = open_time(rows, fixed, j, 2 * side, h)
+    supply = fixed[SUPPLY_PRESSURE][j] + ATMOSPHERE
+    flow, critical = fixed[CONDUCTANCE][j], fixed[CRITICAL_RATIO][j]
+    return filled(rows[AIR_A + side][j], per_volume, supply, flow, critical, duration)
+
+
+@kernel
+def outflow(
+    rows: Any, fixed: Any, j: int, side: int, air: float, per_volume: float, h: float
+) -> float:
+    """Return the air [kg] that an exhaust valve lets out of a bundle in a sub-step."""
+    duration = open_time(rows, fixed, j, 2 * side + 1, h)
+    return emptied(air, per_volume, fixed[CONDUCTANCE][j], fixed[CRITICAL_RATIO][j], duration)
+
+
+@kernel
+def settle_pulsed(rows: Any, fixed: Any, work: Any) -> None:
+    """Write the pressures of the air that is inside."""
+    for side in range(2):
+        for j in range(LANES):
+            contraction = contraction_at(fixed, j, side, rows[ANGLE][j])
+            per_volume = GAS / volume_of(fixed, j, side, contraction)
+            rows[PRESSURE_A + side][j] = rows[AIR_A + side][j] * per_volume - ATMOSPHERE
+
+
+AIR: dict[str, dict[str, Any]] = {
+    "proportional": {
+        "begin_period": begin_regulated,
+        "breathe": breathe_regulated,
+        "settle": settle_regulated,
+    },
+    "on_off": {
+        "begin_period": begin_pulsed,
+        "breathe": breathe_pulsed,
+        "settle": settle_pulsed,
+    },
+}
+"""Kernels by make of valves; regulators keep their set-points where pulses end."""

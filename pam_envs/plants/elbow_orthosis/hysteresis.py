@@ -1,0 +1,143 @@
+"""The memory of the elbow's bundles: friction driven by their contraction.
+
+The threads of the braid slide as the length changes, and press on each other in proportion to the
+force. An operator of slope 1 follows the travel of the pulley (the contraction of bundle b; that
+of bundle a is its mirror image, so that one operator serves both). What it lags behind makes the
+force of each bundle
+
+    P = X [(L_n - C) (C_max - C) - s],    s = loop L_n C_max lag / (2 largest lag)
+
+with the lag of that bundle's own contraction. ``loop`` is the largest difference of the forces
+while the bundle is stretched and let go, over its force at nominal length, at any one pressure:
+so is the paper's 7.5 % read. It was reported of loops that overload the muscles beyond their
+nominal length; shorter ones are said to have less.
+
+The two presets are two memories and not one in two forms. Plays are alike wherever the elbow is,
+and their thresholds are spread evenly on a logarithmic scale. The Preisach preset has thresholds
+spread evenly up to its largest, so that less slides in small motions, and less friction mid-stroke
+than towards either end, where one of the bundles is as long as it gets. No plays can do that. Both
+are assumed; the paper gives no more than the largest difference, which is the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.parameters import parameter
+from pam_envs.plants.antagonistic_joint.hysteresis import ELEMENTS
+from pam_envs.plants.single_muscle.hysteresis import Kind
+
+SMALLEST, LARGEST = 6e-4, 9e-3
+"""Thresholds of the preset's plays [m]: 0.15 % and 2.3 % of the nominal length."""
+WIDEST, LEVELS = 0.06, 121
+"""Travel [m] on either side of the middle that a Preisach memory spans, and levels of its map."""
+SLIDING = 0.8
+"""Part of the slope that has memory, of either preset."""
+HALF_GAP = 7.75e-3
+"""Largest half-gap [m] of the Preisach preset's relays: of 15.5 cells of its map."""
+MIDDLE, REST = 0.3, 9e-3
+"""Density of its relays in the middle over that from ``REST`` [m] on either side. Relays so far out
+are all within the paper's stroke of 66 mm, which is why the loop there is the largest one."""
+
+
+@dataclass(frozen=True)
+class ElbowMemory:
+    """Thread-on-thread friction of both bundles.
+
+    ``operator`` turns travel [m] into the travel that is felt: a :class:`PlayOperator` of total
+    slope 1, a :class:`Preisach` operator with a virgin start, or None.
+    """
+
+    operator: PlayOperator | Preisach | None = None
+    loop: float = parameter(
+        0.075,
+        "1",
+        0.0,
+        0.4,
+        "published",
+        "7.5 % between loading and unloading: seed 001, section 2",
+        neutral=0.0,
+        spread=(0.045, 0.12),
+    )
+
+    @property
+    def kind(self) -> Kind:
+        """Which operator this is."""
+        if self.operator is None:
+            return "none"
+        return "preisach" if isinstance(self.operator, Preisach) else "maxwell_slip"
+
+    @cached_property
+    def largest_lag(self) -> float:
+        """How far [m] the operator lags behind at most after a long way in one direction.
+
+        Of a map, half the largest distance between the two branches of its widest loop.
+        """
+        if isinstance(self.operator, PlayOperator):
+            return float(np.dot(self.operator.weights, self.operator.thresholds))
+        if isinstance(self.operator, Preisach):
+            return 0.5 * float(np.max(_gaps(self.operator.everett)))
+        return 1.0
+
+
+def travel_plays() -> PlayOperator:
+    """Return the preset: plays of equal weight, evenly spread on a logarithmic scale."""
+    thresholds = np.geomspace(SMALLEST, LARGEST, ELEMENTS)
+    return PlayOperator(tuple(thresholds), (0.1,) * ELEMENTS, 0.2)
+
+
+def _gaps(everett: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how far apart the branches of a map's widest loop are at its levels."""
+    return np.asarray(everett[-1, 0] - everett[-1] - everett[:, 0])
+
+
+def _relays(middle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the density of relays by the mean [m] of their two thresholds, over the largest."""
+    return np.asarray(MIDDLE + (1.0 - MIDDLE) * np.minimum(1.0, (middle / REST) ** 2))
+
+
+def _density(up: NDArray[np.float64], down: NDArray[np.float64]) -> NDArray[np.float64]:
+    size = 0.5 * SLIDING / HALF_GAP
+    return size * _relays(0.5 * (up + down)) * (up - down < 2.0 * HALF_GAP)
+
+
+def travel_relays() -> Preisach:
+    """Return the other preset: relays of even half-gaps, fewer mid-stroke; see this module's page.
+
+    What moves at once, without memory, makes up for the relays that are missing, so that the slope
+    is 1 on the mean of both branches.
+    """
+    sliding = Preisach.from_density(_density, -WIDEST, WIDEST, LEVELS).everett
+    levels = np.linspace(-WIDEST, WIDEST, LEVELS)
+    reach = np.linspace(0.0, HALF_GAP, 65)
+    share = 0.5 * (_relays(levels[:, None] - reach) + _relays(levels[:, None] + reach))
+    slope = 1.0 - SLIDING * np.mean(share, axis=1)
+    steps = 0.5 * (slope[1:] + slope[:-1]) * np.diff(levels)
+    at_once = np.concatenate([[0.0], np.cumsum(steps)])
+    table = sliding + (at_once[:, None] - at_once[None, :])
+    table = 0.5 * (table - table[::-1, ::-1])  # virgin relays need the symmetry to rounding
+    return Preisach(-WIDEST, WIDEST, tuple(map(tuple, table)), start="virgin")
+
+
+@lru_cache(maxsize=4)
+def elbow_memory(kind: Kind) -> ElbowMemory:
+    """Return the preset memory of a kind; both have loops of the same largest width.
+
+    Raises
+    ------
+    ValueError
+        If there is no such kind.
+    """
+    if kind == "none":
+        return ElbowMemory()
+    if kind == "maxwell_slip":
+        return ElbowMemory(travel_plays())
+    if kind == "preisach":
+        return ElbowMemory(travel_relays())
+    raise ValueError(f"hysteresis = {kind!r}; choose 'maxwell_slip', 'preisach' or 'none'")

@@ -1,0 +1,311 @@
+"""An elbow orthosis with two antagonistic bundles of pneumatic muscles: seed 001.
+
+    set-points or pulses -> pressures -> P = X [(L_n - C) (C_max - C) - friction],  X = k0 + k1 p
+    Q = r (P_b - P_a),    S = -dQ/dq = -r^2 (k_a + k_b)              flexion positive
+    (J_o + J_w) q'' = Q - weights + wearer
+
+Bundle b (seven muscles) flexes the elbow and bundle a (three) straightens it. Torque and stiffness
+are linear in the two pressures, so that a command of both is met exactly where it lies within the
+parallelogram of the four corners at which each bundle is empty or full. The stiffness is minus the
+paper's ``K_q``, which is negative.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.mechanics.forearm import OrthosisLink, Wearer
+from pam_envs.mechanics.hanging_mass import LARGEST_PHASE
+from pam_envs.mechanics.pulley import Pulley
+from pam_envs.muscle.quadratic_bundle import QuadraticBundle
+from pam_envs.plants.antagonistic_joint.hysteresis_tables import (
+    check_operator,
+    map_tables,
+    model_rows,
+    plays_of,
+)
+from pam_envs.plants.core.plant import Plant
+from pam_envs.plants.elbow_orthosis import rows as K
+from pam_envs.plants.elbow_orthosis.hysteresis import ElbowMemory, elbow_memory
+from pam_envs.plants.single_muscle.hysteresis import Kind
+from pam_envs.pneumatics.bundle_regulator import BundleRegulator
+from pam_envs.pneumatics.on_off_pair import ATMOSPHERE, OnOffValve
+from pam_envs.sensing.orthosis import AngleSensor, GaugeSensor
+
+Valves = Literal["proportional", "on_off"]
+Array = NDArray[np.float64]
+
+MAKES: tuple[Valves, ...] = ("proportional", "on_off")
+STOP_GIVES = 0.15
+"""Depth [rad] of the mechanical stops."""
+SEVEN = ("published", "mus_b = 7: seed 001, section 3")
+
+
+@dataclass(frozen=True)
+class ElbowOrthosis(Plant):
+    """The plant; another one is :meth:`replace` of it.
+
+    Attributes
+    ----------
+    valves : {"proportional", "on_off"}
+        A regulator at each bundle that takes set-points, or the paper's pair of a fill and an
+        exhaust valve, which takes pulses.
+    bundle_a, bundle_b, regulator, valve, memory, pulley, link, wearer
+        The components; of regulator and valve the one that is not in use has no effect.
+    angle, pressure
+        The sensors; both pressure gauges are alike.
+    """
+
+    family: ClassVar[str] = "elbow_orthosis"
+    components: ClassVar[tuple[str, ...]] = (
+        "bundle_a",
+        "bundle_b",
+        "regulator",
+        "valve",
+        "memory",
+        "pulley",
+        "link",
+        "wearer",
+        "angle",
+        "pressure",
+    )
+    names: ClassVar[tuple[str, ...]] = K.NAMES
+    choices: ClassVar[tuple[str, ...]] = ("valves",)
+    extended: ClassVar[bool] = False
+
+    valves: Valves = "proportional"
+    bundle_a: QuadraticBundle = field(default_factory=QuadraticBundle)
+    bundle_b: QuadraticBundle = field(default_factory=lambda: QuadraticBundle(muscles=7.0))
+    regulator: BundleRegulator = field(default_factory=BundleRegulator)
+    valve: OnOffValve = field(default_factory=OnOffValve)
+    memory: ElbowMemory = field(default_factory=lambda: elbow_memory("maxwell_slip"))
+    pulley: Pulley = field(default_factory=Pulley)
+    link: OrthosisLink = field(default_factory=OrthosisLink)
+    wearer: Wearer = field(default_factory=Wearer)
+    angle: AngleSensor = field(default_factory=AngleSensor)
+    pressure: GaugeSensor = field(default_factory=GaugeSensor)
+
+    def __post_init__(self) -> None:
+        """Check every parameter, and that the motion can be followed."""
+        if self.valves not in MAKES:
+            raise ValueError(f"valves = {self.valves!r}; choose one of {', '.join(MAKES)}")
+        self.check_components()
+        check_operator(self.memory.operator)
+        self._check_bundles()
+        self._check_range()
+        self._check_motion()
+
+    def _check_bundles(self) -> None:
+        for name in ("bundle_a", "bundle_b"):
+            muscles = getattr(self, name).muscles
+            if muscles != int(muscles):
+                raise ValueError(f"{name}.muscles = {muscles:g} must be a whole number, 1 or more")
+
+    def _check_range(self) -> None:
+        """Refuse a stroke that leaves the bundles no force, or the memory's map."""
+        if self.pulley.lowest >= self.pulley.highest:
+            raise ValueError(
+                f"pulley.lowest = {self.pulley.lowest:g} rad is not below pulley.highest = "
+                f"{self.pulley.highest:g} rad; swap them"
+            )
+        shortest = min(self.bundle_a.reach, self.bundle_b.reach)
+        if self.pulley.stroke >= shortest:
+            raise ValueError(
+                f"pulley.radius = {self.pulley.radius:g} m: the stroke of {self.pulley.stroke:.4f} "
+                f"m contracts the bundles beyond {shortest:.4f} m, where their force ends; use a "
+                "smaller radius or longer muscles"
+            )
+        operator = self.memory.operator
+        if isinstance(operator, Preisach) and operator.high < 0.55 * self.pulley.stroke:
+            raise ValueError(
+                f"memory: the Everett map spans +-{operator.high:g} m and the pulley travels "
+                f"+-{0.5 * self.pulley.stroke:g} m: give a wider map"
+            )
+
+    def _check_motion(self) -> None:
+        """Refuse a motion that the sub-steps cannot follow (see ``mechanics.hanging_mass``)."""
+        h = self.control_period / self.substeps
+        inertia = self.link.inertia + self.wearer.inertia
+        damping = self.link.damping + self.wearer.damping
+        ends = np.array(self.angle_range)
+        full = float(np.max(self.stiffness(ends, self.full_pressure, self.full_pressure)))
+        k = full + self._air_stiffness() + self.wearer.stiffness + self.pulley.stop_stiffness
+        phase = max(k / inertia, (0.5 * damping / inertia) ** 2) * h * h
+        if phase > LARGEST_PHASE:
+            raise ValueError(
+                f"link.inertia = {self.link.inertia:g} kg m2 and wearer.inertia = "
+                f"{self.wearer.inertia:g} kg m2 with wearer.damping = {self.wearer.damping:g} "
+                f"N m s/rad move too fast for {self.substeps} sub-steps: phase {phase:.1f} against "
+                f"at most {LARGEST_PHASE:g}; use more sub-steps or a larger inertia"
+            )
+
+    def _air_stiffness(self) -> float:
+        """Return how much [N m/rad] the enclosed air adds at most."""
+        total = 0.0
+        for bundle in (self.bundle_a, self.bundle_b):
+            area = bundle.pressure_factor * float(bundle.shape(0.0))
+            air = self.full_pressure + ATMOSPHERE
+            total += area * area * air / bundle.nominal_volume * self.pulley.radius**2
+        return total
+
+    # --- presets --------------------------------------------------------------------------------
+
+    @classmethod
+    def paper(
+        cls, hysteresis: Kind = "maxwell_slip", valves: Valves = "proportional", **changes: float
+    ) -> ElbowOrthosis:
+        """Return the orthosis with three and seven muscles on a pulley of 31.5 mm.
+
+        Parameters
+        ----------
+        hysteresis : {"maxwell_slip", "preisach", "none"}
+            Which memory: two different ones, the widest loops of which are alike.
+        valves : {"proportional", "on_off"}
+            See the class.
+        **changes : float
+            Parameters to replace, with ``__`` for the dot (``bundle_a__muscles=4``).
+        """
+        plant = cls(memory=elbow_memory(hysteresis), provenance={"bundle_b.muscles": SEVEN})
+        return dataclasses.replace(plant._changed(changes), valves=valves)
+
+    def _changed(self, changes: Mapping[str, float]) -> ElbowOrthosis:
+        return self.replace({k.replace("__", "."): v for k, v in changes.items()})
+
+    def without_noise(self) -> ElbowOrthosis:
+        """Return the plant with sensors that show the truth."""
+        sensors = ("angle", "pressure")
+        return self.replace(
+            {f"{s}.{what}": 0.0 for s in sensors for what in ("noise", "resolution")}
+        )
+
+    # --- ranges ---------------------------------------------------------------------------------
+
+    @property
+    def angle_range(self) -> tuple[float, float]:
+        """Lowest and highest flexion [rad]."""
+        return self.pulley.lowest, self.pulley.highest
+
+    @property
+    def hard_limits(self) -> tuple[float, float]:
+        """Flexion [rad] up to which the mechanical stops give way on either side."""
+        return self.pulley.lowest - STOP_GIVES, self.pulley.highest + STOP_GIVES
+
+    @property
+    def full_pressure(self) -> float:
+        """Highest pressure [Pa]: of the regulators, or of the valves' supply."""
+        pulsed = self.valves == "on_off"
+        return self.valve.supply_pressure if pulsed else self.regulator.max_pressure
+
+    @property
+    def cycle(self) -> float:
+        """Cycle of the on/off valves [s]."""
+        return 1.0 / self.valve.frequency
+
+    @property
+    def cycle_periods(self) -> int:
+        """Control periods in a cycle of the on/off valves."""
+        return max(1, round(self.cycle / self.control_period))
+
+    # --- statics, without memory ------------------------------------------------------------------
+
+    def geometry(self, angle: ArrayLike) -> tuple[Array, Array, Array, Array]:
+        """Return the shapes [m2] of bundles a and b and their slopes [m] at an angle [rad]."""
+        c_a, c_b = self.pulley.contractions(angle)
+        a, b = self.bundle_a, self.bundle_b
+        return a.shape(c_a), b.shape(c_b), a.slope(c_a), b.slope(c_b)
+
+    def coefficients(self, pressure_a: ArrayLike, pressure_b: ArrayLike) -> tuple[Array, Array]:
+        """Return ``X = k0 + k1 p`` [N/m2] of both bundles at their pressures [Pa]."""
+        return self.bundle_a.factor(pressure_a), self.bundle_b.factor(pressure_b)
+
+    def pressures_of(self, factor_a: ArrayLike, factor_b: ArrayLike) -> tuple[Array, Array]:
+        """Return the pressures [Pa] of both factors ``X`` [N/m2]."""
+        return self.bundle_a.pressure(factor_a), self.bundle_b.pressure(factor_b)
+
+    def forces(
+        self, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike
+    ) -> tuple[Array, Array]:
+        """Return both forces [N], 0 where a bundle is slack."""
+        c_a, c_b = self.pulley.contractions(angle)
+        return self.bundle_a.force(pressure_a, c_a), self.bundle_b.force(pressure_b, c_b)
+
+    def torque(self, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
+        """Return the torque ``Q`` [N m] at an angle [rad] and pressures [Pa], Eq. (23)."""
+        return self.pulley.torque(*self.forces(angle, pressure_a, pressure_b))
+
+    def stiffness(self, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
+        """Return the stiffness ``S = -K_q`` [N m/rad] at held pressures [Pa], Eq. (22)."""
+        c_a, c_b = self.pulley.contractions(angle)
+        k_a = self.bundle_a.stiffness(pressure_a, c_a) * (self.bundle_a.shape(c_a) > 0.0)
+        k_b = self.bundle_b.stiffness(pressure_b, c_b) * (self.bundle_b.shape(c_b) > 0.0)
+        return np.asarray(-(self.pulley.radius**2) * (k_a + k_b))
+
+    def determinant(self, angle: ArrayLike) -> Array:
+        """Return the determinant [m6] of the map from both factors to torque and ``K_q``."""
+        shape_a, shape_b, slope_a, slope_b = self.geometry(angle)
+        return np.asarray(-(self.pulley.radius**3) * (shape_a * slope_b + shape_b * slope_a))
+
+    def allocate(
+        self, angle: ArrayLike, torque: ArrayLike, stiffness: ArrayLike
+    ) -> tuple[Array, Array]:
+        """Return the pressures [Pa] of a torque [N m] and a stiffness [N m/rad]: exact.
+
+        They are not held within their range; ``mechanics.allocation`` says what is best within it.
+        """
+        shape_a, shape_b, slope_a, slope_b = self.geometry(angle)
+        pull = np.asarray(torque, float) / self.pulley.radius
+        hold = -np.asarray(stiffness, float) / self.pulley.radius**2
+        per = 1.0 / (shape_a * slope_b + shape_b * slope_a)
+        factor_a = (shape_b * hold - slope_b * pull) * per
+        factor_b = (shape_a * hold + slope_a * pull) * per
+        return self.pressures_of(factor_a, factor_b)
+
+    def corners(self, angle: ArrayLike) -> tuple[Array, Array]:
+        """Return torques [N m] and stiffnesses [N m/rad] of the four corners, shape (..., 4).
+
+        Bundles a and b empty and empty, full and empty, full and full, empty and full.
+        """
+        q = np.asarray(angle, float)[..., None]
+        p_a, p_b = self.full_pressure * np.array([[0.0, 1, 1, 0], [0.0, 0, 1, 1]])
+        return self.torque(q, p_a, p_b), self.stiffness(q, p_a, p_b)
+
+    def weight_torque(self, angle: ArrayLike) -> Array:
+        """Return the flexing torque [N m] that bears the orthosis at an angle [rad]."""
+        moment = self.link.mass * self.link.centre * self.link.gravity
+        return np.asarray(moment * np.sin(angle))
+
+    def friction(self, lag: ArrayLike) -> tuple[Array, Array]:
+        """Return what friction takes [m2] of the shapes of bundles a and b.
+
+        ``lag`` [m] is the travel (``pulley.travel(angle)``) less the output of
+        ``memory.operator``: with memory a force is ``X (shape - friction)``.
+        """
+        part = 0.5 * self.memory.loop * np.asarray(lag, float) / self.memory.largest_lag
+        a, b = self.bundle_a, self.bundle_b
+        return -part * a.shape(0.0), part * b.shape(0.0)
+
+    # --- rows, files, identity --------------------------------------------------------------------
+
+    def parameter_rows(self) -> Array:
+        """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
+        column = np.zeros(K.N_PARAMETERS)
+        column[: K.MODEL] = [self.value(name) for name in K.NAMES]
+        column[K.MODEL : K.LARGEST_LAG] = model_rows(self.memory.operator)
+        column[K.LARGEST_LAG] = self.memory.largest_lag
+        return column
+
+    @property
+    def elements(self) -> int:
+        """Plays of the memory."""
+        return plays_of(self.memory.operator)
+
+    def memory_tables(self) -> Array:
+        """Return the Everett maps of all members, shape (members, n, n), or zeros."""
+        return map_tables([m.memory.operator for m in self.members()])

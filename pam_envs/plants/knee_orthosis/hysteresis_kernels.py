@@ -1,0 +1,110 @@
+"""The memories of the orthosis' muscle as kernels: each writes the stiffness of a tile's lanes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pam_envs.hysteresis.modified_maxwell_slip import stiffness_step
+from pam_envs.hysteresis.preisach import preisach_step
+from pam_envs.kernels.build import kernel
+from pam_envs.plants.knee_orthosis.rows import (
+    DEPTH,
+    ELEMENTS,
+    GAIN,
+    LOOP_WIDTH,
+    MAX_PRESSURE,
+    MEMBER,
+    PRESSURE,
+    STACK_COUNT,
+    STIFFNESS,
+    STIFFNESS_RATIO,
+)
+
+BREAKS, STIFFNESSES, SPRING, SEGMENT = range(4)
+"""Rows of a modified Maxwell-slip model's table."""
+
+
+@kernel
+def no_memory(
+    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, first: int, last: int,
+    elements: int,
+) -> None:  # fmt: skip
+    """Stiffness without memory: proportional to the pressure."""
+    pressure, stiffness = rows[PRESSURE], rows[STIFFNESS]
+    for j in range(first, last):
+        stiffness[j] = fixed[GAIN][j] * fixed[STIFFNESS_RATIO][j] * pressure[j]
+
+
+@kernel
+def slip_memory(
+    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, first: int, last: int,
+    elements: int,
+) -> None:  # fmt: skip
+    """Stiffness by a modified Maxwell-slip model."""
+    pressure, stiffness = rows[PRESSURE], rows[STIFFNESS]
+    slips = rows[memory : memory + elements]
+    for j in range(first, last):
+        model = table[counts[MEMBER][j]]
+        value = stiffness_step(
+            pressure[j],
+            slips,
+            j,
+            model[BREAKS],
+            model[STIFFNESSES],
+            model[SPRING],
+            model[SEGMENT][0],
+            fixed[LOOP_WIDTH][j],
+        )
+        stiffness[j] = fixed[GAIN][j] * value
+
+
+@kernel
+def preisach_memory(
+    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, first: int, last: int,
+    elements: int,
+) -> None:  # fmt: skip
+    """Stiffness by a Preisach operator."""
+    pressure, stiffness = rows[PRESSURE], rows[STIFFNESS]
+    stack, sums = rows[memory : memory + DEPTH], rows[memory + DEPTH : memory + 2 * DEPTH]
+    count = counts[STACK_COUNT]
+    for j in range(first, last):
+        everett, full = table[counts[MEMBER][j]], fixed[MAX_PRESSURE][j]
+        cells = len(everett) - 1
+        value = preisach_step(pressure[j], stack, sums, count, j, everett, 0.0, cells / full)
+        line = everett[cells][0] / full * pressure[j]
+        stiffness[j] = fixed[GAIN][j] * (line + fixed[LOOP_WIDTH][j] * (value - line))
+
+
+@kernel
+def forget_nothing(rows: Any, counts: Any, table: Any, memory: int, elements: int, j: int) -> None:
+    """Start a muscle without memory."""
+
+
+@kernel
+def forget_slips(rows: Any, counts: Any, table: Any, memory: int, elements: int, j: int) -> None:
+    """Put the slip positions of one lane where venting leaves them."""
+    model = table[counts[MEMBER][j]]
+    middle = 0.5 * (len(model[SPRING]) - 1) * model[SEGMENT][0]
+    for k in range(elements):
+        rows[memory + k][j] = min(model[BREAKS][k], middle)
+
+
+@kernel
+def forget_turns(rows: Any, counts: Any, table: Any, memory: int, elements: int, j: int) -> None:
+    """Put every relay of one lane down."""
+    for k in range(2 * DEPTH):
+        rows[memory + k][j] = 0.0
+    counts[STACK_COUNT][j] = 1
+
+
+MEMORIES: dict[str, Any] = {
+    "none": no_memory,
+    "maxwell_slip": slip_memory,
+    "preisach": preisach_memory,
+}
+FORGET: dict[str, Any] = {
+    "none": forget_nothing,
+    "maxwell_slip": forget_slips,
+    "preisach": forget_turns,
+}
+MEMORY_ROWS = {"none": 0, "maxwell_slip": ELEMENTS + 1, "preisach": 2 * DEPTH}

@@ -1,0 +1,307 @@
+"""How the brace moves: held in a rig, free without a leg, or carried along by a walking leg.
+
+Each motion is four functions. ``begin_period`` looks up what a control period needs, ``move``
+advances a tile by one sub-step, ``rest`` puts a lane at rest, and ``report`` writes what can be
+seen at the end of the period.
+
+A sub-step is exact for the torque linearised about the predicted middle, with the stiffness of the
+muscle and the wearer's path going straight from their old to their new values: second order,
+and no stability limit from a stiff spring.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pam_envs.kernels.arithmetic import decay
+from pam_envs.kernels.build import LANES, kernel, routine
+from pam_envs.mechanics.hanging_mass import damped_motion
+from pam_envs.mechanics.knee_lever import assistive_torque, half_angle, muscle_length
+from pam_envs.muscle.gas_spring import gas_volume, spring_tension, stretch_of
+from pam_envs.plants.knee_orthosis import rows as K
+from pam_envs.plants.knee_orthosis.leg import gait_at, share_muscles, start_muscles
+from pam_envs.plants.knee_orthosis.rows import (
+    ANGLE,
+    DEVIATION,
+    DEVIATION_RATE,
+    FIXTURE_LENGTH,
+    FULL_VOLUME,
+    HOLD,
+    HOLD_RATE,
+    KNEE,
+    LEG_HABITUATION,
+    LEG_INERTIA,
+    LEVER_ARM,
+    LEVER_DAMPING,
+    LEVER_FITTINGS,
+    LEVER_INERTIA,
+    LEVER_MOUNT_ANGLE,
+    LEVER_RELAXED_ANGLE,
+    LEVER_STIFFNESS,
+    PRESSURE,
+    SHORTEST_LENGTH,
+    STIFFNESS,
+    STIFFNESS_RATIO,
+    STRIDE_TIME,
+    VELOCITY,
+)
+from pam_envs.references.gait import KNEE as KNEE_CURVE
+from pam_envs.references.gait import curve_and_rates, fraction_of_turn
+
+ATMOSPHERE = 101325.0
+AIR = 1.0 / (287.05 * 293.15)
+"""Density over pressure of air at 20 degrees C [kg/(m3 Pa)]."""
+
+WAS, HELD, HELD_RATE, KNEE_WAS, RATE_WAS, FORCE_WAS = range(6)
+"""Rows of scratch: stiffness before the sub-step, then the wearer's hold and path."""
+N_WORK = 6
+
+
+@kernel
+def torque_and_slope(fixed: Any, j: int, angle: float, stiffness: float) -> tuple[float, float]:
+    """Return the assistive torque [N m] at an angle [rad] and its slope [N m/rad]."""
+    sine, cosine = half_angle(angle)
+    arm, spring = fixed[LEVER_ARM][j], fixed[LEVER_STIFFNESS][j]
+    stretch = stretch_of(
+        muscle_length(sine, arm, fixed[LEVER_FITTINGS][j]), fixed[SHORTEST_LENGTH][j]
+    )
+    tension = spring_tension(stiffness, stretch)
+    torque = assistive_torque(tension, cosine, angle, arm, spring, fixed[LEVER_RELAXED_ANGLE][j])
+    pulls = max(0.0, stiffness) if stretch > 0.0 else 0.0
+    lever = arm * cosine
+    return torque, spring + pulls * lever * lever - 0.5 * tension * arm * sine
+
+
+@kernel
+def begin_period_alone(
+    rows: Any, fixed: Any, counts: Any, gait: Any, period: float, work: Any
+) -> None:
+    """Nothing to look up without a leg."""
+
+
+@kernel
+def stay(
+    rows: Any, fixed: Any, counts: Any, gait: Any, i: int, per_substep: float, h: float, work: Any
+) -> None:
+    """Hold the muscle at its length."""
+
+
+@kernel
+def swing_free(
+    rows: Any, fixed: Any, counts: Any, gait: Any, i: int, per_substep: float, h: float, work: Any
+) -> None:
+    """Move the brace alone."""
+    angle, velocity, stiffness, was = rows[ANGLE], rows[VELOCITY], rows[STIFFNESS], work[WAS]
+    for j in range(LANES):
+        ahead = 0.5 * h * velocity[j]
+        per_inertia = 1.0 / fixed[LEVER_INERTIA][j]
+        drag = fixed[LEVER_DAMPING][j] * per_inertia
+        old, slope_old = torque_and_slope(fixed, j, angle[j] + ahead, was[j])
+        new, slope_new = torque_and_slope(fixed, j, angle[j] + ahead, stiffness[j])
+        slope = max(1.0, 0.5 * (slope_old + slope_new))
+        du, velocity[j] = damped_motion(
+            velocity[j],
+            (slope * ahead - old) * per_inertia,
+            (old - new) * per_inertia / h,
+            slope * per_inertia,
+            drag,
+            decay(0.5 * drag * h),
+            h,
+        )
+        angle[j] = angle[j] + du
+
+
+@kernel
+def phase_of(rows: Any, fixed: Any, j: int, time: float) -> float:
+    """Return the phase of the stride, 0 to 1, at a time [s] of the episode."""
+    return fraction_of_turn(rows[K.START_PHASE][j] + time / fixed[STRIDE_TIME][j])
+
+
+@kernel
+def begin_period_leg(
+    rows: Any, fixed: Any, counts: Any, gait: Any, period: float, work: Any
+) -> None:
+    """Look up the wearer's path at the end of the period and how firmly he holds it till then."""
+    for j in range(LANES):
+        stiffness, damping = rows[HOLD][j], rows[HOLD_RATE][j]
+        work[KNEE_WAS][j], work[RATE_WAS][j] = rows[KNEE][j], rows[K.KNEE_RATE][j]
+        work[FORCE_WAS][j] = rows[K.KNEE_ACCELERATION][j]
+        gait_at(rows, fixed, gait, j, phase_of(rows, fixed, j, (counts[K.STEP][j] + 1) * period))
+        work[HELD][j] = 0.5 * (stiffness + rows[HOLD][j])
+        work[HELD_RATE][j] = 0.5 * (damping + rows[HOLD_RATE][j])
+
+
+@kernel
+def follow_leg(
+    rows: Any, fixed: Any, counts: Any, gait: Any, i: int, per_substep: float, h: float, work: Any
+) -> None:
+    """Move the knee off the wearer's path, with the brace on it."""
+    off, rate, stiffness, was = rows[DEVIATION], rows[DEVIATION_RATE], rows[STIFFNESS], work[WAS]
+    held, held_rate, mount = work[HELD], work[HELD_RATE], fixed[LEVER_MOUNT_ANGLE]
+    for j in range(LANES):
+        pace = 1.0 / fixed[STRIDE_TIME][j]
+        time = (counts[K.STEP][j] * per_substep + (i + 1)) * h
+        knee, turn, bend = curve_and_rates(gait, KNEE_CURVE, phase_of(rows, fixed, j, time))
+        turn, bend = turn * pace, bend * pace * pace
+        ahead, per_inertia = (
+            0.5 * h * rate[j],
+            1.0 / (fixed[LEG_INERTIA][j] + fixed[LEVER_INERTIA][j]),
+        )
+        drag = (held_rate[j] + fixed[LEVER_DAMPING][j]) * per_inertia
+        middle = mount[j] + off[j] + ahead
+        old, slope_old = torque_and_slope(fixed, j, middle + work[KNEE_WAS][j], was[j])
+        new, slope_new = torque_and_slope(fixed, j, middle + knee, stiffness[j])
+        old = old + along_path(fixed, j, work[RATE_WAS][j], work[FORCE_WAS][j])
+        old = old - learnt(fixed, j, work[KNEE_WAS][j])
+        new = new + along_path(fixed, j, turn, bend) - learnt(fixed, j, knee)
+        slope = 0.5 * (slope_old + slope_new)
+        du, rate[j] = damped_motion(
+            rate[j],
+            (slope * ahead - old - held[j] * off[j]) * per_inertia,
+            (old - new) * per_inertia / h,
+            max(1.0, slope + held[j]) * per_inertia,
+            drag,
+            decay(0.5 * drag * h),
+            h,
+        )
+        off[j] = off[j] + du
+        work[KNEE_WAS][j], work[RATE_WAS][j], work[FORCE_WAS][j] = knee, turn, bend
+
+
+@kernel
+def along_path(fixed: Any, j: int, rate: float, acceleration: float) -> float:
+    """Return the torque [N m] that carries the brace along the wearer's path."""
+    return fixed[LEVER_DAMPING][j] * rate + fixed[LEVER_INERTIA][j] * acceleration
+
+
+@kernel
+def learnt(fixed: Any, j: int, knee: float) -> float:
+    """Return the extending torque [N m] of the wire that the wearer bears beforehand."""
+    past = fixed[LEVER_MOUNT_ANGLE][j] + knee - fixed[LEVER_RELAXED_ANGLE][j]
+    return fixed[LEG_HABITUATION][j] * fixed[LEVER_STIFFNESS][j] * max(0.0, past)
+
+
+@kernel
+def report_muscle(rows: Any, fixed: Any, j: int, length: float) -> None:
+    """Write length, tension and air of one lane."""
+    stretch = stretch_of(length, fixed[SHORTEST_LENGTH][j])
+    rows[K.LENGTH][j] = length
+    rows[K.TENSION][j] = spring_tension(rows[STIFFNESS][j], stretch)
+    space = gas_volume(
+        length, fixed[SHORTEST_LENGTH][j], fixed[STIFFNESS_RATIO][j], fixed[FULL_VOLUME][j]
+    )
+    rows[K.AIR][j] = AIR * (max(0.0, rows[PRESSURE][j]) + ATMOSPHERE) * space
+
+
+@kernel
+def report_alone(rows: Any, fixed: Any, j: int, period: float) -> None:
+    """Write what can be seen of a brace without a leg."""
+    sine, _ = half_angle(rows[ANGLE][j])
+    report_muscle(
+        rows, fixed, j, muscle_length(sine, fixed[LEVER_ARM][j], fixed[LEVER_FITTINGS][j])
+    )
+    rows[K.TORQUE][j], _ = torque_and_slope(fixed, j, rows[ANGLE][j], rows[STIFFNESS][j])
+
+
+@kernel
+def report_rig(rows: Any, fixed: Any, j: int, period: float) -> None:
+    """Write what can be seen of a muscle held at its length."""
+    report_muscle(rows, fixed, j, fixed[FIXTURE_LENGTH][j])
+    rows[K.TORQUE][j], _ = torque_and_slope(fixed, j, rows[ANGLE][j], rows[STIFFNESS][j])
+
+
+@kernel
+def report_leg(rows: Any, fixed: Any, j: int, period: float) -> None:
+    """Write what can be seen of the brace on the leg, and what the wearer's muscles do."""
+    rate = rows[K.KNEE_RATE][j] + rows[DEVIATION_RATE][j]
+    angle = fixed[LEVER_MOUNT_ANGLE][j] + rows[KNEE][j] + rows[DEVIATION][j]
+    rows[ANGLE][j], rows[VELOCITY][j] = angle, rate
+    report_alone(rows, fixed, j, period)
+    rows[K.TORQUE][j] = delivered(rows, fixed, j, rows[K.TORQUE][j])
+    share_muscles(rows, fixed, j, period)
+
+
+@kernel
+def delivered(rows: Any, fixed: Any, j: int, torque: float) -> float:
+    """Return what reaches the leg [N m] of the torque of spring and muscle.
+
+    The rest moves the brace itself, against its inertia and friction.
+    """
+    path = along_path(fixed, j, rows[K.KNEE_RATE][j], rows[K.KNEE_ACCELERATION][j])
+    off, rate = rows[DEVIATION][j], rows[DEVIATION_RATE][j]
+    drag = (rows[HOLD_RATE][j] + fixed[LEVER_DAMPING][j]) * rate
+    pull = torque + path - learnt(fixed, j, rows[KNEE][j]) + rows[HOLD][j] * off + drag
+    sway = -pull / (fixed[LEG_INERTIA][j] + fixed[LEVER_INERTIA][j])
+    return torque + path + fixed[LEVER_DAMPING][j] * rate + fixed[LEVER_INERTIA][j] * sway
+
+
+@routine
+def rest_rig(rows: Any, fixed: Any, gait: Any, j: int) -> None:
+    """Put the muscle at its length in the rig."""
+    low, high = 0.0, 3.141592653589793
+    for _ in range(60):
+        angle = 0.5 * (low + high)
+        sine, _ = half_angle(angle)
+        if (
+            muscle_length(sine, fixed[LEVER_ARM][j], fixed[LEVER_FITTINGS][j])
+            < fixed[FIXTURE_LENGTH][j]
+        ):
+            low = angle
+        else:
+            high = angle
+    rows[ANGLE][j], rows[VELOCITY][j] = 0.5 * (low + high), 0.0
+
+
+@routine
+def rest_alone(rows: Any, fixed: Any, gait: Any, j: int) -> None:
+    """Put the brace where spring and muscle balance."""
+    low, high = 0.0, 3.141592653589793
+    for _ in range(60):
+        angle = 0.5 * (low + high)
+        torque, _ = torque_and_slope(fixed, j, angle, rows[STIFFNESS][j])
+        if torque < 0.0:
+            low = angle
+        else:
+            high = angle
+    rows[ANGLE][j], rows[VELOCITY][j] = 0.5 * (low + high), 0.0
+
+
+@routine
+def rest_leg(rows: Any, fixed: Any, gait: Any, j: int) -> None:
+    """Put the knee where the wearer's hold balances the brace, moving along the path."""
+    gait_at(rows, fixed, gait, j, fraction_of_turn(rows[K.START_PHASE][j]))
+    load = along_path(fixed, j, rows[K.KNEE_RATE][j], rows[K.KNEE_ACCELERATION][j])
+    load = load - learnt(fixed, j, rows[KNEE][j])
+    angle = fixed[LEVER_MOUNT_ANGLE][j] + rows[KNEE][j]
+    low, high = -1.0, 1.0
+    for _ in range(60):
+        off = 0.5 * (low + high)
+        torque, _ = torque_and_slope(fixed, j, angle + off, rows[STIFFNESS][j])
+        if torque + load + rows[HOLD][j] * off < 0.0:
+            low = off
+        else:
+            high = off
+    rows[DEVIATION][j], rows[DEVIATION_RATE][j] = 0.5 * (low + high), 0.0
+    start_muscles(rows, fixed, j)
+
+
+MOTIONS: dict[str, dict[str, Any]] = {
+    "rig": {
+        "begin_period": begin_period_alone,
+        "move": stay,
+        "rest": rest_rig,
+        "report": report_rig,
+    },
+    "no_load": {
+        "begin_period": begin_period_alone,
+        "move": swing_free,
+        "rest": rest_alone,
+        "report": report_alone,
+    },
+    "leg": {
+        "begin_period": begin_period_leg,
+        "move": follow_leg,
+        "rest": rest_leg,
+        "report": report_leg,
+    },
+}

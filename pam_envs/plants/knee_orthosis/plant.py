@@ -1,0 +1,337 @@
+"""A power-assist knee orthosis with a McKibben muscle: seed 000.
+
+    set-point -> regulator -> pressure P -> memory -> stiffness s -> T = s (L - L_min)
+    L = 2 L_b sin(theta / 2) - L_a
+    tau_a = T L_b cos(theta / 2) - kappa (theta_0 - theta)              extension positive
+
+It is mounted in one of three ways. In the *rig* the muscle is held at its nominal length. With
+*no load* the brace is on its own, ``tau_a`` is 0 at rest and ``theta`` follows the pressure. On
+the *leg* it opens with the knee, ``theta = mount angle + knee flexion``; the wearer walks or takes
+stairs on a path that he holds with a stiffness of his own, and the knee bears the full balance of
+ground force, weight and acceleration, of which the paper's Eq. (1) sees the vertical force alone.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.hysteresis.modified_maxwell_slip import ModifiedMaxwellSlip
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.mechanics.hanging_mass import LARGEST_PHASE
+from pam_envs.mechanics.knee_lever import KneeLever
+from pam_envs.mechanics.leg import Leg
+from pam_envs.muscle.emg import MuscleActivation
+from pam_envs.muscle.gas_spring import GasSpring
+from pam_envs.parameters import parameter
+from pam_envs.plants.core.plant import Plant
+from pam_envs.plants.knee_orthosis import rows as K
+from pam_envs.plants.knee_orthosis.hysteresis import KneeMemory, knee_memory
+from pam_envs.plants.single_muscle.hysteresis import Kind
+from pam_envs.pneumatics.measured_dynamics import OrthosisRegulator, mode_rows
+from pam_envs.references.gait import ACTIVITIES, PAPER_STRIDE, SIGNALS, gait_table
+from pam_envs.sensing.orthosis import (
+    AngleSensor,
+    CopSensor,
+    GaugeSensor,
+    GroundSensor,
+    HeelSensor,
+    TensionSensor,
+)
+from pam_envs.sensing.shoe import Shoe
+
+Mounting = Literal["rig", "no_load", "leg"]
+Dynamics = Literal["lag", "measured"]
+Activity = Literal["walk", "stairs_up", "stairs_down"]
+
+MAKES: dict[str, tuple[str, ...]] = {
+    "mounting": ("rig", "no_load", "leg"),
+    "dynamics": ("lag", "measured"),
+    "activity": ACTIVITIES,
+}
+STAIRS_MOUNT_ANGLE = 1.4835
+"""85 degrees [rad]: 92 degrees of flexion then stay below the toggle at 180 degrees."""
+
+
+@dataclass(frozen=True)
+class Fixture:
+    """What holds the muscle at its length."""
+
+    length: float = parameter(
+        0.22, "m", 0.05, 1.0, "published", "nominal length, seed 000, section 4.1"
+    )
+
+
+@dataclass(frozen=True)
+class Stride:
+    """The wearer's pace."""
+
+    time: float = parameter(
+        PAPER_STRIDE,
+        "s",
+        0.8,
+        20.0,
+        "published",
+        "5 s a stride, seed 000, section 5.2; 1.224 s is the natural pace of the measured stride",
+    )
+
+
+@dataclass(frozen=True)
+class KneeOrthosis(Plant):
+    """The plant; another one is :meth:`replace` of it.
+
+    Attributes
+    ----------
+    mounting : {"rig", "no_load", "leg"}
+        See the module.
+    dynamics : {"lag", "measured"}
+        Between set-point and pressure: the regulator's lag, with which the inverse alone tracks as
+        published, or the published frequency response ``G_T / G_T(0)``, for which the feedback was
+        designed. The paper's figures for the two exclude each other.
+    activity : {"walk", "stairs_up", "stairs_down"}
+        What the leg does.
+    regulator, memory, muscle, lever, fixture, leg, stride, shoe, activation
+        The components.
+    tension, angle, pressure, heel, ground, cop, ankle
+        The sensors.
+    """
+
+    family: ClassVar[str] = "knee_orthosis"
+    components: ClassVar[tuple[str, ...]] = (
+        "regulator",
+        "memory",
+        "muscle",
+        "lever",
+        "fixture",
+        "leg",
+        "stride",
+        "shoe",
+        "activation",
+        "tension",
+        "angle",
+        "pressure",
+        "heel",
+        "ground",
+        "cop",
+        "ankle",
+    )
+    names: ClassVar[tuple[str, ...]] = K.NAMES
+    choices: ClassVar[tuple[str, ...]] = tuple(MAKES)
+    extended: ClassVar[bool] = False
+
+    mounting: Mounting = "no_load"
+    dynamics: Dynamics = "lag"
+    activity: Activity = "walk"
+    regulator: OrthosisRegulator = field(default_factory=OrthosisRegulator)
+    memory: KneeMemory = field(default_factory=lambda: knee_memory("maxwell_slip"))
+    muscle: GasSpring = field(default_factory=GasSpring)
+    lever: KneeLever = field(default_factory=KneeLever)
+    fixture: Fixture = field(default_factory=Fixture)
+    leg: Leg = field(default_factory=Leg)
+    stride: Stride = field(default_factory=Stride)
+    shoe: Shoe = field(default_factory=Shoe)
+    activation: MuscleActivation = field(default_factory=MuscleActivation)
+    tension: TensionSensor = field(default_factory=TensionSensor)
+    angle: AngleSensor = field(default_factory=AngleSensor)
+    pressure: GaugeSensor = field(default_factory=GaugeSensor)
+    heel: HeelSensor = field(default_factory=HeelSensor)
+    ground: GroundSensor = field(default_factory=GroundSensor)
+    cop: CopSensor = field(default_factory=CopSensor)
+    ankle: AngleSensor = field(default_factory=AngleSensor)
+
+    def __post_init__(self) -> None:
+        """Check every parameter, and that the motion can be followed."""
+        for name, allowed in MAKES.items():
+            if getattr(self, name) not in allowed:
+                raise ValueError(
+                    f"{name} = {getattr(self, name)!r}; choose one of {', '.join(allowed)}"
+                )
+        self.check_components()
+        self._check_memory()
+        self._check_motion()
+        self._check_toggle()
+
+    def _check_memory(self) -> None:
+        operator = self.memory.operator
+        if isinstance(operator, ModifiedMaxwellSlip):
+            n = len(operator.stiffnesses)
+            if n > K.ELEMENTS or len(operator.spring) != n + 1:
+                raise ValueError(
+                    f"memory: {n} elements and {len(operator.spring)} knots of the spring; at most "
+                    f"{K.ELEMENTS} elements and one knot more than elements are simulated: "
+                    "identify with fewer elements, or interpolate the spring at its knots"
+                )
+        if isinstance(operator, Preisach):
+            span, full = (operator.low, operator.high), self.regulator.max_pressure
+            if operator.start != "low" or not np.allclose(span, (0.0, full), rtol=1e-9):
+                raise ValueError(
+                    f"memory: the Everett map spans {span} Pa with start {operator.start!r}; the "
+                    f"orthosis needs 0 to {full:g} Pa (the regulator's range) with start 'low'"
+                )
+
+    def _check_motion(self) -> None:
+        """Refuse a motion that the sub-steps cannot follow (see ``mechanics.hanging_mass``)."""
+        h = self.control_period / self.substeps
+        inertia, damping, hold = self.lever.inertia, self.lever.damping, 0.0
+        if self.mounting == "leg":
+            inertia += self.leg.inertia
+            damping += self.leg.hold_damping + self.leg.stance_damping + self.leg.damping
+            hold = self.leg.hold_stiffness + 2.0 * self.leg.stance_stiffness + self.leg.stiffness
+        pull = self.muscle.gain * self.muscle.stiffness_ratio * self.regulator.max_pressure
+        k = (self.lever.stiffness + hold + pull * self.lever.arm**2) / inertia
+        phase = max(k, (0.5 * damping / inertia) ** 2) * h * h
+        if phase > LARGEST_PHASE:
+            raise ValueError(
+                f"lever.inertia = {self.lever.inertia:g} kg m2 with lever.damping = "
+                f"{self.lever.damping:g} N m s/rad and lever.stiffness = {self.lever.stiffness:g} "
+                f"N m/rad moves too fast for {self.substeps} sub-steps: phase {phase:.1f} against "
+                f"at most {LARGEST_PHASE:g}; use more sub-steps or a larger inertia"
+            )
+
+    def _check_toggle(self) -> None:
+        """Refuse a strap setting with which the knee's flexion opens the wire past its toggle."""
+        if self.mounting != "leg":
+            return
+        widest = self.lever.mount_angle + float(self.gait_table()[:, 0].max())
+        if widest >= np.pi:
+            raise ValueError(
+                f"lever.mount_angle = {self.lever.mount_angle:g} rad: the knee of activity "
+                f"{self.activity!r} opens the wire to {widest:.3f} rad, past its toggle at pi; "
+                f"strap it on at less than {self.lever.mount_angle - widest + np.pi:.3f} rad"
+            )
+
+    # --- presets --------------------------------------------------------------------------------
+
+    @classmethod
+    def rig(
+        cls, hysteresis: Kind = "maxwell_slip", dynamics: Dynamics = "lag", **changes: float
+    ) -> KneeOrthosis:
+        """Return the muscle held at its nominal length: 158 N at 2 bar, 79 N/bar.
+
+        Parameters
+        ----------
+        hysteresis : {"maxwell_slip", "preisach", "none"}
+            Which memory; both operators have the same loops.
+        dynamics : {"lag", "measured"}
+            See the class.
+        **changes : float
+            Parameters to replace, with ``__`` for the dot (``memory__width=0.5``).
+        """
+        return cls._preset(hysteresis, changes, mounting="rig", dynamics=dynamics)
+
+    @classmethod
+    def no_load(
+        cls, hysteresis: Kind = "maxwell_slip", dynamics: Dynamics = "lag", **changes: float
+    ) -> KneeOrthosis:
+        """Return the brace alone; the parameters are those of :meth:`rig`."""
+        return cls._preset(hysteresis, changes, mounting="no_load", dynamics=dynamics)
+
+    @classmethod
+    def on_leg(
+        cls,
+        activity: Activity = "walk",
+        stride: float = PAPER_STRIDE,
+        hysteresis: Kind = "maxwell_slip",
+        dynamics: Dynamics = "lag",
+        **changes: float,
+    ) -> KneeOrthosis:
+        """Return the brace on a leg.
+
+        Parameters
+        ----------
+        activity : {"walk", "stairs_up", "stairs_down"}
+            What the leg does.
+        stride : float
+            Duration of a stride [s]; 5 s in the paper, 1.224 s at natural pace.
+        hysteresis, dynamics, **changes
+            See :meth:`rig`.
+        """
+        changes = {"stride__time": stride} | changes
+        if activity in ACTIVITIES[1:]:
+            changes = {"lever__mount_angle": STAIRS_MOUNT_ANGLE} | changes
+        made = {"mounting": "leg", "dynamics": dynamics, "activity": activity}
+        return cls._preset(hysteresis, changes, **made)
+
+    @classmethod
+    def _preset(cls, hysteresis: Kind, changes: Mapping[str, float], **makes: Any) -> KneeOrthosis:
+        activity = makes.pop("activity", "walk")
+        plant = cls(memory=knee_memory(hysteresis), dynamics=makes["dynamics"])
+        plant = plant.replace({k.replace("__", "."): v for k, v in changes.items()})
+        return dataclasses.replace(plant, mounting=makes["mounting"], activity=activity)
+
+    def without_noise(self) -> KneeOrthosis:
+        """Return the plant with sensors that show the truth."""
+        sensors = ("tension", "angle", "pressure", "heel", "ground", "cop", "ankle")
+        return self.replace(
+            {f"{s}.{what}": 0.0 for s in sensors for what in ("noise", "resolution")}
+        )
+
+    # --- statics ----------------------------------------------------------------------------------
+
+    def tension_for(self, angle: ArrayLike, torque: ArrayLike = 0.0) -> NDArray[np.float64]:
+        """Return the tension ``T_d`` [N] for an assistive torque [N m] at an angle [rad].
+
+        ``T_d = [kappa (theta_0 - theta) + tau_a] / (L_b cos(theta / 2))``, not held above 0.
+        """
+        return self.lever.tension(torque, angle)
+
+    def stiffness_for(self, tension: ArrayLike, angle: ArrayLike) -> NDArray[np.float64]:
+        """Return the stiffness ``T / dL`` [N/m] of a tension [N] at an angle [rad]."""
+        return self.muscle.stiffness(tension, self.lever.length(angle))
+
+    def angle_at(self, stiffness: ArrayLike) -> NDArray[np.float64]:
+        """Return the angle [rad] at which the brace rests without load at a stiffness [N/m]."""
+        s = np.asarray(stiffness, float)
+        low, high = np.zeros_like(s), np.full_like(s, np.pi)
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            tension = self.muscle.tension(s, self.lever.length(middle))
+            opens = self.lever.torque(tension, middle) < 0.0
+            low, high = np.where(opens, middle, low), np.where(opens, high, middle)
+        return 0.5 * (low + high)
+
+    # --- rows, files, identity --------------------------------------------------------------------
+
+    def parameter_rows(self) -> NDArray[np.float64]:
+        """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
+        column = np.array([self.value(name) for name in K.NAMES] + mode_rows())
+        return column
+
+    def gait_table(self) -> NDArray[np.float64]:
+        """Return the stride's curves as the kernels read them, shape (points, signals)."""
+        if self.mounting != "leg":
+            return np.zeros((4, len(SIGNALS)))
+        return gait_table(self.activity)
+
+    @property
+    def elements(self) -> int:
+        """Rows of the memory's state that are in use by a modified Maxwell-slip model."""
+        operator = self.memory.operator
+        return len(operator.spring) if isinstance(operator, ModifiedMaxwellSlip) else 0
+
+    def memory_tables(self) -> NDArray[np.float64]:
+        """Return what the memories of all members are made of, shape (members, ., .).
+
+        Everett maps (n, n); or break stiffnesses, stiffnesses, spring and segment, (4, n + 1),
+        filled up with an element that does nothing.
+        """
+        operators = [m.memory.operator for m in self.members()]
+        slips = [_slip_table(o) for o in operators if isinstance(o, ModifiedMaxwellSlip)]
+        maps = [np.asarray(o.table, float) for o in operators if isinstance(o, Preisach)]
+        tables = slips or maps
+        return np.ascontiguousarray(tables) if tables else np.zeros((1, 2, 2))
+
+
+def _slip_table(operator: ModifiedMaxwellSlip) -> NDArray[np.float64]:
+    idle = 2.0 * max(operator.range, operator.break_stiffnesses[-1])
+    table = np.zeros((4, len(operator.spring)))
+    table[0] = (*operator.break_stiffnesses, idle)
+    table[1, :-1] = operator.stiffnesses
+    table[2] = operator.spring
+    table[3] = operator.segment
+    return table

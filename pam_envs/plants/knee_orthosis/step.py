@@ -1,0 +1,162 @@
+"""One control period of the knee orthosis, for one environment or a tile of them.
+
+    set-point -> regulator -> pressure -> memory -> stiffness -> tension -> brace (and leg)
+
+The regulator is exact at the end of a sub-step, and the memory then too, where the pressure goes
+one way within a sub-step; the motion is of second order (see ``knee_orthosis_motion``).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pam_envs.kernels.arithmetic import decay
+from pam_envs.kernels.build import LANES, kernel, routine
+from pam_envs.plants.knee_orthosis import rows as K
+from pam_envs.plants.knee_orthosis.hysteresis_kernels import FORGET, MEMORIES, MEMORY_ROWS
+from pam_envs.plants.knee_orthosis.motion import MOTIONS, N_WORK, WAS
+from pam_envs.plants.knee_orthosis.rows import (
+    MAX_PRESSURE,
+    MODE,
+    MODE_TABLE,
+    PRESSURE,
+    SET_POINT,
+    SLEW_RATE,
+    STIFFNESS,
+    TIME_CONSTANT,
+)
+from pam_envs.pneumatics.measured_dynamics import MODES, REAL_MODES, pair_factor, turned
+from pam_envs.pneumatics.regulator import regulator_step
+
+__all__ = ["MEMORY_ROWS", "N_WORK", "advance", "begin_lane", "replacements", "start_memory"]
+
+PAIR = MODE_TABLE + 2 * REAL_MODES
+"""First row of what the slow pair is made of: decay, frequency, two gains."""
+
+# placeholders, filled in for each memory, mounting and regulator
+remember: Any = None
+forget: Any = None
+regulate: Any = None
+settle: Any = None
+begin_period: Any = None
+move: Any = None
+rest: Any = None
+report: Any = None
+
+
+@kernel
+def lag(rows: Any, fixed: Any, h: float) -> None:
+    """Advance the pressure behind a first-order lag."""
+    pressure, set_point = rows[PRESSURE], rows[SET_POINT]
+    for j in range(LANES):
+        time, slew = fixed[TIME_CONSTANT][j], fixed[SLEW_RATE][j]
+        target = max(0.0, min(fixed[MAX_PRESSURE][j], set_point[j]))
+        pressure[j] = regulator_step(pressure[j], target, time, 1.0 / time, slew, 1.0 / slew, h)
+
+
+@kernel
+def settle_lag(rows: Any, fixed: Any, j: int) -> None:
+    """Put the lag of one lane at rest at its pressure."""
+
+
+@kernel
+def measured(rows: Any, fixed: Any, h: float) -> None:
+    """Advance the modes of the published frequency response."""
+    set_point = rows[SET_POINT]
+    for j in range(LANES):
+        u = max(0.0, min(fixed[MAX_PRESSURE][j], set_point[j]))
+        c, s = pair_factor(fixed[PAIR][j], fixed[PAIR + 1][j], h)
+        real, imaginary = turned(
+            u, rows[MODE + REAL_MODES][j], rows[MODE + REAL_MODES + 1][j], c, s
+        )
+        rows[MODE + REAL_MODES][j], rows[MODE + REAL_MODES + 1][j] = real, imaginary
+        total = fixed[PAIR + 2][j] * real - fixed[PAIR + 3][j] * imaginary
+        for k in range(REAL_MODES):
+            x = u + (rows[MODE + k][j] - u) * decay(fixed[MODE_TABLE + k][j] * h)
+            rows[MODE + k][j] = x
+            total = total + fixed[MODE_TABLE + REAL_MODES + k][j] * x
+        rows[PRESSURE][j] = total
+
+
+@kernel
+def settle_measured(rows: Any, fixed: Any, j: int) -> None:
+    """Put the modes of one lane at rest at its pressure."""
+    for k in range(MODES - 1):
+        rows[MODE + k][j] = rows[PRESSURE][j]
+    rows[MODE + MODES - 1][j] = 0.0
+
+
+@kernel
+def advance(
+    rows: Any, fixed: Any, counts: Any, table: Any, gait: Any, memory: int, elements: int,
+    substeps: int, period: float, work: Any,
+) -> None:  # fmt: skip
+    """Advance a tile by control period ``counts[STEP]``, towards its set-points.
+
+    Parameters
+    ----------
+    rows, fixed, counts : rows
+        State, parameters and whole numbers (``knee_orthosis_rows``).
+    table : array
+        Of the memory: ``KneeOrthosis.memory_tables()``.
+    gait : array
+        ``KneeOrthosis.gait_table()``.
+    memory, elements : int
+        First row of the memory's state, and ``KneeOrthosis.elements``.
+    substeps, period : int, float
+        Sub-steps and duration [s] of the period.
+    work : rows
+        ``N_WORK`` rows of scratch.
+    """
+    h = period / substeps
+    begin_period(rows, fixed, counts, gait, period, work)
+    for i in range(substeps):
+        regulate(rows, fixed, h)
+        for j in range(LANES):
+            work[WAS][j] = rows[STIFFNESS][j]
+        remember(rows, fixed, counts, table, memory, 0, LANES, elements)
+        move(rows, fixed, counts, gait, i, substeps, h, work)
+    for j in range(LANES):
+        report(rows, fixed, j, period)
+
+
+@kernel
+def start_memory(rows: Any, counts: Any, memory: int, j: int) -> None:
+    """Clear what one lane remembers; :func:`begin_lane` then fills in what it begins with."""
+    for k in range(len(rows) - memory):
+        rows[memory + k][j] = 0.0
+    counts[K.STACK_COUNT][j] = 1
+
+
+@routine
+def begin_lane(
+    rows: Any, fixed: Any, counts: Any, table: Any, gait: Any, memory: int, elements: int, j: int,
+    start_phase: float, pressure: float,
+) -> None:  # fmt: skip
+    """Bring one lane to rest at a pressure [Pa] after inflation from none, at a phase in turns.
+
+    ``counts[MEMBER][j]`` is set before.
+    """
+    forget(rows, counts, table, memory, elements, j)
+    rows[PRESSURE][j] = 0.0
+    remember(rows, fixed, counts, table, memory, j, j + 1, elements)
+    rows[PRESSURE][j] = pressure
+    remember(rows, fixed, counts, table, memory, j, j + 1, elements)
+    settle(rows, fixed, j)
+    rows[SET_POINT][j] = rows[K.OLD_SET_POINT][j] = rows[K.OLD_PRESSURE][j] = pressure
+    rows[K.START_PHASE][j] = start_phase
+    rest(rows, fixed, gait, j)
+    report(rows, fixed, j, 0.0)
+    rows[K.OLD_AIR][j] = rows[K.AIR][j]
+
+
+REGULATORS: dict[str, dict[str, Any]] = {
+    "lag": {"regulate": lag, "settle": settle_lag},
+    "measured": {"regulate": measured, "settle": settle_measured},
+}
+
+
+def replacements(kind: str, mounting: str, dynamics: str) -> dict[str, Any]:
+    """Return the kernels that a plant of this make puts in the place of the placeholders."""
+    memory = {"remember": MEMORIES[kind], "forget": FORGET[kind]}
+    return memory | MOTIONS[mounting] | REGULATORS[dynamics]

@@ -1,0 +1,1 @@
+"""redundant_manipulator."""

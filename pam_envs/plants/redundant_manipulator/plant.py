@@ -1,0 +1,378 @@
+"""The redundant manipulator of seed 002: a chain of joints between antagonistic muscles.
+
+    M(q) q'' + bias(q, q') = sum over a joint's muscles of -F dL/dq - D q' + disturbance
+
+Six stages with axes x-y-x-y-x-y unless another chain is given; each has the muscles, the memory,
+the regulators and the feed-forward of a single joint
+(:mod:`pam_envs.plants.antagonistic_joint.plant`). Gravity, inertia and the payload at the tip
+couple the joints. The arm hangs.
+
+Masses and damping are not published. Links of 0.1 kg are about as heavy as the muscles of a stage
+bear where the paper's paths bend the arm most, and lighter than two muscles with their fittings:
+the arm is as if its muscles weighed nothing. Each joint has, beside the viscosity of its muscles,
+the damping that gives it a ratio of one half with the rest of the straight arm held rigid. Both
+have a common factor (``arm.mass_factor``, ``arm.damping_factor``) that can be drawn.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.mechanics.antagonistic_lever import AntagonisticLever
+from pam_envs.mechanics.serial_chain import SerialChain
+from pam_envs.muscle.force_map import ForceMap, paper_stretch
+from pam_envs.plants.antagonistic_joint import statics as pair_statics
+from pam_envs.plants.antagonistic_joint.hysteresis import JointMemory, joint_memory
+from pam_envs.plants.antagonistic_joint.hysteresis_tables import (
+    check_operator,
+    map_tables,
+    model_rows,
+    plays_of,
+)
+from pam_envs.plants.antagonistic_joint.link import (
+    ArmFactors,
+    Link,
+    NominalPoint,
+    Stage,
+    StagePoint,
+)
+from pam_envs.plants.antagonistic_joint.plant import (
+    PRESTRESS_RANGE,
+    REACHED,
+    STRETCHED,
+    AntagonisticJoint,
+)
+from pam_envs.plants.core.plant import Plant
+from pam_envs.plants.redundant_manipulator import rows as M
+from pam_envs.plants.single_muscle.hysteresis import Kind
+from pam_envs.pneumatics.joint_regulator import JointRegulator
+from pam_envs.sensing.joint import JointEncoder
+from pam_envs.sensing.orthosis import GaugeSensor
+
+Array = NDArray[np.float64]
+
+LINK = SerialChain.uniform()
+"""The chain unless another one is given."""
+DAMPING_RATIO = 0.5
+MOST_DAMPING = 100.0
+LINKS = ("lengths", "masses", "centres", "across", "along")
+
+
+@dataclass(frozen=True)
+class RedundantManipulator(Plant):
+    """The plant; another one is :meth:`replace` of it, or ``dataclasses.replace`` for the chain.
+
+    Attributes
+    ----------
+    axes, lengths, masses, centres, across, along, gravity
+        The chain, as in :class:`~pam_envs.mechanics.serial_chain.SerialChain`, for an
+        ``arm.mass_factor`` of 1.
+    joint_damping : tuple of float
+        Of each joint [N m s/rad], beside ``link.damping`` and the muscles' viscosity, for an
+        ``arm.damping_factor`` of 1.
+    arm
+        Factors of all masses and of all damping.
+    regulator, memory, muscle, lever, link, nominal
+        The components of every stage.
+    angle, pressure
+        The sensors of every stage.
+    """
+
+    family: ClassVar[str] = "redundant_manipulator"
+    components: ClassVar[tuple[str, ...]] = (
+        "arm",
+        "regulator",
+        "memory",
+        "muscle",
+        "lever",
+        "link",
+        "nominal",
+        "angle",
+        "pressure",
+    )
+    names: ClassVar[tuple[str, ...]] = M.NAMES
+    choices: ClassVar[tuple[str, ...]] = ("axes", *LINKS, "gravity", "joint_damping")
+    extended: ClassVar[bool] = False
+    dynamics: ClassVar[str] = "muscles"
+
+    axes: str = "".join(LINK.axes)
+    lengths: tuple[float, ...] = LINK.lengths
+    masses: tuple[float, ...] = LINK.masses
+    centres: tuple[float, ...] = LINK.centres
+    across: tuple[float, ...] = LINK.across
+    along: tuple[float, ...] = LINK.along
+    gravity: tuple[float, ...] = LINK.gravity
+    joint_damping: tuple[float, ...] = (0.0,) * LINK.stages
+    arm: ArmFactors = field(default_factory=ArmFactors)
+    regulator: JointRegulator = field(default_factory=JointRegulator)
+    memory: JointMemory = field(default_factory=JointMemory)
+    muscle: ForceMap = field(default_factory=ForceMap)
+    lever: AntagonisticLever = field(default_factory=AntagonisticLever)
+    link: Stage = field(default_factory=Stage)
+    nominal: StagePoint = field(default_factory=StagePoint)
+    angle: JointEncoder = field(default_factory=JointEncoder)
+    pressure: GaugeSensor = field(default_factory=GaugeSensor)
+
+    def __post_init__(self) -> None:
+        """Check every parameter and the chain."""
+        for name in (*LINKS, "gravity", "joint_damping"):
+            object.__setattr__(self, name, _numbers(name, getattr(self, name)))
+        if len(self.gravity) != 3:
+            raise ValueError(f"gravity = {self.gravity!r}; give three numbers [m/s2]")
+        self.check_components()
+        check_operator(self.memory.operator)
+        pair_statics.check_angles(self, self.link)
+        if self.chain.stages > M.MOST_STAGES:
+            raise ValueError(
+                f"axes = {self.axes!r}: {self.chain.stages} joints; at most {M.MOST_STAGES} are "
+                "simulated"
+            )
+        damping = self.joint_damping
+        if len(damping) != self.stages or not all(0.0 <= d <= MOST_DAMPING for d in damping):
+            raise ValueError(
+                f"joint_damping = {damping!r}; give {self.stages} numbers from 0 to "
+                f"{MOST_DAMPING:g} N m s/rad, one a joint"
+            )
+
+    # --- presets --------------------------------------------------------------------------------
+
+    @classmethod
+    def paper(
+        cls, hysteresis: Kind = "maxwell_slip", chain: SerialChain = LINK, **changes: float
+    ) -> RedundantManipulator:
+        """Return the arm whose muscles end at 25 % contraction, so that joints take +-30 degrees.
+
+        Parameters
+        ----------
+        hysteresis : {"maxwell_slip", "preisach", "none"}
+            Which memory; both operators have the same loops.
+        chain : SerialChain
+            Joints and links.
+        **changes : float
+            Parameters to replace, with ``__`` for the dot (``memory__width=0.5``).
+        """
+        muscle, provenance = ForceMap(stretch=paper_stretch()), {"muscle.stretch": STRETCHED}
+        return cls._of(chain, hysteresis, muscle, provenance, changes)
+
+    @classmethod
+    def measured(
+        cls, hysteresis: Kind = "maxwell_slip", chain: SerialChain = LINK, **changes: float
+    ) -> RedundantManipulator:
+        """Return the arm with muscles as measured; what they reach is the limit of its joints.
+
+        The limit is the largest angle that every joint alone reaches at the nominal co-contraction
+        within the regulators' range, against the weight of the straight arm beyond it. Bent, the
+        arm may have to bear more; what a path takes is checked when an environment is made.
+        """
+        plant = cls._of(chain, hysteresis, ForceMap(), {"link.limit": REACHED}, changes)
+        if "link__limit" in changes:
+            return plant
+        return plant.replace({"link.limit": plant.reachable_angle()})
+
+    @classmethod
+    def _of(
+        cls, chain: SerialChain, hysteresis: Kind, muscle: ForceMap,
+        provenance: Mapping[str, tuple[str, str]], changes: Mapping[str, float],
+    ) -> RedundantManipulator:  # fmt: skip
+        plant = cls(
+            axes="".join(chain.axes),
+            lengths=chain.lengths,
+            masses=chain.masses,
+            centres=chain.centres,
+            across=chain.across,
+            along=chain.along,
+            gravity=chain.gravity,
+            joint_damping=(0.0,) * chain.stages,
+            memory=joint_memory(hysteresis),
+            muscle=muscle,
+            provenance=provenance,
+        ).replace({k.replace("__", "."): v for k, v in changes.items()})
+        return dataclasses.replace(plant, joint_damping=plant.even_damping())
+
+    def even_damping(self) -> tuple[float, ...]:
+        """Return what each joint lacks to a damping ratio of a half, the straight arm rigid."""
+        pressures = self.pressures_for(0.0)[:2]
+        rate = self.lever.rate(0.0)
+        viscous = self.muscle.viscosity * float(np.sum(np.array(pressures) * rate**2))
+        own = viscous / self.muscle.rest_length + self.link.damping
+        inertia = np.diag(self.chain.mass_matrix(np.zeros(self.stages), 0.0))
+        stiffness = float(self.stiffness_at(0.0)) + np.maximum(0.0, self.weight_stiffness())
+        wanted = 2.0 * DAMPING_RATIO * np.sqrt(stiffness * inertia)
+        return tuple(float(round(d, 3)) for d in np.maximum(0.0, wanted - own))
+
+    def without_noise(self) -> RedundantManipulator:
+        """Return the plant with sensors that show the truth."""
+        sensors = ("angle", "pressure")
+        return self.replace(
+            {f"{s}.{what}": 0.0 for s in sensors for what in ("noise", "resolution")}
+        )
+
+    # --- chain and ranges -----------------------------------------------------------------------
+
+    @cached_property
+    def chain(self) -> SerialChain:
+        """Joints and links as heavy as they are."""
+        return self.nominal_chain.heavier(self.arm.mass_factor)
+
+    @cached_property
+    def nominal_chain(self) -> SerialChain:
+        """Joints and links for a mass factor of 1."""
+        x, y, z = self.gravity
+        parts = {name: getattr(self, name) for name in LINKS}
+        return SerialChain(tuple(self.axes), **parts, gravity=(x, y, z))
+
+    @property
+    def stages(self) -> int:
+        """Number of joints."""
+        return len(self.axes)
+
+    @property
+    def angle_range(self) -> tuple[float, float]:
+        """Lowest and highest set-point [rad] of a joint."""
+        return -self.link.limit, self.link.limit
+
+    @property
+    def largest_angle(self) -> float:
+        """Where the mechanical stops stand [rad]."""
+        return self.link.stop
+
+    @property
+    def prestress(self) -> float:
+        """Usual co-contraction [N]."""
+        return self.nominal.prestress
+
+    @property
+    def prestress_range(self) -> tuple[float, float]:
+        """Lowest and highest co-contraction [N] that is a set-point."""
+        return PRESTRESS_RANGE
+
+    # --- statics --------------------------------------------------------------------------------
+
+    def pressures_for(
+        self, angle: ArrayLike, prestress: ArrayLike | None = None, torque: ArrayLike = 0.0
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return the pressures [Pa] of a joint's muscles (see ``AntagonisticJoint``)."""
+        stress = self.prestress if prestress is None else prestress
+        return pair_statics.pressures_for(self, angle, stress, torque)
+
+    def torque(self, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
+        """Return the muscles' torque [N m] at joint angles [rad] and pressures [Pa]."""
+        return pair_statics.pull(self, angle, pressure_a, pressure_b)
+
+    def stiffness_at(self, angle: ArrayLike, prestress: ArrayLike | None = None) -> Array:
+        """Return the stiffness of a joint's muscles [N m/rad] at rest, without memory."""
+        pressures = self.pressures_for(angle, prestress)[:2]
+        return pair_statics.stiffness(self, angle, *pressures)
+
+    def weight_stiffness(self, payload: float = 0.0) -> Array:
+        """Return how a joint's own angle changes its weight torque [N m/rad], arm straight."""
+        return self._weights_alone(payload)[1]
+
+    def reachable_angle(self, prestress: float | None = None, payload: float = 0.0) -> float:
+        """Return the largest angle [rad] that each joint of a straight arm reaches alone.
+
+        Parameters
+        ----------
+        prestress : float, optional
+            Co-contraction [N]; default: the nominal one.
+        payload : float
+            Mass at the tip [kg].
+        """
+        stress = self.prestress if prestress is None else prestress
+        straight, across = self._weights_alone(payload)
+        found = self.link.stop
+        for even, odd in zip(straight, across, strict=True):
+
+            def weight(angle: float, even: float = even, odd: float = odd) -> float:
+                return max(0.0, even * math.cos(angle) + odd * math.sin(angle))
+
+            found = min(found, pair_statics.reachable_angle(self, self.link.stop, stress, weight))
+        return found
+
+    def _weights_alone(self, payload: float) -> tuple[Array, Array]:
+        """Return weight torques [N m], arm straight, with each joint at 0 or 90 degrees alone."""
+        straight = self.chain.gravity_torque(np.zeros(self.stages), payload)
+        bent = 0.5 * math.pi * np.eye(self.stages)
+        across = [self.chain.gravity_torque(q, payload)[k] for k, q in enumerate(bent)]
+        return straight, np.array(across)
+
+    def gravity_shift(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
+        """Return what to add to set-points [rad] so that gravity is borne, shape (..., n).
+
+        Parameters
+        ----------
+        angles : array_like, shape (..., n)
+            Where the joints shall rest [rad].
+        payload : array_like, shape (...)
+            Mass at the tip [kg].
+        """
+        phi = np.asarray(angles, float)
+        weight = self.weight_torque(phi, payload)
+        held = np.clip(phi, *self.angle_range)
+        return pair_statics.shift_for(self, held, self.prestress, weight, self.link.limit)
+
+    def weight_torque(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
+        """Return the torques [N m] that hold arm and payload [kg] at angles (..., n) [rad]."""
+        return self.chain.gravity_torque(angles, payload)
+
+    def torque_range(self, angles: ArrayLike, by_pressure: bool = False) -> tuple[Array, Array]:
+        """Return the least and the largest torque [N m] of the muscles at angles [rad].
+
+        Set-points of angles end at their limit, and so does what they exert; pressures do not.
+        """
+        limit = None if by_pressure else self.link.limit
+        return pair_statics.torque_range(self, angles, limit, self.prestress)
+
+    def stage(self) -> AntagonisticJoint:
+        """Return one stage on its own, with its own link."""
+        chain = self.chain
+        link = Link(
+            **{f.name: getattr(self.link, f.name) for f in dataclasses.fields(self.link)},
+            length=chain.lengths[-1],
+            mass=chain.masses[-1],
+            centre=chain.centres[-1],
+            gyration=math.sqrt(chain.across[-1] / chain.masses[-1] + chain.centres[-1] ** 2),
+        )
+        same = {name: getattr(self, name) for name in self.components if name != "arm"}
+        same |= {"link": link, "nominal": NominalPoint(prestress=self.prestress)}
+        return AntagonisticJoint(**same)
+
+    def rest_angles(self, commands: ArrayLike, prestress: float | None = None) -> Array:
+        """Return where one stage rests [rad] after each of a series of set-points [rad], (T,).
+
+        Quasi-static, memory included, from the straight virgin state, without gravity and load.
+        """
+        return self.stage().rest_angles(commands, prestress)
+
+    # --- rows, files, identity --------------------------------------------------------------------
+
+    def parameter_rows(self) -> Array:
+        """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
+        damping = [*self.joint_damping, *[0.0] * (M.MOST_STAGES - self.stages)]
+        named = [self.value(name) for name in M.NAMES]
+        chain = self.nominal_chain.rows()
+        return np.array([*named, *model_rows(self.memory.operator), *damping, *chain])
+
+    @property
+    def elements(self) -> int:
+        """Plays of a muscle's memory."""
+        return plays_of(self.memory.operator)
+
+    def memory_tables(self) -> Array:
+        """Return the Everett maps of all members, shape (members, n, n), or zeros."""
+        return map_tables([m.memory.operator for m in self.members()])
+
+
+def _numbers(name: str, values: Sequence[float]) -> tuple[float, ...]:
+    try:
+        return tuple(float(v) for v in values)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} = {values!r}; give a list of numbers") from error

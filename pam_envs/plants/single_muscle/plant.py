@@ -1,0 +1,289 @@
+"""A muscle that lifts a load: Festo MAS-10-N-100 of seed 003.
+
+    set-point -> regulator -> pressure -> memory -> effective pressure -> static law -> hanging mass
+
+The measured quantity is the contraction from the rest length under the load that hangs at the
+start, as in the paper's tables.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.mechanics.hanging_mass import GRAVITY, LARGEST_PHASE, HangingMass
+from pam_envs.muscle.effective_area import EffectiveAreaMuscle
+from pam_envs.parameters import declarations
+from pam_envs.plants.core.plant import Plant
+from pam_envs.plants.single_muscle import rows as R
+from pam_envs.plants.single_muscle.hysteresis import Kind, Memory
+from pam_envs.pneumatics.regulator import Regulator
+from pam_envs.sensing.sensor import PositionSensor, PressureSensor
+
+NEUTRAL: dict[str, float] = {
+    f"{component}.{name}": declared.neutral
+    for component, part in (
+        ("regulator", Regulator),
+        ("memory", Memory),
+        ("muscle", EffectiveAreaMuscle),
+        ("mass", HangingMass),
+        ("position", PositionSensor),
+        ("pressure", PressureSensor),
+    )
+    for name, declared in declarations(part).items()
+    if declared.neutral is not None and f"{component}.{name}" in R.EFFECTS
+}
+"""The values at which each effect is off."""
+
+_CREEP_TIMES = tuple(f"memory.creep_time_{k}" for k in (1, 2, 3, 4))
+EFFECTS: tuple[tuple[str, ...], ...] = (
+    ("regulator.gain",),
+    ("regulator.slew_bend",),
+    ("regulator.dead_band", "regulator.dead_close"),
+    ("regulator.overlap", "regulator.overlap_leak"),
+    ("regulator.exhaust_ratio", "regulator.exhaust_taper"),
+    ("regulator.exhaust_rate",),
+    ("regulator.leak",),
+    (
+        "regulator.supply_pressure",
+        "regulator.supply_droop",
+        "regulator.supply_time",
+        "regulator.supply_recovery",
+    ),
+    (
+        "regulator.ring_share",
+        "regulator.ring_flow",
+        "regulator.ring_frequency",
+        "regulator.ring_damping",
+    ),
+    ("memory.shape",),
+    ("memory.pressure_slope",),
+    ("memory.pressure_bend",),
+    (*(f"{c}.creep_{k}" for c in ("memory", "muscle") for k in (1, 2, 3, 4)), *_CREEP_TIMES),
+    ("memory.first_width", "memory.first_loss", "memory.first_travel"),
+    ("memory.threshold",),
+    ("muscle.area_curve",),
+    ("muscle.softening",),
+    ("muscle.stiffening",),
+    ("muscle.temperature", "muscle.temperature_gain"),
+    ("muscle.load_curve",),
+    ("muscle.load_stiffening",),
+    ("muscle.load_stiffening_2",),
+    ("muscle.load_stiffening_root",),
+    (*(f"muscle.strand_{k}" for k in (1, 2, 3, 4)), "muscle.strand_break"),
+    ("muscle.viscosity", "muscle.viscosity_speed"),
+    ("mass.carried",),
+    ("mass.load_error",),
+    ("mass.slack",),
+    ("mass.stick", "mass.stick_kinetic", "mass.stick_speed"),
+    ("mass.ring_share", "mass.ring_frequency", "mass.ring_damping"),
+    ("position.drift", "position.drift_time"),
+    ("position.ramp", "position.ramp_at", "position.ramp_over"),
+    ("position.delay",),
+    ("position.bow",),
+    ("position.slip", "position.slip_at"),
+    ("pressure.drift", "pressure.drift_time"),
+    ("pressure.ramp", "pressure.ramp_at", "pressure.ramp_over"),
+    ("pressure.bow",),
+)
+"""See :class:`pam_envs.plants.core.plant.Plant`."""
+
+FOLDER = Path(__file__).resolve().parents[2] / "data"
+
+
+class UnstableParameters(ValueError):
+    """Parameters whose motion the sub-steps cannot follow."""
+
+
+@dataclass(frozen=True)
+class SingleMuscle(Plant):
+    """The plant; an extended one is ``dataclasses.replace`` of it.
+
+    Attributes
+    ----------
+    regulator, memory, muscle, mass, position, pressure
+        Its components, in the order of the signal.
+    """
+
+    family: ClassVar[str] = "single_muscle"
+    components: ClassVar[tuple[str, ...]] = (
+        "regulator",
+        "memory",
+        "muscle",
+        "mass",
+        "position",
+        "pressure",
+    )
+    names: ClassVar[tuple[str, ...]] = R.NAMES
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = EFFECTS
+
+    regulator: Regulator = field(default_factory=Regulator)
+    memory: Memory = field(default_factory=Memory)
+    muscle: EffectiveAreaMuscle = field(default_factory=EffectiveAreaMuscle)
+    mass: HangingMass = field(default_factory=HangingMass)
+    position: PositionSensor = field(default_factory=PositionSensor)
+    pressure: PressureSensor = field(default_factory=PressureSensor)
+
+    def __post_init__(self) -> None:
+        """Check every parameter, and that the motion can be followed."""
+        self.check_components()
+        self._check_memory()
+        self._check_motion()
+
+    def _check_memory(self) -> None:
+        operator = self.memory.operator
+        if isinstance(operator, PlayOperator):
+            total = operator.linear + sum(operator.weights)
+            if abs(total - 1.0) > 1e-9 or operator.linear <= 0.0:
+                raise ValueError(
+                    f"memory: the play operator's total slope is {total:g} with a linear part of "
+                    f"{operator.linear:g}; a muscle's memory needs total slope 1 and a linear part "
+                    "above 0: scale the weights"
+                )
+            if len(operator.weights) > R.ELEMENTS:
+                raise ValueError(
+                    f"memory: {len(operator.weights)} elements, at most {R.ELEMENTS} are "
+                    "simulated; merge neighbouring thresholds"
+                )
+        if isinstance(operator, Preisach):
+            full = self.regulator.max_pressure
+            span = (operator.low, operator.high)
+            if operator.start != "virgin" or not np.allclose(span, (-full, full), rtol=1e-9):
+                raise ValueError(
+                    f"memory: the Everett map spans {span} Pa with start {operator.start!r}; a "
+                    f"muscle needs -{full:g} to {full:g} Pa (the regulator's range and its mirror "
+                    "image) with start 'virgin', so that its first inflation is one"
+                )
+
+    def _check_motion(self) -> None:
+        """Refuse a motion that the sub-steps cannot follow (see ``mechanics.hanging_mass``)."""
+        m, law, h = self.mass, self.muscle, self.control_period / self.substeps
+        strains = np.linspace(-0.02, 0.2, 45)
+        slope = (
+            law.area * law.area_taper * self.regulator.max_pressure
+            + law.braid_force / law.braid_strain * np.exp(-strains / law.braid_strain)
+            + law.stiffness
+            + 3.0 * law.hardening * strains**2
+        )
+        k = float(slope.max()) / law.rest_length / m.moving_mass
+        half = 0.5 * m.damping / m.moving_mass
+        phase = max(k, half * half) * h * h
+        if phase > LARGEST_PHASE:
+            enough = math.ceil(self.substeps * math.sqrt(phase / LARGEST_PHASE))
+            raise UnstableParameters(
+                f"moving_mass = {m.moving_mass:g} kg with damping = {m.damping:g} N s/m and a "
+                f"stiffness of {k * m.moving_mass:.0f} N/m moves too fast for {self.substeps} "
+                f"sub-steps: phase {phase:.1f} against at most {LARGEST_PHASE:g}; use at least "
+                f"{enough} sub-steps or a larger moving_mass"
+            )
+
+    @classmethod
+    def mas10(cls, hysteresis: Kind = "maxwell_slip", **changes: float) -> SingleMuscle:
+        """Return the muscle identified on the measured tables, with that memory.
+
+        Parameters
+        ----------
+        hysteresis : {"maxwell_slip", "preisach", "none"}
+            Which memory; each was identified on the same data.
+        **changes : float
+            Parameters to replace, with ``__`` for the dot (``mass__load=4.55``).
+        """
+        if hysteresis not in ("maxwell_slip", "preisach", "none"):
+            raise ValueError(
+                f"hysteresis = {hysteresis!r}; choose 'maxwell_slip', 'preisach' or 'none'"
+            )
+        plant = cls.from_yaml(FOLDER / f"mas10_{hysteresis}.yaml")
+        return plant.replace({k.replace("__", "."): v for k, v in changes.items()})
+
+    # --- the static law and its inverse -----------------------------------------------------
+
+    def contraction_at(self, drive: ArrayLike, load: ArrayLike) -> NDArray[np.float64]:
+        """Return the contraction [m] at rest under an effective pressure [Pa] and a load [kg].
+
+        Counted from the rest length under that load, as it is measured.
+        """
+        drive, load = np.broadcast_arrays(np.asarray(drive, float), np.asarray(load, float))
+        return np.asarray(self._absolute(drive, load) - self._absolute(np.zeros_like(drive), load))
+
+    def _absolute(self, drive: NDArray[Any], load: NDArray[Any]) -> NDArray[np.float64]:
+        low, high = np.full(drive.shape, -0.3), np.full(drive.shape, 0.6)
+        weight, stiffer, shift = self._carried(load)
+        for _ in range(56):
+            e = 0.5 * (low + high)
+            pull = self.muscle.tension(drive - shift, e) - (stiffer - 1.0) * self.muscle.passive(e)
+            up = pull > weight
+            low, high = np.where(up, e, low), np.where(up, high, e)
+        return np.asarray(0.5 * (low + high) * self.muscle.rest_length)
+
+    def _carried(self, load: NDArray[Any]) -> tuple[Any, Any, Any]:
+        """Return the weight [N], the factor on the stiffness and the pressure shift [Pa]."""
+        weight = (load + self.mass.load_error * (load > 0.0)) * GRAVITY
+        law = self.muscle
+        stiffer = (
+            1.0
+            + (law.load_stiffening + law.load_stiffening_2 * weight) * weight
+            + law.load_stiffening_root * np.sqrt(np.maximum(weight, 0.0))
+        )
+        return weight, stiffer, self.muscle.load_curve * weight * weight
+
+    def drive_for(self, contraction: ArrayLike, load: ArrayLike) -> NDArray[np.float64]:
+        """Return the effective pressure [Pa] that holds a contraction [m] under a load [kg].
+
+        The exact inverse of :meth:`contraction_at`; not held within the regulator's range.
+        """
+        contraction, load = np.broadcast_arrays(
+            np.asarray(contraction, float), np.asarray(load, float)
+        )
+        strain = (contraction + self._absolute(np.zeros(load.shape), load)) / (
+            self.muscle.rest_length
+        )
+        weight, stiffer, shift = self._carried(load)
+        pull = weight + (stiffer - 1.0) * self.muscle.passive(strain)
+        return self.muscle.drive(pull, strain) + shift
+
+    # --- rows, files, identity ----------------------------------------------------------------
+
+    def parameter_rows(self) -> NDArray[np.float64]:
+        """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
+        column = np.zeros(R.N_PARAMETERS)
+        for name in R.NAMES:
+            column[R.place(name)] = self.value(name)
+        column[R.TALL] = (
+            math.pi * self.muscle.diameter**2 / 4.0 / math.sin(self.muscle.braid_angle) ** 2
+        )
+        column[R.COSINE] = math.cos(self.muscle.braid_angle)
+        column[R.LINEAR] = 1.0
+        operator = self.memory.operator
+        if isinstance(operator, PlayOperator):
+            n = len(operator.weights)
+            column[R.LINEAR] = operator.linear
+            for start, values in (
+                (R.THRESHOLD, operator.thresholds),
+                (R.WEIGHT, operator.weights),
+            ):
+                column[start : start + n] = values
+        return column
+
+    @property
+    def extended(self) -> bool:
+        """Whether an effect is on that a plain plant has not."""
+        return any(self.value(name) != neutral for name, neutral in NEUTRAL.items())
+
+    @property
+    def elements(self) -> int:
+        """Number of play operators that are simulated."""
+        operator = self.memory.operator
+        return len(operator.weights) if isinstance(operator, PlayOperator) else 0
+
+    def everett_tables(self) -> NDArray[np.float64]:
+        """Return the Everett maps of all members, shape (members, n, n); (1, 2, 2) if none."""
+        operators = [m.memory.operator for m in self.members()]
+        tables = [np.asarray(o.table, float) for o in operators if isinstance(o, Preisach)]
+        return np.ascontiguousarray(tables) if tables else np.zeros((1, 2, 2))

@@ -1,0 +1,310 @@
+"""One control period of the single muscle, for one environment or a tile of them.
+
+The sub-step: the regulator's pressure is exact at its end; the memory, which depends only on the
+pressures passed through, is then exact too, because within a sub-step the pressure is monotone;
+the motion is exact for the force linearised about the predicted mid-point with the effective
+pressure going straight from its old to its new value. So the step is of second order and has no
+stability limit from the stiffness of a light load.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pam_envs.hysteresis.maxwell_slip import play
+from pam_envs.hysteresis.preisach import preisach_step
+from pam_envs.kernels.arithmetic import decay
+from pam_envs.kernels.build import LANES, kernel, routine
+from pam_envs.mechanics.hanging_mass import GRAVITY, damped_motion
+from pam_envs.muscle.effective_area import tension, tension_slope
+from pam_envs.plants.single_muscle import rows as R
+from pam_envs.plants.single_muscle.rows import (
+    AREA,
+    AREA_TAPER,
+    BRAID_FORCE,
+    BRAID_STRAIN,
+    CONTRACTION,
+    DAMPING,
+    DEAD_TIME,
+    DEPTH,
+    DRIVE,
+    HARDENING,
+    HISTORY,
+    LINEAR,
+    LOAD,
+    MAX_PRESSURE,
+    MOVING_MASS,
+    N_HISTORY,
+    PRESSURE,
+    REST_LENGTH,
+    SET_POINT,
+    SLEW_RATE,
+    STACK_COUNT,
+    STEP,
+    STIFFNESS,
+    STRETCH,
+    THRESHOLD,
+    TIME_CONSTANT,
+    VELOCITY,
+    WEIGHT,
+    WIDTH_PER_LOAD,
+)
+from pam_envs.pneumatics.regulator import DELAY_PERIODS, delayed_fraction, regulator_step
+
+
+@kernel
+def stretched(pressure: float, stretch: float, per_full: float) -> float:
+    """Return the pressure on the scale on which the friction is uniform.
+
+    ``g(p) = p (1 + b (1 - p / P))``: with ``b > 0`` the loop is wider at high pressure.
+    ``per_full`` is ``1 / P``.
+    """
+    return pressure * (1.0 + stretch * (1.0 - pressure * per_full))
+
+
+@kernel
+def unstretched(value: float, stretch: float, per_full: float) -> float:
+    """Return the pressure whose stretched value is ``value``."""
+    s = 1.0 + stretch
+    return 2.0 * value / (s + math.sqrt(max(0.0, s * s - 4.0 * stretch * value * per_full)))
+
+
+@kernel
+def loop_width(width_per_load: float, load: float) -> float:
+    """Return the factor on the hysteretic part at this load, from 0 to 1.2."""
+    return max(0.0, min(1.2, 1.0 + width_per_load * load))
+
+
+@kernel
+def no_memory(
+    rows: Any,
+    fixed: Any,
+    counts: Any,
+    table: Any,
+    memory: int,
+    first: int,
+    last: int,
+    elements: int,
+    work: Any,
+) -> None:
+    """Effective pressure without memory: the pressure."""
+    pressure, drive = rows[PRESSURE], rows[DRIVE]
+    for j in range(first, last):
+        drive[j] = pressure[j]
+
+
+@kernel
+def play_memory(
+    rows: Any,
+    fixed: Any,
+    counts: Any,
+    table: Any,
+    memory: int,
+    first: int,
+    last: int,
+    elements: int,
+    work: Any,
+) -> None:
+    """Effective pressure by play operators, the dual of Maxwell-slip elements."""
+    pressure, drive, stretch, full = (
+        rows[PRESSURE],
+        rows[DRIVE],
+        fixed[STRETCH],
+        fixed[MAX_PRESSURE],
+    )
+    linear, load, per_load = fixed[LINEAR], rows[LOAD], fixed[WIDTH_PER_LOAD]
+    felt, output, per_full = work[0], work[1], work[2]
+    for j in range(first, last):
+        per_full[j] = 1.0 / full[j]
+        felt[j] = stretched(pressure[j], stretch[j], per_full[j])
+        output[j] = linear[j] * felt[j]
+    for k in range(elements):
+        threshold, weight, state = fixed[THRESHOLD + k], fixed[WEIGHT + k], rows[memory + k]
+        for j in range(first, last):
+            w = play(felt[j], threshold[j], state[j])
+            state[j] = w
+            output[j] = output[j] + weight[j] * w
+    for j in range(first, last):
+        friction = felt[j] - output[j]
+        value = felt[j] - loop_width(per_load[j], load[j]) * friction
+        drive[j] = unstretched(value, stretch[j], per_full[j])
+
+
+@kernel
+def preisach_memory(
+    rows: Any,
+    fixed: Any,
+    counts: Any,
+    table: Any,
+    memory: int,
+    first: int,
+    last: int,
+    elements: int,
+    work: Any,
+) -> None:
+    """Effective pressure by a Preisach operator."""
+    pressure, drive, stretch, full = (
+        rows[PRESSURE],
+        rows[DRIVE],
+        fixed[STRETCH],
+        fixed[MAX_PRESSURE],
+    )
+    load, per_load = rows[LOAD], fixed[WIDTH_PER_LOAD]
+    stack, sums = rows[memory : memory + DEPTH], rows[memory + DEPTH : memory + 2 * DEPTH]
+    count, member = counts[STACK_COUNT], counts[R.MEMBER]
+    for j in range(first, last):
+        per_full = 1.0 / full[j]
+        felt = stretched(pressure[j], stretch[j], per_full)
+        everett = table[member[j]]
+        cells = len(everett) - 1
+        output = preisach_step(
+            felt, stack, sums, count, j, everett, -full[j], 0.5 * cells * per_full
+        )
+        value = felt - loop_width(per_load[j], load[j]) * (felt - output)
+        drive[j] = unstretched(value, stretch[j], per_full)
+
+
+remember: Any = None  # a placeholder: one of the three above
+
+
+@kernel
+def advance(
+    rows: Any,
+    fixed: Any,
+    counts: Any,
+    table: Any,
+    memory: int,
+    elements: int,
+    substeps: int,
+    period: float,
+    work: Any,
+) -> None:
+    """Advance a tile by control period ``counts[STEP]``, towards its set-points."""
+    h = period / substeps
+    x, v, pressure, drive = rows[CONTRACTION], rows[VELOCITY], rows[PRESSURE], rows[DRIVE]
+    load, moving, damping, dead = rows[LOAD], fixed[MOVING_MASS], fixed[DAMPING], fixed[DEAD_TIME]
+    lag, slew, length, area = (
+        fixed[TIME_CONSTANT],
+        fixed[SLEW_RATE],
+        fixed[REST_LENGTH],
+        fixed[AREA],
+    )
+    taper, force, k1, k3 = fixed[AREA_TAPER], fixed[BRAID_FORCE], fixed[STIFFNESS], fixed[HARDENING]
+    braid_strain, set_point, step = fixed[BRAID_STRAIN], rows[SET_POINT], counts[STEP]
+    older, newer, switch, was, damped = work[3], work[4], work[5], work[6], work[7]
+    per_lag, per_slew, per_mass, per_length = work[8], work[9], work[10], work[11]
+    per_strain, per_jerk, drag, late, width = work[12], work[13], work[14], work[15], work[16]
+    for j in range(LANES):
+        age = dead[j] / period
+        whole = min(int(age), DELAY_PERIODS)
+        switch[j] = (age - whole) * period
+        now = step[j]
+        rows[HISTORY + (now & (N_HISTORY - 1))][j] = set_point[j]
+        newer[j] = rows[HISTORY + ((now + N_HISTORY - whole) & (N_HISTORY - 1))][j]
+        older[j] = rows[HISTORY + ((now + N_HISTORY - whole - 1) & (N_HISTORY - 1))][j]
+    for j in range(LANES):
+        per_lag[j] = 1.0 / lag[j]
+        per_slew[j] = 1.0 / slew[j]
+        per_length[j] = 1.0 / length[j]
+        per_strain[j] = 1.0 / braid_strain[j]
+        per_mass[j] = 1.0 / (load[j] + moving[j])
+        per_jerk[j] = per_mass[j] / h
+        drag[j] = damping[j] * per_mass[j]
+        damped[j] = decay(0.5 * drag[j] * h)
+    for i in range(substeps):
+        for j in range(LANES):
+            late[j] = delayed_fraction((i + 1) * h, substeps / period, switch[j])
+            was[j] = drive[j]
+        for stage in range(2):  # towards the older set-point, then towards the newer one
+            busy = 0
+            for j in range(LANES):
+                width[j] = h * (late[j] if stage == 1 else 1.0 - late[j])
+                busy = busy + (1 if width[j] > 0.0 else 0)
+            if busy == 0:
+                continue
+            for j in range(LANES):
+                target = newer[j] if stage == 1 else older[j]
+                reached = regulator_step(
+                    pressure[j], target, lag[j], per_lag[j], slew[j], per_slew[j], width[j]
+                )
+                pressure[j] = reached if width[j] > 0.0 else pressure[j]
+            remember(rows, fixed, counts, table, memory, 0, LANES, elements, work)
+        for j in range(LANES):
+            ahead = 0.5 * h * v[j]
+            e = (x[j] + ahead) * per_length[j]
+            slack = decay(e * per_strain[j])
+            pull = tension(was[j], e, slack, area[j], taper[j], force[j], k1[j], k3[j])
+            slope = tension_slope(
+                0.5 * (was[j] + drive[j]),
+                e,
+                slack,
+                area[j],
+                taper[j],
+                force[j] * per_strain[j],
+                k1[j],
+                k3[j],
+            )
+            k = slope * per_length[j] * per_mass[j]
+            a = (pull - load[j] * GRAVITY) * per_mass[j] + k * ahead
+            jerk = area[j] * (1.0 - taper[j] * e) * (drive[j] - was[j]) * per_jerk[j]
+            dx, v[j] = damped_motion(v[j], a, jerk, k, drag[j], damped[j], h)
+            x[j] = x[j] + dx
+
+
+@kernel
+def true_position(rows: Any, j: int) -> float:
+    """Return where the load of lane ``j`` is [m], from its rest position."""
+    return rows[CONTRACTION][j] - rows[R.REST][j]  # type: ignore[no-any-return]
+
+
+@kernel
+def seen_position(rows: Any, j: int) -> float:
+    """Return what the position sensor measures [m], before its bias, noise and steps."""
+    return rows[CONTRACTION][j] - rows[R.REST][j]  # type: ignore[no-any-return]
+
+
+@kernel
+def seen_pressure(rows: Any, j: int) -> float:
+    """Return what the pressure sensor measures [Pa], before its bias, noise and steps."""
+    return rows[PRESSURE][j]  # type: ignore[no-any-return]
+
+
+@kernel
+def begin_effects(rows: Any, fixed: Any, j: int) -> None:
+    """Begin what a plain plant has not."""
+
+
+N_WORK = 17
+"""Rows of scratch that :func:`advance` needs."""
+
+MEMORIES: dict[str, Any] = {
+    "none": no_memory,
+    "maxwell_slip": play_memory,
+    "preisach": preisach_memory,
+}
+MEMORY_ROWS = {"none": 0, "maxwell_slip": R.ELEMENTS, "preisach": 2 * DEPTH}
+
+
+@routine
+def rest_contraction(fixed: Any, lane: int, drive: float, load: float) -> float:
+    """Return the contraction [m] at rest, by bisection to the last bit that matters."""
+    length = fixed[REST_LENGTH][lane]
+    low, high = -0.3, 0.6
+    for _ in range(56):
+        e = 0.5 * (low + high)
+        pull = tension(
+            drive,
+            e,
+            decay(e / fixed[BRAID_STRAIN][lane]),
+            fixed[AREA][lane],
+            fixed[AREA_TAPER][lane],
+            fixed[BRAID_FORCE][lane],
+            fixed[STIFFNESS][lane],
+            fixed[HARDENING][lane],
+        )
+        if pull > load * GRAVITY:
+            low = e
+        else:
+            high = e
+    return 0.5 * (low + high) * length
