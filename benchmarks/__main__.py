@@ -324,7 +324,7 @@ def show(
     Args:
         env: Id of the environment.
         controller: Name of a controller.
-        hysteresis: Which memory the plant has.
+        hysteresis: Which hysteresis the plant has.
         reference: Family of the reference.
         load: Load [kg].
         episode_seconds: Duration [s].

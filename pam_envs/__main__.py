@@ -41,7 +41,7 @@ class Render:
     seconds: float = 10.0
     """Length of the episode [s]."""
     hysteresis: Kind = "maxwell_slip"
-    """The muscle's memory."""
+    """The muscle's hysteresis."""
     reference: str | None = None
     """Family of references; default: the environment's, a staircase for MusclePositioning."""
     load: float | None = None
@@ -112,7 +112,7 @@ def list_environments() -> None:
 
     table = Table(title="Environments")
     table.add_column("id", no_wrap=True)
-    for column in ("action", "observation", "control period", "memories"):
+    for column in ("action", "observation", "control period", "hysteresis models"):
         table.add_column(column, overflow="fold")
     for name in env_ids():
         env: Any = gym.make(name).unwrapped

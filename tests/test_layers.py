@@ -1,4 +1,4 @@
-"""What using the library brings into memory (import-linter holds the layers in the source)."""
+"""What using the library brings into hysteresis (import-linter holds the layers in the source)."""
 
 import json
 import os

@@ -45,7 +45,9 @@ from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
-SEED_003 = "Seed 003: Studies regarding the Use of Pneumatic Muscles in Precise Positioning Systems"
+SEED_003 = (
+    "positioning2021: Studies regarding the Use of Pneumatic Muscles in Precise Positioning Systems"
+)
 P = TypeVar("P")
 KREJCI = (
     "P. Krejci, K. Kuhnen, Inverse control of systems with hysteresis and creep, IEE Proc. Control "
@@ -88,12 +90,12 @@ PUBLISHED: dict[str, Entry] = {
         knobs=PID_KNOBS,
     ),
     "inverse_no_preview": Entry(
-        "exact inverse of memory, static law and regulator at the present reference",
+        "exact inverse of hysteresis, static law and regulator at the present reference",
         "nominal model",
         citation=KREJCI,
     ),
     "inverse": Entry(
-        "exact inverse of memory, static law and regulator, dead time and lag ahead",
+        "exact inverse of hysteresis, static law and regulator, dead time and lag ahead",
         "nominal model",
         preview=True,
         citation=KREJCI,

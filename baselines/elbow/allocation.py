@@ -1,10 +1,10 @@
-"""Torque and stiffness at once: exact allocation, pressure loops, and the memory undone.
+"""Torque and stiffness at once: exact allocation, pressure loops, and the hysteresis undone.
 
-The controller of seed 001, Fig. 7: pressures that give the wanted torque and stiffness at the
+The controller of chakarov2018, Fig. 7: pressures that give the wanted torque and stiffness at the
 present angle, and a loop around each bundle's pressure. Friction inside the bundles is driven by
-the angle, which is sensed: a nominal memory that follows it says by how much the bundles pull more
-on one way and less on the other, and the pressures are those of the bundles as they are. That is
-the exact inverse of the memory.
+the angle, which is sensed: a nominal hysteresis that follows it says by how much the bundles pull
+more on one way and less on the other, and the pressures are those of the bundles as they are. That
+is the exact inverse of the hysteresis.
 
 While a pressure lags, both pressures together give neither the torque nor the stiffness. With
 ``early`` the wish is answered within what the valves come to in their next step: torque first holds
@@ -25,15 +25,15 @@ from baselines.elbow.friction import ElbowFriction, make_elbow_friction
 from baselines.elbow.torque_stiffness import Allocation
 from baselines.elbow.valves import PressureLoop, make_pressure_loop
 from baselines.elbow.view import ElbowSignalMap, make_elbow_signal_map
-from baselines.positioning.nominal import MemoryState
+from baselines.positioning.nominal import HysteresisState
 from pam_envs.parameters import Signals
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 
 
 class AllocationState(NamedTuple):
-    """The nominal memory, first axis n_env."""
+    """The nominal hysteresis, first axis n_env."""
 
-    memory: MemoryState
+    hysteresis: HysteresisState
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class ElbowAllocation:
     signals : ElbowSignalMap
     loop : PressureLoop
     friction : ElbowFriction
-        That is undone; none is if its memory never lags.
+        That is undone; none is if its hysteresis never lags.
     early : bool
         Whether the pressures are chosen among those of the next step.
     """
@@ -70,20 +70,20 @@ class ElbowAllocation:
         if state is None or begin.any():
             fresh = AllocationState(self.friction.initial(len(view.angle)))
             state = choose(begin, fresh, state)
-        friction, memory = self.friction.taken(view, state.memory)
+        friction, hysteresis = self.friction.taken(view, state.hysteresis)
         limits = self.loop.reach(view) if self.early else None
         wanted = self.allocation.pressures(
             view.angle, view.wanted, view.stiffness, friction, limits
         )
         commands = self.loop.commands(view, np.array(wanted))
-        return self.signals.write(commands, observation), AllocationState(memory)
+        return self.signals.write(commands, observation), AllocationState(hysteresis)
 
 
 def make_elbow_allocation(
     plant: ElbowOrthosis,
     signals: Signals,
     action_signals: Signals,
-    memory: bool = False,
+    hysteresis: bool = False,
     early: bool = False,
     knobs: Knobs = AS_DESIGNED,
 ) -> ElbowAllocation:
@@ -93,8 +93,8 @@ def make_elbow_allocation(
     ----------
     plant : ElbowOrthosis
     signals, action_signals : Signals
-    memory : bool
-        Whether the nominal memory is undone.
+    hysteresis : bool
+        Whether the nominal hysteresis is undone.
     early : bool
         See :class:`ElbowAllocation`.
     knobs : mapping
@@ -104,6 +104,6 @@ def make_elbow_allocation(
         Allocation(plant),
         make_elbow_signal_map(signals, action_signals, plant.control_period),
         make_pressure_loop(plant, knobs),
-        make_elbow_friction(plant, known=memory),
+        make_elbow_friction(plant, known=hysteresis),
         early,
     )

@@ -37,7 +37,7 @@ ELBOW_CONTROLLERS: dict[str, Entry] = {
         envs=ELBOW,
         knobs=PID_KNOBS,
     ),
-    "elbow_pid_memory": Entry(
+    "elbow_pid_hysteresis": Entry(
         "elbow_pid, with the bundles' friction in its estimate of the torque",
         MODEL,
         feedback=True,
@@ -53,7 +53,7 @@ ELBOW_CONTROLLERS: dict[str, Entry] = {
         envs=ELBOW,
         knobs=KNOBS,
     ),
-    "elbow_allocation_memory": Entry(
+    "elbow_allocation_hysteresis": Entry(
         "elbow_allocation, with the bundles' friction undone",
         MODEL,
         feedback=True,
@@ -62,7 +62,7 @@ ELBOW_CONTROLLERS: dict[str, Entry] = {
         knobs=KNOBS,
     ),
     "elbow_allocation_early": Entry(
-        "elbow_allocation_memory within the pressures of the valves' next step: torque first",
+        "elbow_allocation_hysteresis within the pressures of the valves' next step: torque first",
         MODEL,
         feedback=True,
         citation=SEED_001,
@@ -93,9 +93,9 @@ ELBOW_MAKERS: Mapping[str, Maker] = {
     "elbow_random": make_elbow_random,
     "elbow_hold": make_held,
     "elbow_pid": make_elbow_pid,
-    "elbow_pid_memory": _pid(memory=True),
+    "elbow_pid_hysteresis": _pid(hysteresis=True),
     "elbow_allocation": make_elbow_allocation,
-    "elbow_allocation_memory": _allocation(memory=True),
-    "elbow_allocation_early": _allocation(memory=True, early=True),
+    "elbow_allocation_hysteresis": _allocation(hysteresis=True),
+    "elbow_allocation_early": _allocation(hysteresis=True, early=True),
 }
 """From nominal plant, signals, action signals and perhaps ``knobs`` to the controller."""

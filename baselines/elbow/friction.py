@@ -1,7 +1,7 @@
-"""The bundles' friction as a nominal memory tells it from the angle.
+"""The bundles' friction as a nominal hysteresis tells it from the angle.
 
 Friction inside the bundles is driven by their contraction, and so by the angle, which is sensed: a
-memory that follows it says by how much the bundles pull more on one way and less on the other.
+hysteresis that follows it says by how much the bundles pull more on one way and less on the other.
 """
 
 from __future__ import annotations
@@ -11,7 +11,13 @@ from typing import Any
 
 from baselines.core.controller import Array
 from baselines.elbow.view import ElbowView
-from baselines.positioning.nominal import MemoryRows, MemoryState, NoMemory, PlayRows, PreisachRows
+from baselines.positioning.nominal import (
+    HysteresisRows,
+    HysteresisState,
+    NoHysteresis,
+    PlayRows,
+    PreisachRows,
+)
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
@@ -26,21 +32,21 @@ class ElbowFriction:
     Attributes
     ----------
     plant : ElbowOrthosis
-    memory : MemoryRows
+    hysteresis : HysteresisRows
         Nothing lags and nothing is taken if it is none.
     """
 
     plant: ElbowOrthosis
-    memory: MemoryRows
+    hysteresis: HysteresisRows
 
-    def initial(self, rows: int) -> MemoryState:
-        """Return the memory of bundles that were never moved."""
-        return self.memory.initial(rows)
+    def initial(self, rows: int) -> HysteresisState:
+        """Return the hysteresis of bundles that were never moved."""
+        return self.hysteresis.initial(rows)
 
-    def taken(self, view: ElbowView, state: MemoryState) -> tuple[Shares, MemoryState]:
-        """Return what friction takes of both bundles' shapes [m^2], and the memory after it."""
+    def taken(self, view: ElbowView, state: HysteresisState) -> tuple[Shares, HysteresisState]:
+        """Return what friction takes of both bundles' shapes [m^2], and the hysteresis after it."""
         travel = self.plant.pulley.travel(view.angle)
-        follows, after = self.memory.forward(travel, state)
+        follows, after = self.hysteresis.forward(travel, state)
         return self.plant.friction(travel - follows), after
 
     def torque(self, view: ElbowView, taken: Shares) -> Array:
@@ -49,12 +55,12 @@ class ElbowFriction:
         return self.plant.pulley.torque(-factor_a * taken[0], -factor_b * taken[1])
 
 
-def _rows(operator: Any) -> MemoryRows:
+def _rows(operator: Any) -> HysteresisRows:
     if isinstance(operator, PlayOperator):
         return PlayRows(operator)
-    return PreisachRows(operator) if isinstance(operator, Preisach) else NoMemory()
+    return PreisachRows(operator) if isinstance(operator, Preisach) else NoHysteresis()
 
 
 def make_elbow_friction(plant: ElbowOrthosis, known: bool) -> ElbowFriction:
     """Return the friction of a nominal plant, or none if it is not ``known``."""
-    return ElbowFriction(plant, _rows(plant.memory.operator if known else None))
+    return ElbowFriction(plant, _rows(plant.hysteresis.operator if known else None))

@@ -25,7 +25,7 @@ from baselines.elbow.friction import ElbowFriction, make_elbow_friction
 from baselines.elbow.valves import PressureLoop, make_pressure_loop
 from baselines.elbow.view import ElbowSignalMap, make_elbow_signal_map
 from baselines.linear.simc import PI_KNOBS, simc_rule
-from baselines.positioning.nominal import MemoryState
+from baselines.positioning.nominal import HysteresisState
 from baselines.positioning.pid import Gains, PidState, pid_start, pid_step
 from pam_envs.parameters import Signals
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
@@ -56,10 +56,10 @@ def simc_torque(plant: ElbowOrthosis, knobs: Knobs = AS_DESIGNED) -> Gains:
 
 
 class ElbowPidState(NamedTuple):
-    """The PI's state and the nominal memory, first axis n_env."""
+    """The PI's state and the nominal hysteresis, first axis n_env."""
 
     pid: PidState
-    memory: MemoryState
+    hysteresis: HysteresisState
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class ElbowPid:
     period : float
         Control period [s].
     friction : ElbowFriction
-        That is added to the estimate; none is if its memory never lags.
+        That is added to the estimate; none is if its hysteresis never lags.
     """
 
     gains: Gains
@@ -102,13 +102,13 @@ class ElbowPid:
             at_rest = pid_start(0.5 * np.diff(view.pressure, axis=0)[0], view.torque)
             fresh = ElbowPidState(at_rest, self.friction.initial(len(begin)))
             state = choose(begin, fresh, state)
-        taken, memory = self.friction.taken(view, state.memory)
+        taken, hysteresis = self.friction.taken(view, state.hysteresis)
         torque, most = view.torque + self.friction.torque(view, taken), self.full
         error = view.wanted - torque
         shift, after = pid_step(self.gains, state.pid, error, torque, -most, most, self.period)
         wanted = np.clip(self.middle + np.array([-shift, shift]), 0.0, most)
         commands = wanted if self.loop is None else self.loop.commands(view, wanted)
-        return self.signals.write(commands, observation), ElbowPidState(after, memory)
+        return self.signals.write(commands, observation), ElbowPidState(after, hysteresis)
 
 
 def make_elbow_pid(
@@ -116,7 +116,7 @@ def make_elbow_pid(
     signals: Signals,
     action_signals: Signals,
     gains: Gains | None = None,
-    memory: bool = False,
+    hysteresis: bool = False,
     knobs: Knobs = AS_DESIGNED,
 ) -> ElbowPid:
     """Return the controller for a nominal plant.
@@ -127,8 +127,8 @@ def make_elbow_pid(
     signals, action_signals : Signals
     gains : Gains, optional
         Default: those of :func:`simc_torque`.
-    memory : bool
-        Whether the nominal memory's friction is added to the estimate of the torque.
+    hysteresis : bool
+        Whether the nominal hysteresis's friction is added to the estimate of the torque.
     knobs : mapping
         Of ``KNOBS``.
     """
@@ -140,5 +140,5 @@ def make_elbow_pid(
         knob(knobs, "start") * SHARE * full,
         full,
         plant.control_period,
-        make_elbow_friction(plant, known=memory),
+        make_elbow_friction(plant, known=hysteresis),
     )

@@ -1,8 +1,9 @@
 """From torque and stiffness to two pressures: the exact solution, held within reach, torque first.
 
-Seed 001 finds the pressures by an optimisation. Torque and stiffness are linear in both pressures,
-so that a system of two equations gives them exactly; where it asks for more than there is, the
-torque is held first and the stiffness gets what is left (:mod:`pam_envs.mechanics.allocation`).
+chakarov2018 finds the pressures by an optimisation. Torque and stiffness are linear in both
+pressures, so that a system of two equations gives them exactly; where it asks for more than there
+is, the torque is held first and the stiffness gets what is left
+(:mod:`pam_envs.mechanics.allocation`).
 """
 
 from __future__ import annotations

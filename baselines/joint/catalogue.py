@@ -21,7 +21,7 @@ from pam_envs.parameters import Signals
 ARM = ("PAM/RedundantManipulator-v0",)
 JOINT = ("PAM/AntagonisticJoint-v0", *ARM)
 SEED_002 = (
-    "Seed 002: Nonlinear Model-Based Control Architecture for Antagonistic Pairs of Fluidic "
+    "fluidic_muscles: Nonlinear Model-Based Control Architecture for Antagonistic Pairs of Fluidic "
     "Muscles in Manipulator Motion Control"
 )
 FOLLOWING = (

@@ -1,7 +1,7 @@
-"""Single loops on the angles of joints, without a model of the memory: PI, slow PI and PID.
+"""Single loops on the angles of joints, without a model of the hysteresis: PI, slow PI and PID.
 
-PI and slow PI: see :mod:`baselines.joint.loop`; seed 002, section 4, with the gain of the nominal
-plant between the tips of the hysteresis loop.
+PI and slow PI: see :mod:`baselines.joint.loop`; fluidic_muscles, section 4, with the gain of the
+nominal plant between the tips of the hysteresis loop.
 
 PID: SIMC (:mod:`baselines.linear.simc`) for both lags ``1 / p`` and the gain of the nominal plant,
 in its cascade form, the derivative on the measurement. For one stage, whose two poles are real,
@@ -12,7 +12,8 @@ plant, ``tau_c = 1 / p``.
 
 A straight arm of six joints without friction leaves the PID a phase margin of 18 degrees at the
 base (3 with 0.1 kg at the tip), the smooth PID 39 (18), the PI 56 (31). With ``tau_c = theta`` it
-would be unstable. The memory's lower gain after a turn, and its friction, leave the true arm more.
+would be unstable. The hysteresis's lower gain after a turn, and its friction, leave the true arm
+more.
 
 Ahead, a loop is given the previewed reference, so that its delay is made up for
 (:mod:`baselines.joint.preview`).
@@ -115,7 +116,7 @@ def pid_delay(law: Simc, gain: float) -> float:
 
 
 class FeedbackState(NamedTuple):
-    """Memories of the loops and of the reference's filters."""
+    """Hysteresis models of the loops and of the reference's filters."""
 
     loop: LoopState
     reference: Array

@@ -1,4 +1,4 @@
-"""A memory of every joint of every environment: lanes in one row, states with the row first."""
+"""A hysteresis of every joint of every environment: lanes in one row, states with the row first."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 from baselines.core.controller import Array
 from baselines.joint.model import JointModel
-from baselines.positioning.nominal import MemoryState
+from baselines.positioning.nominal import HysteresisState
 
 
 @dataclass(frozen=True)
-class JointMemories:
-    """The memory of a model, for arrays of shape (n_env, n_joints).
+class JointHysteresisModels:
+    """The hysteresis of a model, for arrays of shape (n_env, n_joints).
 
     Attributes
     ----------
@@ -20,24 +20,24 @@ class JointMemories:
 
     model: JointModel
 
-    def start(self, set_point: Array) -> tuple[Array, MemoryState]:
-        """Return the angles at rest under first set-points [rad], and the memory they leave."""
+    def start(self, set_point: Array) -> tuple[Array, HysteresisState]:
+        """Return the angles at rest under first set-points [rad], and the hysteresis they leave."""
         found, state = self.model.virgin(set_point.ravel())
         return found.reshape(set_point.shape), _packed(state, set_point.shape)
 
-    def forward(self, set_point: Array, state: MemoryState) -> tuple[Array, MemoryState]:
-        """Return the angles at rest [rad] under set-points, and the memory after them."""
+    def forward(self, set_point: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
+        """Return the angles at rest [rad] under set-points, and the hysteresis after them."""
         found, after = self.model.rows.forward(set_point.ravel(), _flat(state))
         return found.reshape(set_point.shape), _packed(after, set_point.shape)
 
-    def inverse(self, wanted: Array, state: MemoryState) -> Array:
-        """Return the set-points [rad] that give angles at rest; the memory stays."""
+    def inverse(self, wanted: Array, state: HysteresisState) -> Array:
+        """Return the set-points [rad] that give angles at rest; the hysteresis stays."""
         return self.model.rows.inverse(wanted.ravel(), _flat(state)).reshape(wanted.shape)
 
 
-def _flat(state: MemoryState) -> MemoryState:
+def _flat(state: HysteresisState) -> HysteresisState:
     return tuple(part.reshape(-1, *part.shape[2:]) for part in state)
 
 
-def _packed(state: MemoryState, shape: tuple[int, ...]) -> MemoryState:
+def _packed(state: HysteresisState, shape: tuple[int, ...]) -> HysteresisState:
     return tuple(part.reshape(*shape, *part.shape[1:]) for part in state)

@@ -1,8 +1,8 @@
-"""Set-points of joints without feedback: the reference itself, or the inverse of the memory.
+"""Set-points of joints without feedback: the reference itself, or the inverse of the hysteresis.
 
-    u = H^-1(r)                                              seed 002, section 3.2, Fig. 10
+    u = H^-1(r)                                              fluidic_muscles, section 3.2, Fig. 10
 
-``H^-1`` is the exact recursive inverse of the memory as identified on the nominal plant, in the
+``H^-1`` is the exact recursive inverse of the hysteresis as identified on the nominal plant, in the
 history of what was commanded: ``E(u_next, u_turn) = f_next - f_turn``. The printed sum (3.5) is
 exact only up to the first turn (:mod:`pam_envs.identification.everett_series`).
 """
@@ -18,18 +18,18 @@ from numpy.typing import ArrayLike
 from baselines.core.controller import Answer, beginning, choose
 from baselines.core.knobs import AS_DESIGNED, Knobs
 from baselines.joint.gravity import Gravity
-from baselines.joint.hysteresis_rows import JointMemories
+from baselines.joint.hysteresis_rows import JointHysteresisModels
 from baselines.joint.model import JointModel, joint_model
 from baselines.joint.poles import joint_delays
 from baselines.joint.preview import Lookahead, lookahead_for
 from baselines.joint.view import JointSignalMap, make_joint_signal_map
-from baselines.positioning.nominal import MemoryState
+from baselines.positioning.nominal import HysteresisState
 from pam_envs.parameters import Signals
 
 
 @dataclass(frozen=True)
 class JointInverse:
-    """The inverse of the memory as feed-forward.
+    """The inverse of the hysteresis as feed-forward.
 
     Attributes
     ----------
@@ -47,20 +47,20 @@ class JointInverse:
     def predict(
         self,
         observation: ArrayLike,
-        state: MemoryState | None = None,
+        state: HysteresisState | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
     ) -> Answer:
         """Return the set-points; see :class:`~baselines.core.controller.Controller`."""
-        view, memories = self.signals.read(observation), JointMemories(self.model)
+        view, hysteresis_models = self.signals.read(observation), JointHysteresisModels(self.model)
         begin = beginning(state, episode_start, len(view.angle))
         if state is None or begin.any():
             held = view.set_point - self.gravity.shift(view.angle, view.payload)
-            state = choose(begin, memories.start(held)[1], state)
+            state = choose(begin, hysteresis_models.start(held)[1], state)
         shift = self.gravity.shift(view.reference, view.payload)
-        found = memories.inverse(self.lookahead.wanted(view.samples), state) + shift
+        found = hysteresis_models.inverse(self.lookahead.wanted(view.samples), state) + shift
         set_point = np.minimum(np.maximum(found, self.model.low), self.model.high)
-        after = memories.forward(set_point - shift, state)[1]
+        after = hysteresis_models.forward(set_point - shift, state)[1]
         return self.signals.write(set_point, observation), after
 
 
@@ -81,8 +81,8 @@ def make_joint_inverse(
         Nominal plant.
     signals, action_signals : Signals
     inverse : float
-        Width of the memory that is inverted over the identified one; 0: the reference goes through
-        the line between the tips of the loop.
+        Width of the hysteresis that is inverted over the identified one; 0: the reference goes
+        through the line between the tips of the loop.
     gravity : bool
         Whether the set-points carry the weight of the links and the payload that is told.
     ahead : bool

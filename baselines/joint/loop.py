@@ -5,9 +5,10 @@ applied and the controller's own. So the controller sees the angle that its own 
 given: it does not wind up at a limit, and it begins an episode at the command that it meets.
 (The compensator of :mod:`baselines.linear.bumpless` without a gain of its own.)
 
-The PI of seed 002 (section 4) puts its zero on one of the two poles ``p`` of the nominal plant
-``K p^2 / (s + p)^2``, so that the loop is ``K_p K p^2 / (s (s + p))``, and takes the gain for a
-damping ``D``: ``K_p K = 1 / (4 D^2)``, ``K_i = p K_p``. At ``D = 1/sqrt(2)`` and 23 rad/s they are
+The PI of fluidic_muscles (section 4) puts its zero on one of the two poles ``p`` of the nominal
+plant ``K p^2 / (s + p)^2``, so that the loop is ``K_p K p^2 / (s (s + p))``, and takes the gain
+for a damping ``D``: ``K_p K = 1 / (4 D^2)``, ``K_i = p K_p``. At ``D = 1/sqrt(2)`` and 23 rad/s
+they are
 0.5 and 11.5 1/s. The slow PI cancels the pole too, with the crossover that is asked of the
 disturbance loop, ``K_i K = 4 rad/s`` (in proportion to ``p`` where it is another).
 """
@@ -68,7 +69,7 @@ def pi_system(gains: PiGains) -> LinearSystem:
 
 
 class LoopState(NamedTuple):
-    """Memories of the controllers and of the models beside them, (n_env, n_joints, k)."""
+    """Hysteresis models of the controllers and of the models beside them, (n_env, n_joints, k)."""
 
     controller: Array
     model: Array

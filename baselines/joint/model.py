@@ -1,9 +1,9 @@
-"""What the controllers of joints know of a nominal plant: its memory, and a model of its motion.
+"""What the controllers of joints know of a nominal plant: its hysteresis, and a model of its motion.
 
-The memory is identified on the nominal plant as seed 002 (section 3.2) does it on the rig, by
-first-order descending curves (:mod:`pam_envs.identification.joint_forc`), and made symmetric. The
-motion behind it is the paper's nominal model (section 4), two real poles at 23 rad/s. For a
-manipulator it is one stage, without the others.
+The hysteresis is identified on the nominal plant as fluidic_muscles (section 3.2) does it on the
+rig, by first-order descending curves (:mod:`pam_envs.identification.joint_forc`), and made
+symmetric. The motion behind it is the paper's nominal model (section 4), two real poles at 23
+rad/s. For a manipulator it is one stage, without the others.
 """
 
 from __future__ import annotations
@@ -18,39 +18,39 @@ import numpy as np
 from baselines.core.controller import Array
 from baselines.joint.bank import Bank
 from baselines.linear.systems import LinearSystem
-from baselines.positioning.nominal import MemoryRows, MemoryState, PreisachRows
+from baselines.positioning.nominal import HysteresisRows, HysteresisState, PreisachRows
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.identification.joint_forc import measure_joint
 
 POLE = 23.0
-"""Both poles of the nominal model [rad/s] (seed 002, section 4)."""
+"""Both poles of the nominal model [rad/s] (fluidic_muscles, section 4)."""
 LEVELS = 21
 """Levels of the identified map."""
 
-_MEMORIES: dict[str, Preisach] = {}
+_HYSTERESIS_MODELS: dict[str, Preisach] = {}
 
 
 def nominal_motion(pole: float = POLE) -> LinearSystem:
-    """Return ``pole^2 / (s + pole)^2``, from the memory's output to the angle."""
+    """Return ``pole^2 / (s + pole)^2``, from the hysteresis's output to the angle."""
     a = np.array([[-pole, pole], [0.0, -pole]])
     return LinearSystem(a, np.array([0.0, pole]), np.array([1.0, 0.0]))
 
 
 @dataclass(frozen=True)
 class LineRows:
-    """A line through 0, worked by rows like a memory."""
+    """A line through 0, worked by rows like a hysteresis."""
 
     slope: float
 
-    def initial(self, rows: int) -> MemoryState:
+    def initial(self, rows: int) -> HysteresisState:
         """Return no state."""
         return ()
 
-    def forward(self, felt: Array, state: MemoryState) -> tuple[Array, MemoryState]:
+    def forward(self, felt: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
         """Return the output of an input."""
         return self.slope * felt, state
 
-    def inverse(self, wanted: Array, state: MemoryState) -> Array:
+    def inverse(self, wanted: Array, state: HysteresisState) -> Array:
         """Return the input of an output."""
         return wanted / self.slope
 
@@ -61,7 +61,7 @@ class JointModel:
 
     Attributes
     ----------
-    memory : Preisach or None
+    hysteresis : Preisach or None
         From set-point [rad] to angle at rest [rad]; None for a line.
     low, high : float
         Range of the set-point [rad].
@@ -70,10 +70,10 @@ class JointModel:
     poles : tuple of float
         Of each joint [rad/s], double.
     slope : float
-        Of the line where there is no memory.
+        Of the line where there is no hysteresis.
     """
 
-    memory: Preisach | None
+    hysteresis: Preisach | None
     low: float
     high: float
     period: float
@@ -88,14 +88,14 @@ class JointModel:
     @cached_property
     def gain(self) -> float:
         """Angle over set-point between the tips of the major loop: the nominal gain ``K``."""
-        if self.memory is None:
+        if self.hysteresis is None:
             return self.slope
-        return float(self.memory.everett[-1, 0]) / (self.memory.high - self.memory.low)
+        return float(self.hysteresis.everett[-1, 0]) / (self.hysteresis.high - self.hysteresis.low)
 
     @cached_property
-    def rows(self) -> MemoryRows:
-        """The memory worked by rows."""
-        return LineRows(self.slope) if self.memory is None else PreisachRows(self.memory)
+    def rows(self) -> HysteresisRows:
+        """The hysteresis worked by rows."""
+        return LineRows(self.slope) if self.hysteresis is None else PreisachRows(self.hysteresis)
 
     @cached_property
     def reach(self) -> tuple[float, float]:
@@ -106,15 +106,15 @@ class JointModel:
             found, state = self.rows.forward(u, state)
         return float(found[0]), float(found[1])
 
-    def virgin(self, set_point: Array) -> tuple[Array, MemoryState]:
-        """Return angles at rest [rad] under first set-points (n,), and the memory they leave."""
+    def virgin(self, set_point: Array) -> tuple[Array, HysteresisState]:
+        """Return angles at rest [rad] under first set-points (n,), and the hysteresis they leave."""
         return self.rows.forward(set_point, self.rows.initial(len(set_point)))
 
     def narrowed(self, width: float) -> JointModel:
-        """Return the model with a memory ``width`` times as wide, the tips the same; 0: a line."""
-        if self.memory is None or width == 0.0:
-            return replace(self, memory=None, slope=self.gain)
-        return replace(self, memory=self.memory.scaled(width, self.gain))
+        """Return the model with a hysteresis ``width`` times as wide, the tips the same; 0: a line."""
+        if self.hysteresis is None or width == 0.0:
+            return replace(self, hysteresis=None, slope=self.gain)
+        return replace(self, hysteresis=self.hysteresis.scaled(width, self.gain))
 
 
 def joint_model(plant: Any, levels: int = LEVELS, poles: tuple[float, ...] = (POLE,)) -> JointModel:
@@ -132,13 +132,13 @@ def joint_model(plant: Any, levels: int = LEVELS, poles: tuple[float, ...] = (PO
     Warns
     -----
     UserWarning
-        If the memory is no symmetric Preisach operator; the model is then the map as measured.
+        If the hysteresis is no symmetric Preisach operator; the model is then the map as measured.
     """
     key = f"{plant.digest()} {levels}"
     low, high = plant.angle_range
-    if key not in _MEMORIES:
+    if key not in _HYSTERESIS_MODELS:
         found = measure_joint(plant.rest_angles, high, levels)
         if not (found.symmetric and found.preisach):
-            warnings.warn(f"the memory of the nominal plant {found.verdict}", stacklevel=2)
-        _MEMORIES[key] = found.model
-    return JointModel(_MEMORIES[key], low, high, plant.control_period, poles)
+            warnings.warn(f"the hysteresis of the nominal plant {found.verdict}", stacklevel=2)
+        _HYSTERESIS_MODELS[key] = found.model
+    return JointModel(_HYSTERESIS_MODELS[key], low, high, plant.control_period, poles)

@@ -1,4 +1,4 @@
-"""Model-following control of joints with an inverse of the memory: seed 002, section 4, Fig. 11.
+"""Model-following control of joints with an inverse of the hysteresis: fluidic_muscles, section 4, Fig. 11.
 
     model loop         u_mod = C_t (r - phi_mod),      phi_mod = G u_mod
     disturbance loop   u_dis = C_d (phi_mod - phi)
@@ -9,7 +9,7 @@ for tracking alone; the disturbance loop compares the joint with the model and n
 reference, and is designed for rejection alone (:mod:`baselines.robust.loops`). With an exact
 inverse and motion the joint is its model, and the disturbance loop rests.
 
-``H^-1`` is the exact recursive inverse of the memory as identified on the nominal plant
+``H^-1`` is the exact recursive inverse of the hysteresis as identified on the nominal plant
 (:mod:`baselines.joint.model`), in the history of what was commanded. Left out, ``u = (u_mod +
 u_dis) / K``. Limits: ``u_mod`` keeps within the angles that can be held, so that the model
 saturates as the joint does, ``u_dis`` within what is left; the disturbance loop is told what was
@@ -27,14 +27,14 @@ from numpy.typing import ArrayLike
 from baselines.core.controller import Answer, Array, beginning, choose
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.joint.gravity import Gravity
-from baselines.joint.hysteresis_rows import JointMemories
+from baselines.joint.hysteresis_rows import JointHysteresisModels
 from baselines.joint.loop import DAMPING, JointLoop, LoopState, make_loop
 from baselines.joint.model import JointModel, joint_model
 from baselines.joint.poles import joint_poles
 from baselines.joint.preview import Lookahead, double_lags, lookahead_for
 from baselines.joint.tracking import ModelLoop, make_model_loop
 from baselines.joint.view import JointSignalMap, JointView, make_joint_signal_map
-from baselines.positioning.nominal import MemoryState
+from baselines.positioning.nominal import HysteresisState
 from baselines.robust.loops import Kind, robust_controller
 from pam_envs.parameters import Signals
 
@@ -43,7 +43,7 @@ KNOBS: Bounds = {"damping": (0.5, 1.5), "disturbance": (0.5, 2.0)}
 
 
 class FollowingState(NamedTuple):
-    """Memories of model, loops and inverse, shapes (n_env, n_joints, ...).
+    """Hysteresis models of model, loops and inverse, shapes (n_env, n_joints, ...).
 
     Attributes
     ----------
@@ -52,14 +52,14 @@ class FollowingState(NamedTuple):
     tracking : ndarray
         States of the model loop.
     disturbance : LoopState
-    memory : tuple of ndarray
+    hysteresis : tuple of ndarray
         Of the inverse.
     """
 
     model: Array
     tracking: Array
     disturbance: LoopState
-    memory: MemoryState
+    hysteresis: HysteresisState
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class ModelFollowing:
     Attributes
     ----------
     model : JointModel
-        Whose memory is inverted.
+        Whose hysteresis is inverted.
     tracking : ModelLoop
     disturbance : JointLoop
     signals : JointSignalMap
@@ -99,7 +99,7 @@ class ModelFollowing:
             state = choose(begin, self._start(view), state)
         shift = self.gravity.shift(view.reference, view.payload)
         wanted = self._wanted(view, state)
-        set_point = self._inverse(sum(wanted), state.memory) + shift
+        set_point = self._inverse(sum(wanted), state.hysteresis) + shift
         set_point = np.minimum(np.maximum(set_point, self.model.low), self.model.high)
         return self.signals.write(set_point, observation), self._after(
             view, state, wanted[0], set_point - shift
@@ -112,13 +112,13 @@ class ModelFollowing:
     def _start(self, view: JointView) -> FollowingState:
         """Return the state of a joint that rests where it is, at the set-point that it has."""
         shift = self.gravity.shift(view.angle, view.payload)
-        held, memory = JointMemories(self.model).start(view.set_point - shift)
+        held, hysteresis = JointHysteresisModels(self.model).start(view.set_point - shift)
         angle = view.angle
         return FollowingState(
             self.model.motion.rest(angle),
             self.tracking.start(angle),
             self.disturbance.start(held - angle),
-            memory,
+            hysteresis,
         )
 
     def _wanted(self, view: JointView, state: FollowingState) -> tuple[Array, Array]:
@@ -132,14 +132,14 @@ class ModelFollowing:
         )
         return tracking, more
 
-    def _inverse(self, wanted: Array, memory: MemoryState) -> Array:
-        return JointMemories(self.model).inverse(wanted, memory)
+    def _inverse(self, wanted: Array, hysteresis: HysteresisState) -> Array:
+        return JointHysteresisModels(self.model).inverse(wanted, hysteresis)
 
     def _after(
         self, view: JointView, state: FollowingState, tracking: Array, applied: Array
     ) -> FollowingState:
         angle = self.model_output(state)
-        held, memory = JointMemories(self.model).forward(applied, state.memory)
+        held, hysteresis = JointHysteresisModels(self.model).forward(applied, state.hysteresis)
         disturbance = self.disturbance.advance(
             angle, view.angle, held - tracking, state.disturbance
         )
@@ -147,7 +147,7 @@ class ModelFollowing:
             self.model.motion.advance(tracking, state.model),
             self.tracking.advance(self.lookahead.wanted(view.samples), state.tracking),
             disturbance,
-            memory,
+            hysteresis,
         )
 
 
@@ -171,7 +171,7 @@ def make_model_following(
     kind : {"mu", "hinf"}
         Of the disturbance loop.
     inverse : float
-        Width of the memory that is inverted over the identified one: 1 is the exact inverse, 0
+        Width of the hysteresis that is inverted over the identified one: 1 is the exact inverse, 0
         none.
     gravity : bool
         Whether the set-points carry the weight of the links and the payload that is told.

@@ -5,7 +5,7 @@ hangs on it. Its pole is then the frequency at which its angle lags its own set-
 of a turn, as ``p^2 / (s + p)^2`` does at ``p`` (and a swinging joint at its natural frequency), but
 not above that of a stage. Beside it stands the joint's delay for slow set-points, ``2 / p`` of a
 double pole, but less of a joint that swings: the mean time of its answer to a pulse. Both are found
-by small steps of one joint after the other, the arm straight and the memory off.
+by small steps of one joint after the other, the arm straight and the hysteresis off.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def joint_paces(plant: Any) -> tuple[Pace, ...]:
         return (Pace(POLE, 2.0 / POLE),)
     key = plant.digest()
     if key not in _PACES:
-        smooth = plant.replace({"memory.width": 0.0})
+        smooth = plant.replace({"hysteresis.width": 0.0})
         _PACES[key] = tuple(_pace(smooth, k) for k in range(plant.stages))
     return _PACES[key]
 

@@ -3,7 +3,7 @@
     nominal plant -> frequency response -> transfer function -> integrator -> LTR -> discrete
 
 with a compensator that keeps a controller settled while it is off-line or its command is limited
-(:mod:`baselines.linear.bumpless`). The bandwidths are those of seed 000, section 4.1, read in
+(:mod:`baselines.linear.bumpless`). The bandwidths are those of yeh2010, section 4.1, read in
 rad/s. The compensator's gains are 0, which satisfies its matrix inequality for every stable plant:
 the fictitious loop does the work.
 

@@ -1,6 +1,6 @@
 """Feed-forwards of the knee: from a wanted tension to a pressure.
 
-The wanted tension over the muscle's stretch, as measured, is the wanted stiffness (seed 000,
+The wanted tension over the muscle's stretch, as measured, is the wanted stiffness (yeh2010,
 section 4.1). The pressure that gives it comes from the inverse of the identified hysteresis, or
 from the straight line between the tips of its loop, or it is the nominal pressure whatever is
 wanted.
@@ -16,14 +16,14 @@ import numpy as np
 from baselines.core.controller import Array
 from baselines.knee.nominal import KneeNominal
 from baselines.knee.published import NOMINAL_PRESSURE
-from baselines.positioning.nominal import MemoryState
+from baselines.positioning.nominal import HysteresisState
 
 Kind = Literal["nominal", "line", "inverse"]
 
 
 @dataclass(frozen=True)
 class Forward:
-    """A feed-forward; its state is the nominal muscle's memory.
+    """A feed-forward; its state is the nominal muscle's hysteresis.
 
     Attributes
     ----------
@@ -34,11 +34,11 @@ class Forward:
     nominal: KneeNominal
     kind: Kind
 
-    def start(self, pressure: Array) -> MemoryState:
+    def start(self, pressure: Array) -> HysteresisState:
         """Return the state of muscles that were inflated to a pressure [Pa], shape (n_env,)."""
         return self.nominal.rested(pressure) if self.kind == "inverse" else ()
 
-    def pressure(self, tension: Array, stretch: Array, state: MemoryState) -> Array:
+    def pressure(self, tension: Array, stretch: Array, state: HysteresisState) -> Array:
         """Return the pressure [Pa], within the capacity, for a tension [N] at a stretch [m]."""
         if self.kind == "nominal":
             return np.full_like(tension, NOMINAL_PRESSURE)
@@ -47,6 +47,6 @@ class Forward:
             return self.nominal.pressure_for(stiffness, state)
         return np.minimum(self.nominal.line(stiffness), self.nominal.full_pressure)
 
-    def move(self, pressure: Array, state: MemoryState) -> MemoryState:
+    def move(self, pressure: Array, state: HysteresisState) -> HysteresisState:
         """Return the state after a pressure [Pa] of this feed-forward."""
         return self.nominal.felt(pressure, state) if self.kind == "inverse" else state

@@ -1,4 +1,4 @@
-"""Frequency response tests of a nominal knee orthosis, as seed 000 (section 4.1) makes them.
+"""Frequency response tests of a nominal knee orthosis, as yeh2010 (section 4.1) makes them.
 
 The set-point swings about 2 bar, one sine a run, and tension or angle is measured. What the
 orthosis is mounted on in the test is part of what is identified:

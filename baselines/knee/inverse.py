@@ -1,7 +1,7 @@
 """Feed-forward alone: the inverse of the hysteresis, or the straight line, without feedback.
 
 In stance, and with the brace alone, the wanted tension is the reference; in swing it is the one
-that takes the wire's torque off the knee. The inverse is static, as in seed 000: it knows nothing
+that takes the wire's torque off the knee. The inverse is static, as in yeh2010: it knows nothing
 of the regulator's lag. With a preview it aims at the reference one lag ahead.
 """
 
@@ -19,15 +19,15 @@ from baselines.knee.feedforward import Forward, Kind
 from baselines.knee.nominal import KneeNominal
 from baselines.knee.preview import Ahead, free_tension, make_ahead, tension
 from baselines.knee.view import Eyes, View, make_eyes
-from baselines.positioning.nominal import MemoryState
+from baselines.positioning.nominal import HysteresisState
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 
 class ForwardState(NamedTuple):
-    """The nominal memory, first axis n_env."""
+    """The nominal hysteresis, first axis n_env."""
 
-    memory: MemoryState
+    hysteresis: HysteresisState
 
 
 @dataclass(frozen=True)
@@ -65,9 +65,9 @@ class KneeForward:
         if state is None or begin.any():
             state = choose(begin, ForwardState(self.forward.start(view.set_point)), state)
         pressure = self.forward.pressure(
-            self._wanted(view, observation), view.stretch, state.memory
+            self._wanted(view, observation), view.stretch, state.hysteresis
         )
-        after = ForwardState(self.forward.move(pressure, state.memory))
+        after = ForwardState(self.forward.move(pressure, state.hysteresis))
         return answer(self.action_signal, pressure, observation), after
 
     def _wanted(self, view: View, observation: ArrayLike) -> Array:

@@ -1,4 +1,4 @@
-"""Feedback of tension in stance and of angle in swing, with a feed-forward: seed 000, section 4.
+"""Feedback of tension in stance and of angle in swing, with a feed-forward: yeh2010, section 4.
 
     stance   set-point = forward(T_d) + K_T (T_d - T)
     swing    set-point = forward(T_0) + K_theta (theta_d - theta)
@@ -28,25 +28,25 @@ from baselines.knee.nominal import KneeNominal
 from baselines.knee.preview import Ahead, free_tension, make_ahead, tension
 from baselines.knee.view import Eyes, View, make_eyes
 from baselines.linear.bumpless import BumplessState
-from baselines.positioning.nominal import MemoryState
+from baselines.positioning.nominal import HysteresisState
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 
 class LtrState(NamedTuple):
-    """Memories of both controllers and of the feed-forward, first axis n_env.
+    """Hysteresis models of both controllers and of the feed-forward, first axis n_env.
 
     Attributes
     ----------
     tension : BumplessState
     angle : BumplessState or tuple
         Empty without a gait.
-    memory : tuple of ndarray
+    hysteresis : tuple of ndarray
     """
 
     tension: BumplessState
     angle: BumplessState | tuple[()]
-    memory: MemoryState
+    hysteresis: HysteresisState
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class KneeLtr:
         begin = beginning(state, episode_start, len(view.tension))
         if state is None or begin.any():
             state = choose(begin, self._start(view), state)
-        forward, free = self._forward(view, observation, state.memory)
+        forward, free = self._forward(view, observation, state.hysteresis)
         stance = forward + self._share(self.tension, view.wanted, view.tension, forward, state[0])
         command, used, angle = stance, forward, state.angle
         if self.angle is not None and state.angle:
@@ -97,19 +97,19 @@ class KneeLtr:
         stance_state = self.tension.advance(
             view.wanted, view.tension, command - forward, state.tension, view.stance
         )
-        after = LtrState(stance_state, angle, self.forward.move(used, state.memory))
+        after = LtrState(stance_state, angle, self.forward.move(used, state.hysteresis))
         return answer(self.action_signal, command, observation), after
 
     def _forward(
-        self, view: View, observation: ArrayLike, memory: MemoryState
+        self, view: View, observation: ArrayLike, hysteresis: HysteresisState
     ) -> tuple[Array, Array]:
         """Return the feed-forwards [Pa] of stance and of swing."""
         wanted = tension(self.ahead, view, observation)
-        stance = self.forward.pressure(wanted, view.stretch, memory)
+        stance = self.forward.pressure(wanted, view.stretch, hysteresis)
         if self.angle is None:
             return stance, stance
         free = free_tension(self.eyes, self.ahead, view, observation)
-        return stance, self.forward.pressure(free, view.stretch, memory)
+        return stance, self.forward.pressure(free, view.stretch, hysteresis)
 
     def _start(self, view: View) -> LtrState:
         """Return the state at the beginning: at rest, or holding what the set-point was."""

@@ -12,7 +12,12 @@ from functools import cached_property
 import numpy as np
 
 from baselines.core.controller import Array
-from baselines.positioning.nominal import MemoryRows, MemoryState, NoMemory, PreisachRows
+from baselines.positioning.nominal import (
+    HysteresisRows,
+    HysteresisState,
+    NoHysteresis,
+    PreisachRows,
+)
 from pam_envs.hysteresis.modified_maxwell_slip import ModifiedMaxwellSlip
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
@@ -27,16 +32,16 @@ class SlipRows:
 
     operator: ModifiedMaxwellSlip
 
-    def initial(self, rows: int) -> MemoryState:
+    def initial(self, rows: int) -> HysteresisState:
         """Return slip positions, shape (rows, n), of muscles that were vented."""
         return (self.operator.initial_state((rows,)),)
 
-    def forward(self, felt: Array, state: MemoryState) -> tuple[Array, MemoryState]:
+    def forward(self, felt: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
         """Advance to a pressure."""
         stiffness, after = self.operator.step(felt, state[0])
         return stiffness, (after,)
 
-    def inverse(self, wanted: Array, state: MemoryState) -> Array:
+    def inverse(self, wanted: Array, state: HysteresisState) -> Array:
         """Return the pressure of a stiffness; the state stays."""
         return self.operator.inverse_step(wanted, state[0])[0]
 
@@ -59,20 +64,20 @@ class KneeNominal:
         return float(self.plant.regulator.max_pressure)
 
     @cached_property
-    def memory(self) -> MemoryRows:
+    def hysteresis(self) -> HysteresisRows:
         """From pressure [Pa] to stiffness [N/m] of a muscle with gain 1."""
-        operator = self.plant.memory.scaled
+        operator = self.plant.hysteresis.scaled
         if operator is None:
-            return NoMemory()
+            return NoHysteresis()
         if isinstance(operator, ModifiedMaxwellSlip):
             return SlipRows(operator)
         return PreisachRows(operator)
 
     @cached_property
     def _per_output(self) -> float:
-        """Stiffness [N/m] over the memory's output."""
+        """Stiffness [N/m] over the hysteresis's output."""
         muscle = self.plant.muscle
-        return muscle.gain * (1.0 if self.plant.memory.operator else muscle.stiffness_ratio)
+        return muscle.gain * (1.0 if self.plant.hysteresis.operator else muscle.stiffness_ratio)
 
     def stretch(self, angle: Array) -> Array:
         """Return the muscle's length above its shortest [m] at an angle [rad], at least 1 mm."""
@@ -94,20 +99,24 @@ class KneeNominal:
     @cached_property
     def _full_stiffness(self) -> float:
         full = np.array([self.full_pressure])
-        return self._per_output * float(self.memory.forward(full, self.memory.initial(1))[0][0])
+        return self._per_output * float(
+            self.hysteresis.forward(full, self.hysteresis.initial(1))[0][0]
+        )
 
-    def rested(self, pressure: Array) -> MemoryState:
-        """Return the memory of muscles that were inflated from none to a pressure [Pa]."""
-        _, state = self.memory.forward(np.zeros_like(pressure), self.memory.initial(len(pressure)))
+    def rested(self, pressure: Array) -> HysteresisState:
+        """Return the hysteresis of muscles that were inflated from none to a pressure [Pa]."""
+        _, state = self.hysteresis.forward(
+            np.zeros_like(pressure), self.hysteresis.initial(len(pressure))
+        )
         return self.felt(pressure, state)
 
-    def felt(self, pressure: Array, state: MemoryState) -> MemoryState:
-        """Return the memory after a pressure [Pa]."""
-        return self.memory.forward(pressure, state)[1]
+    def felt(self, pressure: Array, state: HysteresisState) -> HysteresisState:
+        """Return the hysteresis after a pressure [Pa]."""
+        return self.hysteresis.forward(pressure, state)[1]
 
-    def pressure_for(self, stiffness: Array, state: MemoryState) -> Array:
+    def pressure_for(self, stiffness: Array, state: HysteresisState) -> Array:
         """Return the pressure [Pa], within the capacity, of a stiffness [N/m] after a history."""
-        found = self.memory.inverse(stiffness / self._per_output, state)
+        found = self.hysteresis.inverse(stiffness / self._per_output, state)
         return np.minimum(np.maximum(found, 0.0), self.full_pressure)
 
     # --- rest -------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """The orthosis paper's printed tension plant and controller, and the plant behind the controller.
 
-Seed 000 (T.-J. Yeh et al., "Control of McKibben pneumatic muscles for a power-assist, lower-limb
+yeh2010 (T.-J. Yeh et al., "Control of McKibben pneumatic muscles for a power-assist, lower-limb
 orthosis", Mechatronics 20, 2010), equations (10), (11) and section 4.2. Both transfer functions
 are between kPa and N, about 2 bar, 22 cm and 158 N.
 

@@ -26,7 +26,7 @@ the work.
 References
 ----------
 L. Zaccarian, A. R. Teel, "A common framework for anti-windup, bumpless transfer and reliable
-designs", Automatica 38 (2002), for the structure; seed 000, section 4.2.
+designs", Automatica 38 (2002), for the structure; yeh2010, section 4.2.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class BumplessGains:
 
 
 class BumplessState(NamedTuple):
-    """Memory of a controller with its compensator.
+    """Hysteresis of a controller with its compensator.
 
     Attributes
     ----------

@@ -1,10 +1,10 @@
 """Joint set-points for a wanted pose of the tool, found anew in each control period.
 
-Seed 002, section 2: of all joint angles that give a pose, those that minimise the weight (2.1),
-which keeps joints off their limits, or the sum of their squares. A period starts from the angles
-and multipliers of the period before, so that a few Newton iterations do; an episode starts from
-the sensed angles. A pose out of reach, or without a direction, leaves the set-points where they
-are, and is counted. A whole path is planned at once by
+fluidic_muscles, section 2: of all joint angles that give a pose, those that minimise the weight
+(2.1), which keeps joints off their limits, or the sum of their squares. A period starts from the
+angles and multipliers of the period before, so that a few Newton iterations do; an episode starts
+from the sensed angles. A pose out of reach, or without a direction, leaves the set-points where
+they are, and is counted. A whole path is planned at once by
 :func:`pam_envs.mechanics.redundancy.resolve`, which raises there.
 """
 
@@ -150,7 +150,7 @@ class Comparison:
 def compare(
     chain: SerialChain, poses: ArrayLike, limit: float = LIMIT, start: ArrayLike | None = None
 ) -> Comparison:
-    """Return both plans of a path of poses, shape (m, 6): Fig. 7 of seed 002.
+    """Return both plans of a path of poses, shape (m, 6): Fig. 7 of fluidic_muscles.
 
     Raises
     ------

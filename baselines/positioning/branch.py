@@ -9,7 +9,7 @@ and a slow ramp does after the dead band; sensor noise plays no part.
 What this logic cannot do: after a small reversal, wider than the dead band, it jumps from one
 branch of the *major* loop to the other, though the muscle has only entered a narrow inner loop.
 The set-point then jumps by up to the width of the major loop (1 bar), which is up to 3 mm. Only a
-memory of the extrema can tell how far the muscle has crossed (see
+hysteresis of the extrema can tell how far the muscle has crossed (see
 ``baselines.positioning.inverse``).
 """
 

@@ -1,8 +1,8 @@
 """Pressure for a contraction, from a measured table: the inverses a logic controller can hold.
 
-Seed 003 programs a proportional regulator with six cubics p(x), one for each load and direction
-(Equations 7 to 12). Here they stand exactly as printed, beside the same method done with care, and
-beside other curves through the same readings. Each inverse answers
+positioning2021 programs a proportional regulator with six cubics p(x), one for each load and
+direction (Equations 7 to 12). Here they stand exactly as printed, beside the same method done with
+care, and beside other curves through the same readings. Each inverse answers
 ``pressure(contraction, inflating, load)`` in SI, element by element over arrays.
 
 Loads between the measured ones: the answer lies on the straight line between the pressures of the

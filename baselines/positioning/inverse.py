@@ -1,8 +1,8 @@
 """Feed-forward through the exact inverse of the identified muscle.
 
-    reference, a lead ahead -> inverse static law -> inverse memory -> inverse regulator
+    reference, a lead ahead -> inverse static law -> inverse hysteresis -> inverse regulator
 
-The memory is not that of the *commanded* pressures but of the pressures that the nominal
+The hysteresis is not that of the *commanded* pressures but of the pressures that the nominal
 regulator makes of them (first-order lag, slew limit): a pressure that was commanded but not
 reached leaves no trace in the muscle. Its start is the simplest history that explains the first
 measurement of an episode; from then on nothing is measured.
@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 
 from baselines.core.controller import Answer, Array, Reader, answer, beginning, choose, reader
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
-from baselines.positioning.nominal import MemoryState, Nominal
+from baselines.positioning.nominal import HysteresisState, Nominal
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
@@ -49,13 +49,13 @@ class InverseState(NamedTuple):
         Nominal pressure [Pa], one dead time from now: all that is under way has arrived.
     drive : ndarray, shape (n_env,)
         Nominal effective pressure [Pa] then.
-    memory : tuple of ndarray, first axis n_env
-        Nominal memory then.
+    hysteresis : tuple of ndarray, first axis n_env
+        Nominal hysteresis then.
     """
 
     pressure: Array
     drive: Array
-    memory: MemoryState
+    hysteresis: HysteresisState
 
 
 def preview_weights(samples: int, spacing: float, ahead: float) -> Array:
@@ -137,14 +137,14 @@ class Inverse:
         if state is not None and not begin.any():
             return state
         contraction, pressure, load = measured[:3]
-        memory: Any = None
+        hysteresis: Any = None
         for muscle, rows in self.nominal.groups(load):
             part = muscle.explain(contraction[rows], pressure[rows])
-            memory = _placed(memory, part, rows, len(load))
+            hysteresis = _placed(hysteresis, part, rows, len(load))
         drive = np.empty(len(load))
         for muscle, rows in self.nominal.groups(load):
-            drive[rows] = muscle.felt(pressure[rows], _taken(memory, rows))[0]
-        return choose(begin, InverseState(pressure, drive, memory), state)
+            drive[rows] = muscle.felt(pressure[rows], _taken(hysteresis, rows))[0]
+        return choose(begin, InverseState(pressure, drive, hysteresis), state)
 
     def feed_forward(self, measured: Array, now: InverseState) -> Array:
         """Return the set-point [Pa], shape (n_env,), that the reference needs."""
@@ -160,8 +160,10 @@ class Inverse:
         wanted = np.empty_like(aims)
         for muscle, rows in self.nominal.groups(load):
             drive = muscle.drive_for(aims[:, rows]).ravel()
-            memory = tuple(np.concatenate([a] * len(aims)) for a in _taken(now.memory, rows))
-            wanted[:, rows] = muscle.pressure_for(drive, memory).reshape(len(aims), -1)
+            hysteresis = tuple(
+                np.concatenate([a] * len(aims)) for a in _taken(now.hysteresis, rows)
+            )
+            wanted[:, rows] = muscle.pressure_for(drive, hysteresis).reshape(len(aims), -1)
         travel = np.abs(wanted - now.pressure) / self.nominal.plant.regulator.slew_rate
         due = travel >= self.due[:, None]
         last = len(aims) - 1 - np.argmax(due[::-1], axis=0)
@@ -171,18 +173,18 @@ class Inverse:
         """Return the nominal muscle's state one control period on."""
         pressure = self.nominal.next_pressure(now.pressure, set_point)
         drive = np.empty(len(load))
-        memory: Any = None
+        hysteresis: Any = None
         for muscle, rows in self.nominal.groups(load):
-            drive[rows], part = muscle.felt(pressure[rows], _taken(now.memory, rows))
-            memory = _placed(memory, part, rows, len(load))
-        return InverseState(pressure, drive, memory)
+            drive[rows], part = muscle.felt(pressure[rows], _taken(now.hysteresis, rows))
+            hysteresis = _placed(hysteresis, part, rows, len(load))
+        return InverseState(pressure, drive, hysteresis)
 
 
-def _taken(memory: MemoryState, rows: Any) -> MemoryState:
-    return memory if isinstance(rows, slice) else tuple(a[rows] for a in memory)
+def _taken(hysteresis: HysteresisState, rows: Any) -> HysteresisState:
+    return hysteresis if isinstance(rows, slice) else tuple(a[rows] for a in hysteresis)
 
 
-def _placed(whole: Any, part: MemoryState, rows: Any, n: int) -> MemoryState:
+def _placed(whole: Any, part: HysteresisState, rows: Any, n: int) -> HysteresisState:
     if isinstance(rows, slice):
         return part
     if whole is None:

@@ -2,7 +2,7 @@
 
 The PID does not compare the contraction with the reference, which would have it fight the dead
 time, the slew limit and every early start. It compares the contraction with what the *nominal*
-muscle would do under the same commands: dead time, regulator, memory and static law, the lag of
+muscle would do under the same commands: dead time, regulator, hysteresis and static law, the lag of
 the mass counted as delay. While the model is right the PID rests, and the feed-forward acts alone;
 what it corrects is a wrong history, a wrong parameter or an unannounced load. (Two degrees of
 freedom with an internal model; K. J. Astrom, T. Hagglund, "Advanced PID Control", ISA 2006,

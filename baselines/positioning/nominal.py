@@ -2,7 +2,7 @@
 
 Everything here is computed from the nominal
 :class:`~pam_envs.plants.single_muscle.plant.SingleMuscle` alone. Rows may hang different loads:
-they are worked load by load, and what a load needs (the memory at that load, its inverse, the
+they are worked load by load, and what a load needs (the hysteresis at that load, its inverse, the
 static curve) is prepared once, when it is first met.
 """
 
@@ -24,40 +24,40 @@ from pam_envs.hysteresis.preisach import Preisach, PreisachState
 from pam_envs.mechanics.hanging_mass import GRAVITY
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
-MemoryState = tuple[NDArray[Any], ...]
+HysteresisState = tuple[NDArray[Any], ...]
 CURVE_POINTS = 1001
 """Points of the tabulated static curve; straight in between to 0.05 um."""
 
 
-class MemoryRows(Protocol):
-    """A memory on the stretched scale, one row an environment; states have the row first."""
+class HysteresisRows(Protocol):
+    """A hysteresis on the stretched scale, one row an environment; states have the row first."""
 
-    def initial(self, rows: int) -> MemoryState:
+    def initial(self, rows: int) -> HysteresisState:
         """Return the state of muscles that were never inflated."""
         ...
 
-    def forward(self, felt: Array, state: MemoryState) -> tuple[Array, MemoryState]:
+    def forward(self, felt: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
         """Return the output for an input, and the state it leaves."""
         ...
 
-    def inverse(self, wanted: Array, state: MemoryState) -> Array:
+    def inverse(self, wanted: Array, state: HysteresisState) -> Array:
         """Return the input that gives an output; the state stays."""
         ...
 
 
 @dataclass(frozen=True)
-class NoMemory:
+class NoHysteresis:
     """The output is the input."""
 
-    def initial(self, rows: int) -> MemoryState:
+    def initial(self, rows: int) -> HysteresisState:
         """Return no state."""
         return ()
 
-    def forward(self, felt: Array, state: MemoryState) -> tuple[Array, MemoryState]:
+    def forward(self, felt: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
         """Return the input."""
         return felt, state
 
-    def inverse(self, wanted: Array, state: MemoryState) -> Array:
+    def inverse(self, wanted: Array, state: HysteresisState) -> Array:
         """Return the output."""
         return wanted
 
@@ -89,18 +89,18 @@ class PlayRows:
     def _spring(self) -> float:
         return self.operator.inverse().spring
 
-    def initial(self, rows: int) -> MemoryState:
+    def initial(self, rows: int) -> HysteresisState:
         """Return plays at 0, shape (rows, n)."""
         return (self.operator.initial_state((rows,)),)
 
-    def forward(self, felt: Array, state: MemoryState) -> tuple[Array, MemoryState]:
+    def forward(self, felt: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
         """Advance the plays."""
         thresholds, weights, *_ = self._arrays
         x = felt[:, None]
         plays = np.maximum(x - thresholds, np.minimum(x + thresholds, state[0]))
         return self.operator.linear * felt + np.add.reduce(weights * plays, axis=1), (plays,)
 
-    def inverse(self, wanted: Array, state: MemoryState) -> Array:
+    def inverse(self, wanted: Array, state: HysteresisState) -> Array:
         """Return the input by the dual model, in the state that mirrors this one."""
         _, _, mirror, breaks, stiffnesses = self._arrays
         slips = np.add.reduce(mirror * state[0][:, None, :], axis=2)
@@ -115,26 +115,26 @@ class PreisachRows:
 
     operator: Preisach
 
-    def initial(self, rows: int) -> MemoryState:
+    def initial(self, rows: int) -> HysteresisState:
         """Return virgin stacks: extrema and outputs, shapes (rows, depth), and counts, (rows,)."""
         return _row_first(self.operator.initial_state((rows,)))
 
-    def forward(self, felt: Array, state: MemoryState) -> tuple[Array, MemoryState]:
+    def forward(self, felt: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
         """Advance the stacks."""
         output, after = self.operator.step(felt, _row_last(state))
         return output, _row_first(after)
 
-    def inverse(self, wanted: Array, state: MemoryState) -> Array:
+    def inverse(self, wanted: Array, state: HysteresisState) -> Array:
         """Return the input by the recursion over the stack."""
         return self.operator.inverse_step(wanted, _row_last(state))[0]
 
 
-def _row_first(state: PreisachState) -> MemoryState:
+def _row_first(state: PreisachState) -> HysteresisState:
     stack, sums, counts = state
     return stack.T, sums.T, counts
 
 
-def _row_last(state: MemoryState) -> PreisachState:
+def _row_last(state: HysteresisState) -> PreisachState:
     stack, sums, counts = state
     return PreisachState(np.ascontiguousarray(stack.T), np.ascontiguousarray(sums.T), counts)
 
@@ -147,11 +147,11 @@ class LoadedMuscle:
     load: float
 
     @cached_property
-    def memory(self) -> MemoryRows:
-        """The memory at this load."""
-        operator = self.plant.memory.at_load(self.load)
+    def hysteresis(self) -> HysteresisRows:
+        """The hysteresis at this load."""
+        operator = self.plant.hysteresis.at_load(self.load)
         if operator is None:
-            return NoMemory()
+            return NoHysteresis()
         return PlayRows(operator) if isinstance(operator, PlayOperator) else PreisachRows(operator)
 
     @cached_property
@@ -177,20 +177,20 @@ class LoadedMuscle:
         """Return the contraction [m] at rest under an effective pressure [Pa]."""
         return np.interp(drive, *self._curve)
 
-    def felt(self, drive: Array, state: MemoryState) -> tuple[Array, MemoryState]:
-        """Return the effective pressure [Pa] at a pressure [Pa], and the memory it leaves."""
-        law, full = self.plant.memory, self.plant.regulator.max_pressure
-        output, after = self.memory.forward(law.stretched(drive, full), state)
+    def felt(self, drive: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
+        """Return the effective pressure [Pa] at a pressure [Pa], and the hysteresis it leaves."""
+        law, full = self.plant.hysteresis, self.plant.regulator.max_pressure
+        output, after = self.hysteresis.forward(law.stretched(drive, full), state)
         return law.unstretched(output, full), after
 
-    def pressure_for(self, drive: Array, state: MemoryState) -> Array:
+    def pressure_for(self, drive: Array, state: HysteresisState) -> Array:
         """Return the pressure [Pa] that gives an effective pressure [Pa] after this history."""
-        law, full = self.plant.memory, self.plant.regulator.max_pressure
-        found = self.memory.inverse(law.stretched(drive, full), state)
+        law, full = self.plant.hysteresis, self.plant.regulator.max_pressure
+        found = self.hysteresis.inverse(law.stretched(drive, full), state)
         return law.unstretched(np.minimum(np.maximum(found, 0.0), full), full)
 
-    def explain(self, contraction: Array, pressure: Array) -> MemoryState:
-        """Return the memory of the simplest history that explains a first measurement.
+    def explain(self, contraction: Array, pressure: Array) -> HysteresisState:
+        """Return the hysteresis of the simplest history that explains a first measurement.
 
         That history is: from no pressure up to a peak, and down to the present pressure. The
         higher the peak, the more contraction is left; it is found by bisection. What is out of
@@ -205,8 +205,8 @@ class LoadedMuscle:
             low, high = np.where(more, middle, low), np.where(more, high, middle)
         return self._after(low, pressure)[1]
 
-    def _after(self, peak: Array, pressure: Array) -> tuple[Array, MemoryState]:
-        _, state = self.felt(peak, self.memory.initial(len(peak)))
+    def _after(self, peak: Array, pressure: Array) -> tuple[Array, HysteresisState]:
+        _, state = self.felt(peak, self.hysteresis.initial(len(peak)))
         return self.felt(pressure, state)
 
 

@@ -96,7 +96,7 @@ def simc(
 
 
 class PidState(NamedTuple):
-    """Memory of a PID, shapes (n_env,).
+    """Hysteresis of a PID, shapes (n_env,).
 
     Attributes
     ----------

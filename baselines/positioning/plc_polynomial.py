@@ -1,4 +1,4 @@
-"""Seed 003's own controller: six cubics in a programmable logic controller (Equations 7 to 12).
+"""positioning2021's own controller: six cubics in a programmable logic controller (Equations 7 to 12).
 
 Two versions, to be kept apart:
 

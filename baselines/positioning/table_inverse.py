@@ -1,9 +1,9 @@
 """Open-loop positioning with one pressure curve for each load and branch.
 
-The method of seed 003: the controller holds curves p(contraction), one for inflation and one for
-deflation at each load, and sends the regulator what the curve of the present branch says for the
-present reference (``baselines.positioning.branch`` decides which one). Nothing is measured after
-the start.
+The method of positioning2021: the controller holds curves p(contraction), one for inflation and
+one for deflation at each load, and sends the regulator what the curve of the present branch says
+for the present reference (``baselines.positioning.branch`` decides which one). Nothing is measured
+after the start.
 
 The curves here interpolate the readings (monotone piecewise cubics through the means), which has
 no fitting error; ``baselines.positioning.plc_polynomial`` uses the cubics that the paper programs.

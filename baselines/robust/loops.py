@@ -1,4 +1,4 @@
-"""The disturbance loops of joints as they were synthesised: H-infinity and mu, seed 002, section 4.
+"""The disturbance loops of joints as they were synthesised: H-infinity and mu, fluidic_muscles, section 4.
 
 The numbers come from ``joint_robust.json``, which :mod:`baselines.robust.synthesis` writes. Both
 loops act on the angle of the model less that of the joint, and were designed for poles at 23 rad/s.

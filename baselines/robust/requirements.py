@@ -1,8 +1,8 @@
 """What the disturbance loop of a joint must withstand, and how far a loop is from it.
 
-The nominal plant is ``G = 23^2 / (s + 23)^2`` (seed 002, section 4, Fig. 12). The hysteresis makes
-its gain uncertain, within the sector of Fig. 14; what is neglected at high frequencies is bounded
-as in Fig. 15; and the sensitivity is weighted:
+The nominal plant is ``G = 23^2 / (s + 23)^2`` (fluidic_muscles, section 4, Fig. 12). The
+hysteresis makes its gain uncertain, within the sector of Fig. 14; what is neglected at high
+frequencies is bounded as in Fig. 15; and the sensitivity is weighted:
 
     plants         G (1 + g delta + W_m Delta),    delta real, Delta complex, both within 1
     performance    |W_p S| <= 1 for all of them
@@ -44,7 +44,7 @@ class RobustDesign:
     Attributes
     ----------
     pole : float
-        Both poles of the nominal plant [rad/s] (seed 002, section 4).
+        Both poles of the nominal plant [rad/s] (fluidic_muscles, section 4).
     gain_spread : float
         ``g``; asked for: mu of 1 or less at 35 %.
     bandwidth : float

@@ -1,4 +1,4 @@
-"""Synthesis of the disturbance loops of joints, off line: seed 002, section 4.
+"""Synthesis of the disturbance loops of joints, off line: fluidic_muscles, section 4.
 
     python -m baselines.robust.synthesis          # needs the extra "synthesis": control, slycot
 

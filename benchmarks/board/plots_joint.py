@@ -1,4 +1,4 @@
-"""The picture of a step and of the open-loop inverse, beside seed 002's Fig. 10 and 16."""
+"""The picture of a step and of the open-loop inverse, beside fluidic_muscles's Fig. 10 and 16."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _loops(ax: Any) -> None:
     model = joint_model(joint)
     for told, label, colour in (
         (model.narrowed(0.0), "straight line", "#009e73"),
-        (model, "inverse of the identified memory", "#d55e00"),
+        (model, "inverse of the identified hysteresis", "#d55e00"),
     ):
         wanted, reached = loop_path(joint, told, STEP)
         ax.plot(wanted / DEGREE, reached / DEGREE, color=colour, label=label)

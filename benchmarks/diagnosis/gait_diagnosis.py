@@ -1,6 +1,6 @@
 """What the orthosis' estimate of the knee torque misses, found by the diagnosis' own comparison.
 
-Eq. (1) of seed 000 takes the knee torque from the vertical ground force, its point of attack and
+Eq. (1) of yeh2010 takes the knee torque from the vertical ground force, its point of attack and
 the lean of the shank. :func:`diagnose` sets it beside the knee torque that a gait laboratory
 measures, refits what one may have measured wrongly with a tape (the shank's length), and lets
 rival terms compete on strides that no fit has seen, by the search and the rule that muscles are

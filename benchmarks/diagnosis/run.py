@@ -38,7 +38,7 @@ LIBRARY = (
     *(f"hysteresis/{name}.py" for name in ("elements", "everett", "maxwell_slip", "preisach")),
     *("hysteresis/checks.py", "hysteresis/extrema.py", "mechanics/hanging_mass.py"),
     *("muscle/effective_area.py", "pneumatics/regulator.py", "sensing/sensor.py"),
-    *(f"plants/{name}.py" for name in ("memory", "plant", "replay", "stepping", "tiles")),
+    *(f"plants/{name}.py" for name in ("hysteresis", "plant", "replay", "stepping", "tiles")),
     "plants/single_muscle.py",
     *(f"plants/single_muscle_{name}.py" for name in ("effects", "kernels", "rows")),
 )

@@ -21,7 +21,7 @@ from benchmarks.papers.knee import BEFORE, UNKNOWN
 
 Array = NDArray[np.float64]
 
-SOURCE = "seed 001"
+SOURCE = "chakarov2018"
 FULL = 6e5
 """Highest pressure [Pa]."""
 DEGREES = (0.0, 60.0, 120.0)
@@ -67,7 +67,7 @@ def bounded(name: str, where: str, unit: str, ours: float, text: str, **bounds: 
 
 
 def orthosis(share: float = 0.28, **changes: float) -> Any:
-    """Return the orthosis without memory whose force ends at a share of the nominal length."""
+    """Return the orthosis without hysteresis whose force ends at a share of the nominal length."""
     from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 
     ends = {f"bundle_{b}__largest_contraction": share for b in "ab"}
@@ -219,7 +219,7 @@ def hysteresis() -> list[Figure]:
     for kind in ("maxwell_slip", "preisach"):
         plant = ElbowOrthosis.paper(kind)  # type: ignore[arg-type]
         for pressure in (0.0, 5e5):
-            text = note("an input (loop)", f"memory {kind}, whole stroke of the orthosis")
+            text = note("an input (loop)", f"hysteresis {kind}, whole stroke of the orthosis")
             name = f"hysteresis at {1e-3 * pressure:g} kPa"
             ours = 100.0 * loop_share(plant, pressure)
             lines.append(Figure(name, where, "%", 7.5, ours, None, text))
@@ -231,7 +231,7 @@ def loop_share(plant: Any, pressure: float) -> float:
     up = np.linspace(*plant.angle_range, 201)
     q = np.concatenate([up, up[::-1], up, up[::-1]])
     travel = plant.pulley.travel(q)
-    lag = travel - plant.memory.operator.simulate(travel)[0]
+    lag = travel - plant.hysteresis.operator.simulate(travel)[0]
     muscles = plant.bundle_b
     shape = muscles.shape(plant.pulley.contractions(q)[1]) - plant.friction(lag)[1]
     force = (muscles.factor(pressure) * shape)[402:]
@@ -241,9 +241,9 @@ def loop_share(plant: Any, pressure: float) -> float:
 def small_motions() -> list[Figure]:
     """Stiffness over a degree, where the threads stick, beside that of the law."""
     where, lines = f"{SOURCE}, Eq. (22)", list[Figure]()
-    text = note("predicted", "from the angle of the last turn", "the law's is with no memory")
+    text = note("predicted", "from the angle of the last turn", "the law's is with no hysteresis")
     for kind in ("none", "maxwell_slip", "preisach"):
-        name = f"stiffness over a degree at 200 kPa and 57 degrees, memory {kind}"
+        name = f"stiffness over a degree at 200 kPa and 57 degrees, hysteresis {kind}"
         ours = stiffness_of_a_degree(kind, 2e5, np.radians(57.0))
         lines.append(bounded(name, where, "N m/rad", ours, text))
     return lines
@@ -255,7 +255,7 @@ def stiffness_of_a_degree(kind: Any, pressure: float, angle: float) -> float:
     Parameters
     ----------
     kind : {"none", "maxwell_slip", "preisach"}
-        Memory.
+        Hysteresis.
     pressure : float
         In both bundles [Pa].
     angle : float
@@ -265,7 +265,7 @@ def stiffness_of_a_degree(kind: Any, pressure: float, angle: float) -> float:
 
     plant = ElbowOrthosis.paper(kind)
     q = np.append(np.linspace(angle - 0.5, angle, 201), angle - np.radians(1.0))
-    travel, operator = plant.pulley.travel(q), plant.memory.operator
+    travel, operator = plant.pulley.travel(q), plant.hysteresis.operator
     lag = travel - operator.simulate(travel)[0] if operator is not None else 0.0 * q
     taken, shapes = plant.friction(lag), plant.geometry(q)[:2]
     factors = plant.coefficients(pressure, pressure)

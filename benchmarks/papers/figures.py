@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-SEED = "seed 003"
+SEED = "positioning2021"
 MM, BAR = 1e3, 1e-5
 
 WIDTHS: dict[float, tuple[float, float]] = {0.0: (3.29, 3.5), 2.55: (2.82, 4.5), 4.55: (2.40, 3.5)}
-"""Load [kg]: largest loop width [mm] and the pressure of it [bar] (seed 003, section 4)."""
+"""Load [kg]: largest loop width [mm] and the pressure of it [bar] (positioning2021, section 4)."""
 
 SIMULATED = 0.3
 """Tolerance [mm] of an identified plant's loop width where the measured loop is widest."""

@@ -1,4 +1,4 @@
-"""Figures of the joint's control, seed 002: PI, robustness, memory, inverse, sines, disturbances.
+"""Figures of the joint's control, fluidic_muscles: PI, robustness, hysteresis, inverse, sines, disturbances.
 
 The paper prints few numbers of its control. What is expected here was computed beforehand, from the
 paper's equations, by another program. The figures of the PI are judged within 1 %, all others that
@@ -16,8 +16,8 @@ from benchmarks.papers.figures import Figure
 
 Array = NDArray[np.float64]
 
-SOURCE = "seed 002"
-CONTROL, MEMORY = f"{SOURCE}, section 4", f"{SOURCE}, section 3"
+SOURCE = "fluidic_muscles"
+CONTROL, HYSTERESIS = f"{SOURCE}, section 4", f"{SOURCE}, section 3"
 BEFORE = "not in the paper: computed beforehand by another program"
 UNKNOWN = float("nan")
 """What the paper does not print."""
@@ -130,8 +130,8 @@ def loop_lines() -> list[Figure]:
     return figures
 
 
-def memory_lines() -> list[Figure]:
-    """Verdicts on the memory of joints and of one muscle, and how well an inverse undoes it."""
+def hysteresis_lines() -> list[Figure]:
+    """Verdicts on the hysteresis of joints and of one muscle, and how well an inverse undoes it."""
     from benchmarks.papers.joint_inverses import inverse_error, width_ratio
     from benchmarks.papers.joint_verdicts import verdicts
     from pam_envs.identification.joint_forc import CONGRUENCY, SYMMETRY
@@ -142,9 +142,9 @@ def memory_lines() -> list[Figure]:
         single = name.startswith("one ")
         bound = {"at_least": SYMMETRY} if single else {"at_most": SYMMETRY}
         figures += [
-            Figure(f"{name}: error of symmetry", MEMORY, "1", UNKNOWN, found.symmetry, None,
+            Figure(f"{name}: error of symmetry", HYSTERESIS, "1", UNKNOWN, found.symmetry, None,
                    found.verdict, **bound),
-            Figure(f"{name}: error of congruency", MEMORY, "1", UNKNOWN, found.congruency, None,
+            Figure(f"{name}: error of congruency", HYSTERESIS, "1", UNKNOWN, found.congruency, None,
                    at_most=CONGRUENCY),
         ]  # fmt: skip
     where = f"{SOURCE}, Fig. 10"
@@ -156,21 +156,21 @@ def memory_lines() -> list[Figure]:
             figures.append(Figure(name, where, "", UNKNOWN, found, None, at_least=5.0))
     exact, series = inverse_error()
     recursion = "largest error over the range, 60 random histories"
-    text = f"{recursion}; {BEFORE}, for another mildly inhomogeneous memory"
+    text = f"{recursion}; {BEFORE}, for another mildly inhomogeneous hysteresis"
     return [
         *figures,
-        Figure("inverse by recursion", MEMORY, "1", 0.0, exact, 1e-12, recursion),
-        near("inverse (3.5) as printed", MEMORY, "%", 1.0, 100.0 * series, None, text),
+        Figure("inverse by recursion", HYSTERESIS, "1", 0.0, exact, 1e-12, recursion),
+        near("inverse (3.5) as printed", HYSTERESIS, "%", 1.0, 100.0 * series, None, text),
     ]
 
 
 LOOP_ALONE = (
-    "the loop alone, without memory and sampling, takes 0.31 s: what the earlier one was weighted"
+    "the loop alone, without hysteresis and sampling, takes 0.31 s: what the earlier one was weighted"
     " with is not known"
 )
 HELD = "the reference is held for 10 ms, 5 ms late in the mean; at 1 ms it is within 5 %"
-OTHER_MEMORY = (
-    "without memory the PI is 19.5 % off: what it loses beyond is the memory's, and that of the"
+OTHER_HYSTERESIS = (
+    "without hysteresis the PI is 19.5 % off: what it loses beyond is the hysteresis's, and that of the"
     " other program is not known"
 )
 
@@ -199,11 +199,11 @@ def sine_lines() -> list[Figure]:
             if name == "joint_mfc_mu":
                 text += f"; to the model's output {to_model:.4f} deg"
             title = f"sine of 0.5 Hz, 20 deg, {1e3 * period:g} ms, {name}"
-            why = HELD if name == "joint_mfc_mu" else OTHER_MEMORY
+            why = HELD if name == "joint_mfc_mu" else OTHER_HYSTERESIS
             figures.append(near(title, CONTROL, "%", expected, error, note=text, why=why))
             found.append(error)
         title = f"sine, {1e3 * period:g} ms: error of the PI less that of model-following"
-        why = f"{OTHER_MEMORY}; and {HELD}" if period == 0.01 else OTHER_MEMORY
+        why = f"{OTHER_HYSTERESIS}; and {HELD}" if period == 0.01 else OTHER_HYSTERESIS
         figures.append(near(title, CONTROL, "% points", 3.2, found[1] - found[0], why=why))
     return figures
 
@@ -212,7 +212,7 @@ GROUPS: tuple[Callable[[], list[Figure]], ...] = (
     pi_figures,
     robust_figures,
     loop_lines,
-    memory_lines,
+    hysteresis_lines,
     disturbance_lines,
     sine_lines,
 )

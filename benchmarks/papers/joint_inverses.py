@@ -1,4 +1,4 @@
-"""How well inverses of a joint's memory undo it: seed 002, section 3."""
+"""How well inverses of a joint's hysteresis undo it: fluidic_muscles, section 3."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def loop_path(
     plant : object
         With ``rest_angles``.
     model : JointModel
-        Its memory is inverted for the set-points.
+        Its hysteresis is inverted for the set-points.
     amplitude : float
         Of the wanted angles [rad].
     """
@@ -62,7 +62,7 @@ def width_ratio(plant: Any, amplitude: float = 10.0 * DEGREE) -> float:
 
 
 def inhomogeneous() -> Preisach:
-    """Return a memory whose relays' density varies by 30 % over the range, starting low."""
+    """Return a hysteresis whose relays' density varies by 30 % over the range, starting low."""
 
     def density(a: Array, b: Array) -> Array:
         return np.asarray((1.0 + 0.3 * np.cos(0.5 * np.pi * (a + b) / RANGE)) * np.exp(-(a - b)))

@@ -39,7 +39,7 @@ class LoopFigures:
     peak : float
         Largest ``|S|``.
     step : StepFigures
-        Of 10 degrees after a turn, with the assumed memory.
+        Of 10 degrees after a turn, with the assumed hysteresis.
     """
 
     name: str

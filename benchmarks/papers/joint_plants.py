@@ -1,9 +1,9 @@
-"""Steps on the plants of ``PAM/AntagonisticJoint-v0``, beside those on the studies' own memory.
+"""Steps on the plants of ``PAM/AntagonisticJoint-v0``, beside those on the studies' own hysteresis.
 
-How much faster model-following is than the PI alone depends on the memory, on the size of the step
-and on whether a turn lies before it; so each of these is gone through. The plants are those of the
-environment, without noise: *reduced* is the paper's, with the memory that was identified on the
-muscles; *paper* is the joint of two muscles that carries its link.
+How much faster model-following is than the PI alone depends on the hysteresis, on the size of the
+step and on whether a turn lies before it; so each of these is gone through. The plants are those
+of the environment, without noise: *reduced* is the paper's, with the hysteresis that was
+identified on the muscles; *paper* is the joint of two muscles that carries its link.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Figures of the joint's step, seed 002, Fig. 16: with hysteresis, controller beside controller."""
+"""Figures of the joint's step, fluidic_muscles, Fig. 16: with hysteresis, controller beside controller."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ EXPECTED = {
 """Rise [s] of a step of 10 degrees, computed beforehand with loops of 10 %."""
 OTHERWISE = {"joint_pid": 0.213, "joint_pi_slow": 0.437}
 """The same, of controllers that were tuned by rules that are not known."""
-MEMORY = "it depends on the memory, of which only the width of its loops is known"
+HYSTERESIS = "it depends on the hysteresis, of which only the width of its loops is known"
 GAIN = (
-    "the memory slows the PI only by the gain after a turn, which is low for a small step and nears"
+    "the hysteresis slows the PI only by the gain after a turn, which is low for a small step and nears"
     " 1 as the step grows; on the first rise there is no turn"
 )
 
@@ -40,7 +40,7 @@ def rise_lines() -> list[Figure]:
         if name in EXPECTED:
             figures.append(
                 near(title, WHERE, "s", EXPECTED[name], found.rise, note=f"{text}; {BEFORE}",
-                     why=MEMORY)
+                     why=HYSTERESIS)
             )  # fmt: skip
             continue
         known = f"; {BEFORE}, tuned otherwise" if name in OTHERWISE else ""
@@ -52,7 +52,7 @@ def rise_lines() -> list[Figure]:
 
 
 def bound_lines() -> list[Figure]:
-    """Bounds on a step of 10 degrees after a turn, on the memory of the studies."""
+    """Bounds on a step of 10 degrees after a turn, on the hysteresis of the studies."""
     from benchmarks.papers.joint_studies import Setting, step
 
     best, same = step(BEST), step("joint_pi")

@@ -1,9 +1,9 @@
-"""Studies of the joint's control on the paper's reduced plant: seed 002, sections 3.2 and 4.
+"""Studies of the joint's control on the paper's reduced plant: fluidic_muscles, sections 3.2 and 4.
 
 The plant is the paper's: a symmetric Preisach operator from set-point to ``w``, then ``23^2 / (s +
 23)^2``. The controllers are those of the catalogue, at 10 ms; the angle is looked at every 1 ms.
-The paper prints no memory; the assumed one has loops whose half-gap is 10 % of their amplitude at
-10 and at 30 degrees, gain 1 between the tips of the largest loop, and 0.65 after a turn, the low
+The paper prints no hysteresis; the assumed one has loops whose half-gap is 10 % of their amplitude
+at 10 and at 30 degrees, gain 1 between the tips of the largest loop, and 0.65 after a turn, the low
 end of the uncertain gain. A step is made after a turn, as nearly all are: up, back, and up again.
 """
 
@@ -37,13 +37,13 @@ AFTER_TURN, TOTAL = 0.65, 1.1
 
 
 @cache
-def assumed_memory(width: float = 1.0) -> Preisach:
-    """Return the memory of the reduced plant, from set-point [rad] to ``w`` [rad].
+def assumed_hysteresis(width: float = 1.0) -> Preisach:
+    """Return the hysteresis of the reduced plant, from set-point [rad] to ``w`` [rad].
 
     Parameters
     ----------
     width : float
-        Of the loops over the assumed ones; 0: no memory.
+        Of the loops over the assumed ones; 0: no hysteresis.
     """
     weights = ((TOTAL - AFTER_TURN) / len(THRESHOLDS),) * len(THRESHOLDS)
     plays = PlayOperator(tuple(DEGREE * r for r in THRESHOLDS), weights, AFTER_TURN)
@@ -58,7 +58,7 @@ class ReducedRig:
     Attributes
     ----------
     width : float
-        Of the memory's loops over the assumed ones.
+        Of the hysteresis's loops over the assumed ones.
     """
 
     width: float = 1.0
@@ -67,9 +67,9 @@ class ReducedRig:
     angle_range: tuple[float, float] = (-RANGE, RANGE)
 
     @cached_property
-    def memory(self) -> Preisach:
-        """The memory."""
-        return assumed_memory(self.width)
+    def hysteresis(self) -> Preisach:
+        """The hysteresis."""
+        return assumed_hysteresis(self.width)
 
     def digest(self) -> str:
         """Return what tells this plant from others."""
@@ -77,7 +77,7 @@ class ReducedRig:
 
     def rest_angles(self, commands: Array) -> Array:
         """Return the angles at rest [rad] after each of a series of set-points."""
-        return self.memory.simulate(commands)[0]
+        return self.hysteresis.simulate(commands)[0]
 
 
 SIGNALS = Signals(
@@ -123,9 +123,9 @@ def run(
     disturbance : callable, optional
         Of the angle [rad], from times [s].
     """
-    motion, memory = nominal_motion(POLE).discrete(FINE, "zoh"), rig.memory
+    motion, hysteresis = nominal_motion(POLE).discrete(FINE, "zoh"), rig.hysteresis
     fine = round(rig.control_period / FINE)
-    x, held, state = motion.initial_state(), memory.initial_state(), None
+    x, held, state = motion.initial_state(), hysteresis.initial_state(), None
     time = (1.0 + np.arange(fine * len(reference))) * FINE
     off = np.zeros(len(time) + 1) if disturbance is None else disturbance(np.append(0.0, time))
     angles, commands, models = np.zeros(len(time)), np.zeros(len(reference)), []
@@ -133,7 +133,7 @@ def run(
     for k, wanted in enumerate(reference):
         action, state = controller.predict(np.array([angle, command, wanted]), state)
         command = float(action[0])
-        w, held = memory.step(command, held)
+        w, held = hysteresis.step(command, held)
         for i in range(fine * k, fine * (k + 1)):
             x = motion.advance(float(w), x)
             angles[i] = motion.c @ x + off[i + 1]
@@ -204,7 +204,7 @@ class Setting:
     Attributes
     ----------
     width : float
-        Of the memory's loops over the assumed ones; 0: no memory.
+        Of the hysteresis's loops over the assumed ones; 0: no hysteresis.
     size : float
         Of the step [rad].
     period : float
@@ -249,7 +249,7 @@ def rejection(name: str, width: float = 1.0, size: float = 2.0 * DEGREE) -> floa
     name : str
         Of the controller.
     width : float
-        Of the memory's loops over the assumed ones.
+        Of the hysteresis's loops over the assumed ones.
     size : float
         [rad].
     """
@@ -299,8 +299,8 @@ def tracking_error(
 
 
 def half_gap(amplitude: float) -> float:
-    """Return half the largest width of the assumed memory's loop, over its amplitude [rad]."""
+    """Return half the largest width of the assumed hysteresis's loop, over its amplitude [rad]."""
     up = np.linspace(-amplitude, amplitude, 201)
     path = np.concatenate([np.linspace(0.0, amplitude, 101), up[::-1], up])
-    output = assumed_memory().simulate(path)[0]
+    output = assumed_hysteresis().simulate(path)[0]
     return 0.5 * float(np.max(output[101:302][::-1] - output[302:])) / amplitude

@@ -1,10 +1,10 @@
-"""What symmetry and congruency are of joints, and of one muscle alone: seed 002, section 3."""
+"""What symmetry and congruency are of joints, and of one muscle alone: fluidic_muscles, section 3."""
 
 from __future__ import annotations
 
 from functools import cache
 
-from pam_envs.identification.joint_forc import JointMemory, measure_joint, measure_memory
+from pam_envs.identification.joint_forc import JointHysteresis, measure_hysteresis, measure_joint
 from pam_envs.identification.joint_muscle import HangingMuscle
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
@@ -13,7 +13,7 @@ PRESSURES = (0.5e5, 6.5e5)
 
 
 @cache
-def verdicts() -> dict[str, JointMemory]:
+def verdicts() -> dict[str, JointHysteresis]:
     """Return what is found on the simulated rigs: two joints, and one of their muscles."""
     joints = {
         "paper joint": AntagonisticJoint.paper(),
@@ -24,5 +24,5 @@ def verdicts() -> dict[str, JointMemory]:
         for name, joint in joints.items()
     }
     muscle = HangingMuscle(joints["paper joint"])
-    found["one DMSP-10 under 100 N"] = measure_memory(muscle.rest_contractions, *PRESSURES)
+    found["one DMSP-10 under 100 N"] = measure_hysteresis(muscle.rest_contractions, *PRESSURES)
     return found

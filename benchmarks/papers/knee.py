@@ -1,7 +1,7 @@
 """Figures of the orthosis paper that need no leg: loop shape, hysteresis inverse, tracking.
 
 Two presets of the rig, because the printed figures fit no single one: *static* has a lag of
-0.0466 s behind the memory (the printed plant's 0.3 s would alone give 13 % where 2.07 % is
+0.0466 s behind the hysteresis (the printed plant's 0.3 s would alone give 13 % where 2.07 % is
 reported), *dynamic* the printed plant over its static gain. An error is a root mean square over the
 half-range of the reference, the first 2 s dropped as the paper's transient.
 """
@@ -19,7 +19,7 @@ from benchmarks.papers.figures import Figure
 
 Array = NDArray[np.float64]
 
-SOURCE = "seed 000"
+SOURCE = "yeh2010"
 PERIOD = 0.01
 """Control period [s]."""
 DROPPED, FREQUENCY = 2.0, 0.1
@@ -61,13 +61,13 @@ def stiffness_tracking(friction: float = FRICTION, lag: float = LAG) -> tuple[fl
     """
     from pam_envs.hysteresis.modified_maxwell_slip import even_model
 
-    memory, step = even_model(FULL_PRESSURE, FULL_STIFFNESS, friction), 1e-3
+    hysteresis, step = even_model(FULL_PRESSURE, FULL_STIFFNESS, friction), 1e-3
     time = np.arange(round((DROPPED + 2.0 / FREQUENCY) / step)) * step
     wanted = 3600.0 - 3500.0 * np.cos(2.0 * np.pi * FREQUENCY * time)
     line = wanted * (FULL_PRESSURE / FULL_STIFFNESS)
     errors = []
-    for pressure in (memory.inverse_simulate(wanted)[0], line):
-        stiffness = _lagged(memory.simulate(pressure)[0], lag, step)
+    for pressure in (hysteresis.inverse_simulate(wanted)[0], line):
+        stiffness = _lagged(hysteresis.simulate(pressure)[0], lag, step)
         errors.append(half_range_error(stiffness, wanted, step))
     return errors[0], errors[1]
 
@@ -107,7 +107,7 @@ def _tracked(friction: float, feed_forward: str) -> float:
     from baselines.knee.published import NOMINAL_PRESSURE, printed_controller, printed_plant
     from pam_envs.hysteresis.modified_maxwell_slip import even_model
 
-    memory = even_model(FULL_PRESSURE, FULL_STIFFNESS, friction)
+    hysteresis = even_model(FULL_PRESSURE, FULL_STIFFNESS, friction)
     plant = printed_plant()
     rig = plant.discrete(PERIOD, "zoh")
     controller = printed_controller().discrete(PERIOD)
@@ -115,18 +115,18 @@ def _tracked(friction: float, feed_forward: str) -> float:
     wanted = 205.0 - 125.0 * np.cos(2.0 * np.pi * FREQUENCY * time)
     ahead = {
         "none": np.full_like(time, NOMINAL_PRESSURE),
-        "inverse": memory.inverse_simulate(wanted / DELTA_LENGTH)[0],
+        "inverse": hysteresis.inverse_simulate(wanted / DELTA_LENGTH)[0],
         "line": wanted * (FULL_PRESSURE / (FULL_STIFFNESS * DELTA_LENGTH)),
     }[feed_forward]
     state = controller.initial_state()
-    _, slips = memory.inverse_step(START_TENSION / DELTA_LENGTH, memory.initial_state())
+    _, slips = hysteresis.inverse_step(START_TENSION / DELTA_LENGTH, hysteresis.initial_state())
     inside = rig.rest_state(START_TENSION / plant.static_gain)
     measured = np.empty_like(time)
     for k, reference in enumerate(wanted):
         measured[k] = float(inside @ rig.c)
         command, state = controller.step(reference - measured[k], state)
         pressure = min(max(float(ahead[k]) + 1e3 * float(command), 0.0), FULL_PRESSURE)
-        stiffness, slips = memory.step(pressure, slips)
+        stiffness, slips = hysteresis.step(pressure, slips)
         inside = rig.advance(stiffness * DELTA_LENGTH / plant.static_gain, inside)
     return half_range_error(measured, wanted, PERIOD)
 
@@ -252,12 +252,12 @@ def slip_programme() -> list[Figure]:
         printed_programme,
     )
 
-    memory = even_model(FULL_PRESSURE, FULL_STIFFNESS, FRICTION)
+    hysteresis = even_model(FULL_PRESSURE, FULL_STIFFNESS, FRICTION)
 
     def loop(segments: int) -> tuple[Array, Array]:
-        up = np.linspace(0.0, segments * memory.segment, 40 * segments + 1)
+        up = np.linspace(0.0, segments * hysteresis.segment, 40 * segments + 1)
         path = np.concatenate([up, up[-2::-1]])
-        return memory.inverse_simulate(path)[0], path
+        return hysteresis.inverse_simulate(path)[0], path
 
     where, lines = f"{SOURCE}, section 3.1", list[Figure]()
     tag = ("predicted", "preset a known model, N = 10, equal break pressures")

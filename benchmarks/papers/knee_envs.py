@@ -1,7 +1,7 @@
 """Figures of the orthosis paper as the environments give them, with the paper's control system.
 
 Beside :mod:`benchmarks.papers.knee`, which needs no environment: there the printed transfer
-functions act on the memory alone, here the plant has everything that it has for any controller.
+functions act on the hysteresis alone, here the plant has everything that it has for any controller.
 """
 
 from __future__ import annotations

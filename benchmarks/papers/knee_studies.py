@@ -1,4 +1,4 @@
-"""Runs of the knee's environments that compare with what seed 000 reports.
+"""Runs of the knee's environments that compare with what yeh2010 reports.
 
 An error is a root mean square over the half-range of the reference, the first 2 s dropped as the
 paper's transient. Sensors show the truth, and the controllers know the plant.
@@ -28,7 +28,7 @@ CYCLES = 2.0
 FREQUENCY = 0.1
 """[Hz]."""
 PRESET_FRICTION = 0.5e5
-"""Pressure [Pa] that all elements of the preset's memory hold together: its loop width."""
+"""Pressure [Pa] that all elements of the preset's hysteresis hold together: its loop width."""
 WIDTHS = (0.0, 0.25e5, 0.5e5)
 """Loop widths [Pa] of the ablation."""
 IDS: dict[Activity, str] = {
@@ -97,7 +97,7 @@ def tension_errors(
     Parameters
     ----------
     width : float
-        Pressure [Pa] that all elements of the memory hold together; the preset's is 0.5 bar.
+        Pressure [Pa] that all elements of the hysteresis hold together; the preset's is 0.5 bar.
     feedback : {"printed", "designed"}
         Controller (11), or our design on the identified plant.
     mounting : {"rig", "no_load"}
@@ -106,7 +106,7 @@ def tension_errors(
         The published frequency response, or the regulator's lag.
     """
     preset = {"rig": KneeOrthosis.rig, "no_load": KneeOrthosis.no_load}[mounting]
-    plant = preset(dynamics=dynamics, memory__width=width / PRESET_FRICTION).without_noise()
+    plant = preset(dynamics=dynamics, hysteresis__width=width / PRESET_FRICTION).without_noise()
     kinds = ("nominal", "line", "inverse")
     return TensionErrors(*(_tension_error(plant, feedback, kind) for kind in kinds))
 

@@ -1,4 +1,4 @@
-"""Figures of the manipulator paper on the planning of paths (seed 002, section 2).
+"""Figures of the manipulator paper on the planning of paths (fluidic_muscles, section 2).
 
 The paper shows two plans of one path, without numbers but the limit of 30 degrees. The numbers
 here were computed beforehand by another program, for three paths, of which one is known by its
@@ -24,7 +24,7 @@ from pam_envs.references.path import PATHS, POINTS, PathEnds, draw_ends, joint_l
 
 Array = NDArray[np.float64]
 
-SOURCE = "seed 002, section 2"
+SOURCE = "fluidic_muscles, section 2"
 BEFORE = "not in the paper: computed beforehand by another program"
 KNOWN, OURS = "predicted; ends known", "calibrated: ends drawn for these peaks"
 UNKNOWN = float("nan")

@@ -1,9 +1,9 @@
 """The measured contraction of one muscle over pressure cycles, checked as it is read.
 
-375 readings of a Festo MAS-10-N-100 (seed 003, Tables 3 to 5): three hanging loads, five cycles
-each, one cycle 0 to 6 bar and back in steps of 0.5 bar, a minute of rest before each reading.
-A muscle remembers, so a reading means something only with those before it: the arrays keep the
-order in which a cycle was gone through.
+375 readings of a Festo MAS-10-N-100 (positioning2021, Tables 3 to 5): three hanging loads, five
+cycles each, one cycle 0 to 6 bar and back in steps of 0.5 bar, a minute of rest before each
+reading. A muscle remembers, so a reading means something only with those before it: the arrays
+keep the order in which a cycle was gone through.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Rate-independent memory as a library of its own: operators, inverses, maps.
+"""Rate-independent hysteresis as a library of its own: operators, inverses, maps.
 
 Every operator is a frozen value with ``initial_state``, ``simulate`` (one history), ``step`` (rows
 of a batch) and ``scaled``; what it remembers is handed in and out. The kernels ``play`` and

@@ -1,4 +1,4 @@
-"""Checks of what a user hands to a memory: every message names value, bound and remedy."""
+"""Checks of what a user hands to a hysteresis: every message names value, bound and remedy."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@
 ``alpha`` and down at or above ``beta``. A falling input changes it by ``E(beta, alpha) =
 -E(alpha, beta)``, so the table is antisymmetric. It lives on a uniform grid and is interpolated
 bilinearly, which spreads the relays of a cell evenly over the cell; relays of a cell on the
-diagonal are free of memory (their loops are narrower than the grid can tell).
+diagonal are free of hysteresis (their loops are narrower than the grid can tell).
 
 There is no factor one half here: a relay goes from 0 to its weight.
 
@@ -69,7 +69,7 @@ def weights_from_table(table: ArrayLike) -> Array:
 
 
 def line_table(slope: float, levels: Array) -> Array:
-    """Return the table of a line without memory: ``slope * (alpha - beta)``."""
+    """Return the table of a line without hysteresis: ``slope * (alpha - beta)``."""
     return slope * (levels[:, None] - levels[None, :])
 
 

@@ -1,4 +1,4 @@
-"""The stack of dominant extrema: a Preisach operator's memory, and its recursive inverse.
+"""The stack of dominant extrema: a Preisach operator's hysteresis, and its recursive inverse.
 
 Of all that an input did, the operator keeps the alternating extrema that no later, larger
 excursion has wiped out, each with the output reached there. In the rows of a lane
@@ -89,7 +89,7 @@ def preisach_step(
     x: float, stack: Any, sums: Any, count: Any, lane: int, table: Any, low: float,
     inverse_cell: float,
 ) -> float:  # fmt: skip
-    """Advance the memory of one lane to the input ``x`` and return the output.
+    """Advance the hysteresis of one lane to the input ``x`` and return the output.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def preisach_peek(
     x: float, stack: Any, sums: Any, count: Any, lane: int, table: Any, low: float,
     inverse_cell: float,
 ) -> float:  # fmt: skip
-    """Return the output that :func:`preisach_step` would give, and leave the memory alone."""
+    """Return the output that :func:`preisach_step` would give, and leave the hysteresis alone."""
     x = _held(x, low, low + (len(table) - 1) / inverse_cell)
     n = count[lane]
     last, start = stack[n - 1][lane], stack[0][lane]
@@ -216,7 +216,7 @@ def preisach_inverse(
     y: float, stack: Any, sums: Any, count: Any, lane: int, table: Any, low: float,
     inverse_cell: float,
 ) -> float:  # fmt: skip
-    """Return the input that takes the output of one lane to ``y``; the memory is left alone.
+    """Return the input that takes the output of one lane to ``y``; the hysteresis is left alone.
 
     The recursion ``E(u_next, u_turn) = y - y_turn`` from the turn that ``y`` leaves standing:
     exact, other than a series over an inverted Everett map, which holds only for relay densities
@@ -263,7 +263,7 @@ def invert_rows(
     y: Array, stack: Any, sums: Any, count: Any, table: Any, low: float, inverse_cell: float,
     x: Array,
 ) -> None:  # fmt: skip
-    """Write into ``x`` the input of every lane that gives ``y``, and advance the memories."""
+    """Write into ``x`` the input of every lane that gives ``y``, and advance the hysteresis models."""
     for lane in range(len(y)):
         x[lane] = preisach_inverse(y[lane], stack, sums, count, lane, table, low, inverse_cell)
         preisach_step(x[lane], stack, sums, count, lane, table, low, inverse_cell)

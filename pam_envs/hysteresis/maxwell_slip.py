@@ -1,4 +1,4 @@
-"""Maxwell-slip elements and play operators: two duals of one rate-independent memory.
+"""Maxwell-slip elements and play operators: two duals of one rate-independent hysteresis.
 
 A *play* follows its input at a distance of at most its threshold. A *stop* (an elasto-slip
 element: a spring in series with dry friction) is the rest, ``stop = x - play``. Springs and stops
@@ -55,7 +55,7 @@ class PlayOperator:
         Slope that each play adds when it moves, output unit per input unit. Not negative for a
         passive, invertible operator.
     linear : float
-        Slope of the memory-free part.
+        Slope of the hysteresis-free part.
     """
 
     thresholds: tuple[float, ...]
@@ -123,7 +123,7 @@ class PlayOperator:
     def scaled(self, width: float) -> PlayOperator:
         """Return this operator with its hysteresis made ``width`` times as wide.
 
-        The output is ``s x - width (s x - y)`` with ``s`` the total slope: 0 is free of memory,
+        The output is ``s x - width (s x - y)`` with ``s`` the total slope: 0 is free of hysteresis,
         1 is this operator, and the slope of large amplitudes is always the same.
         """
         (width,) = floats("width", (width,))

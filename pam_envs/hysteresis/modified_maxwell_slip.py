@@ -248,7 +248,7 @@ class ModifiedMaxwellSlip:
         check_not_negative("stiffnesses", self.stiffnesses, "to dissipate and not create energy")
         if not self.stiffnesses:
             raise ValueError(
-                "stiffnesses is empty; the model needs 1 element: give 0 for no memory"
+                "stiffnesses is empty; the model needs 1 element: give 0 for no hysteresis"
             )
         if not self.segment > 0.0:
             raise ValueError(f"segment is {self.segment}; it must be above 0: give the knots' gap")

@@ -1,7 +1,7 @@
 """The classical Preisach operator, with its exact recursive inverse.
 
 Relays of all switching thresholds in parallel, weighted by a density: the general
-rate-independent memory in which larger excursions wipe out smaller ones and all minor loops
+rate-independent hysteresis in which larger excursions wipe out smaller ones and all minor loops
 between the same two inputs are congruent. The operator is carried by its Everett map
 (:mod:`~pam_envs.hysteresis.everett`) and by a stack of dominant extrema
 (:mod:`~pam_envs.hysteresis.extrema`), a handful of operations a step whatever the grid.
@@ -45,7 +45,7 @@ SMALLEST_WEIGHT = -1e-12
 
 
 class PreisachState(NamedTuple):
-    """Memory of a batch: extrema and outputs, shapes (depth, ...), and points in use."""
+    """Hysteresis of a batch: extrema and outputs, shapes (depth, ...), and points in use."""
 
     stack: Array
     sums: Array
@@ -252,14 +252,14 @@ class Preisach:
         x : array_like, shape batch_shape
             Inputs.
         state : PreisachState
-            Memory before; it is not changed.
+            Hysteresis before; it is not changed.
 
         Returns
         -------
         y : ndarray, shape batch_shape
             Outputs.
         state : PreisachState
-            Memory after.
+            Hysteresis after.
         """
         shape = np.shape(state.counts)
         values = np.array(np.broadcast_to(np.asarray(x, float), shape)).reshape(-1)
@@ -268,14 +268,14 @@ class Preisach:
         return y.reshape(shape), _shaped(rows, shape)
 
     def inverse_step(self, y: ArrayLike, state: PreisachState) -> tuple[Array, PreisachState]:
-        """Return the input that takes the output to ``y``, and the memory after that input.
+        """Return the input that takes the output to ``y``, and the hysteresis after that input.
 
         Parameters
         ----------
         y : array_like, shape batch_shape
             Wanted outputs. One out of reach gives the nearest end of the input's range.
         state : PreisachState
-            Memory before; it is not changed.
+            Hysteresis before; it is not changed.
 
         Raises
         ------

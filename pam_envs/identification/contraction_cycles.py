@@ -1,14 +1,14 @@
 """The measured muscle, identified from quasi-static cycles: contraction against pressure.
 
-The tables of seed 003 hold one inflation and deflation at each of three loads, five times over.
-They fix the static law and the shape of the major loop. They do not fix what a small reversal
+The tables of positioning2021 hold one inflation and deflation at each of three loads, five times
+over. They fix the static law and the shape of the major loop. They do not fix what a small reversal
 does (a documented prior fills that in: equal weight on every threshold), and hold nothing about
 time: lag, dead time, slew rate, damping, moving mass and sensors stay assumed.
 
 Maxwell-slip (play operators on the pressure) and static law are fitted together by least squares
 on the mean contractions and on the three published loop widths. The Preisach map is then fitted to
 the effective pressures that this static law needs for the same readings, so that switching the
-memory changes the memory and not the rig.
+hysteresis changes the hysteresis and not the rig.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from pam_envs.data.tables import ContractionTable
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.identification.preisach_forc import PreisachFit, fit_preisach
-from pam_envs.plants.single_muscle.hysteresis import Kind, Memory
+from pam_envs.plants.single_muscle.hysteresis import Hysteresis, Kind
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ PRIOR_WEIGHT = 0.1
 LEVELS = 49
 """Levels of the Everett map from -6 to 6 bar: one every 0.25 bar."""
 _LEAST_SLOPE = 0.1
-_SOURCE = "identified on seed 003, Tables 3-5"
+_SOURCE = "identified on positioning2021, Tables 3-5"
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class CyclesFit:
     residual : array, shape (n, T)
         Model minus mean reading [m].
     preisach : PreisachFit or None
-        What the record decides of the Everett map, for that memory.
+        What the record decides of the Everett map, for that hysteresis.
     """
 
     plant: SingleMuscle
@@ -126,36 +126,36 @@ def mean_cycles(table: ContractionTable, repeats: Any = None) -> Cycles:
 def quasi_static(plant: SingleMuscle, pressures: Array, load: float) -> Array:
     """Return the contractions [m] of a virgin muscle led slowly through ``pressures`` [Pa]."""
     full = plant.regulator.max_pressure
-    operator = plant.memory.at_load(load)
+    operator = plant.hysteresis.at_load(load)
     drive = np.asarray(pressures, float)
     if operator is not None:
-        felt, _ = operator.simulate(plant.memory.stretched(drive, full))
-        drive = plant.memory.unstretched(felt, full)
+        felt, _ = operator.simulate(plant.hysteresis.stretched(drive, full))
+        drive = plant.hysteresis.unstretched(felt, full)
     return plant.contraction_at(drive, load)
 
 
-def _plant(theta: Array, memory: bool) -> SingleMuscle:
+def _plant(theta: Array, hysteresis: bool) -> SingleMuscle:
     base = SingleMuscle()
     muscle = dataclasses.replace(
         base.muscle, **{k: float(v) for k, v in zip(STATIC, theta, strict=False)}
     )
-    held = Memory()
-    if memory:
+    held = Hysteresis()
+    if hysteresis:
         shares = theta[6:12] / max(float(theta[6:12].sum()), 1e-9)
         weights = tuple(float(w) for w in (1.0 - theta[5]) * shares)
         operator = PlayOperator(THRESHOLDS, weights, 1.0 - float(np.sum(weights)))
-        held = Memory(operator, float(theta[12]), float(theta[13]))
-    return dataclasses.replace(base, muscle=muscle, memory=held)
+        held = Hysteresis(operator, float(theta[12]), float(theta[13]))
+    return dataclasses.replace(base, muscle=muscle, hysteresis=held)
 
 
 def _model(plant: SingleMuscle, cycles: Cycles) -> Array:
     return np.array([quasi_static(plant, cycles.pressures, m) for m in cycles.loads.tolist()])
 
 
-def _residuals(theta: Array, cycles: Cycles, memory: bool, prior: Array) -> Array:
-    made = _model(_plant(theta, memory), cycles)
+def _residuals(theta: Array, cycles: Cycles, hysteresis: bool, prior: Array) -> Array:
+    made = _model(_plant(theta, hysteresis), cycles)
     parts = [1e3 * (made - cycles.contractions)[:, 1:].ravel()]
-    if memory:
+    if hysteresis:
         rows, columns = np.arange(len(cycles.loads)), cycles.widest()
         width = (cycles.widths(made) - cycles.widths())[rows, columns]
         parts += [WIDTH_WEIGHT * 1e3 * width, PRIOR_WEIGHT * (theta[6:12] / prior - 1.0)]
@@ -163,15 +163,15 @@ def _residuals(theta: Array, cycles: Cycles, memory: bool, prior: Array) -> Arra
 
 
 def fit_maxwell_slip(
-    cycles: Cycles, memory: bool = True, prior: Array | None = None, start: Array | None = None
+    cycles: Cycles, hysteresis: bool = True, prior: Array | None = None, start: Array | None = None
 ) -> tuple[CyclesFit, Array]:
-    """Fit static law and play operators (or, without memory, the static law alone).
+    """Fit static law and play operators (or, without hysteresis, the static law alone).
 
     Parameters
     ----------
     cycles : Cycles
         What to fit.
-    memory : bool
+    hysteresis : bool
         False fits a muscle without hysteresis.
     prior : array, shape (6,), optional
         Shares of the thresholds to which the weights are drawn; equal by default.
@@ -187,12 +187,12 @@ def fit_maxwell_slip(
     """
     shares = np.full(6, 1 / 6) if prior is None else np.maximum(prior, 1e-3)
     begin = _START if start is None else start
-    free = np.arange(len(_START)) if memory else np.arange(len(STATIC))
+    free = np.arange(len(_START)) if hysteresis else np.arange(len(STATIC))
 
     def residuals(part: Array) -> Array:
         theta = begin.copy()
         theta[free] = part
-        return _residuals(theta, cycles, memory, shares)
+        return _residuals(theta, cycles, hysteresis, shares)
 
     found = least_squares(
         residuals,
@@ -203,19 +203,19 @@ def fit_maxwell_slip(
     )
     theta = begin.copy()
     theta[free] = found.x
-    plant = _plant(theta, memory)
+    plant = _plant(theta, hysteresis)
     return CyclesFit(plant, cycles, _model(plant, cycles) - cycles.contractions), theta
 
 
 def fit_preisach_map(fit: CyclesFit, prior_weight: float = 1e-2) -> CyclesFit:
-    """Return the plant of ``fit`` with its memory replaced by a Preisach operator.
+    """Return the plant of ``fit`` with its hysteresis replaced by a Preisach operator.
 
     The operator's output at a reading is the effective pressure that the static law needs for it,
     its hysteretic part brought to load 0; the loads are averaged.
     """
     plant, c = fit.plant, fit.cycles
     full = plant.regulator.max_pressure
-    width = np.maximum(0.1, 1.0 + plant.memory.width_per_load * c.loads)[:, None]
+    width = np.maximum(0.1, 1.0 + plant.hysteresis.width_per_load * c.loads)[:, None]
     drive = plant.drive_for(c.contractions, c.loads[:, None])
     outputs = c.pressures - (c.pressures - drive) / width
     weights = np.broadcast_to(width**2, outputs.shape).copy()
@@ -234,15 +234,15 @@ def fit_preisach_map(fit: CyclesFit, prior_weight: float = 1e-2) -> CyclesFit:
     )
     table = np.array(found.model.plus_linear(_LEAST_SLOPE).table) * 1e5
     operator = Preisach(-full, full, table.tolist(), start="virgin")
-    memory = dataclasses.replace(plant.memory, operator=operator, stretch=0.0)
-    made = dataclasses.replace(plant, memory=memory)
+    hysteresis = dataclasses.replace(plant.hysteresis, operator=operator, stretch=0.0)
+    made = dataclasses.replace(plant, hysteresis=hysteresis)
     return CyclesFit(made, c, _model(made, c) - c.contractions, found)
 
 
 def fit_cycles(cycles: Cycles, hysteresis: Kind = "maxwell_slip") -> CyclesFit:
-    """Fit a muscle with that memory to cycles."""
+    """Fit a muscle with that hysteresis to cycles."""
     if hysteresis == "none":
-        return fit_maxwell_slip(cycles, memory=False)[0]
+        return fit_maxwell_slip(cycles, hysteresis=False)[0]
     fit, _ = fit_maxwell_slip(cycles)
     return fit if hysteresis == "maxwell_slip" else fit_preisach_map(fit)
 
@@ -272,20 +272,20 @@ def ensemble(
 
 
 def _member(plant: SingleMuscle) -> Mapping[str, Any]:
-    names = [f"muscle.{k}" for k in STATIC] + ["memory.stretch", "memory.width_per_load"]
+    names = [f"muscle.{k}" for k in STATIC] + ["hysteresis.stretch", "hysteresis.width_per_load"]
     values: dict[str, Any] = {name: plant.value(name) for name in names}
-    if plant.memory.operator is not None:
-        values["memory.operator"] = plant.memory.operator
+    if plant.hysteresis.operator is not None:
+        values["hysteresis.operator"] = plant.hysteresis.operator
     return values
 
 
 def identify_mas10(
     table: ContractionTable, hysteresis: Kind, members: int = 8
 ) -> tuple[SingleMuscle, CyclesFit]:
-    """Return the shipped MAS-10 plant with that memory, and its fit."""
+    """Return the shipped MAS-10 plant with that hysteresis, and its fit."""
     fit = fit_cycles(mean_cycles(table), hysteresis)
     names = [f"muscle.{k}" for k in STATIC] + ["muscle.area_taper"]
-    names += ["memory.stretch", "memory.width_per_load"] if hysteresis != "none" else []
+    names += ["hysteresis.stretch", "hysteresis.width_per_load"] if hysteresis != "none" else []
     plant = dataclasses.replace(
         fit.plant,
         provenance={name: ("identified", _SOURCE) for name in names},
@@ -336,9 +336,9 @@ class Identifiability:
 def identifiability(fit: CyclesFit, standard_error: float = 6.7e-5) -> Identifiability:
     """Return which parameters of a Maxwell-slip fit the cycles fix (``standard_error`` in m)."""
     plant, base = fit.plant, _model(fit.plant, fit.cycles)
-    operator = plant.memory.operator
+    operator = plant.hysteresis.operator
     if not isinstance(operator, PlayOperator):
-        raise ValueError(f"a Maxwell-slip fit is needed, this one has {plant.memory.kind!r}")
+        raise ValueError(f"a Maxwell-slip fit is needed, this one has {plant.hysteresis.kind!r}")
     from pam_envs.plants.single_muscle.rows import PARAMETERS
 
     names = [n for n in PARAMETERS if not n.startswith(("position", "pressure"))]
@@ -357,10 +357,10 @@ def identifiability(fit: CyclesFit, standard_error: float = 6.7e-5) -> Identifia
         weights[k] += change
         scaled = weights * (1.0 - operator.linear) / weights.sum()
         moved = plant.replace(
-            {"memory.operator": PlayOperator(THRESHOLDS, tuple(scaled), 1.0 - scaled.sum())}
+            {"hysteresis.operator": PlayOperator(THRESHOLDS, tuple(scaled), 1.0 - scaled.sum())}
         )
         columns.append((_model(moved, fit.cycles) - base) * 10.0)
-    names += [f"memory.weight[{k}]" for k in range(len(THRESHOLDS))]
+    names += [f"hysteresis.weight[{k}]" for k in range(len(THRESHOLDS))]
     matrix = np.array([c[:, 1:].ravel() for c in columns]).T / standard_error
     _, sizes, directions = np.linalg.svd(matrix, full_matrices=False)
     strong = sizes > 1.0

@@ -1,4 +1,4 @@
-"""The constants of the two calibrated EMG readings, fitted to seed 000's three reductions.
+"""The constants of the two calibrated EMG readings, fitted to yeh2010's three reductions.
 
 Run ``python -m pam_envs.identification.emg_calibration`` to write them anew. They are *fitted*, one
 a published figure, and predict nothing: what is assumed is an orthosis that delivers 20 % of
@@ -118,7 +118,7 @@ def write(path: Path = CONSTANTS) -> None:
     """Write the constants."""
     data = {
         "provenance": "fitted",
-        "source": "seed 000, section 5: EMG 0.11 to 0.07 V walking, -33 % up, -26.1 % down stairs",
+        "source": "yeh2010, section 5: EMG 0.11 to 0.07 V walking, -33 % up, -26.1 % down stairs",
         "assumed": "20 % of Eq. (1) delivered exactly and at once",
         "readings": fitted(),
     }

@@ -1,4 +1,4 @@
-"""The printed inverse (3.5) of seed 002: a sum over an inverted Everett map.
+"""The printed inverse (3.5) of fluidic_muscles: a sum over an inverted Everett map.
 
     u = u_min + sum_i G(F_(i+1), F_i) + G(f, F_k),   G(f_alpha, f_alphabeta) = u_alpha - u_beta
 

@@ -61,7 +61,7 @@ class Fit:
 
 def weights(plant: SingleMuscle) -> tuple[str, ...]:
     """Return the names of a plant's play weights, for :func:`jacobian`."""
-    return tuple(f"memory.weight[{k}]" for k in range(plant.elements))
+    return tuple(f"hysteresis.weight[{k}]" for k in range(plant.elements))
 
 
 def _place(plant: SingleMuscle, name: str) -> int:

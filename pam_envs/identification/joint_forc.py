@@ -1,8 +1,8 @@
-"""The memory of a joint, measured on a rig: Everett map, symmetry and congruency with a verdict.
+"""The hysteresis of a joint, measured on a rig: Everett map, symmetry and congruency with a verdict.
 
-Seed 002 (section 3.2) drives the joint along the ascending branch, turns at chosen set-points and
-lets it fall to negative saturation: first-order descending curves, which give the Everett map
-``E(alpha, beta) = f_alpha - f_alphabeta`` (3.2). The printed rule for the other half,
+fluidic_muscles (section 3.2) drives the joint along the ascending branch, turns at chosen
+set-points and lets it fall to negative saturation: first-order descending curves, which give the
+Everett map ``E(alpha, beta) = f_alpha - f_alphabeta`` (3.2). The printed rule for the other half,
 ``f_alphabeta = -f_betaalpha``, is wrong; it is ``E(beta, alpha) = -E(alpha, beta)``.
 
 Whether a Preisach operator may be read off at all is measured in the same test:
@@ -39,14 +39,14 @@ Rig = Callable[[Array], Array]
 """From a series of inputs, shape (T,), to the outputs at rest after each, shape (T,)."""
 
 SYMMETRY, CONGRUENCY, WIPING_OUT = 0.03, 0.1, 0.03
-"""Largest errors with which a memory counts as a symmetric Preisach operator."""
+"""Largest errors with which a hysteresis counts as a symmetric Preisach operator."""
 LOOPS = ((-1.0, 0.0), (-0.5, 0.5), (0.0, 1.0), (-0.25, 0.25))
 """Ends of the minor loops that are compared, shares of 70 % of the half-range."""
 INSIDE = 0.7
 
 
 @dataclass(frozen=True)
-class JointMemory:
+class JointHysteresis:
     """What the test gives.
 
     Attributes
@@ -82,7 +82,7 @@ class JointMemory:
 
     @property
     def verdict(self) -> str:
-        """A sentence on what the memory is and what to do about it."""
+        """A sentence on what the hysteresis is and what to do about it."""
         found = (
             f"symmetry {self.symmetry:.3f} (bound {SYMMETRY:g}), congruency {self.congruency:.3f}"
             f" (bound {CONGRUENCY:g}), wiping out {self.wiping_out:.3f} (bound {WIPING_OUT:g})"
@@ -99,8 +99,8 @@ class JointMemory:
         return float(self.model.everett[-1, 0]) / (self.model.high - self.model.low)
 
 
-def measure_joint(rig: Rig, amplitude: float, levels: int = 21) -> JointMemory:
-    """Return the memory of a joint between ``-amplitude`` and ``amplitude`` [rad].
+def measure_joint(rig: Rig, amplitude: float, levels: int = 21) -> JointHysteresis:
+    """Return the hysteresis of a joint between ``-amplitude`` and ``amplitude`` [rad].
 
     Parameters
     ----------
@@ -111,11 +111,11 @@ def measure_joint(rig: Rig, amplitude: float, levels: int = 21) -> JointMemory:
     levels : int
         Levels of the grid.
     """
-    return measure_memory(rig, -amplitude, amplitude, levels)
+    return measure_hysteresis(rig, -amplitude, amplitude, levels)
 
 
-def measure_memory(rig: Rig, low: float, high: float, levels: int = 21) -> JointMemory:
-    """Return the memory of a rig, in units of its input and output; see this module's page.
+def measure_hysteresis(rig: Rig, low: float, high: float, levels: int = 21) -> JointHysteresis:
+    """Return the hysteresis of a rig, in units of its input and output; see this module's page.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def measure_memory(rig: Rig, low: float, high: float, levels: int = 21) -> Joint
     symmetry = maps.symmetry_error(fit.model.everett)
     congruency, wiping_out = _loops(rig, low, high, levels)
     model = symmetrised(fit.model) if symmetry <= SYMMETRY else fit.model
-    return JointMemory(model, symmetry, congruency, wiping_out, fit.clipped)
+    return JointHysteresis(model, symmetry, congruency, wiping_out, fit.clipped)
 
 
 def symmetrised(model: Preisach) -> Preisach:

@@ -1,6 +1,6 @@
 """One muscle of a joint alone, under a constant load: what the symmetry test has to refuse.
 
-Against its twin a muscle's memory is symmetric, since each muscle does on the way back what the
+Against its twin a muscle's hysteresis is symmetric, since each muscle does on the way back what the
 other one did on the way there. Alone it is not: its friction grows with its pressure, and its
 contraction saturates as it rises.
 """
@@ -24,12 +24,12 @@ LOWEST, HIGHEST = -0.1, 0.4
 
 @dataclass(frozen=True)
 class HangingMuscle:
-    """A muscle of a joint with its memory, which lifts a load.
+    """A muscle of a joint with its hysteresis, which lifts a load.
 
     Attributes
     ----------
     plant : AntagonisticJoint
-        With muscles and a memory.
+        With muscles and a hysteresis.
     load : float
         [N].
     """
@@ -38,19 +38,19 @@ class HangingMuscle:
     load: float = 100.0
 
     def __post_init__(self) -> None:
-        """Refuse a plant that has no muscles with a memory."""
-        if self.plant.dynamics != "muscles" or self.plant.memory.operator is None:
+        """Refuse a plant that has no muscles with a hysteresis."""
+        if self.plant.dynamics != "muscles" or self.plant.hysteresis.operator is None:
             raise ValueError(
-                f"dynamics = {self.plant.dynamics!r} with memory {self.plant.memory.kind!r} has no"
+                f"dynamics = {self.plant.dynamics!r} with hysteresis {self.plant.hysteresis.kind!r} has no"
                 " muscle that remembers; take AntagonisticJoint.paper() or .measured()"
             )
 
     def rest_contractions(self, pressures: ArrayLike) -> Array:
         """Return the contraction [1] at rest after each of a series of pressures [Pa], (T,).
 
-        From the contraction of the straight joint, where its memory is virgin.
+        From the contraction of the straight joint, where its hysteresis is virgin.
         """
-        operator: Any = self.plant.memory.operator
+        operator: Any = self.plant.hysteresis.operator
         middle = float(self.plant.lever.contraction(0.0, self.plant.muscle.rest_length)[0])
         state, made = operator.initial_state(), []
         for pressure in np.asarray(pressures, float):
@@ -62,7 +62,7 @@ class HangingMuscle:
 
     def _spare(self, x: float, pressure: float, middle: float, state: Any) -> float:
         """Return by how much the muscle pulls more than its load [N]."""
-        memory, operator = self.plant.memory, self.plant.memory.operator
-        friction = memory.width * (memory.base + memory.rate * pressure)
+        hysteresis, operator = self.plant.hysteresis, self.plant.hysteresis.operator
+        friction = hysteresis.width * (hysteresis.base + hysteresis.rate * pressure)
         lag = x - middle - float(operator.step(x - middle, state)[0])  # type: ignore[union-attr]
         return float(self.plant.muscle.law(pressure, x)) - friction * lag - self.load

@@ -1,8 +1,8 @@
 """What the antagonistic joint's presets were identified from, and how.
 
 :func:`fit_force_map` fits the static law of :mod:`pam_envs.muscle.force_map` on the measured map,
-:func:`fit_angle_plays` the reduced plant's memory on loops of the plant with muscles. The numbers
-in the code are theirs, rounded.
+:func:`fit_angle_plays` the reduced plant's hysteresis on loops of the plant with muscles. The
+numbers in the code are theirs, rounded.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ COLUMNS = {
     "force_n": number(0.0, 1e3),
 }
 AMPLITUDES = (25.0, 20.0, 15.0, 10.0, 7.0, 5.0, 3.0)
-"""Of the loops on which the reduced memory is identified [degrees]."""
+"""Of the loops on which the reduced hysteresis is identified [degrees]."""
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ def minor_loops(plant: SingleMuscle, low: float = 2e5, high: float = 3e5) -> tup
     A Preisach operator's loops are congruent, a muscle's contraction loops are not: so a Preisach
     map from pressure straight to contraction is an approximation for a single muscle.
     """
-    operator, load = plant.memory.at_load(plant.mass.load), plant.mass.load
+    operator, load = plant.hysteresis.at_load(plant.mass.load), plant.mass.load
     if operator is None:
         return 0.0, 0.0
     legs = np.linspace(low, high, 41)
@@ -65,7 +65,7 @@ def summarise(table: ContractionTable, plant: SingleMuscle, fit: cycles.CyclesFi
     """Return the figures of one fit."""
     loads = [float(m) for m in fit.cycles.loads]
     at, measured, model = fit.widths()
-    kind = plant.memory.kind
+    kind = plant.hysteresis.kind
     if fit.preisach is not None:
         rank = f"{fit.preisach.rank} of {fit.preisach.unknowns} relay weights"
     elif kind == "maxwell_slip":
@@ -100,7 +100,7 @@ def identify_all(
         f"definition; the repeatability floor (a repeat against the mean of the others) is "
         f"{floor:.3f} mm.",
         "",
-        "| memory | RMS 0 kg | 2.55 kg | 4.55 kg | all | left-out repeat | widest loops, model "
+        "| hysteresis | RMS 0 kg | 2.55 kg | 4.55 kg | all | left-out repeat | widest loops, model "
         "(measured) | rank | members |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
@@ -118,7 +118,7 @@ def identify_all(
         )
         notes = {"rms_mm": round(s.rms_all, 4), "left_out_repeat_mm": round(s.left_out, 4)}
         plant_file.write(plant, folder / f"mas10_{kind}.yaml", notes)
-        if isinstance(plant.memory.operator, Preisach):
+        if isinstance(plant.hysteresis.operator, Preisach):
             inner, outer = minor_loops(plant)
             congruency = (
                 "Preisach's congruency error (minor loops between 2 and 3 bar after 3 and after 6 "

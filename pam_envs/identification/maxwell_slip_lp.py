@@ -23,7 +23,7 @@ combinations that noise would drown: these do not count.
 
 References
 ----------
-Seed 000, section 3.1. T.-J. Yeh, S.-W. Lu, T.-Y. Wu, "Modeling and identification of hysteresis in
+yeh2010, section 3.1. T.-J. Yeh, S.-W. Lu, T.-Y. Wu, "Modeling and identification of hysteresis in
 piezoelectric actuators", J. Dyn. Sys., Meas., Control 128 (2006).
 """
 
@@ -40,7 +40,7 @@ from scipy.linalg import null_space
 from scipy.optimize import linprog
 
 from pam_envs.hysteresis.modified_maxwell_slip import ModifiedMaxwellSlip
-from pam_envs.identification.memory_loops import measured
+from pam_envs.identification.hysteresis_loops import measured
 from pam_envs.identification.preisach_forc import PreisachFit, fit_preisach
 
 Array = NDArray[np.float64]

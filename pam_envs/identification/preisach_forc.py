@@ -28,7 +28,7 @@ from scipy.optimize import nnls
 
 from pam_envs.hysteresis import everett as maps
 from pam_envs.hysteresis.preisach import Preisach, Start
-from pam_envs.identification.memory_loops import measured
+from pam_envs.identification.hysteresis_loops import measured
 from pam_envs.identification.relay_regressors import relay_regressors
 
 Array = NDArray[np.float64]

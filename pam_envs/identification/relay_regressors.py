@@ -70,8 +70,8 @@ def relay_regressors(
     stack, sums, count = blank.initial_state((1,))
     nodes = np.zeros((len(x), levels, levels))
     series = np.ascontiguousarray(x, dtype=float)
-    memory = stack, sums, count, blank.everett, low, blank.inverse_cell
-    _node_weights(series, *memory, start == "virgin", nodes)
+    hysteresis = stack, sums, count, blank.everett, low, blank.inverse_cell
+    _node_weights(series, *hysteresis, start == "virgin", nodes)
     rising = np.tril(nodes - nodes.transpose(0, 2, 1), -1)
     # a cell (k, l) counts in the map at every node (i > k, j <= l)
     after = np.cumsum(rising[:, ::-1, :], axis=1)[:, ::-1, :]

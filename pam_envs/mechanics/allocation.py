@@ -2,9 +2,9 @@
 
 A bundle's force is ``P = X phi(C)`` and its slope over the contraction ``dP/dC = X psi(C)``, with
 ``phi = (L_n - C)(C_max - C)``, ``psi = 2 C - L_n - C_max`` and the *factor* ``X = k_0 + k_1 p``
-linear in the pressure (seed 001, Eqs. 4, 5, 7). Over a pulley of radius ``r`` bundle b bends the
-joint and bundle a straightens it (Eqs. 16, 22 of seed 001), so that torque ``Q`` and stiffness
-``S = -dQ/dq`` are linear in both factors:
+linear in the pressure (chakarov2018, Eqs. 4, 5, 7). Over a pulley of radius ``r`` bundle b bends
+the joint and bundle a straightens it (Eqs. 16, 22 of chakarov2018), so that torque ``Q`` and
+stiffness ``S = -dQ/dq`` are linear in both factors:
 
     Q / r     = -phi_a X_a + phi_b X_b
     -S / r^2  =  psi_a X_a + psi_b X_b,       determinant -(phi_a psi_b + phi_b psi_a) > 0

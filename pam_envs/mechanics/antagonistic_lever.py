@@ -1,4 +1,4 @@
-"""The lever between two antagonistic muscles: lengths and lever arms of seed 002, Eq. (1.1).
+"""The lever between two antagonistic muscles: lengths and lever arms of fluidic_muscles, Eq. (1.1).
 
     L_A = | (r_u, l_u) + R(phi) (-r_o, l_o) |,    L_B = | (-r_u, l_u) + R(phi) (r_o, l_o) |
 
@@ -23,7 +23,7 @@ from pam_envs.kernels.arithmetic import sine_of_turns
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
-_SIZE = "with it +-30 degrees take 0 to 25 % of a muscle of 150 mm (seed 002, section 2)"
+_SIZE = "with it +-30 degrees take 0 to 25 % of a muscle of 150 mm (fluidic_muscles, section 2)"
 PER_TURN = 1.0 / (2.0 * math.pi)
 SIDES = (1.0, -1.0)
 """Of muscle A and of muscle B."""

@@ -22,7 +22,13 @@ class HangingMass:
     """
 
     load: float = parameter(
-        2.55, "kg", 0.0, 50.0, "published", "seed 003: 0, 2.55 and 4.55 kg", spread=(0.0, 4.55)
+        2.55,
+        "kg",
+        0.0,
+        50.0,
+        "published",
+        "positioning2021: 0, 2.55 and 4.55 kg",
+        spread=(0.0, 4.55),
     )
     moving_mass: float = parameter(
         0.25,

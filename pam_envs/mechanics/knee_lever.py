@@ -1,7 +1,7 @@
 """The zig-zag wire of the orthosis as a torsion spring, and the lever by which the muscle pulls.
 
 The wire's two arms of length ``L_b`` include the angle ``theta``; the muscle, with fittings of
-length ``L_a``, spans their ends (seed 000, Fig. 4). Bending the knee opens the angle, the muscle
+length ``L_a``, spans their ends (yeh2010, Fig. 4). Bending the knee opens the angle, the muscle
 closes it:
 
     L = 2 L_b sin(theta / 2) - L_a,          dL / d theta = L_b cos(theta / 2)
@@ -23,7 +23,7 @@ from pam_envs.kernels.arithmetic import sine_of_turns
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
-_GEOMETRY = "reproduces 158 N at 2 bar and 22 cm with seed 000's range of tension and stiffness"
+_GEOMETRY = "reproduces 158 N at 2 bar and 22 cm with yeh2010's range of tension and stiffness"
 PER_TURN = 1.0 / (2.0 * math.pi)
 
 

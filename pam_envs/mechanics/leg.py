@@ -7,7 +7,7 @@ the knee flexion ``q``. The hip moves evenly, so that the knee's acceleration is
     tau = F_z (l sin psi - r) - F_x h - m c [a_x cos psi ... ] - I psi''
 
 (:func:`knee_torque`) is what the wearer's muscles and the orthosis bear together. Its first term
-is all that Eq. (1) of seed 000 knows of. Off the natural pace the force leans less, with the
+is all that Eq. (1) of yeh2010 knows of. Off the natural pace the force leans less, with the
 square of the pace, and the centre of pressure stays at the heel for longer
 (:func:`centre_of_pressure`).
 

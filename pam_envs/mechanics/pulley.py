@@ -1,4 +1,4 @@
-"""A pulley that two antagonistic bundles turn: seed 001, Eqs. (8) to (10).
+"""A pulley that two antagonistic bundles turn: chakarov2018, Eqs. (8) to (10).
 
     C_a = r (q_max - q),    C_b = r (q - q_min),    Q = r (P_b - P_a)
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 class Pulley:
     """Pulley of the elbow; the angle is its flexion, 0 with the forearm straight."""
 
-    radius: float = parameter(0.0315, "m", 5e-3, 0.2, "published", "seed 001, section 3")
+    radius: float = parameter(0.0315, "m", 5e-3, 0.2, "published", "chakarov2018, section 3")
     lowest: float = parameter(
         0.0, "rad", -1.0, 1.0, "assumed", "the stroke begins with the forearm straight"
     )
@@ -33,7 +33,7 @@ class Pulley:
         0.1,
         3.0,
         "published",
-        "120 degrees of stroke: seed 001, section 3",
+        "120 degrees of stroke: chakarov2018, section 3",
     )
     stop_stiffness: float = parameter(
         300.0, "N m/rad", 10.0, 1e5, "assumed", "20 N m press a stop in by 4 degrees"

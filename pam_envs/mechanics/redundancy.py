@@ -2,9 +2,9 @@
 
     minimise f(q)  with  g(q) = x,      f = sum_i 4 q_i^2 - ln(1 - (q_i / q_max)^2)         (2.1)
 
-Seed 002, section 2. The weight grows without bound towards the limits, so that an optimum within
-them is found wherever there is one nearby; the unweighted variant minimises ``q'q`` and knows no
-limits. The iteration is in ``redundancy_newton``.
+fluidic_muscles, section 2. The weight grows without bound towards the limits, so that an optimum
+within them is found wherever there is one nearby; the unweighted variant minimises ``q'q`` and
+knows no limits. The iteration is in ``redundancy_newton``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from pam_envs.mechanics.serial_chain_rows import work_rows
 Array = NDArray[np.float64]
 
 LIMIT = float(np.deg2rad(30.0))
-"""Largest angle of a joint [rad] (seed 002, section 2)."""
+"""Largest angle of a joint [rad] (fluidic_muscles, section 2)."""
 UNIT_TOLERANCE = 1e-6
 REACHED = 1e-5
 """Distance [m] and turn [rad] from which the nearest pose is the one that is wanted."""

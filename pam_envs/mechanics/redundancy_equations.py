@@ -1,8 +1,9 @@
 """What an optimum of a redundant chain has to fulfil: the equations of one Newton iteration.
 
-Seed 002, (2.2) to (2.12), with two corrections: the second derivative of the Lagrangian holds the
-curvature of the constraint, ``sum_i lambda_i d2 g_i / dq2``, which the text leaves to the reader,
-and the upper right block is ``dF_1 / d lambda = J_g'`` and not (2.9)'s ``dF_2 / d lambda``:
+fluidic_muscles, (2.2) to (2.12), with two corrections: the second derivative of the Lagrangian
+holds the curvature of the constraint, ``sum_i lambda_i d2 g_i / dq2``, which the text leaves to
+the reader, and the upper right block is ``dF_1 / d lambda = J_g'`` and not (2.9)'s ``dF_2 / d
+lambda``:
 
     [ d2 f + sum_i lambda_i d2 g_i   J_g' ] [ dq       ]     [ df       ]
     [ J_g                            0    ] [ lambda + ] = - [ g(q) - x ]

@@ -1,7 +1,7 @@
 """Newton's method on the Lagrangian of a redundant chain, pose after pose of a path.
 
-The pose is no linear function of the angles, so the problem is not convex (seed 002 says it is):
-the method needs a start nearby, steps that stay between the limits, and an arm that is not
+The pose is no linear function of the angles, so the problem is not convex (fluidic_muscles says it
+is): the method needs a start nearby, steps that stay between the limits, and an arm that is not
 straight, where the Jacobian loses rank. A path is followed from each pose to the next; where that
 leads nowhere, and at its beginning, bent poses are tried. The equations are in
 ``redundancy_equations``.

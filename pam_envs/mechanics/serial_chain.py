@@ -2,11 +2,11 @@
 
     x = g(q),   M(q) qdd + bias(q, qd) = joint torques
 
-Seed 002, sections 1.2 and 2: six stages, each a joint of +-30 degrees. The base's frame has its
-origin in the first joint and its z along the straight arm. A *pose* is the tip's position and the
-direction in which the last link points (a unit vector): six numbers, five degrees of freedom. The
-formulas here are those of a textbook, by Jacobians; the kernels of ``serial_chain_kinematics`` and
-``serial_chain_dynamics`` find the same numbers recursively, for lanes side by side.
+fluidic_muscles, sections 1.2 and 2: six stages, each a joint of +-30 degrees. The base's frame has
+its origin in the first joint and its z along the straight arm. A *pose* is the tip's position and
+the direction in which the last link points (a unit vector): six numbers, five degrees of freedom.
+The formulas here are those of a textbook, by Jacobians; the kernels of ``serial_chain_kinematics``
+and ``serial_chain_dynamics`` find the same numbers recursively, for lanes side by side.
 """
 
 from __future__ import annotations
@@ -43,10 +43,10 @@ HEAVY = ("masses", "across", "along")
 
 @dataclass(frozen=True)
 class LinkForm:
-    """A link of the arm of seed 002, as a solid cylinder, unless a chain says otherwise."""
+    """A link of the arm of fluidic_muscles, as a solid cylinder, unless a chain says otherwise."""
 
     length: float = parameter(
-        0.25, "m", 1e-3, 5.0, "assumed", "of seed 002's chain, as its figures suggest"
+        0.25, "m", 1e-3, 5.0, "assumed", "of fluidic_muscles's chain, as its figures suggest"
     )
     mass: float = parameter(
         0.1,
@@ -54,7 +54,7 @@ class LinkForm:
         1e-3,
         100.0,
         "assumed",
-        "not published; about what two DMSP-10 a joint bear where seed 002's paths bend most, and "
+        "not published; about what two DMSP-10 a joint bear where fluidic_muscles's paths bend most, and "
         "less than the muscles and their fittings weigh",
     )
     centre: float = parameter(

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
-_FIT = "least squares on seed 003, Tables 3-5"
+_FIT = "least squares on positioning2021, Tables 3-5"
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,10 @@ class EffectiveAreaMuscle:
     """Geometry and static force law of one muscle."""
 
     rest_length: float = parameter(
-        0.1, "m", 0.02, 2.0, "published", "seed 003, Table 1: MAS-10-N-100"
+        0.1, "m", 0.02, 2.0, "published", "positioning2021, Table 1: MAS-10-N-100"
     )
     diameter: float = parameter(
-        0.01, "m", 0.003, 0.1, "published", "seed 003, Table 1: MAS-10-N-100"
+        0.01, "m", 0.003, 0.1, "published", "positioning2021, Table 1: MAS-10-N-100"
     )
     braid_angle: float = parameter(
         0.499, "rad", 0.2, 0.9, "assumed", "28.6 degrees, DMSP-10-250 (public model code)"
@@ -72,16 +72,40 @@ class EffectiveAreaMuscle:
         0.0, "1/N^0.5", -0.1, 0.5, "assumed", "the same by the root of the load", neutral=0.0
     )
     creep_1: float = parameter(
-        0.0, "1", -0.5, 2.0, "assumed", "length that follows at memory.creep_time_1", neutral=0.0
+        0.0,
+        "1",
+        -0.5,
+        2.0,
+        "assumed",
+        "length that follows at hysteresis.creep_time_1",
+        neutral=0.0,
     )
     creep_2: float = parameter(
-        0.0, "1", -0.5, 2.0, "assumed", "length that follows at memory.creep_time_2", neutral=0.0
+        0.0,
+        "1",
+        -0.5,
+        2.0,
+        "assumed",
+        "length that follows at hysteresis.creep_time_2",
+        neutral=0.0,
     )
     creep_3: float = parameter(
-        0.0, "1", -0.5, 2.0, "assumed", "length that follows at memory.creep_time_3", neutral=0.0
+        0.0,
+        "1",
+        -0.5,
+        2.0,
+        "assumed",
+        "length that follows at hysteresis.creep_time_3",
+        neutral=0.0,
     )
     creep_4: float = parameter(
-        0.0, "1", -0.5, 2.0, "assumed", "length that follows at memory.creep_time_4", neutral=0.0
+        0.0,
+        "1",
+        -0.5,
+        2.0,
+        "assumed",
+        "length that follows at hysteresis.creep_time_4",
+        neutral=0.0,
     )
     strand_1: float = parameter(
         0.0, "N", 0.0, 500.0, "assumed", "friction of the first strands to break away", neutral=0.0

@@ -5,9 +5,9 @@
 with ``e`` the contraction over the stretch of its axis. It is linear in the pressure, so that its
 inverse ``p(F, e)`` is exact, and smooth. It meets the measured map of a DMSP-10-250 (0.5 to
 6.5 bar, 0 to 20.8 % contraction, up to 542 N) within 1.4 N RMS, 8 N at the point of the lowest
-pressure. The sine law of seed 002 (Boblan: a line and a sine over contraction, both linear in the
-pressure) has eight parameters in the place of six and meets it within 1.3 N; it waves between the
-measured contractions.
+pressure. The sine law of fluidic_muscles (Boblan: a line and a sine over contraction, both linear
+in the pressure) has eight parameters in the place of six and meets it within 1.3 N; it waves
+between the measured contractions.
 
 A negative value means a slack muscle: its force is 0. The force is taken not to depend on the
 rest length at equal contraction, which the map of one length cannot show.
@@ -34,7 +34,7 @@ _FIT = "least squares on the measured map of a DMSP-10-250 (data/dmsp10_force_ma
 FULL_PRESSURE = 6.5e5
 """Highest pressure of the map [Pa]."""
 PAPER_CONTRACTION = 0.25
-"""Contraction at which the muscle of seed 002 has no force left at full pressure."""
+"""Contraction at which the muscle of fluidic_muscles has no force left at full pressure."""
 
 
 @dataclass(frozen=True)
@@ -91,10 +91,10 @@ class ForceMap:
         spread=(0.8e-4, 1.8e-4),
     )
     rest_length: float = parameter(
-        0.15, "m", 0.02, 2.0, "published", "DMSP-10-150N: seed 002, section 1.2"
+        0.15, "m", 0.02, 2.0, "published", "DMSP-10-150N: fluidic_muscles, section 1.2"
     )
     diameter: float = parameter(
-        0.01, "m", 2e-3, 0.1, "published", "DMSP-10-150N: seed 002, section 1.2"
+        0.01, "m", 2e-3, 0.1, "published", "DMSP-10-150N: fluidic_muscles, section 1.2"
     )
 
     def area_at(self, contraction: ArrayLike) -> NDArray[np.float64]:

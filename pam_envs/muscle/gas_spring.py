@@ -2,7 +2,7 @@
 
     T = s (L - L_min),    s = alpha P  where there is no hysteresis
 
-(seed 000, Eq. 6). A muscle at its shortest length, or with no stiffness, is slack. The volume is
+(yeh2010, Eq. 6). A muscle at its shortest length, or with no stiffness, is slack. The volume is
 the one whose virtual work is this tension, ``T = -P dV/dL``.
 """
 
@@ -22,7 +22,7 @@ class GasSpring:
     """The muscle of the orthosis."""
 
     shortest_length: float = parameter(
-        0.17, "m", 0.02, 1.0, "assumed", "L_min: 5 cm below the nominal length of seed 000"
+        0.17, "m", 0.02, 1.0, "assumed", "L_min: 5 cm below the nominal length of yeh2010"
     )
     gain: float = parameter(
         1.0,
@@ -30,7 +30,7 @@ class GasSpring:
         0.5,
         1.5,
         "assumed",
-        "stiffness of this specimen over that of its memory",
+        "stiffness of this specimen over that of its hysteresis",
         neutral=1.0,
         spread=(0.9, 1.1),
     )
@@ -40,7 +40,7 @@ class GasSpring:
         1e-4,
         1.0,
         "derived",
-        "alpha: 158 N at 2 bar and L_min + 5 cm (seed 000, section 4.1)",
+        "alpha: 158 N at 2 bar and L_min + 5 cm (yeh2010, section 4.1)",
         spread=(0.0142, 0.0174),
     )
     full_volume: float = parameter(

@@ -1,4 +1,4 @@
-"""A bundle of pneumatic muscles as a spring that is quadratic in contraction: seed 001.
+"""A bundle of pneumatic muscles as a spring that is quadratic in contraction: chakarov2018.
 
     P = X (L_n - C) (C_max - C),    X = k0 + k1 p
     k = dP/dC = X (2 C - L_n - C_max)
@@ -26,13 +26,13 @@ from pam_envs.parameters import parameter
 
 Array = NDArray[np.float64]
 
-_FIT = "seed 001, Eq. (6)"
+_FIT = "chakarov2018, Eq. (6)"
 _READ = (
-    "seed 001, Eq. (6) prints -21 per kPa, with which up to four muscles push at 400 kPa; read as "
+    "chakarov2018, Eq. (6) prints -21 per kPa, with which up to four muscles push at 400 kPa; read as "
     "-0.21, with which the force is in proportion to the muscles, as Fig. 4 shows"
 )
 _ENDS = (
-    "of the nominal length: at 28 % contraction filling leaves the force as it is (seed 001, "
+    "of the nominal length: at 28 % contraction filling leaves the force as it is (chakarov2018, "
     "Fig. 2), and with it k1 is that of an ideal braid (4.39 against 4.41 N/(m2 kPa))"
 )
 
@@ -41,8 +41,10 @@ _ENDS = (
 class QuadraticBundle:
     """Muscles side by side, fed together and joined at both ends."""
 
-    muscles: float = parameter(3.0, "1", 1.0, 40.0, "published", "seed 001, section 3: 3 and 7")
-    nominal_length: float = parameter(0.39, "m", 0.05, 2.0, "published", "L_n: seed 001, section 2")
+    muscles: float = parameter(3.0, "1", 1.0, 40.0, "published", "chakarov2018, section 3: 3 and 7")
+    nominal_length: float = parameter(
+        0.39, "m", 0.05, 2.0, "published", "L_n: chakarov2018, section 2"
+    )
     largest_contraction: float = parameter(
         0.28, "1", 0.05, 0.36, "assumed", _ENDS, spread=(0.27, 0.3)
     )
@@ -51,7 +53,7 @@ class QuadraticBundle:
     pressure_base: float = parameter(-2.1e-4, "N/(m2 Pa)", -4e-3, 0.1, "assumed", _READ)
     pressure_each: float = parameter(4.41e-3, "N/(m2 Pa)", 1e-4, 0.1, "published", _FIT)
     diameter: float = parameter(
-        0.016, "m", 2e-3, 0.1, "published", "largest diameter of the braid: seed 001, section 2"
+        0.016, "m", 2e-3, 0.1, "published", "largest diameter of the braid: chakarov2018, section 2"
     )
     line_volume: float = parameter(
         1e-5, "m3", 0.0, 1e-2, "assumed", "of tube and fittings: 0.5 m of 5 mm bore"

@@ -1,1 +1,1 @@
-"""Plants: regulators, muscles with memory, loads and sensors, composed."""
+"""Plants: regulators, muscles with hysteresis, loads and sensors, composed."""

@@ -12,7 +12,7 @@ class BundleRegulator:
     """A closed-loop pressure regulator in the place of the paper's valves."""
 
     max_pressure: float = parameter(
-        6e5, "Pa", 1e4, 1.2e6, "published", "600 kPa at most: seed 001, section 2"
+        6e5, "Pa", 1e4, 1.2e6, "published", "600 kPa at most: chakarov2018, section 2"
     )
     time_constant: float = parameter(
         0.05,
@@ -20,7 +20,7 @@ class BundleRegulator:
         0.002,
         2.0,
         "assumed",
-        "of its class; see the regulator of seed 003",
+        "of its class; see the regulator of positioning2021",
         spread=(0.035, 0.12),
     )
     slew_rate: float = parameter(

@@ -20,7 +20,7 @@ class JointRegulator:
         0.002,
         2.0,
         "derived",
-        "one of the two poles at 23 rad/s of seed 002, Fig. 12",
+        "one of the two poles at 23 rad/s of fluidic_muscles, Fig. 12",
         spread=(0.03, 0.06),
     )
     slew_rate: float = parameter(

@@ -1,6 +1,6 @@
 """The orthosis' measured frequency response as exact modes, and its plain regulator.
 
-Seed 000 identifies the response from pressure set-point to tension as ``G_T(s)``, Eq. (10):
+yeh2010 identifies the response from pressure set-point to tension as ``G_T(s)``, Eq. (10):
 seven poles, four zeros. Divided by its gain at rest it is what lies between set-point and
 pressure in the preset "measured". In partial fractions each mode is
 
@@ -22,7 +22,7 @@ from pam_envs.parameters import parameter
 NUMERATOR = ((1.0, 17.45, 75.79), (1.0, 7.39, 13.41))
 DENOMINATOR = ((0.0, 1.0, 12.33), (1.0, 17.97, 78.51), (1.0, 13.78, 47.43), (1.0, 8.11, 17.12))
 GAIN = 572.157
-"""Seed 000, Eq. (10), factor by factor; tension [N] over pressure [kPa]."""
+"""yeh2010, Eq. (10), factor by factor; tension [N] over pressure [kPa]."""
 REAL_MODES = 5
 MODES = REAL_MODES + 2
 """Rows of state: five real modes, real and imaginary part of the slow pair."""
@@ -37,7 +37,7 @@ class OrthosisRegulator:
     """
 
     max_pressure: float = parameter(
-        4.5e5, "Pa", 1e4, 1.2e6, "published", "seed 000, section 5.2: capacity of the muscle"
+        4.5e5, "Pa", 1e4, 1.2e6, "published", "yeh2010, section 5.2: capacity of the muscle"
     )
     time_constant: float = parameter(
         0.0425,

@@ -26,7 +26,7 @@ REFERENCE_DENSITY = 1.185
 """Of air in the reference state of ISO 8778, 20 degrees C and 1 bar [kg/m3]."""
 
 _MAKER = (
-    "maker's data sheet of the V100 series, standard V114, the valve that seed 001 names in "
+    "maker's data sheet of the V100 series, standard V114, the valve that chakarov2018 names in "
     "section 4 and says no more of"
 )
 _RESTORED = (
@@ -43,7 +43,13 @@ class OnOffValve:
     """
 
     supply_pressure: float = parameter(
-        6e5, "Pa", 5e4, 1.2e6, "published", "gauge, 6 bar: seed 001, section 2", spread=(5e5, 6e5)
+        6e5,
+        "Pa",
+        5e4,
+        1.2e6,
+        "published",
+        "gauge, 6 bar: chakarov2018, section 2",
+        spread=(5e5, 6e5),
     )
     conductance: float = parameter(
         3.7e-10,

@@ -23,7 +23,12 @@ class Regulator:
     """
 
     max_pressure: float = parameter(
-        6e5, "Pa", 1e4, 1.2e6, "published", "seed 003, section 3.2: MPPES-3-1/4-6-010, 0 to 6 bar"
+        6e5,
+        "Pa",
+        1e4,
+        1.2e6,
+        "published",
+        "positioning2021, section 3.2: MPPES-3-1/4-6-010, 0 to 6 bar",
     )
     dead_time: float = parameter(
         0.045,

@@ -30,7 +30,7 @@ ground force over body weight, centre of pressure ahead of the ankle [m], dorsif
 NATURAL_STRIDE = 1.224
 """Duration [s] of the measured stride; horizontal forces are those of this pace."""
 PAPER_STRIDE = 5.0
-"""Duration [s] of the stride of seed 000."""
+"""Duration [s] of the stride of yeh2010."""
 
 FOLDER = Path(__file__).resolve().parent.parent / "data"
 

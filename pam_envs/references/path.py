@@ -2,10 +2,10 @@
 
 A path is told by the joint angles of its two ends, between which each joint goes in a straight
 line; its poses are those of the arm on this line. So every path is within reach, and there are
-joint angles to compare a plan with. That the ends of seed 002's example are meant so, and not as
-ends of a straight line of the tool, follows from its figures: the smallest angles then peak at
-37.12 degrees and the weighted ones at 27.77, as stated; along a straight line of tip and direction
-it would be 39.0 and 28.2 degrees.
+joint angles to compare a plan with. That the ends of fluidic_muscles's example are meant so, and
+not as ends of a straight line of the tool, follows from its figures: the smallest angles then peak
+at 37.12 degrees and the weighted ones at 27.77, as stated; along a straight line of tip and
+direction it would be 39.0 and 28.2 degrees.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from pam_envs.kernels.random import seed_words, uniform
 Array = NDArray[np.float64]
 
 POINTS = 41
-"""Poses of a path (seed 002's example)."""
+"""Poses of a path (fluidic_muscles's example)."""
 STREAM = 40
 """Random stream of drawn paths (one draw number an angle)."""
 MOST_TRIES = 1000
@@ -73,7 +73,7 @@ PATHS = (
         "path_3",
         (-5.65, 7.18, -12.57, -10.03, -12.03, 7.89),
         (-10.53, 12.52, -26.49, -26.45, -25.94, 21.0),
-        "the example worked out for seed 002, section 2",
+        "the example worked out for fluidic_muscles, section 2",
         False,
     ),
 )

@@ -1,6 +1,6 @@
 """Eighth-order Butterworth low-pass of 5 Hz at 100 Hz, as second-order sections.
 
-Seed 000, section 5.2, passes the assistive torque through it before it becomes a reference. At
+yeh2010, section 5.2, passes the assistive torque through it before it becomes a reference. At
 100 Hz it delays slow signals by 163 ms.
 """
 

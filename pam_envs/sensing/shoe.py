@@ -9,7 +9,7 @@ from pam_envs.parameters import parameter
 
 GRAVITY = 9.80665
 HEEL_CELLS = 3.0
-"""Load cells near the heel (seed 000, section 4.2)."""
+"""Load cells near the heel (yeh2010, section 4.2)."""
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,10 @@ class Shoe:
         0.4,
         "assumed",
         "tip of the stiff sole, ahead of the ankle; chosen so that a walking leg whose heel is "
-        "free bears less than half of the body weight (what swing is: seed 000, section 2)",
+        "free bears less than half of the body weight (what swing is: yeh2010, section 2)",
     )
     threshold: float = parameter(
-        5.0, "kg", 0.1, 50.0, "published", "seed 000, section 4.2: mean load of the heel cells"
+        5.0, "kg", 0.1, 50.0, "published", "yeh2010, section 4.2: mean load of the heel cells"
     )
     flat_foot: float = parameter(
         0.0,
@@ -51,7 +51,7 @@ def heel_load(vertical: float, cop: float, heel: float, tip: float) -> float:
 
 @kernel
 def estimated_torque(vertical: float, cop: float, inclination_sine: float, shank: float) -> float:
-    """Return ``tau_w = f (L_0 cos q_a - r)`` [N m], seed 000, Eq. (1).
+    """Return ``tau_w = f (L_0 cos q_a - r)`` [N m], yeh2010, Eq. (1).
 
     ``inclination_sine`` is the sine of the shank's lean from the vertical, ``cos q_a``.
     """

@@ -40,7 +40,7 @@ class GaitAssistance:
         0.2, "1", 0.0, 1e3, "assumed", "cost of moving the set-point over its whole range"
     )
     soft_pressure: float = parameter(
-        4.45e5, "Pa", 0.0, 1e7, "derived", "just below the muscle's capacity of 4.5 bar, seed 000"
+        4.45e5, "Pa", 0.0, 1e7, "derived", "just below the muscle's capacity of 4.5 bar, yeh2010"
     )
     soft_deviation: float = parameter(
         0.1745, "rad", 0.0, 3.0, "assumed", "10 degrees off the wearer's path is uncomfortable"
@@ -72,7 +72,7 @@ class BraceTracking:
         0.2, "1", 0.0, 1e3, "assumed", "cost of moving the set-point over its whole range"
     )
     soft_pressure: float = parameter(
-        4.45e5, "Pa", 0.0, 1e7, "derived", "just below the muscle's capacity of 4.5 bar, seed 000"
+        4.45e5, "Pa", 0.0, 1e7, "derived", "just below the muscle's capacity of 4.5 bar, yeh2010"
     )
     highest_tension: float = parameter(
         600.0, "N", 1.0, 1e5, "assumed", "well above 355 N at the capacity, rigid rig"

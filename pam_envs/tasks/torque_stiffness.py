@@ -63,7 +63,7 @@ class TorqueStiffness:
         "cost of moving both set-points over their range, or of coils that are always on",
     )
     soft_pressure: float = parameter(
-        5.9e5, "Pa", 0.0, 1e7, "assumed", "just below the supply of 600 kPa, seed 001"
+        5.9e5, "Pa", 0.0, 1e7, "assumed", "just below the supply of 600 kPa, chakarov2018"
     )
     lightest: float = parameter(
         0.3, "kg", 0.0, 10.0, "assumed", "lightest weight that is drawn: a cup"

@@ -31,7 +31,7 @@ class Tracking:
         -0.01, "m", -1.0, 0.0, "assumed", "a stretch by a tenth of the length"
     )
     highest_contraction: float = parameter(
-        0.02, "m", 0.0, 1.0, "published", "seed 003, Table 1: axial contraction max. 20 mm"
+        0.02, "m", 0.0, 1.0, "published", "positioning2021, Table 1: axial contraction max. 20 mm"
     )
 
 

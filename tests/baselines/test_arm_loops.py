@@ -1,7 +1,8 @@
 """The loops of an arm's joints, measured on the arm: margins, sensitivity, stability together.
 
-The responses are those of the straight arm without memory to small steps of one set-point after the
-other, which move all joints. A joint's loop is opened with the loops of all others closed.
+The responses are those of the straight arm without hysteresis to small steps of one set-point
+after the other, which move all joints. A joint's loop is opened with the loops of all others
+closed.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from baselines.robust.requirements import FREQUENCIES, RobustDesign
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.plants.redundant_manipulator.rollout import simulate_manipulator
 
-PLANT = RedundantManipulator.paper().replace({"memory.width": 0.0})
+PLANT = RedundantManipulator.paper().replace({"hysteresis.width": 0.0})
 JOINTS, PERIOD, STEP, PERIODS = PLANT.stages, PLANT.control_period, 0.01, 500
 W = np.geomspace(0.05, 0.99 * np.pi / PERIOD, 500)
 LAWS = {

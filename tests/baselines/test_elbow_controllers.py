@@ -150,10 +150,10 @@ def test_allocation_with_friction_gives_the_torque_of_the_bundles_as_they_are():
 
 
 @pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach", "none"])
-def test_the_memory_is_undone_exactly_where_nothing_lags(hysteresis):
+def test_the_hysteresis_is_undone_exactly_where_nothing_lags(hysteresis):
     env = make_env(plant=quiet(hysteresis, prompt=True), reference="free", motion="sines",
                    episode_seconds=6.0)  # fmt: skip
-    record = run(env, built("elbow_allocation_memory", env))
+    record = run(env, built("elbow_allocation_hysteresis", env))
     assert rms(record) < 0.02
     plain = rms(run(env, built("elbow_allocation", env)))
     assert (plain > 8.0 * rms(record)) == (hysteresis != "none")
@@ -182,15 +182,15 @@ def test_pid_follows_the_torque_and_leaves_the_stiffness():
 def test_friction_in_the_estimate_is_most_of_what_a_pid_leaves(hysteresis):
     env = make_env(plant=quiet(hysteresis), reference="free", motion="sines",
                    episode_seconds=5.0)  # fmt: skip
-    plain, known = (rms(run(env, built(n, env))) for n in ("elbow_pid", "elbow_pid_memory"))
+    plain, known = (rms(run(env, built(n, env))) for n in ("elbow_pid", "elbow_pid_hysteresis"))
     assert known < 0.4 * plain
     bare = make_env(plant=quiet("none"), reference="free", motion="sines", episode_seconds=1.0)
-    records = [run(bare, built(n, bare)) for n in ("elbow_pid", "elbow_pid_memory")]
+    records = [run(bare, built(n, bare)) for n in ("elbow_pid", "elbow_pid_hysteresis")]
     assert np.array_equal(records[0]["output"], records[1]["output"])
 
 
 def test_the_estimate_with_friction_is_the_torque_of_the_bundles():
-    """Where the nominal memory is the true one and nothing is noisy."""
+    """Where the nominal hysteresis is the true one and nothing is noisy."""
     env = make_env(plant=quiet(), motion="sines", episode_seconds=3.0, normalize=False)
     view = make_elbow_signal_map(env.signals, env.action_signals, env.control_period)
     friction, action = make_elbow_friction(env.plant, known=True), np.array([1e5, 2e5], np.float32)
@@ -214,7 +214,9 @@ def test_the_next_steps_pressures_keep_the_torque_first_on_the_way(valves):
     """At a wall, where the stiffness has to grow at once."""
     env = make_env(plant=quiet("none", valves=valves), reference="wall", motion="sines",
                    pace=1.5 if valves == "proportional" else 6.0, episode_seconds=7.0)  # fmt: skip
-    slow, early = (run(env, built(f"elbow_allocation_{name}", env)) for name in ("memory", "early"))
+    slow, early = (
+        run(env, built(f"elbow_allocation_{name}", env)) for name in ("hysteresis", "early")
+    )
     assert np.ptp(slow["state/stiffness_reference"]) > 1.0
     assert rms(early) < 0.5 * rms(slow)
 
@@ -256,7 +258,7 @@ def test_pulses_bring_pressures_where_they_are_wanted():
 def test_on_off_valves_follow_slow_motion():
     env = make_env(plant=quiet(valves="on_off"), reference="free", motion="sines", pace=10.0,
                    episode_seconds=8.0)  # fmt: skip
-    records = {n: run(env, built(n, env)) for n in ("elbow_limp", "elbow_allocation_memory")}
+    records = {n: run(env, built(n, env)) for n in ("elbow_limp", "elbow_allocation_hysteresis")}
     torque = {name: rms(record) for name, record in records.items()}
-    assert torque["elbow_allocation_memory"] < 0.25 * torque["elbow_limp"]
-    assert records["elbow_allocation_memory"]["effort/switchings"].sum() > 20.0
+    assert torque["elbow_allocation_hysteresis"] < 0.25 * torque["elbow_limp"]
+    assert records["elbow_allocation_hysteresis"]["effort/switchings"].sum() > 20.0

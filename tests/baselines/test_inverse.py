@@ -1,4 +1,4 @@
-"""The exact inverse puts the muscle where the reference is; curves without memory do not."""
+"""The exact inverse puts the muscle where the reference is; curves without hysteresis do not."""
 
 from __future__ import annotations
 
@@ -62,7 +62,9 @@ def test_later_aims_are_due_after_longer_travel():
 
 def test_pid_on_top_rests_while_the_model_is_right_and_works_when_it_is_not(staircase, settled):
     plant = quiet("maxwell_slip", regulator__dead_time=0.045, regulator__time_constant=0.05)
-    other = plant.replace({"muscle.area": 0.96 * plant.muscle.area, "memory.width_per_load": 0.0})
+    other = plant.replace(
+        {"muscle.area": 0.96 * plant.muscle.area, "hysteresis.width_per_load": 0.0}
+    )
     env = make_env(plant=plant, load=2.55, reference=staircase, episode_seconds=SECONDS)
     right = [rollout(env, built(name, env)) for name in ("inverse", "inverse_pid")]
     assert np.std(right[0]["output"] - right[1]["output"]) < 5e-5

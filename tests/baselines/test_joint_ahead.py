@@ -76,7 +76,7 @@ def test_delay_of_the_pid_is_that_of_its_closed_loop():
 
 
 def _error(made) -> float:
-    """Return the RMS error of a sine of 20 degrees and 0.5 Hz over its amplitude, no memory."""
+    """Return the RMS error of a sine of 20 degrees and 0.5 Hz over its amplitude, no hysteresis."""
     motion = nominal_motion().discrete(PERIOD, "zoh")
 
     def wanted(t):

@@ -193,7 +193,7 @@ def test_start_at_rest_elsewhere_has_no_bump(name):
         assert float(action[0]) == pytest.approx(command, abs=1e-3 * DEGREE)
 
 
-def test_joint_with_the_models_memory_is_the_model():
+def test_joint_with_the_models_hysteresis_is_the_model():
     found = run(controller("joint_mfc_mu", ReducedRig(0.0)), np.full(100, 0.1), ReducedRig(0.0))
     np.testing.assert_allclose(found.angle[9::10], found.model, atol=1e-6)
 

@@ -1,4 +1,4 @@
-"""What controllers are built on says so if the memory is not what they take it for."""
+"""What controllers are built on says so if the hysteresis is not what they take it for."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from baselines.joint.model import joint_model
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
 
-def test_a_memory_that_fails_the_symmetry_is_warned_of_with_value_and_bound() -> None:
+def test_a_hysteresis_that_fails_the_symmetry_is_warned_of_with_value_and_bound() -> None:
     joint = AntagonisticJoint.paper(muscle__imbalance=0.08)
     with pytest.warns(UserWarning, match=r"fails the symmetry: symmetry 0\.0\d\d \(bound 0.03\)"):
         model = joint_model(joint)
-    assert model.memory is not None and model.memory.start == "low"
+    assert model.hysteresis is not None and model.hysteresis.start == "low"
 
 
 @pytest.mark.parametrize("preset", ["paper", "measured", "reduced"])
@@ -22,4 +22,4 @@ def test_presets_are_taken_without_a_word(preset: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         model = joint_model(getattr(AntagonisticJoint, preset)())
-    assert model.memory is not None and model.memory.start == "virgin"
+    assert model.hysteresis is not None and model.hysteresis.start == "virgin"

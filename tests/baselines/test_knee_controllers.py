@@ -98,7 +98,7 @@ def test_one_lag_of_preview_removes_the_lag():
 
 def test_feedback_corrects_a_muscle_that_the_model_does_not_know():
     plant = quiet("no_load")
-    other = plant.replace({"muscle.gain": 1.1, "memory.width": 0.6, "lever.stiffness": 33.0})
+    other = plant.replace({"muscle.gain": 1.1, "hysteresis.width": 0.6, "lever.stiffness": 33.0})
     env = make_knee("KneeTension", plant=other, start="paper", episode_seconds=12.0)
     records = [run(env, built(n, env, plant)) for n in ("knee_inverse_ahead", "knee_inverse_ltr")]
     rms = [np.sqrt(np.mean((r["output"] - r["reference"])[200:] ** 2)) for r in records]

@@ -38,7 +38,7 @@ def test_published_dynamics_give_the_published_bandwidth():
     assert made.sampled_figures(0.01).bandwidth == pytest.approx(26.2, abs=1.0)
 
 
-def test_rig_without_memory_is_identified_as_its_lag():
+def test_rig_without_hysteresis_is_identified_as_its_lag():
     plant = KneeOrthosis.rig(hysteresis="none")
     fit = identify(plant, "tension")
     assert fit.static_gain == pytest.approx(0.79, abs=0.01)  # 158 N / 200 kPa

@@ -46,7 +46,7 @@ def known(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(knee_design, "_DESIGNS", {})
     joint = made_env("PAM/AntagonisticJoint-v0").plant
     key = f"{joint.digest()} {joint_model.LEVELS}"
-    monkeypatch.setitem(joint_model._MEMORIES, key, ReducedRig().memory)
+    monkeypatch.setitem(joint_model._HYSTERESIS_MODELS, key, ReducedRig().hysteresis)
 
 
 def made_env(env: str) -> Any:

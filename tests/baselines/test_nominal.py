@@ -18,9 +18,9 @@ def plant(request):
 PATH = np.concatenate([np.linspace(0, 5.5e5, 9), np.linspace(5e5, 1e5, 7), [3e5, 2e5, 4e5, 3.5e5]])
 
 
-def test_memory_is_the_plants_own(plant):
-    muscle, own = Nominal(plant).at(2.55), plant.memory.inverse(2.55, 6e5)
-    state, theirs = muscle.memory.initial(1), own.initial_state((1,))
+def test_hysteresis_is_the_plants_own(plant):
+    muscle, own = Nominal(plant).at(2.55), plant.hysteresis.inverse(2.55, 6e5)
+    state, theirs = muscle.hysteresis.initial(1), own.initial_state((1,))
     for pressure in PATH:
         drive, state = muscle.felt(np.array([pressure]), state)
         expected, theirs = own.drive(np.array([pressure]), theirs)
@@ -31,9 +31,9 @@ def test_memory_is_the_plants_own(plant):
         )
 
 
-def test_inverse_undoes_the_memory_anywhere_in_a_history(plant):
+def test_inverse_undoes_the_hysteresis_anywhere_in_a_history(plant):
     muscle = Nominal(plant).at(4.55)
-    state = muscle.memory.initial(1)
+    state = muscle.hysteresis.initial(1)
     for pressure in PATH:
         _, state = muscle.felt(np.array([pressure]), state)
         for target in (1e5, 2.7e5, 4e5):
@@ -54,7 +54,7 @@ def test_static_curve_is_the_plants_own(plant):
 def test_first_measurement_explains_the_history(plant):
     muscle = Nominal(plant).at(2.55)
     peak, now = np.array([5e5, 3e5, 2e5]), np.array([2e5, 2.5e5, 2e5])
-    _, truth = muscle.felt(peak, muscle.memory.initial(3))
+    _, truth = muscle.felt(peak, muscle.hysteresis.initial(3))
     drive, truth = muscle.felt(now, truth)
     state = muscle.explain(muscle.contraction_at(drive), now)
     for target in (1.2e5, 2.8e5):

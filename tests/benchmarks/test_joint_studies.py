@@ -1,4 +1,4 @@
-"""The studies of the joint give the figures of seed 002, or known ones."""
+"""The studies of the joint give the figures of fluidic_muscles, or known ones."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from benchmarks.papers import joint_loops, joint_plants
 from benchmarks.papers import joint_studies as studies
 from benchmarks.papers.joint_inverses import width_ratio
 from benchmarks.papers.joint_studies import Setting, step
-from pam_envs.plants.antagonistic_joint.hysteresis import joint_memory
+from pam_envs.plants.antagonistic_joint.hysteresis import joint_hysteresis
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
 
@@ -45,15 +45,15 @@ def test_without_hysteresis_the_inverse_is_of_no_use():
     assert step("joint_mfc_mu", setting).overshoot == pytest.approx(4.32, abs=0.02)
 
 
-def test_assumed_memory_has_loops_of_ten_per_cent():
+def test_assumed_hysteresis_has_loops_of_ten_per_cent():
     for amplitude in (10.0 * studies.DEGREE, studies.RANGE):
         assert studies.half_gap(amplitude) == pytest.approx(0.10, abs=0.002)
-    memory = studies.assumed_memory()
-    assert memory.everett[-1, 0] == pytest.approx(2.0 * studies.RANGE)
+    hysteresis = studies.assumed_hysteresis()
+    assert hysteresis.everett[-1, 0] == pytest.approx(2.0 * studies.RANGE)
 
 
 def test_inverse_shrinks_the_loop_of_a_joint_with_muscles():
-    """On the reduced rig the memory is inverted from itself, which says nothing."""
+    """On the reduced rig the hysteresis is inverted from itself, which says nothing."""
     assert width_ratio(AntagonisticJoint.paper()) > 5.0
 
 
@@ -69,7 +69,7 @@ def test_loops_are_looked_at_as_they_were_designed():
         np.testing.assert_allclose(made, law.response(frequency), rtol=1e-6)
 
 
-def test_only_the_synthesised_loop_withstands_the_memory_and_the_fastest_withstands_least():
+def test_only_the_synthesised_loop_withstands_the_hysteresis_and_the_fastest_withstands_least():
     """What is fast on the nominal plant is not what is robust: model-following buys the latter."""
     table = {row.name: row for row in joint_loops.table()}
     assert set(table) == set(studies.STEPPED)
@@ -82,8 +82,8 @@ def test_only_the_synthesised_loop_withstands_the_memory_and_the_fastest_withsta
     assert pid.step.rise < best.step.rise < smooth.step.rise
 
 
-def test_without_memory_the_pi_alone_is_as_fast_as_model_following():
-    """What slows it is the memory, so that the ratio is the memory's."""
+def test_without_hysteresis_the_pi_alone_is_as_fast_as_model_following():
+    """What slows it is the hysteresis, so that the ratio is the hysteresis's."""
     setting = Setting(width=0.0)
     pair = [step(name, setting).rise for name in ("joint_pi", "joint_mfc_mu")]
     assert pair[0] < pair[1]
@@ -91,19 +91,19 @@ def test_without_memory_the_pi_alone_is_as_fast_as_model_following():
 
 @dataclass(frozen=True)
 class PresetRig(studies.ReducedRig):
-    """The rig of the studies with the memory of the environment's reduced plant."""
+    """The rig of the studies with the hysteresis of the environment's reduced plant."""
 
     @property
-    def memory(self):
-        return joint_memory("preisach", True).operator
+    def hysteresis(self):
+        return joint_hysteresis("preisach", True).operator
 
     def digest(self):
-        return "the rig of the studies with the preset's memory"
+        return "the rig of the studies with the preset's hysteresis"
 
 
 @pytest.mark.parametrize("name", ["joint_pi", "joint_mfc_mu"])
 def test_through_the_environment_a_step_is_what_it_is_in_the_studies(name):
-    """The same memory behind both; the environment counts its angle on an encoder of its own."""
+    """The same hysteresis behind both; the environment counts its angle on an encoder of its own."""
     rig, size = PresetRig(), 10.0
     reference = size * studies.DEGREE * np.repeat([1.0, 0.0, 1.0], 300)
     angle = studies.run(studies.controller(name, rig), reference, rig).angle

@@ -20,8 +20,8 @@ from pam_envs.plants.single_muscle.plant import SingleMuscle
 PAGE = Path(__file__).parents[2] / "docs/diagnosis_causes.md"
 EXAMPLE = Path(__file__).with_name("users_cause.py")
 PLANT = SingleMuscle.mas10("maxwell_slip")
-COMPONENTS = ("regulator", "memory", "muscle", "mass", "position", "pressure")
-WEIGHT = "memory.weight"
+COMPONENTS = ("regulator", "hysteresis", "muscle", "mass", "position", "pressure")
+WEIGHT = "hysteresis.weight"
 
 GIVEN = {
     "regulator.max_pressure": "RIG.yaml, `regulator: {max_pressure_bar}`",
@@ -30,10 +30,10 @@ GIVEN = {
     "muscle.braid_angle": "the plant; only the air used depends on it",
     "muscle.braid_strain": "the plant; `braid_force` and `stiffness` go with it and are refitted",
     "muscle.temperature": "the recording, `temperature_C`; 20 °C if there is none",
-    "memory.creep_time_1": "the plant; four fixed times cover 0.1 to 300 s",
-    "memory.creep_time_2": "the plant",
-    "memory.creep_time_3": "the plant",
-    "memory.creep_time_4": "the plant",
+    "hysteresis.creep_time_1": "the plant; four fixed times cover 0.1 to 300 s",
+    "hysteresis.creep_time_2": "the plant",
+    "hysteresis.creep_time_3": "the plant",
+    "hysteresis.creep_time_4": "the plant",
     "mass.load": "the recording, `load_N`; its error is `payload_error`",
     "mass.carried": "RIG.yaml, `load`: 1 for `hanging_mass`, 0 for `constant_force`",
     "position.noise": "RIG.yaml, `sensors: {contraction_noise_mm}`; measured if it is not given",

@@ -20,7 +20,7 @@ def spring(x):
     return 0.9 * np.tanh(x / 1.6) + 0.26 * x + 0.0009 * np.abs(x) ** 2.5 * np.sign(x)
 
 
-def memory(pressure, friction, scale=lambda p: p):
+def hysteresis(pressure, friction, scale=lambda p: p):
     """Return the pressure [bar] that pulls: relays whose half widths spread like a bell."""
     half = np.clip(friction * (1.0 + 0.45 * np.linspace(-2.0, 2.0, 41)), 0.0, None)
     share = np.exp(-0.5 * np.linspace(-2.0, 2.0, 41) ** 2)
@@ -47,7 +47,7 @@ def table(
     inflating = np.arange(len(pressures)) <= np.argmax(pressures)
     for load in loads:
         # friction that grows or falls along the range: the operator works on a warped scale
-        warped = memory(pressures, 0.45 * width(load), lambda p: p * np.exp(bend * (1 - p / 6)))
+        warped = hysteresis(pressures, 0.45 * width(load), lambda p: p * np.exp(bend * (1 - p / 6)))
         ends = np.linspace(0.0, 8.0, 4001)
         pull = np.interp(warped, ends * np.exp(bend * (1 - ends / 6)), ends)
         x = np.interp(pull - shift(load), spring(GRID), GRID)

@@ -152,7 +152,7 @@ def test_a_rival_that_only_has_to_be_refitted_is_not_apart():
 @compiled
 def test_shutting_the_valve_is_proposed_for_a_leak_where_it_can_be_shut():
     leak = rival("leak", {"regulator.leak": 0.011}, regulator__leak=0.01)
-    creep = rival("creep", {"memory.creep_2": 0.011}, memory__creep_2=0.01)
+    creep = rival("creep", {"hysteresis.creep_2": 0.011}, hysteresis__creep_2=0.01)
     able = proposed(leak, creep)
     assert able["name"] == "valve_shut"
     assert able["enough"]
@@ -169,7 +169,7 @@ def test_shutting_the_valve_is_proposed_for_a_leak_where_it_can_be_shut():
 def test_the_nearest_rival_decides():
     """Each rival alone has its best experiment; for all of them the least one counts."""
     leak = rival("leak", regulator__leak=0.01)
-    creep = rival("creep", memory__creep_2=0.01)
+    creep = rival("creep", hysteresis__creep_2=0.01)
     late = rival("dead_time", regulator__dead_time=0.03)
     both = proposed(leak, creep, late)
     alone = [proposed(leak, other)["separation"] for other in (creep, late)]

@@ -38,22 +38,22 @@ compiled = pytest.mark.skipif(not COMPILED, reason="too many control periods for
 LOAD = 2.0
 KELVIN = 305.0
 HIDDEN = {
-    "creep": {"memory.creep_2": 0.08, "memory.creep_3": 0.12},
+    "creep": {"hysteresis.creep_2": 0.08, "hysteresis.creep_3": 0.12},
     "dead_time": {"regulator.dead_time": 0.06},
-    "load_dependent_hysteresis": {"memory.width_per_load": -0.2},
+    "load_dependent_hysteresis": {"hysteresis.width_per_load": -0.2},
     "exhaust_asymmetry": {"regulator.exhaust_ratio": 2.0},
 }
 SLOW = {
     "valve_dead_band": {"regulator.dead_band": 1.5e4},
     "temperature": {"muscle.temperature_gain": 0.006},
-    "threshold_pressure": {"memory.threshold": 3e4},
+    "threshold_pressure": {"hysteresis.threshold": 3e4},
     "payload_error": {"mass.load_error": 0.5},
 }
 """Hidden too; the loop finds most of these itself."""
 
 
 def muscle(**changes: float) -> SingleMuscle:
-    values = {"mass.load": LOAD, "regulator.dead_time": 0.01, "memory.width_per_load": 0.0}
+    values = {"mass.load": LOAD, "regulator.dead_time": 0.01, "hysteresis.width_per_load": 0.0}
     return SingleMuscle.mas10().replace(values | changes)
 
 
@@ -127,7 +127,7 @@ def test_a_reset_plant_repeats_itself_and_its_noise() -> None:
 def test_what_cannot_be_stepped_is_refused() -> None:
     with pytest.raises(ValueError, match=r"period = 0\.02"):
         PlantStepper(muscle(), LOAD, period=0.02)
-    with pytest.raises(ValueError, match="one memory"):
+    with pytest.raises(ValueError, match="one hysteresis"):
         PlantBatch([muscle(), SingleMuscle.mas10("none")], LOAD)
 
 
@@ -252,7 +252,7 @@ def test_an_oracle_that_is_the_extended_plant_leaves_no_gap() -> None:
 
 @compiled
 def test_a_plant_that_cannot_move_gives_no_comparison() -> None:
-    weak = muscle(**{"regulator.supply_pressure": 5e4, "memory.threshold": 1e5})
+    weak = muscle(**{"regulator.supply_pressure": 5e4, "hysteresis.threshold": 1e5})
     assert closed_loop(muscle(), weak, load=LOAD) is None
 
 

@@ -33,13 +33,13 @@ EVERY_EFFECT = {
     "regulator.supply_time": 0.08,
     "regulator.ring_share": 0.1,
     "regulator.ring_flow": 0.05,
-    "memory.shape": 1.3,
-    "memory.pressure_slope": 0.2,
-    "memory.pressure_bend": -0.1,
-    "memory.creep_1": 0.02,
-    "memory.first_width": 0.2,
-    "memory.first_loss": 0.01,
-    "memory.threshold": 5e3,
+    "hysteresis.shape": 1.3,
+    "hysteresis.pressure_slope": 0.2,
+    "hysteresis.pressure_bend": -0.1,
+    "hysteresis.creep_1": 0.02,
+    "hysteresis.first_width": 0.2,
+    "hysteresis.first_loss": 0.01,
+    "hysteresis.threshold": 5e3,
     "muscle.area_curve": 0.5,
     "muscle.temperature": 300.0,
     "muscle.temperature_gain": 0.002,
@@ -192,8 +192,8 @@ PLAIN: dict[str, dict[str, dict[str, Any]]] = {
         "short": {"plant": RedundantManipulator.paper("none", SHORT), "reference": SHORT_PATH},
     },
 }
-"""What runs uncompiled only: each memory, mounting and regulator is machine code of its own, half a
-minute to make, and a mounting is compiled with another memory already."""
+"""What runs uncompiled only: each hysteresis, mounting and regulator is machine code of its own, half a
+minute to make, and a mounting is compiled with another hysteresis already."""
 
 LIVELY: dict[str, dict[str, Any]] = {
     "PAM/MusclePositioning-v0": {"load": None},

@@ -19,8 +19,8 @@ STILL: dict[str, Any] = {
     "start": "straight",
     "episode_seconds": 60.0,
 }
-IDEAL = AntagonisticJoint.paper(memory__width=0.0, link__gravity=0.0)
-"""Without memory and weight: what the inverse of the static laws is exact for."""
+IDEAL = AntagonisticJoint.paper(hysteresis__width=0.0, link__gravity=0.0)
+"""Without hysteresis and weight: what the inverse of the static laws is exact for."""
 
 
 def make(**arguments: Any) -> Any:
@@ -36,7 +36,7 @@ def run(env: Any, action: list[float], seconds: float) -> dict[str, np.ndarray]:
     return {k: np.array([i[k] for i in infos]) for k in infos[0]}
 
 
-def test_a_set_point_is_the_angle_at_rest_without_memory_weight_and_load() -> None:
+def test_a_set_point_is_the_angle_at_rest_without_hysteresis_weight_and_load() -> None:
     for angle in (-0.45, -0.1, 0.3):
         info = run(make(plant=IDEAL), [angle], 2.0)
         assert info["output"][-1] == pytest.approx(angle, abs=1e-4)
@@ -46,7 +46,7 @@ def test_a_set_point_is_the_angle_at_rest_without_memory_weight_and_load() -> No
         )
 
 
-def test_memory_makes_the_angle_depend_on_the_way() -> None:
+def test_hysteresis_makes_the_angle_depend_on_the_way() -> None:
     env = make()
     env.reset(seed=0)
     rests = []

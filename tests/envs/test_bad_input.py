@@ -189,12 +189,12 @@ def test_an_unknown_argument_names_the_known_ones(name: str) -> None:
         gym.make_vec(name, 2, vectorization_mode="vector_entry_point", previev=3)
 
 
-def test_a_plant_with_another_memory_is_refused() -> None:
+def test_a_plant_with_another_hysteresis_is_refused() -> None:
     plant = SingleMuscle.mas10("preisach")
-    with pytest.raises(ValueError, match="the plant's memory is 'preisach'"):
+    with pytest.raises(ValueError, match="the plant's hysteresis is 'preisach'"):
         gym.make("PAM/MusclePositioning-v0", plant=plant, hysteresis="maxwell_slip")
     env = gym.make("PAM/MusclePositioning-v0", plant=plant, hysteresis="none")
-    assert env.unwrapped.plant.memory.kind == "none"
+    assert env.unwrapped.plant.hysteresis.kind == "none"
 
 
 GOOD = {"schema": 1, "family": "single_muscle"}
@@ -226,11 +226,17 @@ GOOD = {"schema": 1, "family": "single_muscle"}
             "provenance 'rumour'",
         ),
         ("schema: 1\nfamily: single_muscle\nparameters: [1]", "must be a mapping"),
-        ("schema: 1\nfamily: single_muscle\nmemory: {kind: rope}", "memory must be a mapping"),
-        ("schema: 1\nfamily: single_muscle\nmemory: {kind: preisach}", "needs exactly the keys"),
+        (
+            "schema: 1\nfamily: single_muscle\nhysteresis: {kind: rope}",
+            "hysteresis must be a mapping",
+        ),
+        (
+            "schema: 1\nfamily: single_muscle\nhysteresis: {kind: preisach}",
+            "needs exactly the keys",
+        ),
         (
             "schema: 1\nfamily: single_muscle\n"
-            "memory: {kind: maxwell_slip, linear: 0.2, thresholds: [1e4], weights: [0.5]}",
+            "hysteresis: {kind: maxwell_slip, linear: 0.2, thresholds: [1e4], weights: [0.5]}",
             "total slope",
         ),
         ("schema: 1\nfamily: single_muscle\nsubsteps: 0", "substeps"),

@@ -20,9 +20,9 @@ from pam_envs.references.path import PATHS
 NAME = "PAM/RedundantManipulator-v0"
 PLANT = RedundantManipulator.paper()
 LIGHT = RedundantManipulator.paper(
-    chain=SerialChain.uniform(gravity=(0.0, 0.0, 0.0)), memory__width=0.0
+    chain=SerialChain.uniform(gravity=(0.0, 0.0, 0.0)), hysteresis__width=0.0
 )
-"""Without memory and weight: set-points are the angles at rest."""
+"""Without hysteresis and weight: set-points are the angles at rest."""
 
 
 def make(**arguments: Any) -> Any:
@@ -75,7 +75,7 @@ def test_the_planned_angles_take_the_tool_along_the_path_within_the_limits() -> 
     assert peak == pytest.approx(math.radians(37.12), abs=math.radians(0.02))
 
 
-def test_without_memory_and_weight_the_arm_rests_on_its_plan() -> None:
+def test_without_hysteresis_and_weight_the_arm_rests_on_its_plan() -> None:
     first = follow(make(plant=LIGHT), 0.5)[-1]
     assert first["state/joint_error"] < 1e-6
     assert first["output"] < 1e-5

@@ -1,4 +1,4 @@
-"""Plays and stops: memory properties to the last bit, duality, and energy."""
+"""Plays and stops: hysteresis properties to the last bit, duality, and energy."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def leaky(operator: PlayOperator) -> Step:
 
 
 def return_point_error(step: Step, start: Array, history: list[float], part: float) -> float:
-    """Leave the last branch for a part of it, come back, and compare the memory."""
+    """Leave the last branch for a part of it, come back, and compare the hysteresis."""
     before, turn = history[-2:]
     at_turn = run(step, history, start)
     back = run(step, [turn + part * (before - turn), turn], at_turn)
@@ -89,7 +89,7 @@ def refinement_error(step: Step, start: Array, history: list[float], splits: int
 
 @few
 @given(plays(), st.lists(inputs, min_size=2, max_size=12), st.floats(0.0, 1.0))
-def test_return_point_memory_is_exact(operator, history, part):
+def test_return_point_hysteresis_is_exact(operator, history, part):
     assert return_point_error(exact(operator), operator.initial_state(), history, part) == 0.0
 
 

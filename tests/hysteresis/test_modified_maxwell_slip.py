@@ -1,4 +1,4 @@
-"""The modified Maxwell-slip model: forward and inverse, memory, energy, one spring for all."""
+"""The modified Maxwell-slip model: forward and inverse, hysteresis, energy, one spring for all."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def test_batch_gives_the_bits_of_single_histories():
         np.testing.assert_array_equal(end, last)
 
 
-def test_not_a_number_leaves_the_memory_alone():
+def test_not_a_number_leaves_the_hysteresis_alone():
     state = RIG.simulate([3e5])[1]
     stiffness, after = RIG.step(np.nan, state)
     assert np.isnan(stiffness)

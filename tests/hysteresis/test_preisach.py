@@ -1,4 +1,4 @@
-"""The Preisach operator against relays, its memory properties, and its inverse."""
+"""The Preisach operator against relays, its hysteresis properties, and its inverse."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Relays:
     def __init__(self, weights: Array, fine: int, virgin: bool) -> None:
         near = np.eye(len(weights))[:, None, :, None]
         inner = np.eye(fine)[None, :, None, :]
-        # relays of a cell are spread evenly; on the diagonal they are free of memory
+        # relays of a cell are spread evenly; on the diagonal they are free of hysteresis
         share = near * inner / fine + (1.0 - near) / fine**2
         size = len(weights) * fine
         self.weights = (weights[:, None, :, None] * share).reshape(size, size)
@@ -147,12 +147,12 @@ def test_textbook_sum_over_dominant_extrema(operator, history):
     assert y[-1] == pytest.approx(expected, abs=1e-12 * scale(operator))
 
 
-# --- memory ---------------------------------------------------------------------------------------
+# --- hysteresis ---------------------------------------------------------------------------------------
 
 
 @few
 @given(operators(), st.lists(inputs, min_size=2, max_size=14), st.floats(0.0, 1.0))
-def test_return_point_memory_is_exact(operator, history, part):
+def test_return_point_hysteresis_is_exact(operator, history, part):
     before, turn = history[-2:]
     y, _ = operator.simulate([*history, turn + part * (before - turn), turn])
     assert y[-1] == y[len(history) - 1]
@@ -162,25 +162,25 @@ def test_return_point_memory_is_exact(operator, history, part):
 @given(operators(), histories, inputs)
 def test_larger_excursion_wipes_out(operator, history, last):
     largest = max(map(abs, history))
-    through, memory = operator.simulate([largest, -largest, *history, largest, last])
+    through, hysteresis = operator.simulate([largest, -largest, *history, largest, last])
     without, short = operator.simulate([largest, -largest, largest, last])
     assert through[-1] == without[-1]
-    assert memory.counts == short.counts
+    assert hysteresis.counts == short.counts
     used = int(short.counts)
-    np.testing.assert_array_equal(memory.stack[:used], short.stack[:used])
-    np.testing.assert_array_equal(memory.sums[:used], short.sums[:used])
+    np.testing.assert_array_equal(hysteresis.stack[:used], short.stack[:used])
+    np.testing.assert_array_equal(hysteresis.sums[:used], short.sums[:used])
 
 
 @few
 @given(operators(), histories, st.integers(2, 7))
 def test_speed_and_stops_on_the_way_change_nothing(operator, history, splits):
-    y, memory = operator.simulate(history)
+    y, hysteresis = operator.simulate(history)
     fine = [history[0], history[0]]
     for a, b in pairwise(history):
         fine += [*np.linspace(a, b, splits)[1:-1], b, b]
     z, other = operator.simulate(fine)
     assert z[-1] == y[-1]
-    assert other.counts == memory.counts
+    assert other.counts == hysteresis.counts
 
 
 def leaky_play(x: list[float]) -> Array:
@@ -201,13 +201,14 @@ def preisach(x: list[float]) -> Array:
 def test_properties_notice_a_leaky_play():
     history = [0.9, -0.8, 0.7]
     gaps = []
-    for memory in (preisach, leaky_play):
-        turned = memory([*history, 0.1, 0.7])
-        wiped, clean = memory([0.9, -0.9, *history, 0.9]), memory([0.9, -0.9, 0.9])
-        fine = memory([*history[:1], 0.5, 0.0, *history[1:]])
-        coarse = memory(history)
+    for hysteresis in (preisach, leaky_play):
+        turned = hysteresis([*history, 0.1, 0.7])
+        wiped, clean = hysteresis([0.9, -0.9, *history, 0.9]), hysteresis([0.9, -0.9, 0.9])
+        fine = hysteresis([*history[:1], 0.5, 0.0, *history[1:]])
+        coarse = hysteresis(history)
         loops = [
-            memory([*first, -0.3, 0.3, -0.3, 0.0, 0.3, -0.3])[-4:] for first in ([0.9], [0.9, -0.9])
+            hysteresis([*first, -0.3, 0.3, -0.3, 0.0, 0.3, -0.3])[-4:]
+            for first in ([0.9], [0.9, -0.9])
         ]
         gaps.append(
             [
@@ -269,8 +270,8 @@ def test_a_full_stack_forgets_the_smallest_loop_only():
     shallow = Preisach.from_weights(weights, LOW, HIGH, 6)
     history = [*SHRINKING, *np.linspace(SHRINKING[-1], 0.95, 41)]
     full, _ = deep.simulate(history)
-    short, memory = shallow.simulate(history)
-    assert memory.counts <= 6
+    short, hysteresis = shallow.simulate(history)
+    assert hysteresis.counts <= 6
     assert np.max(np.abs(full - short)) > 1e-3  # something was forgotten
     kept = np.array(history) > SHRINKING[2]  # beyond the turns that were not stored
     np.testing.assert_array_equal(full[-10:][kept[-10:]], short[-10:][kept[-10:]])
@@ -283,8 +284,8 @@ def test_a_full_stack_gives_no_jump(weights, history):
     operator = Preisach.from_weights(weights, LOW, HIGH, 4)
     steepest = np.max(np.diff(operator.everett, axis=0)) * operator.inverse_cell
     path = np.concatenate([np.linspace(a, b, 30) for a, b in pairwise([LOW, *history])])
-    y, memory = operator.simulate(path)
-    assert memory.counts <= 4
+    y, hysteresis = operator.simulate(path)
+    assert hysteresis.counts <= 4
     limit = steepest * np.abs(np.diff(path)) + 1e-12 * scale(operator)
     assert np.all(np.abs(np.diff(y)) <= limit)
 
@@ -351,13 +352,13 @@ def test_inverse_with_a_full_stack(weights, numbers):
 
 @few
 @given(operators(), histories)
-def test_inverse_leaves_the_memory_of_the_operator(operator, history):
-    y, memory = operator.simulate(history)
+def test_inverse_leaves_the_hysteresis_of_the_operator(operator, history):
+    y, hysteresis = operator.simulate(history)
     state = operator.initial_state()
     for value in y:
         _, state = operator.inverse_step(value, state)
     again, _ = operator.simulate(SHRINKING, state)
-    np.testing.assert_allclose(again, operator.simulate(SHRINKING, memory)[0], atol=1e-9)
+    np.testing.assert_allclose(again, operator.simulate(SHRINKING, hysteresis)[0], atol=1e-9)
 
 
 def test_out_of_reach_gives_the_end_of_the_range():
@@ -557,10 +558,10 @@ for start in ("low", "virgin"):
         model = Preisach.from_density(lambda a, b: 1.0 + 0.3 * (a + b) ** 2, -1.0, 1.0, 12, depth)
         model = Preisach(-1.0, 1.0, model.plus_linear(0.3).table, depth, start)
         y, state = model.simulate(x)
-        memory = model.initial_state()
+        hysteresis = model.initial_state()
         z = []
         for value in y:
-            u, memory = model.inverse_step(value, memory)
+            u, hysteresis = model.inverse_step(value, hysteresis)
             z.append(u)
         print(*[float(v).hex() for v in [*y, *z, *state.stack, *state.sums]], state.counts)
 """

@@ -1,4 +1,4 @@
-"""Asking a Preisach memory what it would do leaves it alone and tells the truth."""
+"""Asking a Preisach hysteresis what it would do leaves it alone and tells the truth."""
 
 from __future__ import annotations
 

@@ -72,16 +72,16 @@ def test_rank_names_what_the_tables_cannot_fix(fits: dict[str, cc.CyclesFit]) ->
         assert fixed[f"regulator.{name}"] < 1e-20
     assert max(fixed["mass.moving_mass"], fixed["mass.damping"]) < 1e-20
     assert fixed["muscle.area"] > 0.9
-    assert fixed["memory.width_per_load"] > 0.9
+    assert fixed["hysteresis.width_per_load"] > 0.9
 
 
 def test_a_known_muscle_is_recovered_from_its_own_cycles() -> None:
-    true = SingleMuscle.mas10().replace({"muscle.area": 9.5e-4, "memory.width_per_load": -0.03})
+    true = SingleMuscle.mas10().replace({"muscle.area": 9.5e-4, "hysteresis.width_per_load": -0.03})
     made = [cc.quasi_static(true, CYCLES.pressures, m) for m in CYCLES.loads.tolist()]
     fit = cc.fit_cycles(dataclasses.replace(CYCLES, contractions=np.array(made)))
     assert fit.rms() < 0.02e-3
     assert fit.plant.value("muscle.area") == pytest.approx(9.5e-4, rel=0.03)
-    assert fit.plant.value("memory.width_per_load") == pytest.approx(-0.03, abs=0.005)
+    assert fit.plant.value("hysteresis.width_per_load") == pytest.approx(-0.03, abs=0.005)
 
 
 def test_preisach_is_congruent_in_drive_and_not_in_contraction() -> None:

@@ -7,10 +7,10 @@ import pytest
 
 from baselines.positioning.nominal import LoadedMuscle
 from benchmarks.papers.joint_inverses import inhomogeneous, inverse_error
-from benchmarks.papers.joint_studies import RANGE, assumed_memory
+from benchmarks.papers.joint_studies import RANGE, assumed_hysteresis
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.identification.everett_series import series_inverse
-from pam_envs.identification.joint_forc import measure_joint, measure_memory, symmetrised
+from pam_envs.identification.joint_forc import measure_hysteresis, measure_joint, symmetrised
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 
@@ -19,7 +19,7 @@ def _rig(model):
 
 
 def test_symmetric_operator_passes_and_is_given_back():
-    model = assumed_memory()
+    model = assumed_hysteresis()
     found = measure_joint(_rig(model), RANGE, levels=len(model.table))
     assert found.verdict.startswith("passes")
     assert found.symmetry < 1e-12 and found.congruency < 1e-12 and found.wiping_out < 1e-12
@@ -32,20 +32,20 @@ def test_single_muscle_fails_the_symmetry():
     muscle = LoadedMuscle(SingleMuscle.mas10("maxwell_slip"), 0.0)
 
     def rig(pressures):
-        state, outputs = muscle.memory.initial(1), []
+        state, outputs = muscle.hysteresis.initial(1), []
         for pressure in pressures:
             drive, state = muscle.felt(np.array([pressure]), state)
             outputs.append(float(muscle.contraction_at(drive)[0]))
         return np.array(outputs)
 
-    found = measure_memory(rig, 0.0, 6e5)
+    found = measure_hysteresis(rig, 0.0, 6e5)
     assert not found.symmetric and found.symmetry > 0.1
     assert found.verdict.startswith("fails")
     assert found.model.start == "low"
 
 
 def test_asymmetric_preisach_operator_fails_the_symmetry_alone():
-    weights = assumed_memory().weights * np.linspace(0.5, 1.5, 60)[:, None]
+    weights = assumed_hysteresis().weights * np.linspace(0.5, 1.5, 60)[:, None]
     model = Preisach.from_weights(weights, -RANGE, RANGE)
     found = measure_joint(_rig(model), RANGE)
     assert found.preisach and not found.symmetric
@@ -55,17 +55,17 @@ def test_asymmetric_preisach_operator_fails_the_symmetry_alone():
 
 
 def test_output_behind_a_bent_curve_is_not_congruent():
-    memory = assumed_memory()
-    found = measure_joint(lambda u: np.exp(6.0 * memory.simulate(u)[0]), RANGE)
+    hysteresis = assumed_hysteresis()
+    found = measure_joint(lambda u: np.exp(6.0 * hysteresis.simulate(u)[0]), RANGE)
     assert found.congruency > 0.1
     assert found.verdict.startswith("fails as a Preisach operator")
 
 
 def test_output_that_creeps_does_not_wipe_out():
-    memory = assumed_memory()
+    hysteresis = assumed_hysteresis()
 
     def rig(inputs):
-        outputs = memory.simulate(inputs)[0]
+        outputs = hysteresis.simulate(inputs)[0]
         return outputs + 1e-3 * np.arange(len(outputs))
 
     assert measure_joint(rig, RANGE).wiping_out > 0.03
@@ -84,7 +84,7 @@ def test_recursion_is_exact_and_the_printed_sum_is_not():
 
 
 def test_printed_sum_is_exact_up_to_the_first_turn_and_for_plays():
-    mild, homogeneous = inhomogeneous(), assumed_memory()
+    mild, homogeneous = inhomogeneous(), assumed_hysteresis()
     plays = Preisach.from_weights(homogeneous.weights, -RANGE, RANGE)
     for model, shares in ((mild, (0.2, 0.7, 0.4)), (plays, (0.8, 0.3, 0.6, 0.45, 0.9))):
         outputs = float(model.everett[-1, 0]) * np.array(shares)

@@ -1,4 +1,4 @@
-"""One muscle of a joint under a load: its memory is no symmetric one, its joint's is."""
+"""One muscle of a joint under a load: its hysteresis is no symmetric one, its joint's is."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_the_joints_pass_and_one_of_their_muscles_fails_the_symmetry() -> None:
     assert single.model.start == "low"
 
 
-def test_joints_pass_with_either_memory_and_unequal_muscles_do_not() -> None:
+def test_joints_pass_with_either_hysteresis_and_unequal_muscles_do_not() -> None:
     from pam_envs.identification.joint_forc import measure_joint
 
     for joint in (AntagonisticJoint.paper("preisach"), AntagonisticJoint.measured("preisach")):
@@ -37,15 +37,17 @@ def test_joints_pass_with_either_memory_and_unequal_muscles_do_not() -> None:
 def test_at_rest_the_muscle_carries_its_load() -> None:
     """Force of the law less friction, worked out anew with plays of its own."""
     joint = AntagonisticJoint.paper()
-    operator, memory = joint.memory.operator, joint.memory
+    operator, hysteresis = joint.hysteresis.operator, joint.hysteresis
     assert isinstance(operator, PlayOperator)
     pressures = 1e5 * np.array([2.0, 6.0, 3.0, 4.5, 1.0, 6.5])
     found = HangingMuscle(joint, load=80.0).rest_contractions(pressures)
     start = float(joint.lever.contraction(0.0, joint.muscle.rest_length)[0])
     lag = (found - start) - operator.simulate(found - start)[0]
-    force = joint.muscle.law(pressures, found) - (memory.base + memory.rate * pressures) * lag
+    force = (
+        joint.muscle.law(pressures, found) - (hysteresis.base + hysteresis.rate * pressures) * lag
+    )
     np.testing.assert_allclose(force, 80.0, atol=1e-6)
-    without = HangingMuscle(joint.replace({"memory.width": 0.0}), load=80.0)
+    without = HangingMuscle(joint.replace({"hysteresis.width": 0.0}), load=80.0)
     bare = without.rest_contractions(pressures)
     np.testing.assert_allclose(joint.muscle.law(pressures, bare), 80.0, atol=1e-6)
     assert np.all((found < bare)[[1, 3, 5]]) and np.all((found > bare)[[2, 4]])

@@ -24,7 +24,7 @@ ANGLES = np.linspace(0.0, STROKE, 25)
 
 
 def shapes(angle: float, most: float = MOST) -> tuple[float, float, float, float]:
-    """Return phi_a, phi_b, psi_a, psi_b of seed 001's elbow, Eqs. 8, 9, 11 to 14."""
+    """Return phi_a, phi_b, psi_a, psi_b of chakarov2018's elbow, Eqs. 8, 9, 11 to 14."""
     contractions = (RADIUS * (STROKE - angle), RADIUS * angle)
     phi = [(LENGTH - c) * (most - c) for c in contractions]
     psi = [2.0 * c - LENGTH - most for c in contractions]

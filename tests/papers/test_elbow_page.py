@@ -84,7 +84,7 @@ def test_what_a_hand_meets_in_a_small_motion() -> None:
         assert f"{met:.1f}" in other
 
 
-@pytest.mark.parametrize("name", ["elbow_pid", "elbow_pid_memory", "elbow_allocation"])
+@pytest.mark.parametrize("name", ["elbow_pid", "elbow_pid_hysteresis", "elbow_allocation"])
 def test_the_table_of_the_environments_page_roughly(name: str) -> None:
     """One of the four episodes that a cell is the mean of."""
     env: Any = gym.make("PAM/ElbowOrthosis-v0", reference="free", motion="sines",

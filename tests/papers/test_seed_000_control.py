@@ -1,4 +1,4 @@
-"""Seed 000: printed transfer functions, their loop, and tracking with the inverse."""
+"""yeh2010: printed transfer functions, their loop, and tracking with the inverse."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Seed 001: the figures of the elbow orthosis, met or named as missed."""
+"""chakarov2018: the figures of the elbow orthosis, met or named as missed."""
 
 from __future__ import annotations
 

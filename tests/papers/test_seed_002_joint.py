@@ -1,4 +1,4 @@
-"""Seed 002, sections 3 and 4: every figure of the joint's control, and which of them are missed."""
+"""fluidic_muscles, sections 3 and 4: every figure of the joint's control, and which of them are missed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Seed 002, section 2: three paths, planned without and with the weight (2.1)."""
+"""fluidic_muscles, section 2: three paths, planned without and with the weight (2.1)."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.identification.joint_static import fit_angle_plays
 from pam_envs.plants.antagonistic_joint import rows as K
-from pam_envs.plants.antagonistic_joint.hysteresis import contraction_plays, joint_memory
+from pam_envs.plants.antagonistic_joint.hysteresis import contraction_plays, joint_hysteresis
 from pam_envs.plants.antagonistic_joint.pair import feed_forward
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rollout import simulate_joint
@@ -34,7 +34,7 @@ def half_gap(plant: AntagonisticJoint, degrees: float) -> float:
 
 def muscle_under_load(plant: AntagonisticJoint, pressures: np.ndarray) -> np.ndarray:
     """Contractions of one muscle that carries 100 N, at rest after each pressure [Pa]."""
-    plays, memory = contraction_plays(), plant.memory
+    plays, hysteresis = contraction_plays(), plant.hysteresis
     start = float(plant.lever.contraction(0.0, plant.muscle.rest_length)[0])
     state, made = plays.initial_state(), []
     for p in pressures:
@@ -42,7 +42,7 @@ def muscle_under_load(plant: AntagonisticJoint, pressures: np.ndarray) -> np.nda
         for _ in range(45):
             x = 0.5 * (low + high)
             felt, after = plays.step(x - start, state)
-            friction = (memory.base + memory.rate * p) * (x - start - float(felt))
+            friction = (hysteresis.base + hysteresis.rate * p) * (x - start - float(felt))
             if float(plant.muscle.law(p, x)) - friction > 100.0:
                 low = x
             else:
@@ -93,7 +93,9 @@ def test_forces_have_the_co_contraction_and_the_torque_that_were_asked_for(
 
 
 @pytest.mark.parametrize("plant", MADE)
-def test_the_feed_forward_has_gain_one_without_memory_and_load(plant: AntagonisticJoint) -> None:
+def test_the_feed_forward_has_gain_one_without_hysteresis_and_load(
+    plant: AntagonisticJoint,
+) -> None:
     low, high = plant.angle_range
     commands = np.linspace(low, high, 21)
     for prestress in (20.0, 50.0, 100.0):
@@ -160,7 +162,7 @@ def test_more_co_contraction_makes_this_lever_softer() -> None:
     assert AntagonisticJoint().nominal.stiffness == pytest.approx(stiffness[1], abs=0.05)
 
 
-# --- memory -------------------------------------------------------------------------------------
+# --- hysteresis -------------------------------------------------------------------------------------
 
 
 def test_loops_have_a_half_gap_of_a_tenth() -> None:
@@ -168,7 +170,7 @@ def test_loops_have_a_half_gap_of_a_tenth() -> None:
     assert [half_gap(plant, a) for a in (15.0, 20.0)] == pytest.approx([0.1, 0.1], abs=0.005)
     assert [half_gap(plant, a) for a in (10.0, 29.0)] == pytest.approx([0.08, 0.08], abs=0.01)
     assert half_gap(AntagonisticJoint.paper("none"), 15.0) < 1e-9
-    assert half_gap(AntagonisticJoint.paper(memory__width=0.5), 15.0) < 0.07
+    assert half_gap(AntagonisticJoint.paper(hysteresis__width=0.5), 15.0) < 0.07
 
 
 def test_the_gain_after_a_turn_is_that_of_the_published_uncertainty() -> None:
@@ -179,7 +181,7 @@ def test_the_gain_after_a_turn_is_that_of_the_published_uncertainty() -> None:
     assert np.degrees(rests[-2] - rests[-1]) == pytest.approx(0.65, abs=0.02)
 
 
-def test_both_memories_have_the_same_loops() -> None:
+def test_both_hysteresis_models_have_the_same_loops() -> None:
     commands = np.radians(np.concatenate([a * np.sin(np.linspace(0, 6, 60)) for a in (25, 12, 5)]))
     for preset in ("paper", "reduced"):
         first, second = (
@@ -201,20 +203,20 @@ def test_the_joints_loop_is_symmetric_and_a_muscles_is_not() -> None:
 
 
 def test_friction_takes_at_most_the_hysteresis_of_the_data_sheet() -> None:
-    """3 % of the nominal length at constant force (seed 002, section 1.1), at any pressure."""
+    """3 % of the nominal length at constant force (fluidic_muscles, section 1.1), at any pressure."""
     plant, plays = AntagonisticJoint.paper(), contraction_plays()
     lag = sum(w * t for w, t in zip(plays.weights, plays.thresholds, strict=True))
     pressures, h = np.linspace(0.5e5, 6.5e5, 13), 1e-5
     for x in np.linspace(0.0, 0.24, 25):
         pulling = pressures[plant.muscle.law(pressures, x) > 0.0]
-        friction = (plant.memory.base + plant.memory.rate * pulling) * lag
+        friction = (plant.hysteresis.base + plant.hysteresis.rate * pulling) * lag
         slope = (plant.muscle.law(pulling, x - h) - plant.muscle.law(pulling, x + h)) / (2 * h)
         assert np.all(2.0 * friction / slope < 0.03)
 
 
-def test_the_reduced_memory_is_identified_on_the_plant_with_muscles() -> None:
+def test_the_reduced_hysteresis_is_identified_on_the_plant_with_muscles() -> None:
     found, error = fit_angle_plays(AntagonisticJoint.paper())
-    made = joint_memory("maxwell_slip", True).operator
+    made = joint_hysteresis("maxwell_slip", True).operator
     assert isinstance(made, PlayOperator)
     assert np.allclose(found.weights, made.weights, atol=1e-3)
     assert math.degrees(error) < 0.17
@@ -270,16 +272,16 @@ def test_bad_values_are_refused(change: dict[str, float], words: str) -> None:
         AntagonisticJoint.paper("none", **change)
 
 
-def test_memories_that_cannot_be_simulated_are_refused() -> None:
+def test_hysteresis_models_that_cannot_be_simulated_are_refused() -> None:
     plant = AntagonisticJoint.paper()
     steep = PlayOperator((0.01,), (0.5,), 0.7)
     many = PlayOperator(tuple(np.linspace(0.001, 0.03, 9)), (0.1,) * 9, 0.1)
     low = Preisach.from_play(contraction_plays(), 0.0, 0.3)
     for operator, words in ((steep, "slope"), (many, "plays"), (low, "virgin")):
-        memory = dataclasses.replace(plant.memory, operator=operator)
+        hysteresis = dataclasses.replace(plant.hysteresis, operator=operator)
         with pytest.raises(ValueError, match=words):
-            dataclasses.replace(plant, memory=memory)
+            dataclasses.replace(plant, hysteresis=hysteresis)
     with pytest.raises(ValueError, match="dynamics"):
         AntagonisticJoint(dynamics="else")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="choose"):
-        joint_memory("else")  # type: ignore[arg-type]
+        joint_hysteresis("else")  # type: ignore[arg-type]

@@ -48,7 +48,7 @@ def commands_for(plant: ElbowOrthosis, n: int, seed: int = 0) -> Array:
 
 
 class Model:
-    """Forearm and bundles without memory, from their equations."""
+    """Forearm and bundles without hysteresis, from their equations."""
 
     def __init__(self, plant: ElbowOrthosis, intent: Intent) -> None:
         self.plant, self.bundles = plant, (plant.bundle_a, plant.bundle_b)
@@ -156,7 +156,7 @@ def open_spans(widths: Array, valve: OnOffValve) -> list[tuple[float, float]]:
 @pytest.mark.parametrize("valves", MAKES)
 @pytest.mark.parametrize("hysteresis", KINDS)
 def test_the_integrator_is_fine_enough(hysteresis: str, valves: str) -> None:
-    """Against sub-steps 25 and 100 times as many; a memory's kinks cost some of the order."""
+    """Against sub-steps 25 and 100 times as many; a hysteresis's kinks cost some of the order."""
     plant = ElbowOrthosis.paper(hysteresis, valves)  # type: ignore[arg-type]
     commands = commands_for(plant, 400)
 
@@ -253,7 +253,7 @@ def test_regulators_reach_their_set_points_and_count_what_they_fill() -> None:
     assert rise.max() == pytest.approx(plant.regulator.slew_rate, rel=1e-6)
 
 
-# --- wearer, memory, slack ------------------------------------------------------------------------
+# --- wearer, hysteresis, slack ------------------------------------------------------------------------
 
 
 def test_an_orthosis_that_bears_itself_is_not_felt() -> None:
@@ -321,7 +321,7 @@ def test_the_felt_torque_moves_the_forearm() -> None:
 
 
 @pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach"])
-def test_friction_takes_work_in_a_cycle_and_nothing_without_memory(hysteresis: str) -> None:
+def test_friction_takes_work_in_a_cycle_and_nothing_without_hysteresis(hysteresis: str) -> None:
     lost = []
     for kind in ("none", hysteresis):
         plant = ElbowOrthosis.paper(kind)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""The elbow orthosis at rest: published torques, stiffness, allocation, memory, files."""
+"""The elbow orthosis at rest: published torques, stiffness, allocation, hysteresis, files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,11 @@ from pam_envs.plants.elbow_orthosis.bundles import (
     volume_of,
     weight_of,
 )
-from pam_envs.plants.elbow_orthosis.hysteresis import ElbowMemory, elbow_memory, travel_plays
+from pam_envs.plants.elbow_orthosis.hysteresis import (
+    ElbowHysteresis,
+    elbow_hysteresis,
+    travel_plays,
+)
 from pam_envs.plants.elbow_orthosis.plant import MAKES, ElbowOrthosis
 from pam_envs.plants.single_muscle.hysteresis import KINDS
 
@@ -148,13 +152,13 @@ def test_names_and_rows_agree() -> None:
     assert column[K.HANDLE] == plant.wearer.handle
 
 
-# --- memory ---------------------------------------------------------------------------------------
+# --- hysteresis ---------------------------------------------------------------------------------------
 
 
 def forces_over_loop(plant: ElbowOrthosis, pressure: float) -> tuple[np.ndarray, np.ndarray]:
     """Force of bundle b over two sweeps of the whole range, and its contraction."""
     q = np.concatenate([RANGE, RANGE[::-1], RANGE, RANGE[::-1]])
-    operator, travel = plant.memory.operator, plant.pulley.travel(q)
+    operator, travel = plant.hysteresis.operator, plant.pulley.travel(q)
     lag = travel - operator.simulate(travel)[0] if operator else np.zeros_like(q)
     contraction = plant.pulley.contractions(q)[1]
     shape = plant.bundle_b.shape(contraction) - plant.friction(lag)[1]
@@ -180,14 +184,14 @@ def test_loading_and_unloading_differ_by_the_published_share(
 
 def width(kind: str, middle: float, swing: float) -> float:
     """Widest gap of a loop of the travel, over that of the widest loop there is."""
-    memory = elbow_memory(kind)  # type: ignore[arg-type]
+    hysteresis = elbow_hysteresis(kind)  # type: ignore[arg-type]
     up = middle + np.linspace(-swing, swing, 201)
-    output = memory.operator.simulate(np.concatenate([up, up[::-1]] * 3))[0]  # type: ignore[union-attr]
+    output = hysteresis.operator.simulate(np.concatenate([up, up[::-1]] * 3))[0]  # type: ignore[union-attr]
     rise, fall = output[-402:-201], output[-201:][::-1]
-    return float(np.abs(fall - rise).max()) / (2.0 * memory.largest_lag)
+    return float(np.abs(fall - rise).max()) / (2.0 * hysteresis.largest_lag)
 
 
-def test_the_memories_are_alike_in_their_widest_loop_only() -> None:
+def test_the_hysteresis_models_are_alike_in_their_widest_loop_only() -> None:
     for kind in ("maxwell_slip", "preisach"):
         assert width(kind, 0.0, 0.033) == pytest.approx(1.0, abs=1e-3)
     plays = [width("maxwell_slip", place, 0.01) for place in (0.0, 0.02)]
@@ -199,7 +203,7 @@ def test_the_memories_are_alike_in_their_widest_loop_only() -> None:
 
 def test_one_way_the_relays_go_with_the_travel() -> None:
     """Their slope is 1 on the mean of both branches, so that the lag is the same either way."""
-    relays = elbow_memory("preisach").operator
+    relays = elbow_hysteresis("preisach").operator
     x = np.linspace(-0.033, 0.033, 67)
     around = np.concatenate([x, x[::-1], x, x[::-1]])
     output = relays.simulate(around)[0]  # type: ignore[union-attr]
@@ -210,8 +214,8 @@ def test_one_way_the_relays_go_with_the_travel() -> None:
 
 def test_of_plays_as_relays_the_largest_lag_is_the_same() -> None:
     wide = Preisach.from_play(travel_plays(), -0.06, 0.06, 121, start="virgin")
-    lag = elbow_memory("maxwell_slip").largest_lag
-    assert ElbowMemory(wide).largest_lag == pytest.approx(lag, rel=1e-9)
+    lag = elbow_hysteresis("maxwell_slip").largest_lag
+    assert ElbowHysteresis(wide).largest_lag == pytest.approx(lag, rel=1e-9)
 
 
 # --- bad values, files ----------------------------------------------------------------------------
@@ -232,7 +236,7 @@ def test_bad_values_are_refused_with_a_remedy(changes: dict[str, float], words: 
         ElbowOrthosis.paper(**changes)  # type: ignore[arg-type]
 
 
-def test_bad_makes_and_memories_are_refused() -> None:
+def test_bad_makes_and_hysteresis_models_are_refused() -> None:
     with pytest.raises(ValueError, match="valves = 'pulsed'"):
         ElbowOrthosis.paper(valves="pulsed")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="hysteresis = 'dahl'"):
@@ -244,11 +248,11 @@ def test_bad_makes_and_memories_are_refused() -> None:
     )
     for operator, words in ((steep, "total slope"), (many, "at most 8")):
         with pytest.raises(ValueError, match=words):
-            ElbowOrthosis.paper().replace({"memory.operator": operator})
-    relays = elbow_memory("preisach").operator
+            ElbowOrthosis.paper().replace({"hysteresis.operator": operator})
+    relays = elbow_hysteresis("preisach").operator
     with pytest.raises(ValueError, match="virgin"):
         ElbowOrthosis.paper().replace(
-            {"memory.operator": dataclasses.replace(relays, start="low")}  # type: ignore[type-var]
+            {"hysteresis.operator": dataclasses.replace(relays, start="low")}  # type: ignore[type-var]
         )
 
 

@@ -34,7 +34,7 @@ def steps(n: int, largest: float, every: int = 10, seed: int = 0) -> np.ndarray:
 def integrated(
     plant: AntagonisticJoint, commands: np.ndarray, payload: float, shove: float
 ) -> np.ndarray:
-    """Angle [rad] of a joint without memory, from its differential equation written anew."""
+    """Angle [rad] of a joint without hysteresis, from its differential equation written anew."""
     muscle, lever, link = plant.muscle, plant.lever, plant.link
     inertia = link.inertia + payload * link.length**2
     moment = link.gravity * (link.mass * link.centre + payload * link.length)
@@ -113,7 +113,7 @@ def double_pole(response: np.ndarray) -> float:
     "start, end", [(0.0, 1.0), (0.0, 10.0), (10.0, 20.0), (20.0, 25.0), (-10.0, 10.0), (20.0, 10.0)]
 )
 def test_the_nominal_dynamics_are_two_poles_near_23(start: float, end: float) -> None:
-    """Without memory and gravity, over the range of angles: within 3 rad/s, to 2 % of the step."""
+    """Without hysteresis and gravity, over the range of angles: within 3 rad/s, to 2 % of the step."""
     plant = AntagonisticJoint.paper("none", link__gravity=0.0)
     commands = DEGREE * np.array([start] * 2 + [end] * 60)
     angles = simulate_joint(plant, commands)["angle"][1:]
@@ -134,7 +134,7 @@ def test_the_reduced_plant_has_the_published_poles() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_how_far_the_reduced_plant_is_from_the_muscles(kind) -> None:  # type: ignore[no-untyped-def]
-    """Steps and sines within +-20 degrees: about 0.3 degrees RMS; without memory over 1 degree."""
+    """Steps and sines within +-20 degrees: about 0.3 degrees RMS; without hysteresis over 1 degree."""
     t = PERIOD * np.arange(600)
     still = {"link__gravity": 0.0}
     whole, reduced, plain = (
@@ -171,7 +171,7 @@ def test_energy_is_lost_in_free_motion() -> None:
     assert abs(made["angle"][-1]) < 0.02 * DEGREE
 
 
-def test_a_slow_push_and_back_loses_work_to_the_memory() -> None:
+def test_a_slow_push_and_back_loses_work_to_the_hysteresis() -> None:
     """Viscosity takes work in proportion to the speed, friction the same however slow it is."""
     dry, viscous = {}, {}
     for kind in KINDS:

@@ -174,7 +174,7 @@ def tracking_error(plant: KneeOrthosis, command: Callable[[np.ndarray], np.ndarr
 
 def test_the_inverse_alone_tracks_as_published() -> None:
     plant = KneeOrthosis.rig()
-    model = plant.memory.operator
+    model = plant.hysteresis.operator
     inverse = tracking_error(plant, lambda s: model.inverse_simulate(s)[0])  # type: ignore[union-attr]
     line = tracking_error(plant, lambda s: s / plant.muscle.stiffness_ratio)
     assert inverse == pytest.approx(0.0207, abs=1e-3)
@@ -317,7 +317,7 @@ def test_the_activations_are_those_of_the_proxy() -> None:
 def test_plain_python_gives_the_same_bits(plant: KneeOrthosis) -> None:
     u = steps(80)
     compiled = simulate_knee(plant, u, pressure=1e5, phase=0.4)
-    names = kernel_names(plant.memory.kind, plant.mounting, plant.dynamics, 1)
+    names = kernel_names(plant.hysteresis.kind, plant.mounting, plant.dynamics, 1)
     arrays = [a.tolist() for a in arrays_for([plant], u, 1)]
     run = interpreted(run_knee, names)
     run(*arrays, plant.elements, plant.substeps, PERIOD, 0.4, 1e5)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.hysteresis import FULL_STIFFNESS, knee_memory, preisach_of
+from pam_envs.plants.knee_orthosis.hysteresis import FULL_STIFFNESS, knee_hysteresis, preisach_of
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.plants.single_muscle.hysteresis import KINDS
 
@@ -57,8 +57,8 @@ def test_the_volume_does_the_muscles_work() -> None:
         assert -2e5 * slope == pytest.approx(tension, rel=1e-6)
 
 
-def test_both_memories_have_the_same_loops() -> None:
-    slips, relays = (knee_memory(kind).operator for kind in ("maxwell_slip", "preisach"))
+def test_both_hysteresis_models_have_the_same_loops() -> None:
+    slips, relays = (knee_hysteresis(kind).operator for kind in ("maxwell_slip", "preisach"))
     t = np.arange(900) / 300
     pressure = 2.25e5 * (1.0 - np.cos(2 * np.pi * t)) * (0.3 + 0.35 * (2 - np.floor(t)))
     assert pressure.max() == pytest.approx(4.5e5, rel=1e-3)
@@ -69,7 +69,7 @@ def test_both_memories_have_the_same_loops() -> None:
 
 
 def test_preisach_of_a_bent_spring_is_passive() -> None:
-    model = knee_memory("maxwell_slip").operator
+    model = knee_hysteresis("maxwell_slip").operator
     assert model is not None
     bent = dataclasses.replace(model, spring=tuple(p + 0.05 * p * p / 4e5 for p in model.spring))  # type: ignore[union-attr]
     assert preisach_of(bent, 4.5e5).table[-1][0] > 0.0  # type: ignore[arg-type]
@@ -81,7 +81,7 @@ def test_files_hold_the_whole_plant(tmp_path: Path, kind, mounting: str) -> None
     if mounting in ("rig", "no_load"):
         plant = getattr(KneeOrthosis, mounting)(kind, "measured", lever__damping=1.25)
     else:
-        plant = KneeOrthosis.on_leg(mounting, 1.5, kind, memory__width=0.7)  # type: ignore[arg-type]
+        plant = KneeOrthosis.on_leg(mounting, 1.5, kind, hysteresis__width=0.7)  # type: ignore[arg-type]
     plant.to_yaml(tmp_path / "plant.yaml")
     read = KneeOrthosis.from_yaml(tmp_path / "plant.yaml")
     assert read == plant
@@ -114,10 +114,10 @@ def test_every_parameter_has_its_row() -> None:
     assert column[K.ANKLE_BIAS] == plant.ankle.bias
 
 
-def test_members_may_have_memories_of_their_own() -> None:
-    other = knee_memory("maxwell_slip").operator.scaled(0.5)  # type: ignore[union-attr]
-    plant = dataclasses.replace(KneeOrthosis.rig(), ensemble=({"memory.operator": other},))
-    tables = plant.memory_tables()
+def test_members_may_have_hysteresis_models_of_their_own() -> None:
+    other = knee_hysteresis("maxwell_slip").operator.scaled(0.5)  # type: ignore[union-attr]
+    plant = dataclasses.replace(KneeOrthosis.rig(), ensemble=({"hysteresis.operator": other},))
+    tables = plant.hysteresis_tables()
     assert tables.shape == (2, 4, plant.elements)
     assert tables[1, 1, 0] == pytest.approx(0.5 * tables[0, 1, 0])
 

@@ -22,7 +22,7 @@ from pam_envs.plants.redundant_manipulator.rollout import (
     run_arm,
     simulate_manipulator,
 )
-from pam_envs.plants.redundant_manipulator.step import memory_rows, replacements, work_rows
+from pam_envs.plants.redundant_manipulator.step import hysteresis_rows, replacements, work_rows
 from pam_envs.plants.single_muscle.hysteresis import KINDS
 from pam_envs.references.path import PATHS
 
@@ -212,7 +212,7 @@ def test_files_hold_the_whole_plant(tmp_path: Path, kind, axes: str) -> None:  #
     assert read.chain == chain
 
 
-def test_the_column_is_parameters_memory_damping_chain() -> None:
+def test_the_column_is_parameters_hysteresis_damping_chain() -> None:
     plant = RedundantManipulator.paper()
     column = plant.parameter_rows()
     for name in M.NAMES:
@@ -250,10 +250,10 @@ def test_compiled_bits_are_those_of_plain_python(kind) -> None:  # type: ignore[
     commands, n = steps(20, 29.0 * DEGREE, 4), plant.stages
     compiled = simulate_manipulator(plant, commands, payload=0.1)
     arrays = [
-        np.zeros((M.END + memory_rows(kind, n), 1)),
+        np.zeros((M.END + hysteresis_rows(kind, n), 1)),
         plant.parameter_rows()[:, None],
         np.zeros((M.N_COUNTS, 1), np.int64),
-        plant.memory_tables()[:1],
+        plant.hysteresis_tables()[:1],
         commands,
         np.zeros((20, n)),
         np.full((20, 1), 0.1),

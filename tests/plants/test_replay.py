@@ -52,7 +52,7 @@ def test_every_column_is_replayed_once() -> None:
     assert [group.tolist() for group in alike(columns)] == [[0, 2], [1, 3]]
 
 
-@pytest.mark.parametrize("name", ["regulator.slew_bend", "memory.pressure_slope", "mass.slack"])
+@pytest.mark.parametrize("name", ["regulator.slew_bend", "hysteresis.pressure_slope", "mass.slack"])
 def test_an_effect_that_is_off_costs_no_bit(name: str) -> None:
     off = PLANT.replace({"mass.ring_share": 0.0, name: 0.0})
     a, b = replay(PLANT, inputs()), replay(off, inputs())

@@ -104,9 +104,9 @@ def test_static_law_and_its_inverse() -> None:
 
 @pytest.mark.parametrize("kind", ["maxwell_slip", "preisach"])
 @pytest.mark.parametrize("load", [0.0, 2.55, 4.55])
-def test_exact_inverse_of_the_memory(kind: str, load: float) -> None:
+def test_exact_inverse_of_the_hysteresis(kind: str, load: float) -> None:
     plant = SingleMuscle.mas10(kind)
-    inverse = plant.memory.inverse(load, 6e5)
+    inverse = plant.hysteresis.inverse(load, 6e5)
     random = np.random.default_rng(1)
     pressures = random.uniform(0.0, 6e5, (60, 5))
     state = inverse.initial_state((5,))
@@ -117,10 +117,10 @@ def test_exact_inverse_of_the_memory(kind: str, load: float) -> None:
         state = after
 
 
-def test_memory_only_ever_lags() -> None:
+def test_hysteresis_only_ever_lags() -> None:
     up, down = np.linspace(0, 6e5, 61), np.linspace(6e5, 0, 61)
     for kind in ("maxwell_slip", "preisach"):
-        inverse = SingleMuscle.mas10(kind).memory.inverse(0.0, 6e5)
+        inverse = SingleMuscle.mas10(kind).hysteresis.inverse(0.0, 6e5)
         state, drives = inverse.initial_state((1,)), []
         for p in np.concatenate([up, down]):
             drive, state = inverse.drive(np.array([p]), state)
@@ -191,7 +191,7 @@ def test_a_sparse_plant_file_takes_defaults(tmp_path: Path) -> None:
     path.write_text("schema: 1\nfamily: single_muscle\nparameters:\n  mass.load: 1\n")
     plant = SingleMuscle.from_yaml(path)
     assert plant.mass.load == 1.0
-    assert plant.memory.kind == "none"
+    assert plant.hysteresis.kind == "none"
     assert plant.muscle == SingleMuscle().muscle
 
 

@@ -11,19 +11,21 @@ from pam_envs.plants.core.tiles import first_of, in_tiles
 
 
 def plant(kind: str, substeps: int = 4) -> Plant:
-    return Plant(memory=Plant(kind=kind), substeps=substeps, load=np.random.default_rng(0).random())
+    return Plant(
+        hysteresis=Plant(kind=kind), substeps=substeps, load=np.random.default_rng(0).random()
+    )
 
 
 def test_the_first_of_one_make_is_returned() -> None:
     several = [plant("preisach"), plant("preisach")]
-    assert first_of(several, "memory.kind", "substeps") is several[0]
+    assert first_of(several, "hysteresis.kind", "substeps") is several[0]
 
 
 def test_other_makes_and_none_are_refused_by_name() -> None:
     with pytest.raises(
-        ValueError, match=r"one make \(memory.kind, substeps\), got .*'preisach', 5"
+        ValueError, match=r"one make \(hysteresis.kind, substeps\), got .*'preisach', 5"
     ):
-        first_of([plant("preisach"), plant("preisach", 5)], "memory.kind", "substeps")
+        first_of([plant("preisach"), plant("preisach", 5)], "hysteresis.kind", "substeps")
     with pytest.raises(ValueError, match="no plants are given"):
         first_of([], "substeps")
 

@@ -57,7 +57,7 @@ def calibrate(
             family = family.finer(FINE_STEP)
             problem = dataclasses.replace(problem, simulate=family.simulate)
     tried = [frees]
-    operator = family.plant.memory.operator
+    operator = family.plant.hysteresis.operator
     if np.isfinite(measured[0]).any() and isinstance(operator, PlayOperator):
         law = balance(
             _from_rest(family, measured[0]),

@@ -94,7 +94,7 @@ def balance(
             "muscle.hardening": c[6],
             "muscle.stiffening": c[7],
         }
-        found |= {f"memory.weight[{k}]": w / area for k, w in enumerate(c[8:])}
+        found |= {f"hysteresis.weight[{k}]": w / area for k, w in enumerate(c[8:])}
     return found
 
 

@@ -61,7 +61,7 @@ SCALES = {
     "muscle.softening": 500.0,
     "muscle.hardening": 2e3,
     "muscle.stiffening": 1e4,
-    "memory.weight": 0.02,
+    "hysteresis.weight": 0.02,
 }
 
 
@@ -105,7 +105,7 @@ class MuscleFamily:
         return replay_rows(self.plant, columns, self.inputs)
 
     def tie(self, columns: Array) -> None:
-        """Keep the memory's total slope at 1."""
+        """Keep the hysteresis's total slope at 1."""
         n = self.plant.elements
         if n == 0:
             return
@@ -116,10 +116,12 @@ class MuscleFamily:
 
     def free(self, name: str, **changes: Any) -> Free:
         """Return how a fit moves a parameter."""
-        if name.startswith("memory.weight["):
+        if name.startswith("hysteresis.weight["):
             k = int(name[14:-1])
             start = float(self.column[R.WEIGHT + k])
-            made = dict(low=0.0, high=1.0, scale=SCALES["memory.weight"], start=start, prior=25.0)
+            made = dict(
+                low=0.0, high=1.0, scale=SCALES["hysteresis.weight"], start=start, prior=25.0
+            )
             return Free(name, R.WEIGHT + k, **{**made, **changes})
         d = declared(self.plant, name)
         value = self.plant.value(name)
@@ -136,7 +138,7 @@ class MuscleFamily:
 
     def base(self) -> tuple[Free, ...]:
         """Return what is refitted before anything is called missing."""
-        names = [*BASE, *(f"memory.weight[{k}]" for k in range(self.plant.elements))]
+        names = [*BASE, *(f"hysteresis.weight[{k}]" for k in range(self.plant.elements))]
         present = [
             name
             for name, neutral in NEUTRAL.items()
@@ -153,10 +155,10 @@ class MuscleFamily:
         values: dict[str, Any] = {n: float(column[R.place(n)]) for n in R.NAMES}
         n = self.plant.elements
         if n:
-            operator = self.plant.memory.operator
+            operator = self.plant.hysteresis.operator
             assert isinstance(operator, PlayOperator)
             weights = tuple(float(w) for w in column[R.WEIGHT : R.WEIGHT + n])
-            values["memory.operator"] = PlayOperator(
+            values["hysteresis.operator"] = PlayOperator(
                 operator.thresholds, weights, 1.0 - sum(weights)
             )
         for substeps in (self.plant.substeps, *FINER):
@@ -173,8 +175,8 @@ DECLARED = ("mass.carried",)
 OLD_NEUTRAL = {
     "regulator.dead_time": 0.0,
     "regulator.slew_rate": 1e9,
-    "memory.stretch": 0.0,
-    "memory.width_per_load": 0.0,
+    "hysteresis.stretch": 0.0,
+    "hysteresis.width_per_load": 0.0,
 }
 """Effects that were parameters of the plant from the beginning."""
 
@@ -186,9 +188,9 @@ def start_plant(rig: Any) -> SingleMuscle:
     values: dict[str, Any] = {
         "regulator.dead_time": 0.0,
         "regulator.slew_rate": 1e9,
-        "memory.stretch": 0.0,
-        "memory.width_per_load": 0.0,
-        "memory.operator": PlayOperator(THRESHOLDS, tuple(weights), 1.0 - float(weights.sum())),
+        "hysteresis.stretch": 0.0,
+        "hysteresis.width_per_load": 0.0,
+        "hysteresis.operator": PlayOperator(THRESHOLDS, tuple(weights), 1.0 - float(weights.sum())),
         "mass.load": 0.0,
         "muscle.area_taper": 1.0,
         "muscle.braid_strain": 0.03,
@@ -220,7 +222,7 @@ def known_of(rig: Any, values: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
 
     None of it is a published number of the rig at hand, even where it is one of the shipped muscle.
     """
-    made = {name: ("assumed", TAKEN) for name in values if name != "memory.operator"}
+    made = {name: ("assumed", TAKEN) for name in values if name != "hysteresis.operator"}
     for name, attribute in GIVEN.items():
         given = getattr(rig, attribute) is not None
         made[name] = ("assumed", "declared, RIG.yaml" if given else TAKEN)

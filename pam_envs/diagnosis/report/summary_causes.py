@@ -146,7 +146,7 @@ def calibration(study: Any) -> list[Json]:
     column = study.family.column
     for free in study.base.fit.frees:
         value, before = after[free.name], float(column[free.place])
-        unit = "1" if free.name.startswith("memory.weight") else ""
+        unit = "1" if free.name.startswith("hysteresis.weight") else ""
         if not unit:
             unit = declared(study.family.plant, free.name).unit
         tolerance = study.sheet.tolerance.get(free.name)

@@ -1,4 +1,4 @@
-"""The cells of a table of readings, and the memory of the pressures that led to each."""
+"""The cells of a table of readings, and the hysteresis of the pressures that led to each."""
 
 from __future__ import annotations
 

@@ -2,8 +2,8 @@
 
 A table (:class:`~pam_envs.data.tables.ContractionTable`) holds contractions over pressure cycles at
 one load or several, each repeated once or more. The stages: audit; a floor from the repeats; a
-load-blind model with memory; rival causes added one at a time and in pairs, judged on repeats and
-loads left out; the law of the load; and pressures at which the readings themselves look wrong.
+load-blind model with hysteresis; rival causes added one at a time and in pairs, judged on repeats
+and loads left out; the law of the load; and pressures at which the readings themselves look wrong.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ __all__ = ["Curve", "audit_polynomials", "diagnose_readings"]
 
 
 def diagnose_readings(table: ContractionTable, *, seed: int = 0) -> dict[str, Any]:
-    """Say what a load-blind muscle with memory gets wrong of a table, and name the causes.
+    """Say what a load-blind muscle with hysteresis gets wrong of a table, and name the causes.
 
     Parameters
     ----------

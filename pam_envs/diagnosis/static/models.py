@@ -1,6 +1,6 @@
 """Static models of a muscle led through pressure cycles: a load-blind base, and what may be added.
 
-The base: the pressure passes play operators (its memory), and a spring with a stiff start and a
+The base: the pressure passes play operators (its hysteresis), and a spring with a stiff start and a
 hardening end turns the effective pressure into contraction,
 
     c (1 - exp(-x / x0)) + k1 x + k3 x^3 = p - sum(weights * stop_i(p)).
@@ -206,7 +206,7 @@ def lags_of(cells: Cells, values: Values) -> Array:
 
 
 def effective_pressure(cells: Cells, values: Values, lags: Array) -> Array:
-    """Return the pressure after the memory, shape (L, C), before any load acts."""
+    """Return the pressure after the hysteresis, shape (L, C), before any load acts."""
     bend = values.get("bend")
     lost = sum(values[name] * lag for name, lag in zip(WEIGHTS, lags, strict=True))
     if "width" in values:

@@ -17,7 +17,7 @@ def sentences(f: Findings) -> str:
         cells, needed = int(f.study.cells.used.sum()), 2 * len(f.base.fit.numbers)
         return (
             f"The table has {cells} cells; at least {needed} are needed to fit a static law with "
-            "memory and to judge it. Measure more pressures, up and down."
+            "hysteresis and to judge it. Measure more pressures, up and down."
         )
     if not f.search.accepted:
         return _nothing(f, word == "adequate")

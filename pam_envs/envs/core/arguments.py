@@ -96,7 +96,7 @@ def plant_of(kind: type[T], plant: Any, hysteresis: Any, stock: Callable[[Any], 
     hysteresis : str or None
         As given by the user.
     stock : callable
-        Returns the plant to take without ``plant``, by its memory.
+        Returns the plant to take without ``plant``, by its hysteresis.
     """
     if hysteresis is not None:
         check_choice("hysteresis", hysteresis, KINDS)
@@ -110,11 +110,11 @@ def plant_of(kind: type[T], plant: Any, hysteresis: Any, stock: Callable[[Any], 
         )
     found: Any = made
     if hysteresis == "none":
-        return found.replace({"memory.operator": None})  # type: ignore[no-any-return]
-    if hysteresis is not None and hysteresis != found.memory.kind:
+        return found.replace({"hysteresis.operator": None})  # type: ignore[no-any-return]
+    if hysteresis is not None and hysteresis != found.hysteresis.kind:
         raise ValueError(
-            f"hysteresis = {hysteresis!r} but the plant's memory is {found.memory.kind!r}; "
-            "leave hysteresis out, or give a plant identified with that memory"
+            f"hysteresis = {hysteresis!r} but the plant's hysteresis is {found.hysteresis.kind!r}; "
+            "leave hysteresis out, or give a plant identified with that hysteresis"
         )
     return made
 

@@ -116,7 +116,7 @@ def compose(
     samples : ndarray, shape (channels, n)
         References that are given as samples.
     tables : ndarray, shape (members, n, m)
-        What the memories of the plant and its members are made of.
+        What the hysteresis models of the plant and its members are made of.
     spread : ndarray, shape (n, 3)
         Row, low and high of each parameter that is drawn.
     drawn : bool

@@ -1,4 +1,4 @@
-"""``PAM/ElbowOrthosis-v0``: objects that are not there, felt through the elbow, seed 001.
+"""``PAM/ElbowOrthosis-v0``: objects that are not there, felt through the elbow, chakarov2018.
 
 Two bundles of pneumatic muscles turn the elbow of an orthosis over a pulley: bundle b bends it,
 bundle a straightens it. Torque and stiffness of the joint are set at once by their two pressures.
@@ -267,7 +267,7 @@ def make_setup(
     Parameters
     ----------
     hysteresis : {"maxwell_slip", "preisach", "none"}, optional
-        The bundles' memory. Default: that of ``plant``, or Maxwell-slip.
+        The bundles' hysteresis. Default: that of ``plant``, or Maxwell-slip.
     plant : ElbowOrthosis or path, optional
         Another plant. Default: ``ElbowOrthosis.paper()``.
     reference : str or array_like
@@ -358,7 +358,7 @@ def make_setup(
     example = "{'wearer.stiffness': (15, 30)}"
     return compose(
         made,
-        kernels_for(made.memory.kind, made.valves),
+        kernels_for(made.hysteresis.kind, made.valves),
         given,
         signals=_signals(made, given.preview, given.stride * made.control_period, normalize),
         actions=_actions(made, action, normalize),
@@ -374,7 +374,7 @@ def make_setup(
         ),
         own=_own(made, samples),
         samples=samples,
-        tables=made.memory_tables(),
+        tables=made.hysteresis_tables(),
         spread=spread_of(made, R.PARAMETERS, NOT_DRAWN, randomize, example, CORNER),
         drawn=randomize is not False,
     )

@@ -39,6 +39,7 @@ from pam_envs.envs.elbow.layout import (
     HEAVIEST,
     HIGHEST,
     HIGHEST_ANGLE,
+    HYSTERESIS,
     INFO,
     LEVEL,
     LIGHTEST,
@@ -46,7 +47,6 @@ from pam_envs.envs.elbow.layout import (
     LOWEST_ANGLE,
     M_ANGLE,
     M_PRESSURE,
-    MEMORY,
     MODE,
     MOTION,
     MOTION_HIGH,
@@ -110,12 +110,12 @@ from pam_envs.kernels.random import normal, uniform
 from pam_envs.mechanics.hanging_mass import GRAVITY
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.step import (
-    MEMORY_ROWS,
+    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     begin_lane,
     replacements,
-    start_memory,
+    start_hysteresis,
 )
 from pam_envs.references.reaches import draw_motion, motion_at
 from pam_envs.sensing.sensor import read_sensor
@@ -180,7 +180,7 @@ def advance_elbow(
         fixed,
         counts,
         tables,
-        MEMORY,
+        HYSTERESIS,
         choices[N_ELEMENTS],
         choices[SUBSTEPS],
         settings[0][PERIOD],
@@ -371,8 +371,8 @@ def begin_elbow(
         b = config[START_SHARE] * uniform(key_a, key_b, START, 1)
     if choices[PULSED] > 0:
         a, b = min(a, fixed[K.SUPPLY_PRESSURE][j]), min(b, fixed[K.SUPPLY_PRESSURE][j])
-    start_memory(rows, counts, MEMORY, j)
-    begin_lane(rows, fixed, counts, tables, MEMORY, choices[N_ELEMENTS], j, a, b)
+    start_hysteresis(rows, counts, HYSTERESIS, j)
+    begin_lane(rows, fixed, counts, tables, HYSTERESIS, choices[N_ELEMENTS], j, a, b)
     rows[ACTION][j], rows[ACTION + 1][j] = rows[K.COMMAND_A][j], rows[K.COMMAND_B][j]
     if choices[MODE] == BY_TORQUE:
         rows[ACTION][j], rows[ACTION + 1][j] = estimate(model, angle, a, b)
@@ -382,7 +382,7 @@ def begin_elbow(
 
 @lru_cache(maxsize=16)
 def kernels_for(kind: str, valves: str) -> Kernels:
-    """Return the kernels for a kind of memory and a make of the valves."""
+    """Return the kernels for a kind of hysteresis and a make of the valves."""
     functions = {
         "env_apply": apply_elbow,
         "env_advance": advance_elbow,
@@ -397,7 +397,7 @@ def kernels_for(kind: str, valves: str) -> Kernels:
         (kind, valves),
         functions,
         info=INFO,
-        rows=MEMORY + MEMORY_ROWS[kind],
+        rows=HYSTERESIS + HYSTERESIS_ROWS[kind],
         parameters=K.N_PARAMETERS,
         counts=K.N_COUNTS,
         scratch=N_WORK,

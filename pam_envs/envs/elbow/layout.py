@@ -23,8 +23,8 @@ OBJECT, PLACE, STRENGTH, LEVEL = range(SEEN_B + 1, SEEN_B + 5)
 """Virtual object: its kind, angle of a wall, torque of a weight or stiffness of a wall, stiffness
 where there is no wall."""
 MOTION = LEVEL + 1
-MEMORY = MOTION + MOTION_ROWS
-"""First row of the memory's state."""
+HYSTERESIS = MOTION + MOTION_ROWS
+"""First row of the hysteresis's state."""
 
 COPIED = {
     "state/angle": K.ANGLE,

@@ -1,9 +1,9 @@
-"""``PAM/AntagonisticJoint-v0``: a joint between two pneumatic muscles, seed 002.
+"""``PAM/AntagonisticJoint-v0``: a joint between two pneumatic muscles, fluidic_muscles.
 
 Two muscles pull a lever from both sides. The angle ``phi`` is 0 where both are equally long and
-positive towards muscle A. Memory of the muscles' friction makes the angle lag behind what is asked
-for. The action is a set-point of the angle, which the static laws of both muscles turn into two
-pressures under a fixed prestress; or set-points of angle and prestress, that is of position and
+positive towards muscle A. Hysteresis of the muscles' friction makes the angle lag behind what is
+asked for. The action is a set-point of the angle, which the static laws of both muscles turn into
+two pressures under a fixed prestress; or set-points of angle and prestress, that is of position and
 stiffness; or the two pressures.
 
 Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=False``):
@@ -152,7 +152,7 @@ def make_setup(
     Parameters
     ----------
     hysteresis : {"maxwell_slip", "preisach", "none"}, optional
-        The muscles' memory. Default: that of ``plant``, or Maxwell-slip.
+        The muscles' hysteresis. Default: that of ``plant``, or Maxwell-slip.
     plant : AntagonisticJoint or path, optional
         Another plant. Default: ``AntagonisticJoint.paper()``.
     reference : str or array_like
@@ -236,7 +236,7 @@ def make_setup(
     sines = sines_needed(family)
     return compose(
         made,
-        kernels_for(made.memory.kind, made.dynamics),
+        kernels_for(made.hysteresis.kind, made.dynamics),
         given,
         signals=signals,
         actions=actions,
@@ -244,7 +244,7 @@ def make_setup(
         choices=(made.elements, family, sines, K.MODES.index(action), payloads.size, fixed),
         own=payloads,
         samples=samples,
-        tables=made.memory_tables(),
+        tables=made.hysteresis_tables(),
         spread=spread_of(
             made,
             R.PARAMETERS,

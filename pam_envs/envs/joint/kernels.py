@@ -37,11 +37,11 @@ from pam_envs.envs.joint.layout import (
     FIRST_COPIED,
     FIXED_SIGNALS,
     FREQUENCY,
+    HYSTERESIS,
     INFO,
     LARGEST_ANGLE,
     M_ANGLE,
     M_PRESSURE,
-    MEMORY,
     MODE,
     N_ELEMENTS,
     N_PAYLOADS,
@@ -88,12 +88,12 @@ from pam_envs.kernels.random import normal, uniform
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.pair import command
 from pam_envs.plants.antagonistic_joint.step import (
-    MEMORY_ROWS,
+    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     begin_lane,
     replacements,
-    start_memory,
+    start_hysteresis,
 )
 from pam_envs.references.trajectory import SAMPLES, draw_reference, reference_value
 from pam_envs.sensing.sensor import read_sensor
@@ -157,7 +157,7 @@ def advance_joint(
         fixed,
         counts,
         tables,
-        MEMORY,
+        HYSTERESIS,
         choices[N_ELEMENTS],
         choices[SUBSTEPS],
         settings[0][PERIOD],
@@ -299,8 +299,8 @@ def begin_joint(
     rows[K.DISTURBANCE][j] = 0.0
     angle = config[START_ANGLE] * (2.0 * uniform(key_a, key_b, START, 3) - 1.0)
     prestress, elements = config[PRESTRESS], choices[N_ELEMENTS]
-    start_memory(rows, counts, MEMORY, j)
-    begin_lane(rows, fixed, counts, tables, MEMORY, elements, j, angle, prestress)
+    start_hysteresis(rows, counts, HYSTERESIS, j)
+    begin_lane(rows, fixed, counts, tables, HYSTERESIS, elements, j, angle, prestress)
     by_pressure = choices[MODE] == BY_PRESSURE
     rows[ACTION][j] = rows[K.SET_POINT_A][j] if by_pressure else angle
     rows[ACTION + 1][j] = rows[K.SET_POINT_B][j] if by_pressure else prestress
@@ -314,7 +314,7 @@ def begin_joint(
 
 @lru_cache(maxsize=16)
 def kernels_for(kind: str, dynamics: str) -> Kernels:
-    """Return the kernels for a kind of memory and a make of the plant."""
+    """Return the kernels for a kind of hysteresis and a make of the plant."""
     functions = {
         "env_apply": apply_joint,
         "env_advance": advance_joint,
@@ -329,7 +329,7 @@ def kernels_for(kind: str, dynamics: str) -> Kernels:
         (kind, dynamics),
         functions,
         info=INFO,
-        rows=MEMORY + MEMORY_ROWS[kind],
+        rows=HYSTERESIS + HYSTERESIS_ROWS[kind],
         parameters=K.N_PARAMETERS,
         counts=K.N_COUNTS,
         scratch=N_WORK,

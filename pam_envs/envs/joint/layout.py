@@ -15,8 +15,8 @@ OLD_ACTION = ACTION + 2
 OLD_SET_A, OLD_SET_B, OLD_A, OLD_B, OLD_AIR = range(OLD_ACTION + 2, OLD_ACTION + 7)
 TOLD_PAYLOAD, CHANGE_TIME, CHANGE = range(OLD_AIR + 1, OLD_AIR + 4)
 REFERENCE = CHANGE + 1
-MEMORY = REFERENCE + REFERENCE_ROWS
-"""First row of the memory's state."""
+HYSTERESIS = REFERENCE + REFERENCE_ROWS
+"""First row of the hysteresis's state."""
 
 INFO = (
     "time",

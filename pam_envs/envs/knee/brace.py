@@ -1,9 +1,9 @@
 """``PAM/KneeTension-v0`` and ``PAM/KneeStiffness-v0``: the brace of the orthosis, not worn.
 
 A pneumatic muscle works against the zig-zag spring of a knee brace. The action is the set-point of
-its pressure; in ``KneeTension`` its tension has to follow a reference ("no load", seed 000,
+its pressure; in ``KneeTension`` its tension has to follow a reference ("no load", yeh2010,
 section 5.1), in ``KneeStiffness`` its stiffness ``T / (L - L_min)`` (section 3). The stiffness
-follows the pressure with memory: inflating and deflating give different ones.
+follows the pressure with hysteresis: inflating and deflating give different ones.
 
 Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=False``):
 
@@ -119,7 +119,7 @@ def make_setup(
     mounting : {"no_load", "rig"}
         Of the default plant: free to move, or held at the nominal length.
     hysteresis : {"maxwell_slip", "preisach", "none"}, optional
-        The muscle's memory. Default: that of ``plant``, or Maxwell-slip.
+        The muscle's hysteresis. Default: that of ``plant``, or Maxwell-slip.
     plant : KneeOrthosis or path, optional
         Another plant, off the leg.
     reference : str or array_like
@@ -178,7 +178,7 @@ def make_setup(
     sines = 1 if family == K.PAPER else sines_needed(family)
     return compose(
         made,
-        K.kernels_for(made.memory.kind, made.mounting, made.dynamics),
+        K.kernels_for(made.hysteresis.kind, made.mounting, made.dynamics),
         given,
         signals=_signals(quantity, full, given.preview, spacing, normalize),
         actions=Signals([Signal("pressure_set_point", "Pa", 0.0, full, 0, normalize)]),
@@ -186,7 +186,7 @@ def make_setup(
         choices=(made.elements, family, sines, quantity),
         own=made.gait_table(),
         samples=samples,
-        tables=made.memory_tables(),
+        tables=made.hysteresis_tables(),
         spread=spread_of(made, R.PARAMETERS, NOT_DRAWN, randomize, example, {}),
         drawn=randomize is not False,
         view=f"knee_{QUANTITIES[quantity]}",

@@ -24,7 +24,7 @@ from pam_envs.kernels.random import normal, uniform
 from pam_envs.mechanics.knee_lever import half_angle, muscle_length
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.step import (
-    MEMORY_ROWS,
+    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     begin_lane,
@@ -46,8 +46,8 @@ from pam_envs.sensing.sensor import read_sensor
 from pam_envs.tasks.tracking import effort_reward, excess, tracking_reward
 
 REFERENCE = K.END
-MEMORY = K.END + REFERENCE_ROWS
-"""First row of the memory's state."""
+HYSTERESIS = K.END + REFERENCE_ROWS
+"""First row of the hysteresis's state."""
 
 INFO = (
     "time",
@@ -170,7 +170,7 @@ def advance_brace(
         counts,
         tables,
         settings[choices[AT_OWN] :],
-        MEMORY,
+        HYSTERESIS,
         choices[N_ELEMENTS],
         choices[SUBSTEPS],
         settings[0][PERIOD],
@@ -272,7 +272,7 @@ def begin_brace(
     span = config[START_HIGH] - config[START_LOW]
     pressure = config[START_LOW] + span * uniform(key_a, key_b, START, 0)
     gait = settings[choices[AT_OWN] :]
-    begin_lane(rows, fixed, counts, tables, gait, MEMORY, choices[N_ELEMENTS], j, 0.0, pressure)
+    begin_lane(rows, fixed, counts, tables, gait, HYSTERESIS, choices[N_ELEMENTS], j, 0.0, pressure)
     low, high = config[REFERENCE_LOW], config[REFERENCE_HIGH]
     if choices[FAMILY] == PAPER:
         draw_paper(rows, j, low, high, config[FREQUENCY])
@@ -296,7 +296,7 @@ def draw_paper(rows: Any, j: int, low: float, high: float, frequency: float) -> 
 
 @lru_cache(maxsize=16)
 def kernels_for(kind: str, mounting: str, dynamics: str) -> Kernels:
-    """Return the kernels for a kind of memory, a mounting and the dynamics of the pressure."""
+    """Return the kernels for a kind of hysteresis, a mounting and the dynamics of the pressure."""
     functions = {
         "env_apply": nothing_happens,
         "env_advance": advance_brace,
@@ -311,7 +311,7 @@ def kernels_for(kind: str, mounting: str, dynamics: str) -> Kernels:
         (kind, mounting, dynamics),
         functions,
         info=INFO,
-        rows=MEMORY + MEMORY_ROWS[kind],
+        rows=HYSTERESIS + HYSTERESIS_ROWS[kind],
         parameters=K.N_PARAMETERS,
         counts=K.N_COUNTS,
         scratch=N_WORK,

@@ -1,6 +1,6 @@
 """``PAM/KneeWalk-v0``, ``PAM/KneeStairsUp-v0``, ``PAM/KneeStairsDown-v0``: assistance of a gait.
 
-A wearer walks with the knee orthosis of seed 000 on one leg. The action is the set-point of its
+A wearer walks with the knee orthosis of yeh2010 on one leg. The action is the set-point of its
 muscle's pressure. In stance, told from swing by the load on the heel, the muscle's tension has to
 give a share of the knee torque, 20 % by default; in swing the knee has to move as it would without
 the orthosis. The wearer holds his path like a spring and a damper, and gets out of it where the
@@ -153,7 +153,7 @@ def make_setup(
     activity : {"walk", "stairs_up", "stairs_down"}
         What the wearer does.
     hysteresis : {"maxwell_slip", "preisach", "none"}, optional
-        The muscle's memory. Default: that of ``plant``, or Maxwell-slip.
+        The muscle's hysteresis. Default: that of ``plant``, or Maxwell-slip.
     plant : KneeOrthosis or path, optional
         Another plant, on a leg of this activity.
     reference : str or array_like
@@ -227,7 +227,7 @@ def make_setup(
     example = "{'leg.body_mass': (60, 85)}"
     return compose(
         made,
-        kernels_for(made.memory.kind, made.dynamics),
+        kernels_for(made.hysteresis.kind, made.dynamics),
         given,
         signals=_signals(full, given.preview, given.stride * made.control_period, normalize),
         actions=Signals([Signal("pressure_set_point", "Pa", 0.0, full, 0, normalize)]),
@@ -235,7 +235,7 @@ def make_setup(
         choices=(made.elements, source),
         own=made.gait_table(),
         samples=samples,
-        tables=made.memory_tables(),
+        tables=made.hysteresis_tables(),
         spread=spread_of(made, R.PARAMETERS, NOT_DRAWN, randomize, example, {}),
         drawn=randomize is not False,
         view="knee_gait",

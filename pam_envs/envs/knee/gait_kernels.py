@@ -42,6 +42,7 @@ from pam_envs.envs.knee.gait_layout import (
     FIRST_COPIED,
     FIXED_SIGNALS,
     HIGHEST_TENSION,
+    HYSTERESIS,
     INFO,
     KNOWN_ARM,
     KNOWN_RELAXED,
@@ -52,7 +53,6 @@ from pam_envs.envs.knee.gait_layout import (
     M_DEVIATION,
     M_PRESSURE,
     M_TENSION,
-    MEMORY,
     MISMATCH,
     N_ELEMENTS,
     NOISE,
@@ -98,7 +98,7 @@ from pam_envs.mechanics.leg import sine_and_cosine
 from pam_envs.muscle.emg import activation, excitation, left_of_gap
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.step import (
-    MEMORY_ROWS,
+    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     begin_lane,
@@ -200,7 +200,7 @@ def advance_leg(
         counts,
         tables,
         settings[choices[AT_OWN] :],
-        MEMORY,
+        HYSTERESIS,
         choices[N_ELEMENTS],
         choices[SUBSTEPS],
         period,
@@ -309,7 +309,9 @@ def begin_leg(
     share = 1.0 + config[START_SPREAD] * (2.0 * uniform(key_a, key_b, START, 1) - 1.0)
     torque = prime(rows, fixed, settings, choices, phase, j)
     pressure = share * pressure_for(fixed, gait, torque, phase, j)
-    begin_lane(rows, fixed, counts, tables, gait, MEMORY, choices[N_ELEMENTS], j, phase, pressure)
+    begin_lane(
+        rows, fixed, counts, tables, gait, HYSTERESIS, choices[N_ELEMENTS], j, phase, pressure
+    )
     for k in range(len(SENSORS)):
         sense(rows, fixed, counts, k, 0, j)
     share_of_torque(rows, fixed, settings, choices, j)
@@ -325,7 +327,7 @@ def begin_leg(
 
 @lru_cache(maxsize=16)
 def kernels_for(kind: str, dynamics: str) -> Kernels:
-    """Return the kernels for a kind of memory and the dynamics of the pressure."""
+    """Return the kernels for a kind of hysteresis and the dynamics of the pressure."""
     functions = {
         "env_apply": nothing_happens,
         "env_advance": advance_leg,
@@ -340,7 +342,7 @@ def kernels_for(kind: str, dynamics: str) -> Kernels:
         (kind, dynamics),
         functions,
         info=INFO,
-        rows=MEMORY + MEMORY_ROWS[kind],
+        rows=HYSTERESIS + HYSTERESIS_ROWS[kind],
         parameters=K.N_PARAMETERS,
         counts=K.N_COUNTS,
         scratch=N_WORK,

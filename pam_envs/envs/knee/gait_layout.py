@@ -25,8 +25,8 @@ from pam_envs.sensing.butterworth import ROWS as FILTER_ROWS
     FILTER,
 ) = range(K.END, K.END + 14)
 PLAN_FILTER = FILTER + FILTER_ROWS
-MEMORY = PLAN_FILTER + FILTER_ROWS
-"""First row of the memory's state."""
+HYSTERESIS = PLAN_FILTER + FILTER_ROWS
+"""First row of the hysteresis's state."""
 
 SENSORS = (
     (K.TENSION, K.TENSION_NOISE),

@@ -105,7 +105,7 @@ def planned_reference(
 ) -> float:
     """Return the planned tension [N] or angle [rad] of a control period.
 
-    The low-pass has a memory: the periods have to be asked for one after the other.
+    The low-pass has a hysteresis: the periods have to be asked for one after the other.
     """
     config = settings[0]
     turns = rows[K.START_PHASE][lane] + step * config[PERIOD] / fixed[K.STRIDE_TIME][lane]
@@ -150,7 +150,7 @@ def prime(rows: Any, fixed: Any, settings: Any, choices: Any, phase: float, j: i
 
 @routine
 def pressure_for(fixed: Any, gait: Any, torque: float, phase: float, j: int) -> float:
-    """Return the pressure [Pa] that a muscle without memory would need at a phase of the stride."""
+    """Return the pressure [Pa] that a muscle without hysteresis would need at a phase of the stride."""
     angle = fixed[K.LEVER_MOUNT_ANGLE][j] + curve(gait, KNEE, phase)
     arm = fixed[K.LEVER_ARM][j]
     tension = wanted_tension(

@@ -1,4 +1,4 @@
-"""``PAM/RedundantManipulator-v0``: a hanging arm of six antagonistic joints, seed 002.
+"""``PAM/RedundantManipulator-v0``: a hanging arm of six antagonistic joints, fluidic_muscles.
 
 Twelve pneumatic muscles bend an arm of six links about axes x, y, x, y, x, y by turns. Its tool has
 to follow a path in position and direction: five numbers for six joints, so that how the arm gets
@@ -177,7 +177,7 @@ def make_setup(
     Parameters
     ----------
     hysteresis : {"maxwell_slip", "preisach", "none"}, optional
-        The muscles' memory. Default: that of ``plant``, or Maxwell-slip.
+        The muscles' hysteresis. Default: that of ``plant``, or Maxwell-slip.
     plant : RedundantManipulator or path, optional
         Another plant, with any chain. Default: ``RedundantManipulator.paper()``.
     reference : str or array_like, shape (k, 6)
@@ -252,7 +252,7 @@ def make_setup(
     example = "{'regulator.time_constant': (0.03, 0.06)}"
     return compose(
         made,
-        kernels_for(made.memory.kind, made.stages),
+        kernels_for(made.hysteresis.kind, made.stages),
         given,
         signals=_signals(made, action, plan, given.preview, spacing, normalize),
         actions=_actions(made, action, normalize),
@@ -260,7 +260,7 @@ def make_setup(
         choices=(made.elements, MODES.index(action), payloads.size, len(paths)),
         own=payloads,
         samples=np.concatenate(list(paths.values())),
-        tables=made.memory_tables(),
+        tables=made.hysteresis_tables(),
         spread=spread_of(made, R.PARAMETERS, NOT_DRAWN, randomize, example, CORNER),
         drawn=randomize is not False,
         view=f"{made.family}_{made.stages}",

@@ -26,7 +26,7 @@ from pam_envs.envs.manipulator.layout import (
     ACTION,
     BY_ANGLE,
     BY_PRESSURE,
-    MEMORY,
+    HYSTERESIS,
     MODE,
     N_ELEMENTS,
     N_PATHS,
@@ -61,9 +61,9 @@ from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.step import (
     advance,
     begin_lane,
-    memory_rows,
+    hysteresis_rows,
     replacements,
-    start_memory,
+    start_hysteresis,
     work_rows,
 )
 from pam_envs.references.path import along
@@ -110,7 +110,7 @@ def advance_chain(
         fixed,
         counts,
         tables,
-        MEMORY,
+        HYSTERESIS,
         choices[N_ELEMENTS],
         choices[SUBSTEPS],
         settings[0][PERIOD],
@@ -194,8 +194,8 @@ def begin_chain(
         rows[M.COMMAND + k][j] = samples[path * CHANNELS + N_POSE + k][0]
         rows[M.PRESTRESS + k][j] = config[PRESTRESS]
         rows[M.DISTURBANCE + k][j] = 0.0
-    start_memory(rows, counts, MEMORY, j)
-    begin_lane(rows, fixed, counts, tables, MEMORY, choices[N_ELEMENTS], j, work)
+    start_hysteresis(rows, counts, HYSTERESIS, j)
+    begin_lane(rows, fixed, counts, tables, HYSTERESIS, choices[N_ELEMENTS], j, work)
     for k in range(2 * N_STAGES):
         rows[OLD_SET_POINT + k][j] = rows[ACTION + k][j] = rows[M.SET_POINT + k][j]
         rows[OLD_PRESSURE + k][j] = rows[M.PRESSURE + k][j]
@@ -208,7 +208,7 @@ def begin_chain(
 
 @lru_cache(maxsize=16)
 def kernels_for(kind: str, stages: int) -> Kernels:
-    """Return the kernels for a kind of memory and a number of joints."""
+    """Return the kernels for a kind of hysteresis and a number of joints."""
     functions = {
         "env_apply": apply_chain,
         "env_advance": advance_chain,
@@ -224,7 +224,7 @@ def kernels_for(kind: str, stages: int) -> Kernels:
         (kind, stages),
         functions,
         info=info_keys(stages),
-        rows=MEMORY + memory_rows(kind, stages),
+        rows=HYSTERESIS + hysteresis_rows(kind, stages),
         parameters=M.CHAIN + parameter_rows(stages),
         counts=M.N_COUNTS,
         scratch=work_rows(stages),

@@ -25,8 +25,8 @@ OLD_AIR, TOLD_PAYLOAD, CHANGE_TIME, CHANGE, PATH = range(RATE + MOST, RATE + MOS
 RATE_TIME = 0.03
 """Time constant [s] that smooths the rates. The difference of two readings 10 ms apart is mostly
 noise; this leaves a fifth of it, and is quicker than the quickest joint (1 / 23 s)."""
-MEMORY = PATH + 1
-"""First row of the memory's state."""
+HYSTERESIS = PATH + 1
+"""First row of the hysteresis's state."""
 
 POSE = ("x", "y", "z", "point_x", "point_y", "point_z")
 """Position of the tool's tip [m] and direction in which it points [1], in the base's frame."""

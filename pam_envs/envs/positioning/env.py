@@ -130,7 +130,7 @@ def make_setup(
     Parameters
     ----------
     hysteresis : {"maxwell_slip", "preisach", "none"}, optional
-        The muscle's memory, each identified on the same data. Default: that of ``plant``, or
+        The muscle's hysteresis, each identified on the same data. Default: that of ``plant``, or
         Maxwell-slip.
     plant : SingleMuscle or path, optional
         Another plant, as an object or a YAML file. Default: the identified MAS-10-N-100.
@@ -188,7 +188,7 @@ def make_setup(
     full = made.regulator.max_pressure
     return compose(
         made,
-        K.kernels_for(made.memory.kind, made.extended),
+        K.kernels_for(made.hysteresis.kind, made.extended),
         given,
         signals=_signals(made, task, given.preview, given.stride * made.control_period, normalize),
         actions=Signals([Signal("pressure_set_point", "Pa", 0.0, full, 0, normalize)]),

@@ -25,8 +25,8 @@ from pam_envs.muscle.effective_area import volume
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.effects import replacements
 from pam_envs.plants.single_muscle.step import (
-    MEMORIES,
-    MEMORY_ROWS,
+    HYSTERESIS_MODELS,
+    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     begin_effects,
@@ -41,8 +41,8 @@ from pam_envs.sensing.sensor import read_sensor
 from pam_envs.tasks.tracking import effort_reward, excess, tracking_reward
 
 REFERENCE = R.END
-MEMORY = R.END + REFERENCE_ROWS
-"""First row of the memory's state."""
+HYSTERESIS = R.END + REFERENCE_ROWS
+"""First row of the hysteresis's state."""
 
 INFO = (
     "time",
@@ -130,7 +130,7 @@ AIR = 1.0 / (287.05 * 293.15)
 NOISE_X, NOISE_P, START = 1, 2, 3
 """Random streams."""
 
-remember: Any = None  # a placeholder, filled in for each memory
+remember: Any = None  # a placeholder, filled in for each hysteresis
 
 
 @kernel
@@ -184,7 +184,7 @@ def advance_muscle(
         fixed,
         counts,
         tables,
-        MEMORY,
+        HYSTERESIS,
         choices[N_ELEMENTS],
         choices[SUBSTEPS],
         settings[0][PERIOD],
@@ -281,13 +281,13 @@ def begin_muscle(
     rows[R.CHANGE][j] = config[LOAD_CHANGE]
     if uniform(key_a, key_b, START, 2) < 0.5:
         rows[R.CHANGE][j] = max(-load, -config[LOAD_CHANGE])
-    _start_memory(rows, counts, j)
+    _start_hysteresis(rows, counts, j)
     peak = config[START_SHARE] * fixed[R.MAX_PRESSURE][j] * uniform(key_a, key_b, START, 3)
     begin = peak * uniform(key_a, key_b, START, 4)
     rows[R.REST][j] = rest_contraction(fixed, j, 0.0, load)
     for pressure in (0.0, peak, begin):
         rows[R.PRESSURE][j] = pressure
-        remember(rows, fixed, counts, tables, MEMORY, j, j + 1, choices[N_ELEMENTS], work)
+        remember(rows, fixed, counts, tables, HYSTERESIS, j, j + 1, choices[N_ELEMENTS], work)
     for k in range(R.N_HISTORY):
         rows[R.HISTORY + k][j] = begin
     rows[R.SET_POINT][j] = begin
@@ -311,24 +311,24 @@ def begin_muscle(
 
 
 @routine
-def _start_memory(rows: Any, counts: Any, j: int) -> None:
+def _start_hysteresis(rows: Any, counts: Any, j: int) -> None:
     """Forget everything: the muscle as it rests before its first pressure."""
-    for k in range(len(rows) - MEMORY):
-        rows[MEMORY + k][j] = 0.0
+    for k in range(len(rows) - HYSTERESIS):
+        rows[HYSTERESIS + k][j] = 0.0
     counts[R.STACK_COUNT][j] = 1
 
 
 @lru_cache(maxsize=8)
 def kernels_for(kind: str, extended: bool = False) -> Kernels:
-    """Return the kernels for a kind of memory, plain or with effects."""
-    rows = MEMORY + MEMORY_ROWS[kind]
+    """Return the kernels for a kind of hysteresis, plain or with effects."""
+    rows = HYSTERESIS + HYSTERESIS_ROWS[kind]
     functions = {
         "env_apply": change_load,
         "env_advance": advance_muscle,
         "env_reference": reference_at,
         "env_evaluate": evaluate,
         "env_begin": begin_muscle,
-        "remember": MEMORIES[kind],
+        "remember": HYSTERESIS_MODELS[kind],
     }
     if extended:
         functions |= replacements(kind, rows)

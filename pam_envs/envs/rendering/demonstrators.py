@@ -1,4 +1,4 @@
-"""What moves a plant that is filmed: the inverse of its static law and of its memory."""
+"""What moves a plant that is filmed: the inverse of its static law and of its hysteresis."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 
 class InverseFeedForward:
-    """The set-point that the plant's own inverse asks for: static law, then memory."""
+    """The set-point that the plant's own inverse asks for: static law, then hysteresis."""
 
     def __init__(self, env: Any) -> None:
         self.plant, self.signals = env.plant, env.signals
@@ -23,7 +23,7 @@ class InverseFeedForward:
         load = float(self.signals.decode(observation, "load"))
         if self.inverse is None:
             full = self.plant.regulator.max_pressure
-            self.inverse = self.plant.memory.inverse(load, full)
+            self.inverse = self.plant.hysteresis.inverse(load, full)
             self.state = self.inverse.initial_state((1,))
         wanted = self.signals.decode(observation, "reference")
         drive = np.atleast_1d(self.plant.drive_for(wanted, load))
@@ -32,12 +32,12 @@ class InverseFeedForward:
 
 
 class BraceFeedForward:
-    """The set-point that the orthosis' own inverse asks for: spring and lever, then memory."""
+    """The set-point that the orthosis' own inverse asks for: spring and lever, then hysteresis."""
 
     def __init__(self, env: Any) -> None:
         self.plant, self.signals = env.plant, env.signals
         self.action = env.action_signals[0]
-        self.operator: Any = env.plant.memory.scaled
+        self.operator: Any = env.plant.hysteresis.scaled
         self.state: Any = None if self.operator is None else self.operator.initial_state((1,))
 
     def __call__(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -83,7 +83,7 @@ class ElbowAllocation:
 class JointsUpright:
     """The set-points of antagonistic joints that bear their weight and creep to their references.
 
-    Weight by what the plant knows of it, and a slow integral of the error for the memory.
+    Weight by what the plant knows of it, and a slow integral of the error for the hysteresis.
     """
 
     per_step = 0.03

@@ -1,4 +1,4 @@
-"""Whether muscles bear the weights at the angles of a plan, without memory and at rest."""
+"""Whether muscles bear the weights at the angles of a plan, without hysteresis and at rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The memory of the muscles of a joint: friction driven by their contraction.
+"""The hysteresis of the muscles of a joint: friction driven by their contraction.
 
 The threads of the braid slide on each other as the length changes, not as the pressure does. An
 operator of slope 1 follows the contraction; what it lags behind, times a friction stiffness that
@@ -23,13 +23,13 @@ from pam_envs.parameters import parameter
 from pam_envs.plants.single_muscle.hysteresis import Kind
 
 WIDEST = 0.22
-"""Contraction on either side of the straight joint's that a Preisach memory spans."""
+"""Contraction on either side of the straight joint's that a Preisach hysteresis spans."""
 LEVELS = 89
 """Of its map: cells of half a per cent."""
 ELEMENTS = 8
-"""Most plays of a memory."""
+"""Most plays of a hysteresis."""
 ANGLES = 0.62
-"""Angle [rad] that the reduced plant's memory spans on either side."""
+"""Angle [rad] that the reduced plant's hysteresis spans on either side."""
 ANGLE_LEVELS = 63
 
 _SIZE = "half-gap of the joint's loop 10 % of an amplitude of 15 to 20 degrees"
@@ -37,7 +37,7 @@ _SHARE = "friction in proportion to the pressure but for a rest of the empty mus
 
 
 @dataclass(frozen=True)
-class JointMemory:
+class JointHysteresis:
     """Thread-on-thread friction of the muscles.
 
     ``operator`` turns contraction into the contraction that is felt (of the reduced plant: the
@@ -86,8 +86,8 @@ ANGLE_WEIGHTS = (0.052, 0.0721, 0.105, 0.0207, 0.0809, 0.033)
 
 
 @lru_cache(maxsize=8)
-def joint_memory(kind: Kind, reduced: bool = False) -> JointMemory:
-    """Return the preset memory of a kind; both operators have the same loops.
+def joint_hysteresis(kind: Kind, reduced: bool = False) -> JointHysteresis:
+    """Return the preset hysteresis of a kind; both operators have the same loops.
 
     Raises
     ------
@@ -95,11 +95,11 @@ def joint_memory(kind: Kind, reduced: bool = False) -> JointMemory:
         If there is no such kind.
     """
     if kind == "none":
-        return JointMemory()
+        return JointHysteresis()
     plays = angle_plays() if reduced else contraction_plays()
     if kind == "maxwell_slip":
-        return JointMemory(plays)
+        return JointHysteresis(plays)
     if kind == "preisach":
         high, levels = (ANGLES, ANGLE_LEVELS) if reduced else (WIDEST, LEVELS)
-        return JointMemory(Preisach.from_play(plays, -high, high, levels, start="virgin"))
+        return JointHysteresis(Preisach.from_play(plays, -high, high, levels, start="virgin"))
     raise ValueError(f"hysteresis = {kind!r}; choose 'maxwell_slip', 'preisach' or 'none'")

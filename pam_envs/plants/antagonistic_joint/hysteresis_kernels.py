@@ -1,6 +1,6 @@
-"""The memories of a joint's muscles as kernels.
+"""The hysteresis models of a joint's muscles as kernels.
 
-``peek`` asks what a memory would do at an input, ``remember`` lets it go there. Both write, for
+``peek`` asks what a hysteresis would do at an input, ``remember`` lets it go there. Both write, for
 every operator ``m``, how far its output lags behind its input into ``rows[lag + m]``; ``peek``
 also how that grows with the input, into ``rows[stick + m]``: 1 where all sticks, 0 where all
 slips.
@@ -22,10 +22,10 @@ DEPTH = 24
 
 @kernel
 def peek_nothing(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, at: int, lag: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, at: int, lag: int,
     stick: int, operators: int, model: int, stacks: int, member: int, first: int, last: int,
 ) -> None:  # fmt: skip
-    """Without memory nothing lags."""
+    """Without hysteresis nothing lags."""
     for m in range(operators):
         for j in range(first, last):
             rows[lag + m][j] = 0.0
@@ -34,7 +34,7 @@ def peek_nothing(
 
 @kernel
 def peek_plays(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, at: int, lag: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, at: int, lag: int,
     stick: int, operators: int, model: int, stacks: int, member: int, first: int, last: int,
 ) -> None:  # fmt: skip
     """Lag of plays; ``fixed[model]`` on are thresholds, then weights."""
@@ -45,7 +45,7 @@ def peek_plays(
             held[j] = 0.0
         for k in range(elements):
             threshold, weight = fixed[model + k], fixed[model + ELEMENTS + k]
-            state = rows[memory + m * ELEMENTS + k]
+            state = rows[hysteresis + m * ELEMENTS + k]
             for j in range(first, last):
                 w = play(x[j], threshold[j], state[j])
                 behind[j] = behind[j] + weight[j] * (x[j] - w)
@@ -54,12 +54,12 @@ def peek_plays(
 
 @kernel
 def peek_relays(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, at: int, lag: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, at: int, lag: int,
     stick: int, operators: int, model: int, stacks: int, member: int, first: int, last: int,
 ) -> None:  # fmt: skip
-    """Lag of a Preisach operator; its growth is that since the memory was last moved."""
+    """Lag of a Preisach operator; its growth is that since the hysteresis was last moved."""
     for m in range(operators):
-        place = memory + m * 2 * DEPTH
+        place = hysteresis + m * 2 * DEPTH
         stack, sums = rows[place : place + DEPTH], rows[place + DEPTH : place + 2 * DEPTH]
         count = counts[stacks + m]
         for j in range(first, last):
@@ -83,10 +83,10 @@ def growth(change: float, moved: float) -> float:
 
 @kernel
 def remember_nothing(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, at: int, lag: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, at: int, lag: int,
     operators: int, model: int, stacks: int, member: int, first: int, last: int,
 ) -> None:  # fmt: skip
-    """Without memory nothing lags."""
+    """Without hysteresis nothing lags."""
     for m in range(operators):
         for j in range(first, last):
             rows[lag + m][j] = 0.0
@@ -94,7 +94,7 @@ def remember_nothing(
 
 @kernel
 def remember_plays(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, at: int, lag: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, at: int, lag: int,
     operators: int, model: int, stacks: int, member: int, first: int, last: int,
 ) -> None:  # fmt: skip
     """Move plays to their inputs."""
@@ -104,7 +104,7 @@ def remember_plays(
             behind[j] = 0.0
         for k in range(elements):
             threshold, weight = fixed[model + k], fixed[model + ELEMENTS + k]
-            state = rows[memory + m * ELEMENTS + k]
+            state = rows[hysteresis + m * ELEMENTS + k]
             for j in range(first, last):
                 w = play(x[j], threshold[j], state[j])
                 state[j] = w
@@ -113,12 +113,12 @@ def remember_plays(
 
 @kernel
 def remember_relays(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, at: int, lag: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, at: int, lag: int,
     operators: int, model: int, stacks: int, member: int, first: int, last: int,
 ) -> None:  # fmt: skip
     """Move Preisach operators to their inputs; ``fixed[model]`` is half their range."""
     for m in range(operators):
-        place = memory + m * 2 * DEPTH
+        place = hysteresis + m * 2 * DEPTH
         stack, sums = rows[place : place + DEPTH], rows[place + DEPTH : place + 2 * DEPTH]
         count = counts[stacks + m]
         for j in range(first, last):
@@ -129,7 +129,7 @@ def remember_relays(
             rows[lag + m][j] = x - y
 
 
-MEMORIES: dict[str, dict[str, Any]] = {
+HYSTERESIS_MODELS: dict[str, dict[str, Any]] = {
     "none": {"peek": peek_nothing, "remember": remember_nothing},
     "maxwell_slip": {"peek": peek_plays, "remember": remember_plays},
     "preisach": {"peek": peek_relays, "remember": remember_relays},

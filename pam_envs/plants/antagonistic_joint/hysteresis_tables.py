@@ -1,4 +1,4 @@
-"""The operator of a joint's memory as the rows and tables that the kernels read."""
+"""The operator of a joint's hysteresis as the rows and tables that the kernels read."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ def check_operator(operator: Any) -> None:
     if isinstance(operator, PlayOperator):
         if len(operator.thresholds) > ELEMENTS:
             raise ValueError(
-                f"memory: {len(operator.thresholds)} plays, and at most {ELEMENTS} are simulated: "
+                f"hysteresis: {len(operator.thresholds)} plays, and at most {ELEMENTS} are simulated: "
                 "identify with fewer"
             )
         if abs(operator.total_slope - 1.0) > 1e-9:
             raise ValueError(
-                f"memory: the plays' total slope is {operator.total_slope:g}; it must be 1 (the "
+                f"hysteresis: the plays' total slope is {operator.total_slope:g}; it must be 1 (the "
                 "input that is felt): divide linear and weights by it"
             )
     elif isinstance(operator, Preisach):
         if operator.start != "virgin" or operator.depth != DEPTH:
             raise ValueError(
-                f"memory: a Preisach operator with start {operator.start!r} and depth "
+                f"hysteresis: a Preisach operator with start {operator.start!r} and depth "
                 f"{operator.depth}; a joint needs a virgin one (range -h to h) of depth {DEPTH}"
             )
     elif operator is not None:
         raise ValueError(
-            f"memory: a joint takes a PlayOperator, a Preisach operator or None, got {operator!r}"
+            f"hysteresis: a joint takes a PlayOperator, a Preisach operator or None, got {operator!r}"
         )
 
 

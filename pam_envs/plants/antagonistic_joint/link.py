@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pam_envs.mechanics.hanging_mass import GRAVITY
 from pam_envs.parameters import parameter
 
-_FORM = "a slender rod of 0.3 kg; the masses of seed 002's stages are not published"
+_FORM = "a slender rod of 0.3 kg; the masses of fluidic_muscles's stages are not published"
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,12 @@ class Stage:
         0.05, "N m s/rad", 0.0, 100.0, "assumed", "of the bearing", spread=(0.02, 0.1)
     )
     limit: float = parameter(
-        0.5235987755982988, "rad", 0.01, 0.6, "published", "+-30 degrees: seed 002, section 2"
+        0.5235987755982988,
+        "rad",
+        0.01,
+        0.6,
+        "published",
+        "+-30 degrees: fluidic_muscles, section 2",
     )
     stop: float = parameter(
         0.6108652381980153, "rad", 0.02, 0.65, "assumed", "35 degrees, 5 before the toggle"
@@ -37,7 +42,7 @@ class Link(Stage):
     """The link of a single stage, which hangs from the joint; a payload is fixed to its end."""
 
     length: float = parameter(
-        0.25, "m", 0.02, 2.0, "assumed", "of seed 002's chain, as its figures suggest"
+        0.25, "m", 0.02, 2.0, "assumed", "of fluidic_muscles's chain, as its figures suggest"
     )
     mass: float = parameter(0.3, "kg", 0.01, 20.0, "assumed", _FORM, spread=(0.2, 0.5))
     centre: float = parameter(0.125, "m", 0.0, 2.0, "derived", _FORM)
@@ -64,7 +69,7 @@ class Link(Stage):
 class ArmFactors:
     """What all links and all joints of a chain have in common beside their own numbers.
 
-    The masses of seed 002's arm are not published. A link weighs what
+    The masses of fluidic_muscles's arm are not published. A link weighs what
     :class:`~pam_envs.mechanics.serial_chain.LinkForm` says, unless a chain is given.
     """
 
@@ -108,7 +113,7 @@ class NominalPoint(StagePoint):
     """The straight joint at its usual co-contraction, and the reduced plant about it."""
 
     pole: float = parameter(
-        23.0, "rad/s", 1.0, 200.0, "published", "two real poles: seed 002, Fig. 12"
+        23.0, "rad/s", 1.0, 200.0, "published", "two real poles: fluidic_muscles, Fig. 12"
     )
     stiffness: float = parameter(
         14.8, "N m/rad", 0.5, 500.0, "derived", "of the plant with muscles at this point"

@@ -55,7 +55,7 @@ def fill(pressure: Any, set_point: Any, was: Any, fixed: Any, h: float) -> None:
 
 @kernel
 def contract(rows: Any, fixed: Any, j: int, angle: float, at: int, straight: int) -> None:
-    """Write the contractions of a pair at an angle, as its memories' inputs (two rows from ``at``).
+    """Write the contractions of a pair at an angle, as its hysteresis models' inputs (two rows from ``at``).
 
     They count from that of the straight joint, which stands in the row ``straight``.
     """
@@ -65,13 +65,16 @@ def contract(rows: Any, fixed: Any, j: int, angle: float, at: int, straight: int
 
 
 @kernel
-def clear_memories(rows: Any, counts: Any, memory: int, first: int, number: int, j: int) -> None:
-    """Put the memories of one lane into their virgin state, ``number`` of them.
+def clear_hysteresis_models(
+    rows: Any, counts: Any, hysteresis: int, first: int, number: int, j: int
+) -> None:
+    """Put the hysteresis models of one lane into their virgin state, ``number`` of them.
 
-    Their state is all that stands in ``rows`` from ``memory`` on; their counts begin at ``first``.
+    Their state is all that stands in ``rows`` from ``hysteresis`` on; their counts begin at
+    ``first``.
     """
-    for k in range(len(rows) - memory):
-        rows[memory + k][j] = 0.0
+    for k in range(len(rows) - hysteresis):
+        rows[hysteresis + k][j] = 0.0
     for m in range(number):
         counts[first + m][j] = 1
 
@@ -102,7 +105,7 @@ def terms_of(fixed: Any, j: int, contraction: float) -> tuple[float, float, floa
 
 @kernel
 def friction_of(fixed: Any, j: int, pressure: float) -> float:
-    """Return the friction over the memory's lag [N]."""
+    """Return the friction over the hysteresis's lag [N]."""
     return fixed[LOOP_WIDTH][j] * (fixed[FRICTION_BASE][j] + fixed[FRICTION_RATE][j] * pressure)
 
 
@@ -118,8 +121,8 @@ def pulled(
 ) -> tuple[float, float]:
     """Return the force of a muscle [N] and minus its derivative by contraction [N].
 
-    ``speed`` [1/s] is that of the contraction, ``lag`` the memory's; the derivative is that of the
-    law alone. A slack muscle has neither force nor stiffness.
+    ``speed`` [1/s] is that of the contraction, ``lag`` the hysteresis's; the derivative is that of
+    the law alone. A slack muscle has neither force nor stiffness.
     """
     area, passive, less, more = terms_of(fixed, j, contraction)
     gain = gain_of(fixed, j, side)
@@ -204,10 +207,10 @@ def set_pressure(fixed: Any, j: int, contraction: float, force: float) -> tuple[
 
 @kernel
 def feed_forward(fixed: Any, j: int, angle: float, prestress: float) -> tuple[float, float, float]:
-    """Return the set-points [Pa] for an angle [rad] and a co-contraction [N]: seed 002, Fig. 4.
+    """Return the set-points [Pa] for an angle [rad] and a co-contraction [N]: fluidic_muscles, Fig. 4.
 
     The inverse of the law: the forces' mean is ``prestress`` and their torque 0. Where one muscle
-    would need more than full pressure the co-contraction gives way. Memory, gravity, loads and
+    would need more than full pressure the co-contraction gives way. Hysteresis, gravity, loads and
     what sets the specimens apart are left out.
 
     Returns

@@ -1,10 +1,10 @@
-"""One stage of seed 002: a joint between two antagonistic pneumatic muscles.
+"""One stage of fluidic_muscles: a joint between two antagonistic pneumatic muscles.
 
     (angle, co-contraction) -> feed-forward -> set-points -> regulators -> pressures
     F = F(p, e) - friction(e)          of each muscle, 0 where it would push
     J phi'' + D phi' = -F_A dL_A/dphi - F_B dL_B/dphi - m g c sin(phi) + disturbance
 
-Without memory, gravity and load the feed-forward makes the angle at rest the commanded one; the
+Without hysteresis, gravity and load the feed-forward makes the angle at rest the commanded one; the
 regulators' lag and the damped stiffness of the muscles are then two real poles near 23 rad/s. The
 paper's reduced plant, a Preisach operator and two poles, is the make ``dynamics="reduced"``.
 """
@@ -24,7 +24,7 @@ from pam_envs.mechanics.hanging_mass import LARGEST_PHASE
 from pam_envs.muscle.force_map import FULL_PRESSURE, ForceMap, paper_stretch
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint import statics as pair_statics
-from pam_envs.plants.antagonistic_joint.hysteresis import JointMemory, joint_memory
+from pam_envs.plants.antagonistic_joint.hysteresis import JointHysteresis, joint_hysteresis
 from pam_envs.plants.antagonistic_joint.hysteresis_tables import (
     check_operator,
     map_tables,
@@ -59,7 +59,7 @@ class AntagonisticJoint(Plant):
     ----------
     dynamics : {"muscles", "reduced"}
         First principles, or the paper's reduced plant.
-    regulator, memory, muscle, lever, link, nominal
+    regulator, hysteresis, muscle, lever, link, nominal
         The components; both muscles and both regulators are alike but for ``muscle.imbalance``.
     angle, pressure
         The sensors.
@@ -68,7 +68,7 @@ class AntagonisticJoint(Plant):
     family: ClassVar[str] = "antagonistic_joint"
     components: ClassVar[tuple[str, ...]] = (
         "regulator",
-        "memory",
+        "hysteresis",
         "muscle",
         "lever",
         "link",
@@ -83,7 +83,7 @@ class AntagonisticJoint(Plant):
 
     dynamics: Dynamics = "muscles"
     regulator: JointRegulator = field(default_factory=JointRegulator)
-    memory: JointMemory = field(default_factory=JointMemory)
+    hysteresis: JointHysteresis = field(default_factory=JointHysteresis)
     muscle: ForceMap = field(default_factory=ForceMap)
     lever: AntagonisticLever = field(default_factory=AntagonisticLever)
     link: Link = field(default_factory=Link)
@@ -96,7 +96,7 @@ class AntagonisticJoint(Plant):
         if self.dynamics not in ("muscles", "reduced"):
             raise ValueError(f"dynamics = {self.dynamics!r}; choose one of muscles, reduced")
         self.check_components()
-        check_operator(self.memory.operator)
+        check_operator(self.hysteresis.operator)
         pair_statics.check_angles(self, self.link)
         self._check_motion()
 
@@ -117,17 +117,17 @@ class AntagonisticJoint(Plant):
 
     @classmethod
     def paper(cls, hysteresis: Kind = "maxwell_slip", **changes: float) -> AntagonisticJoint:
-        """Return the joint whose muscles end at 25 % contraction, as seed 002 has it.
+        """Return the joint whose muscles end at 25 % contraction, as fluidic_muscles has it.
 
         Parameters
         ----------
         hysteresis : {"maxwell_slip", "preisach", "none"}
-            Which memory; both operators have the same loops.
+            Which hysteresis; both operators have the same loops.
         **changes : float
-            Parameters to replace, with ``__`` for the dot (``memory__width=0.5``).
+            Parameters to replace, with ``__`` for the dot (``hysteresis__width=0.5``).
         """
         plant = cls(
-            memory=joint_memory(hysteresis),
+            hysteresis=joint_hysteresis(hysteresis),
             muscle=ForceMap(stretch=paper_stretch()),
             provenance={"muscle.stretch": STRETCHED},
         )
@@ -140,7 +140,7 @@ class AntagonisticJoint(Plant):
         The limit is the angle that full pressure reaches at the nominal co-contraction, against
         the link's weight; other parameters are those of :meth:`paper`.
         """
-        plant = cls(memory=joint_memory(hysteresis), provenance={"link.limit": REACHED})
+        plant = cls(hysteresis=joint_hysteresis(hysteresis), provenance={"link.limit": REACHED})
         plant = plant._changed(changes)
         if "link__limit" in changes:
             return plant
@@ -148,10 +148,10 @@ class AntagonisticJoint(Plant):
 
     @classmethod
     def reduced(cls, hysteresis: Kind = "maxwell_slip", **changes: float) -> AntagonisticJoint:
-        """Return the paper's reduced plant: a memory, then two real poles."""
+        """Return the paper's reduced plant: a hysteresis, then two real poles."""
         plant = cls.paper("none")
         plant = dataclasses.replace(
-            plant, memory=joint_memory(hysteresis, True), dynamics="reduced"
+            plant, hysteresis=joint_hysteresis(hysteresis, True), dynamics="reduced"
         )
         return plant._changed(changes)
 
@@ -203,7 +203,7 @@ class AntagonisticJoint(Plant):
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Return both pressures [Pa] for an angle [rad], co-contraction [N] and torque [N m].
 
-        The exact inverse of the static law, without memory. Where a muscle would need more than
+        The exact inverse of the static law, without hysteresis. Where a muscle would need more than
         full pressure the co-contraction gives way; the last value says where even without any the
         angle is out of reach.
         """
@@ -211,11 +211,11 @@ class AntagonisticJoint(Plant):
         return pair_statics.pressures_for(self, angle, stress, torque)
 
     def torque(self, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
-        """Return the muscles' torque [N m] at an angle [rad] and pressures [Pa], without memory."""
+        """Return the muscles' torque [N m] at an angle [rad] and pressures [Pa], without hysteresis."""
         return pair_statics.pull(self, angle, pressure_a, pressure_b)
 
     def stiffness_at(self, angle: ArrayLike, prestress: ArrayLike | None = None) -> Array:
-        """Return the stiffness [N m/rad] at rest, pressures held, without memory."""
+        """Return the stiffness [N m/rad] at rest, pressures held, without hysteresis."""
         pressures = self.pressures_for(angle, prestress)[:2]
         return pair_statics.stiffness(self, angle, *pressures)
 
@@ -275,21 +275,21 @@ class AntagonisticJoint(Plant):
     def parameter_rows(self) -> Array:
         """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
         named = [self.value(name) for name in K.NAMES]
-        return np.array(named + model_rows(self.memory.operator))
+        return np.array(named + model_rows(self.hysteresis.operator))
 
     @property
     def elements(self) -> int:
-        """Plays of a muscle's memory."""
-        return plays_of(self.memory.operator)
+        """Plays of a muscle's hysteresis."""
+        return plays_of(self.hysteresis.operator)
 
-    def memory_tables(self) -> Array:
+    def hysteresis_tables(self) -> Array:
         """Return the Everett maps of all members, shape (members, n, n), or zeros."""
-        return map_tables([m.memory.operator for m in self.members()])
+        return map_tables([m.hysteresis.operator for m in self.members()])
 
     def rest_angles(self, commands: ArrayLike, prestress: float | None = None) -> Array:
         """Return where the joint rests [rad] after each of a series of set-points [rad], (T,).
 
-        Quasi-static, memory included, from the straight virgin state, without gravity and load.
+        Quasi-static, hysteresis included, from the straight virgin state, without gravity and load.
         """
         from pam_envs.plants.antagonistic_joint.rollout import rest_angles
 

@@ -14,13 +14,13 @@ from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rows import N_COUNTS, N_PARAMETERS
 from pam_envs.plants.antagonistic_joint.step import (
-    MEMORY_ROWS,
+    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     begin_lane,
     feed_forward,
     replacements,
-    start_memory,
+    start_hysteresis,
 )
 from pam_envs.plants.core.tiles import drives_of, first_of, in_tiles
 
@@ -48,7 +48,7 @@ COMMANDED, STRESSED, DISTURBED, LOADED, FILLED_A, FILLED_B, DIRECT = range(7)
 _ROWS = tuple(OUTPUTS.values())
 WIDTH = LANES if COMPILED else 1
 """Plants that one tile holds; plain Python gains nothing from lanes."""
-N_ROWS = 0  # a placeholder, filled in for each memory
+N_ROWS = 0  # a placeholder, filled in for each hysteresis
 
 Array = NDArray[np.float64]
 
@@ -84,7 +84,7 @@ def run_joint(
         lanes = min(LANES, len(outputs[0][0]) - start)
         last = len(drives[0][0]) - 1
         for j in range(LANES):
-            start_memory(rows, counts, K.END, j)
+            start_hysteresis(rows, counts, K.END, j)
             drive(rows, fixed, drives, 0, min(start + j, last), j)
             angle, stress = rows[K.COMMAND][j], rows[K.PRESTRESS][j]
             begin_lane(rows, fixed, counts, table, K.END, elements, j, angle, stress)
@@ -110,7 +110,7 @@ def _runner(kind: str, dynamics: str) -> Callable[..., Any]:
 
 def kernel_names(kind: str, dynamics: str, lanes: int = WIDTH) -> dict[str, Any]:
     """Return what takes the place of the placeholders of :func:`run_joint`."""
-    sizes = {"N_ROWS": K.END + MEMORY_ROWS[kind], "LANES": lanes}
+    sizes = {"N_ROWS": K.END + HYSTERESIS_ROWS[kind], "LANES": lanes}
     return replacements(kind, dynamics) | sizes
 
 
@@ -123,10 +123,10 @@ def arrays_for(
     n = len(plants) if len(plants) > 1 else columns
     fixed = in_tiles([plant.parameter_rows() for plant in plants], n, lanes)
     return [
-        np.zeros((len(fixed), K.END + MEMORY_ROWS[plants[0].memory.kind], lanes)),
+        np.zeros((len(fixed), K.END + HYSTERESIS_ROWS[plants[0].hysteresis.kind], lanes)),
         fixed,
         np.zeros((len(fixed), N_COUNTS, lanes), np.int64),
-        plants[0].memory_tables()[:1],
+        plants[0].hysteresis_tables()[:1],
         filled,
         np.empty((len(OUTPUTS), periods, n)),
     ]
@@ -147,7 +147,8 @@ def simulate_joint(
     Parameters
     ----------
     plants : AntagonisticJoint or sequence of them
-        Of one memory, of one make, and with the same sub-steps. A memory's map is the first's.
+        Of one hysteresis, of one make, and with the same sub-steps. A hysteresis's map is the
+        first's.
     commands : array_like, shape (T,) or (T, n)
         Set-points [rad] of the feed-forward, one a control period.
     prestress : array_like, optional
@@ -167,7 +168,7 @@ def simulate_joint(
         one plant and (T, n) for several.
     """
     several = [plants] if isinstance(plants, AntagonisticJoint) else list(plants)
-    first = first_of(several, "memory.kind", "dynamics", "substeps")
+    first = first_of(several, "hysteresis.kind", "dynamics", "substeps")
     stress = first.prestress if prestress is None else prestress
     given = (0.0, 0.0) if pressures is None else pressures
     direct = 0.0 if pressures is None else 1.0
@@ -175,7 +176,7 @@ def simulate_joint(
     arrays = arrays_for(several, drives)
     if not COMPILED:
         arrays = [a.tolist() for a in arrays]
-    run = _runner(first.memory.kind, first.dynamics)
+    run = _runner(first.hysteresis.kind, first.dynamics)
     run(*arrays, first.elements, first.substeps, first.control_period, int(quasi_static))
     made = np.asarray(arrays[-1])
     single = isinstance(plants, AntagonisticJoint) and all(np.ndim(d) < 2 for d in drives)

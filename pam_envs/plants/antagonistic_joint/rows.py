@@ -1,7 +1,7 @@
 """Where each number of the antagonistic joint stands in its rows (see ``single_muscle_rows``).
 
 A plant's numbers are rows of two matrices whose columns are environments (lanes): ``rows`` is the
-state, followed by that of the memory, and ``fixed`` the parameters, which all tiles of a batch
+state, followed by that of the hysteresis, and ``fixed`` the parameters, which all tiles of a batch
 share unless they are drawn. This page is the only one that counts. Of what stands twice, the
 first is muscle A's.
 """
@@ -37,17 +37,17 @@ from pam_envs.plants.antagonistic_joint.hysteresis_kernels import MODEL_ROWS
     STICK_B,
     STRAIGHT,
 ) = range(25)
-"""``AT``: contraction beyond that of the straight joint (``STRAIGHT``), the memory's input."""
+"""``AT``: contraction beyond that of the straight joint (``STRAIGHT``), the hysteresis's input."""
 END = 25
-"""First row after the plant's state; the memory's state follows."""
+"""First row after the plant's state; the hysteresis's state follows."""
 
 MUSCLE_PARAMETERS = (
     "regulator.max_pressure",
     "regulator.time_constant",
     "regulator.slew_rate",
-    "memory.width",
-    "memory.base",
-    "memory.rate",
+    "hysteresis.width",
+    "hysteresis.base",
+    "hysteresis.rate",
     "muscle.area",
     "muscle.taper",
     "muscle.threshold",
@@ -136,7 +136,7 @@ PARAMETERS = (
 ) = range(len(MUSCLE_PARAMETERS), len(PARAMETERS))
 
 MODEL = len(PARAMETERS)
-"""First row of the memory's operator: thresholds and weights, or half the range of a map."""
+"""First row of the hysteresis's operator: thresholds and weights, or half the range of a map."""
 N_PARAMETERS = MODEL + MODEL_ROWS
 NAMES = PARAMETERS
 """Every parameter by name; :func:`place` says where it stands."""

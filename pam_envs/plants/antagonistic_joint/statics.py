@@ -1,4 +1,4 @@
-"""The statics of a pair of muscles on its lever, without memory."""
+"""The statics of a pair of muscles on its lever, without hysteresis."""
 
 from __future__ import annotations
 

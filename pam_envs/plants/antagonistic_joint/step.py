@@ -4,11 +4,11 @@
 
 The regulators are exact at the end of a sub-step. The motion is exact for the torque linearised
 about the predicted middle, with the pressures going straight from their old to their new values:
-of second order, and without a stability limit from stiff muscles. The memories are asked at the
-predicted middle and moved to the angle reached.
+of second order, and without a stability limit from stiff muscles. The hysteresis models are asked
+at the predicted middle and moved to the angle reached.
 
-The reduced plant of seed 002 has in its place a memory from command to resting angle and two real
-poles; disturbance and payload reach it through the stiffness of the nominal point.
+The reduced plant of fluidic_muscles has in its place a hysteresis from command to resting angle
+and two real poles; disturbance and payload reach it through the stiffness of the nominal point.
 """
 
 from __future__ import annotations
@@ -20,10 +20,13 @@ from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.mechanics.antagonistic_lever import sine_and_cosine_of
 from pam_envs.mechanics.hanging_mass import damped_motion
 from pam_envs.plants.antagonistic_joint import rows as K
-from pam_envs.plants.antagonistic_joint.hysteresis_kernels import MEMORIES, ROWS_PER_OPERATOR
+from pam_envs.plants.antagonistic_joint.hysteresis_kernels import (
+    HYSTERESIS_MODELS,
+    ROWS_PER_OPERATOR,
+)
 from pam_envs.plants.antagonistic_joint.pair import (
     air_of,
-    clear_memories,
+    clear_hysteresis_models,
     command,
     contract,
     feed_forward,
@@ -65,21 +68,21 @@ from pam_envs.plants.antagonistic_joint.rows import (
 )
 
 __all__ = [
-    "MEMORY_ROWS",
+    "HYSTERESIS_ROWS",
     "N_WORK",
     "advance",
     "begin_lane",
     "feed_forward",
     "replacements",
-    "start_memory",
+    "start_hysteresis",
 ]
 
 WAS_A, WAS_B, RATE_A, RATE_B, CURVE_A, CURVE_B = range(6)
 """Rows of scratch: pressures before the sub-step, geometry at its middle."""
 N_WORK = 6
-MEMORY_ROWS = {kind: 2 * rows for kind, rows in ROWS_PER_OPERATOR.items()}
+HYSTERESIS_ROWS = {kind: 2 * rows for kind, rows in ROWS_PER_OPERATOR.items()}
 
-# placeholders, filled in for each memory and each of the two plants
+# placeholders, filled in for each hysteresis and each of the two plants
 peek: Any = None
 remember: Any = None
 move: Any = None
@@ -107,7 +110,14 @@ def inertia_of(rows: Any, fixed: Any, j: int) -> float:
 
 @kernel
 def swing(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, h: float, work: Any
+    rows: Any,
+    fixed: Any,
+    counts: Any,
+    table: Any,
+    hysteresis: int,
+    elements: int,
+    h: float,
+    work: Any,
 ) -> None:
     """Move the joint by one sub-step."""
     angle, velocity, straight = rows[ANGLE], rows[VELOCITY], rows[STRAIGHT]
@@ -117,7 +127,7 @@ def swing(
         x_b, work[RATE_B][j], work[CURVE_B][j] = lever_of(fixed, j, middle, -1.0)
         rows[AT_A][j], rows[AT_A + 1][j] = x_a - straight[j], x_b - straight[j]
     peek(
-        rows, fixed, counts, table, memory, elements, AT_A, LAG_A, STICK_A, 2, MODEL, STACK_COUNT,
+        rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, STICK_A, 2, MODEL, STACK_COUNT,
         MEMBER, 0, LANES,
     )  # fmt: skip
     for j in range(LANES):
@@ -147,21 +157,28 @@ def swing(
         angle[j] = angle[j] + du
         contract(rows, fixed, j, angle[j], AT_A, STRAIGHT)
     remember(
-        rows, fixed, counts, table, memory, elements, AT_A, LAG_A, 2, MODEL, STACK_COUNT, MEMBER,
+        rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, 2, MODEL, STACK_COUNT, MEMBER,
         0, LANES,
     )  # fmt: skip
 
 
 @kernel
 def follow(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, h: float, work: Any
+    rows: Any,
+    fixed: Any,
+    counts: Any,
+    table: Any,
+    hysteresis: int,
+    elements: int,
+    h: float,
+    work: Any,
 ) -> None:
     """Move the reduced plant by one sub-step."""
     angle, velocity = rows[ANGLE], rows[VELOCITY]
     for j in range(LANES):
         rows[AT_A][j] = rows[COMMAND][j]
     remember(
-        rows, fixed, counts, table, memory, elements, AT_A, LAG_A, 1, MODEL, STACK_COUNT, MEMBER,
+        rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, 1, MODEL, STACK_COUNT, MEMBER,
         0, LANES,
     )  # fmt: skip
     for j in range(LANES):
@@ -185,7 +202,7 @@ def follow(
 
 @kernel
 def advance(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, substeps: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, substeps: int,
     period: float, work: Any,
 ) -> None:  # fmt: skip
     """Advance a tile by one control period, towards its set-points.
@@ -197,9 +214,9 @@ def advance(
         ``_B`` [Pa], ``COMMAND`` [rad] (which the reduced plant follows), ``DISTURBANCE`` [N m] and
         ``PAYLOAD`` [kg] are the caller's to write.
     table : array
-        Of the memory: ``AntagonisticJoint.memory_tables()``.
-    memory, elements : int
-        First row of the memory's state, and ``AntagonisticJoint.elements``.
+        Of the hysteresis: ``AntagonisticJoint.hysteresis_tables()``.
+    hysteresis, elements : int
+        First row of the hysteresis's state, and ``AntagonisticJoint.elements``.
     substeps, period : int, float
         Sub-steps and duration [s] of the period.
     work : rows
@@ -209,7 +226,7 @@ def advance(
     for _ in range(substeps):
         for side in range(2):
             fill(rows[PRESSURE_A + side], rows[SET_POINT_A + side], work[side], fixed, h)
-        move(rows, fixed, counts, table, memory, elements, h, work)
+        move(rows, fixed, counts, table, hysteresis, elements, h, work)
     for j in range(LANES):
         report(rows, fixed, j)
 
@@ -242,34 +259,34 @@ def report_reduced(rows: Any, fixed: Any, j: int) -> None:
 
 
 @kernel
-def start_memory(rows: Any, counts: Any, memory: int, j: int) -> None:
-    """Put the memories of one lane into their virgin state."""
-    clear_memories(rows, counts, memory, STACK_COUNT, 2, j)
+def start_hysteresis(rows: Any, counts: Any, hysteresis: int, j: int) -> None:
+    """Put the hysteresis models of one lane into their virgin state."""
+    clear_hysteresis_models(rows, counts, hysteresis, STACK_COUNT, 2, j)
 
 
 @routine
 def begin_lane(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, j: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, j: int,
     angle: float, prestress: float,
 ) -> None:  # fmt: skip
     """Bring one lane to rest at a commanded angle [rad] and co-contraction [N].
 
     The joint comes there from a straight and virgin state. ``PAYLOAD``, ``DISTURBANCE`` and
-    ``counts[MEMBER]`` are set before, and the memory cleared with :func:`start_memory`.
+    ``counts[MEMBER]`` are set before, and the hysteresis cleared with :func:`start_hysteresis`.
     """
     command(rows, fixed, j, angle, prestress, COMMAND, K.PRESTRESS, SET_POINT_A)
     rows[PRESSURE_A][j], rows[PRESSURE_B][j] = rows[SET_POINT_A][j], rows[SET_POINT_A + 1][j]
     straight, _, _ = lever_of(fixed, j, 0.0, 1.0)
     rows[STRAIGHT][j] = straight
     rows[LAG_A][j] = rows[LAG_A + 1][j] = 0.0
-    rest(rows, fixed, counts, table, memory, elements, j)
+    rest(rows, fixed, counts, table, hysteresis, elements, j)
     rows[VELOCITY][j] = 0.0
     report(rows, fixed, j)
 
 
 @kernel
 def resting_torque(rows: Any, fixed: Any, j: int, angle: float) -> float:
-    """Return the torque at rest [N m] at an angle, with the memories' lags of that angle."""
+    """Return the torque at rest [N m] at an angle, with the hysteresis models' lags of that angle."""
     torque, _ = load_torque(rows, fixed, j, angle)
     for side in range(2):
         sign = 1.0 - 2.0 * side
@@ -281,15 +298,15 @@ def resting_torque(rows: Any, fixed: Any, j: int, angle: float) -> float:
 
 @routine
 def rest_muscles(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, j: int
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, j: int
 ) -> None:
-    """Put a lane where its torques balance at its pressures, and its memories with it."""
+    """Put a lane where its torques balance at its pressures, and its hysteresis models with it."""
     low, high = -fixed[STOP][j] - 0.1, fixed[STOP][j] + 0.1
     for _ in range(52):
         angle = 0.5 * (low + high)
         contract(rows, fixed, j, angle, AT_A, STRAIGHT)
         peek(
-            rows, fixed, counts, table, memory, elements, AT_A, LAG_A, STICK_A, 2, MODEL,
+            rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, STICK_A, 2, MODEL,
             STACK_COUNT, MEMBER, j, j + 1,
         )  # fmt: skip
         if resting_torque(rows, fixed, j, angle) > 0.0:
@@ -299,19 +316,19 @@ def rest_muscles(
     rows[ANGLE][j] = 0.5 * (low + high)
     contract(rows, fixed, j, rows[ANGLE][j], AT_A, STRAIGHT)
     remember(
-        rows, fixed, counts, table, memory, elements, AT_A, LAG_A, 2, MODEL, STACK_COUNT, MEMBER,
+        rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, 2, MODEL, STACK_COUNT, MEMBER,
         j, j + 1,
     )  # fmt: skip
 
 
 @routine
 def rest_reduced(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, j: int
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, j: int
 ) -> None:
     """Put a lane of the reduced plant where it comes to rest under its command."""
     rows[AT_A][j] = rows[COMMAND][j]
     remember(
-        rows, fixed, counts, table, memory, elements, AT_A, LAG_A, 1, MODEL, STACK_COUNT, MEMBER,
+        rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, 1, MODEL, STACK_COUNT, MEMBER,
         j, j + 1,
     )  # fmt: skip
     target = rows[COMMAND][j] - fixed[K.LOOP_WIDTH][j] * rows[LAG_A][j]
@@ -331,4 +348,4 @@ DYNAMICS: dict[str, dict[str, Any]] = {
 
 def replacements(kind: str, dynamics: str) -> dict[str, Any]:
     """Return the kernels that a plant of this make puts in the place of the placeholders."""
-    return MEMORIES[kind] | DYNAMICS[dynamics]
+    return HYSTERESIS_MODELS[kind] | DYNAMICS[dynamics]

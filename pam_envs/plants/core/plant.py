@@ -37,7 +37,7 @@ class Plant:
         declaration.
     ensemble : tuple of mapping
         Other parameter sets that fit the data equally well (parameter name to value; operators of
-        the memory under ``"memory.operator"``), for domain randomisation.
+        the hysteresis under ``"hysteresis.operator"``), for domain randomisation.
     substeps : int
         Steps of the integrator in a control period.
     """
@@ -70,7 +70,7 @@ class Plant:
         changed: dict[str, dict[str, Any]] = {}
         for name, value in values.items():
             component, _, entry = name.partition(".")
-            if name not in self.names and name != "memory.operator":
+            if name not in self.names and name != "hysteresis.operator":
                 raise ValueError(f"no parameter named {name!r}; there are: {', '.join(self.names)}")
             changed.setdefault(component, {})[entry] = value
         parts: dict[str, Any] = {
@@ -103,7 +103,7 @@ class Plant:
         return plant_file.read(cls, Path(path))
 
     def digest(self) -> str:
-        """Return a hash of family, make, parameters and memory, 16 hexadecimal digits."""
+        """Return a hash of family, make, parameters and hysteresis, 16 hexadecimal digits."""
         return self._digest
 
     @cached_property

@@ -5,8 +5,8 @@
     substeps: 4
     parameters:
       muscle.area: {value: 8.7e-4, unit: m2, provenance: identified, source: "..."}
-    memory: {kind: maxwell_slip, linear: 0.2, thresholds: [1.0e4, ...], weights: [0.1, ...]}
-    ensemble: [{muscle.area: 8.8e-4, memory: {...}}, ...]
+    hysteresis: {kind: maxwell_slip, linear: 0.2, thresholds: [1.0e4, ...], weights: [0.1, ...]}
+    ensemble: [{muscle.area: 8.8e-4, hysteresis: {...}}, ...]
     notes: {...}
 
 Everything but ``schema`` and ``family`` may be missing. Notes are free text and not hashed. Of a
@@ -38,12 +38,12 @@ if TYPE_CHECKING:
     Operator: TypeAlias = PlayOperator | ModifiedMaxwellSlip | Preisach | None
 
 P = TypeVar("P", bound="Plant")
-KEYS = ("schema", "family", "substeps", "parameters", "memory", "ensemble", "notes")
+KEYS = ("schema", "family", "substeps", "parameters", "hysteresis", "ensemble", "notes")
 ENTRY_KEYS = ("value", "unit", "provenance", "source")
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
-def _memory_record(operator: Any) -> dict[str, Any]:
+def _hysteresis_record(operator: Any) -> dict[str, Any]:
     if isinstance(operator, PlayOperator):
         return {
             "kind": "maxwell_slip",
@@ -70,7 +70,7 @@ def _memory_record(operator: Any) -> dict[str, Any]:
     return {"kind": "none"}
 
 
-def _memory(record: Any, where: str) -> Operator:
+def _hysteresis(record: Any, where: str) -> Operator:
     fields = {
         "none": set(),
         "maxwell_slip": {"linear", "thresholds", "weights"},
@@ -79,14 +79,14 @@ def _memory(record: Any, where: str) -> Operator:
     }
     if not isinstance(record, Mapping) or record.get("kind") not in fields:
         raise ValueError(
-            f"{where}: memory must be a mapping with kind maxwell_slip, modified_maxwell_slip, "
+            f"{where}: hysteresis must be a mapping with kind maxwell_slip, modified_maxwell_slip, "
             f"preisach or none, got {record!r}"
         )
     kind = record["kind"]
     optional = {"start"} if kind == "preisach" else set()
     if set(record) - {"kind"} - optional != fields[kind]:
         raise ValueError(
-            f"{where}: a {kind} memory needs exactly the keys {sorted(fields[kind])}, "
+            f"{where}: a {kind} hysteresis needs exactly the keys {sorted(fields[kind])}, "
             f"got {sorted(set(record) - {'kind'})}"
         )
     try:
@@ -111,7 +111,7 @@ def _memory(record: Any, where: str) -> Operator:
                 start=record.get("start", "virgin"),
             )
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{where}: memory: {error}") from error
+        raise ValueError(f"{where}: hysteresis: {error}") from error
     return None
 
 
@@ -134,9 +134,11 @@ def record(plant: Plant) -> dict[str, Any]:
             }
     ensemble = []
     for member in plant.ensemble:
-        values: dict[str, Any] = {k: float(v) for k, v in member.items() if k != "memory.operator"}
-        if "memory.operator" in member:
-            values["memory"] = _memory_record(member["memory.operator"])
+        values: dict[str, Any] = {
+            k: float(v) for k, v in member.items() if k != "hysteresis.operator"
+        }
+        if "hysteresis.operator" in member:
+            values["hysteresis"] = _hysteresis_record(member["hysteresis.operator"])
         ensemble.append(values)
     return {
         "schema": 1,
@@ -144,7 +146,7 @@ def record(plant: Plant) -> dict[str, Any]:
         **{choice: getattr(plant, choice) for choice in plant.choices},
         "substeps": plant.substeps,
         "parameters": parameters,
-        "memory": _memory_record(parts["memory"].operator),
+        "hysteresis": _hysteresis_record(parts["hysteresis"].operator),
         "ensemble": ensemble,
     }
 
@@ -245,18 +247,18 @@ def _build(cls: type[P], data: Mapping[str, Any], where: str) -> P:
         values[name] = _entry(name, entry, known[name].unit, where)
         if isinstance(entry, Mapping) and "provenance" in entry:
             provenance[name] = (str(entry["provenance"]), str(entry.get("source", "")))
-    if "memory" in data:
-        values["memory.operator"] = _memory(data["memory"], where)
+    if "hysteresis" in data:
+        values["hysteresis.operator"] = _hysteresis(data["hysteresis"], where)
     ensemble = []
     for i, member in enumerate(data.get("ensemble") or []):
         place = f"{where}: ensemble[{i}]"
         if not isinstance(member, Mapping):
             raise ValueError(f"{place} must be a mapping from parameter to value")
         other: dict[str, Any] = {
-            k: _entry(k, v, "", place) for k, v in member.items() if k != "memory"
+            k: _entry(k, v, "", place) for k, v in member.items() if k != "hysteresis"
         }
-        if "memory" in member:
-            other["memory.operator"] = _memory(member["memory"], place)
+        if "hysteresis" in member:
+            other["hysteresis.operator"] = _hysteresis(member["hysteresis"], place)
         ensemble.append(other)
     substeps = data.get("substeps", 4)
     choices: Any = {choice: data[choice] for choice in cls.choices if choice in data}

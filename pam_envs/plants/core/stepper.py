@@ -22,14 +22,14 @@ from pam_envs.plants.single_muscle.effects import advance_extended, replacements
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.replay import begin
 from pam_envs.plants.single_muscle.rows import N_COUNTS, N_PARAMETERS
-from pam_envs.plants.single_muscle.step import MEMORY_ROWS, N_WORK
+from pam_envs.plants.single_muscle.step import HYSTERESIS_ROWS, N_WORK
 
 PERIOD = 0.01
 """Control period [s] unless another is given."""
 LONGEST_PERIOD = 0.0101
 """Longest one [s]: it is one sub-step, whose errors stay below the noise of a good sensor."""
 READING, PRESSURE, POSITION = range(3)
-N_ROWS = 0  # placeholders, filled in for each memory
+N_ROWS = 0  # placeholders, filled in for each hysteresis
 FIRST = 0
 
 Array = NDArray[np.float64]
@@ -85,7 +85,7 @@ def run_lanes(
 
 @lru_cache(maxsize=8)
 def _built(function: Callable[..., Any], kind: str) -> Callable[..., Any]:
-    first = R.END + MEMORY_ROWS[kind]
+    first = R.END + HYSTERESIS_ROWS[kind]
     return build(
         function,
         f"{function.__name__}_{kind}",
@@ -115,12 +115,12 @@ def _tiled(columns: Array) -> Array:
 
 
 class PlantBatch:
-    """Plants with one kind of memory side by side, each with set-points of its own.
+    """Plants with one kind of hysteresis side by side, each with set-points of its own.
 
     Parameters
     ----------
     plants : sequence of SingleMuscle
-        One a lane. A Preisach memory is that of the first.
+        One a lane. A Preisach hysteresis is that of the first.
     load_kg : float
         Load [kg].
     kelvin : float, optional
@@ -146,9 +146,9 @@ class PlantBatch:
                 f"period = {period!r} s; plants are stepped with periods above 0 up to "
                 f"{LONGEST_PERIOD:g} s: hold a set-point for several of them"
             )
-        kinds = {(plant.memory.kind, plant.elements) for plant in plants}
+        kinds = {(plant.hysteresis.kind, plant.elements) for plant in plants}
         if len(kinds) != 1:
-            raise ValueError(f"plants that are stepped together need one memory, got {kinds}")
+            raise ValueError(f"plants that are stepped together need one hysteresis, got {kinds}")
         self.plants = tuple(plants)
         self.period = period
         self._kind, self._elements = kinds.pop()
@@ -159,7 +159,7 @@ class PlantBatch:
         self._loads = np.array([load_kg])
         self._table = plants[0].everett_tables()[:1]
         tiles = len(self._fixed)
-        self._rows = np.zeros((tiles, R.END + MEMORY_ROWS[self._kind] + R.N_EFFECTS, LANES))
+        self._rows = np.zeros((tiles, R.END + HYSTERESIS_ROWS[self._kind] + R.N_EFFECTS, LANES))
         self._counts = np.zeros((tiles, N_COUNTS, LANES), np.int64)
         self.position = np.zeros(len(plants))
         self.reset()

@@ -1,4 +1,4 @@
-"""The memory of the elbow's bundles: friction driven by their contraction.
+"""The hysteresis of the elbow's bundles: friction driven by their contraction.
 
 The threads of the braid slide as the length changes, and press on each other in proportion to the
 force. An operator of slope 1 follows the travel of the pulley (the contraction of bundle b; that
@@ -12,11 +12,11 @@ while the bundle is stretched and let go, over its force at nominal length, at a
 so is the paper's 7.5 % read. It was reported of loops that overload the muscles beyond their
 nominal length; shorter ones are said to have less.
 
-The two presets are two memories and not one in two forms. Plays are alike wherever the elbow is,
-and their thresholds are spread evenly on a logarithmic scale. The Preisach preset has thresholds
-spread evenly up to its largest, so that less slides in small motions, and less friction mid-stroke
-than towards either end, where one of the bundles is as long as it gets. No plays can do that. Both
-are assumed; the paper gives no more than the largest difference, which is the same.
+The two presets are two hysteresis models and not one in two forms. Plays are alike wherever the
+elbow is, and their thresholds are spread evenly on a logarithmic scale. The Preisach preset has
+thresholds spread evenly up to its largest, so that less slides in small motions, and less friction
+mid-stroke than towards either end, where one of the bundles is as long as it gets. No plays can do
+that. Both are assumed; the paper gives no more than the largest difference, which is the same.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from pam_envs.plants.single_muscle.hysteresis import Kind
 SMALLEST, LARGEST = 6e-4, 9e-3
 """Thresholds of the preset's plays [m]: 0.15 % and 2.3 % of the nominal length."""
 WIDEST, LEVELS = 0.06, 121
-"""Travel [m] on either side of the middle that a Preisach memory spans, and levels of its map."""
+"""Travel [m] on either side of the middle that a Preisach hysteresis spans, and levels of its map."""
 SLIDING = 0.8
-"""Part of the slope that has memory, of either preset."""
+"""Part of the slope that has hysteresis, of either preset."""
 HALF_GAP = 7.75e-3
 """Largest half-gap [m] of the Preisach preset's relays: of 15.5 cells of its map."""
 MIDDLE, REST = 0.3, 9e-3
@@ -47,7 +47,7 @@ are all within the paper's stroke of 66 mm, which is why the loop there is the l
 
 
 @dataclass(frozen=True)
-class ElbowMemory:
+class ElbowHysteresis:
     """Thread-on-thread friction of both bundles.
 
     ``operator`` turns travel [m] into the travel that is felt: a :class:`PlayOperator` of total
@@ -61,7 +61,7 @@ class ElbowMemory:
         0.0,
         0.4,
         "published",
-        "7.5 % between loading and unloading: seed 001, section 2",
+        "7.5 % between loading and unloading: chakarov2018, section 2",
         neutral=0.0,
         spread=(0.045, 0.12),
     )
@@ -110,8 +110,8 @@ def _density(up: NDArray[np.float64], down: NDArray[np.float64]) -> NDArray[np.f
 def travel_relays() -> Preisach:
     """Return the other preset: relays of even half-gaps, fewer mid-stroke; see this module's page.
 
-    What moves at once, without memory, makes up for the relays that are missing, so that the slope
-    is 1 on the mean of both branches.
+    What moves at once, without hysteresis, makes up for the relays that are missing, so that the
+    slope is 1 on the mean of both branches.
     """
     sliding = Preisach.from_density(_density, -WIDEST, WIDEST, LEVELS).everett
     levels = np.linspace(-WIDEST, WIDEST, LEVELS)
@@ -126,8 +126,8 @@ def travel_relays() -> Preisach:
 
 
 @lru_cache(maxsize=4)
-def elbow_memory(kind: Kind) -> ElbowMemory:
-    """Return the preset memory of a kind; both have loops of the same largest width.
+def elbow_hysteresis(kind: Kind) -> ElbowHysteresis:
+    """Return the preset hysteresis of a kind; both have loops of the same largest width.
 
     Raises
     ------
@@ -135,9 +135,9 @@ def elbow_memory(kind: Kind) -> ElbowMemory:
         If there is no such kind.
     """
     if kind == "none":
-        return ElbowMemory()
+        return ElbowHysteresis()
     if kind == "maxwell_slip":
-        return ElbowMemory(travel_plays())
+        return ElbowHysteresis(travel_plays())
     if kind == "preisach":
-        return ElbowMemory(travel_relays())
+        return ElbowHysteresis(travel_relays())
     raise ValueError(f"hysteresis = {kind!r}; choose 'maxwell_slip', 'preisach' or 'none'")

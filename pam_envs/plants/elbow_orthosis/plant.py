@@ -1,4 +1,4 @@
-"""An elbow orthosis with two antagonistic bundles of pneumatic muscles: seed 001.
+"""An elbow orthosis with two antagonistic bundles of pneumatic muscles: chakarov2018.
 
     set-points or pulses -> pressures -> P = X [(L_n - C) (C_max - C) - friction],  X = k0 + k1 p
     Q = r (P_b - P_a),    S = -dQ/dq = -r^2 (k_a + k_b)              flexion positive
@@ -33,7 +33,7 @@ from pam_envs.plants.antagonistic_joint.hysteresis_tables import (
 )
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.elbow_orthosis import rows as K
-from pam_envs.plants.elbow_orthosis.hysteresis import ElbowMemory, elbow_memory
+from pam_envs.plants.elbow_orthosis.hysteresis import ElbowHysteresis, elbow_hysteresis
 from pam_envs.plants.single_muscle.hysteresis import Kind
 from pam_envs.pneumatics.bundle_regulator import BundleRegulator
 from pam_envs.pneumatics.on_off_pair import ATMOSPHERE, OnOffValve
@@ -45,7 +45,7 @@ Array = NDArray[np.float64]
 MAKES: tuple[Valves, ...] = ("proportional", "on_off")
 STOP_GIVES = 0.15
 """Depth [rad] of the mechanical stops."""
-SEVEN = ("published", "mus_b = 7: seed 001, section 3")
+SEVEN = ("published", "mus_b = 7: chakarov2018, section 3")
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class ElbowOrthosis(Plant):
     valves : {"proportional", "on_off"}
         A regulator at each bundle that takes set-points, or the paper's pair of a fill and an
         exhaust valve, which takes pulses.
-    bundle_a, bundle_b, regulator, valve, memory, pulley, link, wearer
+    bundle_a, bundle_b, regulator, valve, hysteresis, pulley, link, wearer
         The components; of regulator and valve the one that is not in use has no effect.
     angle, pressure
         The sensors; both pressure gauges are alike.
@@ -69,7 +69,7 @@ class ElbowOrthosis(Plant):
         "bundle_b",
         "regulator",
         "valve",
-        "memory",
+        "hysteresis",
         "pulley",
         "link",
         "wearer",
@@ -85,7 +85,7 @@ class ElbowOrthosis(Plant):
     bundle_b: QuadraticBundle = field(default_factory=lambda: QuadraticBundle(muscles=7.0))
     regulator: BundleRegulator = field(default_factory=BundleRegulator)
     valve: OnOffValve = field(default_factory=OnOffValve)
-    memory: ElbowMemory = field(default_factory=lambda: elbow_memory("maxwell_slip"))
+    hysteresis: ElbowHysteresis = field(default_factory=lambda: elbow_hysteresis("maxwell_slip"))
     pulley: Pulley = field(default_factory=Pulley)
     link: OrthosisLink = field(default_factory=OrthosisLink)
     wearer: Wearer = field(default_factory=Wearer)
@@ -97,7 +97,7 @@ class ElbowOrthosis(Plant):
         if self.valves not in MAKES:
             raise ValueError(f"valves = {self.valves!r}; choose one of {', '.join(MAKES)}")
         self.check_components()
-        check_operator(self.memory.operator)
+        check_operator(self.hysteresis.operator)
         self._check_bundles()
         self._check_range()
         self._check_motion()
@@ -109,7 +109,7 @@ class ElbowOrthosis(Plant):
                 raise ValueError(f"{name}.muscles = {muscles:g} must be a whole number, 1 or more")
 
     def _check_range(self) -> None:
-        """Refuse a stroke that leaves the bundles no force, or the memory's map."""
+        """Refuse a stroke that leaves the bundles no force, or the hysteresis's map."""
         if self.pulley.lowest >= self.pulley.highest:
             raise ValueError(
                 f"pulley.lowest = {self.pulley.lowest:g} rad is not below pulley.highest = "
@@ -122,10 +122,10 @@ class ElbowOrthosis(Plant):
                 f"m contracts the bundles beyond {shortest:.4f} m, where their force ends; use a "
                 "smaller radius or longer muscles"
             )
-        operator = self.memory.operator
+        operator = self.hysteresis.operator
         if isinstance(operator, Preisach) and operator.high < 0.55 * self.pulley.stroke:
             raise ValueError(
-                f"memory: the Everett map spans +-{operator.high:g} m and the pulley travels "
+                f"hysteresis: the Everett map spans +-{operator.high:g} m and the pulley travels "
                 f"+-{0.5 * self.pulley.stroke:g} m: give a wider map"
             )
 
@@ -166,13 +166,13 @@ class ElbowOrthosis(Plant):
         Parameters
         ----------
         hysteresis : {"maxwell_slip", "preisach", "none"}
-            Which memory: two different ones, the widest loops of which are alike.
+            Which hysteresis: two different ones, the widest loops of which are alike.
         valves : {"proportional", "on_off"}
             See the class.
         **changes : float
             Parameters to replace, with ``__`` for the dot (``bundle_a__muscles=4``).
         """
-        plant = cls(memory=elbow_memory(hysteresis), provenance={"bundle_b.muscles": SEVEN})
+        plant = cls(hysteresis=elbow_hysteresis(hysteresis), provenance={"bundle_b.muscles": SEVEN})
         return dataclasses.replace(plant._changed(changes), valves=valves)
 
     def _changed(self, changes: Mapping[str, float]) -> ElbowOrthosis:
@@ -213,7 +213,7 @@ class ElbowOrthosis(Plant):
         """Control periods in a cycle of the on/off valves."""
         return max(1, round(self.cycle / self.control_period))
 
-    # --- statics, without memory ------------------------------------------------------------------
+    # --- statics, without hysteresis ------------------------------------------------------------------
 
     def geometry(self, angle: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """Return the shapes [m2] of bundles a and b and their slopes [m] at an angle [rad]."""
@@ -285,9 +285,9 @@ class ElbowOrthosis(Plant):
         """Return what friction takes [m2] of the shapes of bundles a and b.
 
         ``lag`` [m] is the travel (``pulley.travel(angle)``) less the output of
-        ``memory.operator``: with memory a force is ``X (shape - friction)``.
+        ``hysteresis.operator``: with hysteresis a force is ``X (shape - friction)``.
         """
-        part = 0.5 * self.memory.loop * np.asarray(lag, float) / self.memory.largest_lag
+        part = 0.5 * self.hysteresis.loop * np.asarray(lag, float) / self.hysteresis.largest_lag
         a, b = self.bundle_a, self.bundle_b
         return -part * a.shape(0.0), part * b.shape(0.0)
 
@@ -297,15 +297,15 @@ class ElbowOrthosis(Plant):
         """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
         column = np.zeros(K.N_PARAMETERS)
         column[: K.MODEL] = [self.value(name) for name in K.NAMES]
-        column[K.MODEL : K.LARGEST_LAG] = model_rows(self.memory.operator)
-        column[K.LARGEST_LAG] = self.memory.largest_lag
+        column[K.MODEL : K.LARGEST_LAG] = model_rows(self.hysteresis.operator)
+        column[K.LARGEST_LAG] = self.hysteresis.largest_lag
         return column
 
     @property
     def elements(self) -> int:
-        """Plays of the memory."""
-        return plays_of(self.memory.operator)
+        """Plays of the hysteresis."""
+        return plays_of(self.hysteresis.operator)
 
-    def memory_tables(self) -> Array:
+    def hysteresis_tables(self) -> Array:
         """Return the Everett maps of all members, shape (members, n, n), or zeros."""
-        return map_tables([m.memory.operator for m in self.members()])
+        return map_tables([m.hysteresis.operator for m in self.members()])

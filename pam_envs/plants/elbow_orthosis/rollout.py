@@ -15,12 +15,12 @@ from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 from pam_envs.plants.elbow_orthosis.rows import N_COUNTS, N_PARAMETERS
 from pam_envs.plants.elbow_orthosis.step import (
-    MEMORY_ROWS,
+    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     begin_lane,
     replacements,
-    start_memory,
+    start_hysteresis,
 )
 
 OUTPUTS = {
@@ -49,7 +49,7 @@ DRIVEN = (K.COMMAND_A, K.COMMAND_B, K.INTENT, K.INTENT_RATE, K.INTENT_ACCELERATI
 _ROWS = tuple(OUTPUTS.values())
 WIDTH = LANES if COMPILED else 1
 """Plants that one tile holds; plain Python gains nothing from lanes."""
-N_ROWS = 0  # a placeholder, filled in for each memory
+N_ROWS = 0  # a placeholder, filled in for each hysteresis
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ def run_elbow(
             column = min(first + j, last)
             rows[K.INTENT][j] = drives[2][0][column]
             rows[K.DISTURBANCE][j] = drives[5][0][column]
-            start_memory(rows, counts, K.END, j)
+            start_hysteresis(rows, counts, K.END, j)
             begin_lane(
                 rows, fixed, counts, table, K.END, elements, j, start[0][column], start[1][column]
             )
@@ -94,7 +94,7 @@ def _runner(kind: str, valves: str) -> Callable[..., Any]:
 
 def kernel_names(kind: str, valves: str, lanes: int = WIDTH) -> dict[str, Any]:
     """Return what takes the place of the placeholders of :func:`run_elbow`."""
-    sizes = {"N_ROWS": K.END + MEMORY_ROWS[kind], "LANES": lanes}
+    sizes = {"N_ROWS": K.END + HYSTERESIS_ROWS[kind], "LANES": lanes}
     return replacements(kind, valves) | sizes
 
 
@@ -110,10 +110,10 @@ def arrays_for(
     n = len(plants) if len(plants) > 1 else columns
     fixed = in_tiles([plant.parameter_rows() for plant in plants], n, lanes)
     return [
-        np.zeros((len(fixed), K.END + MEMORY_ROWS[plants[0].memory.kind], lanes)),
+        np.zeros((len(fixed), K.END + HYSTERESIS_ROWS[plants[0].hysteresis.kind], lanes)),
         fixed,
         np.zeros((len(fixed), N_COUNTS, lanes), np.int64),
-        plants[0].memory_tables()[:1],
+        plants[0].hysteresis_tables()[:1],
         filled,
         np.array([np.broadcast_to(np.asarray(s, float), (columns,)) for s in start]),
         np.empty((len(OUTPUTS), periods, n)),
@@ -155,8 +155,8 @@ def simulate_elbow(
     Parameters
     ----------
     plants : ElbowOrthosis or sequence of them
-        Of one memory, of one make of valves, and with the same sub-steps. A memory's map is the
-        first's.
+        Of one hysteresis, of one make of valves, and with the same sub-steps. A hysteresis's map
+        is the first's.
     commands : array_like, shape (T, 2) or (T, n, 2)
         For bundles a and b, one a control period: set-points [Pa]; of on/off valves pulse widths
         [s], filling above 0, looked at where a cycle begins.
@@ -181,7 +181,7 @@ def simulate_elbow(
         If the plants are not of one make, or a shape or a value does not fit.
     """
     several = [plants] if isinstance(plants, ElbowOrthosis) else list(plants)
-    first = first_of(several, "memory.kind", "valves", "substeps")
+    first = first_of(several, "hysteresis.kind", "valves", "substeps")
     command = np.asarray(commands, np.float64)
     motion = intent if isinstance(intent, tuple) else (intent, 0.0, 0.0)
     _check_shapes(several, command, motion)
@@ -192,7 +192,7 @@ def simulate_elbow(
     arrays = arrays_for(several, drives, pressures)
     if not COMPILED:
         arrays = [a.tolist() for a in arrays]
-    run = _runner(first.memory.kind, first.valves)
+    run = _runner(first.hysteresis.kind, first.valves)
     run(*arrays, first.elements, first.substeps, first.control_period)
     made = np.asarray(arrays[-1])
     single = made.shape[2] == 1 and command.ndim == 2 and isinstance(plants, ElbowOrthosis)

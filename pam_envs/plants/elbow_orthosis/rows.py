@@ -1,7 +1,7 @@
 """Where each number of the elbow orthosis stands in its rows (see ``single_muscle_rows``).
 
 A plant's numbers are rows of two matrices whose columns are environments (lanes): ``rows`` is the
-state, followed by that of the memory, and ``fixed`` the parameters, which all tiles of a batch
+state, followed by that of the hysteresis, and ``fixed`` the parameters, which all tiles of a batch
 share unless they are drawn. This page is the only one that counts. Of what stands twice, the
 first is bundle a's, which straightens the elbow.
 """
@@ -39,13 +39,13 @@ from pam_envs.plants.antagonistic_joint.hysteresis import ELEMENTS
     AT,
     LAG,
 ) = range(27)
-"""``DRIVE``: torque of the intended motion; ``AT``: travel of the pulley, the memory's input."""
+"""``DRIVE``: torque of the intended motion; ``AT``: travel of the pulley, the hysteresis's input."""
 VALVES = 4
 """Fill and exhaust valve of bundle a, then of bundle b."""
 LEFT, LIFT, OPENED = 27, 27 + VALVES, 27 + 2 * VALVES
 """First rows of the valves' state: coil time left, lift, whether open."""
 END = 27 + 3 * VALVES
-"""First row after the plant's state; the memory's state follows."""
+"""First row after the plant's state; the hysteresis's state follows."""
 
 _BUNDLE = (
     "muscles",
@@ -85,7 +85,7 @@ PARAMETERS = (
     "valve.opening_time",
     "valve.closing_time",
     "valve.frequency",
-    "memory.loop",
+    "hysteresis.loop",
     "pulley.radius",
     "pulley.lowest",
     "pulley.highest",
@@ -143,7 +143,7 @@ PARAMETERS = (
 ) = range(2 * BUNDLE_ROWS, len(PARAMETERS))
 
 MODEL = len(PARAMETERS)
-"""First row of the memory's operator: thresholds and weights, or half the range of a map."""
+"""First row of the hysteresis's operator: thresholds and weights, or half the range of a map."""
 LARGEST_LAG = MODEL + 2 * ELEMENTS
 N_PARAMETERS = LARGEST_LAG + 1
 NAMES = PARAMETERS

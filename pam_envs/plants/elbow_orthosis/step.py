@@ -4,8 +4,8 @@
 
 A sub-step is exact for the torque linearised about the predicted middle, with pressures and the
 wearer's drive going straight from their old to their new values: of second order, and without a
-stability limit. The memory is led over the middles of the sub-steps, where it is asked, and to the
-angle that a period ends with. Between periods the wearer's drive goes straight.
+stability limit. The hysteresis is led over the middles of the sub-steps, where it is asked, and to
+the angle that a period ends with. Between periods the wearer's drive goes straight.
 """
 
 from __future__ import annotations
@@ -17,8 +17,10 @@ from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.mechanics.hanging_mass import damped_motion
 from pam_envs.mechanics.leg import sine_and_cosine
 from pam_envs.mechanics.pulley import stop_torque
-from pam_envs.plants.antagonistic_joint.hysteresis_kernels import MEMORIES
-from pam_envs.plants.antagonistic_joint.hysteresis_kernels import ROWS_PER_OPERATOR as MEMORY_ROWS
+from pam_envs.plants.antagonistic_joint.hysteresis_kernels import HYSTERESIS_MODELS
+from pam_envs.plants.antagonistic_joint.hysteresis_kernels import (
+    ROWS_PER_OPERATOR as HYSTERESIS_ROWS,
+)
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.air import (
     AIR,
@@ -71,19 +73,19 @@ from pam_envs.plants.elbow_orthosis.rows import (
 )
 
 __all__ = [
-    "MEMORY_ROWS",
+    "HYSTERESIS_ROWS",
     "N_WORK",
     "advance",
     "begin_lane",
     "replacements",
-    "start_memory",
+    "start_hysteresis",
     "weight_of",
 ]
 
 SOFTEST = 0.1
 """Least stiffness [N m/rad] that a sub-step reckons with."""
 
-# placeholders, filled in for each memory and each make of valves
+# placeholders, filled in for each hysteresis and each make of valves
 remember: Any = None
 begin_period: Any = None
 breathe: Any = None
@@ -174,7 +176,7 @@ def swing(rows: Any, fixed: Any, i: int, substeps: int, h: float, work: Any) -> 
 
 @kernel
 def advance(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, substeps: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, substeps: int,
     period: float, work: Any,
 ) -> None:  # fmt: skip
     """Advance a tile by one control period, towards its set-points or by its pulses.
@@ -187,9 +189,9 @@ def advance(
         period, ``INTENT`` [rad], ``INTENT_RATE``, ``INTENT_ACCELERATION``, and ``DISTURBANCE``
         [N m] are the caller's to write.
     table : array
-        Of the memory: ``ElbowOrthosis.memory_tables()``.
-    memory, elements : int
-        First row of the memory's state, and ``ElbowOrthosis.elements``.
+        Of the hysteresis: ``ElbowOrthosis.hysteresis_tables()``.
+    hysteresis, elements : int
+        First row of the hysteresis's state, and ``ElbowOrthosis.elements``.
     substeps, period : int, float
         Sub-steps and duration [s] of the period.
     work : rows
@@ -205,7 +207,7 @@ def advance(
             work[MIDDLE][j] = rows[ANGLE][j] + 0.5 * h * rows[VELOCITY][j]
             rows[AT][j] = travel_at(fixed, j, work[MIDDLE][j])
         remember(
-            rows, fixed, counts, table, memory, elements, AT, LAG, 1, MODEL, STACK_COUNT, MEMBER,
+            rows, fixed, counts, table, hysteresis, elements, AT, LAG, 1, MODEL, STACK_COUNT, MEMBER,
             0, LANES,
         )  # fmt: skip
         breathe(rows, fixed, h, work)
@@ -214,7 +216,7 @@ def advance(
     for j in range(LANES):
         rows[AT][j] = travel_at(fixed, j, rows[ANGLE][j])
     remember(
-        rows, fixed, counts, table, memory, elements, AT, LAG, 1, MODEL, STACK_COUNT, MEMBER,
+        rows, fixed, counts, table, hysteresis, elements, AT, LAG, 1, MODEL, STACK_COUNT, MEMBER,
         0, LANES,
     )  # fmt: skip
     for j in range(LANES):
@@ -259,16 +261,16 @@ def felt_torque(rows: Any, fixed: Any, j: int, torque: float) -> float:
 
 
 @kernel
-def start_memory(rows: Any, counts: Any, memory: int, j: int) -> None:
-    """Put the memory of one lane into its virgin state."""
-    for k in range(len(rows) - memory):
-        rows[memory + k][j] = 0.0
+def start_hysteresis(rows: Any, counts: Any, hysteresis: int, j: int) -> None:
+    """Put the hysteresis of one lane into its virgin state."""
+    for k in range(len(rows) - hysteresis):
+        rows[hysteresis + k][j] = 0.0
     counts[STACK_COUNT][j] = 1
 
 
 @kernel
 def resting_torque(rows: Any, fixed: Any, j: int, angle: float) -> float:
-    """Return the torque at rest [N m] at an angle, with the memory's lag of that angle."""
+    """Return the torque at rest [N m] at an angle, with the hysteresis's lag of that angle."""
     torque, _ = passive_torque(fixed, j, angle)
     for side in range(2):
         pressure = rows[PRESSURE_A + side][j]
@@ -279,12 +281,12 @@ def resting_torque(rows: Any, fixed: Any, j: int, angle: float) -> float:
 
 @routine
 def begin_lane(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, j: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, j: int,
     pressure_a: float, pressure_b: float,
 ) -> None:  # fmt: skip
     """Bring one lane to rest at two pressures [Pa], held by a wearer who intends an angle.
 
-    The memory is virgin at the middle of the range and comes from there. ``INTENT``,
+    The hysteresis is virgin at the middle of the range and comes from there. ``INTENT``,
     ``DISTURBANCE`` and ``counts[MEMBER]`` are set before.
     """
     rows[PRESSURE_A][j], rows[PRESSURE_A + 1][j] = pressure_a, pressure_b
@@ -294,10 +296,10 @@ def begin_lane(
     low, high = fixed[LOWEST][j] - 0.5, fixed[HIGHEST][j] + 0.5
     for _ in range(54):
         angle = 0.5 * (low + high)
-        start_memory(rows, counts, memory, j)
+        start_hysteresis(rows, counts, hysteresis, j)
         rows[AT][j] = travel_at(fixed, j, angle)
         remember(
-            rows, fixed, counts, table, memory, elements, AT, LAG, 1, MODEL, STACK_COUNT, MEMBER,
+            rows, fixed, counts, table, hysteresis, elements, AT, LAG, 1, MODEL, STACK_COUNT, MEMBER,
             j, j + 1,
         )  # fmt: skip
         if resting_torque(rows, fixed, j, angle) > 0.0:
@@ -331,4 +333,6 @@ STARTS = {"proportional": start_regulated, "on_off": start_pulsed}
 
 def replacements(kind: str, valves: str) -> dict[str, Any]:
     """Return the kernels that a plant of this make puts in the place of the placeholders."""
-    return {"remember": MEMORIES[kind]["remember"], "start_air": STARTS[valves]} | AIR[valves]
+    return {"remember": HYSTERESIS_MODELS[kind]["remember"], "start_air": STARTS[valves]} | AIR[
+        valves
+    ]

@@ -1,4 +1,4 @@
-"""The memory of the orthosis' muscle: from pressure to stiffness."""
+"""The hysteresis of the orthosis' muscle: from pressure to stiffness."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MAP_POINTS = 46
 
 
 @dataclass(frozen=True)
-class KneeMemory:
+class KneeHysteresis:
     """Thread-on-thread friction of the muscle.
 
     ``operator`` turns pressure [Pa] into stiffness ``T / dL`` [N/m]: a
@@ -51,8 +51,8 @@ class KneeMemory:
         return None if self.operator is None else self.operator.scaled(self.width)
 
 
-def knee_memory(kind: Kind, width: float = 1.0) -> KneeMemory:
-    """Return the preset memory of a kind; both operators have the same loops.
+def knee_hysteresis(kind: Kind, width: float = 1.0) -> KneeHysteresis:
+    """Return the preset hysteresis of a kind; both operators have the same loops.
 
     Raises
     ------
@@ -60,12 +60,12 @@ def knee_memory(kind: Kind, width: float = 1.0) -> KneeMemory:
         If there is no such kind.
     """
     if kind == "none":
-        return KneeMemory(None, width)
+        return KneeHysteresis(None, width)
     model = even_model(FULL_PRESSURE, FULL_STIFFNESS, FRICTION)
     if kind == "maxwell_slip":
-        return KneeMemory(model, width)
+        return KneeHysteresis(model, width)
     if kind == "preisach":
-        return KneeMemory(preisach_of(model, FULL_PRESSURE), width)
+        return KneeHysteresis(preisach_of(model, FULL_PRESSURE), width)
     raise ValueError(f"hysteresis = {kind!r}; choose 'maxwell_slip', 'preisach' or 'none'")
 
 

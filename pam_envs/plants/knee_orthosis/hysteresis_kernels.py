@@ -1,4 +1,4 @@
-"""The memories of the orthosis' muscle as kernels: each writes the stiffness of a tile's lanes."""
+"""The hysteresis models of the orthosis' muscle as kernels: each writes the stiffness of a tile's lanes."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ BREAKS, STIFFNESSES, SPRING, SEGMENT = range(4)
 
 
 @kernel
-def no_memory(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, first: int, last: int,
+def no_hysteresis(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, first: int, last: int,
     elements: int,
 ) -> None:  # fmt: skip
-    """Stiffness without memory: proportional to the pressure."""
+    """Stiffness without hysteresis: proportional to the pressure."""
     pressure, stiffness = rows[PRESSURE], rows[STIFFNESS]
     for j in range(first, last):
         stiffness[j] = fixed[GAIN][j] * fixed[STIFFNESS_RATIO][j] * pressure[j]
 
 
 @kernel
-def slip_memory(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, first: int, last: int,
+def slip_hysteresis(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, first: int, last: int,
     elements: int,
 ) -> None:  # fmt: skip
     """Stiffness by a modified Maxwell-slip model."""
     pressure, stiffness = rows[PRESSURE], rows[STIFFNESS]
-    slips = rows[memory : memory + elements]
+    slips = rows[hysteresis : hysteresis + elements]
     for j in range(first, last):
         model = table[counts[MEMBER][j]]
         value = stiffness_step(
@@ -59,13 +59,16 @@ def slip_memory(
 
 
 @kernel
-def preisach_memory(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, first: int, last: int,
+def preisach_hysteresis(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, first: int, last: int,
     elements: int,
 ) -> None:  # fmt: skip
     """Stiffness by a Preisach operator."""
     pressure, stiffness = rows[PRESSURE], rows[STIFFNESS]
-    stack, sums = rows[memory : memory + DEPTH], rows[memory + DEPTH : memory + 2 * DEPTH]
+    stack, sums = (
+        rows[hysteresis : hysteresis + DEPTH],
+        rows[hysteresis + DEPTH : hysteresis + 2 * DEPTH],
+    )
     count = counts[STACK_COUNT]
     for j in range(first, last):
         everett, full = table[counts[MEMBER][j]], fixed[MAX_PRESSURE][j]
@@ -76,35 +79,41 @@ def preisach_memory(
 
 
 @kernel
-def forget_nothing(rows: Any, counts: Any, table: Any, memory: int, elements: int, j: int) -> None:
-    """Start a muscle without memory."""
+def forget_nothing(
+    rows: Any, counts: Any, table: Any, hysteresis: int, elements: int, j: int
+) -> None:
+    """Start a muscle without hysteresis."""
 
 
 @kernel
-def forget_slips(rows: Any, counts: Any, table: Any, memory: int, elements: int, j: int) -> None:
+def forget_slips(
+    rows: Any, counts: Any, table: Any, hysteresis: int, elements: int, j: int
+) -> None:
     """Put the slip positions of one lane where venting leaves them."""
     model = table[counts[MEMBER][j]]
     middle = 0.5 * (len(model[SPRING]) - 1) * model[SEGMENT][0]
     for k in range(elements):
-        rows[memory + k][j] = min(model[BREAKS][k], middle)
+        rows[hysteresis + k][j] = min(model[BREAKS][k], middle)
 
 
 @kernel
-def forget_turns(rows: Any, counts: Any, table: Any, memory: int, elements: int, j: int) -> None:
+def forget_turns(
+    rows: Any, counts: Any, table: Any, hysteresis: int, elements: int, j: int
+) -> None:
     """Put every relay of one lane down."""
     for k in range(2 * DEPTH):
-        rows[memory + k][j] = 0.0
+        rows[hysteresis + k][j] = 0.0
     counts[STACK_COUNT][j] = 1
 
 
-MEMORIES: dict[str, Any] = {
-    "none": no_memory,
-    "maxwell_slip": slip_memory,
-    "preisach": preisach_memory,
+HYSTERESIS_MODELS: dict[str, Any] = {
+    "none": no_hysteresis,
+    "maxwell_slip": slip_hysteresis,
+    "preisach": preisach_hysteresis,
 }
 FORGET: dict[str, Any] = {
     "none": forget_nothing,
     "maxwell_slip": forget_slips,
     "preisach": forget_turns,
 }
-MEMORY_ROWS = {"none": 0, "maxwell_slip": ELEMENTS + 1, "preisach": 2 * DEPTH}
+HYSTERESIS_ROWS = {"none": 0, "maxwell_slip": ELEMENTS + 1, "preisach": 2 * DEPTH}

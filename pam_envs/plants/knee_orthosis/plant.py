@@ -1,6 +1,6 @@
-"""A power-assist knee orthosis with a McKibben muscle: seed 000.
+"""A power-assist knee orthosis with a McKibben muscle: yeh2010.
 
-    set-point -> regulator -> pressure P -> memory -> stiffness s -> T = s (L - L_min)
+    set-point -> regulator -> pressure P -> hysteresis -> stiffness s -> T = s (L - L_min)
     L = 2 L_b sin(theta / 2) - L_a
     tau_a = T L_b cos(theta / 2) - kappa (theta_0 - theta)              extension positive
 
@@ -31,7 +31,7 @@ from pam_envs.muscle.gas_spring import GasSpring
 from pam_envs.parameters import parameter
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.hysteresis import KneeMemory, knee_memory
+from pam_envs.plants.knee_orthosis.hysteresis import KneeHysteresis, knee_hysteresis
 from pam_envs.plants.single_muscle.hysteresis import Kind
 from pam_envs.pneumatics.measured_dynamics import OrthosisRegulator, mode_rows
 from pam_envs.references.gait import ACTIVITIES, PAPER_STRIDE, SIGNALS, gait_table
@@ -63,7 +63,7 @@ class Fixture:
     """What holds the muscle at its length."""
 
     length: float = parameter(
-        0.22, "m", 0.05, 1.0, "published", "nominal length, seed 000, section 4.1"
+        0.22, "m", 0.05, 1.0, "published", "nominal length, yeh2010, section 4.1"
     )
 
 
@@ -77,7 +77,7 @@ class Stride:
         0.8,
         20.0,
         "published",
-        "5 s a stride, seed 000, section 5.2; 1.224 s is the natural pace of the measured stride",
+        "5 s a stride, yeh2010, section 5.2; 1.224 s is the natural pace of the measured stride",
     )
 
 
@@ -95,7 +95,7 @@ class KneeOrthosis(Plant):
         designed. The paper's figures for the two exclude each other.
     activity : {"walk", "stairs_up", "stairs_down"}
         What the leg does.
-    regulator, memory, muscle, lever, fixture, leg, stride, shoe, activation
+    regulator, hysteresis, muscle, lever, fixture, leg, stride, shoe, activation
         The components.
     tension, angle, pressure, heel, ground, cop, ankle
         The sensors.
@@ -104,7 +104,7 @@ class KneeOrthosis(Plant):
     family: ClassVar[str] = "knee_orthosis"
     components: ClassVar[tuple[str, ...]] = (
         "regulator",
-        "memory",
+        "hysteresis",
         "muscle",
         "lever",
         "fixture",
@@ -128,7 +128,7 @@ class KneeOrthosis(Plant):
     dynamics: Dynamics = "lag"
     activity: Activity = "walk"
     regulator: OrthosisRegulator = field(default_factory=OrthosisRegulator)
-    memory: KneeMemory = field(default_factory=lambda: knee_memory("maxwell_slip"))
+    hysteresis: KneeHysteresis = field(default_factory=lambda: knee_hysteresis("maxwell_slip"))
     muscle: GasSpring = field(default_factory=GasSpring)
     lever: KneeLever = field(default_factory=KneeLever)
     fixture: Fixture = field(default_factory=Fixture)
@@ -152,17 +152,17 @@ class KneeOrthosis(Plant):
                     f"{name} = {getattr(self, name)!r}; choose one of {', '.join(allowed)}"
                 )
         self.check_components()
-        self._check_memory()
+        self._check_hysteresis()
         self._check_motion()
         self._check_toggle()
 
-    def _check_memory(self) -> None:
-        operator = self.memory.operator
+    def _check_hysteresis(self) -> None:
+        operator = self.hysteresis.operator
         if isinstance(operator, ModifiedMaxwellSlip):
             n = len(operator.stiffnesses)
             if n > K.ELEMENTS or len(operator.spring) != n + 1:
                 raise ValueError(
-                    f"memory: {n} elements and {len(operator.spring)} knots of the spring; at most "
+                    f"hysteresis: {n} elements and {len(operator.spring)} knots of the spring; at most "
                     f"{K.ELEMENTS} elements and one knot more than elements are simulated: "
                     "identify with fewer elements, or interpolate the spring at its knots"
                 )
@@ -170,7 +170,7 @@ class KneeOrthosis(Plant):
             span, full = (operator.low, operator.high), self.regulator.max_pressure
             if operator.start != "low" or not np.allclose(span, (0.0, full), rtol=1e-9):
                 raise ValueError(
-                    f"memory: the Everett map spans {span} Pa with start {operator.start!r}; the "
+                    f"hysteresis: the Everett map spans {span} Pa with start {operator.start!r}; the "
                     f"orthosis needs 0 to {full:g} Pa (the regulator's range) with start 'low'"
                 )
 
@@ -216,11 +216,11 @@ class KneeOrthosis(Plant):
         Parameters
         ----------
         hysteresis : {"maxwell_slip", "preisach", "none"}
-            Which memory; both operators have the same loops.
+            Which hysteresis; both operators have the same loops.
         dynamics : {"lag", "measured"}
             See the class.
         **changes : float
-            Parameters to replace, with ``__`` for the dot (``memory__width=0.5``).
+            Parameters to replace, with ``__`` for the dot (``hysteresis__width=0.5``).
         """
         return cls._preset(hysteresis, changes, mounting="rig", dynamics=dynamics)
 
@@ -260,7 +260,7 @@ class KneeOrthosis(Plant):
     @classmethod
     def _preset(cls, hysteresis: Kind, changes: Mapping[str, float], **makes: Any) -> KneeOrthosis:
         activity = makes.pop("activity", "walk")
-        plant = cls(memory=knee_memory(hysteresis), dynamics=makes["dynamics"])
+        plant = cls(hysteresis=knee_hysteresis(hysteresis), dynamics=makes["dynamics"])
         plant = plant.replace({k.replace("__", "."): v for k, v in changes.items()})
         return dataclasses.replace(plant, mounting=makes["mounting"], activity=activity)
 
@@ -310,17 +310,17 @@ class KneeOrthosis(Plant):
 
     @property
     def elements(self) -> int:
-        """Rows of the memory's state that are in use by a modified Maxwell-slip model."""
-        operator = self.memory.operator
+        """Rows of the hysteresis's state that are in use by a modified Maxwell-slip model."""
+        operator = self.hysteresis.operator
         return len(operator.spring) if isinstance(operator, ModifiedMaxwellSlip) else 0
 
-    def memory_tables(self) -> NDArray[np.float64]:
-        """Return what the memories of all members are made of, shape (members, ., .).
+    def hysteresis_tables(self) -> NDArray[np.float64]:
+        """Return what the hysteresis models of all members are made of, shape (members, ., .).
 
         Everett maps (n, n); or break stiffnesses, stiffnesses, spring and segment, (4, n + 1),
         filled up with an element that does nothing.
         """
-        operators = [m.memory.operator for m in self.members()]
+        operators = [m.hysteresis.operator for m in self.members()]
         slips = [_slip_table(o) for o in operators if isinstance(o, ModifiedMaxwellSlip)]
         maps = [np.asarray(o.table, float) for o in operators if isinstance(o, Preisach)]
         tables = slips or maps

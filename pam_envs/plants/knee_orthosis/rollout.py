@@ -15,12 +15,12 @@ from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.plants.knee_orthosis.rows import N_COUNTS, N_PARAMETERS
 from pam_envs.plants.knee_orthosis.step import (
-    MEMORY_ROWS,
+    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     begin_lane,
     replacements,
-    start_memory,
+    start_hysteresis,
 )
 
 OUTPUTS = {
@@ -58,7 +58,7 @@ OUTPUTS = {
 _ROWS = tuple(OUTPUTS.values())
 WIDTH = LANES if COMPILED else 1
 """Plants that one tile holds; plain Python gains nothing from lanes."""
-N_ROWS = 0  # a placeholder, filled in for each memory
+N_ROWS = 0  # a placeholder, filled in for each hysteresis
 
 
 @kernel
@@ -75,7 +75,7 @@ def run_knee(
         start = tile * LANES
         lanes = min(LANES, len(outputs[0][0]) - start)
         for j in range(LANES):
-            start_memory(rows, counts, K.END, j)
+            start_hysteresis(rows, counts, K.END, j)
             begin_lane(rows, fixed, counts, table, gait, K.END, elements, j, phase, pressure)
         for step in range(len(set_points)):
             columns = len(set_points[step])
@@ -96,7 +96,7 @@ def _runner(kind: str, mounting: str, dynamics: str) -> Callable[..., Any]:
 
 def kernel_names(kind: str, mounting: str, dynamics: str, lanes: int = WIDTH) -> dict[str, Any]:
     """Return what takes the place of the placeholders of :func:`run_knee`."""
-    sizes = {"N_ROWS": K.END + MEMORY_ROWS[kind], "LANES": lanes}
+    sizes = {"N_ROWS": K.END + HYSTERESIS_ROWS[kind], "LANES": lanes}
     return replacements(kind, mounting, dynamics) | sizes
 
 
@@ -109,10 +109,10 @@ def arrays_for(
     n = len(plants) if len(plants) > 1 else commands.shape[1]
     fixed = in_tiles([plant.parameter_rows() for plant in plants], n, lanes)
     return [
-        np.zeros((len(fixed), K.END + MEMORY_ROWS[plants[0].memory.kind], lanes)),
+        np.zeros((len(fixed), K.END + HYSTERESIS_ROWS[plants[0].hysteresis.kind], lanes)),
         fixed,
         np.zeros((len(fixed), N_COUNTS, lanes), np.int64),
-        plants[0].memory_tables()[:1],
+        plants[0].hysteresis_tables()[:1],
         plants[0].gait_table(),
         commands,
         np.empty((len(OUTPUTS), len(commands), n)),
@@ -131,8 +131,8 @@ def simulate_knee(
     Parameters
     ----------
     plants : KneeOrthosis or sequence of them
-        Of one memory, mounting, regulator, activity, and with the same sub-steps. A memory's
-        operator is that of the first.
+        Of one hysteresis, mounting, regulator, activity, and with the same sub-steps. A
+        hysteresis's operator is that of the first.
     set_points : array_like, shape (T,) or (T, n)
         Set-points [Pa], one a control period.
     phase : float
@@ -147,12 +147,12 @@ def simulate_knee(
         one plant and (T, n) for several.
     """
     several = [plants] if isinstance(plants, KneeOrthosis) else list(plants)
-    words = ("memory.kind", "mounting", "dynamics", "activity", "substeps")
+    words = ("hysteresis.kind", "mounting", "dynamics", "activity", "substeps")
     first = first_of(several, *words)
     arrays = arrays_for(several, set_points)
     if not COMPILED:
         arrays = [a.tolist() for a in arrays]
-    run = _runner(first.memory.kind, first.mounting, first.dynamics)
+    run = _runner(first.hysteresis.kind, first.mounting, first.dynamics)
     numbers = (first.substeps, first.control_period, float(phase), float(pressure))
     run(*arrays, first.elements, *numbers)
     made = np.asarray(arrays[-1])

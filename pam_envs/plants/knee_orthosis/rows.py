@@ -1,7 +1,7 @@
 """Where each number of the knee orthosis stands in its rows (see ``single_muscle_rows``).
 
 A plant's numbers are rows of two matrices whose columns are environments (lanes): ``rows`` is the
-state, followed by that of the memory, and ``fixed`` the parameters, which all tiles of a batch
+state, followed by that of the hysteresis, and ``fixed`` the parameters, which all tiles of a batch
 share unless they are drawn. This page is the only one that counts.
 """
 
@@ -49,14 +49,14 @@ from pam_envs.pneumatics.measured_dynamics import MODE_ROWS, MODES
 MODE = 34
 """First row of the measured dynamics' modes."""
 END = MODE + MODES
-"""First row after the plant's state; the memory's state follows."""
+"""First row after the plant's state; the hysteresis's state follows."""
 
 # parameters, in the order of PARAMETERS below
 PARAMETERS = (
     "regulator.max_pressure",
     "regulator.time_constant",
     "regulator.slew_rate",
-    "memory.width",
+    "hysteresis.width",
     "muscle.shortest_length",
     "muscle.stiffness_ratio",
     "muscle.full_volume",
@@ -186,7 +186,7 @@ NAMES = PARAMETERS
 """Every parameter by name; :func:`place` says where it stands."""
 
 ELEMENTS = 16
-"""Most elements of a modified Maxwell-slip memory."""
+"""Most elements of a modified Maxwell-slip hysteresis."""
 DEPTH = 24
 """Depth of the Preisach stack of extrema."""
 

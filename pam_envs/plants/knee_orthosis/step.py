@@ -1,9 +1,9 @@
 """One control period of the knee orthosis, for one environment or a tile of them.
 
-    set-point -> regulator -> pressure -> memory -> stiffness -> tension -> brace (and leg)
+    set-point -> regulator -> pressure -> hysteresis -> stiffness -> tension -> brace (and leg)
 
-The regulator is exact at the end of a sub-step, and the memory then too, where the pressure goes
-one way within a sub-step; the motion is of second order (see ``knee_orthosis_motion``).
+The regulator is exact at the end of a sub-step, and the hysteresis then too, where the pressure
+goes one way within a sub-step; the motion is of second order (see ``knee_orthosis_motion``).
 """
 
 from __future__ import annotations
@@ -13,7 +13,11 @@ from typing import Any
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.hysteresis_kernels import FORGET, MEMORIES, MEMORY_ROWS
+from pam_envs.plants.knee_orthosis.hysteresis_kernels import (
+    FORGET,
+    HYSTERESIS_MODELS,
+    HYSTERESIS_ROWS,
+)
 from pam_envs.plants.knee_orthosis.motion import MOTIONS, N_WORK, WAS
 from pam_envs.plants.knee_orthosis.rows import (
     MAX_PRESSURE,
@@ -28,12 +32,12 @@ from pam_envs.plants.knee_orthosis.rows import (
 from pam_envs.pneumatics.measured_dynamics import MODES, REAL_MODES, pair_factor, turned
 from pam_envs.pneumatics.regulator import regulator_step
 
-__all__ = ["MEMORY_ROWS", "N_WORK", "advance", "begin_lane", "replacements", "start_memory"]
+__all__ = ["HYSTERESIS_ROWS", "N_WORK", "advance", "begin_lane", "replacements", "start_hysteresis"]
 
 PAIR = MODE_TABLE + 2 * REAL_MODES
 """First row of what the slow pair is made of: decay, frequency, two gains."""
 
-# placeholders, filled in for each memory, mounting and regulator
+# placeholders, filled in for each hysteresis, mounting and regulator
 remember: Any = None
 forget: Any = None
 regulate: Any = None
@@ -88,7 +92,7 @@ def settle_measured(rows: Any, fixed: Any, j: int) -> None:
 
 @kernel
 def advance(
-    rows: Any, fixed: Any, counts: Any, table: Any, gait: Any, memory: int, elements: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, gait: Any, hysteresis: int, elements: int,
     substeps: int, period: float, work: Any,
 ) -> None:  # fmt: skip
     """Advance a tile by control period ``counts[STEP]``, towards its set-points.
@@ -98,11 +102,11 @@ def advance(
     rows, fixed, counts : rows
         State, parameters and whole numbers (``knee_orthosis_rows``).
     table : array
-        Of the memory: ``KneeOrthosis.memory_tables()``.
+        Of the hysteresis: ``KneeOrthosis.hysteresis_tables()``.
     gait : array
         ``KneeOrthosis.gait_table()``.
-    memory, elements : int
-        First row of the memory's state, and ``KneeOrthosis.elements``.
+    hysteresis, elements : int
+        First row of the hysteresis's state, and ``KneeOrthosis.elements``.
     substeps, period : int, float
         Sub-steps and duration [s] of the period.
     work : rows
@@ -114,34 +118,34 @@ def advance(
         regulate(rows, fixed, h)
         for j in range(LANES):
             work[WAS][j] = rows[STIFFNESS][j]
-        remember(rows, fixed, counts, table, memory, 0, LANES, elements)
+        remember(rows, fixed, counts, table, hysteresis, 0, LANES, elements)
         move(rows, fixed, counts, gait, i, substeps, h, work)
     for j in range(LANES):
         report(rows, fixed, j, period)
 
 
 @kernel
-def start_memory(rows: Any, counts: Any, memory: int, j: int) -> None:
+def start_hysteresis(rows: Any, counts: Any, hysteresis: int, j: int) -> None:
     """Clear what one lane remembers; :func:`begin_lane` then fills in what it begins with."""
-    for k in range(len(rows) - memory):
-        rows[memory + k][j] = 0.0
+    for k in range(len(rows) - hysteresis):
+        rows[hysteresis + k][j] = 0.0
     counts[K.STACK_COUNT][j] = 1
 
 
 @routine
 def begin_lane(
-    rows: Any, fixed: Any, counts: Any, table: Any, gait: Any, memory: int, elements: int, j: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, gait: Any, hysteresis: int, elements: int, j: int,
     start_phase: float, pressure: float,
 ) -> None:  # fmt: skip
     """Bring one lane to rest at a pressure [Pa] after inflation from none, at a phase in turns.
 
     ``counts[MEMBER][j]`` is set before.
     """
-    forget(rows, counts, table, memory, elements, j)
+    forget(rows, counts, table, hysteresis, elements, j)
     rows[PRESSURE][j] = 0.0
-    remember(rows, fixed, counts, table, memory, j, j + 1, elements)
+    remember(rows, fixed, counts, table, hysteresis, j, j + 1, elements)
     rows[PRESSURE][j] = pressure
-    remember(rows, fixed, counts, table, memory, j, j + 1, elements)
+    remember(rows, fixed, counts, table, hysteresis, j, j + 1, elements)
     settle(rows, fixed, j)
     rows[SET_POINT][j] = rows[K.OLD_SET_POINT][j] = rows[K.OLD_PRESSURE][j] = pressure
     rows[K.START_PHASE][j] = start_phase
@@ -158,5 +162,5 @@ REGULATORS: dict[str, dict[str, Any]] = {
 
 def replacements(kind: str, mounting: str, dynamics: str) -> dict[str, Any]:
     """Return the kernels that a plant of this make puts in the place of the placeholders."""
-    memory = {"remember": MEMORIES[kind], "forget": FORGET[kind]}
-    return memory | MOTIONS[mounting] | REGULATORS[dynamics]
+    hysteresis = {"remember": HYSTERESIS_MODELS[kind], "forget": FORGET[kind]}
+    return hysteresis | MOTIONS[mounting] | REGULATORS[dynamics]

@@ -1,9 +1,9 @@
-"""The redundant manipulator of seed 002: a chain of joints between antagonistic muscles.
+"""The redundant manipulator of fluidic_muscles: a chain of joints between antagonistic muscles.
 
     M(q) q'' + bias(q, q') = sum over a joint's muscles of -F dL/dq - D q' + disturbance
 
-Six stages with axes x-y-x-y-x-y unless another chain is given; each has the muscles, the memory,
-the regulators and the feed-forward of a single joint
+Six stages with axes x-y-x-y-x-y unless another chain is given; each has the muscles, the
+hysteresis, the regulators and the feed-forward of a single joint
 (:mod:`pam_envs.plants.antagonistic_joint.plant`). Gravity, inertia and the payload at the tip
 couple the joints. The arm hangs.
 
@@ -30,7 +30,7 @@ from pam_envs.mechanics.antagonistic_lever import AntagonisticLever
 from pam_envs.mechanics.serial_chain import SerialChain
 from pam_envs.muscle.force_map import ForceMap, paper_stretch
 from pam_envs.plants.antagonistic_joint import statics as pair_statics
-from pam_envs.plants.antagonistic_joint.hysteresis import JointMemory, joint_memory
+from pam_envs.plants.antagonistic_joint.hysteresis import JointHysteresis, joint_hysteresis
 from pam_envs.plants.antagonistic_joint.hysteresis_tables import (
     check_operator,
     map_tables,
@@ -80,7 +80,7 @@ class RedundantManipulator(Plant):
         ``arm.damping_factor`` of 1.
     arm
         Factors of all masses and of all damping.
-    regulator, memory, muscle, lever, link, nominal
+    regulator, hysteresis, muscle, lever, link, nominal
         The components of every stage.
     angle, pressure
         The sensors of every stage.
@@ -90,7 +90,7 @@ class RedundantManipulator(Plant):
     components: ClassVar[tuple[str, ...]] = (
         "arm",
         "regulator",
-        "memory",
+        "hysteresis",
         "muscle",
         "lever",
         "link",
@@ -113,7 +113,7 @@ class RedundantManipulator(Plant):
     joint_damping: tuple[float, ...] = (0.0,) * LINK.stages
     arm: ArmFactors = field(default_factory=ArmFactors)
     regulator: JointRegulator = field(default_factory=JointRegulator)
-    memory: JointMemory = field(default_factory=JointMemory)
+    hysteresis: JointHysteresis = field(default_factory=JointHysteresis)
     muscle: ForceMap = field(default_factory=ForceMap)
     lever: AntagonisticLever = field(default_factory=AntagonisticLever)
     link: Stage = field(default_factory=Stage)
@@ -128,7 +128,7 @@ class RedundantManipulator(Plant):
         if len(self.gravity) != 3:
             raise ValueError(f"gravity = {self.gravity!r}; give three numbers [m/s2]")
         self.check_components()
-        check_operator(self.memory.operator)
+        check_operator(self.hysteresis.operator)
         pair_statics.check_angles(self, self.link)
         if self.chain.stages > M.MOST_STAGES:
             raise ValueError(
@@ -153,11 +153,11 @@ class RedundantManipulator(Plant):
         Parameters
         ----------
         hysteresis : {"maxwell_slip", "preisach", "none"}
-            Which memory; both operators have the same loops.
+            Which hysteresis; both operators have the same loops.
         chain : SerialChain
             Joints and links.
         **changes : float
-            Parameters to replace, with ``__`` for the dot (``memory__width=0.5``).
+            Parameters to replace, with ``__`` for the dot (``hysteresis__width=0.5``).
         """
         muscle, provenance = ForceMap(stretch=paper_stretch()), {"muscle.stretch": STRETCHED}
         return cls._of(chain, hysteresis, muscle, provenance, changes)
@@ -191,7 +191,7 @@ class RedundantManipulator(Plant):
             along=chain.along,
             gravity=chain.gravity,
             joint_damping=(0.0,) * chain.stages,
-            memory=joint_memory(hysteresis),
+            hysteresis=joint_hysteresis(hysteresis),
             muscle=muscle,
             provenance=provenance,
         ).replace({k.replace("__", "."): v for k, v in changes.items()})
@@ -268,7 +268,7 @@ class RedundantManipulator(Plant):
         return pair_statics.pull(self, angle, pressure_a, pressure_b)
 
     def stiffness_at(self, angle: ArrayLike, prestress: ArrayLike | None = None) -> Array:
-        """Return the stiffness of a joint's muscles [N m/rad] at rest, without memory."""
+        """Return the stiffness of a joint's muscles [N m/rad] at rest, without hysteresis."""
         pressures = self.pressures_for(angle, prestress)[:2]
         return pair_statics.stiffness(self, angle, *pressures)
 
@@ -348,7 +348,7 @@ class RedundantManipulator(Plant):
     def rest_angles(self, commands: ArrayLike, prestress: float | None = None) -> Array:
         """Return where one stage rests [rad] after each of a series of set-points [rad], (T,).
 
-        Quasi-static, memory included, from the straight virgin state, without gravity and load.
+        Quasi-static, hysteresis included, from the straight virgin state, without gravity and load.
         """
         return self.stage().rest_angles(commands, prestress)
 
@@ -359,16 +359,16 @@ class RedundantManipulator(Plant):
         damping = [*self.joint_damping, *[0.0] * (M.MOST_STAGES - self.stages)]
         named = [self.value(name) for name in M.NAMES]
         chain = self.nominal_chain.rows()
-        return np.array([*named, *model_rows(self.memory.operator), *damping, *chain])
+        return np.array([*named, *model_rows(self.hysteresis.operator), *damping, *chain])
 
     @property
     def elements(self) -> int:
-        """Plays of a muscle's memory."""
-        return plays_of(self.memory.operator)
+        """Plays of a muscle's hysteresis."""
+        return plays_of(self.hysteresis.operator)
 
-    def memory_tables(self) -> Array:
+    def hysteresis_tables(self) -> Array:
         """Return the Everett maps of all members, shape (members, n, n), or zeros."""
-        return map_tables([m.memory.operator for m in self.members()])
+        return map_tables([m.hysteresis.operator for m in self.members()])
 
 
 def _numbers(name: str, values: Sequence[float]) -> tuple[float, ...]:

@@ -17,9 +17,9 @@ from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.plants.redundant_manipulator.step import (
     advance,
     begin_lane,
-    memory_rows,
+    hysteresis_rows,
     replacements,
-    start_memory,
+    start_hysteresis,
     work_rows,
 )
 
@@ -63,7 +63,7 @@ def run_arm(
 ) -> None:  # fmt: skip
     """Run one arm from rest under the first commands through all control periods."""
     work = scratch(ARM_WORK, 1)
-    start_memory(rows, counts, M.END, 0)
+    start_hysteresis(rows, counts, M.END, 0)
     order(rows, fixed, commands[0], stress, shoves[0], masses[0])
     begin_lane(rows, fixed, counts, table, M.END, elements, 0, work)
     for step in range(len(commands)):
@@ -114,15 +114,15 @@ def simulate_manipulator(
         at the end of each control period, free of noise.
     """
     given = np.ascontiguousarray(np.atleast_2d(np.asarray(commands, np.float64)))
-    n, periods, kind = plant.stages, len(given), plant.memory.kind
+    n, periods, kind = plant.stages, len(given), plant.hysteresis.kind
     if given.shape[1] != n:
         raise ValueError(f"commands have {given.shape[1]} columns for {n} joints; give one a joint")
     masses = np.broadcast_to(np.asarray(payload, float), (periods,))[:, None]
     arrays = [
-        np.zeros((M.END + memory_rows(kind, n), 1)),
+        np.zeros((M.END + hysteresis_rows(kind, n), 1)),
         plant.parameter_rows()[:, None],
         np.zeros((M.N_COUNTS, 1), np.int64),
-        plant.memory_tables()[:1],
+        plant.hysteresis_tables()[:1],
         given,
         np.array(np.broadcast_to(np.asarray(disturbance, float), (periods, n))),
         np.array(masses),

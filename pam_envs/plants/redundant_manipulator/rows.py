@@ -67,12 +67,12 @@ PRESSURE, SET_POINT, FORCE, CONTRACTION, LAG, AT, STICK = range(
 PAYLOAD, SLACK, AIR, STRAIGHT, SHARE = range(24 * MOST_STAGES, 24 * MOST_STAGES + 5)
 """``SHARE`` is the payload over the links' common factor (see :func:`swing` of the kernels)."""
 END = SHARE + 1
-"""First row after the plant's state; the memory's state follows."""
+"""First row after the plant's state; the hysteresis's state follows."""
 
 PARAMETERS = (*MUSCLE_PARAMETERS, "arm.mass_factor", "arm.damping_factor")
 MASS_FACTOR, DAMPING_FACTOR = range(len(MUSCLE_PARAMETERS), len(PARAMETERS))
 MODEL = len(PARAMETERS)
-"""First row of the memory's operator."""
+"""First row of the hysteresis's operator."""
 JOINT_DAMPING = MODEL + MODEL_ROWS
 """First row of the damping that each joint has beside ``link.damping`` [N m s/rad]."""
 CHAIN = JOINT_DAMPING + MOST_STAGES

@@ -30,10 +30,13 @@ from pam_envs.mechanics.serial_chain_rows import (
     mass_row,
 )
 from pam_envs.mechanics.serial_chain_rows import work_rows as chain_work_rows
-from pam_envs.plants.antagonistic_joint.hysteresis_kernels import MEMORIES, ROWS_PER_OPERATOR
+from pam_envs.plants.antagonistic_joint.hysteresis_kernels import (
+    HYSTERESIS_MODELS,
+    ROWS_PER_OPERATOR,
+)
 from pam_envs.plants.antagonistic_joint.pair import (
     air_of,
-    clear_memories,
+    clear_hysteresis_models,
     command,
     contract,
     feed_forward,
@@ -79,9 +82,9 @@ __all__ = [
     "advance",
     "begin_lane",
     "feed_forward",
-    "memory_rows",
+    "hysteresis_rows",
     "replacements",
-    "start_memory",
+    "start_hysteresis",
     "work_rows",
 ]
 
@@ -92,7 +95,7 @@ CHAIN_WORK = 6 * MOST_STAGES
 RESTING = 30
 """Steps to the pose at rest."""
 
-# placeholders, filled in for each memory
+# placeholders, filled in for each hysteresis
 peek: Any = None
 remember: Any = None
 OPERATOR_ROWS = 0
@@ -144,12 +147,19 @@ def balance(rows: Any, fixed: Any, k: int, h: float, work: Any) -> None:
 
 @kernel
 def swing(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, h: float, work: Any
+    rows: Any,
+    fixed: Any,
+    counts: Any,
+    table: Any,
+    hysteresis: int,
+    elements: int,
+    h: float,
+    work: Any,
 ) -> None:
     """Move the arm by one sub-step."""
     foresee(rows, fixed, h, work)
     peek(
-        rows, fixed, counts, table, memory, elements, AT, LAG, STICK, 2 * N_STAGES, MODEL,
+        rows, fixed, counts, table, hysteresis, elements, AT, LAG, STICK, 2 * N_STAGES, MODEL,
         STACK_COUNT, MEMBER, 0, LANES,
     )  # fmt: skip
     chain_terms(rows, fixed, work, MIDDLE, MIDDLE_RATE, SHARE, CHAIN, CHAIN_WORK)
@@ -167,14 +177,14 @@ def swing(
         for j in range(LANES):
             contract(rows, fixed, j, rows[ANGLE + k][j], AT + 2 * k, STRAIGHT)
     remember(
-        rows, fixed, counts, table, memory, elements, AT, LAG, 2 * N_STAGES, MODEL, STACK_COUNT,
+        rows, fixed, counts, table, hysteresis, elements, AT, LAG, 2 * N_STAGES, MODEL, STACK_COUNT,
         MEMBER, 0, LANES,
     )  # fmt: skip
 
 
 @kernel
 def advance(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, substeps: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, substeps: int,
     period: float, work: Any,
 ) -> None:  # fmt: skip
     """Advance a tile by one control period, towards its set-points.
@@ -185,9 +195,9 @@ def advance(
         State, parameters and whole numbers (``redundant_manipulator_rows``). ``SET_POINT`` [Pa],
         ``DISTURBANCE`` [N m] and ``PAYLOAD`` [kg] are the caller's to write.
     table : array
-        Of the memory: ``RedundantManipulator.memory_tables()``.
-    memory, elements : int
-        First row of the memory's state, and ``RedundantManipulator.elements``.
+        Of the hysteresis: ``RedundantManipulator.hysteresis_tables()``.
+    hysteresis, elements : int
+        First row of the hysteresis's state, and ``RedundantManipulator.elements``.
     substeps, period : int, float
         Sub-steps and duration [s] of the period.
     work : rows
@@ -197,7 +207,7 @@ def advance(
     for _ in range(substeps):
         for m in range(2 * N_STAGES):
             fill(rows[PRESSURE + m], rows[SET_POINT + m], work[WAS + m], fixed, h)
-        swing(rows, fixed, counts, table, memory, elements, h, work)
+        swing(rows, fixed, counts, table, hysteresis, elements, h, work)
     for j in range(LANES):
         report(rows, fixed, j)
 
@@ -232,19 +242,27 @@ def report(rows: Any, fixed: Any, j: int) -> None:
 
 
 @kernel
-def start_memory(rows: Any, counts: Any, memory: int, j: int) -> None:
-    """Put the memories of one lane into their virgin state."""
-    clear_memories(rows, counts, memory, STACK_COUNT, 2 * MOST_STAGES, j)
+def start_hysteresis(rows: Any, counts: Any, hysteresis: int, j: int) -> None:
+    """Put the hysteresis models of one lane into their virgin state."""
+    clear_hysteresis_models(rows, counts, hysteresis, STACK_COUNT, 2 * MOST_STAGES, j)
 
 
 @routine
 def begin_lane(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, j: int, work: Any
+    rows: Any,
+    fixed: Any,
+    counts: Any,
+    table: Any,
+    hysteresis: int,
+    elements: int,
+    j: int,
+    work: Any,
 ) -> None:
     """Bring one lane to rest at its commanded angles [rad] and co-contractions [N].
 
     ``COMMAND``, ``PRESTRESS``, ``DISTURBANCE``, ``PAYLOAD`` and ``counts[MEMBER]`` are set before,
-    and the memory cleared with :func:`start_memory`: the arm comes from a straight virgin state.
+    and the hysteresis cleared with :func:`start_hysteresis`: the arm comes from a straight virgin
+    state.
     """
     straight, _, _ = lever_of(fixed, j, 0.0, 1.0)
     rows[STRAIGHT][j] = straight
@@ -266,12 +284,12 @@ def begin_lane(
         chain_terms(rows, fixed, work, MIDDLE, MIDDLE_RATE, SHARE, CHAIN, CHAIN_WORK)
         for k in range(N_STAGES):
             weight = factor * work[CHAIN_WORK + k][j]
-            settle(rows, fixed, counts, table, memory, elements, j, k, weight)
+            settle(rows, fixed, counts, table, hysteresis, elements, j, k, weight)
     for k in range(N_STAGES):
         rows[CHANGE + k][j] = 0.0
         contract(rows, fixed, j, rows[ANGLE + k][j], AT + 2 * k, STRAIGHT)
     remember(
-        rows, fixed, counts, table, memory, elements, AT, LAG, 2 * N_STAGES, MODEL, STACK_COUNT,
+        rows, fixed, counts, table, hysteresis, elements, AT, LAG, 2 * N_STAGES, MODEL, STACK_COUNT,
         MEMBER, j, j + 1,
     )  # fmt: skip
     report(rows, fixed, j)
@@ -310,14 +328,14 @@ def moment_beyond(rows: Any, fixed: Any, j: int, i: int) -> float:
 
 @kernel
 def settle(
-    rows: Any, fixed: Any, counts: Any, table: Any, memory: int, elements: int, j: int, k: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, j: int, k: int,
     weight: float,
 ) -> None:  # fmt: skip
     """Move joint ``k`` of a lane towards its rest against a weight's torque [N m]."""
     angle = rows[ANGLE + k][j]
     contract(rows, fixed, j, angle, AT + 2 * k, STRAIGHT)
     peek(
-        rows, fixed, counts, table, memory + 2 * k * OPERATOR_ROWS, elements, AT + 2 * k,
+        rows, fixed, counts, table, hysteresis + 2 * k * OPERATOR_ROWS, elements, AT + 2 * k,
         LAG + 2 * k, STICK + 2 * k, 2, MODEL, STACK_COUNT + 2 * k, MEMBER, j, j + 1,
     )  # fmt: skip
     torque, slope = pull_of(rows, fixed, j, k, angle)
@@ -331,8 +349,8 @@ def settle(
     rows[ANGLE + k][j] = angle + max(-0.1, min(0.1, step))
 
 
-def memory_rows(kind: str, stages: int) -> int:
-    """Return how many rows of state the memories take."""
+def hysteresis_rows(kind: str, stages: int) -> int:
+    """Return how many rows of state the hysteresis models take."""
     return 2 * stages * ROWS_PER_OPERATOR[kind]
 
 
@@ -344,4 +362,4 @@ def work_rows(stages: int) -> int:
 def replacements(kind: str, stages: int) -> dict[str, Any]:
     """Return what a plant of this make puts in the place of the placeholders."""
     sizes = {"OPERATOR_ROWS": ROWS_PER_OPERATOR[kind], "N_STAGES": stages}
-    return MEMORIES[kind] | sizes
+    return HYSTERESIS_MODELS[kind] | sizes

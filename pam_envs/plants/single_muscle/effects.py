@@ -5,7 +5,8 @@ the effects of the components in it. With all of them neutral it moves as the pl
 plant runs on it when one is not neutral. The order is that of the signal::
 
     set-point -> gain, supply, dead band, lag, slew, exhaust -> leak -> ringing line
-    -> dead pressure, memory, first cycles -> creep -> temperature -> law, load, viscosity, strands
+    -> dead pressure, hysteresis, first cycles -> creep -> temperature -> law, load, viscosity,
+    strands
     -> support, sticking guide -> soft mount -> delayed, bowed, drifting sensor
 
 A set-point below zero means that the valve is shut: the muscle keeps its air but for the leak.
@@ -22,11 +23,11 @@ from pam_envs.kernels.build import LANES, kernel, routine, scratch
 from pam_envs.mechanics.hanging_mass import GRAVITY, damped_motion
 from pam_envs.muscle.effective_area import fine_slope, fine_tension, tension, tension_slope
 from pam_envs.plants.single_muscle import rows as R
-from pam_envs.plants.single_muscle.step import MEMORIES
+from pam_envs.plants.single_muscle.step import HYSTERESIS_MODELS
 from pam_envs.pneumatics.regulator import DELAY_PERIODS, delayed_fraction, regulator_step
 
-FIRST = 0  # placeholder: the row after the memory's state
-plain_memory: Any = None  # placeholder: one of the three memories
+FIRST = 0  # placeholder: the row after the hysteresis's state
+plain_hysteresis: Any = None  # placeholder: one of the three hysteresis models
 
 ATMOSPHERE = 101325.0
 REFERENCE_TEMPERATURE = 293.15
@@ -147,7 +148,7 @@ def feel(
     fixed: Any,
     counts: Any,
     table: Any,
-    memory: int,
+    hysteresis: int,
     first: int,
     last: int,
     elements: int,
@@ -163,7 +164,7 @@ def feel(
     for j in range(first, last):
         true[j] = pressure[j]
         pressure[j] = max(0.0, pressure[j] - fixed[R.DEAD_PRESSURE][j])
-    plain_memory(rows, fixed, counts, table, memory, first, last, elements, work)
+    plain_hysteresis(rows, fixed, counts, table, hysteresis, first, last, elements, work)
     for j in range(first, last):
         felt = pressure[j]
         pressure[j] = true[j]
@@ -208,7 +209,7 @@ def settled(
     fixed: Any,
     counts: Any,
     table: Any,
-    memory: int,
+    hysteresis: int,
     first: int,
     last: int,
     elements: int,
@@ -219,7 +220,7 @@ def settled(
     for j in range(first, last):
         own[1][j] = 1e9
         rows[FIRST + R.KELVIN][j] = fixed[R.TEMPERATURE][j]
-    feel(rows, fixed, counts, table, memory, first, last, elements, work, own[1], own, 1, 1)
+    feel(rows, fixed, counts, table, hysteresis, first, last, elements, work, own[1], own, 1, 1)
 
 
 @kernel
@@ -518,7 +519,7 @@ def advance_extended(
     fixed: Any,
     counts: Any,
     table: Any,
-    memory: int,
+    hysteresis: int,
     elements: int,
     substeps: int,
     period: float,
@@ -605,7 +606,7 @@ def advance_extended(
                 fixed,
                 counts,
                 table,
-                memory,
+                hysteresis,
                 0,
                 LANES,
                 elements,
@@ -631,11 +632,11 @@ def advance_extended(
 def replacements(kind: str, first: int) -> dict[str, Any]:
     """Return what stands where in a kernel of the plain plant to make it the extended one.
 
-    ``first`` is the row after the memory's state.
+    ``first`` is the row after the hysteresis's state.
     """
     return {
         "FIRST": first,
-        "plain_memory": MEMORIES[kind],
+        "plain_hysteresis": HYSTERESIS_MODELS[kind],
         "remember": settled,
         "advance": advance_extended,
         "rest_contraction": rest_extended,

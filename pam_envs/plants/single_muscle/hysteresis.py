@@ -1,4 +1,4 @@
-"""The memory of a muscle: from the pressure inside to the effective pressure that pulls."""
+"""The hysteresis of a muscle: from the pressure inside to the effective pressure that pulls."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ KINDS: tuple[Kind, ...] = ("maxwell_slip", "preisach", "none")
 
 
 @dataclass(frozen=True)
-class Memory:
+class Hysteresis:
     """Pressure-driven friction of braid and tube.
 
     The pressure, stretched to a scale on which friction is uniform, passes an operator with
-    memory; the operator's hysteretic part is scaled by ``1 + width_per_load * load``; the result
-    is stretched back. ``operator`` is a :class:`PlayOperator` of total slope 1 (the dual of
+    hysteresis; the operator's hysteretic part is scaled by ``1 + width_per_load * load``; the
+    result is stretched back. ``operator`` is a :class:`PlayOperator` of total slope 1 (the dual of
     Maxwell-slip elements), a :class:`Preisach` operator, or None.
     """
 
@@ -33,7 +33,7 @@ class Memory:
         -0.8,
         0.8,
         "identified",
-        "pressure-dependent friction; least squares on seed 003, Tables 3-5",
+        "pressure-dependent friction; least squares on positioning2021, Tables 3-5",
         neutral=0.0,
     )
     width_per_load: float = parameter(
@@ -42,7 +42,7 @@ class Memory:
         -0.2,
         0.2,
         "identified",
-        "load-dependent loop width; least squares on seed 003, Tables 3-5",
+        "load-dependent loop width; least squares on positioning2021, Tables 3-5",
         neutral=0.0,
     )
     # effects, neutral unless a recording shows them
@@ -111,16 +111,16 @@ class Memory:
             return self.operator.scaled(width)
         return self.operator.scaled(width, slope=1.0)
 
-    def inverse(self, load: float, full: float) -> MemoryInverse:
+    def inverse(self, load: float, full: float) -> HysteresisInverse:
         """Return the exact inverse at a load [kg] for pressures from 0 to ``full`` [Pa]."""
-        return MemoryInverse(self, self.at_load(load), full)
+        return HysteresisInverse(self, self.at_load(load), full)
 
 
 @dataclass(frozen=True)
-class MemoryInverse:
+class HysteresisInverse:
     """The pressure that gives a wanted effective pressure, given the history so far."""
 
-    memory: Memory
+    hysteresis: Hysteresis
     operator: PlayOperator | Preisach | None
     full: float
 
@@ -135,7 +135,7 @@ class MemoryInverse:
 
         The pressure is held between 0 and ``full``, and the state is that of the held pressure.
         """
-        wanted = self.memory.stretched(drive, self.full)
+        wanted = self.hysteresis.stretched(drive, self.full)
         if self.operator is None:
             return np.clip(np.asarray(drive, float), 0.0, self.full), None
         if isinstance(self.operator, PlayOperator):
@@ -145,12 +145,12 @@ class MemoryInverse:
             felt, _ = self.operator.inverse_step(wanted, state)
         felt = np.clip(felt, 0.0, self.full)
         _, after = self.operator.step(felt, state)
-        return self.memory.unstretched(felt, self.full), after
+        return self.hysteresis.unstretched(felt, self.full), after
 
     def drive(self, pressure: ArrayLike, state: Any) -> tuple[NDArray[np.float64], Any]:
         """Return the effective pressure [Pa] at a pressure [Pa], and the state it leaves."""
         if self.operator is None:
             return np.asarray(pressure, float), None
-        felt = self.memory.stretched(np.clip(pressure, 0.0, self.full), self.full)
+        felt = self.hysteresis.stretched(np.clip(pressure, 0.0, self.full), self.full)
         value, after = self.operator.step(felt, state)
-        return self.memory.unstretched(value, self.full), after
+        return self.hysteresis.unstretched(value, self.full), after

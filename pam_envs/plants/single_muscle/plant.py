@@ -1,6 +1,7 @@
-"""A muscle that lifts a load: Festo MAS-10-N-100 of seed 003.
+"""A muscle that lifts a load: Festo MAS-10-N-100 of positioning2021.
 
-    set-point -> regulator -> pressure -> memory -> effective pressure -> static law -> hanging mass
+    set-point -> regulator -> pressure -> hysteresis -> effective pressure -> static law -> hanging
+    mass
 
 The measured quantity is the contraction from the rest length under the load that hangs at the
 start, as in the paper's tables.
@@ -23,7 +24,7 @@ from pam_envs.muscle.effective_area import EffectiveAreaMuscle
 from pam_envs.parameters import declarations
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.single_muscle import rows as R
-from pam_envs.plants.single_muscle.hysteresis import Kind, Memory
+from pam_envs.plants.single_muscle.hysteresis import Hysteresis, Kind
 from pam_envs.pneumatics.regulator import Regulator
 from pam_envs.sensing.sensor import PositionSensor, PressureSensor
 
@@ -31,7 +32,7 @@ NEUTRAL: dict[str, float] = {
     f"{component}.{name}": declared.neutral
     for component, part in (
         ("regulator", Regulator),
-        ("memory", Memory),
+        ("hysteresis", Hysteresis),
         ("muscle", EffectiveAreaMuscle),
         ("mass", HangingMass),
         ("position", PositionSensor),
@@ -42,7 +43,7 @@ NEUTRAL: dict[str, float] = {
 }
 """The values at which each effect is off."""
 
-_CREEP_TIMES = tuple(f"memory.creep_time_{k}" for k in (1, 2, 3, 4))
+_CREEP_TIMES = tuple(f"hysteresis.creep_time_{k}" for k in (1, 2, 3, 4))
 EFFECTS: tuple[tuple[str, ...], ...] = (
     ("regulator.gain",),
     ("regulator.slew_bend",),
@@ -63,12 +64,12 @@ EFFECTS: tuple[tuple[str, ...], ...] = (
         "regulator.ring_frequency",
         "regulator.ring_damping",
     ),
-    ("memory.shape",),
-    ("memory.pressure_slope",),
-    ("memory.pressure_bend",),
-    (*(f"{c}.creep_{k}" for c in ("memory", "muscle") for k in (1, 2, 3, 4)), *_CREEP_TIMES),
-    ("memory.first_width", "memory.first_loss", "memory.first_travel"),
-    ("memory.threshold",),
+    ("hysteresis.shape",),
+    ("hysteresis.pressure_slope",),
+    ("hysteresis.pressure_bend",),
+    (*(f"{c}.creep_{k}" for c in ("hysteresis", "muscle") for k in (1, 2, 3, 4)), *_CREEP_TIMES),
+    ("hysteresis.first_width", "hysteresis.first_loss", "hysteresis.first_travel"),
+    ("hysteresis.threshold",),
     ("muscle.area_curve",),
     ("muscle.softening",),
     ("muscle.stiffening",),
@@ -108,14 +109,14 @@ class SingleMuscle(Plant):
 
     Attributes
     ----------
-    regulator, memory, muscle, mass, position, pressure
+    regulator, hysteresis, muscle, mass, position, pressure
         Its components, in the order of the signal.
     """
 
     family: ClassVar[str] = "single_muscle"
     components: ClassVar[tuple[str, ...]] = (
         "regulator",
-        "memory",
+        "hysteresis",
         "muscle",
         "mass",
         "position",
@@ -125,7 +126,7 @@ class SingleMuscle(Plant):
     effects: ClassVar[tuple[tuple[str, ...], ...]] = EFFECTS
 
     regulator: Regulator = field(default_factory=Regulator)
-    memory: Memory = field(default_factory=Memory)
+    hysteresis: Hysteresis = field(default_factory=Hysteresis)
     muscle: EffectiveAreaMuscle = field(default_factory=EffectiveAreaMuscle)
     mass: HangingMass = field(default_factory=HangingMass)
     position: PositionSensor = field(default_factory=PositionSensor)
@@ -134,22 +135,22 @@ class SingleMuscle(Plant):
     def __post_init__(self) -> None:
         """Check every parameter, and that the motion can be followed."""
         self.check_components()
-        self._check_memory()
+        self._check_hysteresis()
         self._check_motion()
 
-    def _check_memory(self) -> None:
-        operator = self.memory.operator
+    def _check_hysteresis(self) -> None:
+        operator = self.hysteresis.operator
         if isinstance(operator, PlayOperator):
             total = operator.linear + sum(operator.weights)
             if abs(total - 1.0) > 1e-9 or operator.linear <= 0.0:
                 raise ValueError(
-                    f"memory: the play operator's total slope is {total:g} with a linear part of "
-                    f"{operator.linear:g}; a muscle's memory needs total slope 1 and a linear part "
+                    f"hysteresis: the play operator's total slope is {total:g} with a linear part of "
+                    f"{operator.linear:g}; a muscle's hysteresis needs total slope 1 and a linear part "
                     "above 0: scale the weights"
                 )
             if len(operator.weights) > R.ELEMENTS:
                 raise ValueError(
-                    f"memory: {len(operator.weights)} elements, at most {R.ELEMENTS} are "
+                    f"hysteresis: {len(operator.weights)} elements, at most {R.ELEMENTS} are "
                     "simulated; merge neighbouring thresholds"
                 )
         if isinstance(operator, Preisach):
@@ -157,7 +158,7 @@ class SingleMuscle(Plant):
             span = (operator.low, operator.high)
             if operator.start != "virgin" or not np.allclose(span, (-full, full), rtol=1e-9):
                 raise ValueError(
-                    f"memory: the Everett map spans {span} Pa with start {operator.start!r}; a "
+                    f"hysteresis: the Everett map spans {span} Pa with start {operator.start!r}; a "
                     f"muscle needs -{full:g} to {full:g} Pa (the regulator's range and its mirror "
                     "image) with start 'virgin', so that its first inflation is one"
                 )
@@ -186,12 +187,12 @@ class SingleMuscle(Plant):
 
     @classmethod
     def mas10(cls, hysteresis: Kind = "maxwell_slip", **changes: float) -> SingleMuscle:
-        """Return the muscle identified on the measured tables, with that memory.
+        """Return the muscle identified on the measured tables, with that hysteresis.
 
         Parameters
         ----------
         hysteresis : {"maxwell_slip", "preisach", "none"}
-            Which memory; each was identified on the same data.
+            Which hysteresis; each was identified on the same data.
         **changes : float
             Parameters to replace, with ``__`` for the dot (``mass__load=4.55``).
         """
@@ -260,7 +261,7 @@ class SingleMuscle(Plant):
         )
         column[R.COSINE] = math.cos(self.muscle.braid_angle)
         column[R.LINEAR] = 1.0
-        operator = self.memory.operator
+        operator = self.hysteresis.operator
         if isinstance(operator, PlayOperator):
             n = len(operator.weights)
             column[R.LINEAR] = operator.linear
@@ -279,11 +280,11 @@ class SingleMuscle(Plant):
     @property
     def elements(self) -> int:
         """Number of play operators that are simulated."""
-        operator = self.memory.operator
+        operator = self.hysteresis.operator
         return len(operator.weights) if isinstance(operator, PlayOperator) else 0
 
     def everett_tables(self) -> NDArray[np.float64]:
         """Return the Everett maps of all members, shape (members, n, n); (1, 2, 2) if none."""
-        operators = [m.memory.operator for m in self.members()]
+        operators = [m.hysteresis.operator for m in self.members()]
         tables = [np.asarray(o.table, float) for o in operators if isinstance(o, Preisach)]
         return np.ascontiguousarray(tables) if tables else np.zeros((1, 2, 2))

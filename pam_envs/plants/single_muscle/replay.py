@@ -38,7 +38,7 @@ from pam_envs.plants.single_muscle.effects import (
 )
 from pam_envs.plants.single_muscle.plant import NEUTRAL, SingleMuscle
 from pam_envs.plants.single_muscle.rows import N_COUNTS, N_PARAMETERS
-from pam_envs.plants.single_muscle.step import MEMORY_ROWS, N_WORK
+from pam_envs.plants.single_muscle.step import HYSTERESIS_ROWS, N_WORK
 
 CHANNELS = ("contraction", "pressure")
 LONGEST_STEP = 0.0201
@@ -172,17 +172,17 @@ COSTLY = (
         "regulator.supply_pressure",
     ),
     (
-        "memory.shape",
-        "memory.pressure_slope",
-        "memory.pressure_bend",
-        "memory.first_width",
-        "memory.first_loss",
+        "hysteresis.shape",
+        "hysteresis.pressure_slope",
+        "hysteresis.pressure_bend",
+        "hysteresis.first_width",
+        "hysteresis.first_loss",
         "muscle.temperature_gain",
     ),
     ("regulator.ring_share", "regulator.ring_flow"),
     ("mass.ring_share",),
     tuple(f"muscle.creep_{k}" for k in (1, 2, 3, 4)),
-    tuple(f"memory.creep_{k}" for k in (1, 2, 3, 4)),
+    tuple(f"hysteresis.creep_{k}" for k in (1, 2, 3, 4)),
     tuple(f"muscle.strand_{k}" for k in (1, 2, 3, 4)),
     ("mass.stick", "muscle.viscosity"),
 )
@@ -199,7 +199,7 @@ def _places() -> list[tuple[list[int], Array]]:
 
 @lru_cache(maxsize=8)
 def _runner(kind: str, parallel: bool) -> Callable[..., Any]:
-    first = R.END + MEMORY_ROWS[kind]
+    first = R.END + HYSTERESIS_ROWS[kind]
     return build(
         run_replay,
         f"replay_{kind}",
@@ -217,7 +217,7 @@ def replay_rows(plant: SingleMuscle, columns: Array, inputs: Inputs) -> Array:
     Parameters
     ----------
     plant : SingleMuscle
-        Gives the memory's kind and Everett map.
+        Gives the hysteresis's kind and Everett map.
     columns : array, shape (n, n_parameters)
         As :meth:`SingleMuscle.parameter_rows` lays them out.
     inputs : Inputs
@@ -248,10 +248,10 @@ def alike(columns: Array) -> list[NDArray[np.int64]]:
 
 
 def _replay_tiles(plant: SingleMuscle, columns: Array, inputs: Inputs, table: Array) -> Array:
-    kind, n = plant.memory.kind, len(columns)
+    kind, n = plant.hysteresis.kind, len(columns)
     fixed = in_tiles(columns, n, TILE)
     tiles = len(fixed)
-    rows = np.zeros((tiles, R.END + MEMORY_ROWS[kind] + R.N_EFFECTS, TILE))
+    rows = np.zeros((tiles, R.END + HYSTERESIS_ROWS[kind] + R.N_EFFECTS, TILE))
     counts = np.zeros((tiles, N_COUNTS, TILE), np.int64)
     outputs = np.empty((len(CHANNELS), len(inputs.command), n))
     substeps = max(1, int(np.ceil(inputs.period / inputs.longest_step)))

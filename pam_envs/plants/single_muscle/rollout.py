@@ -15,8 +15,8 @@ from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.rows import N_COUNTS, N_PARAMETERS
 from pam_envs.plants.single_muscle.step import (
-    MEMORIES,
-    MEMORY_ROWS,
+    HYSTERESIS_MODELS,
+    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     rest_contraction,
@@ -24,7 +24,7 @@ from pam_envs.plants.single_muscle.step import (
 
 OUTPUTS = ("contraction", "velocity", "pressure", "drive")
 N_ROWS = 0
-remember: Any = None  # placeholders, filled in for each memory
+remember: Any = None  # placeholders, filled in for each hysteresis
 
 
 @kernel
@@ -68,7 +68,12 @@ def run(
 
 @lru_cache(maxsize=8)
 def _runner(kind: str) -> Callable[..., Any]:
-    return build(run, f"rollout_{kind}", remember=MEMORIES[kind], N_ROWS=R.END + MEMORY_ROWS[kind])
+    return build(
+        run,
+        f"rollout_{kind}",
+        remember=HYSTERESIS_MODELS[kind],
+        N_ROWS=R.END + HYSTERESIS_ROWS[kind],
+    )
 
 
 def simulate_rows(
@@ -79,7 +84,7 @@ def simulate_rows(
     Parameters
     ----------
     plant : SingleMuscle
-        Gives the memory's kind, the Everett map and the sub-steps.
+        Gives the hysteresis's kind, the Everett map and the sub-steps.
     parameters : array, shape (n, n_parameters)
         Columns as :meth:`SingleMuscle.parameter_rows` lays them out.
     set_points : array_like, shape (T,) or (T, n)
@@ -91,11 +96,11 @@ def simulate_rows(
         Contraction [m], velocity [m/s], pressure [Pa] and effective pressure [Pa] at the end of
         each control period, free of noise.
     """
-    kind, n = plant.memory.kind, len(parameters)
+    kind, n = plant.hysteresis.kind, len(parameters)
     commands = np.asarray(set_points, np.float64)
     commands = np.ascontiguousarray(commands.reshape(len(commands), -1))
     fixed = in_tiles(parameters, n, LANES)
-    rows = np.zeros((len(fixed), R.END + MEMORY_ROWS[kind], LANES))
+    rows = np.zeros((len(fixed), R.END + HYSTERESIS_ROWS[kind], LANES))
     counts = np.zeros((len(fixed), N_COUNTS, LANES), np.int64)
     outputs = np.empty((len(OUTPUTS), len(commands), n))
     arrays: list[Any] = [rows, fixed, counts, plant.everett_tables()[:1], commands, outputs]
@@ -108,7 +113,7 @@ def simulate_rows(
 def simulate(
     plants: SingleMuscle | Sequence[SingleMuscle], set_points: ArrayLike
 ) -> dict[str, NDArray[np.float64]]:
-    """Simulate one plant, or several with the same memory and sub-steps, from rest.
+    """Simulate one plant, or several with the same hysteresis and sub-steps, from rest.
 
     Returns
     -------
@@ -118,8 +123,12 @@ def simulate(
     """
     several = [plants] if isinstance(plants, SingleMuscle) else list(plants)
     first = several[0]
-    if any(p.memory.kind != first.memory.kind or p.substeps != first.substeps for p in several):
-        raise ValueError("plants that are simulated together need the same memory and sub-steps")
+    if any(
+        p.hysteresis.kind != first.hysteresis.kind or p.substeps != first.substeps for p in several
+    ):
+        raise ValueError(
+            "plants that are simulated together need the same hysteresis and sub-steps"
+        )
     outputs = simulate_rows(first, np.array([p.parameter_rows() for p in several]), set_points)
     if isinstance(plants, SingleMuscle):
         outputs = outputs[:, :, 0]

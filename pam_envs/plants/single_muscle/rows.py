@@ -1,7 +1,7 @@
 """Where each number of the single muscle stands in its rows.
 
 A plant's numbers are rows of two matrices whose columns are environments (lanes): ``rows`` is the
-state, followed by that of the memory, and ``fixed`` the parameters, which all tiles of a batch
+state, followed by that of the hysteresis, and ``fixed`` the parameters, which all tiles of a batch
 share unless they are drawn. This page is the only one that counts.
 """
 
@@ -17,7 +17,7 @@ REST, TOLD_LOAD, CHANGE_TIME, CHANGE = range(9, 13)
 HISTORY = 13
 N_HISTORY = 16  # a power of two
 END = HISTORY + N_HISTORY
-"""First row after the plant's state; the memory's state follows."""
+"""First row after the plant's state; the hysteresis's state follows."""
 
 # parameters, in the order of PARAMETERS below
 PARAMETERS = (
@@ -43,8 +43,8 @@ PARAMETERS = (
     "pressure.noise",
     "pressure.resolution",
     "pressure.bias",
-    "memory.stretch",
-    "memory.width_per_load",
+    "hysteresis.stretch",
+    "hysteresis.width_per_load",
 )
 (
     MAX_PRESSURE,
@@ -98,21 +98,21 @@ EFFECTS = (
     "regulator.ring_flow",
     "regulator.ring_frequency",
     "regulator.ring_damping",
-    "memory.shape",
-    "memory.pressure_slope",
-    "memory.pressure_bend",
-    "memory.creep_1",
-    "memory.creep_2",
-    "memory.creep_3",
-    "memory.creep_4",
-    "memory.creep_time_1",
-    "memory.creep_time_2",
-    "memory.creep_time_3",
-    "memory.creep_time_4",
-    "memory.first_width",
-    "memory.first_loss",
-    "memory.first_travel",
-    "memory.threshold",
+    "hysteresis.shape",
+    "hysteresis.pressure_slope",
+    "hysteresis.pressure_bend",
+    "hysteresis.creep_1",
+    "hysteresis.creep_2",
+    "hysteresis.creep_3",
+    "hysteresis.creep_4",
+    "hysteresis.creep_time_1",
+    "hysteresis.creep_time_2",
+    "hysteresis.creep_time_3",
+    "hysteresis.creep_time_4",
+    "hysteresis.first_width",
+    "hysteresis.first_loss",
+    "hysteresis.first_travel",
+    "hysteresis.threshold",
     "muscle.area_curve",
     "muscle.softening",
     "muscle.stiffening",
@@ -241,7 +241,7 @@ N_PARAMETERS = WEIGHT + ELEMENTS + len(EFFECTS)
 NAMES = PARAMETERS + EFFECTS
 """Every parameter by name; :func:`place` says where it stands."""
 
-# state of the effects, counted from the first row after the memory's
+# state of the effects, counted from the first row after the hysteresis's
 (
     REGULATED,
     OPEN,

@@ -1,7 +1,7 @@
 """One control period of the single muscle, for one environment or a tile of them.
 
-The sub-step: the regulator's pressure is exact at its end; the memory, which depends only on the
-pressures passed through, is then exact too, because within a sub-step the pressure is monotone;
+The sub-step: the regulator's pressure is exact at its end; the hysteresis, which depends only on
+the pressures passed through, is then exact too, because within a sub-step the pressure is monotone;
 the motion is exact for the force linearised about the predicted mid-point with the effective
 pressure going straight from its old to its new value. So the step is of second order and has no
 stability limit from the stiffness of a light load.
@@ -77,30 +77,30 @@ def loop_width(width_per_load: float, load: float) -> float:
 
 
 @kernel
-def no_memory(
+def no_hysteresis(
     rows: Any,
     fixed: Any,
     counts: Any,
     table: Any,
-    memory: int,
+    hysteresis: int,
     first: int,
     last: int,
     elements: int,
     work: Any,
 ) -> None:
-    """Effective pressure without memory: the pressure."""
+    """Effective pressure without hysteresis: the pressure."""
     pressure, drive = rows[PRESSURE], rows[DRIVE]
     for j in range(first, last):
         drive[j] = pressure[j]
 
 
 @kernel
-def play_memory(
+def play_hysteresis(
     rows: Any,
     fixed: Any,
     counts: Any,
     table: Any,
-    memory: int,
+    hysteresis: int,
     first: int,
     last: int,
     elements: int,
@@ -120,7 +120,7 @@ def play_memory(
         felt[j] = stretched(pressure[j], stretch[j], per_full[j])
         output[j] = linear[j] * felt[j]
     for k in range(elements):
-        threshold, weight, state = fixed[THRESHOLD + k], fixed[WEIGHT + k], rows[memory + k]
+        threshold, weight, state = fixed[THRESHOLD + k], fixed[WEIGHT + k], rows[hysteresis + k]
         for j in range(first, last):
             w = play(felt[j], threshold[j], state[j])
             state[j] = w
@@ -132,12 +132,12 @@ def play_memory(
 
 
 @kernel
-def preisach_memory(
+def preisach_hysteresis(
     rows: Any,
     fixed: Any,
     counts: Any,
     table: Any,
-    memory: int,
+    hysteresis: int,
     first: int,
     last: int,
     elements: int,
@@ -151,7 +151,10 @@ def preisach_memory(
         fixed[MAX_PRESSURE],
     )
     load, per_load = rows[LOAD], fixed[WIDTH_PER_LOAD]
-    stack, sums = rows[memory : memory + DEPTH], rows[memory + DEPTH : memory + 2 * DEPTH]
+    stack, sums = (
+        rows[hysteresis : hysteresis + DEPTH],
+        rows[hysteresis + DEPTH : hysteresis + 2 * DEPTH],
+    )
     count, member = counts[STACK_COUNT], counts[R.MEMBER]
     for j in range(first, last):
         per_full = 1.0 / full[j]
@@ -174,7 +177,7 @@ def advance(
     fixed: Any,
     counts: Any,
     table: Any,
-    memory: int,
+    hysteresis: int,
     elements: int,
     substeps: int,
     period: float,
@@ -229,7 +232,7 @@ def advance(
                     pressure[j], target, lag[j], per_lag[j], slew[j], per_slew[j], width[j]
                 )
                 pressure[j] = reached if width[j] > 0.0 else pressure[j]
-            remember(rows, fixed, counts, table, memory, 0, LANES, elements, work)
+            remember(rows, fixed, counts, table, hysteresis, 0, LANES, elements, work)
         for j in range(LANES):
             ahead = 0.5 * h * v[j]
             e = (x[j] + ahead) * per_length[j]
@@ -278,12 +281,12 @@ def begin_effects(rows: Any, fixed: Any, j: int) -> None:
 N_WORK = 17
 """Rows of scratch that :func:`advance` needs."""
 
-MEMORIES: dict[str, Any] = {
-    "none": no_memory,
-    "maxwell_slip": play_memory,
-    "preisach": preisach_memory,
+HYSTERESIS_MODELS: dict[str, Any] = {
+    "none": no_hysteresis,
+    "maxwell_slip": play_hysteresis,
+    "preisach": preisach_hysteresis,
 }
-MEMORY_ROWS = {"none": 0, "maxwell_slip": R.ELEMENTS, "preisach": 2 * DEPTH}
+HYSTERESIS_ROWS = {"none": 0, "maxwell_slip": R.ELEMENTS, "preisach": 2 * DEPTH}
 
 
 @routine

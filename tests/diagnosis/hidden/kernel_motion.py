@@ -1,4 +1,4 @@
-"""Jitted: how load, slow memory and what else can move go on by one step."""
+"""Jitted: how load, slow hysteresis and what else can move go on by one step."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 from .kernel_muscle import force
 from .kernel_tools import NUDGE, PRESSURE_SPAN, STEP, jit, uniform
-from .records import MEMORIES
+from .records import HYSTERESIS_MODELS
 
 PARTS = 2  # of a step where a guide rubs
 
@@ -96,12 +96,12 @@ def move(p, s, work, soft, extra):
 
 @jit
 def remember(p, s, work):
-    """Move the slow memory on by one stride."""
+    """Move the slow hysteresis on by one stride."""
     source = s.strain - p.creep * s.level if p.creep_strain > 0.5 else 0.16 * work / PRESSURE_SPAN
     level = 0.0
-    for i in range(MEMORIES):
-        s.memory[i] += p.creep_pace[i] * (source - s.memory[i])
-        level += p.creep_share[i] * s.memory[i]
+    for i in range(HYSTERESIS_MODELS):
+        s.hysteresis[i] += p.creep_pace[i] * (source - s.hysteresis[i])
+        level += p.creep_share[i] * s.hysteresis[i]
     s.level = level
 
 

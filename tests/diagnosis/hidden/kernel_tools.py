@@ -10,7 +10,7 @@ STEP = 1e-3
 GRAVITY = 9.80665
 ATMOSPHERE = 1.013
 PRESSURE_SPAN = 6.0
-CREEP_STRIDE = 5  # steps between two updates of the slow memory
+CREEP_STRIDE = 5  # steps between two updates of the slow hysteresis
 NUDGE = 1e-6  # strain over which the stiffness is measured
 
 jit = njit(cache=True, error_model="numpy")

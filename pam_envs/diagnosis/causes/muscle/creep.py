@@ -18,7 +18,7 @@ CAUSE = Cause(
     forms=(
         Form(
             "pressure",
-            tuple(Term(f"memory.creep_{k}", (0.01,), low=-0.02, scale=0.01) for k in _ELEMENTS),
+            tuple(Term(f"hysteresis.creep_{k}", (0.01,), low=-0.02, scale=0.01) for k in _ELEMENTS),
         ),
         Form(
             "length",

@@ -16,9 +16,9 @@ CAUSE = Cause(
         Form(
             "width and loss",
             (
-                Term("memory.first_width", (0.1,), scale=0.1),
-                Term("memory.first_loss", (0.01,), scale=0.01),
-                Term("memory.first_travel", (1e6, 6e6), log=True, amount=False),
+                Term("hysteresis.first_width", (0.1,), scale=0.1),
+                Term("hysteresis.first_loss", (0.01,), scale=0.01),
+                Term("hysteresis.first_travel", (1e6, 6e6), log=True, amount=False),
             ),
         ),
     ),

@@ -1,8 +1,8 @@
 """What drives the hysteresis: strands rub when the length changes, not when the pressure does.
 
-Threads of the braid slide on one another as the muscle shortens. A memory of the pressure has them
-slide in a blocked muscle too, where they stand still. In the plant four Maxwell elements in the
-length, breaking loose one after the other, pull against the motion.
+Threads of the braid slide on one another as the muscle shortens. A hysteresis of the pressure has
+them slide in a blocked muscle too, where they stand still. In the plant four Maxwell elements in
+the length, breaking loose one after the other, pull against the motion.
 """
 
 from __future__ import annotations

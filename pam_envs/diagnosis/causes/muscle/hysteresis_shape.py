@@ -1,9 +1,9 @@
 """Shape of the hysteresis: minor loops rub otherwise than the major one.
 
-A memory made of plays ties inner loops to the outer one (congruence), and a spread of thresholds
-that fits the outer loop may be wrong for small reversals, since strands that have slid far have
-settled otherwise than those that just turned. In the plant friction below its largest value is
-weakened or strengthened by the part that is missing to it.
+A hysteresis made of plays ties inner loops to the outer one (congruence), and a spread of
+thresholds that fits the outer loop may be wrong for small reversals, since strands that have slid
+far have settled otherwise than those that just turned. In the plant friction below its largest
+value is weakened or strengthened by the part that is missing to it.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 CAUSE = Cause(
     name="hysteresis_shape",
     title="the shape of minor loops",
-    forms=(Form("inner loops", (Term("memory.shape", (2.0, 0.5), log=True),)),),
+    forms=(Form("inner loops", (Term("hysteresis.shape", (2.0, 0.5), log=True),)),),
     signature=(
         "the error begins at reversals and has gone when the loop is fully slipped: large loops "
         "fit, small reversals are off"

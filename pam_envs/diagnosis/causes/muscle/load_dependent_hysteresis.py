@@ -1,7 +1,7 @@
 """Hysteresis that changes with load: the loop's width depends on what hangs on the muscle.
 
 A load stretches the braid, changes its angle and the force between its strands, and with them the
-friction. In the plant the hysteretic part of the memory is scaled in proportion to the load.
+friction. In the plant the hysteretic part of the hysteresis is scaled in proportion to the load.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 CAUSE = Cause(
     name="load_dependent_hysteresis",
     title="hysteresis that changes with load",
-    forms=(Form("linear", (Term("memory.width_per_load", (-0.01, 0.02), scale=0.01),)),),
+    forms=(Form("linear", (Term("hysteresis.width_per_load", (-0.01, 0.02), scale=0.01),)),),
     signature=(
         "the error has the sign of the direction, one way round at small loads and the other way "
         "round at large ones"

@@ -1,8 +1,8 @@
 """Friction that changes with pressure: the loop is wider at one end of the range than at the other.
 
 The pressure presses the threads of the braid on one another, so that their friction grows with it,
-less what the load takes off. In the plant the memory acts on a stretched scale of the pressure, on
-which friction is uniform: the loop's width changes along the range.
+less what the load takes off. In the plant the hysteresis acts on a stretched scale of the
+pressure, on which friction is uniform: the loop's width changes along the range.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ CAUSE = Cause(
     name="pressure_dependent_friction",
     title="friction that changes with pressure",
     forms=(
-        Form("stretch", (Term("memory.stretch", (0.1, -0.1), scale=0.05),)),
+        Form("stretch", (Term("hysteresis.stretch", (0.1, -0.1), scale=0.05),)),
         Form(
             "factor",
             (
-                Term("memory.pressure_slope", (0.5, -0.3), scale=0.3),
-                Term("memory.pressure_bend", (-0.1, 0.1), scale=0.3),
+                Term("hysteresis.pressure_slope", (0.5, -0.3), scale=0.3),
+                Term("hysteresis.pressure_bend", (-0.1, 0.1), scale=0.3),
             ),
         ),
     ),

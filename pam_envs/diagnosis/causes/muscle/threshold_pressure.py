@@ -12,7 +12,7 @@ from pam_envs.diagnosis.cause import Cause, Form, Term
 CAUSE = Cause(
     name="threshold_pressure",
     title="the threshold pressure of the muscle",
-    forms=(Form("hard", (Term("memory.threshold", (5e3,), scale=2e3),)),),
+    forms=(Form("hard", (Term("hysteresis.threshold", (5e3,), scale=2e3),)),),
     signature=(
         "at low pressures the contraction starts late, with a kink, at the same pressure under "
         "every load; above it the curve fits"

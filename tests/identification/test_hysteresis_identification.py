@@ -1,4 +1,4 @@
-"""Memories found again from their records, and how much a record can say."""
+"""Hysteresis models found again from their records, and how much a record can say."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from pam_envs.hysteresis import MaxwellSlip, PlayOperator, Preisach
-from pam_envs.identification.memory_loops import fit_maxwell_slip, fit_play
+from pam_envs.identification.hysteresis_loops import fit_maxwell_slip, fit_play
 from pam_envs.identification.preisach_forc import (
     congruency_error,
     curve_inputs,
@@ -240,7 +240,7 @@ def minor_loops(output) -> list[tuple[Array, Array]]:
 def test_congruency_error_is_a_number():
     operator = random_operator(7)
     assert congruency_error(minor_loops(lambda x: operator.simulate(x)[0])) < 1e-12
-    # a nonlinear output map keeps the memory but not the congruency
+    # a nonlinear output map keeps the hysteresis but not the congruency
     curved = congruency_error(minor_loops(lambda x: operator.simulate(x)[0] ** 2))
     assert curved > 0.1
 
