@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import yaml
@@ -15,9 +13,8 @@ from benchmarks.identity import audit
 from benchmarks.runs.provenance import ROOT
 from benchmarks.runs.rows import shown
 from benchmarks.runs.store import CHECKSUM
+from pam_envs import citations
 
-REFERENCES = Path(__file__).resolve().parent / "references.yaml"
-"""Entries by key: type, and BibTeX's fields. Braces and commands in a value are BibTeX's own."""
 SEPARATOR = "; "
 """Between the parts of a citation."""
 
@@ -35,42 +32,37 @@ def bibtex(row: Mapping[str, Any]) -> str:
     Raises
     ------
     ValueError
-        If a method has no entry in ``references.yaml``.
+        If a method has no entry in ``references.bib``.
     """
-    found = methods(str(row["controller"]["citation"]))
-    parts = [_row_entry(row), package(), *(entry(key, references()[key]) for key in found)]
+    sources = citations.entry_texts(methods(str(row["controller"]["citation"])))
+    parts = [_row_entry(row), package(), *sources]
     return "\n".join(parts)
 
 
 def methods(citation: str) -> list[str]:
     """Return the keys of the methods in a citation, in its order.
 
+    Parameters
+    ----------
+    citation : str
+        Keys of ``references.bib``, or titles of its entries.
+
     Raises
     ------
     ValueError
-        If a part holds the title of no entry, or of several.
+        If a part names no entry.
     """
     keys = []
     for part in filter(None, citation.split(SEPARATOR)):
-        held = [key for key, fields in references().items() if _held(fields["title"], part)]
-        if len(held) != 1:
-            raise ValueError(
-                f"{part!r} holds the title of {' and '.join(held) or 'no entry'} in "
-                f"{REFERENCES.name}; add the entry, or write its title in the citation"
-            )
-        keys += held
+        found = [key for key in citations.entries() if _titled(key, part)]
+        keys += found or citations.named_in(part) or [part]
+    citations.entry_texts(keys)
     return list(dict.fromkeys(keys))
 
 
-def _held(title: str, text: str) -> bool:
-    """Return whether a text holds a title, small and capital letters alike."""
-    return title.casefold() in text.casefold()
-
-
-@lru_cache(maxsize=1)
-def references() -> dict[str, dict[str, Any]]:
-    """Return the entries of methods by key."""
-    return dict(yaml.safe_load(REFERENCES.read_text(encoding="utf-8")))
+def _titled(key: str, text: str) -> bool:
+    """Return whether a text holds the title of an entry, in any case of letters."""
+    return citations.fields(key)["title"].casefold() in text.casefold()
 
 
 def entry(key: str, fields: Fields) -> str:

@@ -17,6 +17,7 @@ from benchmarks.runs.controllers import available
 from benchmarks.runs.provenance import ROOT
 from benchmarks.runs.store import write_record
 from benchmarks.scenarios.scenario import ScenarioSet
+from pam_envs import citations
 from tests.benchmarks.test_harness import options, score
 
 SIMC = "S. Skogestad, Simple analytic rules for model reduction and PID controller tuning, 2003"
@@ -61,19 +62,17 @@ def test_every_method_of_every_controller_has_its_entry(name: str) -> None:
 
 
 def test_entries_are_bibtex() -> None:
-    for key, fields in cite.references().items():
-        entry = parsed(cite.entry(key, fields))[key]
-        assert set(entry) == set(fields)
-        assert entry["title"] == f"{{{fields['title']}}}".replace("&", r"\&")
-        assert entry["type"] in ("article", "inproceedings", "book", "misc")
-        needs = {"article": ("journal", "year"), "inproceedings": ("booktitle", "year")}
-        assert set(needs.get(entry["type"], ())) <= set(entry)
+    for key, entry in citations.entries().items():
+        (found,) = parsed(entry).values()
+        assert set(found) - {"type"} == set(citations.fields(key))
+        assert found["type"] in ("article", "inproceedings", "book", "misc")
 
 
 def test_a_method_without_an_entry_is_named() -> None:
     assert cite.methods(f"{SIMC}; {PPO}; {SIMC}") == ["skogestad2003", "schulman2017"]
     assert cite.methods("") == []
-    with pytest.raises(ValueError, match=r"'N\. N\., A method' holds the title of no entry"):
+    assert cite.methods("skogestad2003; schulman2017") == ["skogestad2003", "schulman2017"]
+    with pytest.raises(ValueError, match=r"N\. N\., A method has no entry in references\.bib"):
         cite.methods(f"{SIMC}; N. N., A method")
 
 
