@@ -26,8 +26,9 @@ import numpy as np
 from baselines.core.controller import Array
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.elbow.view import ElbowView
+from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
-from pam_envs.pneumatics.on_off_pair import ATMOSPHERE, GAS, mass_flow
+from pam_envs.pneumatics.on_off_pair import mass_flow
 
 QUICK = 2.0
 """Control periods that the loop around a regulator takes; fewer would act on sensor noise."""
@@ -125,8 +126,12 @@ class PulseLoop:
             )
             for q in (view.angle, then)
         )
-        inside = (view.pressure + ATMOSPHERE) * now / GAS
-        return inside, inside * GAS / after - ATMOSPHERE, GAS / after
+        inside = (view.pressure + ATMOSPHERE) * now / PRESSURE_PER_DENSITY
+        return (
+            inside,
+            inside * PRESSURE_PER_DENSITY / after - ATMOSPHERE,
+            PRESSURE_PER_DENSITY / after,
+        )
 
     def _flow(self, fills: bool, pressure: float) -> float:
         """Return the flow [kg/s] into, or out of, a bundle at a pressure [Pa]."""

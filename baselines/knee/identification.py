@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.core.controller import Array
+from pam_envs.constants import GRAVITY
 from pam_envs.identification.frequency import RationalFit, fit_rational
-from pam_envs.mechanics.leg import GRAVITY
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.plants.knee_orthosis.rollout import simulate_knee
 

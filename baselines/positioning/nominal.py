@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from baselines.core.controller import Array, by_load
 from baselines.positioning.contraction_tables import LOADS
+from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach, PreisachState
-from pam_envs.mechanics.hanging_mass import GRAVITY
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 HysteresisState = tuple[NDArray[Any], ...]

@@ -13,9 +13,9 @@ from benchmarks.diagnosis.cases import NOISE, Case, Made, make
 from benchmarks.diagnosis.next import DrivenRig, OracleRig, again
 from benchmarks.identity.hashing import plain
 from benchmarks.runs import provenance
+from pam_envs.constants import CELSIUS, GRAVITY
 from pam_envs.diagnosis.closed_loop.gain import COMPENSABLE, closed_loop
 from pam_envs.diagnosis.diagnosis import Diagnosis, diagnose
-from pam_envs.mechanics.hanging_mass import GRAVITY
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,6 @@ STAGES = ("verdict", "loop", "next")
 """The diagnosis; controllers on the hidden rig; the proposed experiment, carried out."""
 OUTPUTS = ("contraction", "pressure")
 MOST_RIVALS = 6
-KELVIN = 273.15
 
 
 def study(case: Case, stages: Collection[str] = ("verdict",)) -> dict[str, Any]:
@@ -182,7 +181,7 @@ def loop_of(made: Made, found: Diagnosis) -> dict[str, Any] | None:
         rig=DrivenRig(made, load, celsius),
         oracle=OracleRig(made, load, celsius),
         load=load / GRAVITY,
-        kelvin=celsius + KELVIN,
+        kelvin=celsius + CELSIUS,
     )
     if loop is None:
         return None

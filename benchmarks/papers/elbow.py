@@ -300,10 +300,11 @@ def time_to_pressure(muscles: Any, share: float, supply: float, wanted: float) -
     supply, wanted : float
         Pressures [Pa] of the supply, and at which the bundle is filled.
     """
-    from pam_envs.pneumatics.on_off_pair import ATMOSPHERE, GAS, OnOffValve, filled
+    from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
+    from pam_envs.pneumatics.on_off_pair import OnOffValve, filled
 
     valve, supply, step = OnOffValve(), supply + ATMOSPHERE, 1e-3
-    per_volume = GAS / float(muscles.volume(share * muscles.nominal_length))
+    per_volume = PRESSURE_PER_DENSITY / float(muscles.volume(share * muscles.nominal_length))
     air, time = ATMOSPHERE / per_volume, valve.opening_time
     while air * per_volume - ATMOSPHERE < wanted:
         air += filled(air, per_volume, supply, valve.conductance, valve.critical_ratio, step)

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from benchmarks.papers.figures import Figure
 from benchmarks.papers.knee import BEFORE, PERIOD, SOURCE, UNKNOWN, note
+from pam_envs.constants import GRAVITY
 from pam_envs.identification.emg_calibration import PUBLISHED, change, stride_torques
-from pam_envs.mechanics.leg import GRAVITY
 from pam_envs.muscle.emg import MuscleActivation, Reading, calibration, emg_proxy
 from pam_envs.plants.knee_orthosis.plant import Activity, KneeOrthosis
 from pam_envs.plants.knee_orthosis.rollout import simulate_knee

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.constants import CELSIUS, GRAVITY
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import audit
@@ -31,13 +32,7 @@ from pam_envs.diagnosis.fit.calibrate import calibrate
 from pam_envs.diagnosis.fit.fit_errors import explained
 from pam_envs.diagnosis.fit.least_squares import Fit, Problem, column_of
 from pam_envs.diagnosis.fit.progress import steps
-from pam_envs.diagnosis.fit.single_muscle import (
-    KELVIN,
-    MuscleFamily,
-    identified,
-    inputs_of,
-    start_plant,
-)
+from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, identified, inputs_of, start_plant
 from pam_envs.diagnosis.fit.tolerance import (
     LOAD,
     PAYLOAD_ERROR,
@@ -50,7 +45,6 @@ from pam_envs.diagnosis.report.report import plain
 from pam_envs.diagnosis.report.summary import report_of
 from pam_envs.diagnosis.report.summary_causes import judged
 from pam_envs.diagnosis.report.traces import Traces
-from pam_envs.mechanics.hanging_mass import GRAVITY
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 Array = NDArray[np.float64]
@@ -363,7 +357,7 @@ class Study:
         celsius = self.recording.temperature
         if celsius is None:
             return None
-        return float(celsius[np.argmax(np.abs(celsius - 20.0))]) + KELVIN
+        return float(celsius[np.argmax(np.abs(celsius - 20.0))]) + CELSIUS
 
     def traces(self) -> Traces:
         """Return what a report draws."""

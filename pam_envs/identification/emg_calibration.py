@@ -17,7 +17,8 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from pam_envs.mechanics.leg import GRAVITY, centre_of_pressure
+from pam_envs.constants import GRAVITY
+from pam_envs.mechanics.leg import centre_of_pressure
 from pam_envs.muscle.emg import CONSTANTS, Reading, emg_proxy
 from pam_envs.plants.knee_orthosis.plant import Activity, KneeOrthosis
 from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE, gait_curves

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 
+from pam_envs.constants import GRAVITY
 from pam_envs.references.gait import ACTIVITIES, FOLDER, SIGNALS
 
 Array = NDArray[np.float64]
@@ -25,7 +26,6 @@ Array = NDArray[np.float64]
 POINTS = 100
 SHANK = 0.43
 """Length of the shank [m] of the subject, knee to ankle."""
-GRAVITY = 9.80665
 HARMONICS = 8
 SHIFT = {"low": -0.06, "high": 0.2}
 """Where on the sole [m ahead of the ankle] the ground can push."""

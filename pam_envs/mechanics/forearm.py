@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pam_envs.mechanics.hanging_mass import GRAVITY
+from pam_envs.constants import GRAVITY
 from pam_envs.parameters import parameter
 
 _BODY = (

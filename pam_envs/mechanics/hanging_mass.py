@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
-GRAVITY = 9.80665
 LARGEST_PHASE = 16.0
 """Largest ``abs(k - d^2 / 4) h^2`` for which the step's series hold (3e-7 relative)."""
 

@@ -26,12 +26,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pam_envs.constants import GRAVITY
 from pam_envs.kernels.arithmetic import sine_of_turns
 from pam_envs.kernels.build import kernel
 from pam_envs.mechanics.knee_lever import PER_TURN
 from pam_envs.parameters import parameter
 
-GRAVITY = 9.80665
 _SCALED = "OpenSim segment masses, gait10dof18musc, scaled to the body mass"
 _WEARER = "of the order of measured knee impedance"
 

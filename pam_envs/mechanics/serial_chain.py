@@ -19,12 +19,12 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.constants import GRAVITY
 from pam_envs.mechanics.serial_chain_rows import GRAVITY_ROWS, LINK_ROWS
 from pam_envs.parameters import parameter
 
 Array = NDArray[np.float64]
 
-STANDARD_GRAVITY = 9.80665
 MOST_JOINTS = 12
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 BOUNDS = {
@@ -92,7 +92,7 @@ class SerialChain:
     centres: tuple[float, ...]
     across: tuple[float, ...]
     along: tuple[float, ...]
-    gravity: tuple[float, float, float] = (0.0, 0.0, STANDARD_GRAVITY)
+    gravity: tuple[float, float, float] = (0.0, 0.0, GRAVITY)
 
     def __post_init__(self) -> None:
         """Check names, numbers of entries and bounds."""
@@ -119,7 +119,7 @@ class SerialChain:
         mass: float = FORM.mass,
         centre: float = FORM.centre,
         radius: float = FORM.radius,
-        gravity: tuple[float, float, float] = (0.0, 0.0, STANDARD_GRAVITY),
+        gravity: tuple[float, float, float] = (0.0, 0.0, GRAVITY),
     ) -> Self:
         """Return a chain of equal links, each with the inertia of a solid cylinder.
 

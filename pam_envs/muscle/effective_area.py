@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.constants import ROOM_TEMPERATURE
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
@@ -54,7 +55,7 @@ class EffectiveAreaMuscle:
     )
     # effects, neutral unless a recording shows them
     temperature: float = parameter(
-        293.15, "K", 230.0, 400.0, "assumed", "of the muscle; the law is that of 293.15 K"
+        ROOM_TEMPERATURE, "K", 230.0, 400.0, "assumed", "of the muscle; the law is that of 293.15 K"
     )
     temperature_gain: float = parameter(
         0.0, "1/K", -0.05, 0.05, "assumed", "effective pressure gained per kelvin", neutral=0.0

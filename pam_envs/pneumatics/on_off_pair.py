@@ -16,14 +16,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from pam_envs.constants import ATMOSPHERE, REFERENCE_DENSITY
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
-
-ATMOSPHERE = 101325.0
-GAS = 287.05 * 293.15
-"""Pressure over density of air at 20 degrees C [J/kg]."""
-REFERENCE_DENSITY = 1.185
-"""Of air in the reference state of ISO 8778, 20 degrees C and 1 bar [kg/m3]."""
 
 _MAKER = (
     "maker's data sheet of the V100 series, standard V114, the valve that chakarov2018 names in "

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pam_envs.constants import GRAVITY
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
-GRAVITY = 9.80665
 HEEL_CELLS = 3.0
 """Load cells near the heel (yeh2010, section 4.2)."""
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pam_envs.constants import GRAVITY
 from pam_envs.mechanics.leg import (
-    GRAVITY,
     Leg,
     centre_of_pressure,
     gravity_stiffness,

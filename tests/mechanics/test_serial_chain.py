@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pam_envs.constants import GRAVITY
 from pam_envs.kernels.build import COMPILED, build, interpreted, kernel
-from pam_envs.mechanics.serial_chain import FORM, STANDARD_GRAVITY, SerialChain
+from pam_envs.mechanics.serial_chain import FORM, SerialChain
 from pam_envs.mechanics.serial_chain_dynamics import chain_solve, chain_terms
 from pam_envs.mechanics.serial_chain_kinematics import place_chain
 from pam_envs.mechanics.serial_chain_rows import (
@@ -138,9 +139,9 @@ def test_weights_of_many_poses_are_those_of_each(chain: SerialChain) -> None:
 def test_a_hanging_arm_comes_back_and_a_lying_one_sags() -> None:
     bent = np.array([0.2, 0, 0, 0, 0, 0])
     torque = PAPER.gravity_torque(bent)[0]
-    weight = 6 * FORM.mass * STANDARD_GRAVITY
+    weight = 6 * FORM.mass * GRAVITY
     assert torque == pytest.approx(weight * 0.75 * np.sin(0.2), rel=1e-12)
-    lying = dataclasses.replace(PAPER, gravity=(0.0, -STANDARD_GRAVITY, 0.0))
+    lying = dataclasses.replace(PAPER, gravity=(0.0, -GRAVITY, 0.0))
     assert lying.gravity_torque(np.zeros(6))[0] == pytest.approx(-weight * 0.75, rel=1e-12)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
 from pam_envs.kernels.build import COMPILED, interpreted
 from pam_envs.plants.elbow_orthosis.plant import MAKES, ElbowOrthosis
 from pam_envs.plants.elbow_orthosis.rollout import (
@@ -18,7 +19,7 @@ from pam_envs.plants.elbow_orthosis.rollout import (
     simulate_elbow,
 )
 from pam_envs.plants.single_muscle.hysteresis import KINDS
-from pam_envs.pneumatics.on_off_pair import ATMOSPHERE, GAS, OnOffValve, mass_flow
+from pam_envs.pneumatics.on_off_pair import OnOffValve, mass_flow
 
 slow = pytest.mark.skipif(not COMPILED, reason="too many sub-steps for plain Python")
 PERIOD = ElbowOrthosis.control_period
@@ -115,7 +116,7 @@ def test_pulses_follow_their_differential_equation() -> None:
             float(b.volume(c))
             for b, c in zip(model.bundles, plant.pulley.contractions(q), strict=True)
         ]
-        pressures = [m * GAS / s for m, s in zip(air, volumes, strict=True)]
+        pressures = [m * PRESSURE_PER_DENSITY / s for m, s in zip(air, volumes, strict=True)]
         flows = []
         for k, p in enumerate(pressures):
             fill, vent = (any(a <= t < b for a, b in s) for s in spans[k])
@@ -186,7 +187,7 @@ def test_shut_valves_keep_the_air_while_the_wearer_moves() -> None:
     for side, bundle in (("a", plant.bundle_a), ("b", plant.bundle_b)):
         volume = bundle.volume(made[f"contraction_{side}"])
         product = (made[f"pressure_{side}"] + ATMOSPHERE) * volume
-        assert product == pytest.approx(GAS * made[f"air_{side}"], rel=1e-12)
+        assert product == pytest.approx(PRESSURE_PER_DENSITY * made[f"air_{side}"], rel=1e-12)
         assert np.ptp(made[f"pressure_{side}"]) > 1e4
 
 

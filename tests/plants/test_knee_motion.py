@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from pam_envs.constants import GRAVITY
 from pam_envs.kernels.build import COMPILED, interpreted
-from pam_envs.mechanics.leg import GRAVITY
 from pam_envs.muscle.emg import MuscleActivation, emg_proxy
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.plants.knee_orthosis.rollout import (

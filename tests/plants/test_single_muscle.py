@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from pam_envs.constants import GRAVITY
 from pam_envs.kernels.build import COMPILED
-from pam_envs.mechanics.hanging_mass import GRAVITY
 from pam_envs.plants.single_muscle.hysteresis import KINDS
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.rollout import simulate

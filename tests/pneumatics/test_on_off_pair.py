@@ -8,16 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pam_envs.pneumatics.on_off_pair import (
-    ATMOSPHERE,
-    GAS,
-    REFERENCE_DENSITY,
-    OnOffValve,
-    coil_window,
-    emptied,
-    filled,
-    mass_flow,
-)
+from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY, REFERENCE_DENSITY
+from pam_envs.pneumatics.on_off_pair import OnOffValve, coil_window, emptied, filled, mass_flow
 
 VALVE = OnOffValve()
 SUPPLY = VALVE.supply_pressure + ATMOSPHERE
@@ -97,7 +89,7 @@ def test_the_catalogues_flow_figure_is_met() -> None:
 def test_a_long_opening_follows_a_fine_solution(muscles: int, fills: bool) -> None:
     """Steps of 2.5 ms through choked and sub-sonic flow, up to the end of the flow."""
     volume, h = 3e-5 * muscles, 2.5e-3
-    per_volume, c, b = GAS / volume, VALVE.conductance, VALVE.critical_ratio
+    per_volume, c, b = PRESSURE_PER_DENSITY / volume, VALVE.conductance, VALVE.critical_ratio
 
     def rate(_: float, mass: list[float]) -> list[float]:
         pressure = mass[0] * per_volume
@@ -123,7 +115,7 @@ def test_a_long_opening_follows_a_fine_solution(muscles: int, fills: bool) -> No
 
 
 def test_no_opening_leaves_the_supply_or_the_atmosphere_behind() -> None:
-    per_volume = GAS / 3e-5
+    per_volume = PRESSURE_PER_DENSITY / 3e-5
     for duration in (1e-3, 1.0, 50.0):
         full = SUPPLY / per_volume
         assert 0.999 * full + filled(0.999 * full, per_volume, SUPPLY, 1e-8, 0.1, duration) <= full
@@ -133,7 +125,7 @@ def test_no_opening_leaves_the_supply_or_the_atmosphere_behind() -> None:
 
 
 def test_a_choked_chamber_empties_exponentially() -> None:
-    per_volume, h = GAS / 2e-4, 2.5e-3
+    per_volume, h = PRESSURE_PER_DENSITY / 2e-4, 2.5e-3
     mass = start = 12e5 / per_volume
     for _ in range(80):
         mass -= emptied(mass, per_volume, VALVE.conductance, 0.11, h)

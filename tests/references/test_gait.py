@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pam_envs.constants import GRAVITY
 from pam_envs.identification.gait_tables import STAIRS, tables
 from pam_envs.mechanics.leg import (
-    GRAVITY,
     Leg,
     ground_torque,
     knee_acceleration,

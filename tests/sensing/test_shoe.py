@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from pam_envs.sensing.shoe import GRAVITY, HEEL_CELLS, Shoe, estimated_torque, heel_load
+from pam_envs.constants import GRAVITY
+from pam_envs.sensing.shoe import HEEL_CELLS, Shoe, estimated_torque, heel_load
 
 
 def test_the_cells_of_heel_and_tip_carry_the_force_and_its_moment() -> None:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from pam_envs.constants import GRAVITY
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 
@@ -30,7 +31,6 @@ WIDE, WIDE_SHARE = 3.0 * BAR, 0.6
 """... of pressures [Pa]: this wide, or this part of the regulator's."""
 FOLLOWS = 0.5
 """Correlation with the command from which a contraction follows it."""
-STANDARD_GRAVITY = 9.80665
 
 
 def wrong_units(recording: Recording, rig: Rig) -> tuple[list[str], list[str]]:
@@ -152,7 +152,7 @@ def _load(recording: Recording) -> tuple[list[str], list[str]]:
     if recording.force is not None:
         loaded = recording.load > 0.5 * heaviest
         ratio = float(np.median(recording.force[loaded] / recording.load[loaded]))
-        if abs(ratio / STANDARD_GRAVITY - 1.0) < 0.1:
+        if abs(ratio / GRAVITY - 1.0) < 0.1:
             return [
                 f"force_N is {ratio:.3g} times load_N; load_N looks like kilograms: multiply by "
                 "9.80665"

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.constants import GRAVITY, ROOM_TEMPERATURE
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.experiment.plans import PERIOD, Means, Plan, plans
 from pam_envs.diagnosis.fit.least_squares import Fit, column_of
-from pam_envs.mechanics.hanging_mass import GRAVITY
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.replay import LONGEST_STEP, Inputs, replay_rows
 
@@ -24,7 +24,6 @@ Array = NDArray[np.float64]
 
 ENOUGH = 1.0
 """Mean squared difference of the rivals, in noise variances, that an experiment has to promise."""
-KELVIN = 293.15
 RANK = 1e-6
 """Directions of a rival's parameters below this part of the largest say nothing."""
 
@@ -102,7 +101,7 @@ def inputs_of(plan: Plan, longest_step: float = LONGEST_STEP) -> Inputs:
         PERIOD,
         plan.command,
         plan.load / GRAVITY,
-        plan.kelvin + KELVIN,
+        plan.kelvin + ROOM_TEMPERATURE,
         fresh,
         np.zeros(n),
         np.zeros(n, bool),

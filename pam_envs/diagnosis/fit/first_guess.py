@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import lsq_linear
 
+from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.elements import move_plays, simulate_plays
-from pam_envs.mechanics.hanging_mass import GRAVITY
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.constants import CELSIUS, GRAVITY
 from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from pam_envs.mechanics.hanging_mass import GRAVITY
 from pam_envs.parameters import declarations
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import NEUTRAL, SingleMuscle, UnstableParameters
@@ -23,7 +23,6 @@ Array = NDArray[np.float64]
 THRESHOLDS = (3e3, 7e3, 1.2e4, 1.8e4, 2.5e4, 3.3e4, 4.2e4, 5.2e4, 6.3e4, 7.6e4, 9.1e4, 1.1e5)
 """Thresholds [Pa] of the base's play operators."""
 LEAST_LINEAR = 0.02
-KELVIN = 273.15
 STATIC = (
     "muscle.area",
     "muscle.area_taper",
@@ -251,7 +250,7 @@ def inputs_of(recording: Any, rig: Any) -> Inputs:
         recording.period,
         command,
         recording.load / GRAVITY,
-        kelvin + KELVIN,
+        kelvin + CELSIUS,
         recording.restart.copy(),
         np.maximum(0.0, recording.command),
         first,

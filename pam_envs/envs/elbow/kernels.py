@@ -8,6 +8,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
+from pam_envs.constants import GRAVITY
 from pam_envs.envs.core.families import Kernels
 from pam_envs.envs.core.step import (
     AT_OWN,
@@ -107,7 +108,6 @@ from pam_envs.envs.elbow.layout import (
 from pam_envs.envs.elbow.program import asked_for, estimate, own_weight, pressures_for, within_reach
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import normal, uniform
-from pam_envs.mechanics.hanging_mass import GRAVITY
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.step import (
     HYSTERESIS_ROWS,

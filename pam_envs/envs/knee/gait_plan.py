@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from pam_envs.constants import GRAVITY
 from pam_envs.envs.core.step import AT_OWN, PERIOD
 from pam_envs.envs.knee.gait_layout import (
     ANGLE_CHANNEL,
@@ -27,7 +28,7 @@ from pam_envs.envs.knee.gait_layout import (
 )
 from pam_envs.kernels.build import kernel, routine
 from pam_envs.mechanics.knee_lever import wanted_tension
-from pam_envs.mechanics.leg import GRAVITY, centre_of_pressure, sine_and_cosine
+from pam_envs.mechanics.leg import centre_of_pressure, sine_and_cosine
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.references.gait import (
     ANKLE,

@@ -8,6 +8,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
+from pam_envs.constants import ATMOSPHERE, DENSITY_PER_PRESSURE
 from pam_envs.envs.core.families import Kernels
 from pam_envs.envs.core.step import (
     AT_OWN,
@@ -123,9 +124,6 @@ N_ELEMENTS, FAMILY, SINES, N_LOADS = range(FIRST_CHOICE, FIRST_CHOICE + len(CHOI
 """Whole numbers of the configuration, after those that all families share. The one own row of the
 settings holds the loads [kg] to draw from."""
 
-ATMOSPHERE = 101325.0
-AIR = 1.0 / (287.05 * 293.15)
-"""Density over pressure of air at 20 degrees C [kg/(m3 Pa)]."""
 
 NOISE_X, NOISE_P, START = 1, 2, 3
 """Random streams."""
@@ -138,7 +136,7 @@ def air_in_muscle(rows: Any, fixed: Any, j: int) -> float:
     """Return the mass of air [kg] in the muscle of lane ``j``."""
     length = fixed[R.REST_LENGTH][j]
     space = volume(rows[R.CONTRACTION][j] / length, length, fixed[R.TALL][j], fixed[R.COSINE][j])
-    return AIR * (rows[R.PRESSURE][j] + ATMOSPHERE) * space
+    return DENSITY_PER_PRESSURE * (rows[R.PRESSURE][j] + ATMOSPHERE) * space
 
 
 @kernel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pam_envs.mechanics.hanging_mass import GRAVITY
+from pam_envs.constants import GRAVITY
 from pam_envs.parameters import parameter
 
 _FORM = "a slender rod of 0.3 kg; the masses of fluidic_muscles's stages are not published"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from pam_envs.constants import ATMOSPHERE, DENSITY_PER_PRESSURE
 from pam_envs.kernels.build import LANES, kernel
 from pam_envs.mechanics.antagonistic_lever import sine_and_cosine_of, span, squares
 from pam_envs.muscle.force_map import force_terms, inner_volume
@@ -37,10 +38,6 @@ from pam_envs.plants.antagonistic_joint.rows import (
     VISCOSITY,
 )
 from pam_envs.pneumatics.regulator import regulator_step
-
-ATMOSPHERE = 101325.0
-AIR_DENSITY = 1.0 / (287.05 * 293.15)
-"""Over pressure, of air at 20 degrees C [kg/(m3 Pa)]."""
 
 
 @kernel
@@ -191,7 +188,7 @@ def air_of(fixed: Any, j: int, contraction: float, pressure: float) -> float:
         bore,
         fixed[REST_LENGTH][j],
     )
-    return AIR_DENSITY * (max(0.0, pressure) + ATMOSPHERE) * space
+    return DENSITY_PER_PRESSURE * (max(0.0, pressure) + ATMOSPHERE) * space
 
 
 @kernel

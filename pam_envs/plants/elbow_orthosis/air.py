@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
 from pam_envs.kernels.arithmetic import clip
 from pam_envs.kernels.build import LANES, kernel
 from pam_envs.plants.elbow_orthosis.bundles import contraction_at, factors_of, shape_of, volume_of
@@ -34,7 +35,7 @@ from pam_envs.plants.elbow_orthosis.rows import (
     USED,
     VALVES,
 )
-from pam_envs.pneumatics.on_off_pair import ATMOSPHERE, GAS, coil_window, emptied, filled
+from pam_envs.pneumatics.on_off_pair import coil_window, emptied, filled
 from pam_envs.pneumatics.regulator import regulator_step
 
 MIDDLE, WAS_A, WAS_B, NOW_A, NOW_B, GIVES_A, GIVES_B, DRIVE_WAS = range(8)
@@ -79,7 +80,7 @@ def settle_regulated(rows: Any, fixed: Any, work: Any) -> None:
 def air_at(rows: Any, fixed: Any, j: int, side: int) -> float:
     """Return the air [kg] in a bundle at its pressure."""
     space = volume_of(fixed, j, side, contraction_at(fixed, j, side, rows[ANGLE][j]))
-    return (rows[PRESSURE_A + side][j] + ATMOSPHERE) * space / GAS
+    return (rows[PRESSURE_A + side][j] + ATMOSPHERE) * space / PRESSURE_PER_DENSITY
 
 
 @kernel
@@ -103,7 +104,7 @@ def breathe_pulsed(rows: Any, fixed: Any, h: float, work: Any) -> None:
     for side in range(2):
         for j in range(LANES):
             contraction = contraction_at(fixed, j, side, work[MIDDLE][j])
-            per_volume = GAS / volume_of(fixed, j, side, contraction)
+            per_volume = PRESSURE_PER_DENSITY / volume_of(fixed, j, side, contraction)
             was = rows[AIR_A + side][j]
             come = inflow(rows, fixed, j, side, per_volume, h)
             left = outflow(rows, fixed, j, side, was + come, per_volume, h)
@@ -113,7 +114,7 @@ def breathe_pulsed(rows: Any, fixed: Any, h: float, work: Any) -> None:
             work[WAS_A + side][j] = was * per_volume - ATMOSPHERE
             work[NOW_A + side][j] = now * per_volume - ATMOSPHERE
             mean = 0.5 * (was + now) * per_volume
-            work[GIVES_A + side][j] = mean * pressed * shape * per_volume / GAS
+            work[GIVES_A + side][j] = mean * pressed * shape * per_volume / PRESSURE_PER_DENSITY
             rows[AIR_A + side][j] = now
             rows[USED][j] = rows[USED][j] + come
 
@@ -158,7 +159,7 @@ def settle_pulsed(rows: Any, fixed: Any, work: Any) -> None:
     for side in range(2):
         for j in range(LANES):
             contraction = contraction_at(fixed, j, side, rows[ANGLE][j])
-            per_volume = GAS / volume_of(fixed, j, side, contraction)
+            per_volume = PRESSURE_PER_DENSITY / volume_of(fixed, j, side, contraction)
             rows[PRESSURE_A + side][j] = rows[AIR_A + side][j] * per_volume - ATMOSPHERE
 
 

@@ -20,6 +20,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.constants import ATMOSPHERE
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.mechanics.forearm import OrthosisLink, Wearer
 from pam_envs.mechanics.hanging_mass import LARGEST_PHASE
@@ -36,7 +37,7 @@ from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.hysteresis import ElbowHysteresis, elbow_hysteresis
 from pam_envs.plants.single_muscle.hysteresis import Kind
 from pam_envs.pneumatics.bundle_regulator import BundleRegulator
-from pam_envs.pneumatics.on_off_pair import ATMOSPHERE, OnOffValve
+from pam_envs.pneumatics.on_off_pair import OnOffValve
 from pam_envs.sensing.orthosis import AngleSensor, GaugeSensor
 
 Valves = Literal["proportional", "on_off"]

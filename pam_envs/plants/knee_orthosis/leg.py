@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from pam_envs.constants import GRAVITY
 from pam_envs.kernels.build import kernel, routine
 from pam_envs.mechanics.leg import (
-    GRAVITY,
     centre_of_pressure,
     gravity_stiffness,
     ground_torque,

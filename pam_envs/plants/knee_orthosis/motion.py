@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from pam_envs.constants import ATMOSPHERE, DENSITY_PER_PRESSURE
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.mechanics.hanging_mass import damped_motion
@@ -47,10 +48,6 @@ from pam_envs.plants.knee_orthosis.rows import (
 )
 from pam_envs.references.gait import KNEE as KNEE_CURVE
 from pam_envs.references.gait import curve_and_rates, fraction_of_turn
-
-ATMOSPHERE = 101325.0
-AIR = 1.0 / (287.05 * 293.15)
-"""Density over pressure of air at 20 degrees C [kg/(m3 Pa)]."""
 
 WAS, HELD, HELD_RATE, KNEE_WAS, RATE_WAS, FORCE_WAS = range(6)
 """Rows of scratch: stiffness before the sub-step, then the wearer's hold and path."""
@@ -190,7 +187,7 @@ def report_muscle(rows: Any, fixed: Any, j: int, length: float) -> None:
     space = gas_volume(
         length, fixed[SHORTEST_LENGTH][j], fixed[STIFFNESS_RATIO][j], fixed[FULL_VOLUME][j]
     )
-    rows[K.AIR][j] = AIR * (max(0.0, rows[PRESSURE][j]) + ATMOSPHERE) * space
+    rows[K.AIR][j] = DENSITY_PER_PRESSURE * (max(0.0, rows[PRESSURE][j]) + ATMOSPHERE) * space
 
 
 @kernel

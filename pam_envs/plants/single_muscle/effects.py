@@ -17,10 +17,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from pam_envs.constants import ATMOSPHERE, GRAVITY, ROOM_TEMPERATURE
 from pam_envs.hysteresis.maxwell_slip import play
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine, scratch
-from pam_envs.mechanics.hanging_mass import GRAVITY, damped_motion
+from pam_envs.mechanics.hanging_mass import damped_motion
 from pam_envs.muscle.effective_area import fine_slope, fine_tension, tension, tension_slope
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.step import HYSTERESIS_MODELS
@@ -29,8 +30,6 @@ from pam_envs.pneumatics.regulator import DELAY_PERIODS, delayed_fraction, regul
 FIRST = 0  # placeholder: the row after the hysteresis's state
 plain_hysteresis: Any = None  # placeholder: one of the three hysteresis models
 
-ATMOSPHERE = 101325.0
-REFERENCE_TEMPERATURE = 293.15
 FULL_STRAIN = 0.15
 """Full scale of the position sensor, over the rest length."""
 SLIDE = 0.2
@@ -198,7 +197,7 @@ def feel(
             drive[j] = w
     for j in range(first, last if worn > 0 else first):
         new = decay(min(40.0, rows[FIRST + R.TRAVEL][j] / fixed[R.FIRST_TRAVEL][j]))
-        warm = rows[FIRST + R.KELVIN][j] - REFERENCE_TEMPERATURE
+        warm = rows[FIRST + R.KELVIN][j] - ROOM_TEMPERATURE
         gained = 1.0 + fixed[R.TEMPERATURE_GAIN][j] * warm
         drive[j] = drive[j] * gained * (1.0 - fixed[R.FIRST_LOSS][j] * new)
 

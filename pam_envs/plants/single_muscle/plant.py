@@ -17,9 +17,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
-from pam_envs.mechanics.hanging_mass import GRAVITY, LARGEST_PHASE, HangingMass
+from pam_envs.mechanics.hanging_mass import LARGEST_PHASE, HangingMass
 from pam_envs.muscle.effective_area import EffectiveAreaMuscle
 from pam_envs.parameters import declarations
 from pam_envs.plants.core.plant import Plant

@@ -12,11 +12,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.maxwell_slip import play
 from pam_envs.hysteresis.preisach import preisach_step
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
-from pam_envs.mechanics.hanging_mass import GRAVITY, damped_motion
+from pam_envs.mechanics.hanging_mass import damped_motion
 from pam_envs.muscle.effective_area import tension, tension_slope
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.rows import (
