@@ -52,7 +52,7 @@ def train(
     resume
         Go on with the run in that folder; its settings are kept, only --steps may change.
     config
-        A YAML file instead of the preset (see agents/configs/).
+        A YAML file or a policy.onnx whose settings replace the preset.
     set
         Single settings, for example: --set ppo.gamma=0.95 network.hidden=[32,32]
     """
@@ -85,7 +85,12 @@ def _wanted(env: str, algo: str, variant: str, file: Path | None) -> configs.Con
     """Return the settings of a preset, or of a file for the same environment and algorithm."""
     if file is None:
         return configs.preset(env, algo, variant)
-    wanted = configs.read(file)
+    if file.suffix == ".onnx":
+        from agents.policies.policy_file import read
+
+        wanted = configs.from_mapping(read(file).card.get("config"))
+    else:
+        wanted = configs.read(file)
     if (wanted.env, wanted.algo) != (env, algo):
         raise SettingsError(
             f"{file} is for {wanted.env} with {wanted.algo}; say so: {wanted.env} --algo "

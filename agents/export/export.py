@@ -20,11 +20,17 @@ from torch import nn
 
 import pam_envs
 from agents.export.graph import Graph, array
-from agents.export.onnx_file import CARD, CONTROLLER, INPUT, SCHEMA, check_graph
-from agents.policies import controllers, probe
+from agents.export.recording import record
 from agents.policies.networks import LayersAndInputs, LinearFeatures, MemoryAndInputs
 from agents.policies.policy import describe
-from agents.training.checkpoint import write_atomically
+from agents.policies.policy_file import (
+    CARD,
+    CONTROLLER,
+    INPUT,
+    SCHEMA,
+    check_graph,
+    write_policy,
+)
 from agents.vec_envs.history import HistoryVecEnv
 from agents.vec_envs.residual import ResidualVecEnv
 
@@ -43,11 +49,9 @@ def export_policy(
     model: BaseAlgorithm,
     path: str | Path,
     card: Mapping[str, Any] | None = None,
-    beside: Mapping[str, Any] | None = None,
+    training: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Write the model's deterministic action as a policy file, and its card beside it.
-
-    The card is written first, so that a policy that is there has one, whenever a process is killed.
+    """Write the model's deterministic action as a policy file, and its training record beside it.
 
     Parameters
     ----------
@@ -55,16 +59,16 @@ def export_policy(
         With its environment (a :class:`agents.vec_envs.sb3.BatchVecEnv`, wrapped or not), from
         which come the signals and the observation's normaliser.
     path : str or Path
-        ``policy.onnx``; the card is written to ``policy.json``.
+        ``policy.onnx``; the training record is written to ``policy.json``.
     card : mapping, optional
         Further entries of the card: seed, steps, command.
-    beside : mapping, optional
-        Entries of the JSON file alone, which differ from one occasion to the next: times, machine.
+    training : mapping, optional
+        Cost of the training (times, machine), which is no part of the policy.
 
     Returns
     -------
     dict
-        The card, as in the file.
+        The card.
 
     Raises
     ------
@@ -72,12 +76,8 @@ def export_policy(
         If the model has layers that have no counterpart here, or corrects a controller that is
         mostly at a limit.
     """
-    path = Path(path)
     full = {**facts(model), **(card or {})}
-    data = policy_bytes(model, full)
-    text = json.dumps({**full, **(beside or {})}, indent=1, sort_keys=True) + "\n"
-    write_atomically(path.with_suffix(".json"), text.encode())
-    write_atomically(path, data)
+    write_policy(Path(path), policy_bytes(model, full), {"training": dict(training or {})})
     return full
 
 
@@ -172,12 +172,11 @@ def _baseline(layer: ResidualVecEnv, env: str) -> dict[str, Any]:
     for kind, plant in _kinds(layer):
         kinds.setdefault(plant.digest(), []).append(kind)
     made = {_plant_at(layer, rows): controller for rows, controller in layer.controllers}
-    told = []
-    for digest, controller in made.items():
-        found = probe.record(env, kinds[digest], controller, layer.name)
-        parameters = controllers.parameters(controller)
-        told.append({"plant": digest, "parameters": parameters, "probe": found.as_dict()})
-    return {"name": layer.name, "scale": float(layer.scale), "told": told}
+    recorded = [
+        {"plant": digest, **record(env, kinds[digest], controller, layer.name).as_dict()}
+        for digest, controller in made.items()
+    ]
+    return {"name": layer.name, "scale": float(layer.scale), "recorded": recorded}
 
 
 def _plant_at(layer: ResidualVecEnv, rows: slice) -> str:

@@ -18,7 +18,7 @@ from onnx import TensorProto, helper, numpy_helper
 from torch import nn
 
 import pam_envs
-from agents.export.onnx_file import AFTER, CONTROLLER, INPUT, OUTPUT, START, STATE
+from agents.policies.policy_file import AFTER, CONTROLLER, INPUT, OUTPUT, START, STATE
 
 OPSET, IR = 17, 8
 ACTIVATIONS = {nn.Tanh: "Tanh", nn.ReLU: "Relu", nn.ELU: "Elu"}

@@ -6,15 +6,14 @@ A controller may have been trained several times: its file then has ``{seed}`` i
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from agents.export.onnx_file import PolicyFileError
 from agents.policies.policy import OnnxPolicy
+from agents.policies.policy_file import PolicyFileError, read, record_of
 from agents.policies.residual import ResidualPolicy, with_controller
 from agents.settings import presets as configs
 from agents.settings.presets import Config
@@ -72,10 +71,20 @@ class Entry:
 
         The JSON file beside the policy of the lowest training seed says so, under ``author``.
         """
-        cards = [path.with_suffix(".json") for path in self.files().values()]
-        if not cards or not cards[0].is_file():
-            return ""
-        return str(json.loads(cards[0].read_text(encoding="utf-8")).get("author", ""))
+        first = next(iter(self.files().values()), None)
+        return "" if first is None else str(record_of(first).get("author", ""))
+
+    @property
+    def trained_with(self) -> tuple[tuple[str, ...], tuple[str, ...]] | None:
+        """Names of signals and actions, by the lowest training seed; None without a file."""
+        first = next(iter(self.files().values()), None)
+        if first is None:
+            return None
+        card = read(first).card
+        signals, actions = (
+            tuple(s["name"] for s in card[p]) for p in ("signals", "action_signals")
+        )
+        return signals, actions
 
     def files(self) -> dict[int, Path]:
         """Return the files that are there by training seed."""

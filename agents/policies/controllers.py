@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from agents.settings.settings import SettingsError
 from baselines.core import catalogue
 from pam_envs.parameters import Signals
 from pam_envs.wording import near
-
-MOST_NUMBERS = 64
-"""Larger arrays stand on a card by their shape alone."""
 
 
 def make(name: str, plant: Any, signals: Signals, actions: Signals) -> Any:
@@ -35,29 +30,6 @@ def make(name: str, plant: Any, signals: Signals, actions: Signals) -> Any:
 def names_for(env: str) -> list[str]:
     """Return the classical controllers of an environment."""
     return [name for name, entry in catalogue.CONTROLLERS.items() if env in entry.envs]
-
-
-def parameters(thing: Any, depth: int = 4) -> Any:
-    """Return the numbers that a controller holds, as plain values by their names.
-
-    Nominal plants and other objects with a ``digest()`` stand by it, long arrays by their shape.
-    """
-    if thing is None or isinstance(thing, (bool, int, float, str)):
-        return thing
-    if isinstance(thing, np.generic):
-        return thing.item()
-    if isinstance(thing, np.ndarray):
-        return thing.tolist() if thing.size <= MOST_NUMBERS else {"shape": list(thing.shape)}
-    if callable(getattr(thing, "digest", None)):
-        return {"digest": thing.digest()}
-    if depth and isinstance(thing, Mapping):
-        return {str(key): parameters(value, depth - 1) for key, value in thing.items()}
-    if depth and dataclasses.is_dataclass(thing):
-        names = [field.name for field in dataclasses.fields(thing)]
-        return {name: parameters(getattr(thing, name), depth - 1) for name in names}
-    if depth and isinstance(thing, (list, tuple)) and len(thing) <= MOST_NUMBERS:
-        return [parameters(value, depth - 1) for value in thing]
-    return type(thing).__name__
 
 
 def mapped(state: Any, change: Callable[[NDArray[Any]], Any]) -> Any:

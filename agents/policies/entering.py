@@ -6,17 +6,22 @@ what was there of that preset.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from agents.export.onnx_file import PolicyFileError, finished
 from agents.policies import catalogue
 from agents.policies.policy import OnnxPolicy
+from agents.policies.policy_file import (
+    POLICY,
+    RECORD,
+    PolicyFileError,
+    finished,
+    record_of,
+    write_policy,
+)
 from agents.settings import presets as configs
 from agents.settings.settings import SettingsError
-from agents.training.sweep import CARD, POLICY
 
 
 @dataclass(frozen=True)
@@ -60,7 +65,7 @@ def enter(folders: Sequence[Path], author: str = "") -> Entered:
     """Copy the policies of finished runs to ``agents/pretrained``.
 
     Everything is checked before anything is written. Each file is written whole or not at all, a
-    card before its policy.
+    record before its policy.
 
     Parameters
     ----------
@@ -75,8 +80,6 @@ def enter(folders: Sequence[Path], author: str = "") -> Entered:
         If a folder holds no sound policy, or the runs are not the first training seeds of one
         preset as it is now.
     """
-    from agents.training.checkpoint import write_atomically
-
     runs = sorted(map(_checked, folders), key=lambda run: run.seed)
     _check_together(runs)
     controller, entry = _entry(runs[0])
@@ -84,8 +87,9 @@ def enter(folders: Sequence[Path], author: str = "") -> Entered:
     written = []
     for run in runs:
         place = catalogue.FOLDER / entry.file.format(seed=run.seed)
-        write_atomically(place.with_suffix(".json"), _card(run, author))
-        write_atomically(place, (run.folder / POLICY).read_bytes())
+        policy = run.folder / POLICY
+        record = record_of(policy) | ({"author": author} if author else {})
+        write_policy(place, policy.read_bytes(), record)
         written.append(place)
     for path in set(before) - {path for place in written for path in _both(place)}:
         path.unlink()
@@ -106,7 +110,7 @@ def _checked(folder: Path) -> Finished:
         raise PolicyFileError(f"{folder}: {error}") from error
     if finished(folder / POLICY) is None:
         raise PolicyFileError(
-            f"{folder}: {CARD} is not the card inside {POLICY}; take both from one run"
+            f"{folder}: {RECORD} is not the record of {POLICY}; take both from one run"
         )
     seed = card["seed"]
     if not isinstance(seed, int) or seed < 0:
@@ -204,14 +208,5 @@ def _files(entry: catalogue.Entry) -> list[Path]:
 
 
 def _both(policy: Path) -> tuple[Path, Path]:
-    """Return the places of a policy and of its card."""
+    """Return the places of a policy and of its record."""
     return policy, policy.with_suffix(".json")
-
-
-def _card(run: Finished, author: str) -> bytes:
-    """Return the file beside a policy, with its author where one is given."""
-    data = (run.folder / CARD).read_bytes()
-    if not author:
-        return data
-    said = {**json.loads(data), "author": author}
-    return (json.dumps(said, indent=1, sort_keys=True) + "\n").encode()

@@ -14,7 +14,7 @@ import numpy as np
 import onnxruntime  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from agents.export.onnx_file import (
+from agents.policies.policy_file import (
     AFTER,
     CONTROLLER,
     INPUT,
@@ -83,7 +83,7 @@ class OnnxPolicy:
         Raises
         ------
         PolicyFileError
-            If the file may not be run (see :mod:`agents.export.onnx_file`) or the signals differ.
+            If the file may not be run (see :mod:`agents.policies.policy_file`) or the signals differ.
         """
         file = read(path)
         made = cls(file.data, file.card, Path(path).name)

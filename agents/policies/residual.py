@@ -8,9 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.export.onnx_file import PolicyFileError
-from agents.policies import controllers, probe
+from agents.policies import controllers
 from agents.policies.policy import OnnxPolicy
+from agents.policies.policy_file import PolicyFileError
+from baselines.core.recorded_answers import RecordedAnswers
+
+TOLERANCE = 1e-3
+"""Allowed deviation of a controller's answers, as a share of what the policy can add."""
 
 
 class ResidualState(NamedTuple):
@@ -83,37 +87,30 @@ def with_controller(policy: OnnxPolicy, plant: Any) -> OnnxPolicy | ResidualPoli
     if not policy.corrects:
         return policy
     controller = controllers.make(policy.corrects, plant, policy.signals, policy.action_signals)
-    told = _told(policy)
-    if plant.digest() in told:
-        _check(policy, controller, told[plant.digest()])
+    recorded, tolerance = _recorded(policy)
+    if plant.digest() in recorded:
+        deviation = recorded[plant.digest()].deviation(controller)
+        if deviation > tolerance:
+            raise PolicyFileError(
+                f"{policy.name} was trained on the controller {policy.corrects!r}, which now "
+                f"answers otherwise: by {deviation:.2g} of at most {tolerance:.2g}; train the "
+                "policy anew, or go back to the version of baselines that it was trained with"
+            )
     return ResidualPolicy(policy, controller)
 
 
-def _told(policy: OnnxPolicy) -> dict[str, Any]:
-    """Return what the card says of the controller by the plant that it was told."""
+def _recorded(policy: OnnxPolicy) -> tuple[dict[str, RecordedAnswers], float]:
+    """Return the controller's recorded answers by the plant's digest, and their tolerance."""
+    widths = len(policy.signals), len(policy.action_signals)
     try:
-        return {entry["plant"]: entry for entry in policy.card["baseline"]["told"]}
-    except (KeyError, TypeError) as error:
-        raise PolicyFileError(
-            f"{policy.name}: its card does not say how the controller {policy.corrects!r} answered "
-            "in training; export it with this version"
-        ) from error
-
-
-def _check(policy: OnnxPolicy, controller: Any, known: Any) -> None:
-    """Raise unless a controller is the one of the training, told the same plant."""
-    try:
-        then = probe.Probe.of(known["probe"], len(policy.signals))
-        parameters, scale = known["parameters"], float(policy.card["baseline"]["scale"])
+        baseline = policy.card["baseline"]
+        recorded = {
+            entry["plant"]: RecordedAnswers.from_dict(entry, *widths)
+            for entry in baseline["recorded"]
+        }
+        return recorded, TOLERANCE * float(baseline["scale"])
     except (KeyError, TypeError, ValueError) as error:
         raise PolicyFileError(
             f"{policy.name}: its card has no sound record of the controller {policy.corrects!r} "
             f"({error}); export it with this version"
         ) from error
-    changed = probe.difference(parameters, controllers.parameters(controller))
-    if changed or not probe.answers_alike(then, controller, scale):
-        raise PolicyFileError(
-            f"{policy.name} was trained on the controller {policy.corrects!r}, which is another "
-            f"one now: {changed or 'it answers otherwise'}; train it anew, or go back to the "
-            "version of baselines that it was trained with"
-        )

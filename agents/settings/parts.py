@@ -191,7 +191,7 @@ class Plants:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Evaluation of the policy during training, on tuning seeds (:mod:`agents.training.seeds`).
+    """Evaluation of the policy during training, on tuning seeds (:mod:`agents.settings.seeds`).
 
     Attributes
     ----------

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -228,7 +227,7 @@ def preset(env: str, algo: str, variant: str = "") -> Config:
 
 
 def read(path: str | Path) -> Config:
-    """Return the configuration in a YAML file, or on the card beside a policy.
+    """Return the configuration in a YAML file.
 
     Raises
     ------
@@ -237,8 +236,6 @@ def read(path: str | Path) -> Config:
     """
     path = Path(path)
     given = _mapping(path)
-    if isinstance(given, Mapping) and "action_signals" in given:
-        given = given.get("config")
     try:
         return from_mapping(given)
     except SettingsError as error:
@@ -247,8 +244,7 @@ def read(path: str | Path) -> Config:
 
 def _mapping(path: Path) -> Any:
     try:
-        text = path.read_text(encoding="utf-8")
-        return json.loads(text) if path.suffix == ".json" else yaml.safe_load(text)
+        return yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         raise SettingsError(f"{path.name} cannot be read as YAML: {error}") from error
 

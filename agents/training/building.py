@@ -15,9 +15,9 @@ from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
 from agents.policies import controllers, inputs
 from agents.policies.networks import policy_arguments, silence
+from agents.settings import seeds
 from agents.settings.presets import ON_POLICY, Config
 from agents.settings.settings import SettingsError
-from agents.training import seeds
 from agents.vec_envs.history import HistoryVecEnv
 from agents.vec_envs.mixed import MixedVecEnv
 from agents.vec_envs.residual import ResidualVecEnv

@@ -18,8 +18,8 @@ import pam_envs  # noqa: F401  (registers the environments)
 from agents.policies import controllers
 from agents.policies.policy import OnnxPolicy
 from agents.policies.residual import with_controller
+from agents.settings import seeds
 from agents.settings.presets import Config
-from agents.training import seeds
 
 Array = NDArray[np.float64]
 TRAVEL = "effort/pressure_travel"

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from agents.settings import seeds
 from agents.settings.presets import Config
-from agents.training import seeds
 
 CPU_FILE = Path("/proc/cpuinfo")
 

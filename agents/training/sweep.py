@@ -15,7 +15,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from agents.export.onnx_file import finished
+from agents.policies.policy_file import POLICY, RECORD, finished, write_atomically
 from agents.settings import presets as configs
 from agents.settings.presets import Config
 from agents.settings.settings import SettingsError
@@ -25,7 +25,6 @@ from sweeps.versions import versions_of
 from sweeps.worker import LOOK, wanted
 
 ROOT = Path(__file__).resolve().parents[2]
-POLICY, CARD = "policy.onnx", "policy.json"
 LOG = "log.txt"
 ATTEMPTS = 3
 """How often the process of a training may be killed."""
@@ -59,7 +58,7 @@ class Training:
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:32]
 
     def finished(self) -> bool:
-        """Return whether the policy is there, with its card.
+        """Return whether the policy is there, with its record.
 
         Raises
         ------
@@ -149,13 +148,11 @@ def run(
 
 
 def _keep(folder: Path, files: dict[str, bytes]) -> None:
-    """Write a policy that was made where this folder is not seen, its card first."""
+    """Write a policy that was made where this folder is not seen, its record first."""
     if finished(folder / POLICY) is not None:
         return
-    from agents.training.checkpoint import write_atomically
-
     folder.mkdir(parents=True, exist_ok=True)
-    for name in (CARD, POLICY):
+    for name in (RECORD, POLICY):
         write_atomically(folder / name, files[name])
 
 
@@ -171,7 +168,7 @@ def train(training: Training) -> dict[str, bytes]:
     for _ in range(ATTEMPTS):
         code = _process(training)
         if code == 0:
-            return {name: (training.folder / name).read_bytes() for name in (POLICY, CARD)}
+            return {name: (training.folder / name).read_bytes() for name in (POLICY, RECORD)}
         if code > 0:
             break
     else:

@@ -13,7 +13,7 @@ for every algorithm, with memory, history and controller, with the same package 
 same type of processor. Torch uses one thread; with several, sums depend on their number. What
 differs is the log: the steps between the last checkpoint and the kill are in it twice.
 
-Seeds. Training and the evaluations during it use the seeds of :mod:`agents.training.seeds` alone.
+Seeds. Training and the evaluations during it use the seeds of :mod:`agents.settings.seeds` alone.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import configure
 
 from agents.export.export import export_policy, facts, plants_of
-from agents.export.onnx_file import finished
+from agents.policies.policy_file import POLICY, finished
 from agents.settings import presets as configs
 from agents.settings.presets import Config
 from agents.training import checkpoint, snapshot, sources
@@ -40,8 +40,6 @@ from agents.training.callbacks import Checkpoints, Evaluations, WarmUp
 from agents.training.checkpoint import CheckpointError
 from agents.training.progress import TrainingProgress
 from agents.training.record import Clock, training
-
-POLICY = "policy.onnx"
 
 
 @dataclass(frozen=True)
@@ -67,13 +65,13 @@ class Run:
         return self.folder / checkpoint.NAME
 
     def command(self) -> str:
-        """Return the command that gives the same policy, run beside its card if need be."""
+        """Return the command that gives the same policy, run in its folder if need be."""
         config = self.config
         words = ["python -m agents train", config.env, "--algo", config.algo]
         words += ["--steps", str(config.steps), "--seed", str(self.seed)]
         variant = self._variant()
         if variant is None:
-            words += ["--config", POLICY.replace(".onnx", ".json")]
+            words += ["--config", POLICY]
         elif variant:
             words += ["--variant", variant]
         return " ".join(words)
@@ -200,8 +198,8 @@ def train(run: Run, model: BaseAlgorithm, console: Console) -> Path:
         card["evaluation"] = evaluations.found
         card["chosen"] = evaluations.best.chosen(len(evaluations.found))
         evaluations.best.put_into(model)
-    beside = training(run.config, run.seed, run.command(), clock.spent(), steps=model.num_timesteps)
-    export_policy(model, run.folder / POLICY, card, {"training": beside})
+    cost = training(run.config, run.seed, run.command(), clock.spent(), steps=model.num_timesteps)
+    export_policy(model, run.folder / POLICY, card, cost)
     return run.folder / POLICY
 
 

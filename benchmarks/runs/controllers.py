@@ -56,6 +56,8 @@ class Entrant:
         Name in ``baselines/core/tuned.yaml``; of a residual controller that of the one it corrects.
     knobs : tuple of (str, float)
         The numbers that stand there under that name, none for a controller that is not tuned.
+    trained_with : (tuple of str, tuple of str) or None
+        Names of the signals and actions of a policy's training.
     """
 
     name: str
@@ -71,6 +73,7 @@ class Entrant:
     author: str = ""
     tuned: str = ""
     knobs: tuple[tuple[str, float], ...] = ()
+    trained_with: tuple[tuple[str, ...], tuple[str, ...]] | None = None
 
     @property
     def training_seeds(self) -> tuple[int | None, ...]:
@@ -122,6 +125,7 @@ def _entrant(name: str, entry: Any, module: str, kind: str) -> Entrant | None:
         author=str(getattr(entry, "author", "")),
         tuned=str(getattr(entry, "baseline", "") or name) if knobs else "",
         knobs=knobs,
+        trained_with=getattr(entry, "trained_with", None),
     )
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from benchmarks.identity import artefacts, audit, tasks
+from benchmarks.identity import audit, tasks
 from benchmarks.identity.audit import Audit
 from benchmarks.runs import cells as cells_module
 from benchmarks.runs import rows
@@ -242,19 +241,14 @@ def pairs_of(entrants: Iterable[Entrant], tracks: Iterable[ScenarioSet]) -> list
 
 
 def fits(entrant: Entrant, track: ScenarioSet) -> bool:
-    """Return whether a track shows and takes what a policy was trained on; others always fit.
+    """Return whether a track has the signals and actions that a policy was trained with.
 
-    The card beside the first policy says by which names. (What an environment shows depends on its
-    arguments, like the valves of the elbow orthosis.)
+    Those of an environment depend on its arguments, like the valves of the elbow orthosis.
     """
-    if not entrant.files:
+    if entrant.trained_with is None:
         return True
-    card = artefacts.located(entrant.files[0][1]).with_suffix(".json")
-    said = json.loads(card.read_text(encoding="utf-8")) if card.is_file() else {}
-    if not {"signals", "action_signals"} <= set(said):
-        return True
-    learned = [[s["name"] for s in said[part]] for part in ("signals", "action_signals")]
     bases = [env.unwrapped for _, env in tasks.built(track).told]
     return all(
-        learned == [[*base.signals.names()], [*base.action_signals.names()]] for base in bases
+        entrant.trained_with == (tuple(base.signals.names()), tuple(base.action_signals.names()))
+        for base in bases
     )

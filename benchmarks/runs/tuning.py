@@ -2,7 +2,7 @@
 
 The settings of learned controllers are searched for; so that classical ones have the same chance,
 this gives them as many trials, by the same sampler, on the same seeds
-(:mod:`agents.training.tune`, :mod:`agents.training.seeds`). The episodes are those of an
+(:mod:`agents.training.tune`, :mod:`agents.settings.seeds`). The episodes are those of an
 environment's nominal track but for their seeds, which no score is ever taken from, and they are
 scored by the same code.
 
@@ -35,7 +35,7 @@ from optuna.samplers import TPESampler
 from optuna.storages import RDBStorage
 from optuna.trial import TrialState
 
-from agents.training.seeds import MOST_TUNING, tuning
+from agents.settings.seeds import MOST_TUNING, tuning
 from baselines.core import catalogue, tuned
 from baselines.core.knobs import Bounds, Knobs
 from baselines.core.tuned import Tuned, tuned_name

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from agents.export.onnx_file import PolicyFileError
 from agents.policies import catalogue
+from agents.policies.policy_file import PolicyFileError
 from agents.settings import presets as configs
 from agents.settings.settings import SettingsError
 

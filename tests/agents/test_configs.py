@@ -12,9 +12,10 @@ from short_runs import ID
 from agents.policies import inputs
 from agents.policies.networks import input_matrix
 from agents.settings import presets as configs
+from agents.settings import seeds
 from agents.settings.parts import TQC, Network, Search
 from agents.settings.settings import SettingsError
-from agents.training import evaluation, seeds
+from agents.training import evaluation
 
 TWO = {"hysteresis": ["maxwell_slip", "preisach"]}
 DRAWN = {"randomize": True}

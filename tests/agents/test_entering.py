@@ -11,8 +11,8 @@ import onnx
 import pytest
 
 from agents.__main__ import main
-from agents.export.onnx_file import CARD
 from agents.policies import catalogue
+from agents.policies.policy_file import CARD, write_policy
 from agents.settings import presets as configs
 
 PRETRAINED = catalogue.FOLDER
@@ -29,9 +29,7 @@ def run_of(folder: Path, seed: int, name: str = f"{NAME}.s0", **changes: Any) ->
     del model.metadata_props[:]
     model.metadata_props.add(key=CARD, value=json.dumps(card))
     folder.mkdir(parents=True)
-    (folder / "policy.onnx").write_bytes(model.SerializeToString())
-    beside = {**card, "training": {"seed": seed}}
-    (folder / "policy.json").write_text(json.dumps(beside))
+    write_policy(folder / "policy.onnx", model.SerializeToString(), {"training": {"seed": seed}})
     return folder
 
 
@@ -111,7 +109,7 @@ REFUSED: dict[str, tuple[list[dict[str, Any]], str]] = {
         "of KneeStairsUp-v0.ppo and",
     ),
     "set by hand": (
-        [{"seed": 0, "command": f"{COMMAND} --config policy.json"}],
+        [{"seed": 0, "command": f"{COMMAND} --config policy.onnx"}],
         "save them as agents/configs/KneeWalk-v0.ppo-VARIANT.yaml",
     ),
     "an unknown preset": (
@@ -149,8 +147,14 @@ def test_what_decides_nothing_may_differ(place: Path, tmp_path: Path) -> None:
     ("spoil", "message"),
     [
         (lambda run: (run / "policy.onnx").unlink(), "holds no policy.onnx; give the folders of"),
-        (lambda run: (run / "policy.json").unlink(), "policy.json is not the card inside"),
-        (lambda run: (run / "policy.json").write_text("{}"), "policy.json is not the card inside"),
+        (
+            lambda run: (run / "policy.json").unlink(),
+            "policy.json is not the record of policy.onnx",
+        ),
+        (
+            lambda run: (run / "policy.json").write_text("{}"),
+            "policy.json is not the record of policy.onnx",
+        ),
         (lambda run: (run / "policy.onnx").write_bytes(b"PK"), "is a zip file"),
         (lambda run: (run / "policy.onnx").write_bytes(b"no"), "is not an ONNX file"),
     ],

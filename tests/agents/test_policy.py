@@ -27,9 +27,15 @@ from stable_baselines3.common.evaluation import evaluate_policy
 
 from agents.__main__ import main
 from agents.export.export import export_policy
-from agents.export.onnx_file import CARD, MOST_BYTES, PolicyFileError
 from agents.policies import catalogue
 from agents.policies.policy import OnnxPolicy
+from agents.policies.policy_file import (
+    CARD,
+    MOST_BYTES,
+    PolicyFileError,
+    finished,
+    write_policy,
+)
 from agents.settings import presets as configs
 from agents.settings.settings import SettingsError
 from agents.training import checkpoint, sweep
@@ -105,9 +111,7 @@ def test_the_same_weights_give_the_same_bytes(ppo: tuple[Any, Path], tmp_path: P
         export_policy(ppo[0], tmp_path / name, {"seed": 3})
     first, second = ((tmp_path / n).read_bytes() for n in ("a.onnx", "b.onnx"))
     assert first == second
-    assert OnnxPolicy.load(tmp_path / "a.onnx").card == json.loads(
-        (tmp_path / "a.json").read_text()
-    )
+    assert finished(tmp_path / "a.onnx") == OnnxPolicy.load(tmp_path / "a.onnx").card
 
 
 @pytest.mark.parametrize(
@@ -241,8 +245,7 @@ class Gift:
         card = {**OnnxPolicy.load(policy).card, "env": self.env, "config": config}
         del model.metadata_props[:]
         model.metadata_props.add(key=CARD, value=json.dumps(card))
-        (folder / "policy.onnx").write_bytes(model.SerializeToString())
-        (folder / "policy.json").write_text(json.dumps(card))
+        write_policy(folder / "policy.onnx", model.SerializeToString(), {})
 
 
 @pytest.fixture
@@ -258,11 +261,11 @@ def test_a_run_or_setting_of_others_cannot_name_a_module(
 ) -> None:
     assert main(["train", ID, "--resume", "--out", str(tmp_path)]) == 2
     assert "is no environment here" in capsys.readouterr().err
-    for place in (tmp_path / "config.yaml", tmp_path / "policy.json"):
+    for place in (tmp_path / "config.yaml", tmp_path / "policy.onnx"):
         for env in (ID, gift.env):
             assert main(["train", env, "--config", str(place), "--out", "nowhere"]) == 2
-        with pytest.raises(SettingsError, match="is no environment here"):
-            configs.read(place)
+    with pytest.raises(SettingsError, match="is no environment here"):
+        configs.read(tmp_path / "config.yaml")
     with pytest.raises(SettingsError, match="is no environment here"):
         saved_run(tmp_path)
     with pytest.raises(SettingsError, match="is no environment here"):

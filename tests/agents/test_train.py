@@ -24,9 +24,11 @@ from stable_baselines3.common.evaluation import evaluate_policy
 
 from agents.__main__ import main
 from agents.policies.policy import OnnxPolicy
+from agents.policies.policy_file import finished
 from agents.settings import presets as configs
+from agents.settings import seeds
 from agents.settings.parts import Evaluation
-from agents.training import checkpoint, seeds, sources, train
+from agents.training import checkpoint, sources, train
 from agents.training.building import make_env, make_model
 from agents.training.checkpoint import MARK, CheckpointError
 from agents.vec_envs.sb3 import make_batch_vec_env
@@ -225,7 +227,7 @@ def test_a_training_that_lost_its_card_is_finished_again(
 ) -> None:
     _, folder = short_run("ppo")
     run = train.Run(kind("ppo"), 3, tmp_path)
-    for name in (checkpoint.NAME, "policy.onnx"):
+    for name in (checkpoint.NAME, "policy.onnx"):  # without its record
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     assert train.train_to_the_end(run, QUIET) == tmp_path / "policy.onnx"
     assert (tmp_path / "policy.onnx").read_bytes() == (folder / "policy.onnx").read_bytes()
@@ -240,8 +242,8 @@ def test_the_log_and_the_card_are_written(ppo: tuple[Any, Path]) -> None:
     assert card["seed"] == 3
     assert card["command"].startswith(f"python -m agents train {ID} --algo ppo --steps 1024")
     assert card["plants"] == [ppo[0].get_env().get_attr("plant")[0].digest()]
-    assert configs.read(folder / "policy.json") == tiny()
-    text = (folder / "policy.json").read_text()
+    assert configs.from_mapping(card["config"]) == tiny()
+    text = json.dumps(card) + (folder / "policy.json").read_text()
     assert str(folder) not in text
     assert str(ROOT) not in text
 
@@ -262,10 +264,9 @@ def test_what_a_training_cost_stands_beside_the_policy(
     short_run: Callable[[str], tuple[Any, Path]],
 ) -> None:
     _, folder = short_run("history")
-    beside = json.loads((folder / "policy.json").read_text())
-    cost = beside.pop("training")
+    cost = json.loads((folder / "policy.json").read_text())["training"]
     card = OnnxPolicy.load(folder / "policy.onnx").card
-    assert beside == card
+    assert finished(folder / "policy.onnx") == card
     assert cost["steps"] == 1024
     assert cost["seconds"] > 0.0
     assert cost["frames_per_second"] == pytest.approx(1024 / cost["seconds"], rel=0.5, abs=2)
@@ -309,7 +310,7 @@ def test_the_command_names_the_variant() -> None:
     command = train.Run(preset, 7, Path("x")).command()
     assert command.endswith(f"--steps {preset.steps} --seed 7 --variant residual")
     other = configs.changed(preset, ["residual.scale=0.123"])
-    assert train.Run(other, 7, Path("x")).command().endswith("--config policy.json")
+    assert train.Run(other, 7, Path("x")).command().endswith("--config policy.onnx")
 
 
 def test_learning_improves_the_return(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from short_runs import ID, tiny
 
 from agents.__main__ import main
 from agents.export import export
+from agents.policies import policy_file
 from agents.settings import presets as configs
 from agents.settings.settings import SettingsError
 from agents.training import sources, sweep, train
@@ -157,19 +158,18 @@ def test_other_settings_are_not_mixed_up(tmp_path: Path, ppo: tuple[object, Path
             other.finished()
 
 
-def test_a_policy_without_its_own_card_is_made_again(
+def test_a_policy_without_its_own_record_is_made_again(
     tmp_path: Path, whole: dict[int, bytes]
 ) -> None:
     """A process may be killed between the two files."""
     run = train.Run(CONFIG, 3, tmp_path / "there")
     train.train_to_the_end(run, Console(quiet=True))
     training = sweep.Training(CONFIG, 3, run.folder)
-    card, policy = run.folder / "policy.json", run.folder / "policy.onnx"
-    good = card.read_text()
+    record, policy = run.folder / "policy.json", run.folder / "policy.onnx"
     assert training.finished()
-    card.write_text(json.dumps({**json.loads(good), "steps": 7}))
+    record.write_text(json.dumps({**json.loads(record.read_text()), "sha256": "7"}))
     assert not training.finished()
-    for spoil in (card.unlink, policy.unlink):
+    for spoil in (record.unlink, policy.unlink):
         spoil()
         assert not training.finished()
         report = sweep.run([training], Cluster())
@@ -178,11 +178,11 @@ def test_a_policy_without_its_own_card_is_made_again(
     assert policy.read_bytes() == whole[3]
 
 
-def test_the_card_is_written_before_the_policy(
+def test_the_record_is_written_before_the_policy(
     ppo: tuple[Any, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     written: list[str] = []
-    monkeypatch.setattr(export, "write_atomically", lambda path, _: written.append(path.name))
+    monkeypatch.setattr(policy_file, "write_atomically", lambda path, _: written.append(path.name))
     export.export_policy(ppo[0], tmp_path / "policy.onnx")
     assert written == ["policy.json", "policy.onnx"]
 

@@ -237,7 +237,7 @@ def test_knobs_that_a_search_found_are_of_the_artefact() -> None:
     assert len(codes) == 3
 
 
-NEEDED = {"policy.py", "residual.py", "catalogue.py", "controllers.py", "onnx_file.py"}
+NEEDED = {"policy.py", "residual.py", "catalogue.py", "controllers.py", "policy_file.py"}
 
 
 @pytest.mark.parametrize("kind", ["learned", "residual"])

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from agents.training import seeds
+from agents.settings import seeds
 from baselines.core import tuned
 from baselines.core.knobs import Knobs
 from benchmarks.runs import tuning

@@ -6,8 +6,11 @@ could still reach beyond itself: weights in other files, operators of other vend
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
+import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +18,10 @@ from typing import Any
 import onnx
 import onnx.shape_inference
 
+POLICY, RECORD = "policy.onnx", "policy.json"
+"""Files of a finished run."""
+TEMPORARY = ".tmp"
+"""Suffix of files that are being written."""
 MOST_BYTES = 5_000_000
 MOST_NUMBERS = 100_000
 CARD = "pam_policy"
@@ -77,22 +84,60 @@ def read(path: str | Path) -> PolicyFile:
         raise PolicyFileError(f"{path.name}: {error}") from error
 
 
-def finished(path: str | Path) -> dict[str, Any] | None:
-    """Return the card of a policy that is there whole, None where a file is missing or older.
+def write_policy(path: Path, data: bytes, record: Mapping[str, Any]) -> None:
+    """Write a policy and, before it, its record with the policy's SHA-256.
+
+    A process that is killed at any moment leaves no policy that :func:`finished` accepts without
+    its record.
 
     Parameters
     ----------
-    path : str or Path
-        Of the policy; its card lies beside it, with what the training cost.
+    path : Path
+        ``*.onnx``; the record goes to ``*.json``.
+    data : bytes
+        Of the policy.
+    record : mapping
+        Of the training: cost, and the author if named.
     """
+    said = {**record, "sha256": hashlib.sha256(data).hexdigest()}
+    text = json.dumps(said, indent=1, sort_keys=True) + "\n"
+    write_atomically(path.with_suffix(".json"), text.encode())
+    write_atomically(path, data)
+
+
+def record_of(path: Path) -> dict[str, Any]:
+    """Return the training record beside a policy; empty where there is none."""
+    try:
+        record = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return record if isinstance(record, dict) else {}
+
+
+def finished(path: str | Path) -> dict[str, Any] | None:
+    """Return the card of a policy, None unless both its files are there and agree."""
     path = Path(path)
     try:
-        beside = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
-        inside = read(path).card
-    except (OSError, ValueError):
+        file = read(path)
+    except PolicyFileError:
         return None
-    known = isinstance(beside, dict) and {key: beside.get(key) for key in inside} == inside
-    return inside if known else None
+    same = record_of(path).get("sha256") == hashlib.sha256(file.data).hexdigest()
+    return file.card if same else None
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """Replace a file by ``data``: a reader finds the old bytes or the new ones, never a part."""
+    temporary = path.with_name(f"{path.name}.{os.getpid()}{TEMPORARY}")
+    with temporary.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+    temporary.replace(path)
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
 
 
 def _refuse_code(name: str, data: bytes) -> None:
