@@ -199,7 +199,7 @@ def verify(
     from sweeps.engine import Cluster
 
     paths = [_row_path(name) for name in row]
-    paths += sorted(rows.RESULTS.glob("*--*.json")) if all else []
+    paths += rows.files() if all else []
     if not paths:
         raise ValueError("name a row, or give --all")
     verdicts, refusal = [], verified.refusal()
@@ -220,9 +220,9 @@ def verify(
 def _row_path(name: str) -> Path:
     """Return the file of a row by its path or its name."""
     given = Path(name)
-    path = given if given.is_file() else rows.RESULTS / f"{given.stem}.json"
+    path = given if given.is_file() else rows.path_of(name)
     if not path.is_file():
-        raise ValueError(f"there is no row {name!r}; {given.stem} would be {path}")
+        raise ValueError(f"there is no row {name!r}; its file would be {path}")
     return path
 
 

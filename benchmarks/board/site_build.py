@@ -11,7 +11,7 @@ from benchmarks.board import leaderboard, plots, site_data
 from benchmarks.identity.hashing import plain
 from benchmarks.runs import rows
 from benchmarks.runs.rows import Row
-from benchmarks.runs.store import write_text
+from benchmarks.runs.store import read_json, write_text
 from benchmarks.scoring import standings
 
 ASSETS = Path(__file__).parent / "site_assets"
@@ -42,8 +42,8 @@ def build(results: Path = rows.RESULTS, out: Path = OUT) -> list[Path]:
     all_rows = leaderboard.load(results)
     texts = page(all_rows)
     for row in all_rows:
-        name = f"{row['row']}.json"
-        texts[f"rows/{name}"] = (results / name).read_text(encoding="utf-8")
+        stored = read_json(rows.path_of(str(row["row"]), results))
+        texts[f"rows/{row['row']}.json"] = _json(stored) + "\n"
     stale = {path for pattern in _OWNED for path in out.glob(pattern)}
     written = [out / name for name in texts]
     for path, text in zip(written, texts.values(), strict=True):

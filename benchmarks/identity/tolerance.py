@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.board import traces
 from benchmarks.identity import artefacts
 from benchmarks.identity.hashing import plain
-from benchmarks.runs import cells, provenance, rows
+from benchmarks.runs import cells, provenance, rows, traces
 from benchmarks.scoring.metrics import headline_of, of_track
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from filelock import FileLock
 
 from benchmarks.identity import artefacts
-from benchmarks.runs import cells, provenance
+from benchmarks.runs import cells, provenance, rows
 from benchmarks.runs.controllers import Entrant
 from benchmarks.runs.store import CHECKSUM, write_text
 
@@ -100,13 +100,14 @@ def note(path: Path, checksum: str, mode: str, sources: Mapping[str, str]) -> No
     sources : mapping of str
         Digests of what it was run again with; see :func:`benchmarks.runs.cells.sources`.
     """
-    with FileLock(path.parent / f".{FILE}.lock"):
-        before = read(path.parent)
-        if _is_stronger(before.get(path.stem), checksum, mode, sources):
+    folder, name = path.parents[1], rows.name_of(path)
+    with FileLock(folder / f".{FILE}.lock"):
+        before = read(folder)
+        if _is_stronger(before.get(name), checksum, mode, sources):
             return
-        known = {name: entry for name, entry in before.items() if name != path.stem}
+        known = {row: entry for row, entry in before.items() if row != name}
         if checksum:
-            known[path.stem] = {
+            known[name] = {
                 "checksum": checksum,
                 "commit": provenance.commit(),
                 "sources": dict(sources),
@@ -115,7 +116,7 @@ def note(path: Path, checksum: str, mode: str, sources: Mapping[str, str]) -> No
                 "mode": mode,
             }
         if known != before:
-            write_text(path.parent / FILE, json.dumps(known, indent=1, sort_keys=True) + "\n")
+            write_text(folder / FILE, json.dumps(known, indent=1, sort_keys=True) + "\n")
 
 
 def _is_stronger(

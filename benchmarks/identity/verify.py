@@ -7,7 +7,6 @@ that it was made elsewhere may differ in last digits, and can at best be verifie
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,7 +21,7 @@ from benchmarks.identity.tolerance import differences
 from benchmarks.runs import cells, replay, rows
 from benchmarks.runs.cells import Cell, cells_of
 from benchmarks.runs.controllers import Entrant, find
-from benchmarks.runs.store import CHECKSUM, comparable, fault
+from benchmarks.runs.store import CHECKSUM, comparable, fault, read_json
 from benchmarks.scenarios import scenario as scenarios
 from benchmarks.scenarios.scenario import ScenarioSet
 from sweeps import engine
@@ -94,10 +93,10 @@ def verify(
     if compare not in COMPARISONS:
         raise ValueError(f"compare: {compare!r} is none of {', '.join(COMPARISONS)}")
     verdict = Verdict(
-        path.stem, verified.ELSEWHERE if compare == verified.ELSEWHERE else verified.BITS
+        rows.name_of(path), verified.ELSEWHERE if compare == verified.ELSEWHERE else verified.BITS
     )
     try:
-        stored = json.loads(path.read_bytes())
+        stored = read_json(path)
         rows.check_schema(stored, path)
     except (OSError, ValueError, AttributeError, TypeError) as error:
         verdict.drifted.append(f"the file cannot be read: {error}")

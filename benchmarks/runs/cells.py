@@ -18,11 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.board import traces
 from benchmarks.identity import artefacts, trainings
 from benchmarks.identity.audit import Audit
 from benchmarks.identity.hashing import arrays_digest, digest
-from benchmarks.runs import controllers, knowledge, provenance, rollout
+from benchmarks.runs import controllers, knowledge, provenance, rollout, traces
 from benchmarks.runs.controllers import Entrant
 from benchmarks.scenarios.scenario import Scenario, ScenarioSet
 from benchmarks.scenarios.scenario_env import make_batch, make_env, model_of, plant_digests

@@ -41,7 +41,7 @@ def _score(path: Path) -> str:
         mean, low, high = (factor * scores[headline][name] for name in ("mean", "low", "high"))
         return f"{mean:.3f} {unit} [{low:.3f}, {high:.3f}]"
 
-    said = f"{path.stem}: RMS {words(row['aggregate'])}"
+    said = f"{row['row']}: RMS {words(row['aggregate'])}"
     if row["failures"]:
         said += f", {row['failures']} of {len(rows.episodes_of(row))} episodes failed"
     if row["audit"]:

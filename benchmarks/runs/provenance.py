@@ -34,7 +34,7 @@ SCORING = (
     "runs/knowledge.py",
     "scenarios/scenario_env.py",
     "identity/source_code.py",
-    "board/traces.py",
+    "runs/traces.py",
     "identity/trainings.py",
     *METRICS,
 )

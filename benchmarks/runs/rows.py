@@ -56,9 +56,29 @@ def shown(content: Mapping[str, Any]) -> tuple[str, float]:
     return str(how["unit"]), float(how["factor"])
 
 
+SUFFIX = ".json.xz"
+"""Of a row's file."""
+
+
 def row_name(track: str, controller: str) -> str:
-    """Return the name of a row and of its file."""
+    """Return the name of a row."""
     return f"{track}--{controller}"
+
+
+def path_of(name: str, folder: Path = RESULTS) -> Path:
+    """Return the file of a row in a folder of rows: one folder a track, one file a controller."""
+    track, _, controller = name.partition("--")
+    return folder / track / f"{controller}{SUFFIX}"
+
+
+def name_of(path: Path) -> str:
+    """Return the name of the row in a file."""
+    return row_name(path.parent.name, path.name.removesuffix(SUFFIX))
+
+
+def files(folder: Path = RESULTS) -> list[Path]:
+    """Return the files of all rows of a folder, sorted."""
+    return sorted(folder.glob(f"*/*{SUFFIX}"))
 
 
 Record = Mapping[str, Any]
@@ -262,7 +282,7 @@ def breakdown(track: ScenarioSet, episodes: Sequence[Mapping[str, Any]]) -> dict
 
 def save(row: Row, folder: Path = RESULTS) -> Path:
     """Write a row under its name and return the path."""
-    path = folder / f"{row['row']}.json"
+    path = path_of(str(row["row"]), folder)
     write_record(path, row)
     return path
 
@@ -285,7 +305,7 @@ def check_schema(row: Record, path: Path) -> None:
 
     Names become names of files and commands, so that nothing but plain ones may be in them.
     """
-    again = f"run it again: {command(path.stem)}"
+    again = f"run it again: {command(name_of(path))}"
     if row.get("schema") != SCHEMA:
         raise ValueError(
             f"{path}: not a row of schema {SCHEMA}, but of {row.get('schema')!r}; {again}"
@@ -297,7 +317,7 @@ def check_schema(row: Record, path: Path) -> None:
     if missing:
         raise ValueError(f"{path}: a row without {', '.join(missing)}; {again}")
     track, controller = str(row["scenarios"]["name"]), str(row["controller"]["name"])
-    names = {str(row["row"]), path.stem, row_name(track, controller)}
+    names = {str(row["row"]), name_of(path), row_name(track, controller)}
     plain = all(_NAME.fullmatch(name) for name in (track, controller))
     if len(names) > 1 or not plain:
         raise ValueError(
@@ -329,7 +349,7 @@ def load_all(folder: Path = RESULTS) -> list[Row]:
         If one is damaged, of an environment version that is not here, or of another task than
         the other rows of its track: a board leaves nothing out silently and mixes nothing.
     """
-    found = [load(path) for path in sorted(folder.glob("*--*.json"))]
+    found = [load(path) for path in files(folder)]
     for row in found:
         tasks.check_version(row["env"]["id"], row["row"])
     check_together(found)

@@ -1,16 +1,20 @@
-"""Results on disk that are either whole or absent.
+"""Records on disk, written atomically and with a checksum.
 
-A file is written under a temporary name, flushed to the disk and renamed, so that a process that
-is killed leaves the old file or the new one. Every file carries a checksum over what is compared
-(all but ``volatile``); one that does not match is set aside and computed again.
+A file is written under a temporary name, flushed to the disk and renamed, so that a killed process
+leaves the old file or the new one. Every record carries a checksum over its comparable part (all
+but ``volatile``); a cell whose checksum does not match is set aside and computed again.
+
+A file that ends in ``.xz`` is compressed JSON and holds the episodes as columns: of a list of
+episodes with the same keys, the list of values of each key. ``xz -dc FILE`` shows its text.
 """
 
 from __future__ import annotations
 
 import json
+import lzma
 import os
 import socket
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +24,8 @@ from benchmarks.identity.hashing import digest, plain
 
 VOLATILE = "volatile"
 CHECKSUM = "checksum"
+COMPRESSED = ".xz"
+EPISODES, SCORES = "episodes", "scores"
 _SUFFIX = ".tmp"
 
 
@@ -57,12 +63,76 @@ def seal(record: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def write_record(path: Path, record: Mapping[str, Any]) -> None:
-    """Write a record as JSON with its checksum."""
-    write_text(path, json.dumps(seal(record), indent=1, sort_keys=True, allow_nan=False) + "\n")
+    """Write a record as JSON with its checksum; see :func:`write_json`."""
+    write_json(path, seal(record))
+
+
+def write_json(path: Path, record: Mapping[str, Any]) -> None:
+    """Write a record as JSON; compressed and with episodes as columns if the path ends in .xz."""
+    if path.suffix != COMPRESSED:
+        write_text(path, json.dumps(record, indent=1, sort_keys=True, allow_nan=False) + "\n")
+        return
+    packed = {k: columns(v) if k == EPISODES else v for k, v in record.items()}
+    text = json.dumps(packed, separators=(",", ":"), sort_keys=True, allow_nan=False)
+    write_bytes(path, lzma.compress(text.encode() + b"\n"))
+
+
+def read_json(path: Path) -> Any:
+    """Return the content of a JSON file, compressed or not; its checksum is not looked at.
+
+    Raises
+    ------
+    ValueError
+        If the file is not JSON.
+    """
+    content = path.read_bytes()
+    try:
+        if path.suffix != COMPRESSED:
+            return json.loads(content)
+        held = json.loads(lzma.decompress(content))
+        packed = isinstance(held, dict) and EPISODES in held
+        return {**held, EPISODES: from_columns(held[EPISODES])} if packed else held
+    except (ValueError, TypeError, LookupError, EOFError, lzma.LZMAError) as error:
+        raise ValueError(f"{path}: not JSON ({error})") from error
+
+
+def columns(episodes: Any) -> Any:
+    """Return episodes as columns, or as they are where their keys differ.
+
+    Parameters
+    ----------
+    episodes : list of dict
+        Each with ``scores``, a mapping from metric to number.
+    """
+    if not _alike(episodes) or not _alike([episode.get(SCORES) for episode in episodes]):
+        return episodes
+    found = {key: [episode[key] for episode in episodes] for key in episodes[0] if key != SCORES}
+    metrics = episodes[0][SCORES]
+    return found | {SCORES: {m: [episode[SCORES][m] for episode in episodes] for m in metrics}}
+
+
+def from_columns(packed: Any) -> Any:
+    """Return the episodes whose columns :func:`columns` made."""
+    if not isinstance(packed, dict):
+        return packed
+    others = {key: values for key, values in packed.items() if key != SCORES}
+    scores = _rows(packed[SCORES])
+    return [{**episode, SCORES: s} for episode, s in zip(_rows(others), scores, strict=True)]
+
+
+def _alike(records: Any) -> bool:
+    """Return whether these are mappings, at least one, all with the same keys."""
+    if not isinstance(records, Sequence) or not records:
+        return False
+    return all(isinstance(r, Mapping) and r and r.keys() == records[0].keys() for r in records)
+
+
+def _rows(table: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
+    return [dict(zip(table, values, strict=True)) for values in zip(*table.values(), strict=True)]
 
 
 def fault(record: Any) -> str | None:
-    """Return what is wrong with a record that was read, ``None`` if nothing."""
+    """Return the fault of a record that was read, ``None`` if it has none."""
     if not isinstance(record, dict):
         return "not a JSON object"
     if CHECKSUM not in record:
@@ -78,12 +148,9 @@ def read_record(path: Path) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If the file is not JSON, or is not what was written.
+        If the file is not JSON, or its checksum does not match.
     """
-    try:
-        record = json.loads(path.read_bytes())
-    except (ValueError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: not JSON ({error})") from error
+    record = read_json(path)
     wrong = fault(record)
     if wrong:
         raise ValueError(f"{path}: {wrong}; run the row again")
@@ -92,12 +159,12 @@ def read_record(path: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Store:
-    """A folder of records, each named by the digest of what it is the result of."""
+    """A folder of records, each named by the digest of its inputs."""
 
     folder: Path
 
     def path(self, key: str) -> Path:
-        """Return where the record ``key`` lies."""
+        """Return the file of the record ``key``."""
         return self.folder / f"{key}.json"
 
     def load(self, key: str) -> dict[str, Any] | None:
@@ -111,7 +178,7 @@ class Store:
             return None
 
     def sound(self, key: str) -> bool:
-        """Return whether the record ``key`` is there and whole; nothing is changed."""
+        """Return whether the record ``key`` exists and is whole; nothing is changed."""
         try:
             self._read(key)
         except (FileNotFoundError, ValueError):
@@ -149,9 +216,9 @@ class Store:
 
 
 def sweep(folder: Path) -> int:
-    """Remove what processes of this machine left half-written in ``folder``."""
+    """Remove the half-written files that processes of this machine left in ``folder``."""
     removed = 0
-    for file in folder.glob(f".*{_SUFFIX}") if folder.is_dir() else ():
+    for file in folder.rglob(f".*{_SUFFIX}") if folder.is_dir() else ():
         *_, host, process = file.name[: -len(_SUFFIX)].rsplit(".", 2)
         if host == socket.gethostname() and not _alive(process):
             file.unlink(missing_ok=True)

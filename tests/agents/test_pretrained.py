@@ -222,7 +222,7 @@ def test_benchmarks_find_it_among_the_controllers() -> None:
 def test_the_knees_policies_do_better_than_classical_ones(
     row: str, other: str, share: float
 ) -> None:
-    ours, theirs = (rows.load(rows.RESULTS / f"{name}.json") for name in (row, other))
+    ours, theirs = (rows.load(rows.path_of(name)) for name in (row, other))
     assert ours["failures"] == 0
     errors = [r["aggregate"]["rms_error"]["mean"] for r in (ours, theirs)]
     assert errors[0] < share * errors[1]

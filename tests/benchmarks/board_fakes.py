@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.board import traces
-from benchmarks.runs import rows
+from benchmarks.runs import rows, traces
 
 CONTENT: dict[str, Any] = {
     "schema": 1,

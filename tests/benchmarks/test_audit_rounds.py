@@ -131,7 +131,7 @@ def test_the_command_draws_runs_and_tells(
 
 def lasting(folder: Path) -> dict[str, object]:
     """Return what is compared of the rows of a folder."""
-    return {path.stem: comparable(read_record(path)) for path in folder.iterdir()}
+    return {rows.name_of(path): comparable(read_record(path)) for path in rows.files(folder)}
 
 
 def test_what_has_changed_reports_itself_until_the_next_round(board: Path) -> None:

@@ -10,7 +10,7 @@ import bench_fakes
 from benchmarks.board import accessors as views
 from benchmarks.board import leaderboard, site_build
 from benchmarks.identity import verified
-from benchmarks.runs.store import CHECKSUM
+from benchmarks.runs.store import CHECKSUM, read_json
 from benchmarks.scoring import standings
 from tests.benchmarks.row_helpers import commit, draw, place, run_row
 
@@ -21,7 +21,7 @@ def test_a_round_its_entrants_and_who_is_outside_of_it(tmp_path: Path) -> None:
         draw(tmp_path, "trained", "low", "integral")
         path = run_row(tmp_path, "trained")
         run_row(tmp_path, "low")
-        held = json.loads(path.read_text())
+        held = read_json(path)
         verified.note(path, held[CHECKSUM], verified.BITS, held["made_with"]["sources"])
         loaded = leaderboard.load(tmp_path / "out")
         (tracks,) = standings.tracks(loaded).values()
@@ -35,7 +35,7 @@ def test_a_round_its_entrants_and_who_is_outside_of_it(tmp_path: Path) -> None:
         assert "Audit round 1, drawn" in text
         assert "30 episodes that nobody could tune to, 2 of 3 rows" in text
         assert "In the round and without a row: integral." in text
-        day = verified.read(path.parent)[path.stem]["date"]
+        day = verified.read(tmp_path / "out")["tiny--trained"]["date"]
         assert f"| verified {day} |" in text
 
         for row in found.inside:  # the row's own record and the board say the same
@@ -49,7 +49,9 @@ def test_a_round_its_entrants_and_who_is_outside_of_it(tmp_path: Path) -> None:
             assert (middle.value, middle.low) == (stated["iqm"], stated["iqm_low"])
 
         site_build.build(tmp_path / "out", tmp_path / "site")
-        assert (tmp_path / "site" / "rows" / path.name).read_bytes() == path.read_bytes()
+        assert json.loads((tmp_path / "site/rows/tiny--trained.json").read_text()) == read_json(
+            path
+        )
 
         bench_fakes.write_policies(tmp_path / "policies", 0.02, 0.06)
         older = leaderboard.board_text(leaderboard.load(tmp_path / "out"))

@@ -14,12 +14,11 @@ import numpy as np
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.board import traces
 from benchmarks.identity import audit, tasks, verified, verify
 from benchmarks.identity.hashing import digest, plain
-from benchmarks.runs import cells, provenance, replay, rows
+from benchmarks.runs import cells, provenance, replay, rows, traces
 from benchmarks.runs.controllers import available
-from benchmarks.runs.store import read_record, write_record
+from benchmarks.runs.store import read_json, read_record, write_json, write_record
 from benchmarks.scoring import metrics
 from benchmarks.scoring.metrics import of_track
 from pam_envs.envs.positioning import env as muscle_positioning
@@ -45,7 +44,7 @@ def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 def verdict_of(board: Path, name: str, compare: str = "bits") -> verify.Verdict:
-    return verify.verify(board / "out" / f"tiny--{name}.json", compare=compare)
+    return verify.verify(rows.path_of(f"tiny--{name}", board / "out"), compare=compare)
 
 
 @pytest.fixture
@@ -56,7 +55,7 @@ def forged(board: Path) -> Iterator[Callable[..., verify.Verdict]]:
     def alter(
         name: str, change: Callable[[Row], None], compare: str = "bits", loads: bool = True
     ) -> verify.Verdict:
-        path = board / "out" / f"tiny--{name}.json"
+        path = rows.path_of(f"tiny--{name}", board / "out")
         path.write_bytes(kept.setdefault(path, path.read_bytes()))
         row = read_record(path)
         before = copy.deepcopy(row)
@@ -134,8 +133,8 @@ def test_a_policy_whose_digest_was_swapped_in_the_row(forged: Any) -> None:
 
 
 def test_another_controller_under_the_name(board: Path) -> None:
-    path = board / "out" / "tiny--low.json"
-    row = read_record(board / "out" / "tiny--integral.json")
+    path = rows.path_of("tiny--low", board / "out")
+    row = read_record(rows.path_of("tiny--integral", board / "out"))
     row["controller"]["name"], row["row"] = "low", "tiny--low"
     write_record(path, row)
     verdict = verdict_of(board, "low")
@@ -329,10 +328,10 @@ def test_a_label_that_says_less_than_the_controller_knows(forged: Any) -> None:
 
 
 def test_a_row_edited_by_hand_and_one_that_is_none(board: Path, tmp_path: Path) -> None:
-    path = tmp_path / "tiny--integral.json"
-    row = json.loads((board / "out" / path.name).read_bytes())
+    path = rows.path_of("tiny--integral", tmp_path)
+    row = read_json(rows.path_of("tiny--integral", board / "out"))
     row["failures"] = 0.5
-    path.write_text(json.dumps(row))
+    write_json(path, row)
     tell(verify.verify(path), "file: the checksum does not match")
     path.write_text("no row")
     tell(verify.verify(path), "cannot be read")
@@ -475,7 +474,7 @@ def turned(board: Path) -> Iterator[Row]:
 
 
 def resealed(board: Path, row: Row) -> verify.Verdict:
-    path = board / "turned" / "tiny--tuned.json"
+    path = rows.path_of("tiny--tuned", board / "turned")
     write_record(path, row)
     return verify.verify(path, compare="elsewhere")
 
@@ -493,7 +492,7 @@ def test_elsewhere_a_knob_that_was_turned_after_the_round_is_found(
 ) -> None:
     """Scores, means and episodes are those of the round, whose artefact the row says it is."""
     assert turned["audit"] is None  # honest, it is outside of the round
-    old = read_record(board / "out" / "tiny--tuned.json")
+    old = read_record(rows.path_of("tiny--tuned", board / "out"))
     row = copy.deepcopy(old)
     if kept != "numbers":
         for part in ("digest", "parameters"):
@@ -632,7 +631,9 @@ def test_elsewhere_a_policy_that_answers_otherwise_is_found(
 def test_the_command_says_which_row_drifted_and_notes_which_held(
     board: Path, forged: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    honest, other = (str(board / "out" / f"tiny--{name}.json") for name in ("integral", "raises"))
+    honest, other = (
+        str(rows.path_of(f"tiny--{name}", board / "out")) for name in ("integral", "raises")
+    )
     assert main(["verify", honest, other, "--jobs", "1"]) == 0
     assert "tiny--integral: holds" in capsys.readouterr().out
     found = verified.read(board / "out")
@@ -660,7 +661,7 @@ def test_the_command_says_which_row_drifted_and_notes_which_held(
 
 
 def test_what_held_to_the_last_bit_stays_noted_so(tmp_path: Path) -> None:
-    path = tmp_path / "a--b.json"
+    path = rows.path_of("a--b", tmp_path)
 
     def noted(checksum: str, mode: str, **sources: str) -> str | None:
         verified.note(path, checksum, mode, sources)
@@ -679,7 +680,7 @@ def test_what_held_to_the_last_bit_stays_noted_so(tmp_path: Path) -> None:
 def test_the_command_notes_nothing_where_code_is_not_committed(
     board: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path, noted = str(board / "out" / "tiny--integral.json"), board / "out" / verified.FILE
+    path, noted = str(rows.path_of("tiny--integral", board / "out")), board / "out" / verified.FILE
     assert main(["verify", path, "--jobs", "1"]) == 0
     before = noted.read_bytes()
     assert json.loads(before)["tiny--integral"]["mode"] == "bits"

@@ -21,7 +21,7 @@ from benchmarks.identity import verify
 from benchmarks.runs import rows
 from benchmarks.runs.controllers import find
 from benchmarks.runs.runner import Options, Report, run
-from benchmarks.runs.store import Store, comparable, read_record, seal
+from benchmarks.runs.store import Store, comparable, read_json, read_record, seal, write_json
 from benchmarks.scenarios.scenario import ScenarioSet
 from benchmarks.scoring import metrics, statistics
 from tests.sweeps.processes_of import wait_until
@@ -173,9 +173,9 @@ def test_an_interrupted_run_goes_on_and_gives_the_rows_of_one_that_was_not(
 
 def test_a_row_edited_by_hand_fails_its_checksum(track: ScenarioSet, folder: Path) -> None:
     (path,) = score(track, folder, "low").rows
-    row = json.loads(path.read_text())
+    row = read_json(path)
     row["row"] = "better"
-    path.write_text(json.dumps(row))
+    write_json(path, row)
     with pytest.raises(ValueError, match="checksum"):
         rows.load(path)
     assert not verify.verify(path).holds

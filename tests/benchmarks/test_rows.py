@@ -131,7 +131,7 @@ def test_an_entry_without_its_policies_is_no_controller(
 def test_a_row_of_the_former_schema_is_to_be_run_again(
     classical: dict[str, Any], tmp_path: Path
 ) -> None:
-    path = tmp_path / "tiny--integral.json"
+    path = rows.path_of("tiny--integral", tmp_path)
     write_record(path, {**classical, "schema": 1})
     with pytest.raises(ValueError, match=r"schema 3, but of 1; run it again: .*--track tiny"):
         rows.load(path)
@@ -147,8 +147,8 @@ def of_version(row: dict[str, Any], number: int) -> dict[str, Any]:
 def test_rows_of_two_versions_are_not_mixed(
     classical: dict[str, Any], board: Path, tmp_path: Path
 ) -> None:
-    write_record(tmp_path / "tiny--integral.json", classical)
-    write_record(tmp_path / "tiny--v1.json", of_version(classical, 1))
+    write_record(rows.path_of("tiny--integral", tmp_path), classical)
+    write_record(rows.path_of("tiny--v1", tmp_path), of_version(classical, 1))
     with pytest.raises(ValueError, match=r"Positioning-v1, and this checkout has .*Positioning-v0"):
         rows.load_all(tmp_path)
     spec = gym.spec("PAM/MusclePositioning-v0")
@@ -193,11 +193,11 @@ def test_names_that_lead_elsewhere_or_disagree_are_refused(
 ) -> None:
     row = copy.deepcopy(classical)
     NAMED[what](row)
-    write_record(tmp_path / "tiny--integral.json", row)
+    write_record(rows.path_of("tiny--integral", tmp_path), row)
     with pytest.raises(ValueError, match="have to agree, in letters, digits and _"):
-        rows.load(tmp_path / "tiny--integral.json")
+        rows.load(rows.path_of("tiny--integral", tmp_path))
     row["scenarios"]["name"], row["controller"]["name"] = "a/b", "c"
-    path = tmp_path / "other.json"
+    path = rows.path_of("tiny--other", tmp_path)
     write_record(path, {**row, "row": "a/b--c"})
     with pytest.raises(ValueError, match="have to agree"):
         rows.load(path)
@@ -206,7 +206,7 @@ def test_names_that_lead_elsewhere_or_disagree_are_refused(
 def test_a_copy_under_another_name_is_no_row(
     classical: dict[str, Any], board: Path, tmp_path: Path
 ) -> None:
-    write_record(tmp_path / "tiny--mine.json", classical)
+    write_record(rows.path_of("tiny--mine", tmp_path), classical)
     with pytest.raises(ValueError, match="holds 'tiny--integral'"):
         rows.load_all(tmp_path)
 
@@ -214,14 +214,14 @@ def test_a_copy_under_another_name_is_no_row(
 def test_a_row_of_an_unknown_track_is_refused(
     classical: dict[str, Any], board: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write_record(tmp_path / "tiny--integral.json", classical)
+    write_record(rows.path_of("tiny--integral", tmp_path), classical)
     monkeypatch.setattr(scenarios, "FOLDER", tmp_path)
     with pytest.raises(ValueError, match="this checkout has no track 'tiny'"):
-        rows.load(tmp_path / "tiny--integral.json")
+        rows.load(rows.path_of("tiny--integral", tmp_path))
 
 
 def test_what_a_row_lacks_is_named(classical: dict[str, Any], board: Path, tmp_path: Path) -> None:
-    path = tmp_path / "tiny--integral.json"
+    path = rows.path_of("tiny--integral", tmp_path)
     row = copy.deepcopy(classical)
     del row["aggregate"], row["env"]["digest"]
     write_record(path, row)
@@ -334,4 +334,4 @@ def test_what_a_controller_raises_is_a_failure_with_its_words(board: Path) -> No
     (words,) = {episode["failure"] for episode in row["episodes"]}
     assert words.startswith("KeyError: 'no such thing at 0x...")
     assert {episode["steps"] for episode in row["episodes"]} == {50}
-    assert read_record(board / "out" / "tiny--raises.json")["failures"] == 4
+    assert read_record(rows.path_of("tiny--raises", board / "out"))["failures"] == 4

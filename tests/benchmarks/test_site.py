@@ -14,9 +14,11 @@ import board_fakes as fakes
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.board import leaderboard, site_build, site_data, traces
+from benchmarks.board import leaderboard, site_build, site_data
+from benchmarks.runs import rows, traces
 from benchmarks.runs.controllers import find
 from benchmarks.runs.runner import Options, run
+from benchmarks.runs.store import write_json
 from benchmarks.scenarios.scenario import ScenarioSet
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
@@ -266,7 +268,7 @@ def test_the_page_is_the_same_when_it_is_built_again(
     made = {"rows": page_rows()}
     monkeypatch.setattr(leaderboard, "load", lambda folder: made["rows"])
     for row in made["rows"]:
-        (tmp_path / f"{row['row']}.json").write_text(json.dumps({"the row": row["row"]}))
+        write_json(rows.path_of(row["row"], tmp_path), {"the row": row["row"]})
     written = site_build.build(tmp_path, tmp_path / "out")
     assert written[0].name == "index.html"
     raw = tmp_path / "out" / "rows" / "short_nominal--pid.json"

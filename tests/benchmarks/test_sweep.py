@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+import json
 import signal
 import subprocess
 import sys
@@ -17,6 +17,7 @@ from benchmarks.__main__ import main
 from benchmarks.runs import cells, rows
 from benchmarks.runs.controllers import find
 from benchmarks.runs.runner import Options, run
+from benchmarks.runs.store import read_json
 from benchmarks.scenarios import scenario as scenarios
 from benchmarks.scenarios.scenario import ScenarioSet
 from sweeps import engine
@@ -110,12 +111,10 @@ class Driver:
     def rows(self) -> dict[str, str]:
         """Return the rows' texts without times, host and date."""
         found = {}
-        for path in sorted((self.folder / "out").glob("*.json")):
-            text, count = re.subn(
-                r'^ "volatile": \{.*?^ \}', "", path.read_text(), flags=re.M | re.S
-            )
-            assert count == 1
-            found[path.name] = text
+        for path in rows.files(self.folder / "out"):
+            row = read_json(path)
+            del row["volatile"]
+            found[path.name] = json.dumps(row)
         return found
 
 
@@ -277,11 +276,11 @@ def test_a_row_is_written_as_soon_as_its_cells_are_there(
     def looking(act: object, groups: Iterable[cells.Group], cluster: object) -> Iterator[Done]:
         for group in groups:
             yield Done(group.key, cells.compute(group))
-            written.append(sorted(path.name for path in (folder / "out").glob("*.json")))
+            written.append([rows.name_of(path) for path in rows.files(folder / "out")])
 
     monkeypatch.setattr(engine, "run", looking)
     options = Options(jobs=1, out=folder / "out", cells=folder / "cells")
     report = run([(find("middle"), track), (find("low"), track)], options)
     assert [len(names) for names in written] == [0, 1, 1, 2]
-    assert written[1] == ["short--middle.json"]
-    assert [path.name for path in report.rows] == ["short--middle.json", "short--low.json"]
+    assert written[1] == ["short--middle"]
+    assert [rows.name_of(path) for path in report.rows] == ["short--middle", "short--low"]

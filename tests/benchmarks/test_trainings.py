@@ -85,7 +85,9 @@ def test_seeds_that_are_no_trainings_of_their_own_make_no_row(what: str, board: 
     (line,) = report.missing
     assert line.startswith("tiny--trained: trained: ")
     assert words in line
-    assert any(words in line for line in verify(board / "out" / "tiny--trained.json").drifted)
+    assert any(
+        words in line for line in verify(rows.path_of("tiny--trained", board / "out")).drifted
+    )
 
 
 def test_a_round_takes_no_copies(board: Path) -> None:

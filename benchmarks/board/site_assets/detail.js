@@ -18,13 +18,10 @@ function loaded(row) {
   }));
 }
 
-function unpack({ low, high, data }) {
-  const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));
-  const view = new DataView(bytes.buffer), step = (high - low || 1) / 65534;
-  return Array.from({ length: bytes.length / 2 }, (_, i) => {
-    const number = view.getInt16(2 * i, true);
-    return number === -32768 ? NaN : low + (number + 32767) * step;
-  });
+function unpack({ low, high, steps }) {
+  const unit = (high - low || 1) / 2000;
+  let place = 0;
+  return steps.map((step) => step === null ? NaN : low + (place += step) * unit);
 }
 
 function unpackAll(signals) {
