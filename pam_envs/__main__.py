@@ -66,18 +66,20 @@ class Identify:
 
 @dataclass
 class Diagnose:
-    """Say what the plant gets wrong on a recording, why, and write the better plant."""
+    """Diagnose model error from a recording and write the extended plant."""
 
     recording: tyro.conf.Positional[Path]
     """CSV file: a recording in time, or a table of settled readings (docs/recording.md)."""
     rig: Path | None = None
-    """YAML file that says what is known of the rig."""
+    """YAML file with the known properties of the rig."""
     out: Path = Path("diagnosis")
     """Folder for report.json, report.html and plant.yaml."""
     plant: Path | None = None
     """Plant file to begin with; default: the shipped muscle, scaled to the rig's."""
+    causes: Path | None = None
+    """Folder of further causes, one a file (docs/diagnosis_causes.md)."""
     seed: int = 0
-    """Of all draws."""
+    """Seed of all random draws."""
     quiet: bool = False
     """Show no progress."""
 
@@ -212,13 +214,15 @@ def diagnose(options: Diagnose) -> None:
     if not isinstance(data, Recording):
         _diagnose_readings(data, options)
         return
+    from pam_envs.diagnosis.causes import catalogue, causes_in
     from pam_envs.diagnosis.diagnosis import diagnose as run
     from pam_envs.plants.single_muscle.plant import SingleMuscle
 
     if rig.plant != SingleMuscle.family:
         raise Mistake(f"plant: {rig.plant!r} cannot be diagnosed; there is: {SingleMuscle.family}")
     plant = None if options.plant is None else SingleMuscle.from_yaml(options.plant)
-    found = run(data, plant, rig=rig, seed=options.seed, progress=not options.quiet)
+    causes = (*catalogue(), *(causes_in(options.causes) if options.causes else ()))
+    found = run(data, plant, rig=rig, causes=causes, seed=options.seed, progress=not options.quiet)
     print(f"{found.verdict}: {found.text}")
     for warning in found.report["warnings"]:
         print(f"warning: {warning}")

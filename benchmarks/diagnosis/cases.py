@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import BAR, MM, Rig
-from pam_envs.diagnosis.decide.isolability import complement, projected
-from pam_envs.diagnosis.decide.search import Blocks
+from pam_envs.diagnosis.decide.isolability import base_subspace, projected
+from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.calibrate import calibrate
 from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, inputs_of, start_plant
 from tests.diagnosis import hidden
@@ -236,7 +236,7 @@ def ground_of(base: hidden.Base, campaign: hidden.Campaign) -> Ground:
     family = MuscleFamily(start_plant(sheet), inputs_of(recording, sheet))
     blocks = Blocks.make(recording.time, clean)
     _, problem, fitted = calibrate(family, clean, NOISE, blocks, recording.time)
-    return Ground(base, campaign, clean, complement(fitted.fit), problem.order)
+    return Ground(base, campaign, clean, base_subspace(fitted.fit), problem.order)
 
 
 def solve(ground: Ground, effect: hidden.Effect, wanted: float) -> tuple[float, Array] | None:
@@ -267,8 +267,8 @@ def _next(amplitude: float, size: float, wanted: float, low: float, high: float)
     guess = amplitude * wanted / max(size, 1e-6) if np.isfinite(size) else 0.5 * amplitude
     if np.isinf(high):
         return float(min(guess, 6.0 * amplitude, MOST_AMPLITUDE))
-    inside = low + 0.02 * (high - low) < guess < high - 0.02 * (high - low)
-    return float(guess if inside else 0.5 * (low + high))
+    may_be_within = low + 0.02 * (high - low) < guess < high - 0.02 * (high - low)
+    return float(guess if may_be_within else 0.5 * (low + high))
 
 
 def _draw(
@@ -360,11 +360,11 @@ FULL = Counts(
 )
 
 
-def first_seed(chosen: str, offset: int = 0) -> int:
+def first_seed(selected: str, offset: int = 0) -> int:
     """Return the first seed of a set; no two sets, and no two offsets, share any."""
     if not 0 <= offset < 100:
         raise ValueError(f"seed offset {offset} is outside [0, 99]; choose another")
-    return 10_000_000 * (SETS[chosen] + 1) + 100_000 * offset
+    return 10_000_000 * (SETS[selected] + 1) + 100_000 * offset
 
 
 def sizes_in(low: float, high: float, number: int, rng: np.random.Generator) -> Array:
@@ -373,7 +373,7 @@ def sizes_in(low: float, high: float, number: int, rng: np.random.Generator) -> 
     return np.asarray(rng.permutation(low * (high / low) ** parts))
 
 
-def cases(chosen: str = "small", offset: int = 0) -> list[Case]:
+def cases(selected: str = "small", offset: int = 0) -> list[Case]:
     """Return the cases of a set.
 
     Parameters
@@ -382,9 +382,9 @@ def cases(chosen: str = "small", offset: int = 0) -> list[Case]:
     offset : int
         Another number gives other seeds: freshly drawn cases.
     """
-    counts = SMALL if chosen == "small" else FULL
-    unknown = hidden.FINAL_UNKNOWN if chosen == "final" else hidden.TUNING_UNKNOWN
-    start = first_seed(chosen, offset)
+    counts = SMALL if selected == "small" else FULL
+    unknown = hidden.FINAL_UNKNOWN if selected == "final" else hidden.TUNING_UNKNOWN
+    start = first_seed(selected, offset)
     rng = np.random.default_rng(start)
     made = list(_wanted(counts, unknown, rng))
     numbered = [replace(case, seed=start + i) for i, case in enumerate(made)]

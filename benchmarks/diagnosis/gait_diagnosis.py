@@ -22,9 +22,10 @@ from benchmarks.diagnosis.gait_recording import GaitRecording, record
 from pam_envs.constants import GRAVITY
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.decide.rule import Rule
-from pam_envs.diagnosis.decide.search import EVERY, Blocks, Candidate, fit_base
 from pam_envs.diagnosis.decide.structure import Regressors
 from pam_envs.diagnosis.decide.verdict import Decision, decide
+from pam_envs.diagnosis.fit.blocks import EVERY, Blocks
+from pam_envs.diagnosis.fit.candidate import Candidate, fit_base
 from pam_envs.diagnosis.fit.least_squares import Free, Problem
 from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE
 

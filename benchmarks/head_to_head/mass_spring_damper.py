@@ -206,14 +206,14 @@ CAUSES = (
         "dry_friction",
         "dry friction of the guide",
         (
-            Form("sliding", (Term("friction.force", (0.5,)),), seeds=grid(FORCES)),
+            Form("sliding", (Term("friction.force", (0.5,)),), search=grid(FORCES)),
             Form(
                 "sliding and breakaway",
                 (
                     Term("friction.force", (0.5,)),
                     Term("friction.breakaway", (0.1,), amount=False),
                 ),
-                seeds=grid(FORCES, (0.1, 0.3)),
+                search=grid(FORCES, (0.1, 0.3)),
             ),
         ),
         signature="the error has the sign of the velocity, and a hold keeps it",

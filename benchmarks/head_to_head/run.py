@@ -24,8 +24,9 @@ from benchmarks.head_to_head.rig import NOISE, PERIOD, Oscillator, another, camp
 from benchmarks.identity.hashing import plain
 from benchmarks.runs.provenance import packages
 from pam_envs.diagnosis.decide.rule import Rule
-from pam_envs.diagnosis.decide.search import Blocks, Candidate, fit_base
 from pam_envs.diagnosis.decide.verdict import Decision, decide
+from pam_envs.diagnosis.fit.blocks import Blocks
+from pam_envs.diagnosis.fit.candidate import Candidate, fit_base
 from pam_envs.diagnosis.fit.least_squares import Problem, column_of
 
 Array = NDArray[np.float64]

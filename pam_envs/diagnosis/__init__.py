@@ -7,7 +7,7 @@ from typing import Any
 __all__ = ["Diagnosis", "diagnose", "diagnose_readings"]
 
 _HOMES = {
-    "Diagnosis": "pam_envs.diagnosis.decide.outcome",
+    "Diagnosis": "pam_envs.diagnosis.report.outcome",
     "diagnose": "pam_envs.diagnosis.diagnosis",
     "diagnose_readings": "pam_envs.diagnosis.static.diagnosis",
 }

@@ -66,13 +66,13 @@ class Form:
 
     name: str
     terms: tuple[Term, ...]
-    seeds: Callable[..., Sequence[Sequence[float]]] | None = None
+    search: Callable[..., Sequence[Sequence[float]]] | None = None
 
     @property
-    def looks(self) -> int:
+    def trials(self) -> int:
         """Among how many beginnings the best was chosen."""
         own = max(len(t.starts) for t in self.terms)
-        return int(getattr(self.seeds, "looks", own)) if self.seeds is not None else own
+        return int(getattr(self.search, "trials", own)) if self.search is not None else own
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,11 @@ class Cause:
     contains : tuple of str
         Causes that it can imitate in a limit: where both fit alike the simpler one is named.
     compensable : bool
-        Whether a controller that knows of it can do something about it.
+        Whether a controller that knows of it can reduce its effect on the true position; decided
+        before any controller was run.
+    settled : str
+        Why a table of settled readings cannot show it; ignored where such a table can
+        (:data:`pam_envs.diagnosis.static.models.TERMS`).
     """
 
     name: str
@@ -119,6 +123,7 @@ class Cause:
     sensor: str = ""
     contains: tuple[str, ...] = ()
     compensable: bool = False
+    settled: str = "settled readings have no time"
 
     def __post_init__(self) -> None:
         """Refuse a need that no recording is checked for."""

@@ -16,31 +16,32 @@ from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import audit
 from pam_envs.diagnosis.audit.noise import ChannelFloor, Floor, noise_floor
 from pam_envs.diagnosis.cause import Cause
-from pam_envs.diagnosis.causes import chosen
+from pam_envs.diagnosis.causes import selected
 from pam_envs.diagnosis.closed_loop import gain as loops
 from pam_envs.diagnosis.decide.held_out import HeldOut, choose, compared, hold_out, interleaved
 from pam_envs.diagnosis.decide.isolability import Isolability
-from pam_envs.diagnosis.decide.outcome import Diagnosis
 from pam_envs.diagnosis.decide.rule import Rule
-from pam_envs.diagnosis.decide.search import Blocks, Candidate
 from pam_envs.diagnosis.decide.structure import Regressors
-from pam_envs.diagnosis.decide.testable import not_testable, too_few, too_short
-from pam_envs.diagnosis.decide.verdict import Decision, decide, traces_of
+from pam_envs.diagnosis.decide.testable import not_testable, shortness_warning, too_few_testable
+from pam_envs.diagnosis.decide.verdict import Decision, decide, effect_traces
 from pam_envs.diagnosis.experiment.experiment import propose, rival_of
 from pam_envs.diagnosis.experiment.plans import Means
+from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.calibrate import calibrate
-from pam_envs.diagnosis.fit.fit_errors import explained
+from pam_envs.diagnosis.fit.candidate import Candidate
+from pam_envs.diagnosis.fit.fit_errors import fit_failures_explained
 from pam_envs.diagnosis.fit.least_squares import Fit, Problem, column_of
-from pam_envs.diagnosis.fit.progress import steps
 from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, identified, inputs_of, start_plant
 from pam_envs.diagnosis.fit.tolerance import (
     LOAD,
     PAYLOAD_ERROR,
     UNWEIGHED,
-    limit_of,
+    load_error_limit,
     may_be_load,
-    released,
+    refit_load,
 )
+from pam_envs.diagnosis.report.outcome import Diagnosis
+from pam_envs.diagnosis.report.progress import steps
 from pam_envs.diagnosis.report.report import plain
 from pam_envs.diagnosis.report.summary import report_of
 from pam_envs.diagnosis.report.summary_causes import judged
@@ -109,8 +110,8 @@ def diagnose(
     """
     started = clock.perf_counter()
     rule, sheet = rule or Rule(), rig or Rig()
-    asked = chosen(causes)
-    with explained(), steps(progress) as step:
+    asked = selected(causes)
+    with fit_failures_explained(), steps(progress) as step:
         step("checking the data")
         checked = audit(recording, sheet)
         if checked.problems:
@@ -248,11 +249,11 @@ class Study:
         if self.decision is None:
             return
         known, loads = self.sheet.tolerance.get(LOAD), self.recording.load / GRAVITY
-        limit = limit_of(loads, UNWEIGHED if known is None else known)
+        limit = load_error_limit(loads, UNWEIGHED if known is None else known)
         models = (self.decision.model, *self.decision.open_rivals)
         at_stake = any(may_be_load(self.problem, self.blocks, m, loads, known) for m in models)
         if at_stake and np.isfinite(limit):
-            self.base = released(self.problem, self.blocks, self.family, self.base, limit)
+            self.base = refit_load(self.problem, self.blocks, self.family, self.base, limit)
             self.causes = [c for c in self.causes if c.name != PAYLOAD_ERROR]
             self.decide(rule, seed)
 
@@ -261,8 +262,10 @@ class Study:
         moving = np.bincount(self.blocks.of, np.abs(np.diff(self.recording.command, prepend=0.0)))
         moved = int(np.sum(self.blocks.held_out & (moving > 0.0)))
         if moved < rule.least_blocks:
-            self.short = too_short(moved, rule.least_blocks)
-        if self.short or too_few(len(self.causes), len(self.causes) + len(self.not_testable)):
+            self.short = shortness_warning(moved, rule.least_blocks)
+        if self.short or too_few_testable(
+            len(self.causes), len(self.causes) + len(self.not_testable)
+        ):
             self.decision = Decision("insufficient", self.base)
             return
         self.decision = decide(
@@ -370,7 +373,7 @@ class Study:
                 if np.isfinite(m).any()
             }
 
-        effects = traces_of(self.problem, self.family, self.base, self.model)
+        effects = effect_traces(self.problem, self.family, self.base, self.model)
         return Traces(
             self.problem.time,
             r.segment,

@@ -20,7 +20,7 @@ from pam_envs.diagnosis import Diagnosis, diagnose
 from pam_envs.diagnosis.audit.audit import undecidable
 from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.decide.isolability import ALIKE
-from pam_envs.diagnosis.fit.fit_errors import explained
+from pam_envs.diagnosis.fit.fit_errors import fit_failures_explained
 from pam_envs.kernels.build import COMPILED
 from pam_envs.plants.single_muscle.plant import UnstableParameters
 from tests.diagnosis import hidden
@@ -140,6 +140,6 @@ def test_what_no_muscle_does_is_a_sentence_on_the_data(files: Files) -> None:
         diagnose(metres, rig=Rig(), progress=False)
     with (
         pytest.raises(ValueError, match=r"check the units of contraction_mm.*RIG.yaml"),
-        explained(),
+        fit_failures_explained(),
     ):
         raise UnstableParameters("too fast for 4 sub-steps")

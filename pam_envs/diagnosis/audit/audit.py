@@ -17,7 +17,7 @@ from pam_envs.diagnosis.audit.tables import audit_table
 from pam_envs.diagnosis.audit.units import wrong_units
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.causes import catalogue
-from pam_envs.diagnosis.fit.tolerance import LOAD, unknown_names, unused
+from pam_envs.diagnosis.fit.tolerance import LOAD, unknown_names, unused_tolerances
 
 BAR = 1e5
 LOAD_STEP = 0.5
@@ -239,7 +239,8 @@ def _lacks(recording: Recording, rig: Rig) -> list[str]:
 def _not_used(recording: Recording, rig: Rig) -> list[str]:
     """Return what was told, but does not enter the replay."""
     warnings = [
-        f"tolerance of {name} is not used: no refit moves it" for name in unused(rig.tolerance)
+        f"tolerance of {name} is not used: no refit moves it"
+        for name in unused_tolerances(rig.tolerance)
     ]
     if recording.supply is not None:
         warnings.append(

@@ -1,72 +1,54 @@
-"""Causes that the single muscle may lack, one a file."""
+"""Catalogue of causes: each file below this folder declares one as ``CAUSE``."""
 
 from __future__ import annotations
 
+import runpy
 from collections.abc import Sequence
+from functools import cache
+from importlib import import_module
+from pathlib import Path
 
 from pam_envs.diagnosis.cause import Cause
-from pam_envs.diagnosis.causes.mechanics import payload_error, resonance, stick_slip, wire_slack
-from pam_envs.diagnosis.causes.muscle import (
-    creep,
-    first_cycle_softening,
-    hysteresis_drive,
-    hysteresis_shape,
-    load_dependent_compliance,
-    load_dependent_hysteresis,
-    pressure_dependent_friction,
-    temperature,
-    threshold_pressure,
-    viscous_loss,
-)
-from pam_envs.diagnosis.causes.pneumatics import (
-    dead_time,
-    exhaust_asymmetry,
-    leak,
-    slew_limit,
-    supply_droop,
-    valve_dead_band,
-)
-from pam_envs.diagnosis.causes.sensing import (
-    sensor_bias,
-    sensor_delay,
-    sensor_drift,
-    sensor_nonlinearity,
-    slip_step,
-)
 from pam_envs.wording import near
 
-_FILES = (
-    creep,
-    leak,
-    valve_dead_band,
-    dead_time,
-    slew_limit,
-    sensor_bias,
-    sensor_drift,
-    sensor_delay,
-    viscous_loss,
-    temperature,
-    first_cycle_softening,
-    load_dependent_hysteresis,
-    load_dependent_compliance,
-    hysteresis_shape,
-    hysteresis_drive,
-    supply_droop,
-    stick_slip,
-    threshold_pressure,
-    exhaust_asymmetry,
-    pressure_dependent_friction,
-    sensor_nonlinearity,
-    resonance,
-    slip_step,
-    wire_slack,
-    payload_error,
-)
+FOLDER = Path(__file__).parent
 
 
+def _files(folder: Path) -> list[Path]:
+    """Return the Python files of a folder and its subfolders, without package files."""
+    return sorted(path for path in folder.rglob("*.py") if path.name != "__init__.py")
+
+
+@cache
 def catalogue() -> tuple[Cause, ...]:
-    """Return every cause; the order does not matter to a diagnosis."""
-    return tuple(file.CAUSE for file in _FILES)
+    """Return the shipped causes, sorted by name; a new file is found without registration."""
+    names = [path.relative_to(FOLDER).with_suffix("").parts for path in _files(FOLDER)]
+    found = [import_module(".".join((__name__, *parts))).CAUSE for parts in names]
+    return tuple(sorted(found, key=lambda cause: cause.name))
+
+
+def causes_in(folder: str | Path) -> tuple[Cause, ...]:
+    """Return the causes declared in the files of a user's folder, sorted by name.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Each Python file in it, or in a subfolder, declares one :class:`Cause` as ``CAUSE``.
+
+    Raises
+    ------
+    ValueError
+        If there is no file, or one declares no cause.
+    """
+    made = []
+    for path in _files(Path(folder)):
+        cause = runpy.run_path(str(path)).get("CAUSE")
+        if not isinstance(cause, Cause):
+            raise ValueError(f"{path} declares no cause; assign a Cause to the name CAUSE")
+        made.append(cause)
+    if not made:
+        raise ValueError(f"{folder} holds no Python file; each file declares one cause as CAUSE")
+    return tuple(sorted(made, key=lambda cause: cause.name))
 
 
 def by_name(name: str) -> Cause:
@@ -83,15 +65,15 @@ def by_name(name: str) -> Cause:
     raise ValueError(f"no cause named {name!r}{near(name, [c.name for c in catalogue()])}")
 
 
-def chosen(given: Sequence[Cause | str] | None = None) -> tuple[Cause, ...]:
-    """Return causes, those given by name from the catalogue; all of it where none are given.
+def selected(given: Sequence[Cause | str] | None = None) -> tuple[Cause, ...]:
+    """Return the given causes, with names looked up; the whole catalogue by default.
 
     Raises
     ------
     ValueError
-        If there are none, if a name is not known or comes twice.
+        If none is given, a name is unknown or a cause is given twice.
     TypeError
-        If something is neither a cause nor a name.
+        If an element is neither a cause nor a name.
     """
     if given is None:
         return catalogue()

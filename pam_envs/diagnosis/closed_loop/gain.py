@@ -25,21 +25,6 @@ Array = NDArray[np.float64]
 Design = Callable[[Any], Controller]
 """From a plant to a controller; ``mass.load`` and ``muscle.temperature`` are those of the runs."""
 
-# What a controller can do about a cause that its plant knows, decided before any was tried.
-#
-# It can: everything between set-point and true position, be it static, slow or a known delay.
-#   creep, leak, valve_dead_band, dead_time, slew_limit, viscous_loss, temperature (measured),
-#   first_cycle_softening (runs begin with it), load_dependent_hysteresis,
-#   load_dependent_compliance, hysteresis_shape, hysteresis_drive, supply_droop,
-#   threshold_pressure, exhaust_asymmetry, pressure_dependent_friction, wire_slack, payload_error
-#   sensor_delay: the loop compares the reading with one that is as late
-# It cannot:
-#   sensor_bias, sensor_drift: the loop follows the reading wherever the sensor goes
-#   sensor_nonlinearity: the recording is read through the same sensor, there is no true position
-#       to learn its bow from; that of the pressure sensor does not matter to a position loop
-#   slip_step: happened once; when the clamp will give way next is not in the plant
-#   stick_slip: below the breakaway nothing moves, and where it sticks depends on the noise
-#   resonance: at or above the bandwidth of regulator and loop, which can only avoid it
 COMPENSABLE: tuple[str, ...] = tuple(cause.name for cause in catalogue() if cause.compensable)
 """Causes that a controller can compensate."""
 

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.data.recording.recording import Recording
-from pam_envs.diagnosis.decide.search import (
-    Blocks,
+from pam_envs.diagnosis.fit.blocks import Blocks
+from pam_envs.diagnosis.fit.candidate import (
     Candidate,
-    fresh,
-    less_one,
+    complete_jacobian,
     polish,
     refit,
-    whole,
+    restarted,
+    without_each_cause,
 )
 from pam_envs.diagnosis.fit.least_squares import FEW_DAMPINGS, Problem, evaluate, improve, share
 
@@ -205,7 +205,7 @@ def hold_out(
     for k, candidate in zip(others, fitted, strict=True):
         thorough = any(rivals[k] is c for c in close)
         found[k] = _thoroughly(again, blocks, old, rivals[k]) if thorough else candidate
-    less = less_one(again, blocks, old, new) if len(model.causes) > 1 else {}
+    less = without_each_cause(again, blocks, old, new) if len(model.causes) > 1 else {}
 
     def scored(candidate: Candidate) -> Candidate:
         left = np.where(rows, again.rows(candidate.fit.residual), 0.0)
@@ -229,9 +229,9 @@ def _side_by_side(
     """Return candidates fitted anew, by the base's Jacobian for the base's parameters."""
     if not candidates:
         return []
-    whole(problem, base.fit)
+    complete_jacobian(problem, base.fit)
     shared = share(problem, base.fit)
-    fits = [fresh(c.fit, z=_begun_at(base, c), shared=shared) for c in candidates]
+    fits = [restarted(c.fit, z=starting_point_from(base, c), shared=shared) for c in candidates]
     evaluate(problem, fits)
     improve(problem, fits, ROUNDS, 1e-4, FEW_DAMPINGS)
     return [replace(c, fit=fit) for c, fit in zip(candidates, fits, strict=True)]
@@ -245,6 +245,6 @@ def _thoroughly(problem: Problem, blocks: Blocks, base: Candidate, model: Candid
     return min(there, here, key=lambda c: c.fit.cost)
 
 
-def _begun_at(base: Candidate, candidate: Candidate) -> Array:
+def starting_point_from(base: Candidate, candidate: Candidate) -> Array:
     """Return where a candidate's fit begins if its base is another one."""
     return np.concatenate([base.fit.z, candidate.fit.z[len(base.fit.z) :]])

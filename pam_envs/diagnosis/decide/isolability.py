@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.diagnosis.cause import Cause
-from pam_envs.diagnosis.decide.search import begun
+from pam_envs.diagnosis.fit.candidate import initial_fits
 from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, column_of
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ ALIKE = 0.9
 """Cosine from which two causes are told apart by nothing but a further sensor."""
 
 
-def complement(base: Fit) -> Array:
+def base_subspace(base: Fit) -> Array:
     """Return an orthonormal basis of what refitting the base can change, shape (k, m)."""
     j = base.slopes
     spreads = np.array([1.0 / f.prior if np.isfinite(f.prior) else 0.0 for f in base.frees])
@@ -97,7 +97,7 @@ def isolability(problem: Problem, family: Any, base: Fit, causes: Sequence[Cause
     bounds: dict[str, list[int]] = {}
     for cause in causes:
         for form in cause.forms:
-            fits = begun(problem, family, base, cause, form)
+            fits = initial_fits(problem, family, base, cause, form)
             for at, more in ((begins, [column_of(f, f.z) for f in fits]), (bounds, ends(fits))):
                 places = range(len(columns), len(columns) + len(more))
                 at.setdefault(cause.name, []).extend(places)
@@ -147,15 +147,15 @@ def far(free: Free, here: float) -> float:
 
 def _shown(problem: Problem, base: Fit, columns: Sequence[Array]) -> Iterator[Shown]:
     """Yield what each column shows beside the base."""
-    basis, without = complement(base), problem.residuals(column_of(base, base.z)[None])[0]
+    basis, without = base_subspace(base), problem.residuals(column_of(base, base.z)[None])[0]
     for at in range(0, len(columns), TOGETHER):
         traces = problem.residuals(np.array(columns[at : at + TOGETHER])) - without
         for trace, left in zip(traces, projected(traces, basis), strict=True):
             raw = float(np.linalg.norm(trace)) / np.sqrt(trace.size)
-            yield Shown(left, channel_size(left, problem), raw)
+            yield Shown(left, size_over_noise(left, problem), raw)
 
 
-def twins(found: Isolability, causes: Sequence[Cause]) -> dict[str, str]:
+def lookalikes(found: Isolability, causes: Sequence[Cause]) -> dict[str, str]:
     """Return, for causes of the valve or line, another one that looks the same without pressure."""
     names = {cause.name: k for k, cause in enumerate(causes)}
     made = {}
@@ -166,7 +166,7 @@ def twins(found: Isolability, causes: Sequence[Cause]) -> dict[str, str]:
     return {name: str(other) for name, other in made.items()}
 
 
-def channel_size(trace: Array, problem: Problem) -> float:
+def size_over_noise(trace: Array, problem: Problem) -> float:
     """Return the RMS over the noise on the channel where it is largest."""
     good = np.isfinite(problem.measured)
     rows = problem.rows(trace)

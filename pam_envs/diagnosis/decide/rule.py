@@ -63,7 +63,7 @@ class Rule:
     version: str = "2"
     least_gain: float = 0.1
     least_total: float = 2.4
-    look: float = 0.01
+    trial_penalty: float = 0.01
     flexible: float = 0.15
     peak: float = 30.0
     excess: float = 1.6
@@ -106,16 +106,16 @@ def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
     """
     levels = evidence["levels"]
     least = max(rule.least_gain, rule.least_total / max(1, evidence["blocks"]))
-    if len(levels) < 2 or not pays(levels[1], least, rule):
+    if len(levels) < 2 or not is_accepted(levels[1], least, rule):
         return Judgement("unexplained" if structured(levels[0]["left"], rule) else "adequate", 0)
     level, first = 1, levels[1]["gain"]
     while level + 1 < len(levels) and level < rule.most:
-        wanted = max(least, wanted_of_further(first, levels[level + 1]["possible"], rule))
-        if not pays(levels[level + 1], wanted, rule):
+        wanted = max(least, required_gain(first, levels[level + 1]["possible"], rule))
+        if not is_accepted(levels[level + 1], wanted, rule):
             break
         level += 1
     found = levels[level]
-    if structured(found["left"], rule) and gone(levels[0], found) < rule.explained:
+    if structured(found["left"], rule) and explained_fraction(levels[0], found) < rule.explained:
         return Judgement("unexplained", level)
     still = not_excluded(found["rivals"], rule)
     return Judgement("ambiguous" if still else "named", level, still)
@@ -128,7 +128,7 @@ def structured(left: dict[str, Any], rule: Rule) -> bool:
     )
 
 
-def wanted_of_further(first: float, possible: float, rule: Rule) -> float:
+def required_gain(first: float, possible: float, rule: Rule) -> float:
     """Return what a further cause has to gain, after a first that gained so much.
 
     Parameters
@@ -144,12 +144,12 @@ def wanted_of_further(first: float, possible: float, rule: Rule) -> float:
     return max(rule.second_gain, min(ways))
 
 
-def pays(level: Mapping[str, Any], wanted: float, rule: Rule) -> bool:
+def is_accepted(level: Mapping[str, Any], wanted: float, rule: Rule) -> bool:
     """Return whether a further cause gains as much as is wanted, and surely gains."""
     return bool(level["added"] >= wanted and level["unsure"] <= rule.doubt)
 
 
-def gone(before: Mapping[str, Any], after: Mapping[str, Any]) -> float:
+def explained_fraction(before: Mapping[str, Any], after: Mapping[str, Any]) -> float:
     """Return the part of the mean square over the noise that is gone (infinite: of none)."""
     over = float(before["left"]["excess"]) - 1.0
     return 1.0 - (float(after["left"]["excess"]) - 1.0) / over if over > 0.0 else np.inf

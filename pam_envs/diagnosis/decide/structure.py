@@ -13,7 +13,7 @@ from scipy.ndimage import median_filter
 from scipy.signal import lfilter, welch
 from scipy.stats import chi2
 
-from pam_envs.diagnosis.decide.search import Blocks
+from pam_envs.diagnosis.fit.blocks import Blocks
 
 Array = NDArray[np.float64]
 

@@ -9,11 +9,12 @@ from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.audit.audit import undecidable
 from pam_envs.diagnosis.cause import Cause
-from pam_envs.diagnosis.decide.isolability import Isolability, isolability, twins
-from pam_envs.diagnosis.decide.search import BLOCK_SECONDS, EVERY
+from pam_envs.diagnosis.decide.isolability import Isolability, isolability, lookalikes
+from pam_envs.diagnosis.fit.blocks import BLOCK_SECONDS, EVERY
 from pam_envs.diagnosis.fit.least_squares import Fit, Problem
-from pam_envs.diagnosis.report.summary_text import SHORT
 
+SHORT = "The recording is too short to decide anything"
+"""Beginning of the warning on a short recording."""
 LEAST_SIZE = 1.0
 """A cause that cannot reach this size over the noise within its bounds is not testable."""
 LEAST_TESTABLE, LEAST_SHARE = 5, 0.5
@@ -38,7 +39,7 @@ def not_testable(
     found = isolability(problem, family, base, left)
     reasons |= _too_small(found, left)
     if recording.pressure is None:
-        for name, other in twins(found, left).items():
+        for name, other in lookalikes(found, left).items():
             reasons.setdefault(name, f"cannot be told from {other} without pressure_bar")
     return found, {c.name: reasons[c.name] for c in causes if c.name in reasons}
 
@@ -52,18 +53,18 @@ def _too_small(found: Isolability, causes: Sequence[Cause]) -> dict[str, str]:
         )
         for cause in causes
         # where something happens once is looked for in the residual
-        if not (cause.once and cause.forms[0].seeds is not None)
+        if not (cause.once and cause.forms[0].search is not None)
         and reach.get(cause.name, 0.0) < LEAST_SIZE
     }
 
 
-def too_few(testable: int, asked: int) -> bool:
+def too_few_testable(testable: int, asked: int) -> bool:
     """Return whether so few causes can be tested that a recording decides nothing."""
     few = testable < LEAST_TESTABLE and testable < LEAST_SHARE * asked
     return testable == 0 or few
 
 
-def too_short(moved: int, least: int) -> str:
+def shortness_warning(moved: int, least: int) -> str:
     """Return what to say of a recording in which little moves."""
     return (
         f"{SHORT}: the command moves in {moved} of the {BLOCK_SECONDS:g} s blocks that are held "

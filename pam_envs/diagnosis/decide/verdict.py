@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from scipy.special import stdtr
 
 from pam_envs.diagnosis.cause import Cause
-from pam_envs.diagnosis.decide.rule import Judgement, Rule, judge, wanted_of_further
-from pam_envs.diagnosis.decide.search import Blocks, Candidate, less_one, refit, search
+from pam_envs.diagnosis.decide.rule import Judgement, Rule, judge, required_gain
+from pam_envs.diagnosis.decide.search import search
 from pam_envs.diagnosis.decide.structure import Regressors, flexible_r2, spectral_peak
+from pam_envs.diagnosis.fit.blocks import Blocks
+from pam_envs.diagnosis.fit.candidate import Candidate, refit, without_each_cause
 from pam_envs.diagnosis.fit.least_squares import Problem, column_of
 
 Array = NDArray[np.float64]
@@ -71,7 +73,7 @@ class Decision:
     evidence: dict[str, Any] = field(default_factory=dict)
 
 
-def left_over(
+def remaining_structure(
     problem: Problem, blocks: Blocks, candidate: Candidate, regressors: Regressors
 ) -> dict[str, Any]:
     """Return what is left in a candidate's residual: flexible model and spectral peak."""
@@ -109,27 +111,27 @@ def decide(
     seed: int = 0,
 ) -> Decision:
     """Search causes, add further ones while they pay, and word the verdict."""
-    levels = [Level(base, [], left_over(problem, blocks, base, regressors))]
+    levels = [Level(base, [], remaining_structure(problem, blocks, base, regressors))]
     for model, rivals in _ladder(problem, family, blocks, base, causes, rule):
-        levels.append(Level(model, rivals, left_over(problem, blocks, model, regressors)))
+        levels.append(Level(model, rivals, remaining_structure(problem, blocks, model, regressors)))
     evidence = evidence_of(problem, blocks, levels, rule, seed)
     judged = judge(evidence, rule)
     if judged.verdict == "ambiguous":
-        cross(problem, blocks, levels, regressors, judged, evidence, rule, seed)
+        cross_validate_level(problem, blocks, levels, regressors, judged, evidence, rule, seed)
         judged = judge(evidence, rule)
-    chosen = levels[judged.level]
-    rivals = chosen.rivals if judged.level else levels[min(1, len(levels) - 1)].rivals
+    selected = levels[judged.level]
+    rivals = selected.rivals if judged.level else levels[min(1, len(levels) - 1)].rivals
     return Decision(
         judged.verdict,
-        chosen.model,
+        selected.model,
         rivals,
         [rivals[k] for k in judged.open_rivals],
-        {"before": levels[0].left, "after": chosen.left},
+        {"before": levels[0].left, "after": selected.left},
         evidence,
     )
 
 
-def cross(
+def cross_validate_level(
     problem: Problem,
     blocks: Blocks,
     levels: list[Level],
@@ -146,12 +148,12 @@ def cross(
     level, found = levels[judged.level], evidence["levels"][judged.level]
     places = [0, *judged.open_rivals]
     smaller = levels[judged.level - 1].model
-    base, before, *again = crossed(
+    base, before, *again = cross_validate(
         problem, blocks, [levels[0].model, smaller, *(level.rivals[k] for k in places)], rule
     )
     every = replace(blocks, held_out=np.ones_like(blocks.held_out))
-    ranked = sorted(again, key=lambda c: -worth(every, base, c, rule))
-    order = preferred(every, base, ranked, rule)
+    ranked = sorted(again, key=lambda c: -penalised_gain(every, base, c, rule))
+    order = prefer_simpler(every, base, ranked, rule)
     draws = every.draws(rule.draws, seed)
     rows = [_row(every, base, c, order[0], draws, rule) for c in order]
     places = [places[next(i for i, c in enumerate(again) if c is o)] for o in order]
@@ -161,11 +163,11 @@ def cross(
     ]
     found["crossed"] = len(rows)
     found["gain"] = rows[0]["gain"]
-    found["added"] = worth(every, before, order[0], rule)
-    found["unsure"] = unsure(problem, blocks, smaller, level.rivals[places[0]], len(level.rivals))
+    found["added"] = penalised_gain(every, before, order[0], rule)
+    found["unsure"] = p_value(problem, blocks, smaller, level.rivals[places[0]], len(level.rivals))
     rivals = [level.rivals[k] for k in (*places, *others)]
     if rivals[0] is not level.model:
-        found["left"] = left_over(problem, blocks, rivals[0], regressors)
+        found["left"] = remaining_structure(problem, blocks, rivals[0], regressors)
     levels[judged.level] = Level(rivals[0], rivals, found["left"])
 
 
@@ -181,13 +183,17 @@ def _ladder(
     rivals = search(problem, family, blocks, base, causes)
     if not rivals:
         return []
-    rivals = preferred(blocks, base, rivals, rule)
+    rivals = prefer_simpler(blocks, base, rivals, rule)
     found, mended = [(rivals[0], rivals)], False
     while len(found) < rule.most:
         larger = _larger(problem, family, blocks, base, causes, found, rule)
         if not larger:
             break
-        better = None if mended else smaller(problem, blocks, base, larger[0], found[-1], rule)
+        better = (
+            None
+            if mended
+            else with_one_cause_less(problem, blocks, base, larger[0], found[-1], rule)
+        )
         mended = better is not None
         if better is not None:  # what was added only mended a fit that had stuck
             found[-1] = better
@@ -207,22 +213,22 @@ def _larger(
 ) -> list[Candidate]:
     """Return models with one more cause than the last found, the best first; none if none pays."""
     model, rivals = found[-1]
-    first_gain = worth(blocks, base, found[0][0], rule)
-    possible = attainable(blocks, model)
-    wanted = wanted_of_further(first_gain, possible, rule)
+    first_gain = penalised_gain(blocks, base, found[0][0], rule)
+    possible = possible_gain(blocks, model)
+    wanted = required_gain(first_gain, possible, rule)
     if first_gain < rule.least_gain or possible < wanted:
         return []
     larger = search(problem, family, blocks, model, causes, 2, rule.hint * wanted)
-    if max((worth(blocks, model, c, rule) for c in larger), default=0.0) < wanted:
+    if max((penalised_gain(blocks, model, c, rule) for c in larger), default=0.0) < wanted:
         return []
     if len(found) == 1:
         for first in rivals[1 : rule.beam]:
             larger += search(problem, family, blocks, first, causes, 2)[:4]
-    larger.sort(key=lambda c: -worth(blocks, base, c, rule))
-    return preferred(blocks, base, distinct(larger), rule)
+    larger.sort(key=lambda c: -penalised_gain(blocks, base, c, rule))
+    return prefer_simpler(blocks, base, distinct(larger), rule)
 
 
-def smaller(
+def with_one_cause_less(
     problem: Problem,
     blocks: Blocks,
     base: Candidate,
@@ -234,30 +240,33 @@ def smaller(
 
     A fit that has stuck borrows a second cause to get away; without it, it may then stay there.
     """
-    made = list(less_one(problem, blocks, base, model).values())
-    best = max(made, key=lambda c: worth(blocks, base, c, rule))
-    if worth(blocks, base, best, rule) < worth(blocks, base, known[0], rule) + rule.simpler:
+    made = list(without_each_cause(problem, blocks, base, model).values())
+    best = max(made, key=lambda c: penalised_gain(blocks, base, c, rule))
+    if (
+        penalised_gain(blocks, base, best, rule)
+        < penalised_gain(blocks, base, known[0], rule) + rule.simpler
+    ):
         return None
     rivals = [best, *(r for r in known[1] if set(r.names) != set(best.names))]
-    rivals = preferred(blocks, base, rivals, rule)
+    rivals = prefer_simpler(blocks, base, rivals, rule)
     return rivals[0], rivals
 
 
-def attainable(blocks: Blocks, model: Candidate) -> float:
+def possible_gain(blocks: Blocks, model: Candidate) -> float:
     """Return the gain of a model that leaves nothing but noise, on all blocks."""
     some = blocks.counts.sum(axis=1) > 0
     whole = blocks.means(model.errors, np.ones_like(blocks.held_out))[some]
     return float(np.sum(np.log(np.maximum(whole / PERFECT, 1.0))))
 
 
-def worth(blocks: Blocks, base: Candidate, candidate: Candidate, rule: Rule) -> float:
+def penalised_gain(blocks: Blocks, base: Candidate, candidate: Candidate, rule: Rule) -> float:
     """Return a candidate's gain over a smaller one, less the penalty for having looked often."""
     known = set(base.names)
-    looks = sum(np.log(form.looks) for cause, form in candidate.causes if cause.name not in known)
-    return blocks.gain(base.errors, candidate.errors) - rule.look * float(looks)
+    trials = sum(np.log(form.trials) for cause, form in candidate.causes if cause.name not in known)
+    return blocks.gain(base.errors, candidate.errors) - rule.trial_penalty * float(trials)
 
 
-def preferred(
+def prefer_simpler(
     blocks: Blocks, base: Candidate, rivals: Sequence[Candidate], rule: Rule, seed: int = 0
 ) -> list[Candidate]:
     """Return rivals, best first, a cause that another one contains before it where both are close.
@@ -265,29 +274,29 @@ def preferred(
     A drift that is over before the record begins is a bias, and a very fast resonance a delay:
     what can imitate another cause has to gain more than that one, and surely.
     """
-    order = sorted(rivals, key=lambda c: -worth(blocks, base, c, rule))
-    best = worth(blocks, base, order[0], rule)
+    order = sorted(rivals, key=lambda c: -penalised_gain(blocks, base, c, rule))
+    best = penalised_gain(blocks, base, order[0], rule)
     margin = max(rule.simpler, rule.simpler_share * best)
     draws = blocks.draws(rule.draws, seed)
     for rival in order[1:]:
-        if not reduces(order[0], rival):
+        if not imitates(order[0], rival):
             continue
-        behind = best - worth(blocks, base, rival, rule)
+        behind = best - penalised_gain(blocks, base, rival, rule)
         if behind < margin or _better(blocks, rival, order[0], draws) > rule.doubt:
             return [rival, *(r for r in order if r is not rival)]
     return order
 
 
-def reduces(model: Candidate, other: Candidate) -> bool:
+def imitates(model: Candidate, other: Candidate) -> bool:
     """Return whether the model, with one cause in a limit, is the other."""
     mine, its = set(model.names), set(other.names)
     if len(model.names) != len(other.names) or len(mine - its) != 1:
         return False
-    (gone,), (come,) = mine - its, its - mine
-    return any(cause.name == gone and come in cause.contains for cause, _ in model.causes)
+    (own,), (other_cause,) = mine - its, its - mine
+    return any(cause.name == own and other_cause in cause.contains for cause, _ in model.causes)
 
 
-def crossed(
+def cross_validate(
     problem: Problem, blocks: Blocks, candidates: Sequence[Candidate], rule: Rule
 ) -> list[Candidate]:
     """Return candidates with errors on all blocks, each from a fit to other blocks."""
@@ -321,10 +330,10 @@ def evidence_of(
         before = levels[max(k - 1, 0)].model
         made.append(
             {
-                "gain": worth(blocks, base, level.model, rule),
-                "added": worth(blocks, before, level.model, rule),
-                "possible": attainable(blocks, before),
-                "unsure": unsure(problem, blocks, before, level.model, len(level.rivals)),
+                "gain": penalised_gain(blocks, base, level.model, rule),
+                "added": penalised_gain(blocks, before, level.model, rule),
+                "possible": possible_gain(blocks, before),
+                "unsure": p_value(problem, blocks, before, level.model, len(level.rivals)),
                 "left": level.left,
                 "rivals": [
                     _row(blocks, base, rival, level.model, draws, rule)
@@ -347,14 +356,14 @@ def _row(
     return {
         "names": list(rival.names),
         "forms": [form.name for _, form in rival.causes],
-        "gain": worth(blocks, base, rival, rule),
+        "gain": penalised_gain(blocks, base, rival, rule),
         "better": _better(blocks, rival, best, draws),
-        "imitates": reduces(rival, best),
+        "imitates": imitates(rival, best),
         "out": False,
     }
 
 
-def unsure(
+def p_value(
     problem: Problem, blocks: Blocks, before: Candidate, after: Candidate, looked: int = 1
 ) -> float:
     """Return how likely a cause fits the held-out blocks as well if it is not there.
@@ -394,7 +403,9 @@ def distinct(candidates: Iterable[Candidate]) -> list[Candidate]:
     return kept
 
 
-def traces_of(problem: Problem, family: Any, base: Candidate, model: Candidate) -> dict[str, Array]:
+def effect_traces(
+    problem: Problem, family: Any, base: Candidate, model: Candidate
+) -> dict[str, Array]:
     """Return the contribution of each cause of a model to the outputs, shape (channels, T)."""
     fit = model.fit
     whole = column_of(fit, fit.z)

@@ -7,8 +7,9 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.diagnosis.decide.search import Blocks, Candidate, fit_base
-from pam_envs.diagnosis.fit.first_guess import balance, guessed
+from pam_envs.diagnosis.fit.blocks import Blocks
+from pam_envs.diagnosis.fit.candidate import Candidate, fit_base
+from pam_envs.diagnosis.fit.first_guess import balance, start_at_guess
 from pam_envs.diagnosis.fit.least_squares import Fit, Problem, column_of, evaluate, improve
 from pam_envs.diagnosis.fit.single_muscle import MuscleFamily
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
@@ -69,7 +70,9 @@ def calibrate(
             operator.thresholds,
             np.isfinite(measured[0]),
         )
-        tried = [guessed(frees, found | law), frees] if law else [guessed(frees, found)]
+        tried = (
+            [start_at_guess(frees, found | law), frees] if law else [start_at_guess(frees, found)]
+        )
     best = fit_base(problem, blocks, column, tried[0], ROUNDS)
     for start in tried[1:]:
         if best.fit.cost < FAR * problem.seen:

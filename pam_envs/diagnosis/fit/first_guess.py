@@ -98,7 +98,7 @@ def balance(
     return found
 
 
-def guessed(frees: tuple[Any, ...], found: dict[str, float]) -> tuple[Any, ...]:
+def start_at_guess(frees: tuple[Any, ...], found: dict[str, float]) -> tuple[Any, ...]:
     """Return frees that start at the guess, within their bounds."""
     made = []
     for free in frees:

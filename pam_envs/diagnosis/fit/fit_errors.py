@@ -17,7 +17,7 @@ ADVICE = (
 
 
 @contextmanager
-def explained() -> Iterator[None]:
+def fit_failures_explained() -> Iterator[None]:
     """Turn the failure of a fit into a sentence on the data and RIG.yaml."""
     try:
         yield

@@ -116,7 +116,7 @@ class MuscleFamily:
     def free(self, name: str, **changes: Any) -> Free:
         """Return how a fit moves a parameter."""
         if name.startswith("hysteresis.weight["):
-            k = int(name[14:-1])
+            k = int(name.removeprefix("hysteresis.weight[")[:-1])
             start = float(self.column[R.WEIGHT + k])
             made = dict(
                 low=0.0, high=1.0, scale=SCALES["hysteresis.weight"], start=start, prior=25.0

@@ -59,7 +59,7 @@ def step_starts(problem: Problem, family: Any, base: Fit, form: Any, output: int
     return starts
 
 
-step_starts.looks = 100  # type: ignore[attr-defined]
+step_starts.trials = 100  # type: ignore[attr-defined]
 
 
 def ramp_starts(problem: Problem, family: Any, base: Fit, form: Any, output: int = 0) -> Starts:
@@ -68,7 +68,7 @@ def ramp_starts(problem: Problem, family: Any, base: Fit, form: Any, output: int
     return [(size, middle, slow) for size, middle in found for slow in SLOW]
 
 
-ramp_starts.looks = 200  # type: ignore[attr-defined]
+ramp_starts.trials = 200  # type: ignore[attr-defined]
 
 
 def pressure_ramp_starts(problem: Problem, family: Any, base: Fit, form: Any) -> Starts:
@@ -76,7 +76,7 @@ def pressure_ramp_starts(problem: Problem, family: Any, base: Fit, form: Any) ->
     return ramp_starts(problem, family, base, form, output=1)
 
 
-pressure_ramp_starts.looks = 200  # type: ignore[attr-defined]
+pressure_ramp_starts.trials = 200  # type: ignore[attr-defined]
 
 
 def grid(*values: Sequence[float], best: int = 3) -> Callable[..., Starts]:
@@ -104,5 +104,5 @@ def grid(*values: Sequence[float], best: int = 3) -> Callable[..., Starts]:
         left = np.einsum("nm,nm->n", found, found) - taken
         return [points[k] for k in np.argsort(left, kind="stable")[:best]]
 
-    starts.looks = int(np.prod([len(v) for v in values]))  # type: ignore[attr-defined]
+    starts.trials = int(np.prod([len(v) for v in values]))  # type: ignore[attr-defined]
     return starts

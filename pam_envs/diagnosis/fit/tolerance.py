@@ -13,17 +13,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pam_envs.diagnosis.decide.search import Blocks, Candidate, refit, whole
+from pam_envs.diagnosis.fit.blocks import Blocks
+from pam_envs.diagnosis.fit.candidate import Candidate, complete_jacobian, refit
+from pam_envs.diagnosis.fit.intervals import spans
 from pam_envs.diagnosis.fit.least_squares import Fit, Problem
 from pam_envs.diagnosis.fit.single_muscle import BASE
-from pam_envs.diagnosis.report.summary_causes import spans
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.wording import near
 
 LOAD = "mass.load"
 """The declared parameter whose error a cause stands for."""
 LOAD_ERROR = "mass.load_error"
-PAYLOAD_ERROR, LIKE_PAYLOAD = "payload_error", "load_dependent_compliance"
+PAYLOAD_ERROR, IMITATES_PAYLOAD_ERROR = "payload_error", "load_dependent_compliance"
 UNWEIGHED = 0.5
 """Relative error of a load of which nothing is declared."""
 
@@ -38,18 +39,18 @@ def unknown_names(tolerance: Iterable[str]) -> list[str]:
     ]
 
 
-def unused(tolerance: Iterable[str]) -> list[str]:
+def unused_tolerances(tolerance: Iterable[str]) -> list[str]:
     """Return the names of which no refit could leave the tolerance."""
     return [name for name in tolerance if name not in (*BASE, LOAD)]
 
 
-def limit_of(loads: ArrayLike, tolerance: float) -> float:
+def load_error_limit(loads: ArrayLike, tolerance: float) -> float:
     """Return by how much the lightest load that was hung may be off [kg]; infinite if none was."""
     hung = np.asarray(loads, float)
     return tolerance * float(np.min(hung[hung > 0.0], initial=np.inf))
 
 
-def inside(interval: tuple[float, float], loads: ArrayLike, tolerance: float) -> bool:
+def may_be_within(interval: tuple[float, float], loads: ArrayLike, tolerance: float) -> bool:
     """Return whether an error of the load may lie within what was declared.
 
     Parameters
@@ -66,11 +67,11 @@ def inside(interval: tuple[float, float], loads: ArrayLike, tolerance: float) ->
     bool
         False if for one of the loads the whole interval lies outside.
     """
-    limit, (low, high) = limit_of(loads, tolerance), sorted(interval)
+    limit, (low, high) = load_error_limit(loads, tolerance), sorted(interval)
     return bool(low <= limit and high >= -limit)
 
 
-def interval_of(problem: Problem, blocks: Blocks, fit: Fit) -> tuple[float, float]:
+def load_error_interval(problem: Problem, blocks: Blocks, fit: Fit) -> tuple[float, float]:
     """Return where the error of the load lies with 95 % [kg]; open at a bound."""
     low, high = spans(problem, blocks, fit)[LOAD_ERROR]["interval"]
     return (-np.inf if low is None else low), (np.inf if high is None else high)
@@ -84,13 +85,13 @@ def may_be_load(
     Where nothing is declared of the loads, what depends on them may be their error.
     """
     if known is None:
-        return LIKE_PAYLOAD in model.names
+        return IMITATES_PAYLOAD_ERROR in model.names
     if PAYLOAD_ERROR not in model.names:
         return False
-    return inside(interval_of(problem, blocks, model.fit), loads, known)
+    return may_be_within(load_error_interval(problem, blocks, model.fit), loads, known)
 
 
-def released(
+def refit_load(
     problem: Problem, blocks: Blocks, family: Any, base: Candidate, limit: float
 ) -> Candidate:
     """Return the base with the error of the load refitted too, within a limit [kg]."""
@@ -104,5 +105,5 @@ def released(
         begins={},
     )
     found = refit(problem, blocks, Candidate((), fit, base.errors))
-    whole(problem, found.fit)
+    complete_jacobian(problem, found.fit)
     return found

@@ -9,7 +9,13 @@ from typing import Any
 
 from pam_envs.diagnosis.figures import Picture, draw
 from pam_envs.diagnosis.figures.quantities import changed
-from pam_envs.diagnosis.report.page_details import DETAILS, held_out, left_over, provenance, why
+from pam_envs.diagnosis.report.page_details import (
+    DETAILS,
+    held_out,
+    provenance,
+    structure_table,
+    why,
+)
 from pam_envs.diagnosis.report.page_parts import DASH, TIMES, enumeration, interval, number, words
 
 CSS = Path(__file__).with_name("page.css")
@@ -157,7 +163,7 @@ def _sections(report: Report, pictures: Mapping[str, Picture]) -> Iterable[tuple
         return "\n".join(found) or f'<p class="none">{NOTHING[names[0]]}</p>'
 
     yield "replay", "Replay", shown("replay", "zoom")
-    left = shown("residual", "structure", "scatter") + left_over(report)
+    left = shown("residual", "structure", "scatter") + structure_table(report)
     yield "residual", "What the simulation leaves", left
     loops = shown("loops")
     if report.get("readings"):

@@ -21,7 +21,7 @@ from pam_envs.diagnosis.report.page_parts import (
 Report = Mapping[str, Any]
 
 
-def left_over(report: Report) -> str:
+def structure_table(report: Report) -> str:
     """Return the table of what is left in the residuals."""
     rows = []
     for side in ("before", "after") if changed(report) else ("before",):

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from pam_envs.diagnosis.decide.held_out import HeldOut, kind_of
 from pam_envs.diagnosis.decide.rule import Rule
-from pam_envs.diagnosis.decide.search import Candidate
 from pam_envs.diagnosis.decide.structure import binned_r2, flexible_r2, ljung_box, spectral_peak
+from pam_envs.diagnosis.fit.candidate import Candidate
 from pam_envs.diagnosis.report.summary_causes import SCALE, UNITS, calibration, causes, rivals, seen
 from pam_envs.diagnosis.report.summary_text import sentence
 

@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pam_envs.diagnosis.decide.rule import Rule
-from pam_envs.diagnosis.decide.search import BLOCK_SECONDS
+from pam_envs.diagnosis.decide.testable import SHORT
+from pam_envs.diagnosis.fit.blocks import BLOCK_SECONDS
 
 Report = Mapping[str, Any]
 
-SHORT = "The recording is too short to decide anything"
-"""Beginning of the warning that says so."""
 GOES_WITH = 0.05
 """Share of a residual that goes with one variable, from which on it is said."""
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pam_envs.data.tables import BAR, MM, ContractionTable
 from pam_envs.diagnosis.audit.tables import audit_table
+from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.static.compare import (
     Model,
     error_interval,
@@ -28,30 +29,6 @@ from pam_envs.diagnosis.static.text import sentences
 Array = NDArray[np.float64]
 Json = dict[str, Any]
 
-NO_TIME = (
-    "valve_dead_band",
-    "dead_time",
-    "slew_limit",
-    "sensor_delay",
-    "sensor_drift",
-    "viscous_loss",
-    "leak",
-    "supply_droop",
-    "stick_slip",
-    "slip_step",
-    "exhaust_asymmetry",
-    "resonance",
-)
-OTHERWISE = {
-    "temperature": "no temperature was recorded",
-    "sensor_bias": "contractions count from each load's own rest length: a bias is gone",
-    "sensor_nonlinearity": "the static law absorbs it exactly",
-    "hysteresis_shape": "whole cycles hold no minor loops",
-    "hysteresis_drive": "whole cycles do not tell length- from pressure-driven friction",
-    "first_cycle_softening": "cycles before the table are not known; see the warnings for a drift",
-    "wire_slack": "the static law absorbs it at a constant load",
-    "payload_error": "needs loads declared with a tolerance",
-}
 STATIC = (
     "a table of settled readings has no time and no measured pressure: of the pressure channel, "
     "delays, rates and the closed loop nothing is said"
@@ -240,7 +217,8 @@ def calibrated(f: Findings, number: Number) -> Json:
 
 def not_testable(f: Findings) -> list[Json]:
     """Return the causes that no such table, or not this one, can show."""
-    reasons = dict.fromkeys(NO_TIME, "settled readings have no time") | OTHERWISE
+    shown = {term.cause for term in TERMS}
+    reasons = {c.name: c.settled for c in catalogue() if c.name not in shown}
     have = len(f.study.cells.loads)
     for term in TERMS:
         if term.both_ways and not f.study.cells.falling.any():

@@ -56,7 +56,7 @@ from .effects_pneumatic import PNEUMATIC
 from .effects_sensing import SENSING
 from .effects_unknown import FINAL, TUNING
 
-EFFECTS: tuple[str, ...] = (
+_FIRST = [
     "creep",
     "leak",
     "valve_dead_band",
@@ -82,19 +82,14 @@ EFFECTS: tuple[str, ...] = (
     "slip_step",
     "wire_slack",
     "payload_error",
-)
+]
+"""Order in which the benchmark draws its cases; effects that are not listed follow."""
+_OF_CATALOGUE = {**PNEUMATIC, **FRICTION, **MUSCLE, **LOAD, **SENSING}
+EFFECTS: tuple[str, ...] = tuple(dict.fromkeys((*_FIRST, *_OF_CATALOGUE)))
 TUNING_UNKNOWN: tuple[str, ...] = tuple(TUNING)
 FINAL_UNKNOWN: tuple[str, ...] = tuple(FINAL)
 
-_KINDS: dict[str, Kind] = {
-    **PNEUMATIC,
-    **FRICTION,
-    **MUSCLE,
-    **LOAD,
-    **SENSING,
-    **TUNING,
-    **FINAL,
-}
+_KINDS: dict[str, Kind] = {**_OF_CATALOGUE, **TUNING, **FINAL}
 
 
 def draw_effect(name: str, rng: np.random.Generator) -> Effect:
@@ -113,6 +108,6 @@ def constants(base: Base, effects: list[tuple[Effect, float]], duration: float) 
     for effect, amplitude in effects:
         strength = effect.strength(amplitude)
         if strength > 0.0:
-            _KINDS[effect.name].write(record, strength, dict(effect.shape))
+            effect.write(record, strength, dict(effect.shape))
     record["slip_time"] *= duration
     return record

@@ -23,12 +23,14 @@ class Effect:
     reference : float, strength at amplitude 1, where the trace moves by one to two noise RMS
     exponent : float, the strength grows with amplitude ** exponent, so that the trace grows
         about linearly
+    write : enters a strength into the constants of a rig
     """
 
     name: str
     shape: Mapping[str, float]
     reference: float
-    exponent: float = 1.0
+    exponent: float
+    write: Write
 
     def strength(self, amplitude: float) -> float:
         """Return the strength at an amplitude, 0 at 0."""
@@ -52,7 +54,7 @@ class Kind:
     def effect(self, name: str, rng: np.random.Generator) -> Effect:
         """Draw one effect of this kind."""
         reference = self.reference * float(rng.uniform(0.8, 1.25))
-        return Effect(name, self.draw(rng), reference, self.exponent)
+        return Effect(name, self.draw(rng), reference, self.exponent, self.write)
 
 
 def uniform(rng: np.random.Generator, low: float, high: float) -> float:

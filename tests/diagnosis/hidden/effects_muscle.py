@@ -6,12 +6,12 @@ import numpy as np
 
 from .effect import Kind, Shape, coin, put, sign, uniform
 from .kernel_tools import CREEP_STRIDE, STEP
-from .records import HYSTERESIS_MODELS
+from .records import CREEP_ELEMENTS
 
 
 def _creep(record: np.ndarray, strength: float, shape: Shape) -> None:
     """A hysteresis of power law or logarithm in time, summed from a dense scale of paces."""
-    times = np.geomspace(shape["first"], 3000.0, HYSTERESIS_MODELS)
+    times = np.geomspace(shape["first"], 3000.0, CREEP_ELEMENTS)
     share = times ** shape["power"]
     put(record, creep=strength, creep_strain=shape["of_strain"])
     record["creep_share"][0] = share / share[times < 300.0].sum()

@@ -6,7 +6,7 @@ import math
 
 from .kernel_muscle import force
 from .kernel_tools import NUDGE, PRESSURE_SPAN, STEP, jit, uniform
-from .records import HYSTERESIS_MODELS
+from .records import CREEP_ELEMENTS
 
 PARTS = 2  # of a step where a guide rubs
 
@@ -99,9 +99,9 @@ def remember(p, s, work):
     """Move the slow hysteresis on by one stride."""
     source = s.strain - p.creep * s.level if p.creep_strain > 0.5 else 0.16 * work / PRESSURE_SPAN
     level = 0.0
-    for i in range(HYSTERESIS_MODELS):
-        s.hysteresis[i] += p.creep_pace[i] * (source - s.hysteresis[i])
-        level += p.creep_share[i] * s.hysteresis[i]
+    for i in range(CREEP_ELEMENTS):
+        s.crept[i] += p.creep_pace[i] * (source - s.crept[i])
+        level += p.creep_share[i] * s.crept[i]
     s.level = level
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 SLIDERS = 24
-HYSTERESIS_MODELS = 12
+CREEP_ELEMENTS = 12
 LAGS = 6
 HISTORY = 1024  # of the sensor's moving average, in steps
 TUBE = 256  # of the waves in a line, in steps: more than the way to its end and back
@@ -79,7 +79,7 @@ PARAMETERS = np.dtype(
     _MARK
     + _numbers(_BASE + _AIR + _FRICTION + _MUSCLE + _LOAD + _SENSING)
     + _vectors("stiffness breaks strand_stiffness strand_breaks", SLIDERS)
-    + _vectors("creep_share creep_pace", HYSTERESIS_MODELS)
+    + _vectors("creep_share creep_pace", CREEP_ELEMENTS)
     + _vectors("wave_size wave_hz wave_phase", WAVES)
 )
 STATE = np.dtype(
@@ -87,7 +87,7 @@ STATE = np.dtype(
     + [(name, np.int64) for name in ("tick",)]
     + _numbers(_STATE)
     + _vectors("stops strands", SLIDERS)
-    + _vectors("hysteresis", HYSTERESIS_MODELS)
+    + _vectors("crept", CREEP_ELEMENTS)
     + _vectors("queue late", LAGS)
     + _vectors("history", HISTORY)
     + _vectors("sent returned", TUBE)

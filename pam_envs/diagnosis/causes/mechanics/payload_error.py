@@ -27,6 +27,7 @@ CAUSE = Cause(
         "of the static map by changing the mass."
     ),
     needs=("contraction", "loads", "weighed"),
+    settled="needs loads declared with a tolerance",
     sensor="scales",
     compensable=True,
 )

@@ -49,4 +49,5 @@ CAUSE = Cause(
         "and frequencies are assumed."
     ),
     sensor="an accelerometer on the mount, or a fast pressure sensor at either end of the line",
+    # not compensable: at or above the bandwidth of regulator and load
 )

@@ -25,7 +25,7 @@ CAUSE = Cause(
                 Term("mass.stick_kinetic", (0.4,), high=0.95, scale=1.0, amount=False),
                 Term("mass.stick_speed", (5e-3,), high=0.3, log=True, amount=False),
             ),
-            seeds=grid(_BREAKS, _HOLDS, _SPEEDS, best=5),
+            search=grid(_BREAKS, _HOLDS, _SPEEDS, best=5),
         ),
     ),
     signature=(
@@ -43,4 +43,5 @@ CAUSE = Cause(
     ),
     needs=("contraction",),
     sensor="a position sensor of higher resolution, or a load cell between muscle and load",
+    # not compensable: below the breakaway force nothing moves, and noise decides where it sticks
 )

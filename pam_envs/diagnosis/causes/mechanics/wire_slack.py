@@ -26,6 +26,7 @@ CAUSE = Cause(
         "which a pull begins; sizes are assumed."
     ),
     needs=("contraction", "loads"),
+    settled="the static law absorbs it at a constant load",
     sensor="a load cell between muscle and load",
     compensable=True,
 )

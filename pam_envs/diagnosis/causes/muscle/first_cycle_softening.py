@@ -37,6 +37,7 @@ CAUSE = Cause(
     ),
     needs=("contraction", "rest"),
     once=True,
+    settled="cycles before the table are unknown; see the warnings for a drift",
     sensor="a load cell at a blocked length, over the first cycles",
     compensable=True,
 )

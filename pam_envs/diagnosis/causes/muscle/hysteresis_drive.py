@@ -44,6 +44,7 @@ CAUSE = Cause(
         "IEEE/ASME Transactions on Mechatronics 16(1): Maxwell-slip elements in the length."
     ),
     needs=("contraction",),
+    settled="whole cycles do not separate length-driven from pressure-driven friction",
     sensor="a load cell at a blocked length",
     compensable=True,
 )

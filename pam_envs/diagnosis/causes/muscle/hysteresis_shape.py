@@ -29,6 +29,7 @@ CAUSE = Cause(
         "to 0.6 % miss random holds by 2.8 %, refitted on the holds by 1.1 %."
     ),
     needs=("contraction",),
+    settled="whole cycles hold no minor loops",
     sensor="a load cell at a blocked length, for the part that length does not drive",
     compensable=True,
 )

@@ -26,6 +26,7 @@ CAUSE = Cause(
         "temperature; no figure for a pneumatic muscle was found, the size is assumed."
     ),
     needs=("contraction", "temperature"),
+    settled="no temperature was recorded",
     sensor="a thermocouple on the muscle",
     compensable=True,
 )

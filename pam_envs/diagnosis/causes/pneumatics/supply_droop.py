@@ -26,7 +26,7 @@ CAUSE = Cause(
                 Term("regulator.supply_time", (0.05,), log=True, amount=False),
                 Term("regulator.supply_recovery", (4.0,), log=True, amount=False),
             ),
-            seeds=grid(_SUPPLIES, _DROOPS, _TIMES, _RECOVERIES),
+            search=grid(_SUPPLIES, _DROOPS, _TIMES, _RECOVERIES),
         ),
     ),
     signature=(

@@ -33,7 +33,7 @@ CAUSE = Cause(
                 Term("regulator.dead_band", (6e3,), scale=4e3),
                 Term("regulator.dead_close", (0.3,), scale=0.5, amount=False),
             ),
-            seeds=grid(_OPENS, _CLOSES),
+            search=grid(_OPENS, _CLOSES),
         ),
     ),
     signature=(

@@ -53,5 +53,7 @@ CAUSE = Cause(
         "A public record of a DMSP-10-250 on a pressure regulator: the pressure reads 0.3 bar off "
         "at rest."
     ),
+    settled="contractions count from each load's own rest length: a bias is gone",
     sensor="zeroing the sensors at rest without pressure",
+    # not compensable: the loop follows the reading
 )

@@ -28,7 +28,7 @@ CAUSE = Cause(
                 Term("position.ramp_at", (100.0,), scale=20.0, amount=False),
                 Term("position.ramp_over", (60.0,), low=15.0, log=True, amount=False),
             ),
-            seeds=ramp_starts,
+            search=ramp_starts,
         ),
         Form(
             "pressure",
@@ -44,7 +44,7 @@ CAUSE = Cause(
                 Term("pressure.ramp_at", (100.0,), scale=20.0, amount=False),
                 Term("pressure.ramp_over", (60.0,), low=15.0, log=True, amount=False),
             ),
-            seeds=pressure_ramp_starts,
+            search=pressure_ramp_starts,
         ),
     ),
     signature=(
@@ -70,4 +70,5 @@ CAUSE = Cause(
         "Table 3) rise by 0.03 mm a repeat at no load."
     ),
     sensor="a second position sensor of another kind",
+    # not compensable: the loop follows the reading
 )

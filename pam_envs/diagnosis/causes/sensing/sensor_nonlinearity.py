@@ -30,5 +30,7 @@ CAUSE = Cause(
         "Data sheets of proportional regulators with sensors of their own: linearity within 1 % of "
         "full scale."
     ),
+    settled="the static law absorbs it exactly",
     sensor="a second sensor of another kind, or gauge blocks",
+    # not compensable: the recording is read through the same sensor
 )

@@ -19,7 +19,7 @@ CAUSE = Cause(
                 Term("position.slip", (1e-4,), scale=1e-4),
                 Term("position.slip_at", (100.0,), scale=0.1, amount=False),
             ),
-            seeds=step_starts,
+            search=step_starts,
         ),
     ),
     signature=(
@@ -35,4 +35,5 @@ CAUSE = Cause(
     needs=("contraction",),
     once=True,
     sensor="a second position sensor on the other side of the clamp",
+    # not compensable: it happened once; the plant cannot predict the next slip
 )

@@ -1,23 +1,23 @@
 """What ``docs/diagnosis_causes.md`` has to say, made of the declarations.
 
 The page holds three parts between marks; the rest of it is written by hand. After a change of the
-catalogue ``python -m tests.diagnosis.causes_page`` brings the parts up to date.
+catalogue ``python -m tests.diagnosis.causes.causes_page`` brings the parts up to date.
 """
 
 from __future__ import annotations
 
+import ast
 import re
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from pam_envs.diagnosis.cause import NEEDS, Cause, Form, Term
-from pam_envs.diagnosis.causes import catalogue
+from pam_envs.diagnosis.causes import FOLDER, catalogue
 from pam_envs.diagnosis.fit.single_muscle import BASE, declared
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
-PAGE = Path(__file__).parents[2] / "docs/diagnosis_causes.md"
+PAGE = Path(__file__).parents[3] / "docs/diagnosis_causes.md"
 EXAMPLE = Path(__file__).with_name("users_cause.py")
 PLANT = SingleMuscle.mas10("maxwell_slip")
 COMPONENTS = ("regulator", "hysteresis", "muscle", "mass", "position", "pressure")
@@ -104,10 +104,15 @@ def row_of(form: Form, term: Term) -> str:
     return f"| {' | '.join(cells)} | {number(neutral) if term.amount else ''} | {role} |"
 
 
+def documentation(cause: Cause) -> str:
+    """Return the text at the top of a cause's file."""
+    (path,) = FOLDER.rglob(f"{cause.name}.py")
+    return ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+
+
 def section(cause: Cause) -> str:
     """Return the section of a cause."""
-    module = sys.modules[f"pam_envs.diagnosis.causes.{cause.name}"]
-    lead, _, physics = (module.__doc__ or "").strip().partition("\n\n")
+    lead, _, physics = documentation(cause).partition("\n\n")
     rows = [row_of(form, term) for form in cause.forms for term in form.terms]
     points = {
         "Residual": cause.signature + ".",

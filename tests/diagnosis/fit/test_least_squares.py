@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from pam_envs.diagnosis.decide.search import Blocks
+from pam_envs.diagnosis.fit.blocks import Blocks
+from pam_envs.diagnosis.fit.intervals import spans
 from pam_envs.diagnosis.fit.least_squares import (
     WORST,
     Fit,
@@ -21,7 +22,6 @@ from pam_envs.diagnosis.fit.least_squares import (
     improve,
     share,
 )
-from pam_envs.diagnosis.report.summary_causes import spans
 
 Array = NDArray[np.float64]
 

@@ -17,11 +17,11 @@ from pam_envs.diagnosis.report import page as page_module
 from pam_envs.diagnosis.report.page import headline, page
 from pam_envs.diagnosis.report.page_parts import number
 from pam_envs.diagnosis.report.report import report_json
-from tests.diagnosis import report_fakes as fakes
-from tests.diagnosis.page_reader import SECTIONS, Page
+from tests.diagnosis.report import report_fakes as fakes
+from tests.diagnosis.report.page_reader import SECTIONS, Page
 
 SCHEMA = json.loads(
-    (Path(__file__).parents[1] / "schemas/diagnosis.schema.json").read_text(encoding="utf-8")
+    (Path(__file__).parents[2] / "schemas/diagnosis.schema.json").read_text(encoding="utf-8")
 )
 
 

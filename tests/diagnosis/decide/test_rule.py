@@ -10,9 +10,10 @@ from scipy.signal import lfilter
 
 from pam_envs.diagnosis.decide.held_out import kind_of
 from pam_envs.diagnosis.decide.rule import Rule, judge
-from pam_envs.diagnosis.decide.search import Blocks, Candidate
 from pam_envs.diagnosis.decide.structure import spectral_peak
-from pam_envs.diagnosis.decide.verdict import unsure
+from pam_envs.diagnosis.decide.verdict import p_value
+from pam_envs.diagnosis.fit.blocks import Blocks
+from pam_envs.diagnosis.fit.candidate import Candidate
 from pam_envs.diagnosis.fit.least_squares import Fit, Problem
 
 RULE = Rule()
@@ -139,7 +140,7 @@ def compared(
         return Candidate((), Fit((), np.zeros(0), np.zeros(0), residual=residual), residual)
 
     before, after = (noise + removed, noise) if there else (noise, noise - removed)
-    return unsure(problem, blocks, model(before), model(after), looked=25)
+    return p_value(problem, blocks, model(before), model(after), looked=25)
 
 
 @pytest.mark.parametrize("slow", [0.0, 0.5])

@@ -9,7 +9,7 @@ import pytest
 
 from pam_envs.data.recording.recording import Recording, Rig
 from pam_envs.diagnosis.audit.noise import ChannelFloor, noise_floor
-from tests.diagnosis.test_audit import NOISE, RIG, arrays, made
+from tests.diagnosis.audit.test_audit import NOISE, RIG, arrays, made
 
 UNDECLARED = dataclasses.replace(RIG, contraction_noise=None, pressure_noise=None)
 

@@ -15,7 +15,7 @@ from pam_envs.diagnosis.static.diagnosis import audit_polynomials, diagnose_read
 from pam_envs.diagnosis.static.fit import Fit, check_nested
 from pam_envs.diagnosis.static.models import SHIFT, TERMS, predict, units
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from tests.diagnosis.synthetic_readings import PRESSURES, table
+from tests.diagnosis.static.synthetic_readings import PRESSURES, table
 
 TABLE = load_contraction_table()
 COMPLIANCE, WIDTH, FRICTION = (

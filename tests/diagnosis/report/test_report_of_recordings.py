@@ -18,11 +18,11 @@ from pam_envs.diagnosis import Diagnosis, diagnose
 from pam_envs.kernels.build import COMPILED
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from tests.diagnosis import hidden
-from tests.diagnosis.page_reader import Page
+from tests.diagnosis.report.page_reader import Page
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")
 SCHEMA = json.loads(
-    (Path(__file__).parents[1] / "schemas/diagnosis.schema.json").read_text(encoding="utf-8")
+    (Path(__file__).parents[2] / "schemas/diagnosis.schema.json").read_text(encoding="utf-8")
 )
 CAUSES = ("leak", "temperature", "creep", "slip_step", "sensor_bias", "dead_time")
 

@@ -11,14 +11,15 @@ from pam_envs.data.recording.recording import Recording, Rig
 from pam_envs.diagnosis.audit.noise import noise_floor
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.causes import by_name, catalogue
-from pam_envs.diagnosis.decide.isolability import Isolability, ends, isolability, twins
-from pam_envs.diagnosis.decide.search import begun
-from pam_envs.diagnosis.decide.testable import LEAST_SIZE, not_testable, too_few
+from pam_envs.diagnosis.decide.isolability import Isolability, ends, isolability, lookalikes
+from pam_envs.diagnosis.decide.testable import LEAST_SIZE, not_testable, too_few_testable
 from pam_envs.diagnosis.diagnosis import Study
+from pam_envs.diagnosis.fit.candidate import initial_fits
 from pam_envs.diagnosis.fit.single_muscle import start_plant
-from pam_envs.diagnosis.fit.tolerance import inside, limit_of, released
+from pam_envs.diagnosis.fit.tolerance import load_error_limit, may_be_within, refit_load
 from pam_envs.kernels.build import COMPILED
-from tests.diagnosis import hidden, users_cause
+from tests.diagnosis import hidden
+from tests.diagnosis.causes import users_cause
 
 needs_kernels = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")
 BAR = 1e5
@@ -98,7 +99,7 @@ def test_what_a_cause_shows_at_most_is_at_its_bounds(study):
 def test_both_bounds_of_every_form_are_looked_at(study):
     for cause in (by_name("creep"), by_name("exhaust_asymmetry"), by_name("supply_droop")):
         for form in cause.forms:
-            fits = begun(study.problem, study.family, study.base.fit, cause, form)
+            fits = initial_fits(study.problem, study.family, study.base.fit, cause, form)
             low, high, far = ends(fits)
             for term, free in zip(form.terms, fits[0].frees[-len(form.terms) :], strict=True):
                 if term.amount:
@@ -183,7 +184,7 @@ def test_without_pressure_every_cause_of_the_valve_is_told_apart_or_listed(blind
     )
     valve = [c.name for c in causes if c.in_valve]
     assert set(valve) <= {*found.names, *reasons}
-    alike = twins(found, causes)
+    alike = lookalikes(found, causes)
     assert set(alike) <= set(reasons)
     for name in valve:
         if name not in reasons:
@@ -196,21 +197,21 @@ def test_without_pressure_every_cause_of_the_valve_is_told_apart_or_listed(blind
 
 def test_an_error_of_the_load_is_inside_what_was_declared_or_not():
     loads = [0.0, 1.5, 3.0, 6.0]
-    assert limit_of(loads, 0.02) == pytest.approx(0.03)
-    assert inside((-0.01, 0.01), loads, 0.02)
-    assert inside((0.025, 0.2), loads, 0.02)  # it may be
-    assert not inside((0.035, 0.2), loads, 0.02)
-    assert inside((-0.2, -0.025), loads, 0.02)
-    assert not inside((-0.2, -0.035), loads, 0.02)
-    assert inside((0.035, 0.2), loads, 0.05)
-    assert not inside((-0.035, -0.2), loads, 0.02)  # either way round
-    assert not inside((0.035, np.inf), loads, 0.02)
-    assert inside((5.0, 6.0), [0.0, 0.0], 0.02)  # of nothing there is no error
+    assert load_error_limit(loads, 0.02) == pytest.approx(0.03)
+    assert may_be_within((-0.01, 0.01), loads, 0.02)
+    assert may_be_within((0.025, 0.2), loads, 0.02)  # it may be
+    assert not may_be_within((0.035, 0.2), loads, 0.02)
+    assert may_be_within((-0.2, -0.025), loads, 0.02)
+    assert not may_be_within((-0.2, -0.035), loads, 0.02)
+    assert may_be_within((0.035, 0.2), loads, 0.05)
+    assert not may_be_within((-0.035, -0.2), loads, 0.02)  # either way round
+    assert not may_be_within((0.035, np.inf), loads, 0.02)
+    assert may_be_within((5.0, 6.0), [0.0, 0.0], 0.02)  # of nothing there is no error
 
 
 @needs_kernels
 def test_a_released_load_is_refitted_within_its_tolerance(study):
-    free = released(study.problem, study.blocks, study.family, study.base, 0.03)
+    free = refit_load(study.problem, study.blocks, study.family, study.base, 0.03)
     value = free.fit.values()["mass.load_error"]
     assert abs(value) <= 0.03
     assert free.names == ()
@@ -226,4 +227,4 @@ def test_a_released_load_is_refitted_within_its_tolerance(study):
     [(0, 1, True), (1, 1, False), (2, 3, False), (1, 3, True), (4, 25, True), (5, 25, False)],
 )
 def test_few_testable_causes_count_against_those_asked_for(testable, asked, few):
-    assert too_few(testable, asked) is few
+    assert too_few_testable(testable, asked) is few

@@ -11,10 +11,12 @@ import pytest
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.decide.held_out import LEAST_BLOCKS, Choice, HeldOut, choose
 from pam_envs.diagnosis.decide.rule import Rule
-from pam_envs.diagnosis.decide.search import Blocks, Candidate
 from pam_envs.diagnosis.decide.verdict import Decision
+from pam_envs.diagnosis.fit.blocks import Blocks
+from pam_envs.diagnosis.fit.candidate import Candidate
+from pam_envs.diagnosis.fit.intervals import span
 from pam_envs.diagnosis.fit.least_squares import Fit, Free
-from pam_envs.diagnosis.report.summary_causes import EXCLUDED, reasons, span
+from pam_envs.diagnosis.report.summary_causes import EXCLUDED, reasons
 
 PERIOD = 0.05
 

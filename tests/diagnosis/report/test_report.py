@@ -16,11 +16,11 @@ from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.report import page as page_module
 from pam_envs.diagnosis.report.report import dumps, plain, report_json, write
 from pam_envs.diagnosis.report.summary_text import sentence
-from tests.diagnosis import report_fakes as fakes
-from tests.diagnosis.page_reader import SECTIONS, Page
+from tests.diagnosis.report import report_fakes as fakes
+from tests.diagnosis.report.page_reader import SECTIONS, Page
 
 SCHEMA = json.loads(
-    (Path(__file__).parents[1] / "schemas/diagnosis.schema.json").read_text(encoding="utf-8")
+    (Path(__file__).parents[2] / "schemas/diagnosis.schema.json").read_text(encoding="utf-8")
 )
 VERDICTS = ("named", "ambiguous", "adequate", "unexplained", "insufficient")
 FILES = {"report.json", "report.html", "plant.yaml"}
@@ -118,7 +118,7 @@ def test_what_was_added_without_sufficing_is_said():
 
 
 def test_every_key_is_in_the_schema_and_every_one_is_documented():
-    document = (Path(__file__).parents[2] / "docs/diagnosis_report.md").read_text(encoding="utf-8")
+    document = (Path(__file__).parents[3] / "docs/diagnosis_report.md").read_text(encoding="utf-8")
     parts = [SCHEMA, *SCHEMA["$defs"].values(), *SCHEMA["properties"].values()]
     keys = {key for part in parts for key in part.get("properties", {})}
     assert len(keys) > 60

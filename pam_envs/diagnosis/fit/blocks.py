@@ -1,0 +1,81 @@
+"""Blocks of time that are held out in turn, and gains between models on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+BLOCK_SECONDS = 4.0
+"""Length of the interleaved blocks on which causes are compared."""
+EVERY = 3
+"""Every third block is held out."""
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Blocks of time.
+
+    Attributes
+    ----------
+    of : ndarray of int, shape (T,)
+        Block of each sample.
+    held_out : ndarray of bool, shape (n,)
+        Which blocks fits do not see.
+    counts : ndarray, shape (channels, n)
+        Readings in each.
+    """
+
+    of: NDArray[np.int64]
+    held_out: NDArray[np.bool_]
+    counts: Array
+
+    @classmethod
+    def make(cls, time: Array, measured: Array) -> Blocks:
+        """Cut a record into blocks, every third one held out."""
+        of = ((time - time[0]) / BLOCK_SECONDS + 1e-9).astype(np.int64)
+        n = int(of.max()) + 1
+        counts = np.stack(
+            [np.bincount(of, np.isfinite(m).astype(float), minlength=n) for m in measured]
+        )
+        return cls(of, np.arange(n) % EVERY == EVERY - 1, counts.astype(np.float64))
+
+    @property
+    def train(self) -> NDArray[np.bool_]:
+        """Samples that fits see, shape (T,)."""
+        return ~self.held_out[self.of]
+
+    def errors(self, rows: Array) -> Array:
+        """Return sums of squares of weighted residuals (channels, T), shape (channels, n)."""
+        n = len(self.held_out)
+        return np.stack([np.bincount(self.of, r * r, minlength=n) for r in rows])
+
+    def means(self, errors: Array, selected: NDArray[np.bool_] | None = None) -> Array:
+        """Return the mean square by channel over chosen blocks (the held-out ones)."""
+        use = self.held_out if selected is None else selected
+        counts = self.counts[:, use].sum(axis=1)
+        return errors[:, use].sum(axis=1) / np.maximum(counts, 1)
+
+    def gain(self, before: Array, after: Array, selected: NDArray[np.bool_] | None = None) -> float:
+        """Return the sum over channels of ``ln(MSE_before / MSE_after)``."""
+        some = self.counts.sum(axis=1) > 0
+        a, b = self.means(before, selected)[some], self.means(after, selected)[some]
+        return float(np.sum(np.log(np.maximum(a, 1e-12) / np.maximum(b, 1e-12))))
+
+    def draws(self, number: int, seed: int) -> NDArray[np.int64]:
+        """Return how often each block is drawn in bootstrap samples, shape (number, n)."""
+        rng = np.random.default_rng(seed)
+        places = np.flatnonzero(self.held_out)
+        drawn = np.zeros((number, len(self.held_out)), np.int64)
+        for k in range(number):
+            drawn[k] = np.bincount(rng.choice(places, len(places)), minlength=drawn.shape[1])
+        return drawn
+
+    def gains(self, before: Array, after: Array, draws: NDArray[np.int64]) -> Array:
+        """Return the gain in bootstrap samples, shape (number,)."""
+        some = self.counts.sum(axis=1) > 0
+        a, b = before[some] @ draws.T, after[some] @ draws.T
+        return np.asarray(np.sum(np.log(np.maximum(a, 1e-12) / np.maximum(b, 1e-12)), axis=0))

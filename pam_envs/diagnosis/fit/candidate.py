@@ -1,0 +1,161 @@
+"""Models that extend the base by causes: starting points, refits and ablations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.diagnosis.cause import Cause, Form
+from pam_envs.diagnosis.fit.blocks import Blocks
+from pam_envs.diagnosis.fit.least_squares import (
+    FEW_DAMPINGS,
+    Fit,
+    Free,
+    Problem,
+    Shared,
+    differentiate,
+    evaluate,
+    improve,
+    share,
+)
+
+Array = NDArray[np.float64]
+
+POLISH = 6
+"""Rounds, at most, with all of the Jacobian."""
+FEW_ROUNDS = 3
+"""Rounds of a model with a cause less."""
+POLISHED_ENOUGH = 1e-3
+"""Part of the cost that a round has to gain for another one."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A model: the base and some causes, each in one form, fitted."""
+
+    causes: tuple[tuple[Cause, Form], ...]
+    fit: Fit
+    errors: Array
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its causes."""
+        return tuple(c.name for c, _ in self.causes)
+
+
+def frees_for(family: Any, form: Form, values: Sequence[float]) -> tuple[Free, ...]:
+    """Return how a fit moves the parameters of a form, from starting values."""
+    made = []
+    for term, value in zip(form.terms, values, strict=True):
+        given = {k: getattr(term, k) for k in ("low", "high", "scale")}
+        changes = {k: v for k, v in given.items() if v is not None}
+        made.append(family.free(term.name, log=term.log, start=value, prior=np.inf, **changes))
+    return tuple(made)
+
+
+def starts(problem: Problem, family: Any, base: Fit, form: Form) -> list[tuple[float, ...]]:
+    """Return where the fits of a form begin."""
+    if form.search is not None:
+        key = id(form)
+        if key not in base.begins:
+            base.begins[key] = [tuple(s) for s in form.search(problem, family, base, form)]
+        return list(base.begins[key])
+    n = max(len(t.starts) for t in form.terms)
+    return [tuple(t.starts[min(i, len(t.starts) - 1)] for t in form.terms) for i in range(n)]
+
+
+def initial_fits(
+    problem: Problem,
+    family: Any,
+    base: Fit,
+    cause: Cause,
+    form: Form,
+    shared: Shared | None = None,
+) -> list[Fit]:
+    """Return the fits of a form, at their starts, with the base's Jacobian."""
+    names = {f.name for f in base.frees}
+    if any(t.name in names for t in form.terms):
+        return []
+    fits = []
+    for values in starts(problem, family, base, form):
+        frees = frees_for(family, form, values)
+        z = np.concatenate([base.z, [f.inner(f.start) for f in frees]])
+        fits.append(Fit((*base.frees, *frees), z, base.column, shared=shared, label=(cause, form)))
+    return fits
+
+
+def polish(problem: Problem, fits: Sequence[Fit], rounds: int = POLISH) -> None:
+    """Take rounds with a fresh Jacobian of all parameters."""
+    for fit in fits:
+        fit.done, fit.damping, fit.shared = False, 1.0, None
+    improve(problem, fits, rounds, POLISHED_ENOUGH)
+
+
+def complete_jacobian(problem: Problem, fit: Fit) -> None:
+    """Give a fit a Jacobian of all its parameters."""
+    if fit.shared is not None or len(fit.slopes) != len(fit.frees):
+        fit.shared = None
+        differentiate(problem, [fit])
+
+
+def fit_base(
+    problem: Problem, blocks: Blocks, column: Array, frees: tuple[Free, ...], rounds: int = 25
+) -> Candidate:
+    """Refit the plant's present parameters."""
+    fit = Fit(frees, np.array([f.inner(f.start) for f in frees]), column)
+    evaluate(problem, [fit])
+    improve(problem, [fit], rounds, 1e-5)
+    differentiate(problem, [fit])
+    return Candidate((), fit, blocks.errors(problem.rows(fit.residual)))
+
+
+def refit(problem: Problem, blocks: Blocks, candidate: Candidate, rounds: int = 6) -> Candidate:
+    """Return a candidate fitted anew to a problem with other training samples."""
+    fit = replace(candidate.fit, done=False, damping=1.0, shared=None, begins={})
+    evaluate(problem, [fit])
+    improve(problem, [fit], rounds, 1e-5)
+    return Candidate(candidate.causes, fit, blocks.errors(problem.rows(fit.residual)))
+
+
+def restarted(fit: Fit, **changes: Any) -> Fit:
+    """Return a copy of a fit that has not begun."""
+    empty = np.zeros((0, 0))
+    return replace(fit, done=False, damping=1.0, begins={}, slopes=empty, **changes)
+
+
+def without_each_cause(
+    problem: Problem, blocks: Blocks, base: Candidate, model: Candidate
+) -> dict[str, Candidate]:
+    """Return the model refitted without each one of its causes, the better of two beginnings."""
+    fits, labels = [], []
+    for gone, form in model.causes:
+        dropped = {t.name for t in form.terms}
+        kept = [k for k, f in enumerate(model.fit.frees) if f.name not in dropped]
+        frees, z = tuple(model.fit.frees[k] for k in kept), model.fit.z[kept]
+        of_base = np.concatenate([base.fit.z, z[len(base.fit.z) :]])
+        for start in (z, of_base):
+            fits.append(restarted(replace(model.fit, frees=frees, z=start.copy()), shared=None))
+            labels.append(gone.name)
+    complete_jacobian(problem, base.fit)
+    shared = share(problem, base.fit)
+    for fit in fits:
+        fit.shared = shared
+    evaluate(problem, fits)
+    improve(problem, fits, FEW_ROUNDS, 1e-4, FEW_DAMPINGS)
+    best: dict[str, Fit] = {}
+    for name, fit in zip(labels, fits, strict=True):
+        if name not in best or fit.cost < best[name].cost:
+            best[name] = fit
+    polish(problem, list(best.values()))
+    return {
+        name: Candidate(
+            tuple(c for c in model.causes if c[0].name != name),
+            fit,
+            blocks.errors(problem.rows(fit.residual)),
+        )
+        for name, fit in best.items()
+    }

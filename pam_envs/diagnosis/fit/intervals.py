@@ -1,0 +1,79 @@
+"""Confidence intervals of fitted parameters, robust against noise that is correlated in blocks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from pam_envs.diagnosis.fit.blocks import Blocks
+from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, differentiate, normal_equations
+
+Array = NDArray[np.float64]
+Json = dict[str, Any]
+
+LEAST_LEFT = 2
+"""Degrees of freedom that are assumed where there are hardly more blocks than parameters."""
+WIDE_LOG, WIDE = 10.0, 0.5
+"""An interval over a wider factor, or a larger part of the bounds, identifies nothing."""
+
+
+def at_bound(free: Free, value: float) -> bool:
+    """Return whether a fit stopped at a bound of a parameter."""
+    return bool(value <= free.low or value >= free.high)
+
+
+def interval_half_widths(problem: Problem, blocks: Blocks, fit: Fit) -> Array:
+    """Return half the widths of the 95 % intervals of a fit's internal coordinates.
+
+    From the curvature of the fit and the scatter of the blocks' gradients, so that noise that is
+    correlated within a block counts as it should; never less than what white noise of the declared
+    size gives. Each parameter takes a block's worth of freedom, and Student's t has what is left.
+    What stands at a bound does not widen the rest.
+    """
+    if fit.shared is not None or len(fit.slopes) != len(fit.frees):
+        fit.shared = None
+        differentiate(problem, [fit])
+    normal, _ = normal_equations(problem, fit)
+    n = problem.seen
+    of = np.tile(blocks.of, len(problem.measured))[problem.order[:n]]
+    pulls = fit.slopes[:, :n] * fit.residual[:n]
+    sums = np.stack([np.bincount(of, row, minlength=len(blocks.held_out)) for row in pulls])
+    scatter, values = sums @ sums.T, fit.values()
+    may_be_within = np.array([not at_bound(f, values[f.name]) for f in fit.frees])
+    number = len(np.unique(of))
+    found = np.zeros(len(fit.frees))
+    for places in (np.arange(len(found)), np.flatnonzero(may_be_within)):
+        part = np.ix_(places, places)
+        inverse = np.linalg.pinv(normal[part], rcond=1e-12, hermitian=True)
+        left = max(number - len(places), LEAST_LEFT)
+        spread = np.diag(inverse @ scatter[part] @ inverse) * number / left
+        wide = np.sqrt(np.maximum(spread, np.diag(inverse)))
+        found[places] = float(stdtrit(left, 0.975)) * wide
+    return found
+
+
+def spans(problem: Problem, blocks: Blocks, fit: Fit) -> dict[str, Json]:
+    """Return, by parameter, its 95 % interval in SI and what is to be said of it."""
+    made, values = {}, fit.values()
+    for free, z, half in zip(
+        fit.frees, fit.z, interval_half_widths(problem, blocks, fit), strict=True
+    ):
+        made[free.name] = span(free, values[free.name], float(z), float(half))
+    return made
+
+
+def span(free: Free, value: float, z: float, half: float) -> Json:
+    """Return the interval of one parameter; open on the side on which the fit hit a bound."""
+    low, high = (float(v) for v in free.outer(np.array([z - half, z + half])))
+    if free.log:
+        wide = low <= 0.0 or high > WIDE_LOG * low
+    else:
+        wide = high - low > WIDE * (free.high - free.low)
+    return {
+        "interval": [None if value <= free.low else low, None if value >= free.high else high],
+        "at_bound": at_bound(free, value),
+        "not_identified": bool(wide),
+    }

@@ -1,0 +1,71 @@
+"""A version of the rule stands for its numbers, those of the causes, and recorded decisions."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from typing import Any
+
+import pytest
+
+from pam_envs.diagnosis.decide.rule import Rule
+from tests.diagnosis.decide import rule_record as recorded
+
+RULE = Rule()
+ADVICE = (
+    "a number or a decision changed: give the rule a new version and record it with "
+    "python -m tests.diagnosis.decide.rule_record; keep the old record"
+)
+
+
+@pytest.fixture(scope="module")
+def known() -> dict[str, Any]:
+    path = recorded.path_of(RULE.version)
+    assert path.is_file(), f"no record of version {RULE.version}: {ADVICE}"
+    return dict(json.loads(path.read_text(encoding="utf-8")))
+
+
+@pytest.fixture(scope="module")
+def present() -> dict[str, Any]:
+    return recorded.record(RULE)
+
+
+def test_numbers_of_the_rule_belong_to_its_version(known: Any, present: Any) -> None:
+    assert present["rule"] == known["rule"], ADVICE
+
+
+def test_numbers_of_shipped_causes_belong_to_the_version(known: Any, present: Any) -> None:
+    for name, numbers in known["causes"].items():
+        assert present["causes"][name] == numbers, f"{name}: {ADVICE}"
+
+
+def test_recorded_evidence_gives_the_recorded_verdicts(known: Any, present: Any) -> None:
+    assert present["judgements"] == known["judgements"], ADVICE
+    assert {found["verdict"] for found in known["judgements"].values()} >= {"named", "adequate"}
+
+
+@pytest.mark.parametrize("part", ["decisions", "noise"])
+def test_engine_reproduces_its_recorded_decisions(part: str, known: Any, present: Any) -> None:
+    assert_alike(present[part], known[part], part)
+
+
+def assert_alike(found: Any, wanted: Any, where: str) -> None:
+    """Compare nested values, numbers within what processors differ by."""
+    if isinstance(wanted, dict):
+        assert found.keys() == wanted.keys(), where
+        for key, value in wanted.items():
+            assert_alike(found[key], value, f"{where}.{key}")
+    elif isinstance(wanted, list):
+        assert len(found) == len(wanted), where
+        for k, value in enumerate(wanted):
+            assert_alike(found[k], value, f"{where}[{k}]")
+    elif isinstance(wanted, float):
+        assert found == pytest.approx(wanted, rel=1e-3, abs=6e-3), f"{where}: {ADVICE}"
+    else:
+        assert found == wanted, f"{where}: {ADVICE}"
+
+
+@pytest.mark.parametrize("field", [f.name for f in dataclasses.fields(Rule) if f.name != "version"])
+def test_each_number_of_the_rule_is_recorded(field: str, known: Any) -> None:
+    other = dataclasses.replace(RULE, **{field: getattr(RULE, field) + 1})
+    assert recorded.numbers_of_rule(other) != known["rule"]
