@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections import namedtuple
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
+from itertools import accumulate
 from typing import Any, Literal
 
 import numpy as np
@@ -65,12 +68,50 @@ def parameter(
 
 
 def declarations(component: Any) -> dict[str, Declaration]:
-    """Return the declared parameters of a component class or instance, by field name."""
-    return {
+    """Return the declared parameters of a component class or instance, by field name.
+
+    A class attribute ``quantity = (unit, size)`` completes declarations whose unit holds ``{}``:
+    it is put in its place, and their bounds are multiples of ``size``.
+    """
+    return dict(_declarations(component if isinstance(component, type) else type(component)))
+
+
+@lru_cache(maxsize=256)
+def _declarations(component: Any) -> dict[str, Declaration]:
+    found = {
         field.name: field.metadata["declaration"]
         for field in dataclasses.fields(component)
         if "declaration" in field.metadata
     }
+    unit, size = getattr(component, "quantity", ("1", 1.0))
+    for name, declared in found.items():
+        if "{}" in declared.unit:
+            found[name] = dataclasses.replace(
+                declared,
+                unit=declared.unit.format(unit),
+                low=declared.low * size,
+                high=declared.high * size,
+            )
+    return found
+
+
+def named_rows(*names: str) -> Any:
+    """Return a named tuple of row numbers, which kernels read as constants.
+
+    ``named_rows("pressure", "rate").rate`` is 1.
+    """
+    return namedtuple("Rows", names)(*range(len(names)))  # type: ignore[misc]
+
+
+def row_blocks(start: int = 0, **sizes: int) -> Any:
+    """Return a named tuple of the first row of each block of rows, and ``end`` behind the last."""
+    firsts = list(accumulate(sizes.values(), initial=start))
+    return namedtuple("Blocks", (*sizes, "end"))(*firsts)  # type: ignore[misc, arg-type]
+
+
+def parameter_rows(*components: type) -> Any:
+    """Return the rows, from 0, of the declared parameters of components (see :func:`named_rows`)."""
+    return named_rows(*(name for component in components for name in declarations(component)))
 
 
 def check(component: Any, where: str = "") -> None:

@@ -16,7 +16,7 @@ from scipy import stats
 from pam_envs.kernels import arithmetic, random
 from pam_envs.kernels import build as kernels
 from pam_envs.kernels.build import prange
-from pam_envs.mechanics.hanging_mass import damped_motion, oscillator
+from pam_envs.kernels.motion import damped_motion, oscillator
 
 ROOT = Path(__file__).resolve().parents[1]
 

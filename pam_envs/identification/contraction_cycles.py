@@ -144,7 +144,9 @@ def _plant(theta: Array, hysteresis: bool) -> SingleMuscle:
         shares = theta[6:12] / max(float(theta[6:12].sum()), 1e-9)
         weights = tuple(float(w) for w in (1.0 - theta[5]) * shares)
         operator = PlayOperator(THRESHOLDS, weights, 1.0 - float(np.sum(weights)))
-        held = Hysteresis(operator, float(theta[12]), float(theta[13]))
+        held = Hysteresis(
+            operator=operator, stretch=float(theta[12]), width_per_load=float(theta[13])
+        )
     return dataclasses.replace(base, muscle=muscle, hysteresis=held)
 
 

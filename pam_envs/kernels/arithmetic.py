@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from pam_envs.kernels.build import kernel
+from typing import Any
+
+from pam_envs.kernels.build import LANES, kernel
 
 
 @kernel
@@ -100,3 +102,12 @@ def log_of_fraction(u: float) -> float:
     t = t * y + 2.0 / 3.0
     t = t * y + 2.0
     return s * t + (e - 0.5) * 0.6931471805599453
+
+
+@kernel
+def count_on(values: Any, neutral: float) -> int:
+    """Return the number of lanes of a tile in which a parameter is not neutral."""
+    on = 0
+    for j in range(LANES):
+        on = on + (0 if values[j] == neutral else 1)
+    return on

@@ -13,20 +13,40 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.constants import ROOM_TEMPERATURE
 from pam_envs.kernels.build import kernel
+from pam_envs.muscle.length_creep import LengthCreepEffects
+from pam_envs.muscle.load_effects import LoadEffects
+from pam_envs.muscle.strands import StrandEffects
+from pam_envs.muscle.temperature import TemperatureEffects
+from pam_envs.muscle.viscosity import ViscosityEffects
 from pam_envs.parameters import parameter
 
 _FIT = "least squares on positioning2021, Tables 3-5"
 
 
 @dataclass(frozen=True)
-class EffectiveAreaMuscle:
+class EffectiveAreaMuscle(
+    ViscosityEffects, StrandEffects, LengthCreepEffects, LoadEffects, TemperatureEffects
+):
     """Geometry and static force law of one muscle."""
+
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("area_curve",),
+        ("softening",),
+        ("stiffening",),
+        ("temperature", "temperature_gain"),
+        ("load_curve",),
+        ("load_stiffening",),
+        ("load_stiffening_2",),
+        ("load_stiffening_root",),
+        ("strand_1", "strand_2", "strand_3", "strand_4", "strand_break"),
+        ("viscosity", "viscosity_speed"),
+    )
 
     rest_length: float = parameter(
         0.1, "m", 0.02, 2.0, "published", "positioning2021, Table 1: MAS-10-N-100"
@@ -52,82 +72,6 @@ class EffectiveAreaMuscle:
     )
     stiffening: float = parameter(
         0.0, "N", -1e8, 1e8, "assumed", "passive force over strain to the fourth", neutral=0.0
-    )
-    # effects, neutral unless a recording shows them
-    temperature: float = parameter(
-        ROOM_TEMPERATURE, "K", 230.0, 400.0, "assumed", "of the muscle; the law is that of 293.15 K"
-    )
-    temperature_gain: float = parameter(
-        0.0, "1/K", -0.05, 0.05, "assumed", "effective pressure gained per kelvin", neutral=0.0
-    )
-    load_curve: float = parameter(
-        0.0, "Pa/N2", -200.0, 200.0, "assumed", "pressure shift over load squared", neutral=0.0
-    )
-    load_stiffening: float = parameter(
-        0.0, "1/N", -0.015, 0.05, "assumed", "stiffness gained per newton of load", neutral=0.0
-    )
-    load_stiffening_2: float = parameter(
-        0.0, "1/N2", -2e-4, 1e-3, "assumed", "the same by load squared", neutral=0.0
-    )
-    load_stiffening_root: float = parameter(
-        0.0, "1/N^0.5", -0.1, 0.5, "assumed", "the same by the root of the load", neutral=0.0
-    )
-    creep_1: float = parameter(
-        0.0,
-        "1",
-        -0.5,
-        2.0,
-        "assumed",
-        "length that follows at hysteresis.creep_time_1",
-        neutral=0.0,
-    )
-    creep_2: float = parameter(
-        0.0,
-        "1",
-        -0.5,
-        2.0,
-        "assumed",
-        "length that follows at hysteresis.creep_time_2",
-        neutral=0.0,
-    )
-    creep_3: float = parameter(
-        0.0,
-        "1",
-        -0.5,
-        2.0,
-        "assumed",
-        "length that follows at hysteresis.creep_time_3",
-        neutral=0.0,
-    )
-    creep_4: float = parameter(
-        0.0,
-        "1",
-        -0.5,
-        2.0,
-        "assumed",
-        "length that follows at hysteresis.creep_time_4",
-        neutral=0.0,
-    )
-    strand_1: float = parameter(
-        0.0, "N", 0.0, 500.0, "assumed", "friction of the first strands to break away", neutral=0.0
-    )
-    strand_2: float = parameter(
-        0.0, "N", 0.0, 500.0, "assumed", "friction of the second strands to break away", neutral=0.0
-    )
-    strand_3: float = parameter(
-        0.0, "N", 0.0, 500.0, "assumed", "friction of the third strands to break away", neutral=0.0
-    )
-    strand_4: float = parameter(
-        0.0, "N", 0.0, 500.0, "assumed", "friction of the last strands to break away", neutral=0.0
-    )
-    strand_break: float = parameter(
-        0.02, "1", 0.001, 0.3, "assumed", "strain at which the last strand slips"
-    )
-    viscosity: float = parameter(
-        0.0, "N s/m", 0.0, 1e5, "assumed", "damping at small speed beside the mass's", neutral=0.0
-    )
-    viscosity_speed: float = parameter(
-        0.02, "m/s", 1e-4, 10.0, "assumed", "speed at which that damping has fallen by 1 / sqrt(2)"
     )
 
     def tension(self, drive: ArrayLike, strain: ArrayLike) -> NDArray[np.float64]:

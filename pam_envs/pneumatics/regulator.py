@@ -1,19 +1,100 @@
-"""Proportional pressure regulator: dead time, slew limit, first-order lag, saturation."""
+"""Proportional pressure regulator: dead time, slew limit, first-order lag, saturation.
+
+Its effects are those of valve, supply and line: static gain, rounded slew limit, dead band of a
+valve that closes, overlap of a spool, slower and choked exhaust, leak.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
-from pam_envs.kernels.arithmetic import decay
+from pam_envs.constants import ATMOSPHERE
+from pam_envs.kernels.arithmetic import count_on, decay
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import named_rows, parameter, parameter_rows
+from pam_envs.pneumatics.line import LINE_STATE, LineEffects
+from pam_envs.pneumatics.supply import AMPLE, SupplyEffects, supplied, supply_drop
 
 DELAY_PERIODS = 12
 """Longest dead time, in control periods, that a command history has to hold."""
+NO_SLEW_LIMIT = 1e9
+"""Slew rate [Pa/s] that limits nothing."""
+UNCHOKED = 100.0
+"""Exhaust rate [1/s] that limits nothing."""
 
 
 @dataclass(frozen=True)
-class Regulator:
+class ValveEffects:
+    """Effects of a regulator's valve, neutral unless a recording shows them."""
+
+    gain: float = parameter(
+        1.0, "1", 0.5, 1.5, "assumed", "pressure reached over set-point", neutral=1.0
+    )
+    slew_bend: float = parameter(
+        0.0, "1", 0.0, 1.0, "assumed", "from a sharp slew limit to a rounded one", neutral=0.0
+    )
+    dead_band: float = parameter(
+        0.0, "Pa", 0.0, 3e5, "assumed", "error that the valve does not answer", neutral=0.0
+    )
+    dead_close: float = parameter(
+        1.0, "1", 0.0, 1.0, "assumed", "error at which the valve closes again, over dead_band"
+    )
+    overlap: float = parameter(
+        0.0, "Pa", 0.0, 3e5, "assumed", "error up to which the spool only leaks", neutral=0.0
+    )
+    overlap_leak: float = parameter(
+        0.01, "1", 1e-4, 1.0, "assumed", "gain within the overlap over that beyond it"
+    )
+    exhaust_ratio: float = parameter(
+        1.0, "1", 0.1, 20.0, "assumed", "lag when exhausting over lag when filling", neutral=1.0
+    )
+    exhaust_taper: float = parameter(
+        0.0, "1", 0.0, 1.0, "assumed", "how much of exhaust_ratio is gone at full pressure"
+    )
+    exhaust_rate: float = parameter(
+        UNCHOKED,
+        "1/s",
+        0.05,
+        UNCHOKED,
+        "assumed",
+        "fastest exhaust over absolute pressure (choked flow)",
+        neutral=UNCHOKED,
+    )
+    leak: float = parameter(
+        0.0, "1/s", 0.0, 10.0, "assumed", "pressure lost over pressure", neutral=0.0
+    )
+
+
+@dataclass(frozen=True)
+class RegulatorEffects(LineEffects, SupplyEffects, ValveEffects):
+    """Effects of a regulator with its supply and its line."""
+
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("gain",),
+        ("slew_bend",),
+        ("dead_band", "dead_close"),
+        ("overlap", "overlap_leak"),
+        ("exhaust_ratio", "exhaust_taper"),
+        ("exhaust_rate",),
+        ("leak",),
+        ("supply_pressure", "supply_droop", "supply_time", "supply_recovery"),
+        ("ring_share", "ring_flow", "ring_frequency", "ring_damping"),
+    )
+
+
+@dataclass(frozen=True)
+class DelayedEffects(RegulatorEffects):
+    """The same, and a dead time, of regulators whose plain model has none."""
+
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = (("dead_time",), *RegulatorEffects.effects)
+
+    dead_time: float = parameter(0.0, "s", 0.0, 0.11, "assumed", "of the set-point", neutral=0.0)
+
+
+@dataclass(frozen=True)
+class Regulator(RegulatorEffects):
     """A closed-loop pressure regulator as its user sees it.
 
     The set-point, held between 0 and ``max_pressure``, takes effect after ``dead_time``. The
@@ -59,63 +140,13 @@ class Regulator:
         neutral=1e9,
         spread=(4e5, 1.2e6),
     )
-    # effects, neutral unless a recording shows them
-    gain: float = parameter(
-        1.0, "1", 0.5, 1.5, "assumed", "pressure reached over set-point", neutral=1.0
-    )
-    slew_bend: float = parameter(
-        0.0, "1", 0.0, 1.0, "assumed", "from a sharp slew limit to a rounded one", neutral=0.0
-    )
-    dead_band: float = parameter(
-        0.0, "Pa", 0.0, 3e5, "assumed", "error that the valve does not answer", neutral=0.0
-    )
-    dead_close: float = parameter(
-        1.0, "1", 0.0, 1.0, "assumed", "error at which the valve closes again, over dead_band"
-    )
-    overlap: float = parameter(
-        0.0, "Pa", 0.0, 3e5, "assumed", "error up to which the spool only leaks", neutral=0.0
-    )
-    overlap_leak: float = parameter(
-        0.01, "1", 1e-4, 1.0, "assumed", "gain within the overlap over that beyond it"
-    )
-    exhaust_ratio: float = parameter(
-        1.0, "1", 0.1, 20.0, "assumed", "lag when exhausting over lag when filling", neutral=1.0
-    )
-    exhaust_taper: float = parameter(
-        0.0, "1", 0.0, 1.0, "assumed", "how much of exhaust_ratio is gone at full pressure"
-    )
-    exhaust_rate: float = parameter(
-        100.0,
-        "1/s",
-        0.05,
-        100.0,
-        "assumed",
-        "fastest exhaust over absolute pressure (choked flow)",
-        neutral=100.0,
-    )
-    leak: float = parameter(
-        0.0, "1/s", 0.0, 10.0, "assumed", "pressure lost over pressure", neutral=0.0
-    )
-    supply_pressure: float = parameter(
-        2e7, "Pa", 5e4, 2e7, "assumed", "of the reservoir at rest", neutral=2e7
-    )
-    supply_droop: float = parameter(
-        0.0, "1", 0.0, 5.0, "assumed", "supply pressure lost over pressure filled", neutral=0.0
-    )
-    supply_time: float = parameter(
-        0.01, "s", 0.001, 5.0, "assumed", "filling to the supply takes at full flow"
-    )
-    supply_recovery: float = parameter(
-        10.0, "s", 0.1, 1e3, "assumed", "filling the empty reservoir takes at full flow"
-    )
-    ring_share: float = parameter(
-        0.0, "1", 0.0, 1.0, "assumed", "share of the pressure behind a line that rings", neutral=0.0
-    )
-    ring_flow: float = parameter(
-        0.0, "1", -2.0, 2.0, "assumed", "ringing that goes with the flow", neutral=0.0
-    )
-    ring_frequency: float = parameter(7.0, "Hz", 0.5, 20.0, "assumed", "of the line")
-    ring_damping: float = parameter(0.1, "1", 0.005, 2.0, "assumed", "damping ratio of the line")
+
+
+AIR = parameter_rows(RegulatorEffects)
+"""Rows of the effects of valve, supply and line, from the first."""
+AIR_STATE = named_rows("regulated", "opened", "drop", "line", "line_rate")
+"""Rows of the state of valve, supply and line, from the first."""
+assert AIR_STATE.line + LINE_STATE.rate == AIR_STATE.line_rate
 
 
 @kernel
@@ -166,3 +197,111 @@ def regulator_step(
     if gap < 0.0:
         return target + left
     return target - left
+
+
+@kernel
+def regulate_with_effects(
+    rows: Any, fixed: Any, j: int, state: int, effects: int, lag: float, slew: float, full: float,
+    target: float, h: float,
+) -> float:  # fmt: skip
+    """Return the regulated pressure [Pa] of lane ``j`` after ``h`` seconds, with all effects.
+
+    Parameters
+    ----------
+    rows, fixed : rows
+        State and parameters.
+    j : int
+        Lane.
+    state, effects : int
+        First row of the air's state (``AIR_STATE``) and of its effects (``AIR``).
+    lag, slew, full : float
+        Time constant [s], slew rate [Pa/s] and full pressure [Pa].
+    target : float
+        Set-point [Pa]; below zero the valve is shut.
+    h : float
+        Duration [s].
+    """
+    pressure = rows[state + AIR_STATE.regulated][j]
+    drop = rows[state + AIR_STATE.drop][j]
+    goal = fixed[effects + AIR.gain][j] * target
+    wide = fixed[effects + AIR.dead_band][j]
+    band = wide * fixed[effects + AIR.dead_close][j]
+    off, opened = abs(goal - pressure), rows[state + AIR_STATE.opened][j]
+    opened = 1.0 if off > wide else (opened if off > band * 1.0000001 else 0.0)
+    goal = goal if opened > 0.0 else pressure
+    stop_low, stop_high = min(pressure, goal + band), max(pressure, goal - band)
+    slower = (fixed[effects + AIR.exhaust_ratio][j] - 1.0) * (
+        1.0 - fixed[effects + AIR.exhaust_taper][j] * pressure / full
+    )
+    lag = lag * (1.0 + slower if goal < pressure else 1.0)
+    # a spool opens beyond its overlap, by what the error exceeds it; within it leaks
+    over, within = fixed[effects + AIR.overlap][j], fixed[effects + AIR.overlap_leak][j]
+    shift = over * (1.0 - within) if abs(goal - pressure) > over else 0.0
+    lag = lag / within if abs(goal - pressure) < over else lag
+    aim = goal + shift if goal < pressure else goal - shift
+    reached = regulator_step(pressure, aim, lag, 1.0 / lag, slew, 1.0 / slew, h)
+    free = (aim - pressure) * (1.0 - decay(h / lag))
+    most = slew * max(h, 1e-9)
+    rounded = pressure + free * most / math.sqrt(free * free + most * most)
+    bend = fixed[effects + AIR.slew_bend][j] if slew < NO_SLEW_LIMIT else 0.0
+    reached = reached + bend * (rounded - reached)
+    rate = fixed[effects + AIR.exhaust_rate][j]
+    choked = (pressure + ATMOSPHERE) * decay(rate * h) - ATMOSPHERE
+    reached = reached if rate >= UNCHOKED else max(reached, min(pressure, choked))
+    rest = fixed[effects + AIR.supply_pressure][j]
+    reached = supplied(pressure, reached, rest, drop, fixed[effects + AIR.supply_time][j], h)
+    # the valve closes when the error has fallen to the band
+    stopped = min(reached, stop_high) if goal > pressure else max(reached, stop_low)
+    rows[state + AIR_STATE.opened][j] = opened if stopped == reached else 0.0
+    reached = stopped
+    reached = pressure if target < 0.0 else reached
+    rows[state + AIR_STATE.drop][j] = supply_drop(
+        drop,
+        reached - pressure,
+        rest,
+        fixed[effects + AIR.supply_droop][j],
+        fixed[effects + AIR.supply_recovery][j],
+        h,
+    )
+    return reached * decay(fixed[effects + AIR.leak][j] * h)  # type: ignore[no-any-return]
+
+
+@kernel
+def regulate_with_gain(
+    rows: Any, fixed: Any, j: int, state: int, effects: int, lag: float, slew: float, target: float,
+    h: float,
+) -> float:  # fmt: skip
+    """Return the same as :func:`regulate_with_effects` where no effect but the gain is on."""
+    pressure, goal = rows[state + AIR_STATE.regulated][j], fixed[effects + AIR.gain][j] * target
+    reached = regulator_step(pressure, goal, lag, 1.0 / lag, slew, 1.0 / slew, h)
+    return pressure if target < 0.0 else reached  # type: ignore[no-any-return]
+
+
+@kernel
+def begin_air(rows: Any, j: int, state: int, pressure: float) -> None:
+    """Begin valve, supply and line of one lane at rest at a pressure [Pa]."""
+    rows[state + AIR_STATE.regulated][j] = rows[state + AIR_STATE.line][j] = pressure
+    rows[state + AIR_STATE.opened][j] = rows[state + AIR_STATE.drop][j] = 0.0
+    rows[state + AIR_STATE.line_rate][j] = 0.0
+
+
+@kernel
+def valve_effects_on(fixed: Any, effects: int) -> int:
+    """Return the number of lanes and effects for which the plain regulator will not do."""
+    return (  # type: ignore[no-any-return]
+        count_on(fixed[effects + AIR.dead_band], 0.0)
+        + count_on(fixed[effects + AIR.overlap], 0.0)
+        + count_on(fixed[effects + AIR.exhaust_ratio], 1.0)
+        + count_on(fixed[effects + AIR.exhaust_rate], UNCHOKED)
+        + count_on(fixed[effects + AIR.leak], 0.0)
+        + count_on(fixed[effects + AIR.supply_pressure], AMPLE)
+        + count_on(fixed[effects + AIR.slew_bend], 0.0)
+    )
+
+
+@kernel
+def line_effects_on(fixed: Any, effects: int) -> int:
+    """Return the number of lanes whose line rings."""
+    return count_on(fixed[effects + AIR.ring_share], 0.0) + count_on(  # type: ignore[no-any-return]
+        fixed[effects + AIR.ring_flow], 0.0
+    )

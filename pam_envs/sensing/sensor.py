@@ -1,17 +1,57 @@
-"""A sensor: bias, white noise, quantisation."""
+"""Sensors: bias, white noise and quantisation; and delay, bow, drift, ramp and slip as effects."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
-from pam_envs.kernels.arithmetic import quantise
-from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.kernels.arithmetic import decay, quantise
+from pam_envs.kernels.build import kernel, routine
+from pam_envs.kernels.history import N_HISTORY, note, noted
+from pam_envs.parameters import named_rows, parameter, parameter_rows
+
+SLIDE = 0.2
+"""Time [s] that a slipping clamp takes."""
 
 
 @dataclass(frozen=True)
-class PositionSensor:
-    """Displacement sensor on the free end."""
+class SensorEffects:
+    """Effects of any sensor, neutral unless a recording shows them.
+
+    A reading is ``x + bow x (x / full - 1) + drift + ramp + slip`` of the quantity ``x`` that the
+    sensor measured ``delay`` seconds ago.
+
+    Attributes
+    ----------
+    quantity : tuple of str and float
+        Unit, and the largest drift, ramp and slip.
+    """
+
+    quantity: ClassVar[tuple[str, float]] = ("1", 1.0)
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("drift", "drift_time"),
+        ("ramp", "ramp_at", "ramp_over"),
+        ("delay",),
+        ("bow",),
+        ("slip", "slip_at"),
+    )
+
+    drift: float = parameter(0.0, "{}/s", -1.0, 1.0, "assumed", "at the start", neutral=0.0)
+    drift_time: float = parameter(1e4, "s", 1.0, 1e4, "assumed", "time in which the drift settles")
+    ramp: float = parameter(0.0, "{}", -1.0, 1.0, "assumed", "drift that ends", neutral=0.0)
+    ramp_at: float = parameter(0.0, "s", 0.0, 1e6, "assumed", "its middle")
+    ramp_over: float = parameter(60.0, "s", 1.0, 1e6, "assumed", "its duration")
+    delay: float = parameter(0.0, "s", 0.0, 0.14, "assumed", "of the reading", neutral=0.0)
+    bow: float = parameter(0.0, "1", -0.5, 0.5, "assumed", "parabola over full scale", neutral=0.0)
+    slip: float = parameter(0.0, "{}", -1.0, 1.0, "assumed", "step of a clamp", neutral=0.0)
+    slip_at: float = parameter(0.0, "s", 0.0, 1e6, "assumed", "time of the slip")
+
+
+@dataclass(frozen=True)
+class PositionSensor(SensorEffects):
+    """Displacement sensor on the free end; the full scale is a contraction of 15 %."""
+
+    quantity: ClassVar[tuple[str, float]] = ("m", 0.02)
 
     noise: float = parameter(
         3e-5, "m", 0.0, 1e-2, "assumed", "0.03 mm RMS; 0.02-0.05 mm seen", neutral=0.0
@@ -20,23 +60,13 @@ class PositionSensor:
         1e-5, "m", 0.0, 1e-3, "assumed", "0.01 mm; 0.049 mm on one public rig", neutral=0.0
     )
     bias: float = parameter(0.0, "m", -0.05, 0.05, "assumed", "zeroed at rest", neutral=0.0)
-    # effects, neutral unless a recording shows them
-    drift: float = parameter(0.0, "m/s", -0.02, 0.02, "assumed", "at the start", neutral=0.0)
-    drift_time: float = parameter(1e4, "s", 1.0, 1e4, "assumed", "time in which the drift settles")
-    ramp: float = parameter(0.0, "m", -0.02, 0.02, "assumed", "drift that ends", neutral=0.0)
-    ramp_at: float = parameter(0.0, "s", 0.0, 1e6, "assumed", "its middle")
-    ramp_over: float = parameter(60.0, "s", 1.0, 1e6, "assumed", "how long it takes")
-    delay: float = parameter(0.0, "s", 0.0, 0.14, "assumed", "of the reading", neutral=0.0)
-    bow: float = parameter(
-        0.0, "1", -0.5, 0.5, "assumed", "parabola over full scale, 15 % contraction", neutral=0.0
-    )
-    slip: float = parameter(0.0, "m", -0.02, 0.02, "assumed", "step of a clamp", neutral=0.0)
-    slip_at: float = parameter(0.0, "s", 0.0, 1e6, "assumed", "when it slipped")
 
 
 @dataclass(frozen=True)
-class PressureSensor:
-    """Gauge pressure sensor at the muscle."""
+class PressureSensor(SensorEffects):
+    """Gauge pressure sensor at the muscle; the full scale is the regulator's."""
+
+    quantity: ClassVar[tuple[str, float]] = ("Pa", 1e5)
 
     noise: float = parameter(
         800.0, "Pa", 0.0, 1e5, "assumed", "0.008 bar RMS; 0.4-8 kPa on public rigs", neutral=0.0
@@ -45,16 +75,81 @@ class PressureSensor:
         450.0, "Pa", 0.0, 1e5, "assumed", "0.45 kPa on one public rig", neutral=0.0
     )
     bias: float = parameter(0.0, "Pa", -1e5, 1e5, "assumed", "zeroed at rest", neutral=0.0)
-    # effects, neutral unless a recording shows them
-    drift: float = parameter(0.0, "Pa/s", -1e5, 1e5, "assumed", "at the start", neutral=0.0)
-    drift_time: float = parameter(1e4, "s", 1.0, 1e4, "assumed", "time in which the drift settles")
-    ramp: float = parameter(0.0, "Pa", -1e5, 1e5, "assumed", "drift that ends", neutral=0.0)
-    ramp_at: float = parameter(0.0, "s", 0.0, 1e6, "assumed", "its middle")
-    ramp_over: float = parameter(60.0, "s", 1.0, 1e6, "assumed", "how long it takes")
-    bow: float = parameter(0.0, "1", -0.5, 0.5, "assumed", "parabola over full scale", neutral=0.0)
+
+
+SENSOR = parameter_rows(SensorEffects)
+"""Rows of a sensor's effects, from its first."""
+SENSED = named_rows("reading", "ring")
+"""Rows of a sensor's state: the undisturbed reading, then the ring of the measured quantity."""
+SENSOR_ROWS = SENSED.ring + N_HISTORY
 
 
 @kernel
 def read_sensor(value: float, noise: float, resolution: float, bias: float, normal: float) -> float:
     """Return the reading of a true ``value``, given one standard normal number."""
     return quantise(value + bias + noise * normal, resolution)
+
+
+@routine
+def drift_of(time: float, rate: float, span: float) -> float:
+    """Return a drift that begins at a rate and settles within a span [s]."""
+    return rate * span * (1.0 - decay(min(40.0, time / span)))
+
+
+@routine
+def ramp_of(time: float, middle: float, over: float) -> float:
+    """Return a smooth rise from 0 to 1 about a middle [s]."""
+    s = max(0.0, min(1.0, (time - middle) / over + 0.5))
+    return s * s * (3.0 - 2.0 * s)
+
+
+@kernel
+def sense(
+    rows: Any, fixed: Any, j: int, state: int, effects: int, value: float, full: float, step: int,
+    time: float, period: float,
+) -> None:  # fmt: skip
+    """Write the reading of one lane, without bias, noise and quantisation.
+
+    Parameters
+    ----------
+    rows, fixed : rows
+        State and parameters.
+    j : int
+        Lane.
+    state, effects : int
+        First row of the sensor's state (``SENSED``) and of its effects (``SENSOR``).
+    value, full : float
+        The measured quantity and the full scale, in its unit.
+    step : int
+        Control period.
+    time, period : float
+        Time of the episode and control period [s].
+    """
+    note(rows, state + SENSED.ring, j, step, value)
+    age = fixed[effects + SENSOR.delay][j] / period
+    whole = min(int(age), N_HISTORY - 2)
+    newer = noted(rows, state + SENSED.ring, j, step, whole)
+    older = noted(rows, state + SENSED.ring, j, step, whole + 1)
+    x = newer + (age - whole) * (older - newer)
+    slipped = max(0.0, min(1.0, (time - fixed[effects + SENSOR.slip_at][j]) / SLIDE + 0.5))
+    drift = drift_of(time, fixed[effects + SENSOR.drift][j], fixed[effects + SENSOR.drift_time][j])
+    ramp = fixed[effects + SENSOR.ramp][j] * ramp_of(
+        time, fixed[effects + SENSOR.ramp_at][j], fixed[effects + SENSOR.ramp_over][j]
+    )
+    rows[state + SENSED.reading][j] = (
+        x
+        + fixed[effects + SENSOR.bow][j] * x * (x / full - 1.0)
+        + drift
+        + ramp
+        + fixed[effects + SENSOR.slip][j] * slipped
+    )
+
+
+@kernel
+def begin_sensor(
+    rows: Any, fixed: Any, j: int, state: int, effects: int, value: float, full: float
+) -> None:
+    """Begin the sensor of one lane at a quantity that has been constant (see :func:`sense`)."""
+    for k in range(N_HISTORY):
+        rows[state + SENSED.ring + k][j] = value
+    sense(rows, fixed, j, state, effects, value, full, 0, 0.0, 0.01)

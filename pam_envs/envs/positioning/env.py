@@ -172,7 +172,7 @@ def make_setup(
     change = check_number("load_disturbance", load_disturbance, 0.0, HIGHEST_LOAD, "kg")
     task = task_of(Tracking, reward)
     example = "{'mass.damping': (100, 500)}"
-    spread = spread_of(made, R.PARAMETERS, NOT_DRAWN, randomize, example, CORNER)
+    spread = spread_of(made, R.NAMES, NOT_DRAWN, randomize, example, CORNER)
     config = (
         task.tracking_weight,
         task.error_scale,
@@ -188,7 +188,7 @@ def make_setup(
     full = made.regulator.max_pressure
     return compose(
         made,
-        K.kernels_for(made.hysteresis.kind, made.extended),
+        K.kernels_for(made.hysteresis.kind, made.needs_effects(spread)),
         given,
         signals=_signals(made, task, given.preview, given.stride * made.control_period, normalize),
         actions=Signals([Signal("pressure_set_point", "Pa", 0.0, full, 0, normalize)]),

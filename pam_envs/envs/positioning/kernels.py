@@ -21,6 +21,7 @@ from pam_envs.envs.core.step import (
     write_references,
 )
 from pam_envs.kernels.build import LANES, kernel, routine
+from pam_envs.kernels.history import N_HISTORY
 from pam_envs.kernels.random import normal, uniform
 from pam_envs.muscle.effective_area import volume
 from pam_envs.plants.single_muscle import rows as R
@@ -286,7 +287,7 @@ def begin_muscle(
     for pressure in (0.0, peak, begin):
         rows[R.PRESSURE][j] = pressure
         remember(rows, fixed, counts, tables, HYSTERESIS, j, j + 1, choices[N_ELEMENTS], work)
-    for k in range(R.N_HISTORY):
+    for k in range(N_HISTORY):
         rows[R.HISTORY + k][j] = begin
     rows[R.SET_POINT][j] = begin
     rows[R.OLD_SET_POINT][j] = begin

@@ -19,8 +19,8 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.mechanics.antagonistic_lever import AntagonisticLever
-from pam_envs.mechanics.hanging_mass import LARGEST_PHASE
 from pam_envs.muscle.force_map import FULL_PRESSURE, ForceMap, paper_stretch
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint import statics as pair_statics
@@ -101,7 +101,7 @@ class AntagonisticJoint(Plant):
         self._check_motion()
 
     def _check_motion(self) -> None:
-        """Refuse a motion that the sub-steps cannot follow (see ``mechanics.hanging_mass``)."""
+        """Refuse a motion that the sub-steps cannot follow (see ``kernels.motion``)."""
         h, link = self.control_period / self.substeps, self.link
         full = float(np.max(pair_statics.stiffness(self, link.stop, *2 * (FULL_PRESSURE,))))
         k = (full + link.stop_stiffness) / link.inertia

@@ -17,8 +17,8 @@ from typing import Any
 
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
+from pam_envs.kernels.motion import damped_motion
 from pam_envs.mechanics.antagonistic_lever import sine_and_cosine_of
-from pam_envs.mechanics.hanging_mass import damped_motion
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.hysteresis_kernels import (
     HYSTERESIS_MODELS,

@@ -1,16 +1,39 @@
-"""What all plants have in common: named parameters in components, members, files, identity."""
+"""Base of all plants: named parameters in components, ensemble members, files, identity."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
-from pam_envs.parameters import check
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pam_envs.parameters import check, declarations
 from pam_envs.plants.core import plant_file
+
+
+def effects_of(components: Mapping[str, type]) -> tuple[tuple[str, ...], ...]:
+    """Return the effects of component classes, by component name (see :class:`Plant`)."""
+    return tuple(
+        tuple(f"{part}.{name}" for name in group)
+        for part, component in components.items()
+        for group in getattr(component, "effects", ())
+    )
+
+
+def neutral_of(components: Mapping[str, type], names: Iterable[str]) -> dict[str, float]:
+    """Return the values at which effects are off, of those ``names`` that have one."""
+    found = {}
+    for name in names:
+        part, _, field_name = name.partition(".")
+        neutral = declarations(components[part])[field_name].neutral
+        if neutral is not None:
+            found[name] = neutral
+    return found
 
 
 @dataclass(frozen=True)
@@ -32,6 +55,8 @@ class Plant:
     effects : tuple of tuple of str
         Parameters that switch an effect on, each with those that shape it. A file leaves out what
         is off, so that a plant's digest stays when a new effect is added.
+    neutral : mapping
+        Value of each parameter that switches an effect off.
     provenance : mapping
         Parameter name (``"muscle.area"``) to ``(provenance, source)`` where it differs from the
         declaration.
@@ -48,6 +73,7 @@ class Plant:
     names: ClassVar[tuple[str, ...]]
     choices: ClassVar[tuple[str, ...]] = ()
     effects: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    neutral: ClassVar[Mapping[str, float]] = {}
 
     provenance: Mapping[str, tuple[str, str]] = field(
         default_factory=dict, compare=False, kw_only=True
@@ -82,6 +108,22 @@ class Plant:
         """Return a parameter by dotted name, in SI."""
         component, _, entry = name.partition(".")
         return float(getattr(getattr(self, component), entry))
+
+    @property
+    def extended(self) -> bool:
+        """Whether an effect is on, so that the extended step is needed."""
+        return any(self.value(name) != neutral for name, neutral in self.neutral.items())
+
+    def needs_effects(self, spread: ArrayLike = ()) -> bool:
+        """Return whether the extended step is needed with parameters that are drawn.
+
+        Parameters
+        ----------
+        spread : array_like, shape (n, 3)
+            Row of each parameter that is drawn, and its range.
+        """
+        drawn = {self.names[int(row[0])] for row in np.asarray(spread, float).reshape(-1, 3)}
+        return self.extended or not drawn.isdisjoint(self.neutral)
 
     def members(self) -> tuple[Self, ...]:
         """Return this plant and the equally good fits beside it."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import COMPILED, LANES, build, kernel, prange, scratch, tile_view
-from pam_envs.mechanics.hanging_mass import oscillator_wide
+from pam_envs.kernels.motion import oscillator_wide
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.effects import advance_extended, replacements
 from pam_envs.plants.single_muscle.plant import SingleMuscle
@@ -69,8 +69,11 @@ def run_lanes(
         work = scratch(N_WORK, LANES)
         start = tile * LANES
         lanes = min(LANES, len(outputs[0][0]) - start)
-        seen_x, seen_p = rows[FIRST + R.SEEN_POSITION], rows[FIRST + R.SEEN_PRESSURE]
-        true_x = rows[FIRST + R.POSITION]
+        seen_x, seen_p = (
+            rows[FIRST + R.STATE.position_sensor],
+            rows[FIRST + R.STATE.pressure_sensor],
+        )
+        true_x = rows[FIRST + R.STATE.position]
         for t in range(len(set_points)):
             for j in range(LANES):
                 rows[R.SET_POINT][j] = set_points[t][start + min(j, lanes - 1)]

@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.constants import ATMOSPHERE
 from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.mechanics.forearm import OrthosisLink, Wearer
-from pam_envs.mechanics.hanging_mass import LARGEST_PHASE
 from pam_envs.mechanics.pulley import Pulley
 from pam_envs.muscle.quadratic_bundle import QuadraticBundle
 from pam_envs.plants.antagonistic_joint.hysteresis_tables import (
@@ -131,7 +131,7 @@ class ElbowOrthosis(Plant):
             )
 
     def _check_motion(self) -> None:
-        """Refuse a motion that the sub-steps cannot follow (see ``mechanics.hanging_mass``)."""
+        """Refuse a motion that the sub-steps cannot follow (see ``kernels.motion``)."""
         h = self.control_period / self.substeps
         inertia = self.link.inertia + self.wearer.inertia
         damping = self.link.damping + self.wearer.damping

@@ -14,7 +14,7 @@ from typing import Any
 
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
-from pam_envs.mechanics.hanging_mass import damped_motion
+from pam_envs.kernels.motion import damped_motion
 from pam_envs.mechanics.leg import sine_and_cosine
 from pam_envs.mechanics.pulley import stop_torque
 from pam_envs.plants.antagonistic_joint.hysteresis_kernels import HYSTERESIS_MODELS

@@ -16,7 +16,7 @@ from typing import Any
 from pam_envs.constants import ATMOSPHERE, DENSITY_PER_PRESSURE
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
-from pam_envs.mechanics.hanging_mass import damped_motion
+from pam_envs.kernels.motion import damped_motion
 from pam_envs.mechanics.knee_lever import assistive_torque, half_angle, muscle_length
 from pam_envs.muscle.gas_spring import gas_volume, spring_tension, stretch_of
 from pam_envs.plants.knee_orthosis import rows as K

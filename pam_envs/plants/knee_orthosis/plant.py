@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.modified_maxwell_slip import ModifiedMaxwellSlip
 from pam_envs.hysteresis.preisach import Preisach
-from pam_envs.mechanics.hanging_mass import LARGEST_PHASE
+from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.mechanics.knee_lever import KneeLever
 from pam_envs.mechanics.leg import Leg
 from pam_envs.muscle.emg import MuscleActivation
@@ -175,7 +175,7 @@ class KneeOrthosis(Plant):
                 )
 
     def _check_motion(self) -> None:
-        """Refuse a motion that the sub-steps cannot follow (see ``mechanics.hanging_mass``)."""
+        """Refuse a motion that the sub-steps cannot follow (see ``kernels.motion``)."""
         h = self.control_period / self.substeps
         inertia, damping, hold = self.lever.inertia, self.lever.damping, 0.0
         if self.mounting == "leg":

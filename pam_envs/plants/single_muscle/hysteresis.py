@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.hysteresis.creep import CreepEffects
+from pam_envs.hysteresis.friction_effects import FirstCycles, FrictionEffects, Threshold
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.parameters import parameter
@@ -17,7 +19,7 @@ KINDS: tuple[Kind, ...] = ("maxwell_slip", "preisach", "none")
 
 
 @dataclass(frozen=True)
-class Hysteresis:
+class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects):
     """Pressure-driven friction of braid and tube.
 
     The pressure, stretched to a scale on which friction is uniform, passes an operator with
@@ -25,6 +27,14 @@ class Hysteresis:
     result is stretched back. ``operator`` is a :class:`PlayOperator` of total slope 1 (the dual of
     Maxwell-slip elements), a :class:`Preisach` operator, or None.
     """
+
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("shape",),
+        ("pressure_slope",),
+        ("pressure_bend",),
+        ("first_width", "first_loss", "first_travel"),
+        ("threshold",),
+    )
 
     operator: PlayOperator | Preisach | None = None
     stretch: float = parameter(
@@ -45,43 +55,9 @@ class Hysteresis:
         "load-dependent loop width; least squares on positioning2021, Tables 3-5",
         neutral=0.0,
     )
-    # effects, neutral unless a recording shows them
-    shape: float = parameter(
-        1.0, "1", 0.01, 100.0, "assumed", "slope of small loops over that of plays", neutral=1.0
-    )
-    pressure_slope: float = parameter(
-        0.0, "1", -2.0, 20.0, "assumed", "friction gained up to full pressure, linear", neutral=0.0
-    )
-    pressure_bend: float = parameter(
-        0.0, "1", -20.0, 20.0, "assumed", "friction gained with pressure squared", neutral=0.0
-    )
-    creep_1: float = parameter(
-        0.0, "1", -0.5, 2.0, "assumed", "first Kelvin-Voigt compliance", neutral=0.0
-    )
-    creep_2: float = parameter(
-        0.0, "1", -0.5, 2.0, "assumed", "second Kelvin-Voigt compliance", neutral=0.0
-    )
-    creep_3: float = parameter(
-        0.0, "1", -0.5, 2.0, "assumed", "third Kelvin-Voigt compliance", neutral=0.0
-    )
-    creep_4: float = parameter(
-        0.0, "1", -0.5, 2.0, "assumed", "fourth Kelvin-Voigt compliance", neutral=0.0
-    )
-    creep_time_1: float = parameter(0.4, "s", 0.02, 1e4, "assumed", "its time constant")
-    creep_time_2: float = parameter(2.5, "s", 0.02, 1e4, "assumed", "its time constant")
-    creep_time_3: float = parameter(15.0, "s", 0.02, 1e4, "assumed", "its time constant")
-    creep_time_4: float = parameter(90.0, "s", 0.02, 1e4, "assumed", "its time constant")
+    # an effect of the first cycles that only this hysteresis has
     first_width: float = parameter(
         0.0, "1", -1.0, 10.0, "assumed", "extra loop width of the first travel", neutral=0.0
-    )
-    first_loss: float = parameter(
-        0.0, "1", -0.9, 0.9, "assumed", "effective pressure missing at first", neutral=0.0
-    )
-    first_travel: float = parameter(
-        2e6, "Pa", 1e4, 1e9, "assumed", "pressure travel in which the first state fades"
-    )
-    threshold: float = parameter(
-        0.0, "Pa", 0.0, 3e5, "assumed", "pressure before the tube meets the braid", neutral=0.0
     )
 
     @property

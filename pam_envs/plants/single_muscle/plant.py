@@ -10,6 +10,7 @@ start, as in the paper's tables.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -20,82 +21,30 @@ from numpy.typing import ArrayLike, NDArray
 from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
-from pam_envs.mechanics.hanging_mass import LARGEST_PHASE, HangingMass
+from pam_envs.kernels.motion import LARGEST_PHASE
+from pam_envs.mechanics.hanging_mass import HangingMass
 from pam_envs.muscle.effective_area import EffectiveAreaMuscle
-from pam_envs.parameters import declarations
-from pam_envs.plants.core.plant import Plant
+from pam_envs.plants.core.plant import Plant, effects_of, neutral_of
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.hysteresis import Hysteresis, Kind
 from pam_envs.pneumatics.regulator import Regulator
 from pam_envs.sensing.sensor import PositionSensor, PressureSensor
 
-NEUTRAL: dict[str, float] = {
-    f"{component}.{name}": declared.neutral
-    for component, part in (
-        ("regulator", Regulator),
-        ("hysteresis", Hysteresis),
-        ("muscle", EffectiveAreaMuscle),
-        ("mass", HangingMass),
-        ("position", PositionSensor),
-        ("pressure", PressureSensor),
-    )
-    for name, declared in declarations(part).items()
-    if declared.neutral is not None and f"{component}.{name}" in R.EFFECTS
+PARTS: dict[str, type] = {
+    "regulator": Regulator,
+    "hysteresis": Hysteresis,
+    "muscle": EffectiveAreaMuscle,
+    "mass": HangingMass,
+    "position": PositionSensor,
+    "pressure": PressureSensor,
 }
-"""The values at which each effect is off."""
-
-_CREEP_TIMES = tuple(f"hysteresis.creep_time_{k}" for k in (1, 2, 3, 4))
-EFFECTS: tuple[tuple[str, ...], ...] = (
-    ("regulator.gain",),
-    ("regulator.slew_bend",),
-    ("regulator.dead_band", "regulator.dead_close"),
-    ("regulator.overlap", "regulator.overlap_leak"),
-    ("regulator.exhaust_ratio", "regulator.exhaust_taper"),
-    ("regulator.exhaust_rate",),
-    ("regulator.leak",),
-    (
-        "regulator.supply_pressure",
-        "regulator.supply_droop",
-        "regulator.supply_time",
-        "regulator.supply_recovery",
-    ),
-    (
-        "regulator.ring_share",
-        "regulator.ring_flow",
-        "regulator.ring_frequency",
-        "regulator.ring_damping",
-    ),
-    ("hysteresis.shape",),
-    ("hysteresis.pressure_slope",),
-    ("hysteresis.pressure_bend",),
-    (*(f"{c}.creep_{k}" for c in ("hysteresis", "muscle") for k in (1, 2, 3, 4)), *_CREEP_TIMES),
-    ("hysteresis.first_width", "hysteresis.first_loss", "hysteresis.first_travel"),
-    ("hysteresis.threshold",),
-    ("muscle.area_curve",),
-    ("muscle.softening",),
-    ("muscle.stiffening",),
-    ("muscle.temperature", "muscle.temperature_gain"),
-    ("muscle.load_curve",),
-    ("muscle.load_stiffening",),
-    ("muscle.load_stiffening_2",),
-    ("muscle.load_stiffening_root",),
-    (*(f"muscle.strand_{k}" for k in (1, 2, 3, 4)), "muscle.strand_break"),
-    ("muscle.viscosity", "muscle.viscosity_speed"),
-    ("mass.carried",),
-    ("mass.load_error",),
-    ("mass.slack",),
-    ("mass.stick", "mass.stick_kinetic", "mass.stick_speed"),
-    ("mass.ring_share", "mass.ring_frequency", "mass.ring_damping"),
-    ("position.drift", "position.drift_time"),
-    ("position.ramp", "position.ramp_at", "position.ramp_over"),
-    ("position.delay",),
-    ("position.bow",),
-    ("position.slip", "position.slip_at"),
-    ("pressure.drift", "pressure.drift_time"),
-    ("pressure.ramp", "pressure.ramp_at", "pressure.ramp_over"),
-    ("pressure.bow",),
+CREEP = (
+    *(f"{part}.creep_{k}" for part in ("hysteresis", "muscle") for k in (1, 2, 3, 4)),
+    *(f"hysteresis.creep_time_{k}" for k in (1, 2, 3, 4)),
 )
-"""See :class:`pam_envs.plants.core.plant.Plant`."""
+"""Creep of pressure and length has the same time constants."""
+NEUTRAL = neutral_of(PARTS, R.EFFECTS)
+"""Values at which effects are off."""
 
 FOLDER = Path(__file__).resolve().parents[2] / "data"
 
@@ -115,16 +64,10 @@ class SingleMuscle(Plant):
     """
 
     family: ClassVar[str] = "single_muscle"
-    components: ClassVar[tuple[str, ...]] = (
-        "regulator",
-        "hysteresis",
-        "muscle",
-        "mass",
-        "position",
-        "pressure",
-    )
+    components: ClassVar[tuple[str, ...]] = tuple(PARTS)
     names: ClassVar[tuple[str, ...]] = R.NAMES
-    effects: ClassVar[tuple[tuple[str, ...], ...]] = EFFECTS
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = (*effects_of(PARTS), CREEP)
+    neutral: ClassVar[Mapping[str, float]] = NEUTRAL
 
     regulator: Regulator = field(default_factory=Regulator)
     hysteresis: Hysteresis = field(default_factory=Hysteresis)
@@ -165,7 +108,7 @@ class SingleMuscle(Plant):
                 )
 
     def _check_motion(self) -> None:
-        """Refuse a motion that the sub-steps cannot follow (see ``mechanics.hanging_mass``)."""
+        """Refuse a motion that the sub-steps cannot follow (see ``kernels.motion``)."""
         m, law, h = self.mass, self.muscle, self.control_period / self.substeps
         strains = np.linspace(-0.02, 0.2, 45)
         slope = (
@@ -272,11 +215,6 @@ class SingleMuscle(Plant):
             ):
                 column[start : start + n] = values
         return column
-
-    @property
-    def extended(self) -> bool:
-        """Whether an effect is on that a plain plant has not."""
-        return any(self.value(name) != neutral for name, neutral in NEUTRAL.items())
 
     @property
     def elements(self) -> int:

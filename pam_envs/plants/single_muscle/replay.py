@@ -26,7 +26,8 @@ from pam_envs.kernels.build import (
     threads,
     tile_view,
 )
-from pam_envs.mechanics.hanging_mass import oscillator_wide
+from pam_envs.kernels.history import N_HISTORY
+from pam_envs.kernels.motion import oscillator_wide
 from pam_envs.plants.core.tiles import in_tiles
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.effects import (
@@ -142,20 +143,23 @@ def run_replay(
             if inputs[FRESH][t] == 1.0:
                 begin(rows, fixed, counts, table, inputs[START_PRESSURE][t], elements, work)
                 hold = inputs[COMMAND][t]
-                for k in range(R.N_HISTORY):
+                for k in range(N_HISTORY):
                     for j in range(LANES):
                         rows[R.HISTORY + k][j] = max(0.0, hold)
             if inputs[FRESH][t] == 2.0:
                 for j in range(LANES):
                     rows[R.REST][j] = rest_extended(fixed, j, 0.0, rows[R.LOAD][j])
-            seen_x, seen_p = rows[FIRST + R.SEEN_POSITION], rows[FIRST + R.SEEN_PRESSURE]
+            seen_x, seen_p = (
+                rows[FIRST + R.STATE.position_sensor],
+                rows[FIRST + R.STATE.pressure_sensor],
+            )
             bias_x, bias_p = fixed[R.POSITION_BIAS], fixed[R.PRESSURE_BIAS]
             for j in range(lanes):
                 outputs[0][t][start + j] = seen_x[j] + bias_x[j]
                 outputs[1][t][start + j] = seen_p[j] + bias_p[j]
             for j in range(LANES):
                 rows[R.SET_POINT][j] = inputs[COMMAND][t]
-                rows[FIRST + R.KELVIN][j] = inputs[KELVIN][t]
+                rows[FIRST + R.STATE.kelvin][j] = inputs[KELVIN][t]
             advance_extended(rows, fixed, counts, table, R.END, elements, substeps, period, work)
 
 

@@ -17,7 +17,8 @@ from pam_envs.hysteresis.maxwell_slip import play
 from pam_envs.hysteresis.preisach import preisach_step
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
-from pam_envs.mechanics.hanging_mass import damped_motion
+from pam_envs.kernels.history import N_HISTORY
+from pam_envs.kernels.motion import damped_motion
 from pam_envs.muscle.effective_area import tension, tension_slope
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.rows import (
@@ -36,7 +37,6 @@ from pam_envs.plants.single_muscle.rows import (
     LOAD,
     MAX_PRESSURE,
     MOVING_MASS,
-    N_HISTORY,
     PRESSURE,
     REST_LENGTH,
     SET_POINT,

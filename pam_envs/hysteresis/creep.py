@@ -1,0 +1,84 @@
+"""Creep: four Kelvin-Voigt elements that follow a quantity with time constants of their own.
+
+The creep of ``x`` is ``sum_k c_k y_k`` with ``T_k y_k' = x - y_k``. Applied to the effective
+pressure the force creeps, applied to the length the position does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from pam_envs.kernels.arithmetic import count_on, decay
+from pam_envs.kernels.build import kernel
+from pam_envs.parameters import parameter
+
+ELEMENTS = 4
+"""Kelvin-Voigt elements."""
+
+
+@dataclass(frozen=True)
+class CreepEffects:
+    """Creep of the effective pressure, off unless a recording shows it."""
+
+    creep_1: float = parameter(
+        0.0, "1", -0.5, 2.0, "assumed", "first Kelvin-Voigt compliance", neutral=0.0
+    )
+    creep_2: float = parameter(
+        0.0, "1", -0.5, 2.0, "assumed", "second Kelvin-Voigt compliance", neutral=0.0
+    )
+    creep_3: float = parameter(
+        0.0, "1", -0.5, 2.0, "assumed", "third Kelvin-Voigt compliance", neutral=0.0
+    )
+    creep_4: float = parameter(
+        0.0, "1", -0.5, 2.0, "assumed", "fourth Kelvin-Voigt compliance", neutral=0.0
+    )
+    creep_time_1: float = parameter(0.4, "s", 0.02, 1e4, "assumed", "its time constant")
+    creep_time_2: float = parameter(2.5, "s", 0.02, 1e4, "assumed", "its time constant")
+    creep_time_3: float = parameter(15.0, "s", 0.02, 1e4, "assumed", "its time constant")
+    creep_time_4: float = parameter(90.0, "s", 0.02, 1e4, "assumed", "its time constant")
+
+
+@kernel
+def creep_step(
+    rows: Any, fixed: Any, state: int, compliance: int, time: int, first: int, last: int, value: Any,
+    width: Any, total: Any,
+) -> None:  # fmt: skip
+    """Add the creep of lanes ``first`` to ``last`` to ``total``.
+
+    Parameters
+    ----------
+    rows, fixed : rows
+        State and parameters.
+    state, compliance, time : int
+        First rows of the elements' state, compliances and time constants [s].
+    first, last : int
+        Lanes.
+    value, width, total : row
+        The quantity that is followed, seconds since the last time, and where to add.
+    """
+    for k in range(ELEMENTS):
+        lag = rows[state + k]
+        for j in range(first, last):
+            kept = decay(width[j] / fixed[time + k][j])
+            lag[j] = value[j] - (value[j] - lag[j]) * kept
+            total[j] = total[j] + fixed[compliance + k][j] * lag[j]
+
+
+@kernel
+def begin_creep(rows: Any, fixed: Any, j: int, state: int, compliance: int, value: float) -> float:
+    """Settle the elements of one lane at a value; return their creep."""
+    total = 0.0
+    for k in range(ELEMENTS):
+        rows[state + k][j] = value
+        total = total + fixed[compliance + k][j]
+    return total * value
+
+
+@kernel
+def creeps_on(fixed: Any, compliance: int) -> int:
+    """Return the number of lanes and elements of a tile that creep."""
+    on = 0
+    for k in range(ELEMENTS):
+        on = on + count_on(fixed[compliance + k], 0.0)
+    return on

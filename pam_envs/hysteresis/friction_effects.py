@@ -1,0 +1,72 @@
+"""Effects on the friction of a muscle: shape of small loops, pressure dependence, first cycles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pam_envs.kernels.arithmetic import decay
+from pam_envs.kernels.build import kernel
+from pam_envs.parameters import parameter
+
+
+@dataclass(frozen=True)
+class FrictionEffects:
+    """Shape and pressure dependence of the friction, neutral unless a recording shows them."""
+
+    shape: float = parameter(
+        1.0, "1", 0.01, 100.0, "assumed", "slope of small loops over that of plays", neutral=1.0
+    )
+    pressure_slope: float = parameter(
+        0.0, "1", -2.0, 20.0, "assumed", "friction gained up to full pressure, linear", neutral=0.0
+    )
+    pressure_bend: float = parameter(
+        0.0, "1", -20.0, 20.0, "assumed", "friction gained with pressure squared", neutral=0.0
+    )
+
+
+@dataclass(frozen=True)
+class FirstCycles:
+    """Loss of force in the first cycles, none unless a recording shows it."""
+
+    first_loss: float = parameter(
+        0.0, "1", -0.9, 0.9, "assumed", "effective pressure missing at first", neutral=0.0
+    )
+    first_travel: float = parameter(
+        2e6, "Pa", 1e4, 1e9, "assumed", "pressure travel in which the first state fades"
+    )
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """Pressure below which the muscle exerts no force, none unless a recording shows it."""
+
+    threshold: float = parameter(
+        0.0, "Pa", 0.0, 3e5, "assumed", "pressure before the tube meets the braid", neutral=0.0
+    )
+
+
+@kernel
+def newness(travel: float, span: float) -> float:
+    """Return the share of the first state that is left after a travel, 1 to 0."""
+    return decay(min(40.0, travel / span))
+
+
+@kernel
+def friction_with_effects(
+    friction: float, most: float, share_of_full: float, shape: float, slope: float, bend: float
+) -> float:
+    """Return the friction [Pa] with its shape and its dependence on pressure.
+
+    Parameters
+    ----------
+    friction, most : float
+        Of the plays, and its largest size [Pa].
+    share_of_full : float
+        Pressure over full pressure.
+    shape, slope, bend : float
+        Parameters of :class:`FrictionEffects`.
+    """
+    share = min(1.0, abs(friction) / max(most, 1.0))
+    friction = friction * shape / (1.0 + (shape - 1.0) * share)
+    grown = (slope + bend * share_of_full) * share_of_full
+    return friction * max(0.02, 1.0 + grown)

@@ -1,0 +1,118 @@
+"""Exact steps of linear second-order motion: damped oscillator and resonator."""
+
+from __future__ import annotations
+
+from pam_envs.kernels.arithmetic import decay
+from pam_envs.kernels.build import kernel
+
+LARGEST_PHASE = 16.0
+"""Largest ``abs(k - d^2 / 4) h^2`` for which the step's series hold (3e-7 relative)."""
+TURN = 6.283185307179586
+"""Radians in a turn."""
+
+
+@kernel
+def oscillator(phase: float) -> tuple[float, float]:
+    """Return ``cos(sqrt(phase))`` and ``sin(sqrt(phase)) / sqrt(phase)``, entire in ``phase``.
+
+    Negative phases (an overdamped motion) give the hyperbolic functions.
+    """
+    z = 0.25 * phase
+    c = z * (1.0 / 479001600.0) - 1.0 / 3628800.0
+    c = c * z + 1.0 / 40320.0
+    c = c * z - 1.0 / 720.0
+    c = c * z + 1.0 / 24.0
+    c = c * z - 0.5
+    c = c * z + 1.0
+    s = z * (1.0 / 6227020800.0) - 1.0 / 39916800.0
+    s = s * z + 1.0 / 362880.0
+    s = s * z - 1.0 / 5040.0
+    s = s * z + 1.0 / 120.0
+    s = s * z - 1.0 / 6.0
+    s = s * z + 1.0
+    return 2.0 * c * c - 1.0, s * c
+
+
+@kernel
+def oscillator_wide(phase: float) -> tuple[float, float]:
+    """Return the same as :func:`oscillator` for phases up to 256, for long steps."""
+    z = 0.015625 * phase
+    c = z * (1.0 / 479001600.0) - 1.0 / 3628800.0
+    c = c * z + 1.0 / 40320.0
+    c = c * z - 1.0 / 720.0
+    c = c * z + 1.0 / 24.0
+    c = c * z - 0.5
+    c = c * z + 1.0
+    s = z * (1.0 / 6227020800.0) - 1.0 / 39916800.0
+    s = s * z + 1.0 / 362880.0
+    s = s * z - 1.0 / 5040.0
+    s = s * z + 1.0 / 120.0
+    s = s * z - 1.0 / 6.0
+    s = s * z + 1.0
+    s, c = s * c, 2.0 * c * c - 1.0
+    s, c = s * c, 2.0 * c * c - 1.0
+    return 2.0 * c * c - 1.0, s * c
+
+
+@kernel
+def damped_motion(
+    velocity: float,
+    acceleration: float,
+    jerk: float,
+    stiffness: float,
+    damping: float,
+    damped: float,
+    h: float,
+) -> tuple[float, float]:
+    """Return displacement and velocity after ``h`` of ``u'' = a + j t - k u - d u'``: exact.
+
+    Parameters
+    ----------
+    velocity : float
+        At the start [m/s]; the displacement starts at 0.
+    acceleration, jerk : float
+        ``a`` [m/s2] and ``j`` [m/s3].
+    stiffness, damping : float
+        ``k`` [1/s2], above zero, and ``d`` [1/s], per unit mass.
+    damped : float
+        ``exp(-d h / 2)``.
+    h : float
+        Duration [s].
+    """
+    half = 0.5 * damping
+    c, s = oscillator((stiffness - half * half) * h * h)
+    compliance = 1.0 / stiffness
+    settling = jerk * compliance
+    offset = (acceleration - damping * settling) * compliance
+    v0 = velocity - settling
+    swing = damped * h * s
+    sway = damped * half * h * s
+    u = offset + settling * h - (damped * c + sway) * offset + swing * v0
+    v = settling + stiffness * swing * offset + (damped * c - sway) * v0
+    return u, v
+
+
+@kernel
+def resonator_step(
+    y: float, rate: float, was: float, now: float, turns: float, ratio: float, h: float
+) -> tuple[float, float]:
+    """Return value and rate of a resonator whose input went straight from ``was`` to ``now``.
+
+    Parameters
+    ----------
+    y, rate : float
+        Value and its rate [1/s] at the start.
+    was, now : float
+        Input at the start and after ``h``.
+    turns, ratio : float
+        Natural frequency [Hz] and damping ratio.
+    h : float
+        Duration [s].
+    """
+    omega = TURN * turns
+    k, d = omega * omega, 2.0 * ratio * omega
+    span = max(h, 1e-9)
+    moved, rate = damped_motion(
+        rate, k * (was - y) - d * rate, k * (now - was) / span, k, d, decay(0.5 * d * span), span
+    )
+    return y + moved, rate

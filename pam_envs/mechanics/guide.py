@@ -1,0 +1,101 @@
+"""Dry friction of a guide or a bearing: stick-slip motion with the Stribeck effect."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from pam_envs.kernels.arithmetic import decay
+from pam_envs.kernels.build import kernel
+from pam_envs.kernels.motion import damped_motion
+from pam_envs.parameters import parameter, parameter_rows
+
+
+@dataclass(frozen=True)
+class GuideEffects:
+    """Dry friction of the guide of a load, none unless a recording shows it."""
+
+    stick: float = parameter(
+        0.0, "N", 0.0, 200.0, "assumed", "force at which the guide breaks away", neutral=0.0
+    )
+    stick_kinetic: float = parameter(
+        0.5, "1", 0.0, 1.0, "assumed", "force while it slides, over that at which it breaks away"
+    )
+    stick_speed: float = parameter(
+        5e-3, "m/s", 1e-4, 1.0, "assumed", "speed at which friction falls to the kinetic one"
+    )
+
+
+@dataclass(frozen=True)
+class BearingEffects:
+    """Dry friction of a joint's bearing, none unless a recording shows it."""
+
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = (("stick", "stick_kinetic", "stick_speed"),)
+
+    stick: float = parameter(
+        0.0, "N m", 0.0, 50.0, "assumed", "torque at which the bearing breaks away", neutral=0.0
+    )
+    stick_kinetic: float = parameter(
+        0.5, "1", 0.0, 1.0, "assumed", "torque while it turns, over that at which it breaks away"
+    )
+    stick_speed: float = parameter(
+        0.05, "rad/s", 1e-3, 10.0, "assumed", "speed at which friction falls to the kinetic one"
+    )
+
+
+GUIDE = parameter_rows(GuideEffects)
+"""Rows of a guide's or a bearing's effects, from the first."""
+
+
+@kernel
+def stick_slip_step(
+    velocity: float, stuck: float, push: float, jerk: float, stiffness: float, damping: float,
+    most: float, kinetic: float, pace: float, h: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Return displacement, velocity and whether the guide holds after ``h`` seconds.
+
+    The guide holds until the push exceeds the breakaway friction; in motion the friction falls
+    with speed towards the kinetic one (Stribeck). It holds again where the velocity passes zero.
+
+    Parameters
+    ----------
+    velocity, stuck : float
+        At the start; ``stuck`` is 1 where the guide holds, else 0.
+    push, jerk, stiffness, damping : float
+        Motion without friction, per unit mass (see ``damped_motion``); the push is that at the
+        predicted middle.
+    most, kinetic, pace : float
+        Breakaway friction per unit mass, kinetic share and Stribeck speed.
+    h : float
+        Duration [s].
+    """
+    end = push + jerk * h
+    held = stuck > 0.0 and most > 0.0
+    side = 1.0 if (end if held or velocity == 0.0 else velocity) > 0.0 else -1.0
+    rubs = most * (kinetic + (1.0 - kinetic) * decay(min(40.0, abs(velocity) / pace)))
+    a = push + 0.5 * stiffness * h * velocity - side * rubs
+    dx, after = damped_motion(velocity, a, jerk, stiffness, damping, decay(0.5 * damping * h), h)
+    turned = most > 0.0 and after * side < 0.0
+    share = velocity / (velocity - after) if turned and velocity * side > 0.0 else 0.0
+    dx = 0.5 * velocity * share * h if turned else dx
+    rests = held and abs(end) <= most
+    stops = rests or turned
+    return 0.0 if rests else dx, 0.0 if stops else after, 1.0 if stops else 0.0
+
+
+@kernel
+def bearing_step(
+    rows: Any, fixed: Any, j: int, state: int, effects: int, velocity: float, acceleration: float,
+    jerk: float, stiffness: float, damping: float, per_inertia: float, h: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Return what ``damped_motion`` returns, with the dry friction of the bearing of lane ``j``.
+
+    ``state`` is the row that says whether the bearing holds, ``effects`` the first of ``GUIDE``.
+    """
+    push = acceleration - 0.5 * stiffness * h * velocity
+    most = fixed[effects + GUIDE.stick][j] * per_inertia
+    kinetic, pace = fixed[effects + GUIDE.stick_kinetic][j], fixed[effects + GUIDE.stick_speed][j]
+    dx, after, rows[state][j] = stick_slip_step(
+        velocity, rows[state][j], push, jerk, stiffness, damping, most, kinetic, pace, h
+    )
+    return dx, after

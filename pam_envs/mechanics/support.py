@@ -1,0 +1,85 @@
+"""Support under a hanging load, and the compliant mount of the whole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from pam_envs.kernels.build import kernel
+from pam_envs.kernels.motion import resonator_step
+from pam_envs.parameters import named_rows, parameter
+
+
+@dataclass(frozen=True)
+class SupportEffects:
+    """A support that gives way under the load, none unless a recording shows it."""
+
+    slack: float = parameter(
+        0.0,
+        "m",
+        0.0,
+        0.02,
+        "assumed",
+        "contraction over which the support lets the load go",
+        neutral=0.0,
+    )
+
+
+@dataclass(frozen=True)
+class MountEffects:
+    """A mount that gives way, rigid unless a recording shows a resonance."""
+
+    ring_share: float = parameter(
+        0.0,
+        "1",
+        -1.0,
+        1.0,
+        "assumed",
+        "share of the motion behind a mount that gives or tilts",
+        neutral=0.0,
+    )
+    ring_frequency: float = parameter(7.0, "Hz", 0.5, 20.0, "assumed", "of the mount")
+    ring_damping: float = parameter(0.1, "1", 0.005, 2.0, "assumed", "damping ratio of the mount")
+
+
+MOUNT_STATE = named_rows("position", "rate")
+"""Rows of a mount's state, from the first."""
+
+
+@kernel
+def load_fraction(x: float, hangs: float, slack: float) -> float:
+    """Return the share of a load that hangs on the muscle, 0 to 1.
+
+    From the position ``hangs`` of the unpressurised muscle [m] on, the muscle takes the load over
+    from the support within ``slack`` [m].
+    """
+    return 1.0 if slack <= 0.0 else max(0.0, min(1.0, (x - hangs) / slack))
+
+
+@kernel
+def mount_step(
+    rows: Any, j: int, state: int, was: float, now: float, share: float, turns: float, ratio: float,
+    h: float,
+) -> float:  # fmt: skip
+    """Return the position [m] of a load of lane ``j`` behind the mount.
+
+    Parameters
+    ----------
+    rows : rows
+        State; that of the mount begins at row ``state`` (``MOUNT_STATE``).
+    was, now : float
+        Position before the mount at the start and after ``h`` seconds [m].
+    share, turns, ratio : float
+        Parameters of :class:`MountEffects`.
+    """
+    swung, rate = resonator_step(
+        rows[state + MOUNT_STATE.position][j],
+        rows[state + MOUNT_STATE.rate][j],
+        was,
+        now,
+        turns,
+        ratio,
+        h,
+    )
+    rows[state + MOUNT_STATE.position][j], rows[state + MOUNT_STATE.rate][j] = swung, rate
+    return (1.0 - share) * now + share * swung

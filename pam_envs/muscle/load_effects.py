@@ -1,0 +1,33 @@
+"""Effects of the load on a muscle's static law: pressure shift and stiffening."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from pam_envs.kernels.build import kernel
+from pam_envs.parameters import parameter
+
+
+@dataclass(frozen=True)
+class LoadEffects:
+    """Dependence of the static law on the load, none unless a recording shows it."""
+
+    load_curve: float = parameter(
+        0.0, "Pa/N2", -200.0, 200.0, "assumed", "pressure shift over load squared", neutral=0.0
+    )
+    load_stiffening: float = parameter(
+        0.0, "1/N", -0.015, 0.05, "assumed", "stiffness gained per newton of load", neutral=0.0
+    )
+    load_stiffening_2: float = parameter(
+        0.0, "1/N2", -2e-4, 1e-3, "assumed", "the same by load squared", neutral=0.0
+    )
+    load_stiffening_root: float = parameter(
+        0.0, "1/N^0.5", -0.1, 0.5, "assumed", "the same by the root of the load", neutral=0.0
+    )
+
+
+@kernel
+def stiffening(weight: float, linear: float, square: float, root: float) -> float:
+    """Return the factor on the passive force under a weight [N]."""
+    return 1.0 + (linear + square * weight) * weight + root * math.sqrt(max(0.0, weight))

@@ -1,0 +1,74 @@
+"""Friction of the braid's strands: four Maxwell-slip elements in parallel with the muscle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from pam_envs.kernels.arithmetic import count_on
+from pam_envs.kernels.build import LANES, kernel
+from pam_envs.parameters import parameter
+
+BREAKS = (0.1, 0.3, 0.6, 1.0)
+"""Strains at which strands break away, over that of the last one."""
+STRANDS = len(BREAKS)
+
+
+@dataclass(frozen=True)
+class StrandEffects:
+    """Friction of strands against each other, none unless a recording shows it."""
+
+    strand_1: float = parameter(
+        0.0, "N", 0.0, 500.0, "assumed", "friction of the first strands to break away", neutral=0.0
+    )
+    strand_2: float = parameter(
+        0.0, "N", 0.0, 500.0, "assumed", "friction of the second strands to break away", neutral=0.0
+    )
+    strand_3: float = parameter(
+        0.0, "N", 0.0, 500.0, "assumed", "friction of the third strands to break away", neutral=0.0
+    )
+    strand_4: float = parameter(
+        0.0, "N", 0.0, 500.0, "assumed", "friction of the last strands to break away", neutral=0.0
+    )
+    strand_break: float = parameter(
+        0.02, "1", 0.001, 0.3, "assumed", "strain at which the last strand slips"
+    )
+
+
+@kernel
+def strand_forces(
+    rows: Any, fixed: Any, state: int, force: int, break_away: int, strain: Any, friction: Any,
+    sticking: Any,
+) -> None:  # fmt: skip
+    """Add the strands' force [N] and its slope by strain [N] at strains of a tile.
+
+    ``state``, ``force`` and ``break_away`` are the first rows of the strands' slip positions,
+    forces, and the row of the strain at which the last one breaks away.
+    """
+    for i in range(STRANDS):
+        slip, part = rows[state + i], BREAKS[i]
+        for j in range(LANES):
+            span = part * fixed[break_away][j]
+            stiff = fixed[force + i][j] / span
+            gap = max(-span, min(span, strain[j] - slip[j]))
+            friction[j] = friction[j] + stiff * gap
+            sticking[j] = sticking[j] + (stiff if abs(strain[j] - slip[j]) < span else 0.0)
+
+
+@kernel
+def slip_strands(rows: Any, fixed: Any, state: int, break_away: int, strain: Any) -> None:
+    """Move the strands' slip positions with the strains of a tile."""
+    for i in range(STRANDS):
+        slip, part = rows[state + i], BREAKS[i]
+        for j in range(LANES):
+            span = part * fixed[break_away][j]
+            slip[j] = max(strain[j] - span, min(strain[j] + span, slip[j]))
+
+
+@kernel
+def strands_on(fixed: Any, force: int) -> int:
+    """Return the number of lanes and strands of a tile that rub."""
+    on = 0
+    for i in range(STRANDS):
+        on = on + count_on(fixed[force + i], 0.0)
+    return on

@@ -1,0 +1,27 @@
+"""Viscous friction of a muscle that falls with speed (shear thinning)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from pam_envs.kernels.build import kernel
+from pam_envs.parameters import parameter
+
+
+@dataclass(frozen=True)
+class ViscosityEffects:
+    """Damping at small speeds, none unless a recording shows it."""
+
+    viscosity: float = parameter(
+        0.0, "N s/m", 0.0, 1e5, "assumed", "damping at small speed beside the mass's", neutral=0.0
+    )
+    viscosity_speed: float = parameter(
+        0.02, "m/s", 1e-4, 10.0, "assumed", "speed at which that damping has fallen by 1 / sqrt(2)"
+    )
+
+
+@kernel
+def viscous_damping(viscosity: float, speed: float, pace: float) -> float:
+    """Return the damping [N s/m] at a speed [m/s]."""
+    return viscosity / math.sqrt(1.0 + abs(speed) / pace)

@@ -1,0 +1,51 @@
+"""Pneumatic line between regulator and muscle: a resonance in the pressure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from pam_envs.kernels.build import kernel
+from pam_envs.kernels.motion import TURN, resonator_step
+from pam_envs.parameters import named_rows, parameter, parameter_rows
+
+
+@dataclass(frozen=True)
+class LineEffects:
+    """Line of a regulator; rigid unless a recording shows a resonance."""
+
+    ring_share: float = parameter(
+        0.0, "1", 0.0, 1.0, "assumed", "share of the pressure behind a line that rings", neutral=0.0
+    )
+    ring_flow: float = parameter(
+        0.0, "1", -2.0, 2.0, "assumed", "ringing that goes with the flow", neutral=0.0
+    )
+    ring_frequency: float = parameter(7.0, "Hz", 0.5, 20.0, "assumed", "of the line")
+    ring_damping: float = parameter(0.1, "1", 0.005, 2.0, "assumed", "damping ratio of the line")
+
+
+LINE = parameter_rows(LineEffects)
+"""Rows of a line's effects, from its first."""
+LINE_STATE = named_rows("pressure", "rate")
+"""Rows of a line's state, from its first."""
+
+
+@kernel
+def line_step(
+    rows: Any, fixed: Any, j: int, state: int, effects: int, was: float, now: float, h: float
+) -> float:
+    """Return the pressure [Pa] behind the line whose input went from ``was`` to ``now``."""
+    turns, ratio = fixed[effects + LINE.ring_frequency][j], fixed[effects + LINE.ring_damping][j]
+    swung, rate = resonator_step(
+        rows[state + LINE_STATE.pressure][j],
+        rows[state + LINE_STATE.rate][j],
+        was,
+        now,
+        turns,
+        ratio,
+        h,
+    )
+    rows[state + LINE_STATE.pressure][j], rows[state + LINE_STATE.rate][j] = swung, rate
+    part = fixed[effects + LINE.ring_share][j]
+    flow = fixed[effects + LINE.ring_flow][j] * rate / (TURN * turns)
+    return max(0.0, (1.0 - part) * now + part * swung + flow)
