@@ -266,11 +266,12 @@ def papers(json: Path | None = None) -> int:
     Args:
         json: Also write them to this file.
     """
-    from benchmarks.papers import figures as published
+    from benchmarks.papers.figures import all_figures
+    from benchmarks.papers.published import table
     from benchmarks.runs.store import write_record
 
-    figures = published.all_figures()
-    print(published.table(figures))
+    figures = all_figures()
+    print(table(figures))
     if json:
         write_record(json, {"figures": [figure.record() for figure in figures]})
     return 0 if all_pass(figures) else 1
@@ -293,13 +294,13 @@ def speed(
         strict: Exit code 1 if a floor is missed.
     """
     from benchmarks.runs.store import write_record
-    from benchmarks.speed import rates as measuring
+    from benchmarks.speed import groups, rates
 
     with progress("groups") as start:
-        results = measuring.measure(only, rounds, start)
-    print(measuring.table(results))
+        results = groups.measure(only, rounds, start)
+    print(rates.table(results))
     if json:
-        write_record(json, measuring.record(results))
+        write_record(json, rates.record(results))
     missed = [result for result in results if result.passed is False]
     return 1 if strict and missed else 0
 

@@ -15,9 +15,8 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from baselines.core.catalogue import make_controller  # noqa: E402
-from benchmarks.board import plots_joint, plots_knee  # noqa: E402
 from benchmarks.papers import elbow as papers_elbow  # noqa: E402
-from benchmarks.papers import knee_studies  # noqa: E402
+from benchmarks.papers import knee_studies, plots  # noqa: E402
 
 
 def save(env: gym.Env, path: Path) -> None:
@@ -62,13 +61,13 @@ def frame(name: str, path: Path, seconds: float, **arguments: object) -> None:
 def stride(path: Path, mismatch: float = 10.0) -> None:
     """Draw the third stride of a walk, with and without bumpless transfer."""
     walks = [knee_studies.stride("walk", mismatch, bumpless) for bumpless in (True, False)]
-    records = [plots_knee.cut(walk, 9.2, 15.4) for walk in walks]
+    records = [plots.cut(walk, 9.2, 15.4) for walk in walks]
     title = (
         "Walking at 5 s a stride with 20 % assistance, inverse + LTR; out of charge (in swing) the"
         f" tension's controller sees a reference that is off by {mismatch:g} N"
     )
     titles = ("I   with bumpless transfer", "II   without")
-    plots_knee.stride_figure(records, titles, title).savefig(path, dpi=100)
+    plots.stride_figure(records, titles, title).savefig(path, dpi=100)
 
 
 if __name__ == "__main__":
@@ -84,4 +83,4 @@ if __name__ == "__main__":
     arm = images / "redundant_manipulator_frame.png"
     frame("PAM/RedundantManipulator-v0", arm, 4.2, reference="path_3")
     stride(images / "knee_stride.png")
-    plots_joint.step_figure().savefig(images / "joint_step.png", dpi=100)
+    plots.step_figure().savefig(images / "joint_step.png", dpi=100)

@@ -1,1 +1,1 @@
-"""papers."""
+"""Published figures of the papers beside ours."""

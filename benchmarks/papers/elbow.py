@@ -10,14 +10,12 @@ what that gives. What was put in comes out, the hysteresis and the sign change, 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.papers.figures import Figure
-from benchmarks.papers.knee import BEFORE, UNKNOWN
+from benchmarks.papers.published import BEFORE, UNKNOWN, Figure, Group, note
 
 Array = NDArray[np.float64]
 
@@ -49,11 +47,6 @@ FIG_2 = {8.0: 66.7, 13.0: 47.3, 19.0: 26.4, 24.0: 11.0, 28.0: 0.0, 32.0: -9.9}
 """Contraction [%] of one muscle: force [N] at 500 kPa."""
 
 
-def note(*words: str) -> str:
-    """Return what stands behind a figure: calibrated or predicted, and with what."""
-    return "; ".join(words)
-
-
 def expected(
     name: str, where: str, unit: str, value: float, ours: float, tolerance: float, text: str
 ) -> Figure:
@@ -61,16 +54,16 @@ def expected(
     return Figure(name, where, unit, UNKNOWN, ours, tolerance, text, expected=value)
 
 
-def bounded(name: str, where: str, unit: str, ours: float, text: str, **bounds: float) -> Figure:
+def bounded(name: str, where: str, unit: str, ours: float, text: str, **bounds: Any) -> Figure:
     """Return a figure that is judged by ``at_least`` and ``at_most``, or not at all."""
     return Figure(name, where, unit, UNKNOWN, ours, None, text, **bounds)
 
 
-def orthosis(share: float = 0.28, **changes: float) -> Any:
+def orthosis(share: float = 0.28, **changes: Any) -> Any:
     """Return the orthosis without hysteresis whose force ends at a share of the nominal length."""
     from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 
-    ends = {f"bundle_{b}__largest_contraction": share for b in "ab"}
+    ends: dict[str, Any] = {f"bundle_{b}__largest_contraction": share for b in "ab"}
     return ElbowOrthosis.paper("none", **ends, **changes)
 
 
@@ -228,7 +221,8 @@ def hysteresis() -> list[Figure]:
 
 def loop_share(plant: Any, pressure: float) -> float:
     """Return the largest gap of the force loop of bundle b over its force at nominal length."""
-    up = np.linspace(*plant.angle_range, 201)
+    low, high = plant.angle_range
+    up = np.linspace(low, high, 201)
     q = np.concatenate([up, up[::-1], up, up[::-1]])
     travel = plant.pulley.travel(q)
     lag = travel - plant.hysteresis.operator.simulate(travel)[0]
@@ -340,7 +334,7 @@ def _curve(ax: Any, muscles: Any, pressure: float, colour: str) -> None:
     ax.annotate(label, (0.0, force[0]), (4, 3), textcoords="offset points", color=colour)
 
 
-GROUPS: tuple[Callable[[], list[Figure]], ...] = (
+GROUPS: tuple[Group, ...] = (
     stroke,
     torque_table,
     exactness,

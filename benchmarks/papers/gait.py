@@ -12,13 +12,14 @@ them behind the paper's own low-pass, in stance alone, is reported beside them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.papers.figures import Figure
-from benchmarks.papers.knee import BEFORE, PERIOD, SOURCE, UNKNOWN, note
+from benchmarks.papers.knee import PERIOD, SOURCE
+from benchmarks.papers.published import BEFORE, UNKNOWN, Figure, Group, note
 from pam_envs.constants import GRAVITY
 from pam_envs.identification.emg_calibration import PUBLISHED, change, stride_torques
 from pam_envs.muscle.emg import MuscleActivation, Reading, calibration, emg_proxy
@@ -90,7 +91,8 @@ def uncalibrated_change(
     # the record is of the ends of the periods, the curves are of their beginnings
     helped = 0.2 * made["estimate"] if exact else np.roll(late, -1)
     muscle = MuscleActivation(floor=floor)
-    return emg_proxy(*(np.tile(x, 2) for x in (made["demand"], helped)), PERIOD, muscle).change
+    demand, assistance = np.tile(made["demand"], 2), np.tile(helped, 2)
+    return emg_proxy(demand, assistance, PERIOD, muscle).change
 
 
 def estimator_error(
@@ -248,7 +250,7 @@ def switching_transient() -> list[Figure]:
     """Tension error and jump of the pressure after a switch, with and without bumpless transfer."""
     where, figures = f"{SOURCE}, section 5.2", list[Figure]()
     beforehand = {True: (11.4, 7.7), False: (46.0, 220.0)}
-    bounds: dict[bool, dict[str, float]] = {True: {"at_most": 15.0}, False: {"at_least": 40.0}}
+    bounds: dict[bool, dict[str, Any]] = {True: {"at_most": 15.0}, False: {"at_least": 40.0}}
     preset = f"preset as printed, mismatch {MISMATCH:g} N, linear plant, {SWING:g} s of swing"
     for compensated, (error_then, jump_then) in beforehand.items():
         name = f"{'with' if compensated else 'without'} bumpless transfer"
@@ -266,4 +268,4 @@ def switching_transient() -> list[Figure]:
     return figures
 
 
-GROUPS: tuple[Callable[[], list[Figure]], ...] = (emg_reductions, switching_transient)
+GROUPS: tuple[Group, ...] = (emg_reductions, switching_transient)

@@ -76,7 +76,7 @@ def figures_of(angles: Array, size: float, turned: bool) -> StepFigures:
     """
     time = PERIOD * np.arange(len(angles))
     begin = 2.0 * HOLD if turned else 0.0
-    fine = FINE * np.arange(1, round(HOLD / FINE))
+    fine = FINE * np.arange(1.0, round(HOLD / FINE))
     output = CubicSpline(time, angles)(begin + fine)
     return step_figures(fine, np.asarray(output) / (size * DEGREE))
 

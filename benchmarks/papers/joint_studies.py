@@ -126,7 +126,7 @@ def run(
     motion, hysteresis = nominal_motion(POLE).discrete(FINE, "zoh"), rig.hysteresis
     fine = round(rig.control_period / FINE)
     x, held, state = motion.initial_state(), hysteresis.initial_state(), None
-    time = (1.0 + np.arange(fine * len(reference))) * FINE
+    time = np.arange(1.0, fine * len(reference) + 1.0) * FINE
     off = np.zeros(len(time) + 1) if disturbance is None else disturbance(np.append(0.0, time))
     angles, commands, models = np.zeros(len(time)), np.zeros(len(reference)), []
     command, angle = 0.0, float(off[0])

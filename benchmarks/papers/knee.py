@@ -9,13 +9,12 @@ half-range of the reference, the first 2 s dropped as the paper's transient.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.papers.figures import Figure
+from benchmarks.papers.published import BEFORE, UNKNOWN, Figure, Group, note
 
 Array = NDArray[np.float64]
 
@@ -133,14 +132,6 @@ def _tracked(friction: float, feed_forward: str) -> float:
 
 NORM = "RMS over half-range, first 2 s dropped"
 STATIC, DYNAMIC = "preset static", "preset dynamic"
-BEFORE = "not in the paper: computed beforehand by another program"
-UNKNOWN = float("nan")
-"""What the paper does not print."""
-
-
-def note(kind: str, preset: str, norm: str, *more: str) -> str:
-    """Return what stands behind a figure: calibrated or predicted, with what, measured how."""
-    return "; ".join((kind, preset, norm, *more))
 
 
 def loop_shape() -> list[Figure]:
@@ -298,7 +289,7 @@ def bumpless_inequality() -> list[Figure]:
     return [_judged("largest decay of the printed K, L", where, "1/s", 4.05, fastest, 0.0, text)]
 
 
-GROUPS: tuple[Callable[[], list[Figure]], ...] = (
+GROUPS: tuple[Group, ...] = (
     loop_shape,
     hysteresis_inverse,
     tension_feedback,

@@ -6,11 +6,11 @@ functions act on the hysteresis alone, here the plant has everything that it has
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import Any
 
-from benchmarks.papers.figures import Figure
 from benchmarks.papers.gait import MISMATCH, NAMES, RMS_NORM
-from benchmarks.papers.knee import LOOP_WIDTHS, NORM, SOURCE, STATIC, UNKNOWN, note
+from benchmarks.papers.knee import LOOP_WIDTHS, NORM, SOURCE, STATIC
+from benchmarks.papers.published import UNKNOWN, Figure, Group, note
 from pam_envs.identification.emg_calibration import PUBLISHED
 from pam_envs.references.gait import NATURAL_STRIDE
 
@@ -115,7 +115,7 @@ def _by_pace(where: str) -> list[Figure]:
 
 LARGEST = "largest in 0.5 s after the switch, mean of strides"
 FASTER = "swing holds the set-point at its limit until the heel's contact"
-TARGETS: dict[str, dict[str, float]] = {
+TARGETS: dict[str, dict[str, Any]] = {
     "without bumpless transfer": {"at_least": 40.0},
     "with bumpless transfer": {"at_most": 15.0},
 }
@@ -157,7 +157,7 @@ def emg_environment() -> list[Figure]:
 
 FLEXORS = "what the flexors do more than without is added, which the paper did not measure"
 
-GROUPS: tuple[Callable[[], list[Figure]], ...] = (
+GROUPS: tuple[Group, ...] = (
     stiffness_environment,
     tension_environment,
     switch_environment,

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 import pam_envs  # noqa: F401  registers the ids
 from benchmarks.runs import rollout
 from benchmarks.scoring import knee as metrics_knee
+from benchmarks.scoring.errors import rms
 from pam_envs.plants.knee_orthosis.plant import Activity, Dynamics, KneeOrthosis, Mounting
 from pam_envs.references.gait import PAPER_STRIDE
 
@@ -135,7 +136,7 @@ def stiffness_errors() -> tuple[float, float]:
 
 def _brace(env: str, plant: KneeOrthosis) -> Any:
     seconds = DROPPED + CYCLES / FREQUENCY
-    how = {"start": "paper", "reference": "sine", "frequency": FREQUENCY}
+    how: dict[str, Any] = {"start": "paper", "reference": "sine", "frequency": FREQUENCY}
     made = gym.make(env, disable_env_checker=True, plant=plant, episode_seconds=seconds, **how)
     return made.unwrapped
 
@@ -145,7 +146,7 @@ def _error(env: Any, controller: Any) -> float:
     kept = signals["time"] > DROPPED + 1e-6
     reference = signals["reference"][kept]
     error = signals["output"][kept] - reference
-    return 100.0 * metrics_knee.rms(error) / metrics_knee.half_range(reference)
+    return 100.0 * rms(error) / metrics_knee.half_range(reference)
 
 
 @lru_cache(maxsize=32)

@@ -8,7 +8,6 @@ inputs and judge nothing. What the weight does where nothing was fitted is said 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.manipulator.redundancy import Comparison, compare
-from benchmarks.papers.figures import Figure
+from benchmarks.papers.published import BEFORE, UNKNOWN, Figure, Group
 from pam_envs.envs.manipulator.paths import LEAP
 from pam_envs.mechanics.redundancy import LIMIT
 from pam_envs.mechanics.serial_chain import SerialChain
@@ -25,10 +24,7 @@ from pam_envs.references.path import PATHS, POINTS, PathEnds, draw_ends, joint_l
 Array = NDArray[np.float64]
 
 SOURCE = "fluidic_muscles, section 2"
-BEFORE = "not in the paper: computed beforehand by another program"
 KNOWN, OURS = "predicted; ends known", "calibrated: ends drawn for these peaks"
-UNKNOWN = float("nan")
-"""What the paper does not print."""
 UNWEIGHTED = {"path_1": 34.2, "path_2": 33.2, "path_3": 37.12}
 WEIGHTED = {"path_1": 27.6, "path_2": 26.2, "path_3": 27.77}
 """Largest angle of a joint [degrees] in each plan."""
@@ -67,15 +63,15 @@ def peaks() -> list[Figure]:
     figures = []
     for path in PATHS:
         both = plans(path)
-        for name, expected, plan, bound in (
-            ("unweighted", UNWEIGHTED, both.unweighted, {"at_least": 33.0}),
-            ("weighted", WEIGHTED, both.weighted, {"at_most": 30.0}),
+        for name, expected, plan, least, most in (
+            ("unweighted", UNWEIGHTED, both.unweighted, 33.0, None),
+            ("weighted", WEIGHTED, both.weighted, None, 30.0),
         ):
             text = f"{OURS if path.calibrated else KNOWN}; straight line of the joints; {BEFORE}"
             figures.append(
                 Figure(f"{path.name}, {name}: largest angle", SOURCE, "deg", UNKNOWN,
                        float(np.rad2deg(plan.peak)), 0.005, text, expected[path.name],
-                       given=path.calibrated, **bound)
+                       given=path.calibrated, at_least=least, at_most=most)
             )  # fmt: skip
     return figures
 
@@ -122,7 +118,8 @@ def held_out(number: int = HELD_OUT, seed: int = 0) -> HeldOut:
         pair = (both.unweighted, both.weighted)
         counts += [not plan.within_limits for plan in pair] + [p.longest_step > leap for p in pair]
         most = max(most, float(np.median(both.weighted.iterations)))
-    return HeldOut(number, *(counts / number).tolist(), most)
+    crossed, crossed_weighted, leapt, leapt_weighted = (counts / number).tolist()
+    return HeldOut(number, crossed, crossed_weighted, leapt, leapt_weighted, most)
 
 
 def drawn_lines() -> list[Figure]:
@@ -187,7 +184,7 @@ def newton() -> list[Figure]:
     return figures
 
 
-GROUPS: tuple[Callable[[], list[Figure]], ...] = (
+GROUPS: tuple[Group, ...] = (
     peaks,
     drawn_lines,
     other_reading,

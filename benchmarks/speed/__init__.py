@@ -1,1 +1,1 @@
-"""speed."""
+"""Speed of environments, training, planning and diagnosis."""

@@ -1,4 +1,4 @@
-"""How long a rig owner waits: ten minutes at 50 Hz, from the file to the written report."""
+"""Wall time of a diagnosis: ten minutes at 50 Hz, from the file to the written report."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def write_case(folder: Path) -> None:
 
 
 def whole_reports(rounds: int = 3) -> list[float]:
-    """Return the seconds that whole reports of ten minutes at 50 Hz took, one after the other."""
+    """Return the wall times [s] of consecutive whole reports of ten minutes at 50 Hz."""
     with tempfile.TemporaryDirectory() as name:
         write_case(Path(name))
         return [_timed(Path(name))[1] for _ in range(rounds)]
@@ -78,7 +78,7 @@ def diagnosing(rounds: int) -> list[Measurement]:
 
 
 def _timed(folder: Path) -> tuple[float, float, str]:
-    """Return the seconds of a verdict and of a whole report, and what was said."""
+    """Return the wall times [s] of a verdict and of a whole report, and the verdict's text."""
     threads = {"OMP_NUM_THREADS": str(CORES), "NUMBA_NUM_THREADS": str(CORES)}
     begun = time.perf_counter()
     ran = subprocess.run(

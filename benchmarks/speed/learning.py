@@ -1,4 +1,4 @@
-"""Where the time of a training goes: stepping plants, and everything else."""
+"""Speed of training, and the share of its time that the environments take."""
 
 from __future__ import annotations
 
@@ -7,24 +7,57 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from benchmarks.speed.rates import Chunk, Measurement, Missing, median
+from benchmarks.speed.rates import Chunk, Measurement, Missing, interleaved, median, ratio
 
 MOST = 0.05
 """The largest share of a training's time that its environments may take."""
 
 
-def shares(rounds: int) -> list[Measurement]:
-    """Environments' share of the time of each PPO preset."""
+def learning(rounds: int) -> list[Measurement]:
+    """PPO at 256 environments against the default on one Pendulum."""
+    (speed,) = _agents("training.speed")
+    import torch
+    from stable_baselines3 import PPO
+
+    torch.set_num_threads(1)
+    peer = PPO("MlpPolicy", "Pendulum-v1", seed=0, device="cpu")
+
+    def default() -> int:
+        peer.learn(2048, reset_num_timesteps=False)
+        return 2048
+
+    subjects: dict[str, Chunk] = {"ours": speed.ppo_chunk(256), "peer": default}
+    rates = interleaved(subjects, min(rounds, 3))
+    ours, peers = rates["ours"], rates["peer"]
+    gain = "PPO N = 256 / default on one Pendulum"
+    return [
+        Measurement("learning", "PPO, N = 256, frames per CPU second", median(ours), "1/s"),
+        Measurement("learning", "PPO default, one Pendulum, the same", median(peers), "1/s"),
+        Measurement("learning", gain, ratio(ours, peers), "x", 25.0, 60.0),
+    ]
+
+
+def _agents(*names: str) -> list[Any]:
+    """Return modules of the package ``agents``.
+
+    Raises
+    ------
+    Missing
+        If it, or a package that it needs, is not installed.
+    """
     try:
-        building, configs, speed = (
-            importlib.import_module(f"agents.{name}") for name in ("building", "configs", "speed")
-        )
+        return [importlib.import_module(f"agents.{name}") for name in names]
     except ModuleNotFoundError as error:
         raise Missing(f"agents cannot be imported: {error.name} is not installed") from error
+
+
+def shares(rounds: int) -> list[Measurement]:
+    """Environments' share of the time of each PPO preset."""
+    building, presets, speed = _agents("training.building", "settings.presets", "training.speed")
     from pam_envs.__main__ import env_ids
 
     found = []
-    for preset in (configs.preset(env, "ppo") for env in env_ids()):
+    for preset in (presets.preset(env, "ppo") for env in env_ids()):
         env = building.make_env(preset)
         chunk = speed.stepper(building.make_model(preset, 0, env))
         name = preset.env.removeprefix("PAM/").rpartition("-")[0]
@@ -47,7 +80,7 @@ def _share(name: str, env: Any, chunk: Chunk, rounds: int) -> Measurement:
 
 
 def batches_of(env: Any) -> Iterator[Any]:
-    """Yield the batches of plants below all that training wraps around them."""
+    """Yield the batches of plants below the wrappers of training."""
     if hasattr(env, "venv"):
         yield from batches_of(env.venv)
     else:
@@ -55,7 +88,7 @@ def batches_of(env: Any) -> Iterator[Any]:
 
 
 def _timed(batch: Any) -> Callable[[], float]:
-    """Make a batch count the CPU seconds of its steps, and return what reads the count."""
+    """Make a batch count the CPU seconds of its steps; return a function that reads the count."""
     plain, total = batch.step_wait, [0.0]
 
     def step_wait() -> Any:

@@ -1,4 +1,4 @@
-"""How fast the joint angles of an arm are planned."""
+"""Speed of planning the joint angles of an arm."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from benchmarks.speed.rates import Measurement, interleaved, median
 FLOOR, AIM = 2000.0, 20000.0
 """Poses per CPU second."""
 REPEATS = 5
-"""How often a path is gone through, there and back."""
+"""Repetitions of each path, there and back."""
 
 
 def planning(rounds: int) -> list[Measurement]:

@@ -1,23 +1,18 @@
-"""What is measured, group by group. A library that is absent costs its line and nothing else."""
+"""Probes of environments, batches, start-up and training. An absent library costs only its line."""
 
 from __future__ import annotations
 
-import importlib
 import json
 import os
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.speed.diagnosis import diagnosing
-from benchmarks.speed.learning import shares
-from benchmarks.speed.planning import planning
 from benchmarks.speed.rates import Chunk, Measurement, Missing, interleaved, median, ratio
 
 ENV = "PAM/MusclePositioning-v0"
@@ -354,60 +349,8 @@ def start_up(rounds: int) -> list[Measurement]:
             for state, times, floor, aim in (("warm", again, 0.7, 0.35), ("cold", cold, 1.5, 1.0)):
                 name = f"interpreter, import and {title}, {state}"
                 limits = (floor, aim) if steps == "1" else (None, None)
+                found = median(times)
                 results.append(
-                    Measurement("start", name, median(times), "s", *limits, "less", note)
+                    Measurement("start", name, found, "s", limits[0], limits[1], "less", note)
                 )
     return results
-
-
-# --- learning -----------------------------------------------------------------------------------
-
-
-def learning(rounds: int) -> list[Measurement]:
-    """PPO at 256 environments against the default on one Pendulum."""
-    try:
-        module = importlib.import_module("agents.training.speed")
-    except ModuleNotFoundError as error:
-        raise Missing(
-            f"agents.training.speed is not there, or {error.name} is not installed"
-        ) from error
-    import torch
-    from stable_baselines3 import PPO
-
-    torch.set_num_threads(1)
-    peer = PPO("MlpPolicy", "Pendulum-v1", seed=0, device="cpu")
-
-    def default() -> int:
-        peer.learn(2048, reset_num_timesteps=False)
-        return 2048
-
-    subjects: dict[str, Chunk] = {"ours": module.ppo_chunk(256), "peer": default}
-    rates = interleaved(subjects, min(rounds, 3))
-    return [
-        Measurement(
-            "learning", "PPO, N = 256, frames per CPU second", median(rates["ours"]), "1/s"
-        ),
-        Measurement(
-            "learning", "PPO default, one Pendulum, the same", median(rates["peer"]), "1/s"
-        ),
-        Measurement(
-            "learning",
-            "PPO N = 256 / default on one Pendulum",
-            ratio(rates["ours"], rates["peer"]),
-            "x",
-            25.0,
-            60.0,
-        ),
-    ]
-
-
-GROUPS: dict[str, tuple[Callable[[int], list[Measurement]], ...]] = {
-    "single": (single, single_joints),
-    "batch": (batch, variants, growth, cores, processes),
-    "planning": (planning,),
-    "plain": (uncompiled, jacobian),
-    "start": (start_up,),
-    "learning": (learning, shares),
-    "diagnosis": (diagnosing,),
-}
-"""Probes of each group; a probe takes the number of rounds."""

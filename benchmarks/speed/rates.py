@@ -1,8 +1,7 @@
-"""Rates measured side by side: what is compared runs in one process, in interleaved rounds.
+"""Rates measured in one process, in interleaved rounds, and their table.
 
 A rate is the median over rounds, a ratio the median of the ratios within each round, so that a
-busy machine slows both sides alike. Times are CPU seconds of the process, except where *wall* is
-said.
+busy machine slows both sides alike. Times are CPU seconds of the process unless *wall* is stated.
 """
 
 from __future__ import annotations
@@ -16,13 +15,11 @@ from typing import Any, Literal
 from benchmarks.runs import provenance
 
 Chunk = Callable[[], int]
-"""Does some work and returns how many environment steps it was."""
-
-Start = Callable[[int], Callable[[], None]]
+"""Does some work and returns its number of environment steps."""
 
 
 class Missing(Exception):
-    """What a measurement needs is not there; the message says what."""
+    """A requirement of a measurement is absent; the message names it."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +32,7 @@ class Measurement:
     value : float or None
         ``None`` if it could not be measured; ``note`` says why.
     floor, aim : float or None
-        What must be reached, and what is aimed at.
+        Required value and target.
     better : {"more", "less"}
     note : str
     """
@@ -105,46 +102,6 @@ def ratio(above: Sequence[float], below: Sequence[float]) -> float:
     return median([a / b for a, b in zip(above, below, strict=True)])
 
 
-def measure(
-    only: Sequence[str] = (), rounds: int = 7, start: Start = lambda total: lambda: None
-) -> list[Measurement]:
-    """Measure the groups that are named, or all.
-
-    Raises
-    ------
-    ValueError
-        If there is no group of a name.
-    """
-    from benchmarks.speed.probes import GROUPS
-
-    unknown = sorted(set(only) - set(GROUPS))
-    if unknown:
-        raise ValueError(f"no group named {unknown[0]!r}; there are: {', '.join(GROUPS)}")
-    chosen = [name for name in GROUPS if not only or name in only]
-    advance, results = start(len(chosen)), list[Measurement]()
-    for name in chosen:
-        for probe in GROUPS[name]:
-            results += attempt(name, probe, rounds)
-        advance()
-    return results
-
-
-def attempt(
-    group: str, probe: Callable[[int], list[Measurement]], rounds: int
-) -> list[Measurement]:
-    """Return what a probe measures, or one line that says why it could not."""
-    try:
-        return probe(rounds)
-    except Missing as reason:
-        note = str(reason)
-    except ModuleNotFoundError as error:
-        note = f"{error.name} is not installed"
-    except Exception as error:  # a figure that fails must not cost the others
-        note = f"failed: {type(error).__name__}: {error}"
-    title = (probe.__doc__ or probe.__name__).splitlines()[0].rstrip(".")
-    return [Measurement(group, title, None, "", note=note)]
-
-
 def _shown(value: float | None) -> str:
     if value is None:
         return "-"
@@ -179,7 +136,7 @@ def table(results: Sequence[Measurement]) -> str:
 
 
 def record(results: Sequence[Measurement]) -> dict[str, Any]:
-    """Return the figures as plain data, with what they were measured with and where."""
+    """Return the figures as plain data, with packages, commit, machine and date."""
     return {
         "schema": 1,
         "measurements": [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from baselines.positioning.nominal import LoadedMuscle
-from benchmarks.papers.joint_inverses import inhomogeneous, inverse_error
+from benchmarks.papers.joint_hysteresis import inhomogeneous, inverse_error
 from benchmarks.papers.joint_studies import RANGE, assumed_hysteresis
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.identification.everett_series import series_inverse

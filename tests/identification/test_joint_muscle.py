@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.papers.joint_verdicts import verdicts
+from benchmarks.papers.joint_hysteresis import verdicts
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.identification.joint_forc import CONGRUENCY, SYMMETRY
 from pam_envs.identification.joint_muscle import HangingMuscle

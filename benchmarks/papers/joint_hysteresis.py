@@ -1,7 +1,8 @@
-"""How well inverses of a joint's hysteresis undo it: fluidic_muscles, section 3."""
+"""Hysteresis of a joint and its inverse: loop widths, symmetry, congruency (fluidic_muscles, section 3)."""
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,9 @@ from baselines.joint.model import JointModel, joint_model
 from benchmarks.papers.joint_studies import DEGREE, RANGE
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.identification.everett_series import series_inverse
+from pam_envs.identification.joint_forc import JointHysteresis, measure_hysteresis, measure_joint
+from pam_envs.identification.joint_muscle import HangingMuscle
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
 Array = NDArray[np.float64]
 
@@ -91,3 +95,23 @@ def inverse_error(histories: int = 60) -> tuple[float, float]:
         printed = series_inverse(model, wanted)
         worst_series = max(worst_series, float(np.max(np.abs(printed - inputs))) / (2.0 * RANGE))
     return worst_exact, worst_series
+
+
+PRESSURES = (0.5e5, 6.5e5)
+"""Between which the single muscle is driven [Pa]: below, it does not lift its load."""
+
+
+@cache
+def verdicts() -> dict[str, JointHysteresis]:
+    """Return what is found on the simulated rigs: two joints, and one of their muscles."""
+    joints = {
+        "paper joint": AntagonisticJoint.paper(),
+        "measured joint": AntagonisticJoint.measured(),
+    }
+    found = {
+        name: measure_joint(joint.rest_angles, joint.angle_range[1])
+        for name, joint in joints.items()
+    }
+    muscle = HangingMuscle(joints["paper joint"])
+    found["one DMSP-10 under 100 N"] = measure_hysteresis(muscle.rest_contractions, *PRESSURES)
+    return found

@@ -16,7 +16,7 @@ from benchmarks.papers import elbow as figures
 from benchmarks.runs.rollout import run
 from tests.test_readme import run_snippets
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 PAGE = DOCS / "elbow_orthosis.md"
 TEXT = PAGE.read_text()
 FLAT = " ".join(TEXT.replace("**", "").split())

@@ -7,19 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from joint_figures import REACHED, figures
 
 from benchmarks.papers import joint_loops
 from benchmarks.papers import manipulator as papers_manipulator
-from benchmarks.papers.joint_inverses import width_ratio
+from benchmarks.papers.joint_hysteresis import verdicts, width_ratio
 from benchmarks.papers.joint_plants import CASES, PLANTS, plant_step
 from benchmarks.papers.joint_studies import Setting, step
-from benchmarks.papers.joint_verdicts import verdicts
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
-from tests.papers.joint_figures import REACHED, figures
 from tests.test_readme import run_snippets
 
 pytestmark = pytest.mark.xdist_group("seed_002_joint")
-PAGE = Path(__file__).parents[2] / "docs" / "joint_and_arm.md"
+PAGE = Path(__file__).parents[3] / "docs" / "joint_and_arm.md"
 TEXT = PAGE.read_text()
 FLAT = " ".join(TEXT.replace("**", "").split())
 

@@ -10,9 +10,10 @@ import pytest
 from baselines.knee import published as seed
 from baselines.linear.ltr import closed_loop_poles, design_ltr, loop_figures
 from benchmarks.papers import figures as papers
-from benchmarks.papers import gait
+from benchmarks.papers import gait, positioning
 from benchmarks.papers import knee as figures
 from benchmarks.papers import knee_envs as envs
+from benchmarks.papers.published import Figure, table
 
 PLANT, CONTROLLER = seed.printed_plant(), seed.printed_controller()
 
@@ -153,10 +154,10 @@ def test_what_is_fitted_is_called_calibrated_and_what_is_not_judged_is_not_fitte
 
 
 def test_the_table_holds_the_figures_of_all_groups():
-    made = papers.groups()
-    assert {*papers.GROUPS, *figures.GROUPS, *gait.GROUPS, *envs.GROUPS} <= set(made)
+    made = papers.GROUPS
+    assert {*positioning.GROUPS, *figures.GROUPS, *gait.GROUPS, *envs.GROUPS} <= set(made)
     assert len(set(made)) == len(made)
-    lines = papers.table(gait.switching_transient()).splitlines()
+    lines = table(gait.switching_transient()).splitlines()
     assert len(lines) == 5
     assert all("mismatch 10 N" in line for line in lines[1:])
     assert ["pass" in line for line in lines[1:]] == ["tension" in line[:10] for line in lines[1:]]
@@ -164,7 +165,7 @@ def test_the_table_holds_the_figures_of_all_groups():
 
 def test_a_figure_is_judged_by_what_is_expected_and_by_its_bounds():
     def judged(ours, tolerance=None, **bounds):
-        return papers.Figure("a", "b", "", 3.5, ours, tolerance, **bounds).verdict
+        return Figure("a", "b", "", 3.5, ours, tolerance, **bounds).verdict
 
     assert judged(1.6, at_least=3.5) == "MISSED"
     assert judged(5.6, at_least=3.5) == "pass"
@@ -179,7 +180,7 @@ def test_a_group_that_cannot_be_computed_is_one_line(monkeypatch):
         """Say what is missing."""
         raise ModuleNotFoundError("no such thing")
 
-    monkeypatch.setattr(papers, "groups", lambda: (broken,))
+    monkeypatch.setattr(papers, "GROUPS", (broken,))
     (figure,) = papers.all_figures()
     assert (figure.name, figure.verdict) == ("Say what is missing", "not computed")
     assert "no such thing" in figure.note

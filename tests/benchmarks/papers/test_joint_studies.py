@@ -9,11 +9,10 @@ import pytest
 
 from baselines.joint.loop import pi_system, pole_cancelling
 from baselines.robust.loops import robust_controller
-from benchmarks.board import plots_joint
 from benchmarks.papers import joint as papers_joint
-from benchmarks.papers import joint_loops, joint_plants
+from benchmarks.papers import joint_loops, joint_plants, plots
 from benchmarks.papers import joint_studies as studies
-from benchmarks.papers.joint_inverses import width_ratio
+from benchmarks.papers.joint_hysteresis import width_ratio
 from benchmarks.papers.joint_studies import Setting, step
 from pam_envs.plants.antagonistic_joint.hysteresis import joint_hysteresis
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
@@ -121,8 +120,8 @@ def test_errors_of_a_sine_and_to_the_model():
 
 
 def test_picture_shows_every_controller_and_both_loops():
-    figure = plots_joint.step_figure()
+    figure = plots.step_figure()
     steps, loops = figure.axes
-    assert [len(ax.get_lines()) for ax in (steps, loops)] == [len(plots_joint.LINES) + 1, 2]
+    assert [len(ax.get_lines()) for ax in (steps, loops)] == [len(plots.LINES) + 1, 2]
     best = [t.get_text() for t in steps.get_legend().get_texts() if "0.133 s" in t.get_text()]
     assert best == ["model-following, inverse: rise 0.133 s"]

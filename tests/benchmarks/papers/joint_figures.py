@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from benchmarks.papers import joint as papers_joint
-from benchmarks.papers import joint_steps as papers_joint_steps
-from benchmarks.papers.figures import Figure
+from benchmarks.papers.published import Figure
 
 REACHED = {
     ("study", 5.0, True),
@@ -22,7 +21,7 @@ REACHED = {
 @cache
 def figures() -> dict[str, Figure]:
     """Return every figure of the joint by its name."""
-    groups = (*papers_joint.GROUPS, *papers_joint_steps.GROUPS)
+    groups = papers_joint.GROUPS
     made = [figure for group in groups for figure in group()]
     assert len({figure.name for figure in made}) == len(made)
     return {figure.name: figure for figure in made}

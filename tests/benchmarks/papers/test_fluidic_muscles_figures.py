@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 
 import pytest
+from joint_figures import REACHED, figures
 
 from benchmarks.papers import figures as papers
 from benchmarks.papers import joint as papers_joint
-from benchmarks.papers import joint_steps as papers_joint_steps
-from benchmarks.papers.figures import Figure
 from benchmarks.papers.joint_plants import CASES
-from tests.papers.joint_figures import REACHED, figures
+from benchmarks.papers.published import Figure
 
 pytestmark = pytest.mark.xdist_group("seed_002_joint")
 
@@ -97,8 +96,8 @@ def test_every_loop_shows_what_it_withstands_beside_how_fast_it_is() -> None:
 
 
 def test_the_groups_stand_in_the_table_of_all_papers() -> None:
-    made = papers.groups()
-    assert {*papers_joint.GROUPS, *papers_joint_steps.GROUPS} <= set(made)
+    made = papers.GROUPS
+    assert {*papers_joint.GROUPS} <= set(made)
 
 
 def test_an_input_is_never_judged_and_a_reason_makes_a_miss() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.board.plots_knee import after_switch, cut, reduction, spans, stride_figure
+from benchmarks.papers.plots import after_switch, cut, reduction, spans, stride_figure
 
 TIME = 0.01 * np.arange(1, 1601)
 
