@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import gymnasium as gym
 import numpy as np
@@ -21,8 +21,13 @@ from numpy.typing import NDArray
 from pam_envs.envs.registration import full_id, register_all
 from pam_envs.envs.rendering.demonstrators import POLICIES
 from pam_envs.envs.rendering.film import write_film
+from pam_envs.hysteresis.protocol import kinds
 from pam_envs.parameters import Signals
-from pam_envs.plants.single_muscle.hysteresis import KINDS, Kind
+
+if TYPE_CHECKING:
+    Kind: TypeAlias = str
+else:
+    Kind = Literal[kinds()]  # the registered models
 
 
 @dataclass
@@ -120,7 +125,7 @@ def list_environments() -> None:
         env: Any = gym.make(name).unwrapped
         actions, signals = _names(env.action_signals), _names(env.signals)
         period = f"{1e3 * env.control_period:g} ms"
-        table.add_row(name, actions, signals, period, ", ".join(KINDS))
+        table.add_row(name, actions, signals, period, ", ".join(kinds()))
         env.close()
     Console().print(table)
 

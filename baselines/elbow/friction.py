@@ -7,19 +7,11 @@ hysteresis that follows it says by how much the bundles pull more on one way and
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from baselines.core.controller import Array
 from baselines.elbow.view import ElbowView
-from baselines.positioning.nominal import (
-    HysteresisRows,
-    HysteresisState,
-    NoHysteresis,
-    PlayRows,
-    PreisachRows,
-)
-from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from pam_envs.hysteresis.preisach import Preisach
+from baselines.positioning.nominal import HysteresisState
+from pam_envs.hysteresis.protocol import Rows, operator_of
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 
 Shares = tuple[Array, Array]
@@ -32,12 +24,12 @@ class ElbowFriction:
     Attributes
     ----------
     plant : ElbowOrthosis
-    hysteresis : HysteresisRows
+    hysteresis : Rows
         Nothing lags and nothing is taken if it is none.
     """
 
     plant: ElbowOrthosis
-    hysteresis: HysteresisRows
+    hysteresis: Rows
 
     def initial(self, rows: int) -> HysteresisState:
         """Return the hysteresis of bundles that were never moved."""
@@ -55,12 +47,6 @@ class ElbowFriction:
         return self.plant.pulley.torque(-factor_a * taken[0], -factor_b * taken[1])
 
 
-def _rows(operator: Any) -> HysteresisRows:
-    if isinstance(operator, PlayOperator):
-        return PlayRows(operator)
-    return PreisachRows(operator) if isinstance(operator, Preisach) else NoHysteresis()
-
-
 def make_elbow_friction(plant: ElbowOrthosis, known: bool) -> ElbowFriction:
     """Return the friction of a nominal plant, or none if it is not ``known``."""
-    return ElbowFriction(plant, _rows(plant.hysteresis.operator if known else None))
+    return ElbowFriction(plant, operator_of(plant.hysteresis.operator if known else None).rows())

@@ -18,8 +18,9 @@ import numpy as np
 from baselines.core.controller import Array
 from baselines.joint.bank import Bank
 from baselines.linear.systems import LinearSystem
-from baselines.positioning.nominal import HysteresisRows, HysteresisState, PreisachRows
+from baselines.positioning.nominal import HysteresisState
 from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.hysteresis.protocol import Rows
 from pam_envs.identification.joint_forc import measure_joint
 
 POLE = 23.0
@@ -93,9 +94,9 @@ class JointModel:
         return float(self.hysteresis.everett[-1, 0]) / (self.hysteresis.high - self.hysteresis.low)
 
     @cached_property
-    def rows(self) -> HysteresisRows:
+    def rows(self) -> Rows | LineRows:
         """The hysteresis worked by rows."""
-        return LineRows(self.slope) if self.hysteresis is None else PreisachRows(self.hysteresis)
+        return LineRows(self.slope) if self.hysteresis is None else self.hysteresis.rows()
 
     @cached_property
     def reach(self) -> tuple[float, float]:

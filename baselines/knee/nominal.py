@@ -12,38 +12,13 @@ from functools import cached_property
 import numpy as np
 
 from baselines.core.controller import Array
-from baselines.positioning.nominal import (
-    HysteresisRows,
-    HysteresisState,
-    NoHysteresis,
-    PreisachRows,
-)
-from pam_envs.hysteresis.modified_maxwell_slip import ModifiedMaxwellSlip
+from baselines.positioning.nominal import HysteresisState
+from pam_envs.hysteresis.protocol import Rows, operator_of
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 SHORTEST_STRETCH = 1e-3
 """Length [m] above the shortest below which a muscle is not divided by its stretch."""
 CURVE_POINTS = 451
-
-
-@dataclass(frozen=True)
-class SlipRows:
-    """A modified Maxwell-slip model: pressure [Pa] in, stiffness [N/m] out."""
-
-    operator: ModifiedMaxwellSlip
-
-    def initial(self, rows: int) -> HysteresisState:
-        """Return slip positions, shape (rows, n), of muscles that were vented."""
-        return (self.operator.initial_state((rows,)),)
-
-    def forward(self, felt: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
-        """Advance to a pressure."""
-        stiffness, after = self.operator.step(felt, state[0])
-        return stiffness, (after,)
-
-    def inverse(self, wanted: Array, state: HysteresisState) -> Array:
-        """Return the pressure of a stiffness; the state stays."""
-        return self.operator.inverse_step(wanted, state[0])[0]
 
 
 @dataclass(frozen=True)
@@ -64,14 +39,9 @@ class KneeNominal:
         return float(self.plant.regulator.max_pressure)
 
     @cached_property
-    def hysteresis(self) -> HysteresisRows:
+    def hysteresis(self) -> Rows:
         """From pressure [Pa] to stiffness [N/m] of a muscle with gain 1."""
-        operator = self.plant.hysteresis.scaled
-        if operator is None:
-            return NoHysteresis()
-        if isinstance(operator, ModifiedMaxwellSlip):
-            return SlipRows(operator)
-        return PreisachRows(operator)
+        return operator_of(self.plant.hysteresis.scaled).rows()
 
     @cached_property
     def _per_output(self) -> float:

@@ -12,131 +12,19 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from baselines.core.controller import Array, by_load
 from baselines.positioning.contraction_tables import LOADS
 from pam_envs.constants import GRAVITY
-from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from pam_envs.hysteresis.preisach import Preisach, PreisachState
+from pam_envs.hysteresis.protocol import Rows, RowsState, operator_of
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
-HysteresisState = tuple[NDArray[Any], ...]
+HysteresisState = RowsState
 CURVE_POINTS = 1001
 """Points of the tabulated static curve; straight in between to 0.05 um."""
-
-
-class HysteresisRows(Protocol):
-    """A hysteresis on the stretched scale, one row an environment; states have the row first."""
-
-    def initial(self, rows: int) -> HysteresisState:
-        """Return the state of muscles that were never inflated."""
-        ...
-
-    def forward(self, felt: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
-        """Return the output for an input, and the state it leaves."""
-        ...
-
-    def inverse(self, wanted: Array, state: HysteresisState) -> Array:
-        """Return the input that gives an output; the state stays."""
-        ...
-
-
-@dataclass(frozen=True)
-class NoHysteresis:
-    """The output is the input."""
-
-    def initial(self, rows: int) -> HysteresisState:
-        """Return no state."""
-        return ()
-
-    def forward(self, felt: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
-        """Return the input."""
-        return felt, state
-
-    def inverse(self, wanted: Array, state: HysteresisState) -> Array:
-        """Return the output."""
-        return wanted
-
-
-@dataclass(frozen=True)
-class PlayRows:
-    """Play operators and their dual, the Maxwell-slip model that undoes them, as arrays.
-
-    The same numbers as :meth:`PlayOperator.step`, :meth:`PlayOperator.inverse_state` and
-    ``PlayOperator.inverse().step``, without rebuilding the inverse at each sample.
-    """
-
-    operator: PlayOperator
-
-    @cached_property
-    def _arrays(self) -> tuple[Array, Array, Array, Array, Array]:
-        undo = self.operator.inverse()
-        n = len(self.operator.thresholds)
-        mirror = self.operator.inverse_state(np.eye(n)).T  # inverse_state is linear in the state
-        return (
-            np.array(self.operator.thresholds),
-            np.array(self.operator.weights),
-            mirror,
-            np.array(undo.break_displacements),
-            np.array(undo.stiffnesses),
-        )
-
-    @cached_property
-    def _spring(self) -> float:
-        return self.operator.inverse().spring
-
-    def initial(self, rows: int) -> HysteresisState:
-        """Return plays at 0, shape (rows, n)."""
-        return (self.operator.initial_state((rows,)),)
-
-    def forward(self, felt: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
-        """Advance the plays."""
-        thresholds, weights, *_ = self._arrays
-        x = felt[:, None]
-        plays = np.maximum(x - thresholds, np.minimum(x + thresholds, state[0]))
-        return self.operator.linear * felt + np.add.reduce(weights * plays, axis=1), (plays,)
-
-    def inverse(self, wanted: Array, state: HysteresisState) -> Array:
-        """Return the input by the dual model, in the state that mirrors this one."""
-        _, _, mirror, breaks, stiffnesses = self._arrays
-        slips = np.add.reduce(mirror * state[0][:, None, :], axis=2)
-        y = wanted[:, None]
-        slips = np.maximum(y - breaks, np.minimum(y + breaks, slips))
-        return np.asarray(self._spring * wanted + np.add.reduce(stiffnesses * (y - slips), axis=1))
-
-
-@dataclass(frozen=True)
-class PreisachRows:
-    """A Preisach operator; its state is kept with the row first."""
-
-    operator: Preisach
-
-    def initial(self, rows: int) -> HysteresisState:
-        """Return virgin stacks: extrema and outputs, shapes (rows, depth), and counts, (rows,)."""
-        return _row_first(self.operator.initial_state((rows,)))
-
-    def forward(self, felt: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
-        """Advance the stacks."""
-        output, after = self.operator.step(felt, _row_last(state))
-        return output, _row_first(after)
-
-    def inverse(self, wanted: Array, state: HysteresisState) -> Array:
-        """Return the input by the recursion over the stack."""
-        return self.operator.inverse_step(wanted, _row_last(state))[0]
-
-
-def _row_first(state: PreisachState) -> HysteresisState:
-    stack, sums, counts = state
-    return stack.T, sums.T, counts
-
-
-def _row_last(state: HysteresisState) -> PreisachState:
-    stack, sums, counts = state
-    return PreisachState(np.ascontiguousarray(stack.T), np.ascontiguousarray(sums.T), counts)
 
 
 @dataclass(frozen=True)
@@ -147,12 +35,9 @@ class LoadedMuscle:
     load: float
 
     @cached_property
-    def hysteresis(self) -> HysteresisRows:
+    def hysteresis(self) -> Rows:
         """The hysteresis at this load."""
-        operator = self.plant.hysteresis.at_load(self.load)
-        if operator is None:
-            return NoHysteresis()
-        return PlayRows(operator) if isinstance(operator, PlayOperator) else PreisachRows(operator)
+        return operator_of(self.plant.hysteresis.at_load(self.load)).rows()
 
     @cached_property
     def _rest_strain(self) -> float:

@@ -13,14 +13,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.hysteresis.protocol import ELEMENTS
 from pam_envs.kernels.build import entry, kernel
 
 Array = NDArray[np.float64]
 
+LINEAR, THRESHOLD, WEIGHT = 1, 2, 2 + ELEMENTS
+"""Rows of a play operator's numbers, counted from the slope."""
+
 
 @kernel
 def play(x: float, threshold: float, w: float) -> float:
-    """Return where a play stands after its input has come to ``x`` from one side.
+    """Return the position of a play after its input has moved monotonically to ``x``.
 
     Parameters
     ----------
@@ -29,12 +33,12 @@ def play(x: float, threshold: float, w: float) -> float:
     threshold : float
         Half the dead width, in the unit of the input, not negative.
     w : float
-        Where the play stood before.
+        Position before.
 
     Returns
     -------
     float
-        Where the play stands now; at most ``threshold`` away from ``x``.
+        Position after; at most ``threshold`` away from ``x``.
     """
     low, high = x - threshold, x + threshold
     if w < low:
@@ -76,6 +80,59 @@ def slip_step(
     return force
 
 
+@kernel
+def plays_step(
+    x: Any, y: Any, rows: Any, fixed: Any, counts: Any, table: Any, elements: int, at: int,
+    model: int, count: int, member: int, first: int, last: int,
+) -> None:  # fmt: skip
+    """Advance the plays of a tile (:class:`~pam_envs.hysteresis.protocol.Kernels`)."""
+    linear = fixed[model + LINEAR]
+    for j in range(first, last):
+        y[j] = linear[j] * x[j]
+    for k in range(elements):
+        threshold, weight = fixed[model + THRESHOLD + k], fixed[model + WEIGHT + k]
+        state = rows[at + k]
+        for j in range(first, last):
+            w = play(x[j], threshold[j], state[j])
+            state[j] = w
+            y[j] = y[j] + weight[j] * w
+
+
+@kernel
+def plays_lag(
+    x: Any, lag: Any, rows: Any, fixed: Any, counts: Any, table: Any, elements: int, at: int,
+    model: int, count: int, member: int, first: int, last: int,
+) -> None:  # fmt: skip
+    """Advance the plays of a tile and write how far they lag behind, for a total slope of 1."""
+    for j in range(first, last):
+        lag[j] = 0.0
+    for k in range(elements):
+        threshold, weight = fixed[model + THRESHOLD + k], fixed[model + WEIGHT + k]
+        state = rows[at + k]
+        for j in range(first, last):
+            w = play(x[j], threshold[j], state[j])
+            state[j] = w
+            lag[j] = lag[j] + weight[j] * (x[j] - w)
+
+
+@kernel
+def plays_peek(
+    x: Any, lag: Any, stick: Any, rows: Any, fixed: Any, counts: Any, table: Any, elements: int,
+    at: int, model: int, count: int, member: int, first: int, last: int,
+) -> None:  # fmt: skip
+    """Write the lag at an input and its slope, the weight of the plays that do not move."""
+    for j in range(first, last):
+        lag[j] = 0.0
+        stick[j] = 0.0
+    for k in range(elements):
+        threshold, weight = fixed[model + THRESHOLD + k], fixed[model + WEIGHT + k]
+        state = rows[at + k]
+        for j in range(first, last):
+            w = play(x[j], threshold[j], state[j])
+            lag[j] = lag[j] + weight[j] * (x[j] - w)
+            stick[j] = stick[j] + (weight[j] if w == state[j] else 0.0)
+
+
 @entry
 def simulate_plays(
     x: Array, state: Array, thresholds: Array, weights: Array, linear: float, y: Array
@@ -95,7 +152,7 @@ def simulate_slips(
 
 
 def move_plays(x: Array, thresholds: Sequence[float], state: ArrayLike) -> Array:
-    """Return where plays stand after inputs (...), from positions (..., n)."""
+    """Return the positions of plays after inputs (...), from positions (..., n)."""
     # the comparisons of the kernel, spelt out, so that even the sign of a zero is the same
     w = np.asarray(state, dtype=float)
     r = np.asarray(thresholds)

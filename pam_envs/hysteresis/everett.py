@@ -11,19 +11,21 @@ There is no factor one half here: a relay goes from 0 to its weight.
 
 References
 ----------
-I. D. Mayergoyz, "Mathematical Models of Hysteresis", Springer 1991. D. H. Everett, "A general
+I. D. Mayergoyz, "Mathematical Models of HysteresisModel", Springer 1991. D. H. Everett, "A general
 approach to hysteresis, part 4", Trans. Faraday Society 51 (1955).
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.kernels.build import kernel
+
+if TYPE_CHECKING:
+    from pam_envs.hysteresis.maxwell_slip import PlayOperator
 
 Array = NDArray[np.float64]
 

@@ -26,6 +26,11 @@ from pam_envs.kernels.build import entry, kernel
 
 Array = NDArray[np.float64]
 
+DEPTH = 24
+"""Depth of the stack in the rows of a plant."""
+LOW, INVERSE_CELL, BOTTOM, START_OUTPUT = range(1, 5)
+"""Rows of an operator's numbers, counted from the slope; the last two are the first point."""
+
 
 # Branches live in kernels of scalars, and the kernels that hold rows run straight through: the
 # compiler then needs no reference counts on the rows, which makes a step three times as fast.
@@ -85,6 +90,24 @@ def _origin(
 
 
 @kernel
+def _find_turn(
+    x: float, stack: Any, sums: Any, count: Any, lane: int, low: float
+) -> tuple[int, float, float, float]:
+    """Return the points that an input leaves, and the turn, output and factor to count from."""
+    n = count[lane]
+    last, start = stack[n - 1][lane], stack[0][lane]
+    goes_up = last > stack[max(n - 2, 0)][lane]
+    rising = _rises(x, last, goes_up)
+    n = _branch(n, rising, goes_up)
+    while n > 1 and _passes(x, stack[n - 2][lane], rising):
+        n -= 2  # a loop is closed and wiped out
+    n = _room(_base(n, x, start, start, low), len(stack))
+    k = max(n - 1, 0)
+    turn, output, part = _origin(n, x, stack[k][lane], sums[k][lane], start, low)
+    return n, turn, output, part
+
+
+@kernel
 def preisach_step(
     x: float, stack: Any, sums: Any, count: Any, lane: int, table: Any, low: float,
     inverse_cell: float,
@@ -120,16 +143,7 @@ def preisach_step(
     that led to that turn. The output has no jump, and all larger loops are kept exactly.
     """
     x = _held(x, low, low + (len(table) - 1) / inverse_cell)
-    n = count[lane]
-    last, start = stack[n - 1][lane], stack[0][lane]
-    goes_up = last > stack[max(n - 2, 0)][lane]
-    rising = _rises(x, last, goes_up)
-    n = _branch(n, rising, goes_up)
-    while n > 1 and _passes(x, stack[n - 2][lane], rising):
-        n -= 2  # a loop is closed and wiped out
-    n = _room(_base(n, x, start, start, low), len(stack))
-    k = max(n - 1, 0)
-    turn, output, part = _origin(n, x, stack[k][lane], sums[k][lane], start, low)
+    n, turn, output, part = _find_turn(x, stack, sums, count, lane, low)
     change = everett((x - low) * inverse_cell, (turn - low) * inverse_cell, table)
     y = output + part * change
     stack[n][lane] = x
@@ -145,16 +159,7 @@ def preisach_peek(
 ) -> float:  # fmt: skip
     """Return the output that :func:`preisach_step` would give, and leave the hysteresis alone."""
     x = _held(x, low, low + (len(table) - 1) / inverse_cell)
-    n = count[lane]
-    last, start = stack[n - 1][lane], stack[0][lane]
-    goes_up = last > stack[max(n - 2, 0)][lane]
-    rising = _rises(x, last, goes_up)
-    n = _branch(n, rising, goes_up)
-    while n > 1 and _passes(x, stack[n - 2][lane], rising):
-        n -= 2
-    n = _room(_base(n, x, start, start, low), len(stack))
-    k = max(n - 1, 0)
-    turn, output, part = _origin(n, x, stack[k][lane], sums[k][lane], start, low)
+    _, turn, output, part = _find_turn(x, stack, sums, count, lane, low)
     change = everett((x - low) * inverse_cell, (turn - low) * inverse_cell, table)
     return output + part * change
 
@@ -267,3 +272,55 @@ def invert_rows(
     for lane in range(len(y)):
         x[lane] = preisach_inverse(y[lane], stack, sums, count, lane, table, low, inverse_cell)
         preisach_step(x[lane], stack, sums, count, lane, table, low, inverse_cell)
+
+
+# --- tiles of lanes: the same hysteresis, with the present branch in rows of its own -------------
+
+
+@kernel
+def relays_step(
+    x: Any, y: Any, rows: Any, fixed: Any, counts: Any, table: Any, elements: int, at: int,
+    model: int, count: int, member: int, first: int, last: int,
+) -> None:  # fmt: skip
+    """Advance the extrema of a tile (:class:`~pam_envs.hysteresis.protocol.Kernels`)."""
+    stack, sums = rows[at : at + DEPTH], rows[at + DEPTH : at + 2 * DEPTH]
+    low, inverse_cell, points = fixed[model + LOW], fixed[model + INVERSE_CELL], counts[count]
+    for j in range(first, last):
+        own = table[counts[member][j]]
+        y[j] = preisach_step(x[j], stack, sums, points, j, own, low[j], inverse_cell[j])
+
+
+@kernel
+def relays_peek(
+    x: Any, lag: Any, stick: Any, rows: Any, fixed: Any, counts: Any, table: Any, elements: int,
+    at: int, model: int, count: int, member: int, first: int, last: int,
+) -> None:  # fmt: skip
+    """Write the lag at an input, and its growth since the state was last moved."""
+    stack, sums = rows[at : at + DEPTH], rows[at + DEPTH : at + 2 * DEPTH]
+    low, inverse_cell, points = fixed[model + LOW], fixed[model + INVERSE_CELL], counts[count]
+    for j in range(first, last):
+        own = table[counts[member][j]]
+        output = preisach_peek(x[j], stack, sums, points, j, own, low[j], inverse_cell[j])
+        now = points[j] - 1
+        moved, lagged = x[j] - stack[now][j], stack[now][j] - sums[now][j]
+        lag[j] = x[j] - output
+        stick[j] = growth(x[j] - output - lagged, moved)
+
+
+@kernel
+def growth(change: float, moved: float) -> float:
+    """Return a difference quotient from 0 to 1, and a half where nothing moved."""
+    if abs(moved) < 1e-9:
+        return 0.5
+    return clip(change / moved, 0.0, 1.0)
+
+
+@kernel
+def relays_begin(
+    rows: Any, fixed: Any, counts: Any, table: Any, elements: int, at: int, model: int, count: int,
+    member: int, j: int,
+) -> None:  # fmt: skip
+    """Put every relay of one lane down, or leave it virgin (see ``BOTTOM``)."""
+    rows[at][j] = fixed[model + BOTTOM][j]
+    rows[at + DEPTH][j] = fixed[model + START_OUTPUT][j]
+    counts[count][j] = 1

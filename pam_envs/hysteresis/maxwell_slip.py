@@ -17,6 +17,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,10 +34,24 @@ from pam_envs.hysteresis.elements import (
     move_plays,
     play,
     play_step,
+    plays_lag,
+    plays_peek,
+    plays_step,
     simulate_plays,
     simulate_slips,
     slip_step,
     stop,
+)
+from pam_envs.hysteresis.everett import grid, play_table
+from pam_envs.hysteresis.protocol import (
+    ELEMENTS,
+    HysteresisModel,
+    Kernels,
+    Rows,
+    RowsState,
+    Start,
+    Usage,
+    register,
 )
 
 __all__ = ["MaxwellSlip", "PlayOperator", "play", "play_step", "slip_step", "stop"]
@@ -43,8 +59,9 @@ __all__ = ["MaxwellSlip", "PlayOperator", "play", "play_step", "slip_step", "sto
 Array = NDArray[np.float64]
 
 
+@register
 @dataclass(frozen=True)
-class PlayOperator:
+class PlayOperator(HysteresisModel):
     """A line and plays in parallel: ``y = linear * x + sum(weights * plays)``.
 
     Parameters
@@ -57,6 +74,10 @@ class PlayOperator:
     linear : float
         Slope of the hysteresis-free part.
     """
+
+    kind: ClassVar[str] = "maxwell_slip"
+    kernels: ClassVar[Kernels] = Kernels(plays_step, lag=plays_lag, peek=plays_peek)
+    state_rows: ClassVar[int] = ELEMENTS
 
     thresholds: tuple[float, ...]
     weights: tuple[float, ...]
@@ -72,6 +93,60 @@ class PlayOperator:
     def total_slope(self) -> float:
         """The slope where every play moves: that of large amplitudes."""
         return self.linear + math.fsum(self.weights)
+
+    @property
+    def largest_lag(self) -> float:
+        """Distance of the output from the line after a long way in one direction."""
+        return float(np.dot(self.weights, self.thresholds))
+
+    # --- the protocol ---------------------------------------------------------------------------
+
+    @property
+    def elements(self) -> int:
+        """Number of plays."""
+        return len(self.thresholds)
+
+    def numbers(self, full: float | None = None) -> list[float]:
+        """Return the total slope, the linear part, thresholds and weights, filled up."""
+        idle = [0.0] * (ELEMENTS - self.elements)
+        return [self.total_slope, self.linear, *self.thresholds, *idle, *self.weights, *idle]
+
+    def check(self, usage: Usage) -> None:
+        """Refuse too many plays, and a total slope other than 1 where the plant needs 1."""
+        if self.elements > ELEMENTS:
+            raise ValueError(
+                f"hysteresis: {self.elements} elements, at most {ELEMENTS} are simulated; merge "
+                "neighbouring thresholds"
+            )
+        total = self.linear + sum(self.weights)
+        if usage.unit_slope and (abs(total - 1.0) > 1e-9 or self.linear <= 0.0):
+            raise ValueError(
+                f"hysteresis: the play operator's total slope is {total:g} with a linear part of "
+                f"{self.linear:g}; the hysteresis of {usage.plant} needs total slope 1 and a "
+                "linear part above 0: scale the weights"
+            )
+
+    def rows(self) -> PlayRows:
+        """Return the operator and its inverse over rows of environments."""
+        return PlayRows(self)
+
+    @classmethod
+    def keys(cls) -> tuple[str, ...]:
+        """Return the keys of a record, in the order of a plant file."""
+        return ("linear", "thresholds", "weights")
+
+    def everett_map(
+        self, low: float, high: float, levels: int, start: Start
+    ) -> tuple[Array, float]:
+        """Return the Everett map, shape (levels, levels), and the output at the start."""
+        output = 0.0
+        if start == "low":
+            output = self.total_slope * low + math.fsum(
+                a * r for a, r in zip(self.weights, self.thresholds, strict=True)
+            )
+        return play_table(self, grid(low, high, levels)), output
+
+    # --- operation ------------------------------------------------------------------------------
 
     def initial_state(self, batch_shape: tuple[int, ...] = ()) -> Array:
         """Return the play positions of the virgin state, zeros of shape ``(*batch_shape, n)``."""
@@ -120,11 +195,19 @@ class PlayOperator:
         moved = np.abs(np.asarray(after, dtype=float) - np.asarray(before, dtype=float))
         return moved @ (np.array(self.weights) * np.array(self.thresholds))
 
-    def scaled(self, width: float) -> PlayOperator:
+    def inverse_step(self, y: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
+        """Return the input that gives the output ``y``, and the state after it.
+
+        The shapes are those of :meth:`step`, whose exact inverse this is.
+        """
+        x = self.inverse().step(y, self.inverse_state(state))[0]
+        return x, self.step(x, state)[1]
+
+    def scaled(self, width: float, slope: float | None = None) -> PlayOperator:
         """Return this operator with its hysteresis made ``width`` times as wide.
 
-        The output is ``s x - width (s x - y)`` with ``s`` the total slope: 0 is free of hysteresis,
-        1 is this operator, and the slope of large amplitudes is always the same.
+        The output is ``s x - width (s x - y)`` with ``s`` the total slope (whatever ``slope``): 0
+        is free of hysteresis, 1 is this operator, and the slope of large amplitudes is the same.
         """
         (width,) = floats("width", (width,))
         check_not_negative("width", (width,), "to stay passive")
@@ -174,6 +257,48 @@ class PlayOperator:
         loading curve once play ``i`` moves.
         """
         return _mirrored(state, self._slopes(), self.weights)
+
+
+@dataclass(frozen=True)
+class PlayRows(Rows):
+    """Plays and the Maxwell-slip model that inverts them, over rows of environments.
+
+    The numbers of :meth:`PlayOperator.step` and :meth:`PlayOperator.inverse_step`, without
+    rebuilding the inverse at each sample.
+    """
+
+    operator: PlayOperator
+
+    @cached_property
+    def _arrays(self) -> tuple[Array, Array, Array, Array, Array]:
+        undo = self.operator.inverse()
+        mirror = self.operator.inverse_state(np.eye(self.operator.elements)).T  # it is linear
+        return (
+            np.array(self.operator.thresholds),
+            np.array(self.operator.weights),
+            mirror,
+            np.array(undo.break_displacements),
+            np.array(undo.stiffnesses),
+        )
+
+    @cached_property
+    def _spring(self) -> float:
+        return self.operator.inverse().spring
+
+    def forward(self, felt: Array, state: RowsState) -> tuple[Array, RowsState]:
+        """Return the outputs for inputs, shape (rows,), and the states they leave."""
+        thresholds, weights, *_ = self._arrays
+        x = felt[:, None]
+        plays = np.maximum(x - thresholds, np.minimum(x + thresholds, state[0]))
+        return self.operator.linear * felt + np.add.reduce(weights * plays, axis=1), (plays,)
+
+    def inverse(self, wanted: Array, state: RowsState) -> Array:
+        """Return the inputs that give outputs, shape (rows,); the states stay."""
+        _, _, mirror, breaks, stiffnesses = self._arrays
+        slips = np.add.reduce(mirror * state[0][:, None, :], axis=2)
+        y = wanted[:, None]
+        slips = np.maximum(y - breaks, np.minimum(y + breaks, slips))
+        return np.asarray(self._spring * wanted + np.add.reduce(stiffnesses * (y - slips), axis=1))
 
 
 @dataclass(frozen=True)

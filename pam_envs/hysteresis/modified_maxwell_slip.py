@@ -25,7 +25,7 @@ import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,11 +38,17 @@ from pam_envs.hysteresis.checks import (
     single_rows,
 )
 from pam_envs.hysteresis.elements import play
+from pam_envs.hysteresis.everett import table_from_weights, weights_from_table
+from pam_envs.hysteresis.protocol import HysteresisModel, Kernels, Start, Usage, register
 from pam_envs.kernels.build import entry, kernel
 
 Array = NDArray[np.float64]
 
 FAR = 1e300
+MOST = 16
+"""Most elements that the plants' kernels simulate."""
+BREAKS, STIFFNESSES, SPRING, SEGMENT = range(4)
+"""Rows of a member's table."""
 
 
 @kernel
@@ -177,6 +183,46 @@ def stiffness_step(
     return x
 
 
+@kernel
+def slips_scaled(
+    x: Any, y: Any, width: Any, rows: Any, fixed: Any, counts: Any, table: Any, elements: int,
+    at: int, model: int, count: int, member: int, first: int, last: int,
+) -> None:  # fmt: skip
+    """Advance a tile to its pressures (:class:`~pam_envs.hysteresis.protocol.Kernels`)."""
+    slips = rows[at : at + elements]
+    for j in range(first, last):
+        own = table[counts[member][j]]
+        y[j] = stiffness_step(
+            x[j], slips, j, own[BREAKS], own[STIFFNESSES], own[SPRING], own[SEGMENT][0], width[j]
+        )
+
+
+@kernel
+def slips_step(
+    x: Any, y: Any, rows: Any, fixed: Any, counts: Any, table: Any, elements: int, at: int,
+    model: int, count: int, member: int, first: int, last: int,
+) -> None:  # fmt: skip
+    """Advance a tile to its pressures with the width of the model."""
+    slips = rows[at : at + elements]
+    for j in range(first, last):
+        own = table[counts[member][j]]
+        y[j] = stiffness_step(
+            x[j], slips, j, own[BREAKS], own[STIFFNESSES], own[SPRING], own[SEGMENT][0], 1.0
+        )
+
+
+@kernel
+def slips_begin(
+    rows: Any, fixed: Any, counts: Any, table: Any, elements: int, at: int, model: int, count: int,
+    member: int, j: int,
+) -> None:  # fmt: skip
+    """Write the slip positions of one lane after inflation and venting."""
+    own = table[counts[member][j]]
+    middle = 0.5 * (len(own[SPRING]) - 1) * own[SEGMENT][0]
+    for k in range(elements):
+        rows[at + k][j] = min(own[BREAKS][k], middle)
+
+
 @entry
 def _advance(
     values: Array, state: Array, breaks: Array, stiffnesses: Array, spring: Array, segment: float,
@@ -210,8 +256,9 @@ def _follow(
             out[t] = stiffness_step(values[t], state, 0, breaks, stiffnesses, spring, segment, 1.0)
 
 
+@register
 @dataclass(frozen=True)
-class ModifiedMaxwellSlip:
+class ModifiedMaxwellSlip(HysteresisModel):
     """From pressure [Pa] to stiffness [N/m], with the pressure of a wanted stiffness as inverse.
 
     Parameters
@@ -232,6 +279,11 @@ class ModifiedMaxwellSlip:
     The state holds the slip positions, shape (..., n). Beyond its knots the spring goes on with
     its end slopes.
     """
+
+    kind: ClassVar[str] = "modified_maxwell_slip"
+    choice: ClassVar[str] = "maxwell_slip"
+    kernels: ClassVar[Kernels] = Kernels(slips_step, scaled=slips_scaled, begin=slips_begin)
+    state_rows: ClassVar[int] = MOST + 1
 
     stiffnesses: tuple[float, ...]
     break_stiffnesses: tuple[float, ...]
@@ -265,6 +317,65 @@ class ModifiedMaxwellSlip:
         return math.fsum(
             k * r for k, r in zip(self.stiffnesses, self.break_stiffnesses, strict=True)
         )
+
+    @property
+    def total_slope(self) -> float:
+        """Stiffness over pressure [N/(m Pa)] between the tips of the major loop."""
+        return self.range / (self.spring[-1] - self.spring[0] + 2.0 * self.friction)
+
+    # --- the protocol ---------------------------------------------------------------------------
+
+    @property
+    def elements(self) -> int:
+        """Rows of the state that are in use: the elements and an idle one."""
+        return len(self.spring)
+
+    def table_rows(self) -> Array:
+        """Return break stiffnesses, stiffnesses, spring and segment, shape (4, n + 1).
+
+        Filled up with an element that does nothing.
+        """
+        table = np.zeros((4, len(self.spring)))
+        table[BREAKS] = (*self.break_stiffnesses, 2.0 * max(self.range, self.break_stiffnesses[-1]))
+        table[STIFFNESSES, :-1] = self.stiffnesses
+        table[SPRING] = self.spring
+        table[SEGMENT] = self.segment
+        return table
+
+    def check(self, usage: Usage) -> None:
+        """Refuse a plant without pressure-driven stiffness, and too many elements."""
+        n = len(self.stiffnesses)
+        if usage.unit_slope:
+            raise ValueError(
+                f"hysteresis: a modified Maxwell-slip model turns pressure into stiffness, which "
+                f"{usage.plant} has not; give a PlayOperator, a Preisach operator or None"
+            )
+        if n > MOST or len(self.spring) != n + 1:
+            raise ValueError(
+                f"hysteresis: {n} elements and {len(self.spring)} knots of the spring; at most "
+                f"{MOST} elements and one knot more than elements are simulated: "
+                "identify with fewer elements, or interpolate the spring at its knots"
+            )
+
+    def everett_map(
+        self, low: float, high: float, levels: int, start: Start
+    ) -> tuple[Array, float]:
+        """Return the Everett map of the first-order reversal curves, and the output at the start.
+
+        An operator with this map agrees on every loop where the model's minor loops are congruent,
+        as they are with a straight spring; a spring with bends may ask for relays of negative
+        weight, which are left out.
+        """
+        grid = np.linspace(low, high, levels)
+        table = np.zeros((levels, levels))
+        for i in range(1, levels):
+            down = grid[:i][::-1]
+            rise = self.simulate(np.concatenate([[high, low], grid[1 : i + 1]]))[0]
+            fall = self.simulate(np.concatenate([[high, low], grid[1 : i + 1], down]))[0]
+            table[i, :i] = rise[-1] - fall[-i:][::-1]
+        return table_from_weights(np.maximum(weights_from_table(table), 0.0)), 0.0
+
+    # --- operation ------------------------------------------------------------------------------
 
     @cached_property
     def arrays(self) -> tuple[Array, Array, Array, float]:
@@ -327,11 +438,11 @@ class ModifiedMaxwellSlip:
         breaks, stiffnesses = self.arrays[:2]
         return slipped @ (breaks * stiffnesses)
 
-    def scaled(self, width: float) -> ModifiedMaxwellSlip:
+    def scaled(self, width: float, slope: float | None = None) -> ModifiedMaxwellSlip:
         """Return this model with its hysteresis ``width`` times as wide, 0 for none.
 
         The spring takes over what the elements held at the tips of the major loop, so that the
-        tips stay where they are.
+        tips stay where they are, whatever ``slope``.
         """
         (width,) = floats("width", (width,))
         check_not_negative("width", (width,), "to stay passive")

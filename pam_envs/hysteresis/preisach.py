@@ -10,16 +10,15 @@ Play operators are the special case whose density depends on ``alpha - beta`` al
 
 References
 ----------
-I. D. Mayergoyz, "Mathematical Models of Hysteresis", Springer 1991, chapter 1.
+I. D. Mayergoyz, "Mathematical Models of HysteresisModel", Springer 1991, chapter 1.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,33 +26,47 @@ from numpy.typing import ArrayLike, NDArray
 from pam_envs.hysteresis import everett as maps
 from pam_envs.hysteresis.checks import check_not_negative, floats, series
 from pam_envs.hysteresis.extrema import (
+    DEPTH,
     advance_rows,
     invert_rows,
     preisach_inverse,
     preisach_step,
+    relays_begin,
+    relays_peek,
+    relays_step,
     simulate,
 )
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.hysteresis.protocol import (
+    HysteresisModel,
+    Kernels,
+    Rows,
+    RowsState,
+    Start,
+    Usage,
+    padded,
+    register,
+)
 
 __all__ = ["Preisach", "PreisachState", "preisach_inverse", "preisach_step"]
 
 Array = NDArray[np.float64]
-Start = Literal["low", "virgin"]
 
 SMALLEST_WEIGHT = -1e-12
 """Relay weights down to this part of the largest Everett value count as rounding errors."""
 
 
 class PreisachState(NamedTuple):
-    """Hysteresis of a batch: extrema and outputs, shapes (depth, ...), and points in use."""
+    """HysteresisModel of a batch: extrema and outputs, shapes (depth, ...), and points in use."""
 
     stack: Array
     sums: Array
     counts: NDArray[np.int64]
 
 
+@register
 @dataclass(frozen=True)
-class Preisach:
+class Preisach(HysteresisModel):
     """Preisach operator on the inputs from ``low`` to ``high``.
 
     Parameters
@@ -78,10 +91,14 @@ class Preisach:
         If a value is out of bounds, or a relay weight is negative (the message names the cell).
     """
 
+    kind: ClassVar[str] = "preisach"
+    kernels: ClassVar[Kernels] = Kernels(relays_step, peek=relays_peek, begin=relays_begin)
+    state_rows: ClassVar[int] = 2 * DEPTH
+
     low: float
     high: float
     table: tuple[tuple[float, ...], ...]
-    depth: int = 24
+    depth: int = DEPTH
     start: Start = "low"
     start_output: float = 0.0
 
@@ -160,13 +177,15 @@ class Preisach:
         It starts in the play's own virgin state, or where the play is after the input has come
         up to ``low`` from far below; the outputs agree, start included.
         """
-        table = maps.play_table(operator, maps.grid(low, high, levels))
-        output = 0.0
-        if start == "low":
-            output = operator.total_slope * low + math.fsum(
-                a * r for a, r in zip(operator.weights, operator.thresholds, strict=True)
-            )
-        return cls(low, high, table, depth, start, output)  # type: ignore[arg-type]
+        return cls.resembling(operator, low, high, levels, start, depth)
+
+    @classmethod
+    def resembling(
+        cls, reference: Any, low: float, high: float, levels: int, start: Start, depth: int = DEPTH
+    ) -> Preisach:
+        """Return the operator with the Everett map of a reference model."""
+        table, output = reference.everett_map(low, high, levels, start)
+        return cls(low, high, table, depth, start, output)
 
     def plus_linear(self, slope: float) -> Preisach:
         """Return this operator with ``slope * x`` added to its output."""
@@ -219,6 +238,80 @@ class Preisach:
         e = self.everett
         return float((2.0 * e[-1, 0] - e[-2, 0] - e[-1, 1]) / 2.0 * self.inverse_cell)
 
+    @cached_property
+    def largest_lag(self) -> float:
+        """Half the largest distance between the branches of the widest loop."""
+        e = self.everett
+        return 0.5 * float(np.max(np.asarray(e[-1, 0] - e[-1] - e[:, 0])))
+
+    @property
+    def chord_slope(self) -> float:
+        """Slope of the line between the tips of the major loop."""
+        return self.table[-1][0] / (self.high - self.low)
+
+    # --- the protocol ---------------------------------------------------------------------------
+
+    def numbers(self, full: float | None = None) -> list[float]:
+        """Return the slope of the chord, the lowest input and the cells per input, filled up."""
+        cells = len(self.table) - 1
+        low, per_input = self.low, cells / (self.high - self.low)
+        if full is not None:
+            low, per_input = -full, 0.5 * cells * (1.0 / full)
+        bottom = self.low if self.start == "low" else 0.0
+        return padded([self.chord_slope, low, per_input, bottom, self.start_output])
+
+    def table_rows(self) -> Array:
+        """Return the Everett map."""
+        return self.everett
+
+    def check(self, usage: Usage) -> None:
+        """Refuse another start, range or depth than the plant simulates."""
+        span, full = (self.low, self.high), usage.full
+        asked = None
+        if full is not None:
+            asked = (-full, full) if usage.start == "virgin" else (0.0, full)
+        wrong = asked is not None and not np.allclose(span, asked, rtol=1e-9)
+        if wrong or self.start != usage.start or self.depth != DEPTH:
+            needs = "" if asked is None else f" from {asked[0]:g} to {asked[1]:g} (its range)"
+            raise ValueError(
+                f"hysteresis: the Everett map spans {span} with start {self.start!r} and depth "
+                f"{self.depth}; {usage.plant} needs a map{needs} with start {usage.start!r} and "
+                f"depth {DEPTH}"
+            )
+
+        if self.high < usage.reach:
+            raise ValueError(
+                f"hysteresis: the Everett map spans +-{self.high:g} and {usage.plant} needs "
+                f"+-{usage.reach:g}: give a wider map"
+            )
+
+    def rows(self) -> PreisachRows:
+        """Return the operator over rows of environments."""
+        return PreisachRows(self)
+
+    def record(self) -> dict[str, Any]:
+        """Return range, map and a start other than virgin, in the layout of a plant file."""
+        table = [[float(v) for v in row] for row in self.table]
+        made = {"kind": self.kind, "low": self.low, "high": self.high, "table": table}
+        return made | ({} if self.start == "virgin" else {"start": self.start})
+
+    @classmethod
+    def keys(cls) -> tuple[str, ...]:
+        """Return the keys of a record."""
+        return ("low", "high", "table")
+
+    @classmethod
+    def optional(cls) -> tuple[str, ...]:
+        """Return the keys that a record may leave out."""
+        return ("start",)
+
+    @classmethod
+    def from_record(cls, record: Mapping[str, Any]) -> Preisach:
+        """Return the operator of a record, virgin unless it names another start."""
+        table = tuple(tuple(float(v) for v in row) for row in record["table"])
+        start = record.get("start", "virgin")
+        return cls(float(record["low"]), float(record["high"]), table, start=start)
+
     # --- operation ------------------------------------------------------------------------------
 
     def initial_state(self, batch_shape: tuple[int, ...] = ()) -> PreisachState:
@@ -252,14 +345,14 @@ class Preisach:
         x : array_like, shape batch_shape
             Inputs.
         state : PreisachState
-            Hysteresis before; it is not changed.
+            HysteresisModel before; it is not changed.
 
         Returns
         -------
         y : ndarray, shape batch_shape
             Outputs.
         state : PreisachState
-            Hysteresis after.
+            HysteresisModel after.
         """
         shape = np.shape(state.counts)
         values = np.array(np.broadcast_to(np.asarray(x, float), shape)).reshape(-1)
@@ -275,7 +368,7 @@ class Preisach:
         y : array_like, shape batch_shape
             Wanted outputs. One out of reach gives the nearest end of the input's range.
         state : PreisachState
-            Hysteresis before; it is not changed.
+            HysteresisModel before; it is not changed.
 
         Raises
         ------
@@ -309,6 +402,36 @@ class Preisach:
         stack = np.array(state.stack, dtype=float).reshape(depth, -1)
         sums = np.array(state.sums, dtype=float).reshape(depth, -1)
         return stack, sums, np.array(state.counts, dtype=np.int64).reshape(-1)
+
+
+@dataclass(frozen=True)
+class PreisachRows(Rows):
+    """A Preisach operator over rows of environments; its state is kept with the row first."""
+
+    operator: Preisach
+
+    def initial(self, rows: int) -> RowsState:
+        """Return extrema and outputs, shapes (rows, depth), and counts, (rows,)."""
+        return _row_first(self.operator.initial_state((rows,)))
+
+    def forward(self, felt: Array, state: RowsState) -> tuple[Array, RowsState]:
+        """Return the outputs for inputs, shape (rows,), and the states they leave."""
+        output, after = self.operator.step(felt, _row_last(state))
+        return output, _row_first(after)
+
+    def inverse(self, wanted: Array, state: RowsState) -> Array:
+        """Return the inputs by the recursion over the stack; the states stay."""
+        return self.operator.inverse_step(wanted, _row_last(state))[0]
+
+
+def _row_first(state: PreisachState) -> RowsState:
+    stack, sums, counts = state
+    return stack.T, sums.T, counts
+
+
+def _row_last(state: RowsState) -> PreisachState:
+    stack, sums, counts = state
+    return PreisachState(np.ascontiguousarray(stack.T), np.ascontiguousarray(sums.T), counts)
 
 
 def _shaped(rows: tuple[Array, Array, NDArray[np.int64]], shape: tuple[int, ...]) -> PreisachState:

@@ -338,8 +338,8 @@ class Identifiability:
 def identifiability(fit: CyclesFit, standard_error: float = 6.7e-5) -> Identifiability:
     """Return which parameters of a Maxwell-slip fit the cycles fix (``standard_error`` in m)."""
     plant, base = fit.plant, _model(fit.plant, fit.cycles)
-    operator = plant.hysteresis.operator
-    if not isinstance(operator, PlayOperator):
+    operator: Any = plant.hysteresis.operator
+    if plant.hysteresis.kind != PlayOperator.kind:
         raise ValueError(f"a Maxwell-slip fit is needed, this one has {plant.hysteresis.kind!r}")
     from pam_envs.plants.single_muscle.rows import PARAMETERS
 

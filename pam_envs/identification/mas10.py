@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from pam_envs.data.tables import ContractionTable, load_contraction_table
+from pam_envs.hysteresis.maxwell_slip import PlayOperator
+from pam_envs.hysteresis.none import NoHysteresis
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.identification import contraction_cycles as cycles
 from pam_envs.identification.preisach_forc import congruency_error
 from pam_envs.plants.core import plant_file
-from pam_envs.plants.single_muscle.hysteresis import KINDS
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 MISSED = (
@@ -24,6 +25,9 @@ MISSED = (
     "a width that depends on load other than linearly (three loads cannot tell)",
 )
 """What the residuals show and the model has no part for."""
+
+STOCK = (PlayOperator.kind, Preisach.kind, NoHysteresis.kind)
+"""Kinds of hysteresis that are identified on the tables."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,7 +72,7 @@ def summarise(table: ContractionTable, plant: SingleMuscle, fit: cycles.CyclesFi
     kind = plant.hysteresis.kind
     if fit.preisach is not None:
         rank = f"{fit.preisach.rank} of {fit.preisach.unknowns} relay weights"
-    elif kind == "maxwell_slip":
+    elif kind == PlayOperator.kind:
         found = cycles.identifiability(fit)
         rank = f"{found.rank} of {len(found.names)} parameters"
     else:
@@ -105,9 +109,9 @@ def identify_all(
         "|---|---|---|---|---|---|---|---|---|",
     ]
     fits: dict[str, cycles.CyclesFit] = {}
-    for kind in KINDS:
+    for kind in STOCK:
         say(f"identifying with hysteresis {kind}")
-        plant, fit = cycles.identify_mas10(table, kind, members if kind != "none" else 0)
+        plant, fit = cycles.identify_mas10(table, kind, members if kind != NoHysteresis.kind else 0)
         fits[kind] = fit
         s = summarise(table, plant, fit)
         widths = ", ".join(f"{b:.2f} ({a:.2f} at {p:g} bar)" for p, a, b in s.widths.values())
@@ -118,7 +122,7 @@ def identify_all(
         )
         notes = {"rms_mm": round(s.rms_all, 4), "left_out_repeat_mm": round(s.left_out, 4)}
         plant_file.write(plant, folder / f"mas10_{kind}.yaml", notes)
-        if isinstance(plant.hysteresis.operator, Preisach):
+        if fit.preisach is not None:
             inner, outer = minor_loops(plant)
             congruency = (
                 "Preisach's congruency error (minor loops between 2 and 3 bar after 3 and after 6 "
@@ -127,7 +131,7 @@ def identify_all(
                 "approximation; here the static law stands between."
             )
     lines += ["", congruency, "", "## What the readings fix", ""]
-    found = cycles.identifiability(fits["maxwell_slip"])
+    found = cycles.identifiability(fits[PlayOperator.kind])
     lines += [
         "Share of each parameter that lies in the combinations that the means fix to better than "
         "a fifth. What is near 0 is assumed (its range stands in the plant file) or comes from the "

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pam_envs.data.tables import load_contraction_table
+from pam_envs.hysteresis.protocol import kinds
 from pam_envs.identification import contraction_cycles as cc
 from pam_envs.identification.mas10 import minor_loops
-from pam_envs.plants.single_muscle.hysteresis import KINDS
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 TABLE = load_contraction_table()
@@ -24,10 +24,10 @@ def residual(plant: SingleMuscle) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def fits() -> dict[str, cc.CyclesFit]:
-    return {kind: cc.fit_cycles(CYCLES, kind) for kind in KINDS}
+    return {kind: cc.fit_cycles(CYCLES, kind) for kind in kinds()}
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kinds())
 def test_the_shipped_plant_is_the_identified_one(kind: str, fits: dict[str, cc.CyclesFit]) -> None:
     shipped, fitted = residual(SingleMuscle.mas10(kind)), fits[kind].residual
     assert np.abs(shipped - fitted).max() < 2e-5  # 0.02 mm: the optimum is flat in places

@@ -11,13 +11,13 @@ import pytest
 
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.hysteresis.protocol import kinds
 from pam_envs.identification.joint_static import fit_angle_plays
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.hysteresis import contraction_plays, joint_hysteresis
 from pam_envs.plants.antagonistic_joint.pair import feed_forward
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rollout import simulate_joint
-from pam_envs.plants.single_muscle.hysteresis import KINDS
 
 PRESETS = ("paper", "measured", "reduced")
 ANGLES = np.radians(np.linspace(-28.0, 28.0, 29))
@@ -225,7 +225,7 @@ def test_the_reduced_hysteresis_is_identified_on_the_plant_with_muscles() -> Non
 # --- files, rows, bad values --------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kinds())
 @pytest.mark.parametrize("preset", PRESETS)
 def test_files_hold_the_whole_plant(tmp_path: Path, kind, preset: str) -> None:  # type: ignore[no-untyped-def]
     plant = getattr(AntagonisticJoint, preset)(kind, muscle__viscosity=1e-4)
@@ -236,7 +236,7 @@ def test_files_hold_the_whole_plant(tmp_path: Path, kind, preset: str) -> None: 
 
 
 def test_the_digest_tells_plants_apart() -> None:
-    plants = [getattr(AntagonisticJoint, p)(kind) for p in PRESETS for kind in KINDS]
+    plants = [getattr(AntagonisticJoint, p)(kind) for p in PRESETS for kind in kinds()]
     plants.append(AntagonisticJoint.paper(link__mass=0.4))
     assert len({plant.digest() for plant in plants}) == len(plants)
 

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
+from pam_envs.hysteresis.protocol import kinds
 from pam_envs.kernels.build import COMPILED, interpreted
 from pam_envs.plants.elbow_orthosis.plant import MAKES, ElbowOrthosis
 from pam_envs.plants.elbow_orthosis.rollout import (
@@ -18,7 +19,6 @@ from pam_envs.plants.elbow_orthosis.rollout import (
     run_elbow,
     simulate_elbow,
 )
-from pam_envs.plants.single_muscle.hysteresis import KINDS
 from pam_envs.pneumatics.on_off_pair import OnOffValve, mass_flow
 
 slow = pytest.mark.skipif(not COMPILED, reason="too many sub-steps for plain Python")
@@ -155,7 +155,7 @@ def open_spans(widths: Array, valve: OnOffValve) -> list[tuple[float, float]]:
 
 @slow
 @pytest.mark.parametrize("valves", MAKES)
-@pytest.mark.parametrize("hysteresis", KINDS)
+@pytest.mark.parametrize("hysteresis", kinds())
 def test_the_integrator_is_fine_enough(hysteresis: str, valves: str) -> None:
     """Against sub-steps 25 and 100 times as many; a hysteresis's kinks cost some of the order."""
     plant = ElbowOrthosis.paper(hysteresis, valves)  # type: ignore[arg-type]
@@ -389,7 +389,7 @@ def test_stops_hold_the_elbow_in_its_range() -> None:
 
 @slow
 @pytest.mark.parametrize("valves", MAKES)
-@pytest.mark.parametrize("hysteresis", KINDS)
+@pytest.mark.parametrize("hysteresis", kinds())
 def test_plain_python_gives_the_same_bits(hysteresis: str, valves: str) -> None:
     plant = ElbowOrthosis.paper(hysteresis, valves)  # type: ignore[arg-type]
     commands, intent, start = commands_for(plant, 60), reach(60), (2e5, 3e5)

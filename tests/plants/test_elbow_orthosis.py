@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.hysteresis.protocol import kinds
 from pam_envs.mechanics import allocation
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.bundles import (
@@ -26,7 +27,6 @@ from pam_envs.plants.elbow_orthosis.hysteresis import (
     travel_plays,
 )
 from pam_envs.plants.elbow_orthosis.plant import MAKES, ElbowOrthosis
-from pam_envs.plants.single_muscle.hysteresis import KINDS
 
 FULL = 6e5
 ANGLES = np.radians([0.0, 60.0, 120.0])
@@ -121,7 +121,7 @@ def test_equal_full_pressures_balance_near_107_degrees() -> None:
     assert np.degrees(zero) == pytest.approx(107.0, abs=0.6)
 
 
-@pytest.mark.parametrize("hysteresis", KINDS)
+@pytest.mark.parametrize("hysteresis", kinds())
 def test_the_kernels_are_the_numpy_face(hysteresis: str) -> None:
     plant = ElbowOrthosis.paper(hysteresis, bundle_a__gain=1.1, link__mass=0.7)  # type: ignore[arg-type]
     fixed = plant.parameter_rows()[:, None].tolist()
@@ -256,7 +256,7 @@ def test_bad_makes_and_hysteresis_models_are_refused() -> None:
         )
 
 
-@pytest.mark.parametrize("hysteresis", KINDS)
+@pytest.mark.parametrize("hysteresis", kinds())
 @pytest.mark.parametrize("valves", MAKES)
 def test_a_plant_comes_back_from_its_file(hysteresis: str, valves: str, tmp_path: Path) -> None:
     plant = ElbowOrthosis.paper(hysteresis, valves, bundle_a__muscles=4)  # type: ignore[arg-type]

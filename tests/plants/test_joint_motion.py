@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
+from pam_envs.hysteresis.protocol import kinds
 from pam_envs.kernels.build import COMPILED, interpreted
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rollout import (
@@ -18,7 +19,6 @@ from pam_envs.plants.antagonistic_joint.rollout import (
     run_joint,
     simulate_joint,
 )
-from pam_envs.plants.single_muscle.hysteresis import KINDS
 
 slow = pytest.mark.skipif(not COMPILED, reason="too many sub-steps for plain Python")
 PERIOD = AntagonisticJoint.control_period
@@ -80,7 +80,7 @@ def test_the_joint_follows_its_differential_equation(payload: float, shove: floa
 
 
 @slow
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kinds())
 def test_sub_steps_converge_at_second_order(kind) -> None:  # type: ignore[no-untyped-def]
     """And that of four stays a fifth of the encoder's noise where a muscle turns slack, too."""
 
@@ -132,7 +132,7 @@ def test_the_reduced_plant_has_the_published_poles() -> None:
     assert double_pole(angles / (10.0 * DEGREE)) == pytest.approx(23.0, abs=1e-6)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kinds())
 def test_how_far_the_reduced_plant_is_from_the_muscles(kind) -> None:  # type: ignore[no-untyped-def]
     """Steps and sines within +-20 degrees: about 0.3 degrees RMS; without hysteresis over 1 degree."""
     t = PERIOD * np.arange(600)
@@ -174,7 +174,7 @@ def test_energy_is_lost_in_free_motion() -> None:
 def test_a_slow_push_and_back_loses_work_to_the_hysteresis() -> None:
     """Viscosity takes work in proportion to the speed, friction the same however slow it is."""
     dry, viscous = {}, {}
-    for kind in KINDS:
+    for kind in kinds():
         lost = []
         for periods in (400, 800):
             shoves = 3.0 * np.sin(2.0 * np.pi * np.arange(2 * periods) / periods)
@@ -222,7 +222,7 @@ def test_more_payload_is_slower_and_sinks() -> None:
 
 
 @pytest.mark.parametrize("make", MAKES)
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kinds())
 def test_a_joint_at_rest_stays(make: str, kind) -> None:  # type: ignore[no-untyped-def]
     plant = getattr(AntagonisticJoint, make)(kind)
     made = simulate_joint(plant, np.full(40, 12.0 * DEGREE), payload=0.3, disturbance=0.4)
@@ -230,7 +230,7 @@ def test_a_joint_at_rest_stays(make: str, kind) -> None:  # type: ignore[no-unty
 
 
 @pytest.mark.parametrize("make", ["paper", "reduced"])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kinds())
 def test_slow_commands_come_to_the_quasi_static_angles(make: str, kind) -> None:  # type: ignore[no-untyped-def]
     plant = getattr(AntagonisticJoint, make)(kind, link__gravity=0.0)
     commands = DEGREE * np.array([0.0, 15.0, -5.0, 10.0, 2.0])
@@ -240,7 +240,7 @@ def test_slow_commands_come_to_the_quasi_static_angles(make: str, kind) -> None:
 
 @pytest.mark.skipif(not COMPILED, reason="needs the compiler")
 @pytest.mark.parametrize("make", ["paper", "reduced"])
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kinds())
 def test_compiled_bits_are_those_of_plain_python(make: str, kind) -> None:  # type: ignore[no-untyped-def]
     plant = getattr(AntagonisticJoint, make)(kind)
     commands, shoves = steps(60, 29.0 * DEGREE, 6), steps(60, 4.0, 9, 2)

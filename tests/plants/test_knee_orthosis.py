@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.hysteresis.protocol import kinds
 from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.hysteresis import FULL_STIFFNESS, knee_hysteresis, preisach_of
+from pam_envs.plants.knee_orthosis.hysteresis import FULL_STIFFNESS, knee_hysteresis
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
-from pam_envs.plants.single_muscle.hysteresis import KINDS
 
 POINTS = ((0.5e5, 56.7), (0.75e5, 80.6), (2e5, 158.0), (4.5e5, 211.5))
 """Pressure [Pa] and tension [N] of the brace without load and without hysteresis."""
@@ -72,10 +73,10 @@ def test_preisach_of_a_bent_spring_is_passive() -> None:
     model = knee_hysteresis("maxwell_slip").operator
     assert model is not None
     bent = dataclasses.replace(model, spring=tuple(p + 0.05 * p * p / 4e5 for p in model.spring))  # type: ignore[union-attr]
-    assert preisach_of(bent, 4.5e5).table[-1][0] > 0.0  # type: ignore[arg-type]
+    assert Preisach.resembling(bent, 0.0, 4.5e5, 46, "low").table[-1][0] > 0.0  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kinds())
 @pytest.mark.parametrize("mounting", ["rig", "no_load", "walk", "stairs_up"])
 def test_files_hold_the_whole_plant(tmp_path: Path, kind, mounting: str) -> None:  # type: ignore[no-untyped-def]
     if mounting in ("rig", "no_load"):

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pam_envs.hysteresis.protocol import kinds
 from pam_envs.kernels.build import COMPILED, interpreted
 from pam_envs.mechanics.redundancy import resolve
 from pam_envs.mechanics.serial_chain import SerialChain
@@ -23,7 +24,6 @@ from pam_envs.plants.redundant_manipulator.rollout import (
     simulate_manipulator,
 )
 from pam_envs.plants.redundant_manipulator.step import hysteresis_rows, replacements, work_rows
-from pam_envs.plants.single_muscle.hysteresis import KINDS
 from pam_envs.references.path import PATHS
 
 DEGREE = np.radians(1.0)
@@ -36,7 +36,7 @@ def steps(n: int, largest: float, every: int = 12, seed: int = 0) -> np.ndarray:
     return np.repeat(drawn, every, axis=0)[:n]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kinds())
 @pytest.mark.parametrize("payload", [0.0, 0.1, 0.5])
 def test_at_rest_the_muscles_bear_the_weights(kind, payload: float) -> None:  # type: ignore[no-untyped-def]
     plant = RedundantManipulator.paper(kind)
@@ -142,7 +142,7 @@ def test_energy_is_kept_but_for_friction() -> None:
 
 
 @slow
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kinds())
 def test_sub_steps_converge_at_second_order(kind) -> None:  # type: ignore[no-untyped-def]
     commands = steps(48, 25.0 * DEGREE)
 
@@ -200,7 +200,7 @@ def test_damping_makes_up_a_ratio_of_a_half() -> None:
     assert plant.joint_damping == plant.even_damping()
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kinds())
 @pytest.mark.parametrize("axes", ["xyxyxy", "xyz"])
 def test_files_hold_the_whole_plant(tmp_path: Path, kind, axes: str) -> None:  # type: ignore[no-untyped-def]
     chain = SerialChain.uniform(axes, mass=0.15)
@@ -244,7 +244,7 @@ def test_bad_chains_are_refused() -> None:
 
 
 @pytest.mark.skipif(not COMPILED, reason="needs the compiler")
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kinds())
 def test_compiled_bits_are_those_of_plain_python(kind) -> None:  # type: ignore[no-untyped-def]
     plant = RedundantManipulator.paper(kind)
     commands, n = steps(20, 29.0 * DEGREE, 4), plant.stages

@@ -11,8 +11,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pam_envs.constants import GRAVITY
+from pam_envs.hysteresis.protocol import kinds
 from pam_envs.kernels.build import COMPILED
-from pam_envs.plants.single_muscle.hysteresis import KINDS
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.rollout import simulate
 from pam_envs.pneumatics.regulator import regulator_step
@@ -38,7 +38,7 @@ def run(substeps: int, set_points: np.ndarray, kind: str = "maxwell_slip") -> np
 
 
 @pytest.mark.skipif(not COMPILED, reason="too many sub-steps for plain Python")
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kinds())
 def test_default_substeps_are_accurate_over_loads_and_pressures(kind: str) -> None:
     default = SingleMuscle.mas10(kind)
     for name, set_points in commands(1500).items():
@@ -80,7 +80,7 @@ def test_the_motion_is_that_of_an_independent_solver() -> None:
     assert np.abs(got - (exact - rest)).max() < 2e-7
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kinds())
 def test_a_long_hold_ends_where_the_static_law_says(kind: str) -> None:
     plant = SingleMuscle.mas10(kind).replace({"mass.load": 4.55})
     made = simulate(plant, np.full(300, 3.5e5))
@@ -173,7 +173,7 @@ def test_neutral_effects_cost_no_bit() -> None:
     )
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kinds())
 def test_a_plant_file_keeps_every_bit(kind: str, tmp_path: Path) -> None:
     plant = SingleMuscle.mas10(kind).replace({"mass.damping": 1.0 / 3.0 * 1000})
     plant.to_yaml(tmp_path / "rig.yaml")

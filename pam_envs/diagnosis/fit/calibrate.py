@@ -58,8 +58,8 @@ def calibrate(
             family = family.finer(FINE_STEP)
             problem = dataclasses.replace(problem, simulate=family.simulate)
     tried = [frees]
-    operator = family.plant.hysteresis.operator
-    if np.isfinite(measured[0]).any() and isinstance(operator, PlayOperator):
+    operator = family.plant.hysteresis.model
+    if np.isfinite(measured[0]).any() and operator.kind == PlayOperator.kind:
         law = balance(
             _from_rest(family, measured[0]),
             family.simulate(column[None])[1, :, 0],
@@ -67,7 +67,7 @@ def calibrate(
             family.inputs.period,
             family.plant.muscle.rest_length,
             family.plant.muscle.braid_strain,
-            operator.thresholds,
+            operator.thresholds,  # type: ignore[attr-defined]
             np.isfinite(measured[0]),
         )
         tried = (

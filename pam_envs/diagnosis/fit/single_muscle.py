@@ -154,8 +154,7 @@ class MuscleFamily:
         values: dict[str, Any] = {n: float(column[R.place(n)]) for n in R.NAMES}
         n = self.plant.elements
         if n:
-            operator = self.plant.hysteresis.operator
-            assert isinstance(operator, PlayOperator)
+            operator: Any = self.plant.hysteresis.operator
             weights = tuple(float(w) for w in column[R.WEIGHT : R.WEIGHT + n])
             values["hysteresis.operator"] = PlayOperator(
                 operator.thresholds, weights, 1.0 - sum(weights)

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from pam_envs.envs.core.setup import check_choice, check_number, check_whole
 from pam_envs.envs.core.step import MOST_PREVIEW
+from pam_envs.hysteresis.protocol import kinds, model_of
 from pam_envs.parameters import check, declarations
-from pam_envs.plants.single_muscle.hysteresis import KINDS
 
 T = TypeVar("T")
 
@@ -99,7 +99,7 @@ def plant_of(kind: type[T], plant: Any, hysteresis: Any, stock: Callable[[Any], 
         Returns the plant to take without ``plant``, by its hysteresis.
     """
     if hysteresis is not None:
-        check_choice("hysteresis", hysteresis, KINDS)
+        check_choice("hysteresis", hysteresis, kinds())
     if plant is None:
         return stock(hysteresis or "maxwell_slip")
     made: Any = kind.from_yaml(plant) if isinstance(plant, (str, Path)) else plant  # type: ignore[attr-defined]
@@ -109,11 +109,11 @@ def plant_of(kind: type[T], plant: Any, hysteresis: Any, stock: Callable[[Any], 
             "or None"
         )
     found: Any = made
-    if hysteresis == "none":
+    if hysteresis is not None and model_of(hysteresis).identity:
         return found.replace({"hysteresis.operator": None})  # type: ignore[no-any-return]
-    if hysteresis is not None and hysteresis != found.hysteresis.kind:
+    if hysteresis is not None and hysteresis != found.hysteresis.choice:
         raise ValueError(
-            f"hysteresis = {hysteresis!r} but the plant's hysteresis is {found.hysteresis.kind!r}; "
+            f"hysteresis = {hysteresis!r} but the plant's hysteresis is {found.hysteresis.choice!r}; "
             "leave hysteresis out, or give a plant identified with that hysteresis"
         )
     return made

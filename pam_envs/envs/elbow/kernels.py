@@ -106,11 +106,11 @@ from pam_envs.envs.elbow.layout import (
     WORST_PERIOD,
 )
 from pam_envs.envs.elbow.program import asked_for, estimate, own_weight, pressures_for, within_reach
+from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import normal, uniform
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.step import (
-    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     begin_lane,
@@ -397,7 +397,7 @@ def kernels_for(kind: str, valves: str) -> Kernels:
         (kind, valves),
         functions,
         info=INFO,
-        rows=HYSTERESIS + HYSTERESIS_ROWS[kind],
+        rows=HYSTERESIS + state_rows(kind),
         parameters=K.N_PARAMETERS,
         counts=K.N_COUNTS,
         scratch=N_WORK,

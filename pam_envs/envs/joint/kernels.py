@@ -82,13 +82,13 @@ from pam_envs.envs.joint.layout import (
     TRACKING_WEIGHT,
     WORST_PERIOD,
 )
+from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.arithmetic import sine_of_turns
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import normal, uniform
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.pair import command
 from pam_envs.plants.antagonistic_joint.step import (
-    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     begin_lane,
@@ -329,7 +329,7 @@ def kernels_for(kind: str, dynamics: str) -> Kernels:
         (kind, dynamics),
         functions,
         info=INFO,
-        rows=HYSTERESIS + HYSTERESIS_ROWS[kind],
+        rows=HYSTERESIS + 2 * state_rows(kind),
         parameters=K.N_PARAMETERS,
         counts=K.N_COUNTS,
         scratch=N_WORK,

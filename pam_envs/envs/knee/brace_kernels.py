@@ -19,12 +19,12 @@ from pam_envs.envs.core.step import (
     nothing_happens,
     write_references,
 )
+from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import normal, uniform
 from pam_envs.mechanics.knee_lever import half_angle, muscle_length
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.step import (
-    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     begin_lane,
@@ -311,7 +311,7 @@ def kernels_for(kind: str, mounting: str, dynamics: str) -> Kernels:
         (kind, mounting, dynamics),
         functions,
         info=INFO,
-        rows=HYSTERESIS + HYSTERESIS_ROWS[kind],
+        rows=HYSTERESIS + state_rows(kind),
         parameters=K.N_PARAMETERS,
         counts=K.N_COUNTS,
         scratch=N_WORK,

@@ -91,6 +91,7 @@ from pam_envs.envs.knee.gait_layout import (
     WANTED_TORQUE,
 )
 from pam_envs.envs.knee.gait_plan import lean, planned_reference, pressure_for, prime
+from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import normal, uniform
 from pam_envs.mechanics.knee_lever import wanted_tension
@@ -98,7 +99,6 @@ from pam_envs.mechanics.leg import sine_and_cosine
 from pam_envs.muscle.emg import activation, excitation, left_of_gap
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.step import (
-    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     begin_lane,
@@ -342,7 +342,7 @@ def kernels_for(kind: str, dynamics: str) -> Kernels:
         (kind, dynamics),
         functions,
         info=INFO,
-        rows=HYSTERESIS + HYSTERESIS_ROWS[kind],
+        rows=HYSTERESIS + state_rows(kind),
         parameters=K.N_PARAMETERS,
         counts=K.N_COUNTS,
         scratch=N_WORK,

@@ -196,7 +196,7 @@ def make_setup(
         choices=(made.elements, family, sines_needed(family), len(loads)),
         own=loads[None],
         samples=samples,
-        tables=made.everett_tables(),
+        tables=made.hysteresis_tables(),
         spread=spread,
         drawn=randomize is not False,
     )

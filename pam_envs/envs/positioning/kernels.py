@@ -20,15 +20,15 @@ from pam_envs.envs.core.step import (
     SUBSTEPS,
     write_references,
 )
+from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.history import N_HISTORY
 from pam_envs.kernels.random import normal, uniform
 from pam_envs.muscle.effective_area import volume
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.effects import replacements
+from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.step import (
-    HYSTERESIS_MODELS,
-    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     begin_effects,
@@ -320,14 +320,14 @@ def _start_hysteresis(rows: Any, counts: Any, j: int) -> None:
 @lru_cache(maxsize=8)
 def kernels_for(kind: str, extended: bool = False) -> Kernels:
     """Return the kernels for a kind of hysteresis, plain or with effects."""
-    rows = HYSTERESIS + HYSTERESIS_ROWS[kind]
+    rows = HYSTERESIS + state_rows(kind)
     functions = {
         "env_apply": change_load,
         "env_advance": advance_muscle,
         "env_reference": reference_at,
         "env_evaluate": evaluate,
         "env_begin": begin_muscle,
-        "remember": HYSTERESIS_MODELS[kind],
+        **hysteresis_kernels(kind),
     }
     if extended:
         functions |= replacements(kind, rows)

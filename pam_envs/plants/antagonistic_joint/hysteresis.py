@@ -1,13 +1,13 @@
-"""The hysteresis of the muscles of a joint: friction driven by their contraction.
+"""Hysteresis of the muscles of a joint: friction driven by their contraction.
 
 The threads of the braid slide on each other as the length changes, not as the pressure does. An
-operator of slope 1 follows the contraction; what it lags behind, times a friction stiffness that
+operator of slope 1 follows the contraction; its lag, times a friction stiffness that
 grows with the pressure pressing the threads together, is the friction force:
 
     F = F(p, e) - width (base + rate p) (e - operator(e))
 
 With plays, the lag is a sum of Maxwell-slip elements. The contraction is counted from that of the
-straight joint, at which a virgin memory is at rest.
+straight joint, at which a virgin hysteresis is at rest.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from functools import lru_cache
 import numpy as np
 
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.hysteresis.protocol import preset
 from pam_envs.parameters import parameter
-from pam_envs.plants.single_muscle.hysteresis import Kind
+from pam_envs.plants.core.operator_component import OperatorComponent
 
 WIDEST = 0.22
 """Contraction on either side of the straight joint's that a Preisach hysteresis spans."""
 LEVELS = 89
 """Of its map: cells of half a per cent."""
-ELEMENTS = 8
-"""Most plays of a hysteresis."""
+PLAYS = 8
+"""Plays of the preset."""
 ANGLES = 0.62
 """Angle [rad] that the reduced plant's hysteresis spans on either side."""
 ANGLE_LEVELS = 63
@@ -37,15 +37,13 @@ _SHARE = "friction in proportion to the pressure but for a rest of the empty mus
 
 
 @dataclass(frozen=True)
-class JointHysteresis:
+class JointHysteresis(OperatorComponent):
     """Thread-on-thread friction of the muscles.
 
-    ``operator`` turns contraction into the contraction that is felt (of the reduced plant: the
-    commanded angle [rad] into the angle at rest): a :class:`PlayOperator` of total slope 1, a
-    :class:`Preisach` operator with a virgin start, or None.
+    ``operator`` turns contraction into the contraction that the friction follows (of the reduced
+    plant: the commanded angle [rad] into the angle at rest), with slope 1 and a virgin start.
     """
 
-    operator: PlayOperator | Preisach | None = None
     width: float = parameter(
         1.0,
         "1",
@@ -59,21 +57,14 @@ class JointHysteresis:
     base: float = parameter(100.0, "N", 0.0, 1e5, "assumed", _SHARE)
     rate: float = parameter(1.7e-3, "N/Pa", 0.0, 1.0, "assumed", _SIZE)
 
-    @property
-    def kind(self) -> Kind:
-        """Which operator this is."""
-        if self.operator is None:
-            return "none"
-        return "preisach" if isinstance(self.operator, Preisach) else "maxwell_slip"
-
 
 def contraction_plays() -> PlayOperator:
     """Return the preset: eight plays, thresholds 0.3 % to 4.5 % of contraction, of equal weight.
 
     Evenly spread on a logarithmic scale, so that loops of any amplitude look alike.
     """
-    thresholds = np.geomspace(3e-3, 4.5e-2, ELEMENTS)
-    return PlayOperator(tuple(thresholds), (0.1,) * ELEMENTS, 0.2)
+    thresholds = np.geomspace(3e-3, 4.5e-2, PLAYS)
+    return PlayOperator(tuple(thresholds), (0.1,) * PLAYS, 0.2)
 
 
 def angle_plays() -> PlayOperator:
@@ -86,20 +77,14 @@ ANGLE_WEIGHTS = (0.052, 0.0721, 0.105, 0.0207, 0.0809, 0.033)
 
 
 @lru_cache(maxsize=8)
-def joint_hysteresis(kind: Kind, reduced: bool = False) -> JointHysteresis:
-    """Return the preset hysteresis of a kind; both operators have the same loops.
+def joint_hysteresis(kind: str, reduced: bool = False) -> JointHysteresis:
+    """Return the preset hysteresis of a kind; all operators have the same loops.
 
     Raises
     ------
     ValueError
         If there is no such kind.
     """
-    if kind == "none":
-        return JointHysteresis()
     plays = angle_plays() if reduced else contraction_plays()
-    if kind == "maxwell_slip":
-        return JointHysteresis(plays)
-    if kind == "preisach":
-        high, levels = (ANGLES, ANGLE_LEVELS) if reduced else (WIDEST, LEVELS)
-        return JointHysteresis(Preisach.from_play(plays, -high, high, levels, start="virgin"))
-    raise ValueError(f"hysteresis = {kind!r}; choose 'maxwell_slip', 'preisach' or 'none'")
+    high, levels = (ANGLES, ANGLE_LEVELS) if reduced else (WIDEST, LEVELS)
+    return JointHysteresis(preset(kind, plays, -high, high, levels, "virgin"))

@@ -19,21 +19,15 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.hysteresis.protocol import Usage
 from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.mechanics.antagonistic_lever import AntagonisticLever
 from pam_envs.muscle.force_map import FULL_PRESSURE, ForceMap, paper_stretch
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint import statics as pair_statics
 from pam_envs.plants.antagonistic_joint.hysteresis import JointHysteresis, joint_hysteresis
-from pam_envs.plants.antagonistic_joint.hysteresis_tables import (
-    check_operator,
-    map_tables,
-    model_rows,
-    plays_of,
-)
 from pam_envs.plants.antagonistic_joint.link import Link, NominalPoint
 from pam_envs.plants.core.plant import Plant
-from pam_envs.plants.single_muscle.hysteresis import Kind
 from pam_envs.pneumatics.joint_regulator import JointRegulator
 from pam_envs.sensing.joint import JointEncoder
 from pam_envs.sensing.orthosis import GaugeSensor
@@ -96,7 +90,7 @@ class AntagonisticJoint(Plant):
         if self.dynamics not in ("muscles", "reduced"):
             raise ValueError(f"dynamics = {self.dynamics!r}; choose one of muscles, reduced")
         self.check_components()
-        check_operator(self.hysteresis.operator)
+        self._model.check(Usage("a joint", "virgin"))
         pair_statics.check_angles(self, self.link)
         self._check_motion()
 
@@ -116,7 +110,7 @@ class AntagonisticJoint(Plant):
     # --- presets --------------------------------------------------------------------------------
 
     @classmethod
-    def paper(cls, hysteresis: Kind = "maxwell_slip", **changes: float) -> AntagonisticJoint:
+    def paper(cls, hysteresis: str = "maxwell_slip", **changes: float) -> AntagonisticJoint:
         """Return the joint whose muscles end at 25 % contraction, as fluidic_muscles has it.
 
         Parameters
@@ -134,7 +128,7 @@ class AntagonisticJoint(Plant):
         return plant._changed(changes)
 
     @classmethod
-    def measured(cls, hysteresis: Kind = "maxwell_slip", **changes: float) -> AntagonisticJoint:
+    def measured(cls, hysteresis: str = "maxwell_slip", **changes: float) -> AntagonisticJoint:
         """Return the joint with muscles as measured; what it reaches is its limit.
 
         The limit is the angle that full pressure reaches at the nominal co-contraction, against
@@ -147,7 +141,7 @@ class AntagonisticJoint(Plant):
         return plant.replace({"link.limit": plant.reachable_angle()})
 
     @classmethod
-    def reduced(cls, hysteresis: Kind = "maxwell_slip", **changes: float) -> AntagonisticJoint:
+    def reduced(cls, hysteresis: str = "maxwell_slip", **changes: float) -> AntagonisticJoint:
         """Return the paper's reduced plant: a hysteresis, then two real poles."""
         plant = cls.paper("none")
         plant = dataclasses.replace(
@@ -275,16 +269,7 @@ class AntagonisticJoint(Plant):
     def parameter_rows(self) -> Array:
         """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
         named = [self.value(name) for name in K.NAMES]
-        return np.array(named + model_rows(self.hysteresis.operator))
-
-    @property
-    def elements(self) -> int:
-        """Plays of a muscle's hysteresis."""
-        return plays_of(self.hysteresis.operator)
-
-    def hysteresis_tables(self) -> Array:
-        """Return the Everett maps of all members, shape (members, n, n), or zeros."""
-        return map_tables([m.hysteresis.operator for m in self.members()])
+        return np.array(named + self._model.numbers())
 
     def rest_angles(self, commands: ArrayLike, prestress: float | None = None) -> Array:
         """Return where the joint rests [rad] after each of a series of set-points [rad], (T,).

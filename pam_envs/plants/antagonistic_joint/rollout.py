@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import COMPILED, LANES, build, kernel, prange, scratch, tile_view
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rows import N_COUNTS, N_PARAMETERS
 from pam_envs.plants.antagonistic_joint.step import (
-    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     begin_lane,
@@ -110,7 +110,7 @@ def _runner(kind: str, dynamics: str) -> Callable[..., Any]:
 
 def kernel_names(kind: str, dynamics: str, lanes: int = WIDTH) -> dict[str, Any]:
     """Return what takes the place of the placeholders of :func:`run_joint`."""
-    sizes = {"N_ROWS": K.END + HYSTERESIS_ROWS[kind], "LANES": lanes}
+    sizes = {"N_ROWS": K.END + 2 * state_rows(kind), "LANES": lanes}
     return replacements(kind, dynamics) | sizes
 
 
@@ -123,7 +123,7 @@ def arrays_for(
     n = len(plants) if len(plants) > 1 else columns
     fixed = in_tiles([plant.parameter_rows() for plant in plants], n, lanes)
     return [
-        np.zeros((len(fixed), K.END + HYSTERESIS_ROWS[plants[0].hysteresis.kind], lanes)),
+        np.zeros((len(fixed), K.END + 2 * state_rows(plants[0].hysteresis.kind), lanes)),
         fixed,
         np.zeros((len(fixed), N_COUNTS, lanes), np.int64),
         plants[0].hysteresis_tables()[:1],

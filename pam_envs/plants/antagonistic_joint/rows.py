@@ -8,7 +8,7 @@ first is muscle A's.
 
 from __future__ import annotations
 
-from pam_envs.plants.antagonistic_joint.hysteresis_kernels import MODEL_ROWS
+from pam_envs.hysteresis.protocol import NUMBERS
 
 (
     ANGLE,
@@ -136,8 +136,8 @@ PARAMETERS = (
 ) = range(len(MUSCLE_PARAMETERS), len(PARAMETERS))
 
 MODEL = len(PARAMETERS)
-"""First row of the hysteresis's operator: thresholds and weights, or half the range of a map."""
-N_PARAMETERS = MODEL + MODEL_ROWS
+"""First row of the hysteresis operator's numbers."""
+N_PARAMETERS = MODEL + NUMBERS
 NAMES = PARAMETERS
 """Every parameter by name; :func:`place` says where it stands."""
 

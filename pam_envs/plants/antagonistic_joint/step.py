@@ -15,15 +15,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from pam_envs.hysteresis import protocol
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.motion import damped_motion
 from pam_envs.mechanics.antagonistic_lever import sine_and_cosine_of
 from pam_envs.plants.antagonistic_joint import rows as K
-from pam_envs.plants.antagonistic_joint.hysteresis_kernels import (
-    HYSTERESIS_MODELS,
-    ROWS_PER_OPERATOR,
-)
+from pam_envs.plants.antagonistic_joint.hysteresis_kernels import peek, remember
 from pam_envs.plants.antagonistic_joint.pair import (
     air_of,
     clear_hysteresis_models,
@@ -68,7 +66,6 @@ from pam_envs.plants.antagonistic_joint.rows import (
 )
 
 __all__ = [
-    "HYSTERESIS_ROWS",
     "N_WORK",
     "advance",
     "begin_lane",
@@ -80,11 +77,8 @@ __all__ = [
 WAS_A, WAS_B, RATE_A, RATE_B, CURVE_A, CURVE_B = range(6)
 """Rows of scratch: pressures before the sub-step, geometry at its middle."""
 N_WORK = 6
-HYSTERESIS_ROWS = {kind: 2 * rows for kind, rows in ROWS_PER_OPERATOR.items()}
 
-# placeholders, filled in for each hysteresis and each of the two plants
-peek: Any = None
-remember: Any = None
+# placeholders, filled in for each of the two plants
 move: Any = None
 rest: Any = None
 report: Any = None
@@ -348,4 +342,4 @@ DYNAMICS: dict[str, dict[str, Any]] = {
 
 def replacements(kind: str, dynamics: str) -> dict[str, Any]:
     """Return the kernels that a plant of this make puts in the place of the placeholders."""
-    return HYSTERESIS_MODELS[kind] | DYNAMICS[dynamics]
+    return protocol.kernels(kind) | DYNAMICS[dynamics]

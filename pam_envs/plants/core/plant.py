@@ -10,10 +10,12 @@ from pathlib import Path
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.hysteresis.protocol import HysteresisModel, tables_of
 from pam_envs.parameters import check, declarations
 from pam_envs.plants.core import plant_file
+from pam_envs.plants.core.operator_component import OperatorComponent
 
 
 def effects_of(components: Mapping[str, type]) -> tuple[tuple[str, ...], ...]:
@@ -128,6 +130,23 @@ class Plant:
     def members(self) -> tuple[Self, ...]:
         """Return this plant and the equally good fits beside it."""
         return (self, *(self.replace(values) for values in self.ensemble))
+
+    @property
+    def elements(self) -> int:
+        """Elements of the hysteresis that the kernels loop over."""
+        return self._model.elements
+
+    def hysteresis_tables(self) -> NDArray[np.float64]:
+        """Return the tables of the hysteresis of all members, shape (members, ., .)."""
+        return tables_of([member._component.operator for member in self.members()])
+
+    @property
+    def _component(self) -> OperatorComponent:
+        return self.hysteresis  # type: ignore[attr-defined, no-any-return]
+
+    @property
+    def _model(self) -> HysteresisModel:
+        return self._component.model
 
     def to_yaml(self, path: str | Path) -> None:
         """Write the plant to a file that :meth:`from_yaml` and ``gym.make(plant=...)`` read."""

@@ -22,97 +22,20 @@ import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
 import yaml
 
-from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from pam_envs.hysteresis.modified_maxwell_slip import ModifiedMaxwellSlip
-from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.hysteresis import protocol
 from pam_envs.parameters import PROVENANCES, Declaration, declarations
 
 if TYPE_CHECKING:
     from pam_envs.plants.core.plant import Plant
 
-    Operator: TypeAlias = PlayOperator | ModifiedMaxwellSlip | Preisach | None
-
 P = TypeVar("P", bound="Plant")
 KEYS = ("schema", "family", "substeps", "parameters", "hysteresis", "ensemble", "notes")
 ENTRY_KEYS = ("value", "unit", "provenance", "source")
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-
-
-def _hysteresis_record(operator: Any) -> dict[str, Any]:
-    if isinstance(operator, PlayOperator):
-        return {
-            "kind": "maxwell_slip",
-            "linear": float(operator.linear),
-            "thresholds": [float(v) for v in operator.thresholds],
-            "weights": [float(v) for v in operator.weights],
-        }
-    if isinstance(operator, ModifiedMaxwellSlip):
-        return {
-            "kind": "modified_maxwell_slip",
-            "stiffnesses": [float(v) for v in operator.stiffnesses],
-            "break_stiffnesses": [float(v) for v in operator.break_stiffnesses],
-            "spring": [float(v) for v in operator.spring],
-            "segment": float(operator.segment),
-        }
-    if isinstance(operator, Preisach):
-        table = [[float(v) for v in row] for row in np.asarray(operator.table)]
-        return {
-            "kind": "preisach",
-            "low": float(operator.low),
-            "high": float(operator.high),
-            "table": table,
-        } | ({} if operator.start == "virgin" else {"start": operator.start})
-    return {"kind": "none"}
-
-
-def _hysteresis(record: Any, where: str) -> Operator:
-    fields = {
-        "none": set(),
-        "maxwell_slip": {"linear", "thresholds", "weights"},
-        "modified_maxwell_slip": {"stiffnesses", "break_stiffnesses", "spring", "segment"},
-        "preisach": {"low", "high", "table"},
-    }
-    if not isinstance(record, Mapping) or record.get("kind") not in fields:
-        raise ValueError(
-            f"{where}: hysteresis must be a mapping with kind maxwell_slip, modified_maxwell_slip, "
-            f"preisach or none, got {record!r}"
-        )
-    kind = record["kind"]
-    optional = {"start"} if kind == "preisach" else set()
-    if set(record) - {"kind"} - optional != fields[kind]:
-        raise ValueError(
-            f"{where}: a {kind} hysteresis needs exactly the keys {sorted(fields[kind])}, "
-            f"got {sorted(set(record) - {'kind'})}"
-        )
-    try:
-        if kind == "maxwell_slip":
-            return PlayOperator(
-                tuple(float(v) for v in record["thresholds"]),
-                tuple(float(v) for v in record["weights"]),
-                float(record["linear"]),
-            )
-        if kind == "modified_maxwell_slip":
-            return ModifiedMaxwellSlip(
-                tuple(float(v) for v in record["stiffnesses"]),
-                tuple(float(v) for v in record["break_stiffnesses"]),
-                tuple(float(v) for v in record["spring"]),
-                float(record["segment"]),
-            )
-        if kind == "preisach":
-            return Preisach(
-                float(record["low"]),
-                float(record["high"]),
-                tuple(tuple(float(v) for v in row) for row in record["table"]),
-                start=record.get("start", "virgin"),
-            )
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{where}: hysteresis: {error}") from error
-    return None
 
 
 def record(plant: Plant) -> dict[str, Any]:
@@ -138,7 +61,7 @@ def record(plant: Plant) -> dict[str, Any]:
             k: float(v) for k, v in member.items() if k != "hysteresis.operator"
         }
         if "hysteresis.operator" in member:
-            values["hysteresis"] = _hysteresis_record(member["hysteresis.operator"])
+            values["hysteresis"] = protocol.record(member["hysteresis.operator"])
         ensemble.append(values)
     return {
         "schema": 1,
@@ -146,7 +69,7 @@ def record(plant: Plant) -> dict[str, Any]:
         **{choice: getattr(plant, choice) for choice in plant.choices},
         "substeps": plant.substeps,
         "parameters": parameters,
-        "hysteresis": _hysteresis_record(parts["hysteresis"].operator),
+        "hysteresis": protocol.record(parts["hysteresis"].operator),
         "ensemble": ensemble,
     }
 
@@ -248,7 +171,7 @@ def _build(cls: type[P], data: Mapping[str, Any], where: str) -> P:
         if isinstance(entry, Mapping) and "provenance" in entry:
             provenance[name] = (str(entry["provenance"]), str(entry.get("source", "")))
     if "hysteresis" in data:
-        values["hysteresis.operator"] = _hysteresis(data["hysteresis"], where)
+        values["hysteresis.operator"] = protocol.read(data["hysteresis"], where)
     ensemble = []
     for i, member in enumerate(data.get("ensemble") or []):
         place = f"{where}: ensemble[{i}]"
@@ -258,7 +181,7 @@ def _build(cls: type[P], data: Mapping[str, Any], where: str) -> P:
             k: _entry(k, v, "", place) for k, v in member.items() if k != "hysteresis"
         }
         if "hysteresis" in member:
-            other["hysteresis.operator"] = _hysteresis(member["hysteresis"], place)
+            other["hysteresis.operator"] = protocol.read(member["hysteresis"], place)
         ensemble.append(other)
     substeps = data.get("substeps", 4)
     choices: Any = {choice: data[choice] for choice in cls.choices if choice in data}

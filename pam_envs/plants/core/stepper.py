@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import COMPILED, LANES, build, kernel, prange, scratch, tile_view
 from pam_envs.kernels.motion import oscillator_wide
 from pam_envs.plants.single_muscle import rows as R
@@ -22,7 +23,7 @@ from pam_envs.plants.single_muscle.effects import advance_extended, replacements
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.replay import begin
 from pam_envs.plants.single_muscle.rows import N_COUNTS, N_PARAMETERS
-from pam_envs.plants.single_muscle.step import HYSTERESIS_ROWS, N_WORK
+from pam_envs.plants.single_muscle.step import N_WORK
 
 PERIOD = 0.01
 """Control period [s] unless another is given."""
@@ -88,7 +89,7 @@ def run_lanes(
 
 @lru_cache(maxsize=8)
 def _built(function: Callable[..., Any], kind: str) -> Callable[..., Any]:
-    first = R.END + HYSTERESIS_ROWS[kind]
+    first = R.END + state_rows(kind)
     return build(
         function,
         f"{function.__name__}_{kind}",
@@ -160,9 +161,9 @@ class PlantBatch:
             columns[:, R.place("muscle.temperature")] = kelvin
         self._fixed = _tiled(columns)
         self._loads = np.array([load_kg])
-        self._table = plants[0].everett_tables()[:1]
+        self._table = plants[0].hysteresis_tables()[:1]
         tiles = len(self._fixed)
-        self._rows = np.zeros((tiles, R.END + HYSTERESIS_ROWS[self._kind] + R.N_EFFECTS, LANES))
+        self._rows = np.zeros((tiles, R.END + state_rows(self._kind) + R.N_EFFECTS, LANES))
         self._counts = np.zeros((tiles, N_COUNTS, LANES), np.int64)
         self.position = np.zeros(len(plants))
         self.reset()

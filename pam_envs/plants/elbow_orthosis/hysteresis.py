@@ -22,16 +22,17 @@ that. Both are assumed; the paper gives no more than the largest difference, whi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.hysteresis.protocol import preset
 from pam_envs.parameters import parameter
-from pam_envs.plants.antagonistic_joint.hysteresis import ELEMENTS
-from pam_envs.plants.single_muscle.hysteresis import Kind
+from pam_envs.plants.antagonistic_joint.hysteresis import PLAYS
+from pam_envs.plants.core.operator_component import OperatorComponent
 
 SMALLEST, LARGEST = 6e-4, 9e-3
 """Thresholds of the preset's plays [m]: 0.15 % and 2.3 % of the nominal length."""
@@ -47,14 +48,13 @@ are all within the paper's stroke of 66 mm, which is why the loop there is the l
 
 
 @dataclass(frozen=True)
-class ElbowHysteresis:
+class ElbowHysteresis(OperatorComponent):
     """Thread-on-thread friction of both bundles.
 
-    ``operator`` turns travel [m] into the travel that is felt: a :class:`PlayOperator` of total
-    slope 1, a :class:`Preisach` operator with a virgin start, or None.
+    ``operator`` turns travel [m] into the travel that the friction follows, with slope 1 and a
+    virgin start.
     """
 
-    operator: PlayOperator | Preisach | None = None
     loop: float = parameter(
         0.075,
         "1",
@@ -67,34 +67,15 @@ class ElbowHysteresis:
     )
 
     @property
-    def kind(self) -> Kind:
-        """Which operator this is."""
-        if self.operator is None:
-            return "none"
-        return "preisach" if isinstance(self.operator, Preisach) else "maxwell_slip"
-
-    @cached_property
     def largest_lag(self) -> float:
-        """How far [m] the operator lags behind at most after a long way in one direction.
-
-        Of a map, half the largest distance between the two branches of its widest loop.
-        """
-        if isinstance(self.operator, PlayOperator):
-            return float(np.dot(self.operator.weights, self.operator.thresholds))
-        if isinstance(self.operator, Preisach):
-            return 0.5 * float(np.max(_gaps(self.operator.everett)))
-        return 1.0
+        """Largest lag [m] of the operator, after a long way in one direction."""
+        return self.model.largest_lag
 
 
 def travel_plays() -> PlayOperator:
     """Return the preset: plays of equal weight, evenly spread on a logarithmic scale."""
-    thresholds = np.geomspace(SMALLEST, LARGEST, ELEMENTS)
-    return PlayOperator(tuple(thresholds), (0.1,) * ELEMENTS, 0.2)
-
-
-def _gaps(everett: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how far apart the branches of a map's widest loop are at its levels."""
-    return np.asarray(everett[-1, 0] - everett[-1] - everett[:, 0])
+    thresholds = np.geomspace(SMALLEST, LARGEST, PLAYS)
+    return PlayOperator(tuple(thresholds), (0.1,) * PLAYS, 0.2)
 
 
 def _relays(middle: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -126,18 +107,14 @@ def travel_relays() -> Preisach:
 
 
 @lru_cache(maxsize=4)
-def elbow_hysteresis(kind: Kind) -> ElbowHysteresis:
-    """Return the preset hysteresis of a kind; both have loops of the same largest width.
+def elbow_hysteresis(kind: str) -> ElbowHysteresis:
+    """Return the preset hysteresis of a kind; all have loops of the same largest width.
 
     Raises
     ------
     ValueError
         If there is no such kind.
     """
-    if kind == "none":
-        return ElbowHysteresis()
-    if kind == "maxwell_slip":
-        return ElbowHysteresis(travel_plays())
-    if kind == "preisach":
+    if kind == Preisach.kind:
         return ElbowHysteresis(travel_relays())
-    raise ValueError(f"hysteresis = {kind!r}; choose 'maxwell_slip', 'preisach' or 'none'")
+    return ElbowHysteresis(preset(kind, travel_plays(), -WIDEST, WIDEST, LEVELS, "virgin"))

@@ -21,21 +21,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.constants import ATMOSPHERE
-from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.hysteresis.protocol import Usage
 from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.mechanics.forearm import OrthosisLink, Wearer
 from pam_envs.mechanics.pulley import Pulley
 from pam_envs.muscle.quadratic_bundle import QuadraticBundle
-from pam_envs.plants.antagonistic_joint.hysteresis_tables import (
-    check_operator,
-    map_tables,
-    model_rows,
-    plays_of,
-)
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.hysteresis import ElbowHysteresis, elbow_hysteresis
-from pam_envs.plants.single_muscle.hysteresis import Kind
 from pam_envs.pneumatics.bundle_regulator import BundleRegulator
 from pam_envs.pneumatics.on_off_pair import OnOffValve
 from pam_envs.sensing.orthosis import AngleSensor, GaugeSensor
@@ -98,7 +91,7 @@ class ElbowOrthosis(Plant):
         if self.valves not in MAKES:
             raise ValueError(f"valves = {self.valves!r}; choose one of {', '.join(MAKES)}")
         self.check_components()
-        check_operator(self.hysteresis.operator)
+        self._model.check(Usage("an elbow", "virgin", reach=0.55 * self.pulley.stroke))
         self._check_bundles()
         self._check_range()
         self._check_motion()
@@ -122,12 +115,6 @@ class ElbowOrthosis(Plant):
                 f"pulley.radius = {self.pulley.radius:g} m: the stroke of {self.pulley.stroke:.4f} "
                 f"m contracts the bundles beyond {shortest:.4f} m, where their force ends; use a "
                 "smaller radius or longer muscles"
-            )
-        operator = self.hysteresis.operator
-        if isinstance(operator, Preisach) and operator.high < 0.55 * self.pulley.stroke:
-            raise ValueError(
-                f"hysteresis: the Everett map spans +-{operator.high:g} m and the pulley travels "
-                f"+-{0.5 * self.pulley.stroke:g} m: give a wider map"
             )
 
     def _check_motion(self) -> None:
@@ -160,7 +147,7 @@ class ElbowOrthosis(Plant):
 
     @classmethod
     def paper(
-        cls, hysteresis: Kind = "maxwell_slip", valves: Valves = "proportional", **changes: float
+        cls, hysteresis: str = "maxwell_slip", valves: Valves = "proportional", **changes: float
     ) -> ElbowOrthosis:
         """Return the orthosis with three and seven muscles on a pulley of 31.5 mm.
 
@@ -298,15 +285,6 @@ class ElbowOrthosis(Plant):
         """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
         column = np.zeros(K.N_PARAMETERS)
         column[: K.MODEL] = [self.value(name) for name in K.NAMES]
-        column[K.MODEL : K.LARGEST_LAG] = model_rows(self.hysteresis.operator)
+        column[K.MODEL : K.LARGEST_LAG] = self._model.numbers()
         column[K.LARGEST_LAG] = self.hysteresis.largest_lag
         return column
-
-    @property
-    def elements(self) -> int:
-        """Plays of the hysteresis."""
-        return plays_of(self.hysteresis.operator)
-
-    def hysteresis_tables(self) -> Array:
-        """Return the Everett maps of all members, shape (members, n, n), or zeros."""
-        return map_tables([m.hysteresis.operator for m in self.members()])

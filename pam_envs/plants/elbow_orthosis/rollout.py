@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import COMPILED, LANES, build, kernel, prange, scratch, tile_view
 from pam_envs.plants.core.tiles import drives_of, first_of, in_tiles
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 from pam_envs.plants.elbow_orthosis.rows import N_COUNTS, N_PARAMETERS
 from pam_envs.plants.elbow_orthosis.step import (
-    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     begin_lane,
@@ -94,7 +94,7 @@ def _runner(kind: str, valves: str) -> Callable[..., Any]:
 
 def kernel_names(kind: str, valves: str, lanes: int = WIDTH) -> dict[str, Any]:
     """Return what takes the place of the placeholders of :func:`run_elbow`."""
-    sizes = {"N_ROWS": K.END + HYSTERESIS_ROWS[kind], "LANES": lanes}
+    sizes = {"N_ROWS": K.END + state_rows(kind), "LANES": lanes}
     return replacements(kind, valves) | sizes
 
 
@@ -110,7 +110,7 @@ def arrays_for(
     n = len(plants) if len(plants) > 1 else columns
     fixed = in_tiles([plant.parameter_rows() for plant in plants], n, lanes)
     return [
-        np.zeros((len(fixed), K.END + HYSTERESIS_ROWS[plants[0].hysteresis.kind], lanes)),
+        np.zeros((len(fixed), K.END + state_rows(plants[0].hysteresis.kind), lanes)),
         fixed,
         np.zeros((len(fixed), N_COUNTS, lanes), np.int64),
         plants[0].hysteresis_tables()[:1],

@@ -8,7 +8,7 @@ first is bundle a's, which straightens the elbow.
 
 from __future__ import annotations
 
-from pam_envs.plants.antagonistic_joint.hysteresis import ELEMENTS
+from pam_envs.hysteresis.protocol import NUMBERS
 
 (
     ANGLE,
@@ -143,8 +143,8 @@ PARAMETERS = (
 ) = range(2 * BUNDLE_ROWS, len(PARAMETERS))
 
 MODEL = len(PARAMETERS)
-"""First row of the hysteresis's operator: thresholds and weights, or half the range of a map."""
-LARGEST_LAG = MODEL + 2 * ELEMENTS
+"""First row of the hysteresis operator's numbers."""
+LARGEST_LAG = MODEL + NUMBERS
 N_PARAMETERS = LARGEST_LAG + 1
 NAMES = PARAMETERS
 """Every parameter by name; :func:`place` says where it stands."""

@@ -12,15 +12,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from pam_envs.hysteresis import protocol
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.motion import damped_motion
 from pam_envs.mechanics.leg import sine_and_cosine
 from pam_envs.mechanics.pulley import stop_torque
-from pam_envs.plants.antagonistic_joint.hysteresis_kernels import HYSTERESIS_MODELS
-from pam_envs.plants.antagonistic_joint.hysteresis_kernels import (
-    ROWS_PER_OPERATOR as HYSTERESIS_ROWS,
-)
+from pam_envs.plants.antagonistic_joint.hysteresis_kernels import remember
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.air import (
     AIR,
@@ -73,7 +71,6 @@ from pam_envs.plants.elbow_orthosis.rows import (
 )
 
 __all__ = [
-    "HYSTERESIS_ROWS",
     "N_WORK",
     "advance",
     "begin_lane",
@@ -86,7 +83,6 @@ SOFTEST = 0.1
 """Least stiffness [N m/rad] that a sub-step reckons with."""
 
 # placeholders, filled in for each hysteresis and each make of valves
-remember: Any = None
 begin_period: Any = None
 breathe: Any = None
 settle: Any = None
@@ -333,6 +329,4 @@ STARTS = {"proportional": start_regulated, "on_off": start_pulsed}
 
 def replacements(kind: str, valves: str) -> dict[str, Any]:
     """Return the kernels that a plant of this make puts in the place of the placeholders."""
-    return {"remember": HYSTERESIS_MODELS[kind]["remember"], "start_air": STARTS[valves]} | AIR[
-        valves
-    ]
+    return protocol.kernels(kind) | {"start_air": STARTS[valves]} | AIR[valves]

@@ -21,8 +21,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.hysteresis.modified_maxwell_slip import ModifiedMaxwellSlip
-from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.hysteresis.protocol import Usage
 from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.mechanics.knee_lever import KneeLever
 from pam_envs.mechanics.leg import Leg
@@ -32,7 +31,6 @@ from pam_envs.parameters import parameter
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.hysteresis import KneeHysteresis, knee_hysteresis
-from pam_envs.plants.single_muscle.hysteresis import Kind
 from pam_envs.pneumatics.measured_dynamics import OrthosisRegulator, mode_rows
 from pam_envs.references.gait import ACTIVITIES, PAPER_STRIDE, SIGNALS, gait_table
 from pam_envs.sensing.orthosis import (
@@ -152,27 +150,10 @@ class KneeOrthosis(Plant):
                     f"{name} = {getattr(self, name)!r}; choose one of {', '.join(allowed)}"
                 )
         self.check_components()
-        self._check_hysteresis()
+        full = self.regulator.max_pressure
+        self._model.check(Usage("the orthosis", "low", full, unit_slope=False))
         self._check_motion()
         self._check_toggle()
-
-    def _check_hysteresis(self) -> None:
-        operator = self.hysteresis.operator
-        if isinstance(operator, ModifiedMaxwellSlip):
-            n = len(operator.stiffnesses)
-            if n > K.ELEMENTS or len(operator.spring) != n + 1:
-                raise ValueError(
-                    f"hysteresis: {n} elements and {len(operator.spring)} knots of the spring; at most "
-                    f"{K.ELEMENTS} elements and one knot more than elements are simulated: "
-                    "identify with fewer elements, or interpolate the spring at its knots"
-                )
-        if isinstance(operator, Preisach):
-            span, full = (operator.low, operator.high), self.regulator.max_pressure
-            if operator.start != "low" or not np.allclose(span, (0.0, full), rtol=1e-9):
-                raise ValueError(
-                    f"hysteresis: the Everett map spans {span} Pa with start {operator.start!r}; the "
-                    f"orthosis needs 0 to {full:g} Pa (the regulator's range) with start 'low'"
-                )
 
     def _check_motion(self) -> None:
         """Refuse a motion that the sub-steps cannot follow (see ``kernels.motion``)."""
@@ -209,7 +190,7 @@ class KneeOrthosis(Plant):
 
     @classmethod
     def rig(
-        cls, hysteresis: Kind = "maxwell_slip", dynamics: Dynamics = "lag", **changes: float
+        cls, hysteresis: str = "maxwell_slip", dynamics: Dynamics = "lag", **changes: float
     ) -> KneeOrthosis:
         """Return the muscle held at its nominal length: 158 N at 2 bar, 79 N/bar.
 
@@ -226,7 +207,7 @@ class KneeOrthosis(Plant):
 
     @classmethod
     def no_load(
-        cls, hysteresis: Kind = "maxwell_slip", dynamics: Dynamics = "lag", **changes: float
+        cls, hysteresis: str = "maxwell_slip", dynamics: Dynamics = "lag", **changes: float
     ) -> KneeOrthosis:
         """Return the brace alone; the parameters are those of :meth:`rig`."""
         return cls._preset(hysteresis, changes, mounting="no_load", dynamics=dynamics)
@@ -236,7 +217,7 @@ class KneeOrthosis(Plant):
         cls,
         activity: Activity = "walk",
         stride: float = PAPER_STRIDE,
-        hysteresis: Kind = "maxwell_slip",
+        hysteresis: str = "maxwell_slip",
         dynamics: Dynamics = "lag",
         **changes: float,
     ) -> KneeOrthosis:
@@ -258,7 +239,7 @@ class KneeOrthosis(Plant):
         return cls._preset(hysteresis, changes, **made)
 
     @classmethod
-    def _preset(cls, hysteresis: Kind, changes: Mapping[str, float], **makes: Any) -> KneeOrthosis:
+    def _preset(cls, hysteresis: str, changes: Mapping[str, float], **makes: Any) -> KneeOrthosis:
         activity = makes.pop("activity", "walk")
         plant = cls(hysteresis=knee_hysteresis(hysteresis), dynamics=makes["dynamics"])
         plant = plant.replace({k.replace("__", "."): v for k, v in changes.items()})
@@ -299,39 +280,11 @@ class KneeOrthosis(Plant):
 
     def parameter_rows(self) -> NDArray[np.float64]:
         """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
-        column = np.array([self.value(name) for name in K.NAMES] + mode_rows())
-        return column
+        named = [self.value(name) for name in K.NAMES]
+        return np.array(named + mode_rows() + self._model.numbers())
 
     def gait_table(self) -> NDArray[np.float64]:
         """Return the stride's curves as the kernels read them, shape (points, signals)."""
         if self.mounting != "leg":
             return np.zeros((4, len(SIGNALS)))
         return gait_table(self.activity)
-
-    @property
-    def elements(self) -> int:
-        """Rows of the hysteresis's state that are in use by a modified Maxwell-slip model."""
-        operator = self.hysteresis.operator
-        return len(operator.spring) if isinstance(operator, ModifiedMaxwellSlip) else 0
-
-    def hysteresis_tables(self) -> NDArray[np.float64]:
-        """Return what the hysteresis models of all members are made of, shape (members, ., .).
-
-        Everett maps (n, n); or break stiffnesses, stiffnesses, spring and segment, (4, n + 1),
-        filled up with an element that does nothing.
-        """
-        operators = [m.hysteresis.operator for m in self.members()]
-        slips = [_slip_table(o) for o in operators if isinstance(o, ModifiedMaxwellSlip)]
-        maps = [np.asarray(o.table, float) for o in operators if isinstance(o, Preisach)]
-        tables = slips or maps
-        return np.ascontiguousarray(tables) if tables else np.zeros((1, 2, 2))
-
-
-def _slip_table(operator: ModifiedMaxwellSlip) -> NDArray[np.float64]:
-    idle = 2.0 * max(operator.range, operator.break_stiffnesses[-1])
-    table = np.zeros((4, len(operator.spring)))
-    table[0] = (*operator.break_stiffnesses, idle)
-    table[1, :-1] = operator.stiffnesses
-    table[2] = operator.spring
-    table[3] = operator.segment
-    return table

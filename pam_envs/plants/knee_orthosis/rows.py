@@ -7,6 +7,7 @@ share unless they are drawn. This page is the only one that counts.
 
 from __future__ import annotations
 
+from pam_envs.hysteresis.protocol import NUMBERS
 from pam_envs.pneumatics.measured_dynamics import MODE_ROWS, MODES
 
 # state: brace and muscle, then stride and wearer
@@ -181,14 +182,11 @@ PARAMETERS = (
 
 MODE_TABLE = len(PARAMETERS)
 """First row of what the modes are made of."""
-N_PARAMETERS = MODE_TABLE + MODE_ROWS
+MODEL = MODE_TABLE + MODE_ROWS
+"""First row of the hysteresis operator's numbers."""
+N_PARAMETERS = MODEL + NUMBERS
 NAMES = PARAMETERS
 """Every parameter by name; :func:`place` says where it stands."""
-
-ELEMENTS = 16
-"""Most elements of a modified Maxwell-slip hysteresis."""
-DEPTH = 24
-"""Depth of the Preisach stack of extrema."""
 
 # integer rows
 KEY_A, KEY_B, EPISODE, STEP, STACK_COUNT, MEMBER = range(6)

@@ -13,11 +13,7 @@ from typing import Any
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.hysteresis_kernels import (
-    FORGET,
-    HYSTERESIS_MODELS,
-    HYSTERESIS_ROWS,
-)
+from pam_envs.plants.knee_orthosis.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.knee_orthosis.motion import MOTIONS, N_WORK, WAS
 from pam_envs.plants.knee_orthosis.rows import (
     MAX_PRESSURE,
@@ -32,14 +28,14 @@ from pam_envs.plants.knee_orthosis.rows import (
 from pam_envs.pneumatics.measured_dynamics import MODES, REAL_MODES, pair_factor, turned
 from pam_envs.pneumatics.regulator import regulator_step
 
-__all__ = ["HYSTERESIS_ROWS", "N_WORK", "advance", "begin_lane", "replacements", "start_hysteresis"]
+__all__ = ["N_WORK", "advance", "begin_lane", "replacements", "start_hysteresis"]
 
 PAIR = MODE_TABLE + 2 * REAL_MODES
 """First row of what the slow pair is made of: decay, frequency, two gains."""
 
 # placeholders, filled in for each hysteresis, mounting and regulator
 remember: Any = None
-forget: Any = None
+hysteresis_begin: Any = None
 regulate: Any = None
 settle: Any = None
 begin_period: Any = None
@@ -141,7 +137,9 @@ def begin_lane(
 
     ``counts[MEMBER][j]`` is set before.
     """
-    forget(rows, counts, table, hysteresis, elements, j)
+    hysteresis_begin(
+        rows, fixed, counts, table, elements, hysteresis, K.MODEL, K.STACK_COUNT, K.MEMBER, j
+    )
     rows[PRESSURE][j] = 0.0
     remember(rows, fixed, counts, table, hysteresis, j, j + 1, elements)
     rows[PRESSURE][j] = pressure
@@ -162,5 +160,4 @@ REGULATORS: dict[str, dict[str, Any]] = {
 
 def replacements(kind: str, mounting: str, dynamics: str) -> dict[str, Any]:
     """Return the kernels that a plant of this make puts in the place of the placeholders."""
-    hysteresis = {"remember": HYSTERESIS_MODELS[kind], "forget": FORGET[kind]}
-    return hysteresis | MOTIONS[mounting] | REGULATORS[dynamics]
+    return hysteresis_kernels(kind) | MOTIONS[mounting] | REGULATORS[dynamics]

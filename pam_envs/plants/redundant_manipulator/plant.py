@@ -26,17 +26,12 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.hysteresis.protocol import Usage
 from pam_envs.mechanics.antagonistic_lever import AntagonisticLever
 from pam_envs.mechanics.serial_chain import SerialChain
 from pam_envs.muscle.force_map import ForceMap, paper_stretch
 from pam_envs.plants.antagonistic_joint import statics as pair_statics
 from pam_envs.plants.antagonistic_joint.hysteresis import JointHysteresis, joint_hysteresis
-from pam_envs.plants.antagonistic_joint.hysteresis_tables import (
-    check_operator,
-    map_tables,
-    model_rows,
-    plays_of,
-)
 from pam_envs.plants.antagonistic_joint.link import (
     ArmFactors,
     Link,
@@ -52,7 +47,6 @@ from pam_envs.plants.antagonistic_joint.plant import (
 )
 from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.redundant_manipulator import rows as M
-from pam_envs.plants.single_muscle.hysteresis import Kind
 from pam_envs.pneumatics.joint_regulator import JointRegulator
 from pam_envs.sensing.joint import JointEncoder
 from pam_envs.sensing.orthosis import GaugeSensor
@@ -128,7 +122,7 @@ class RedundantManipulator(Plant):
         if len(self.gravity) != 3:
             raise ValueError(f"gravity = {self.gravity!r}; give three numbers [m/s2]")
         self.check_components()
-        check_operator(self.hysteresis.operator)
+        self._model.check(Usage("an arm", "virgin"))
         pair_statics.check_angles(self, self.link)
         if self.chain.stages > M.MOST_STAGES:
             raise ValueError(
@@ -146,7 +140,7 @@ class RedundantManipulator(Plant):
 
     @classmethod
     def paper(
-        cls, hysteresis: Kind = "maxwell_slip", chain: SerialChain = LINK, **changes: float
+        cls, hysteresis: str = "maxwell_slip", chain: SerialChain = LINK, **changes: float
     ) -> RedundantManipulator:
         """Return the arm whose muscles end at 25 % contraction, so that joints take +-30 degrees.
 
@@ -164,7 +158,7 @@ class RedundantManipulator(Plant):
 
     @classmethod
     def measured(
-        cls, hysteresis: Kind = "maxwell_slip", chain: SerialChain = LINK, **changes: float
+        cls, hysteresis: str = "maxwell_slip", chain: SerialChain = LINK, **changes: float
     ) -> RedundantManipulator:
         """Return the arm with muscles as measured; what they reach is the limit of its joints.
 
@@ -179,7 +173,7 @@ class RedundantManipulator(Plant):
 
     @classmethod
     def _of(
-        cls, chain: SerialChain, hysteresis: Kind, muscle: ForceMap,
+        cls, chain: SerialChain, hysteresis: str, muscle: ForceMap,
         provenance: Mapping[str, tuple[str, str]], changes: Mapping[str, float],
     ) -> RedundantManipulator:  # fmt: skip
         plant = cls(
@@ -359,16 +353,7 @@ class RedundantManipulator(Plant):
         damping = [*self.joint_damping, *[0.0] * (M.MOST_STAGES - self.stages)]
         named = [self.value(name) for name in M.NAMES]
         chain = self.nominal_chain.rows()
-        return np.array([*named, *model_rows(self.hysteresis.operator), *damping, *chain])
-
-    @property
-    def elements(self) -> int:
-        """Plays of a muscle's hysteresis."""
-        return plays_of(self.hysteresis.operator)
-
-    def hysteresis_tables(self) -> Array:
-        """Return the Everett maps of all members, shape (members, n, n), or zeros."""
-        return map_tables([m.hysteresis.operator for m in self.members()])
+        return np.array([*named, *self._model.numbers(), *damping, *chain])
 
 
 def _numbers(name: str, values: Sequence[float]) -> tuple[float, ...]:

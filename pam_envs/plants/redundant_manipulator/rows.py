@@ -8,7 +8,7 @@ kernels of the pair serve both.
 
 from __future__ import annotations
 
-from pam_envs.plants.antagonistic_joint.hysteresis_kernels import MODEL_ROWS
+from pam_envs.hysteresis.protocol import NUMBERS
 from pam_envs.plants.antagonistic_joint.rows import (
     ANGLE_BIAS,
     ANGLE_NOISE,
@@ -73,7 +73,7 @@ PARAMETERS = (*MUSCLE_PARAMETERS, "arm.mass_factor", "arm.damping_factor")
 MASS_FACTOR, DAMPING_FACTOR = range(len(MUSCLE_PARAMETERS), len(PARAMETERS))
 MODEL = len(PARAMETERS)
 """First row of the hysteresis's operator."""
-JOINT_DAMPING = MODEL + MODEL_ROWS
+JOINT_DAMPING = MODEL + NUMBERS
 """First row of the damping that each joint has beside ``link.damping`` [N m s/rad]."""
 CHAIN = JOINT_DAMPING + MOST_STAGES
 """First row of the chain's parameters (``serial_chain_rows``)."""

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from pam_envs.hysteresis import protocol
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.mechanics.serial_chain_dynamics import chain_solve, chain_terms
 from pam_envs.mechanics.serial_chain_kinematics import N_STAGES
@@ -30,10 +31,7 @@ from pam_envs.mechanics.serial_chain_rows import (
     mass_row,
 )
 from pam_envs.mechanics.serial_chain_rows import work_rows as chain_work_rows
-from pam_envs.plants.antagonistic_joint.hysteresis_kernels import (
-    HYSTERESIS_MODELS,
-    ROWS_PER_OPERATOR,
-)
+from pam_envs.plants.antagonistic_joint.hysteresis_kernels import peek, remember
 from pam_envs.plants.antagonistic_joint.pair import (
     air_of,
     clear_hysteresis_models,
@@ -95,10 +93,7 @@ CHAIN_WORK = 6 * MOST_STAGES
 RESTING = 30
 """Steps to the pose at rest."""
 
-# placeholders, filled in for each hysteresis
-peek: Any = None
-remember: Any = None
-OPERATOR_ROWS = 0
+MODEL_STATE = 0  # a placeholder
 
 
 @kernel
@@ -335,7 +330,7 @@ def settle(
     angle = rows[ANGLE + k][j]
     contract(rows, fixed, j, angle, AT + 2 * k, STRAIGHT)
     peek(
-        rows, fixed, counts, table, hysteresis + 2 * k * OPERATOR_ROWS, elements, AT + 2 * k,
+        rows, fixed, counts, table, hysteresis + 2 * k * MODEL_STATE, elements, AT + 2 * k,
         LAG + 2 * k, STICK + 2 * k, 2, MODEL, STACK_COUNT + 2 * k, MEMBER, j, j + 1,
     )  # fmt: skip
     torque, slope = pull_of(rows, fixed, j, k, angle)
@@ -351,7 +346,7 @@ def settle(
 
 def hysteresis_rows(kind: str, stages: int) -> int:
     """Return how many rows of state the hysteresis models take."""
-    return 2 * stages * ROWS_PER_OPERATOR[kind]
+    return 2 * stages * protocol.state_rows(kind)
 
 
 def work_rows(stages: int) -> int:
@@ -361,5 +356,4 @@ def work_rows(stages: int) -> int:
 
 def replacements(kind: str, stages: int) -> dict[str, Any]:
     """Return what a plant of this make puts in the place of the placeholders."""
-    sizes = {"OPERATOR_ROWS": ROWS_PER_OPERATOR[kind], "N_STAGES": stages}
-    return HYSTERESIS_MODELS[kind] | sizes
+    return protocol.kernels(kind) | {"N_STAGES": stages}

@@ -30,9 +30,9 @@ from pam_envs.muscle.strands import slip_strands, strand_forces, strands_on
 from pam_envs.muscle.temperature import temperature_factor
 from pam_envs.muscle.viscosity import viscous_damping
 from pam_envs.plants.single_muscle import rows as R
+from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.rows import EFFECT as P
 from pam_envs.plants.single_muscle.rows import STATE as S
-from pam_envs.plants.single_muscle.step import HYSTERESIS_MODELS
 from pam_envs.pneumatics.line import line_step
 from pam_envs.pneumatics.regulator import (
     AIR,
@@ -461,7 +461,7 @@ def replacements(kind: str, first: int) -> dict[str, Any]:
     """
     return {
         "FIRST": first,
-        "plain_hysteresis": HYSTERESIS_MODELS[kind],
+        **hysteresis_kernels(kind, "plain_hysteresis"),
         "remember": settled,
         "advance": advance_extended,
         "rest_contraction": rest_extended,

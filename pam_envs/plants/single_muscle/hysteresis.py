@@ -1,31 +1,30 @@
-"""The hysteresis of a muscle: from the pressure inside to the effective pressure that pulls."""
+"""Hysteresis of the single muscle, from its pressure to its effective pressure."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.creep import CreepEffects
 from pam_envs.hysteresis.friction_effects import FirstCycles, FrictionEffects, Threshold
-from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.hysteresis.protocol import HysteresisModel, operator_of
 from pam_envs.parameters import parameter
+from pam_envs.plants.core.operator_component import OperatorComponent
 
-Kind = Literal["maxwell_slip", "preisach", "none"]
-KINDS: tuple[Kind, ...] = ("maxwell_slip", "preisach", "none")
+Kind: TypeAlias = str
+"""A value of ``hysteresis=``, one of :func:`pam_envs.hysteresis.protocol.kinds`."""
 
 
 @dataclass(frozen=True)
-class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects):
+class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects, OperatorComponent):
     """Pressure-driven friction of braid and tube.
 
     The pressure, stretched to a scale on which friction is uniform, passes an operator with
     hysteresis; the operator's hysteretic part is scaled by ``1 + width_per_load * load``; the
-    result is stretched back. ``operator`` is a :class:`PlayOperator` of total slope 1 (the dual of
-    Maxwell-slip elements), a :class:`Preisach` operator, or None.
+    result is stretched back. ``operator`` is one of slope 1 that starts virgin, or None.
     """
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (
@@ -36,7 +35,6 @@ class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects):
         ("threshold",),
     )
 
-    operator: PlayOperator | Preisach | None = None
     stretch: float = parameter(
         0.0,
         "1",
@@ -60,13 +58,6 @@ class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects):
         0.0, "1", -1.0, 10.0, "assumed", "extra loop width of the first travel", neutral=0.0
     )
 
-    @property
-    def kind(self) -> Kind:
-        """Which operator this is."""
-        if self.operator is None:
-            return "none"
-        return "maxwell_slip" if isinstance(self.operator, PlayOperator) else "preisach"
-
     def stretched(self, pressure: ArrayLike, full: float) -> NDArray[np.float64]:
         """Return ``pressure`` [Pa] on the scale on which the friction is uniform."""
         p = np.asarray(pressure, float)
@@ -78,13 +69,11 @@ class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects):
         root = np.sqrt(np.maximum(0.0, s * s - 4.0 * self.stretch * z / full))
         return np.asarray(2.0 * z / (s + root))
 
-    def at_load(self, load: float) -> PlayOperator | Preisach | None:
+    def at_load(self, load: float) -> HysteresisModel | None:
         """Return the operator at a load [kg], with its hysteretic part scaled."""
         if self.operator is None:
             return None
         width = max(0.0, min(1.2, 1.0 + self.width_per_load * load))
-        if isinstance(self.operator, PlayOperator):
-            return self.operator.scaled(width)
         return self.operator.scaled(width, slope=1.0)
 
     def inverse(self, load: float, full: float) -> HysteresisInverse:
@@ -94,31 +83,24 @@ class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects):
 
 @dataclass(frozen=True)
 class HysteresisInverse:
-    """The pressure that gives a wanted effective pressure, given the history so far."""
+    """The pressure that gives a desired effective pressure, given the history so far."""
 
     hysteresis: Hysteresis
-    operator: PlayOperator | Preisach | None
+    operator: HysteresisModel | None
     full: float
 
     def initial_state(self, batch_shape: tuple[int, ...] = ()) -> Any:
         """Return the state after a rest at no pressure."""
-        if self.operator is None:
-            return None
-        return self.operator.initial_state(batch_shape)
+        return operator_of(self.operator).initial_state(batch_shape)
 
     def pressure(self, drive: ArrayLike, state: Any) -> tuple[NDArray[np.float64], Any]:
         """Return the pressure [Pa] for an effective pressure [Pa], and the state it leaves.
 
         The pressure is held between 0 and ``full``, and the state is that of the held pressure.
         """
-        wanted = self.hysteresis.stretched(drive, self.full)
         if self.operator is None:
-            return np.clip(np.asarray(drive, float), 0.0, self.full), None
-        if isinstance(self.operator, PlayOperator):
-            undo = self.operator.inverse()
-            felt, _ = undo.step(wanted, self.operator.inverse_state(state))
-        else:
-            felt, _ = self.operator.inverse_step(wanted, state)
+            return np.clip(np.asarray(drive, float), 0.0, self.full), state
+        felt, _ = self.operator.inverse_step(self.hysteresis.stretched(drive, self.full), state)
         felt = np.clip(felt, 0.0, self.full)
         _, after = self.operator.step(felt, state)
         return self.hysteresis.unstretched(felt, self.full), after
@@ -126,7 +108,7 @@ class HysteresisInverse:
     def drive(self, pressure: ArrayLike, state: Any) -> tuple[NDArray[np.float64], Any]:
         """Return the effective pressure [Pa] at a pressure [Pa], and the state it leaves."""
         if self.operator is None:
-            return np.asarray(pressure, float), None
+            return np.asarray(pressure, float), state
         felt = self.hysteresis.stretched(np.clip(pressure, 0.0, self.full), self.full)
         value, after = self.operator.step(felt, state)
         return self.hysteresis.unstretched(value, self.full), after

@@ -20,13 +20,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.hysteresis.protocol import NUMBERS, Usage, model_of, preset
 from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.mechanics.hanging_mass import HangingMass
 from pam_envs.muscle.effective_area import EffectiveAreaMuscle
 from pam_envs.plants.core.plant import Plant, effects_of, neutral_of
 from pam_envs.plants.single_muscle import rows as R
-from pam_envs.plants.single_muscle.hysteresis import Hysteresis, Kind
+from pam_envs.plants.single_muscle.hysteresis import Hysteresis
 from pam_envs.pneumatics.regulator import Regulator
 from pam_envs.sensing.sensor import PositionSensor, PressureSensor
 
@@ -46,6 +46,8 @@ CREEP = (
 NEUTRAL = neutral_of(PARTS, R.EFFECTS)
 """Values at which effects are off."""
 
+LEVELS = 49
+"""Levels of a map that resembles the identified hysteresis."""
 FOLDER = Path(__file__).resolve().parents[2] / "data"
 
 
@@ -79,33 +81,8 @@ class SingleMuscle(Plant):
     def __post_init__(self) -> None:
         """Check every parameter, and that the motion can be followed."""
         self.check_components()
-        self._check_hysteresis()
+        self._model.check(Usage("a muscle", "virgin", self.regulator.max_pressure))
         self._check_motion()
-
-    def _check_hysteresis(self) -> None:
-        operator = self.hysteresis.operator
-        if isinstance(operator, PlayOperator):
-            total = operator.linear + sum(operator.weights)
-            if abs(total - 1.0) > 1e-9 or operator.linear <= 0.0:
-                raise ValueError(
-                    f"hysteresis: the play operator's total slope is {total:g} with a linear part of "
-                    f"{operator.linear:g}; a muscle's hysteresis needs total slope 1 and a linear part "
-                    "above 0: scale the weights"
-                )
-            if len(operator.weights) > R.ELEMENTS:
-                raise ValueError(
-                    f"hysteresis: {len(operator.weights)} elements, at most {R.ELEMENTS} are "
-                    "simulated; merge neighbouring thresholds"
-                )
-        if isinstance(operator, Preisach):
-            full = self.regulator.max_pressure
-            span = (operator.low, operator.high)
-            if operator.start != "virgin" or not np.allclose(span, (-full, full), rtol=1e-9):
-                raise ValueError(
-                    f"hysteresis: the Everett map spans {span} Pa with start {operator.start!r}; a "
-                    f"muscle needs -{full:g} to {full:g} Pa (the regulator's range and its mirror "
-                    "image) with start 'virgin', so that its first inflation is one"
-                )
 
     def _check_motion(self) -> None:
         """Refuse a motion that the sub-steps cannot follow (see ``kernels.motion``)."""
@@ -130,21 +107,24 @@ class SingleMuscle(Plant):
             )
 
     @classmethod
-    def mas10(cls, hysteresis: Kind = "maxwell_slip", **changes: float) -> SingleMuscle:
+    def mas10(cls, hysteresis: str = "maxwell_slip", **changes: float) -> SingleMuscle:
         """Return the muscle identified on the measured tables, with that hysteresis.
 
         Parameters
         ----------
         hysteresis : {"maxwell_slip", "preisach", "none"}
-            Which hysteresis; each was identified on the same data.
+            Kind; each was identified on the same data.
         **changes : float
             Parameters to replace, with ``__`` for the dot (``mass__load=4.55``).
         """
-        if hysteresis not in ("maxwell_slip", "preisach", "none"):
-            raise ValueError(
-                f"hysteresis = {hysteresis!r}; choose 'maxwell_slip', 'preisach' or 'none'"
-            )
-        plant = cls.from_yaml(FOLDER / f"mas10_{hysteresis}.yaml")
+        kind = model_of(hysteresis).kind
+        if (FOLDER / f"mas10_{kind}.yaml").exists():
+            plant = cls.from_yaml(FOLDER / f"mas10_{kind}.yaml")
+        else:
+            plant = cls.from_yaml(FOLDER / f"mas10_{PlayOperator.kind}.yaml")
+            full = plant.regulator.max_pressure
+            made = preset(kind, plant._model, -full, full, LEVELS, "virgin")
+            plant = plant.replace({"hysteresis.operator": made})
         return plant.replace({k.replace("__", "."): v for k, v in changes.items()})
 
     # --- the static law and its inverse -----------------------------------------------------
@@ -204,26 +184,11 @@ class SingleMuscle(Plant):
             math.pi * self.muscle.diameter**2 / 4.0 / math.sin(self.muscle.braid_angle) ** 2
         )
         column[R.COSINE] = math.cos(self.muscle.braid_angle)
-        column[R.LINEAR] = 1.0
-        operator = self.hysteresis.operator
-        if isinstance(operator, PlayOperator):
-            n = len(operator.weights)
-            column[R.LINEAR] = operator.linear
-            for start, values in (
-                (R.THRESHOLD, operator.thresholds),
-                (R.WEIGHT, operator.weights),
-            ):
-                column[start : start + n] = values
+        numbers = self._model.numbers(self.regulator.max_pressure)
+        column[R.MODEL : R.MODEL + NUMBERS] = numbers
         return column
 
     @property
-    def elements(self) -> int:
-        """Number of play operators that are simulated."""
-        operator = self.hysteresis.operator
-        return len(operator.weights) if isinstance(operator, PlayOperator) else 0
-
-    def everett_tables(self) -> NDArray[np.float64]:
-        """Return the Everett maps of all members, shape (members, n, n); (1, 2, 2) if none."""
-        operators = [m.hysteresis.operator for m in self.members()]
-        tables = [np.asarray(o.table, float) for o in operators if isinstance(o, Preisach)]
-        return np.ascontiguousarray(tables) if tables else np.zeros((1, 2, 2))
+    def extended(self) -> bool:
+        """Whether an effect is on that a plain plant has not."""
+        return any(self.value(name) != neutral for name, neutral in NEUTRAL.items())

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import (
     COMPILED,
     LANES,
@@ -39,7 +40,7 @@ from pam_envs.plants.single_muscle.effects import (
 )
 from pam_envs.plants.single_muscle.plant import NEUTRAL, SingleMuscle
 from pam_envs.plants.single_muscle.rows import N_COUNTS, N_PARAMETERS
-from pam_envs.plants.single_muscle.step import HYSTERESIS_ROWS, N_WORK
+from pam_envs.plants.single_muscle.step import N_WORK
 
 CHANNELS = ("contraction", "pressure")
 LONGEST_STEP = 0.0201
@@ -203,7 +204,7 @@ def _places() -> list[tuple[list[int], Array]]:
 
 @lru_cache(maxsize=8)
 def _runner(kind: str, parallel: bool) -> Callable[..., Any]:
-    first = R.END + HYSTERESIS_ROWS[kind]
+    first = R.END + state_rows(kind)
     return build(
         run_replay,
         f"replay_{kind}",
@@ -255,11 +256,11 @@ def _replay_tiles(plant: SingleMuscle, columns: Array, inputs: Inputs, table: Ar
     kind, n = plant.hysteresis.kind, len(columns)
     fixed = in_tiles(columns, n, TILE)
     tiles = len(fixed)
-    rows = np.zeros((tiles, R.END + HYSTERESIS_ROWS[kind] + R.N_EFFECTS, TILE))
+    rows = np.zeros((tiles, R.END + state_rows(kind) + R.N_EFFECTS, TILE))
     counts = np.zeros((tiles, N_COUNTS, TILE), np.int64)
     outputs = np.empty((len(CHANNELS), len(inputs.command), n))
     substeps = max(1, int(np.ceil(inputs.period / inputs.longest_step)))
-    arrays: list[Any] = [rows, fixed, counts, plant.everett_tables()[:1], table, outputs]
+    arrays: list[Any] = [rows, fixed, counts, plant.hysteresis_tables()[:1], table, outputs]
     if not COMPILED:
         arrays = [a.tolist() for a in arrays]
     _runner(kind, tiles > 1 and threads() > 1)(*arrays, plant.elements, substeps, inputs.period)

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import COMPILED, LANES, build, kernel, prange, scratch, tile_view
 from pam_envs.plants.core.tiles import in_tiles
 from pam_envs.plants.single_muscle import rows as R
+from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.rows import N_COUNTS, N_PARAMETERS
 from pam_envs.plants.single_muscle.step import (
-    HYSTERESIS_MODELS,
-    HYSTERESIS_ROWS,
     N_WORK,
     advance,
     rest_contraction,
@@ -71,8 +71,8 @@ def _runner(kind: str) -> Callable[..., Any]:
     return build(
         run,
         f"rollout_{kind}",
-        remember=HYSTERESIS_MODELS[kind],
-        N_ROWS=R.END + HYSTERESIS_ROWS[kind],
+        **hysteresis_kernels(kind),
+        N_ROWS=R.END + state_rows(kind),
     )
 
 
@@ -100,10 +100,10 @@ def simulate_rows(
     commands = np.asarray(set_points, np.float64)
     commands = np.ascontiguousarray(commands.reshape(len(commands), -1))
     fixed = in_tiles(parameters, n, LANES)
-    rows = np.zeros((len(fixed), R.END + HYSTERESIS_ROWS[kind], LANES))
+    rows = np.zeros((len(fixed), R.END + state_rows(kind), LANES))
     counts = np.zeros((len(fixed), N_COUNTS, LANES), np.int64)
     outputs = np.empty((len(OUTPUTS), len(commands), n))
-    arrays: list[Any] = [rows, fixed, counts, plant.everett_tables()[:1], commands, outputs]
+    arrays: list[Any] = [rows, fixed, counts, plant.hysteresis_tables()[:1], commands, outputs]
     if not COMPILED:
         arrays = [a.tolist() for a in arrays]
     _runner(kind)(*arrays, plant.elements, plant.substeps, plant.control_period)

@@ -7,8 +7,10 @@ which all tiles of a batch share unless they are drawn.
 
 from __future__ import annotations
 
+from pam_envs.hysteresis import elements as plays
 from pam_envs.hysteresis.creep import CreepEffects
 from pam_envs.hysteresis.friction_effects import FirstCycles, FrictionEffects, Threshold
+from pam_envs.hysteresis.protocol import NUMBERS
 from pam_envs.kernels.history import N_HISTORY
 from pam_envs.mechanics.guide import GuideEffects
 from pam_envs.mechanics.support import MOUNT_STATE, MountEffects, SupportEffects
@@ -127,11 +129,11 @@ EFFECT = named_rows(*(name.replace(".", "_") for name in NAMES))
 """Row of every parameter: ``EFFECT.muscle_viscosity`` of ``"muscle.viscosity"``."""
 
 # derived from them once
-TALL, COSINE, LINEAR = range(len(NAMES), len(NAMES) + 3)
-ELEMENTS = 12
-THRESHOLD = LINEAR + 1
-WEIGHT = THRESHOLD + ELEMENTS
-N_PARAMETERS = WEIGHT + ELEMENTS
+TALL, COSINE = range(len(NAMES), len(NAMES) + 2)
+MODEL = COSINE + 1
+"""First row of the hysteresis operator's numbers; of play operators the rows are these."""
+LINEAR, THRESHOLD, WEIGHT = MODEL + plays.LINEAR, MODEL + plays.THRESHOLD, MODEL + plays.WEIGHT
+N_PARAMETERS = MODEL + NUMBERS
 
 STATE = row_blocks(
     air=len(AIR_STATE),
@@ -158,9 +160,6 @@ def place(name: str) -> int:
     """Return the row of a parameter in the column that the kernels read."""
     return NAMES.index(name)
 
-
-DEPTH = 24
-"""Depth of the Preisach stack of extrema."""
 
 # integer rows
 KEY_A, KEY_B, EPISODE, STEP, STACK_COUNT, MEMBER = range(6)

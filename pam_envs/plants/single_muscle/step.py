@@ -9,12 +9,9 @@ stability limit from the stiffness of a light load.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from pam_envs.constants import GRAVITY
-from pam_envs.hysteresis.maxwell_slip import play
-from pam_envs.hysteresis.preisach import preisach_step
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.history import N_HISTORY
@@ -29,147 +26,23 @@ from pam_envs.plants.single_muscle.rows import (
     CONTRACTION,
     DAMPING,
     DEAD_TIME,
-    DEPTH,
     DRIVE,
     HARDENING,
     HISTORY,
-    LINEAR,
     LOAD,
-    MAX_PRESSURE,
     MOVING_MASS,
     PRESSURE,
     REST_LENGTH,
     SET_POINT,
     SLEW_RATE,
-    STACK_COUNT,
     STEP,
     STIFFNESS,
-    STRETCH,
-    THRESHOLD,
     TIME_CONSTANT,
     VELOCITY,
-    WEIGHT,
-    WIDTH_PER_LOAD,
 )
 from pam_envs.pneumatics.regulator import DELAY_PERIODS, delayed_fraction, regulator_step
 
-
-@kernel
-def stretched(pressure: float, stretch: float, per_full: float) -> float:
-    """Return the pressure on the scale on which the friction is uniform.
-
-    ``g(p) = p (1 + b (1 - p / P))``: with ``b > 0`` the loop is wider at high pressure.
-    ``per_full`` is ``1 / P``.
-    """
-    return pressure * (1.0 + stretch * (1.0 - pressure * per_full))
-
-
-@kernel
-def unstretched(value: float, stretch: float, per_full: float) -> float:
-    """Return the pressure whose stretched value is ``value``."""
-    s = 1.0 + stretch
-    return 2.0 * value / (s + math.sqrt(max(0.0, s * s - 4.0 * stretch * value * per_full)))
-
-
-@kernel
-def loop_width(width_per_load: float, load: float) -> float:
-    """Return the factor on the hysteretic part at this load, from 0 to 1.2."""
-    return max(0.0, min(1.2, 1.0 + width_per_load * load))
-
-
-@kernel
-def no_hysteresis(
-    rows: Any,
-    fixed: Any,
-    counts: Any,
-    table: Any,
-    hysteresis: int,
-    first: int,
-    last: int,
-    elements: int,
-    work: Any,
-) -> None:
-    """Effective pressure without hysteresis: the pressure."""
-    pressure, drive = rows[PRESSURE], rows[DRIVE]
-    for j in range(first, last):
-        drive[j] = pressure[j]
-
-
-@kernel
-def play_hysteresis(
-    rows: Any,
-    fixed: Any,
-    counts: Any,
-    table: Any,
-    hysteresis: int,
-    first: int,
-    last: int,
-    elements: int,
-    work: Any,
-) -> None:
-    """Effective pressure by play operators, the dual of Maxwell-slip elements."""
-    pressure, drive, stretch, full = (
-        rows[PRESSURE],
-        rows[DRIVE],
-        fixed[STRETCH],
-        fixed[MAX_PRESSURE],
-    )
-    linear, load, per_load = fixed[LINEAR], rows[LOAD], fixed[WIDTH_PER_LOAD]
-    felt, output, per_full = work[0], work[1], work[2]
-    for j in range(first, last):
-        per_full[j] = 1.0 / full[j]
-        felt[j] = stretched(pressure[j], stretch[j], per_full[j])
-        output[j] = linear[j] * felt[j]
-    for k in range(elements):
-        threshold, weight, state = fixed[THRESHOLD + k], fixed[WEIGHT + k], rows[hysteresis + k]
-        for j in range(first, last):
-            w = play(felt[j], threshold[j], state[j])
-            state[j] = w
-            output[j] = output[j] + weight[j] * w
-    for j in range(first, last):
-        friction = felt[j] - output[j]
-        value = felt[j] - loop_width(per_load[j], load[j]) * friction
-        drive[j] = unstretched(value, stretch[j], per_full[j])
-
-
-@kernel
-def preisach_hysteresis(
-    rows: Any,
-    fixed: Any,
-    counts: Any,
-    table: Any,
-    hysteresis: int,
-    first: int,
-    last: int,
-    elements: int,
-    work: Any,
-) -> None:
-    """Effective pressure by a Preisach operator."""
-    pressure, drive, stretch, full = (
-        rows[PRESSURE],
-        rows[DRIVE],
-        fixed[STRETCH],
-        fixed[MAX_PRESSURE],
-    )
-    load, per_load = rows[LOAD], fixed[WIDTH_PER_LOAD]
-    stack, sums = (
-        rows[hysteresis : hysteresis + DEPTH],
-        rows[hysteresis + DEPTH : hysteresis + 2 * DEPTH],
-    )
-    count, member = counts[STACK_COUNT], counts[R.MEMBER]
-    for j in range(first, last):
-        per_full = 1.0 / full[j]
-        felt = stretched(pressure[j], stretch[j], per_full)
-        everett = table[member[j]]
-        cells = len(everett) - 1
-        output = preisach_step(
-            felt, stack, sums, count, j, everett, -full[j], 0.5 * cells * per_full
-        )
-        value = felt - loop_width(per_load[j], load[j]) * (felt - output)
-        drive[j] = unstretched(value, stretch[j], per_full)
-
-
-remember: Any = None  # a placeholder: one of the three above
+remember: Any = None  # a placeholder, see hysteresis_kernels
 
 
 @kernel
@@ -281,13 +154,6 @@ def begin_effects(rows: Any, fixed: Any, j: int) -> None:
 
 N_WORK = 17
 """Rows of scratch that :func:`advance` needs."""
-
-HYSTERESIS_MODELS: dict[str, Any] = {
-    "none": no_hysteresis,
-    "maxwell_slip": play_hysteresis,
-    "preisach": preisach_hysteresis,
-}
-HYSTERESIS_ROWS = {"none": 0, "maxwell_slip": R.ELEMENTS, "preisach": 2 * DEPTH}
 
 
 @routine

@@ -1,0 +1,89 @@
+"""Effective pressure of the single muscle: its scales around the kernels of a hysteresis model."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pam_envs.hysteresis import protocol
+from pam_envs.kernels.build import kernel
+from pam_envs.plants.single_muscle.rows import (
+    DRIVE,
+    LOAD,
+    MAX_PRESSURE,
+    MEMBER,
+    MODEL,
+    PRESSURE,
+    STACK_COUNT,
+    STRETCH,
+    WIDTH_PER_LOAD,
+)
+
+hysteresis_step: Any = None  # a placeholder
+
+
+@kernel
+def stretched(pressure: float, stretch: float, per_full: float) -> float:
+    """Return the pressure on the scale on which the friction is uniform.
+
+    ``g(p) = p (1 + b (1 - p / P))``: with ``b > 0`` the loop is wider at high pressure.
+    ``per_full`` is ``1 / P``.
+    """
+    return pressure * (1.0 + stretch * (1.0 - pressure * per_full))
+
+
+@kernel
+def unstretched(value: float, stretch: float, per_full: float) -> float:
+    """Return the pressure whose stretched value is ``value``."""
+    s = 1.0 + stretch
+    return 2.0 * value / (s + math.sqrt(max(0.0, s * s - 4.0 * stretch * value * per_full)))
+
+
+@kernel
+def loop_width(width_per_load: float, load: float) -> float:
+    """Return the factor on the hysteretic part at this load, from 0 to 1.2."""
+    return max(0.0, min(1.2, 1.0 + width_per_load * load))
+
+
+@kernel
+def pressure_itself(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, first: int, last: int,
+    elements: int, work: Any,
+) -> None:  # fmt: skip
+    """Write the pressure as effective pressure."""
+    pressure, drive = rows[PRESSURE], rows[DRIVE]
+    for j in range(first, last):
+        drive[j] = pressure[j]
+
+
+@kernel
+def effective_pressure(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, first: int, last: int,
+    elements: int, work: Any,
+) -> None:  # fmt: skip
+    """Write the effective pressure by a hysteresis model on the stretched scale."""
+    pressure, drive, stretch, full = (
+        rows[PRESSURE],
+        rows[DRIVE],
+        fixed[STRETCH],
+        fixed[MAX_PRESSURE],
+    )
+    load, per_load = rows[LOAD], fixed[WIDTH_PER_LOAD]
+    felt, output, per_full = work[0], work[1], work[2]
+    for j in range(first, last):
+        per_full[j] = 1.0 / full[j]
+        felt[j] = stretched(pressure[j], stretch[j], per_full[j])
+    hysteresis_step(
+        felt, output, rows, fixed, counts, table, elements, hysteresis, MODEL, STACK_COUNT, MEMBER,
+        first, last,
+    )  # fmt: skip
+    for j in range(first, last):
+        friction = felt[j] - output[j]
+        value = felt[j] - loop_width(per_load[j], load[j]) * friction
+        drive[j] = unstretched(value, stretch[j], per_full[j])
+
+
+def hysteresis_kernels(kind: str, name: str = "remember") -> dict[str, Any]:
+    """Return the kernels of a kind; ``name`` is the plant's placeholder for the whole."""
+    identity = protocol.model_of(kind).identity
+    return protocol.kernels(kind) | {name: pressure_itself if identity else effective_pressure}
