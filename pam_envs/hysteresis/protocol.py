@@ -209,6 +209,14 @@ class HysteresisModel:
         """Return the output for one sample of every row, and the state after it."""
         raise NotImplementedError
 
+    def simulate(self, x: ArrayLike, state: Any = None) -> tuple[Array, Any]:
+        """Return the outputs, shape (T,), for inputs of shape (T,), and the last state."""
+        state = self.initial_state() if state is None else state
+        outputs = np.empty(np.shape(x))
+        for t, value in enumerate(np.asarray(x, float)):
+            outputs[t], state = self.step(value, state)
+        return outputs, state
+
     def inverse_step(self, y: ArrayLike, state: Any) -> tuple[Array, Any]:
         """Return the input that gives an output, and the state after it."""
         raise NotImplementedError

@@ -27,7 +27,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
 from pam_envs.hysteresis import everett as maps
-from pam_envs.hysteresis.preisach import Preisach, Start
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.hysteresis.protocol import Start
 from pam_envs.identification.hysteresis_loops import measured
 from pam_envs.identification.relay_regressors import relay_regressors
 

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.hysteresis.extrema import preisach_step
-from pam_envs.hysteresis.preisach import Preisach, Start
+from pam_envs.hysteresis.preisach import Preisach
+from pam_envs.hysteresis.protocol import Start
 from pam_envs.kernels.build import entry, kernel
 
 Array = NDArray[np.float64]
