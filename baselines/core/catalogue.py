@@ -1,144 +1,86 @@
-"""All classical controllers by name.
+"""Catalogue of the classical controllers by name.
 
-What a controller *knows* is part of its result. A controller is built from a nominal plant and the
-named signals, never from an environment. Where the label says "nominal model", whoever runs the
-controller decides what that model is: where it is the simulated plant itself, unrandomised, the
-controller knows the true model, and a table of results should say so.
+Each module of this package that defines controllers holds their entries in ``ENTRIES``, a dict of
+:class:`~baselines.core.entry.Entry` by name; the catalogue collects them. Controllers from outside
+are added by :func:`register`, by :func:`load` from a folder of such modules, or by folders in the
+environment variable ``PAM_ENVS_CONTROLLERS`` (separated as in ``PATH``), which command lines read
+as well.
 
-Most numbers of a controller follow from a rule or a paper. What they leave open are its *knobs*
-(:mod:`baselines.core.knobs`); names with ``_tuned`` are controllers whose knobs were searched for
-on tuning seeds, with the budget that learned controllers have (:mod:`baselines.core.tuned`).
+A controller is built from a nominal plant and the named signals, never from an environment. Its
+model knowledge is part of its result. For "nominal model" the caller provides the model: if it is
+the simulated plant itself without randomisation, the controller knows the true model, and a table
+of results should say so.
+
+Numbers that neither a rule nor a paper fixes are *knobs* (:mod:`baselines.core.knobs`). Names with
+``_tuned`` are controllers with knobs from a search (:mod:`baselines.core.tuned`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+import importlib
+import importlib.util
+import os
+import pkgutil
+import sys
+from pathlib import Path
+from typing import Any
 
+import baselines
 from baselines.core import tuned
-from baselines.core.controller import Controller, reader
-from baselines.core.entry import POSITIONING, Entry
+from baselines.core.controller import Controller
+from baselines.core.entry import Entry
 from baselines.core.knobs import AS_DESIGNED, Knobs, check_knobs
-from baselines.elbow.catalogue import ELBOW_CONTROLLERS, ELBOW_MAKERS
-from baselines.joint.catalogue import ARM, JOINT_CONTROLLERS, JOINT_MAKERS
-from baselines.knee.catalogue import KNEE, KNEE_CONTROLLERS, KNEE_MAKERS, SIMC
-from baselines.positioning.contraction_tables import LOADS
-from baselines.positioning.inverse import KNOBS as INVERSE_KNOBS
-from baselines.positioning.inverse import make_inverse
-from baselines.positioning.inverse_pid import KNOBS as INVERSE_PID_KNOBS
-from baselines.positioning.inverse_pid import make_inverse_pid
-from baselines.positioning.pid import KNOBS as PID_KNOBS
-from baselines.positioning.pid import make_pid
-from baselines.positioning.plc_polynomial import (
-    make_one_cubic,
-    make_plc_as_printed,
-    make_plc_refitted,
-)
-from baselines.positioning.table_inverse import make_table_inverse
-from baselines.positioning.trivial import Constant, Line, Random
-from pam_envs.data.tables import load_contraction_table
 from pam_envs.parameters import Signals
-from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
-from pam_envs.plants.core.plant import Plant
-from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
-from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
-from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
-from pam_envs.plants.single_muscle.plant import SingleMuscle
 
-SEED_003 = (
-    "positioning2021: Studies regarding the Use of Pneumatic Muscles in Precise Positioning Systems"
-)
-P = TypeVar("P")
-KREJCI = (
-    "P. Krejci, K. Kuhnen, Inverse control of systems with hysteresis and creep, IEE Proc. Control "
-    "Theory Appl. 148 (2001); I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer 1991"
-)
-
-PUBLISHED: dict[str, Entry] = {
-    "zero": Entry("no pressure, ever", "nothing", envs=(*POSITIONING, *KNEE)),
-    "random": Entry(
-        "set-points drawn evenly from the whole range, seeded",
-        "nothing",
-        envs=(*POSITIONING, *KNEE),
-    ),
-    "linear": Entry(
-        "straight line through the end points of the table at the nearest load", "tables"
-    ),
-    "one_cubic": Entry(
-        "one cubic a load for both branches: hysteresis ignored", "tables", citation=SEED_003
-    ),
-    "plc_as_printed": Entry(
-        "the paper's Equations 7-12 exactly as printed, misprints included",
-        "tables",
-        citation=SEED_003,
-    ),
-    "plc_refitted": Entry(
-        "the paper's cubics refitted to its Table 6 at full precision",
-        "tables",
-        citation=SEED_003,
-    ),
-    "table": Entry(
-        "monotone interpolation of the tables' means, a curve for each load and branch",
-        "tables",
-        citation=SEED_003,
-    ),
-    "pid": Entry(
-        "PID on the present error, SIMC tuning",
-        "nominal model",
-        feedback=True,
-        citation=SIMC,
-        knobs=PID_KNOBS,
-    ),
-    "inverse_no_preview": Entry(
-        "exact inverse of hysteresis, static law and regulator at the present reference",
-        "nominal model",
-        citation=KREJCI,
-    ),
-    "inverse": Entry(
-        "exact inverse of hysteresis, static law and regulator, dead time and lag ahead",
-        "nominal model",
-        preview=True,
-        citation=KREJCI,
-        knobs=INVERSE_KNOBS,
-    ),
-    "inverse_pid_no_preview": Entry(
-        "inverse_no_preview, and a PID on the deviation from the nominal muscle",
-        "nominal model",
-        feedback=True,
-        citation=f"{KREJCI}; {SIMC}",
-    ),
-    "inverse_pid": Entry(
-        "inverse, and a PID on the deviation from the nominal muscle",
-        "nominal model",
-        preview=True,
-        feedback=True,
-        citation=f"{KREJCI}; {SIMC}",
-        knobs=INVERSE_PID_KNOBS,
-    ),
-    **KNEE_CONTROLLERS,
-    **ELBOW_CONTROLLERS,
-    **JOINT_CONTROLLERS,
-}
+VARIABLE = "PAM_ENVS_CONTROLLERS"
+PUBLISHED: dict[str, Entry] = {}
 """By rule or as published."""
-TUNED = tuned.read()
-CONTROLLERS: dict[str, Entry] = {**PUBLISHED, **tuned.entries(PUBLISHED, TUNED)}
+CONTROLLERS: dict[str, Entry] = {}
+"""All: also those with knobs from a search."""
 
 
-def make_linear(signals: Signals, action_signals: Signals) -> Line:
-    """Return the straight line from (0, 0) to the mean contraction at the highest pressure."""
-    table = load_contraction_table()
-    ends = [(p[-1], x[-1].mean()) for p, x in (table.branch(load, True) for load in LOADS)]
-    return Line(
-        reader(signals, ["load", "reference"]),
-        action_signals["pressure_set_point"],
-        LOADS,
-        tuple(float(p / x) for p, x in ends),
-    )
+def register(name: str, entry: Entry) -> None:
+    """Add a controller to the catalogue.
+
+    Raises
+    ------
+    ValueError
+        If the name is taken.
+    """
+    if name in CONTROLLERS:
+        raise ValueError(f"a controller named {name!r} is registered already; choose another name")
+    PUBLISHED[name] = CONTROLLERS[name] = entry
+
+
+def load(folder: str | Path) -> list[str]:
+    """Register the controllers of all Python files in a folder; return their names.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Each file defines ``ENTRIES``, a dict of :class:`~baselines.core.entry.Entry` by name.
+
+    Raises
+    ------
+    ValueError
+        If the folder has no such file, or a name is taken.
+    """
+    names: list[str] = []
+    for file in sorted(Path(folder).glob("*.py")):
+        module = f"pam_envs_controllers_{file.stem}"
+        spec = importlib.util.spec_from_file_location(module, file)
+        assert spec is not None and spec.loader is not None
+        sys.modules[module] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(sys.modules[module])
+        names += _register_entries(sys.modules[module])
+    if not names:
+        raise ValueError(f"{folder} has no Python file with ENTRIES; see baselines.core.catalogue")
+    return names
 
 
 def make_controller(
     name: str,
-    plant: Plant,
+    plant: Any,
     signals: Signals,
     action_signals: Signals,
     seed: int = 0,
@@ -151,85 +93,51 @@ def make_controller(
     name : str
         One of ``CONTROLLERS``.
     plant : Plant
-        Nominal plant: what the controller is told of the muscle. Controllers that know nothing or
-        tables do not look at it.
+        Nominal plant; not used by controllers with knowledge "nothing" or "tables".
     signals, action_signals : Signals
         Those of the environment.
     seed : int
-        For controllers that draw.
+        For controllers that draw random numbers.
     knobs : mapping of float
-        Of those that the entry names; 1 where left out.
+        Factors on the knobs of the entry; 1 where left out.
 
     Raises
     ------
     ValueError
-        If there is no controller of that name, or it has no such knob with that value.
+        If there is no controller of that name, it has no such knob or value, or it is for another
+        class of plants.
     """
-    if name in TUNED:
-        found = TUNED[name]
-        told = (plant, signals, action_signals)
-        return make_controller(found.controller, *told, seed, found.knobs)
-    if name not in PUBLISHED:
+    entry = CONTROLLERS.get(name)
+    if entry is None:
         raise ValueError(f"no controller named {name!r}; there are: {', '.join(CONTROLLERS)}")
-    check_knobs(name, PUBLISHED[name].knobs, knobs)
-    return _published(name, plant, signals, action_signals, seed, {"knobs": knobs} if knobs else {})
-
-
-def _published(
-    name: str,
-    plant: Plant,
-    signals: Signals,
-    action_signals: Signals,
-    seed: int,
-    knobs: Mapping[str, Any],
-) -> Controller:
-    """Return a controller as published, but for its ``knobs`` where there are some."""
-    told = (signals, action_signals)
-    if name in KNEE_MAKERS:
-        made: Controller = KNEE_MAKERS[name](_as(KneeOrthosis, plant, name), *told, **knobs)
-        return made
-    if name in ELBOW_MAKERS:
-        seeded = {"seed": seed} if name == "elbow_random" else {}
-        bending: Controller = ELBOW_MAKERS[name](
-            _as(ElbowOrthosis, plant, name), *told, **seeded, **knobs
-        )
-        return bending
-    if name in JOINT_MAKERS:
-        following: Controller = JOINT_MAKERS[name](_joint(plant, name), *told, **knobs)
-        return following
-
-    def muscle() -> SingleMuscle:
-        return _as(SingleMuscle, plant, name)
-
-    makers: dict[str, Callable[[], Any]] = {
-        "zero": lambda: Constant(action_signals["pressure_set_point"]),
-        "random": lambda: Random(action_signals["pressure_set_point"], seed),
-        "linear": lambda: make_linear(*told),
-        "one_cubic": lambda: make_one_cubic(*told),
-        "plc_as_printed": lambda: make_plc_as_printed(*told),
-        "plc_refitted": lambda: make_plc_refitted(*told),
-        "table": lambda: make_table_inverse(*told),
-        "pid": lambda: make_pid(muscle(), *told, **knobs),
-        "inverse_no_preview": lambda: make_inverse(muscle(), *told, preview=False),
-        "inverse": lambda: make_inverse(muscle(), *told, **knobs),
-        "inverse_pid_no_preview": lambda: make_inverse_pid(muscle(), *told, preview=False),
-        "inverse_pid": lambda: make_inverse_pid(muscle(), *told, **knobs),
-    }
-    built: Controller = makers[name]()
-    return built
-
-
-def _joint(plant: Any, name: str) -> AntagonisticJoint | RedundantManipulator:
-    if isinstance(plant, RedundantManipulator) or JOINT_CONTROLLERS[name].envs == ARM:
-        return _as(RedundantManipulator, plant, name)
-    return _as(AntagonisticJoint, plant, name)
-
-
-def _as(family: type[P], plant: Any, name: str) -> P:
-    """Return a plant of a family, or say which one a controller needs."""
-    if not isinstance(plant, family):
+    check_knobs(name, entry.knobs, knobs)
+    if entry.plants and not isinstance(plant, entry.plants):
         raise ValueError(
-            f"{name} is for a {family.__name__}, and the plant is a {type(plant).__name__}; "
-            "choose a controller whose envs name the environment"
+            f"{name} is for a {' or '.join(family.__name__ for family in entry.plants)}, and the "
+            f"plant is a {type(plant).__name__}; choose a controller whose envs name the "
+            "environment"
         )
-    return plant
+    options: dict[str, Any] = {"knobs": knobs} if knobs else {}
+    if entry.seeded:
+        options["seed"] = seed
+    made: Controller = entry.make(plant, signals, action_signals, **options)
+    return made
+
+
+def _register_entries(module: Any) -> list[str]:
+    entries: dict[str, Entry] = getattr(module, "ENTRIES", {})
+    for name, entry in entries.items():
+        register(name, entry)
+    return list(entries)
+
+
+def _collect() -> None:
+    for found in pkgutil.walk_packages(baselines.__path__, "baselines."):
+        if not found.name.startswith("baselines.core"):
+            _register_entries(importlib.import_module(found.name))
+    CONTROLLERS.update(tuned.entries(PUBLISHED, tuned.read()))
+    for folder in filter(None, os.environ.get(VARIABLE, "").split(os.pathsep)):
+        load(folder)
+
+
+_collect()

@@ -1,14 +1,14 @@
-"""What a controller is, and the small functions that all of them share.
+"""Policy-predictor protocol of controllers, and functions that all of them share.
 
-A controller is what stable-baselines3 calls a policy predictor: any object with ``predict``. It
-runs as it is in ``evaluate_policy``, on one observation of shape (n_obs,) or on a batch of shape
-(n_env, n_obs). What it remembers is its ``state``: a named tuple of arrays whose first axis is the
-row (one row for a single observation). It is handed out and back, and never changed in place.
+A controller is a policy predictor as in stable-baselines3: any object with ``predict``. It runs
+unchanged in ``evaluate_policy``, on one observation of shape (n_obs,) or on a batch of shape
+(n_env, n_obs). Its ``state`` is a named tuple of arrays with the row as first axis (one row for a
+single observation); it is passed in and returned, and never changed in place.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -18,10 +18,10 @@ from pam_envs.parameters import Signal, Signals
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
-Answer = tuple[NDArray[np.float32], Any]
+Prediction = tuple[NDArray[np.float32], Any]
 S = TypeVar("S", bound=tuple[Any, ...])
 LOAD_DIGITS = 4
-"""Loads that agree to 0.1 g are one load."""
+"""Loads that agree to 0.1 g count as equal."""
 
 
 class Controller(Protocol):
@@ -33,17 +33,17 @@ class Controller(Protocol):
         state: Any = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
-    ) -> Answer:
+    ) -> Prediction:
         """Return the action for an observation, and the state for the next call.
 
         Parameters
         ----------
         observation : array_like, shape (n_obs,) or (n_env, n_obs)
-            As the environment gives it.
+            As returned by the environment.
         state : tuple of ndarray, optional
-            As the last call returned it; None begins an episode in every row.
+            As returned by the last call; None starts an episode in every row.
         episode_start : bool or array_like, shape (n_env,), optional
-            Rows that begin an episode: their state is forgotten.
+            Rows that start an episode: their state is reset.
         deterministic : bool
             Unused: every controller here is a function of its arguments.
 
@@ -56,7 +56,7 @@ class Controller(Protocol):
 
 
 class Reader(NamedTuple):
-    """Where some named signals stand in an observation, and their scales."""
+    """Columns and scales of named signals in an observation."""
 
     columns: NDArray[np.int64]
     gain: Array
@@ -75,51 +75,93 @@ def reader(signals: Signals, names: Sequence[str]) -> Reader:
     Raises
     ------
     KeyError
-        If there is no signal of that name; the message lists those there are.
+        If there is no signal of that name; the message lists the names.
     """
     chosen: list[Signal] = [signals[name] for name in names]
     gain, offset = np.array([signal.scale for signal in chosen]).T
     return Reader(np.array([signal.index for signal in chosen]), gain, offset)
 
 
-def answer(signal: Signal, value: Array, observation: ArrayLike) -> NDArray[np.float32]:
-    """Return the action for SI values of shape (n_env,), in the form that the observation has."""
-    gain, offset = signal.scale
-    held = np.minimum(np.maximum(value, signal.low), signal.high)
-    action = (gain * held + offset).astype(np.float32)[:, None]
+def preview_names(name: str, signals: Signals) -> list[str]:
+    """Return the names of a signal and its preview samples, the present one first."""
+    names, known = [name], set(signals.names())
+    while f"{name}_{len(names)}" in known:
+        names.append(f"{name}_{len(names)}")
+    return names
+
+
+def row_count(observation: ArrayLike) -> int:
+    """Return the number of rows of an observation: 1 for a single one."""
+    return 1 if np.ndim(observation) == 1 else len(np.asarray(observation))
+
+
+def encode_action(signal: Signal, value: Array, observation: ArrayLike) -> NDArray[np.float32]:
+    """Return the action for SI values of shape (n_env,), in the form of the observation."""
+    return encode_actions([signal], value[None], observation)
+
+
+def encode_actions(
+    signals: Sequence[Signal], values: ArrayLike, observation: ArrayLike
+) -> NDArray[np.float32]:
+    """Return the action for SI values of several signals, clipped to their ranges.
+
+    Parameters
+    ----------
+    signals : sequence of Signal
+        All signals of the action.
+    values : array_like, shape (n_act, n_env)
+        In the order of ``signals``.
+    observation : array_like, shape (n_obs,) or (n_env, n_obs)
+        Determines the form of the action.
+    """
+    values = np.asarray(values)
+    action = np.empty(values.shape[::-1], np.float32)
+    for signal, value in zip(signals, values, strict=True):
+        gain, offset = signal.scale
+        clipped = np.minimum(np.maximum(value, signal.low), signal.high)
+        action[:, signal.index] = gain * clipped + offset
     return action if np.ndim(observation) == 2 else action[0]
 
 
-def beginning(state: Any, episode_start: ArrayLike | None, rows: int) -> Rows:
-    """Return which rows begin an episode, shape (rows,)."""
-    if state is None:
-        return np.ones(rows, bool)
-    if episode_start is None:
-        return np.zeros(rows, bool)
-    return np.broadcast_to(np.asarray(episode_start, bool), (rows,))
+def reset_rows(
+    state: S | None, episode_start: ArrayLike | None, rows: int, initial: Callable[[], S]
+) -> S:
+    """Return the state with initial values in the rows that start an episode.
 
-
-def choose(begin: Rows, fresh: S, old: S | None) -> S:
-    """Return the fresh state in rows that begin an episode and the old one elsewhere.
-
-    States are (named) tuples of arrays whose first axis is the row, or of further such tuples.
+    Parameters
+    ----------
+    state : tuple or None
+        As passed to ``predict``.
+    episode_start : array_like of bool, shape (rows,), optional
+    rows : int
+    initial : callable
+        Returns the initial state of all rows; called only if a row starts.
     """
-    if old is None or begin.all():
+    if state is None:
+        return initial()
+    if episode_start is None:
+        return state
+    start = np.broadcast_to(np.asarray(episode_start, bool), (rows,))
+    return _merged(start, initial(), state) if start.any() else state
+
+
+def _merged(start: Rows, fresh: S, old: S) -> S:
+    """Return (named) tuples of arrays, or of such tuples: fresh where ``start``, else old."""
+    if start.all():
         return fresh
     parts = [
-        choose(begin, a, b)
+        _merged(start, a, b)
         if isinstance(a, tuple)
-        else np.where(begin.reshape((-1,) + (1,) * (np.ndim(a) - 1)), a, b)
+        else np.where(start.reshape((-1,) + (1,) * (np.ndim(a) - 1)), a, b)
         for a, b in zip(fresh, old, strict=True)
     ]
     return type(fresh)(*parts) if hasattr(fresh, "_fields") else type(fresh)(parts)
 
 
-def by_load(load: Array) -> Iterator[tuple[float, Any]]:
+def group_by_load(load: Array) -> Iterator[tuple[float, Any]]:
     """Yield each load [kg], rounded to ``LOAD_DIGITS``, with the index of its rows.
 
-    What a controller prepares for a load (an inverse, a curve) can so be kept under that load.
-    The index is ``slice(None)`` where all rows hang the same one.
+    The index is ``slice(None)`` if all rows have the same load.
     """
     if len(load) == 1 or (load == load[0]).all():
         yield round(float(load[0]), LOAD_DIGITS), slice(None)

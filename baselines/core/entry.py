@@ -1,16 +1,18 @@
-"""What a catalogue of controllers says of one of them."""
+"""Entry of a controller in the catalogue: description, environments, knobs and maker."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
+from baselines.core.environments import POSITIONING
 from baselines.core.knobs import Bounds, Knobs
 
 Knowledge = Literal["nothing", "tables", "nominal model", "true model"]
-
-
-POSITIONING = ("PAM/MusclePositioning-v0",)
+Maker = Callable[..., Any]
+"""``make(plant, signals, action_signals, **options)``; options are ``knobs`` and ``seed``, each
+passed only to controllers whose entry declares it."""
 
 
 @dataclass(frozen=True)
@@ -20,17 +22,23 @@ class Entry:
     Attributes
     ----------
     summary : str
-        One line on what it does.
+        One line on the method.
     knowledge : {"nothing", "tables", "nominal model", "true model"}
-        What it is told of the muscle; see the catalogue's page on the last two.
+        Model knowledge; see :mod:`baselines.core.catalogue` on the last two.
+    make : callable
+        From nominal plant, signals and action signals to the controller; see :data:`Maker`.
     preview : bool
-        Whether it reads the previewed reference samples (all that the observation has).
+        Whether the controller reads the previewed reference samples.
     feedback : bool
         Whether it uses measurements beyond the first of an episode.
     citation : str
-        Where the method is from; empty for what needs no source.
+        Keys of ``references.bib``, separated by "; "; empty for what needs no source.
     envs : tuple of str
-        Environment ids that it is for.
+        Ids of the environments that it is for.
+    plants : tuple of type
+        Classes of nominal plants that the maker accepts; empty if the plant is not used.
+    seeded : bool
+        Whether the maker takes a random seed.
     kind : str
         "classical": a row of results is verified by running it again.
     tuning : str
@@ -38,19 +46,22 @@ class Entry:
     trials : int
         How many settings were tried in simulation to choose them.
     knobs : mapping
-        What a search may turn, with lowest and highest factor; see :mod:`baselines.core.knobs`.
+        Lowest and highest factor of each knob; see :mod:`baselines.core.knobs`.
     found : mapping
-        What a search found for them; see :mod:`baselines.core.tuned`.
+        Factors found by a search; see :mod:`baselines.core.tuned`.
     author : str
-        Who made it, as BibTeX wants it; empty for the authors of this package.
+        Author as in BibTeX; empty for the authors of this package.
     """
 
     summary: str
     knowledge: Knowledge
+    make: Maker
     preview: bool = False
     feedback: bool = False
     citation: str = ""
     envs: tuple[str, ...] = POSITIONING
+    plants: tuple[type, ...] = ()
+    seeded: bool = False
     kind: str = "classical"
     tuning: str = "by rule or as published"
     trials: int = 0

@@ -1,10 +1,9 @@
 """Knobs: factors on the numbers that a design leaves free.
 
-A rule or a paper fixes most numbers of a controller by the nominal plant, and leaves some to
-whoever applies it: how fast the closed loop is, how far ahead a reference is read. A knob is a
-factor on one of them. At 1 it is the number as published or by the rule, to the last bit. An entry
-of the catalogue names its knobs with their bounds (``Entry.knobs``), and the makers take them as
-``knobs``; what is left out is 1.
+A rule or a paper fixes most numbers of a controller from the nominal plant, and leaves some open:
+the bandwidth of the closed loop, the lead of the preview. A knob is a factor on one of them; 1 is
+the number as published or by the rule, to the last bit. An entry of the catalogue declares its
+knobs with their bounds (``Entry.knobs``); makers take them as ``knobs``.
 """
 
 from __future__ import annotations
@@ -30,15 +29,15 @@ def check_knobs(controller: str, bounds: Bounds, knobs: Knobs) -> None:
     Raises
     ------
     ValueError
-        Naming the knob, its value and what is allowed.
+        Naming the knob, its value and the allowed range.
     """
     for name, value in knobs.items():
         if name not in bounds:
-            there = f"choose from {', '.join(bounds)}" if bounds else "it has none: leave them out"
+            there = f"choose from {', '.join(bounds)}" if bounds else "it has none: leave knobs out"
             raise ValueError(f"{controller} has no knob {name!r}; {there}")
         low, high = bounds[name]
         if not low <= value <= high:
             raise ValueError(
-                f"{controller}: knob {name} is {value!r}, and goes from {low:g} to {high:g}; "
+                f"{controller}: knob {name} is {value!r}, outside {low:g} to {high:g}; "
                 "give a factor in that range, 1 for the number as designed"
             )

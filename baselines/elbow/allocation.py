@@ -14,16 +14,19 @@ on the way as well.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Answer, beginning, choose
+from baselines.core.controller import Prediction, reset_rows
+from baselines.core.entry import Entry
+from baselines.core.environments import ELBOW
 from baselines.core.knobs import AS_DESIGNED, Knobs
 from baselines.elbow.friction import ElbowFriction, make_elbow_friction
 from baselines.elbow.torque_stiffness import Allocation
-from baselines.elbow.valves import PressureLoop, make_pressure_loop
+from baselines.elbow.valves import EARLY_KNOBS, KNOBS, PressureLoop, make_pressure_loop
 from baselines.elbow.view import ElbowSignalMap, make_elbow_signal_map
 from baselines.positioning.nominal import HysteresisState
 from pam_envs.parameters import Signals
@@ -63,13 +66,13 @@ class ElbowAllocation:
         state: AllocationState | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
-    ) -> Answer:
+    ) -> Prediction:
         """Return the commands; see :class:`~baselines.core.controller.Controller`."""
         view = self.signals.read(observation)
-        begin = beginning(state, episode_start, len(view.angle))
-        if state is None or begin.any():
-            fresh = AllocationState(self.friction.initial(len(view.angle)))
-            state = choose(begin, fresh, state)
+        rows = len(view.angle)
+        state = reset_rows(
+            state, episode_start, rows, lambda: AllocationState(self.friction.initial(rows))
+        )
         friction, hysteresis = self.friction.taken(view, state.hysteresis)
         limits = self.loop.reach(view) if self.early else None
         wanted = self.allocation.pressures(
@@ -107,3 +110,31 @@ def make_elbow_allocation(
         make_elbow_friction(plant, known=hysteresis),
         early,
     )
+
+
+ALLOCATION = partial(
+    Entry,
+    knowledge="nominal model",
+    feedback=True,
+    citation="chakarov2018",
+    envs=ELBOW,
+    plants=(ElbowOrthosis,),
+)
+ENTRIES = {
+    "elbow_allocation": ALLOCATION(
+        "exact allocation of torque and stiffness, loops around both pressures",
+        make=make_elbow_allocation,
+        knobs=KNOBS,
+    ),
+    "elbow_allocation_hysteresis": ALLOCATION(
+        "elbow_allocation with compensation of the bundles' friction",
+        make=partial(make_elbow_allocation, hysteresis=True),
+        knobs=KNOBS,
+    ),
+    "elbow_allocation_early": ALLOCATION(
+        "elbow_allocation_hysteresis within the pressures reachable in the valves' next step:"
+        " torque first",
+        make=partial(make_elbow_allocation, hysteresis=True, early=True),
+        knobs=EARLY_KNOBS,
+    ),
+}

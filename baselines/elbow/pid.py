@@ -14,16 +14,19 @@ work it out.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Answer, beginning, choose
+from baselines.core.controller import Prediction, reset_rows
+from baselines.core.entry import Entry
+from baselines.core.environments import ELBOW
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.elbow.friction import ElbowFriction, make_elbow_friction
 from baselines.elbow.valves import PressureLoop, make_pressure_loop
-from baselines.elbow.view import ElbowSignalMap, make_elbow_signal_map
+from baselines.elbow.view import ElbowSignalMap, ElbowView, make_elbow_signal_map
 from baselines.linear.simc import PI_KNOBS, simc_rule
 from baselines.positioning.nominal import HysteresisState
 from baselines.positioning.pid import Gains, PidState, pid_start, pid_step
@@ -94,14 +97,10 @@ class ElbowPid:
         state: ElbowPidState | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
-    ) -> Answer:
+    ) -> Prediction:
         """Return the commands; see :class:`~baselines.core.controller.Controller`."""
         view = self.signals.read(observation)
-        begin = beginning(state, episode_start, len(view.angle))
-        if state is None or begin.any():
-            at_rest = pid_start(0.5 * np.diff(view.pressure, axis=0)[0], view.torque)
-            fresh = ElbowPidState(at_rest, self.friction.initial(len(begin)))
-            state = choose(begin, fresh, state)
+        state = reset_rows(state, episode_start, len(view.angle), lambda: self._start(view))
         taken, hysteresis = self.friction.taken(view, state.hysteresis)
         torque, most = view.torque + self.friction.torque(view, taken), self.full
         error = view.wanted - torque
@@ -109,6 +108,10 @@ class ElbowPid:
         wanted = np.clip(self.middle + np.array([-shift, shift]), 0.0, most)
         commands = wanted if self.loop is None else self.loop.commands(view, wanted)
         return self.signals.write(commands, observation), ElbowPidState(after, hysteresis)
+
+    def _start(self, view: ElbowView) -> ElbowPidState:
+        pid = pid_start(0.5 * np.diff(view.pressure, axis=0)[0], view.torque)
+        return ElbowPidState(pid, self.friction.initial(len(view.angle)))
 
 
 def make_elbow_pid(
@@ -142,3 +145,25 @@ def make_elbow_pid(
         plant.control_period,
         make_elbow_friction(plant, known=hysteresis),
     )
+
+
+PID = partial(
+    Entry,
+    knowledge="nominal model",
+    feedback=True,
+    citation="skogestad2003",
+    envs=ELBOW,
+    plants=(ElbowOrthosis,),
+    knobs=KNOBS,
+)
+ENTRIES = {
+    "elbow_pid": PID(
+        "PI of the estimated torque about 1.2 bar in both bundles, SIMC tuning (with an assumed lag"
+        " for on/off valves); stiffness not controlled",
+        make=make_elbow_pid,
+    ),
+    "elbow_pid_hysteresis": PID(
+        "elbow_pid with the bundles' friction in its estimate of the torque",
+        make=partial(make_elbow_pid, hysteresis=True),
+    ),
+}

@@ -23,12 +23,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Answer, Array, beginning, choose
+from baselines.core.controller import Array, Prediction, reset_rows
+from baselines.core.entry import Entry
+from baselines.core.environments import JOINT
 from baselines.core.knobs import AS_DESIGNED, Knobs
 from baselines.joint.bank import Bank
 from baselines.joint.gravity import Gravity
@@ -44,11 +47,13 @@ from baselines.joint.loop import (
 )
 from baselines.joint.model import POLE, JointModel, joint_model
 from baselines.joint.poles import joint_poles
-from baselines.joint.preview import Lookahead, double_lags, lookahead_for
-from baselines.joint.view import JointSignalMap, make_joint_signal_map
-from baselines.linear.simc import WAIT, Simc, simc_rule
+from baselines.joint.preview import KNOBS, Lookahead, double_lags, lookahead_for
+from baselines.joint.view import JointSignalMap, JointView, make_joint_signal_map
+from baselines.linear.simc import PID_KNOBS, WAIT, Simc, simc_rule
 from baselines.linear.systems import LinearSystem
 from pam_envs.parameters import Signals
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 
 FILTER = 8.0
 """Derivative time over the time constant of its filter."""
@@ -150,14 +155,10 @@ class JointFeedback:
         state: FeedbackState | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
-    ) -> Answer:
+    ) -> Prediction:
         """Return the set-points; see :class:`~baselines.core.controller.Controller`."""
         view = self.signals.read(observation)
-        begin = beginning(state, episode_start, len(view.angle))
-        if state is None or begin.any():
-            held = view.set_point - self.gravity.shift(view.angle, view.payload)
-            fresh = FeedbackState(self.loop.start(held), self._rest(view.angle))
-            state = choose(begin, fresh, state)
+        state = reset_rows(state, episode_start, len(view.angle), lambda: self._start(view))
         shift = self.gravity.shift(view.reference, view.payload)
         aim = self.lookahead.wanted(view.samples)
         wanted, filtered = self._filtered(aim, state.reference)
@@ -165,6 +166,10 @@ class JointFeedback:
         command = self.loop.output(wanted, view.angle, state.loop, low, high)
         loop = self.loop.advance(wanted, view.angle, command, state.loop)
         return self.signals.write(command + shift, observation), FeedbackState(loop, filtered)
+
+    def _start(self, view: JointView) -> FeedbackState:
+        held = view.set_point - self.gravity.shift(view.angle, view.payload)
+        return FeedbackState(self.loop.start(held), self._rest(view.angle))
 
     def _rest(self, angle: Array) -> Array:
         return self.prefilter.rest(angle) if self.prefilter else np.zeros((*angle.shape, 0))
@@ -242,3 +247,58 @@ def _loops(model: JointModel, kind: Kind, in_arm: bool, knobs: Knobs) -> Loops:
 
 def _pi(model: JointModel, gains: Callable[[float, float], PiGains]) -> JointLoop:
     return make_loop(model, lambda pole: pi_system(gains(model.gain, pole)))
+
+
+FEEDBACK = partial(
+    Entry,
+    knowledge="nominal model",
+    feedback=True,
+    envs=JOINT,
+    plants=(AntagonisticJoint, RedundantManipulator),
+)
+PI = partial(FEEDBACK, citation="fluidic_muscles")
+PID = partial(FEEDBACK, citation="skogestad2003")
+PREVIEW = partial(make_joint_feedback, gravity=True, ahead=True)
+ENTRIES = {
+    "joint_pi": PI(
+        "PI by pole cancellation, damping 0.71, as in the paper",
+        make=partial(make_joint_feedback, kind="pi"),
+    ),
+    "joint_pi_slow": PI(
+        "PI by pole cancellation, crossover 4 rad/s",
+        make=partial(make_joint_feedback, kind="pi_slow"),
+    ),
+    "joint_pi_ahead": PI(
+        "joint_pi with gravity feedforward and a reference previewed by its own delay",
+        make=partial(PREVIEW, kind="pi"),
+        preview=True,
+        knobs=KNOBS,
+    ),
+    "joint_pid": PID(
+        "PID, SIMC tuning with tau_c = theta; in an arm at most twice as fast as the joint",
+        make=partial(make_joint_feedback, kind="pid"),
+        knobs=PID_KNOBS,
+    ),
+    "joint_pid_smooth": PID(
+        "PID, SIMC tuning, closed loop as fast as the plant",
+        make=partial(make_joint_feedback, kind="pid_smooth"),
+        knobs=PID_KNOBS,
+    ),
+    "joint_pid_gravity": PID(
+        "joint_pid with gravity feedforward",
+        make=partial(make_joint_feedback, kind="pid", gravity=True),
+        knobs=PID_KNOBS,
+    ),
+    "joint_pid_ahead": PID(
+        "joint_pid with gravity feedforward and a reference previewed by its own delay",
+        make=partial(PREVIEW, kind="pid"),
+        preview=True,
+        knobs={**PID_KNOBS, **KNOBS},
+    ),
+    "joint_pid_smooth_ahead": PID(
+        "joint_pid_smooth with gravity feedforward and a reference previewed by its own delay",
+        make=partial(PREVIEW, kind="pid_smooth"),
+        preview=True,
+        knobs={**PID_KNOBS, **KNOBS},
+    ),
+}

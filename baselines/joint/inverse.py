@@ -10,21 +10,26 @@ exact only up to the first turn (:mod:`pam_envs.identification.everett_series`).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Answer, beginning, choose
+from baselines.core.controller import Prediction, reset_rows
+from baselines.core.entry import Entry
+from baselines.core.environments import JOINT
 from baselines.core.knobs import AS_DESIGNED, Knobs
 from baselines.joint.gravity import Gravity
 from baselines.joint.hysteresis_rows import JointHysteresisModels
 from baselines.joint.model import JointModel, joint_model
 from baselines.joint.poles import joint_delays
-from baselines.joint.preview import Lookahead, lookahead_for
-from baselines.joint.view import JointSignalMap, make_joint_signal_map
+from baselines.joint.preview import KNOBS, Lookahead, lookahead_for
+from baselines.joint.view import JointSignalMap, JointView, make_joint_signal_map
 from baselines.positioning.nominal import HysteresisState
 from pam_envs.parameters import Signals
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 
 
 @dataclass(frozen=True)
@@ -50,18 +55,19 @@ class JointInverse:
         state: HysteresisState | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
-    ) -> Answer:
+    ) -> Prediction:
         """Return the set-points; see :class:`~baselines.core.controller.Controller`."""
         view, hysteresis_models = self.signals.read(observation), JointHysteresisModels(self.model)
-        begin = beginning(state, episode_start, len(view.angle))
-        if state is None or begin.any():
-            held = view.set_point - self.gravity.shift(view.angle, view.payload)
-            state = choose(begin, hysteresis_models.start(held)[1], state)
+        state = reset_rows(state, episode_start, len(view.angle), lambda: self._start(view))
         shift = self.gravity.shift(view.reference, view.payload)
         found = hysteresis_models.inverse(self.lookahead.wanted(view.samples), state) + shift
         set_point = np.minimum(np.maximum(found, self.model.low), self.model.high)
         after = hysteresis_models.forward(set_point - shift, state)[1]
         return self.signals.write(set_point, observation), after
+
+    def _start(self, view: JointView) -> HysteresisState:
+        held = view.set_point - self.gravity.shift(view.angle, view.payload)
+        return JointHysteresisModels(self.model).start(held)[1]
 
 
 def make_joint_inverse(
@@ -94,3 +100,30 @@ def make_joint_inverse(
     made = make_joint_signal_map(signals, action_signals)
     lookahead = lookahead_for(made, joint_delays(plant) if ahead else None, model.period, knobs)
     return JointInverse(model, made, Gravity(plant if gravity else None), lookahead)
+
+
+INVERSE = partial(
+    Entry,
+    knowledge="nominal model",
+    citation="fluidic_muscles",
+    envs=JOINT,
+    plants=(AntagonisticJoint, RedundantManipulator),
+)
+ENTRIES = {
+    "joint_line": INVERSE(
+        "line between the tips of the loop: hysteresis ignored",
+        make=partial(make_joint_inverse, inverse=0.0),
+    ),
+    "joint_inverse": INVERSE(
+        "exact inverse of the identified hysteresis, without feedback", make=make_joint_inverse
+    ),
+    "joint_inverse_gravity": INVERSE(
+        "joint_inverse with gravity feedforward", make=partial(make_joint_inverse, gravity=True)
+    ),
+    "joint_inverse_ahead": INVERSE(
+        "joint_inverse with gravity feedforward and a reference previewed by its own delay",
+        make=partial(make_joint_inverse, gravity=True, ahead=True),
+        preview=True,
+        knobs=KNOBS,
+    ),
+}

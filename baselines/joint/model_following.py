@@ -19,24 +19,30 @@ applied (:mod:`baselines.joint.loop`).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Answer, Array, beginning, choose
+from baselines.core.controller import Array, Prediction, reset_rows
+from baselines.core.entry import Entry
+from baselines.core.environments import JOINT
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.joint.gravity import Gravity
 from baselines.joint.hysteresis_rows import JointHysteresisModels
 from baselines.joint.loop import DAMPING, JointLoop, LoopState, make_loop
 from baselines.joint.model import JointModel, joint_model
 from baselines.joint.poles import joint_poles
+from baselines.joint.preview import KNOBS as PREVIEW_KNOBS
 from baselines.joint.preview import Lookahead, double_lags, lookahead_for
 from baselines.joint.tracking import ModelLoop, make_model_loop
 from baselines.joint.view import JointSignalMap, JointView, make_joint_signal_map
 from baselines.positioning.nominal import HysteresisState
 from baselines.robust.loops import Kind, robust_controller
 from pam_envs.parameters import Signals
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 
 KNOBS: Bounds = {"damping": (0.5, 1.5), "disturbance": (0.5, 2.0)}
 """On the damping of the model loop and on the bandwidth of the disturbance loop."""
@@ -91,12 +97,10 @@ class ModelFollowing:
         state: FollowingState | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
-    ) -> Answer:
+    ) -> Prediction:
         """Return the set-points; see :class:`~baselines.core.controller.Controller`."""
         view = self.signals.read(observation)
-        begin = beginning(state, episode_start, len(view.angle))
-        if state is None or begin.any():
-            state = choose(begin, self._start(view), state)
+        state = reset_rows(state, episode_start, len(view.angle), lambda: self._start(view))
         shift = self.gravity.shift(view.reference, view.payload)
         wanted = self._wanted(view, state)
         set_point = self._inverse(sum(wanted), state.hysteresis) + shift
@@ -193,3 +197,42 @@ def make_model_following(
         Gravity(plant if gravity else None),
         lookahead_for(made, delays if ahead else None, model.period, knobs),
     )
+
+
+NARROW = 0.7
+"""Width of the mismatched inverse's hysteresis over the identified width."""
+FOLLOWING = partial(
+    Entry,
+    knowledge="nominal model",
+    feedback=True,
+    citation="fluidic_muscles; skoczowski2005; packard1993",
+    envs=JOINT,
+    plants=(AntagonisticJoint, RedundantManipulator),
+    knobs=KNOBS,
+)
+ENTRIES = {
+    "joint_mfc_hinf": FOLLOWING(
+        "model-following control with inverse and H-infinity disturbance loop",
+        make=partial(make_model_following, kind="hinf"),
+    ),
+    "joint_mfc_mu": FOLLOWING(
+        "model-following control with inverse and mu-synthesised disturbance loop: the paper's",
+        make=make_model_following,
+    ),
+    "joint_mfc_mu_plain": FOLLOWING(
+        "joint_mfc_mu without the inverse", make=partial(make_model_following, inverse=0.0)
+    ),
+    "joint_mfc_mu_wrong": FOLLOWING(
+        "joint_mfc_mu with an inverse 30 % too narrow",
+        make=partial(make_model_following, inverse=NARROW),
+    ),
+    "joint_mfc_mu_gravity": FOLLOWING(
+        "joint_mfc_mu with gravity feedforward", make=partial(make_model_following, gravity=True)
+    ),
+    "joint_mfc_mu_ahead": FOLLOWING(
+        "joint_mfc_mu with gravity feedforward and a reference previewed by its own delay",
+        make=partial(make_model_following, gravity=True, ahead=True),
+        preview=True,
+        knobs={**KNOBS, **PREVIEW_KNOBS},
+    ),
+}

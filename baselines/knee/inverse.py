@@ -8,16 +8,19 @@ of the regulator's lag. With a preview it aims at the reference one lag ahead.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Answer, Array, answer, beginning, choose
+from baselines.core.controller import Array, Prediction, encode_action, reset_rows
+from baselines.core.entry import Entry
+from baselines.core.environments import GAIT, KNEE
 from baselines.core.knobs import AS_DESIGNED, Knobs
 from baselines.knee.feedforward import Forward, Kind
 from baselines.knee.nominal import KneeNominal
-from baselines.knee.preview import Ahead, free_tension, make_ahead, tension
+from baselines.knee.preview import KNOBS, Ahead, free_tension, make_ahead, tension
 from baselines.knee.view import Eyes, View, make_eyes
 from baselines.positioning.nominal import HysteresisState
 from pam_envs.parameters import Signal, Signals
@@ -58,17 +61,20 @@ class KneeForward:
         state: ForwardState | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
-    ) -> Answer:
+    ) -> Prediction:
         """Return the set-point; see :class:`~baselines.core.controller.Controller`."""
         view = self.eyes.look(observation)
-        begin = beginning(state, episode_start, len(view.tension))
-        if state is None or begin.any():
-            state = choose(begin, ForwardState(self.forward.start(view.set_point)), state)
+        state = reset_rows(
+            state,
+            episode_start,
+            len(view.tension),
+            lambda: ForwardState(self.forward.start(view.set_point)),
+        )
         pressure = self.forward.pressure(
             self._wanted(view, observation), view.stretch, state.hysteresis
         )
         after = ForwardState(self.forward.move(pressure, state.hysteresis))
-        return answer(self.action_signal, pressure, observation), after
+        return encode_action(self.action_signal, pressure, observation), after
 
     def _wanted(self, view: View, observation: ArrayLike) -> Array:
         free = free_tension(self.eyes, self.ahead, view, observation)
@@ -105,3 +111,32 @@ def make_knee_forward(
     ahead = make_ahead(nominal, signals, eyes, knobs) if preview else None
     signal = action_signals["pressure_set_point"]
     return KneeForward(Forward(nominal, kind), eyes, signal, assist, ahead)
+
+
+FORWARD = partial(Entry, knowledge="nominal model", envs=KNEE, plants=(KneeOrthosis,))
+ENTRIES = {
+    "knee_free": Entry(
+        "inverse for zero torque on the knee: neither assistance nor resistance",
+        "nominal model",
+        partial(make_knee_forward, assist=False),
+        citation="yeh2010",
+        envs=GAIT,
+        plants=(KneeOrthosis,),
+    ),
+    "knee_line": FORWARD(
+        "straight line between the tips of the loop: hysteresis ignored",
+        make=partial(make_knee_forward, kind="line"),
+    ),
+    "knee_inverse": FORWARD(
+        "inverse of the hysteresis at the present reference, as in the paper",
+        make=make_knee_forward,
+        citation="yeh2010",
+    ),
+    "knee_inverse_ahead": FORWARD(
+        "knee_inverse at the reference previewed by one lag of the regulator",
+        make=partial(make_knee_forward, preview=True),
+        preview=True,
+        citation="yeh2010",
+        knobs=KNOBS,
+    ),
+}

@@ -15,16 +15,20 @@ always stance.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Answer, Array, answer, beginning, choose
+from baselines.core.controller import Array, Prediction, encode_action, reset_rows
+from baselines.core.entry import Entry
+from baselines.core.environments import GAIT, KNEE
 from baselines.core.knobs import AS_DESIGNED, Knobs
-from baselines.knee.design import Loop, make_loop, printed_loop
+from baselines.knee.design import KNOBS, Loop, make_loop, printed_loop
 from baselines.knee.feedforward import Forward, Kind
 from baselines.knee.nominal import KneeNominal
+from baselines.knee.preview import KNOBS as PREVIEW_KNOBS
 from baselines.knee.preview import Ahead, free_tension, make_ahead, tension
 from baselines.knee.view import Eyes, View, make_eyes
 from baselines.linear.bumpless import BumplessState
@@ -78,12 +82,10 @@ class KneeLtr:
         state: LtrState | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
-    ) -> Answer:
+    ) -> Prediction:
         """Return the set-point; see :class:`~baselines.core.controller.Controller`."""
         view = self.eyes.look(observation)
-        begin = beginning(state, episode_start, len(view.tension))
-        if state is None or begin.any():
-            state = choose(begin, self._start(view), state)
+        state = reset_rows(state, episode_start, len(view.tension), lambda: self._start(view))
         forward, free = self._forward(view, observation, state.hysteresis)
         stance = forward + self._share(self.tension, view.wanted, view.tension, forward, state[0])
         command, used, angle = stance, forward, state.angle
@@ -98,7 +100,7 @@ class KneeLtr:
             view.wanted, view.tension, command - forward, state.tension, view.stance
         )
         after = LtrState(stance_state, angle, self.forward.move(used, state.hysteresis))
-        return answer(self.action_signal, command, observation), after
+        return encode_action(self.action_signal, command, observation), after
 
     def _forward(
         self, view: View, observation: ArrayLike, hysteresis: HysteresisState
@@ -165,3 +167,49 @@ def make_knee_ltr(
         action_signals["pressure_set_point"],
         make_ahead(nominal, signals, eyes, knobs) if preview else None,
     )
+
+
+LTR = partial(Entry, knowledge="nominal model", feedback=True, envs=KNEE, plants=(KneeOrthosis,))
+ENTRIES = {
+    "knee_ltr": LTR(
+        "loop transfer recovery on the identified plant, about 2 bar",
+        make=partial(make_knee_ltr, forward="nominal"),
+        citation="yeh2010; athans1986; zaccarian2002",
+        knobs=KNOBS,
+    ),
+    "knee_line_ltr": LTR(
+        "knee_ltr with knee_line as feedforward: the share of the gain due to feedforward",
+        make=partial(make_knee_ltr, forward="line"),
+        citation="athans1986; zaccarian2002",
+        knobs=KNOBS,
+    ),
+    "knee_inverse_ltr": LTR(
+        "knee_ltr and knee_inverse: the paper's control system, with compensator gains K = L = 0,"
+        " which satisfy its matrix inequality for a stable plant",
+        make=make_knee_ltr,
+        citation="yeh2010; athans1986; zaccarian2002",
+        knobs=KNOBS,
+    ),
+    "knee_inverse_ahead_ltr": LTR(
+        "knee_inverse_ltr, its feedforward previewed by one lag of the regulator",
+        make=partial(make_knee_ltr, preview=True),
+        preview=True,
+        citation="yeh2010; athans1986; zaccarian2002",
+        knobs={**KNOBS, **PREVIEW_KNOBS},
+    ),
+    "knee_inverse_ltr_bumpy": Entry(
+        "knee_inverse_ltr without compensators: each loop integrates off-line, clamped in charge",
+        "nominal model",
+        partial(make_knee_ltr, bumpless=False),
+        feedback=True,
+        citation="yeh2010; athans1986",
+        envs=GAIT,
+        plants=(KneeOrthosis,),
+    ),
+    "knee_printed": LTR(
+        "knee_inverse_ltr with the printed tension controller (11) and compensator; for"
+        ' dynamics="measured" (1.1 % on its sine), limit cycles on plants with the regulator\'s lag',
+        make=partial(make_knee_ltr, printed=True),
+        citation="yeh2010",
+    ),
+}

@@ -14,12 +14,14 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Answer, answer, beginning, choose
+from baselines.core.controller import Prediction, encode_action, reset_rows
+from baselines.core.entry import Entry
+from baselines.core.environments import KNEE
 from baselines.core.knobs import AS_DESIGNED, Knobs
 from baselines.knee.nominal import KneeNominal
 from baselines.knee.published import printed_plant
 from baselines.knee.view import Eyes, make_eyes
-from baselines.linear.simc import WAIT, simc_rule
+from baselines.linear.simc import PI_KNOBS, WAIT, simc_rule
 from baselines.positioning.pid import Gains, PidState, pid_start, pid_step
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
@@ -75,16 +77,19 @@ class KneePid:
         state: PidState | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
-    ) -> Answer:
+    ) -> Prediction:
         """Return the PI's set-point; see :class:`~baselines.core.controller.Controller`."""
         view = self.eyes.look(observation)
-        begin = beginning(state, episode_start, len(view.tension))
-        if state is None or begin.any():
-            state = choose(begin, pid_start(view.set_point, view.tension), state)
+        state = reset_rows(
+            state,
+            episode_start,
+            len(view.tension),
+            lambda: pid_start(view.set_point, view.tension),
+        )
         low, high = self.action_signal.low, self.action_signal.high
         error = view.wanted - view.tension
         output, after = pid_step(self.gains, state, error, view.tension, low, high, self.period)
-        return answer(self.action_signal, output, observation), after
+        return encode_action(self.action_signal, output, observation), after
 
 
 def make_knee_pid(
@@ -101,3 +106,17 @@ def make_knee_pid(
         action_signals["pressure_set_point"],
         plant.control_period,
     )
+
+
+ENTRIES = {
+    "knee_pid": Entry(
+        "PI of the tension, SIMC tuning",
+        "nominal model",
+        make_knee_pid,
+        feedback=True,
+        citation="skogestad2003",
+        envs=KNEE,
+        plants=(KneeOrthosis,),
+        knobs=PI_KNOBS,
+    ),
+}

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Reader, reader
+from baselines.core.controller import Array, Reader, preview_names, reader
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.knee.nominal import KneeNominal
 from baselines.knee.view import Eyes, View
-from baselines.positioning.inverse import preview_count, preview_weights
+from baselines.positioning.inverse import preview_weights
 from pam_envs.parameters import Signals
 
 KNOBS: Bounds = {"lead": (0.25, 4.0)}
@@ -63,20 +63,16 @@ def make_ahead(
     nominal: KneeNominal, signals: Signals, eyes: Eyes, knobs: Knobs = AS_DESIGNED
 ) -> Ahead:
     """Return what looks ahead by the regulator's lag and half a control period."""
-    samples = preview_count(signals)
+    samples = len(preview_names("reference", signals)) - 1
     delay = nominal.plant.regulator.time_constant + 0.5 * nominal.plant.control_period
     spacing = signals["reference_1"].ahead if samples else 0.0
     return Ahead(
         nominal,
-        reader(signals, _previews("reference", samples)),
-        reader(signals, _previews("angle_reference", samples)) if eyes.gait else None,
+        reader(signals, preview_names("reference", signals)),
+        reader(signals, preview_names("angle_reference", signals)) if eyes.gait else None,
         preview_weights(samples, spacing, knob(knobs, "lead") * delay),
         eyes.stiffness,
     )
-
-
-def _previews(name: str, samples: int) -> list[str]:
-    return [name, *(f"{name}_{i + 1}" for i in range(samples))]
 
 
 def tension(ahead: Ahead | None, view: View, observation: ArrayLike) -> Array:

@@ -14,9 +14,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from baselines.core.controller import Answer, Array, beginning, choose, reader
+from baselines.core.controller import Array, Prediction, reader, reset_rows
+from baselines.core.entry import Entry
+from baselines.core.environments import ARM
 from pam_envs.mechanics.redundancy import LIMIT, Resolution, UnreachablePose, resolve
 from pam_envs.mechanics.serial_chain import SerialChain
 from pam_envs.parameters import Signals
@@ -86,30 +88,29 @@ class InverseKinematics:
         state: PlanState | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
-    ) -> Answer:
+    ) -> Prediction:
         """Return the action for an observation, and the state (see ``Controller.predict``)."""
         poses, sensed = self._wanted.rows(observation).T, self._sensed.rows(observation).T
-        begin = beginning(state, episode_start, len(poses))
-        after = self.plan(poses, choose(begin, self.begin(sensed), state), begin)
+        state = reset_rows(state, episode_start, len(poses), lambda: self.initial_state(sensed))
+        after = self.plan(poses, state)
         action = (self._gain * after.angles + self._offset).astype(np.float32)
         return (action if np.ndim(observation) == 2 else action[0]), after
 
-    def begin(self, sensed: Array) -> PlanState:
-        """Return the state of rows that begin at sensed angles [rad], shape (rows, n)."""
+    def initial_state(self, sensed: Array) -> PlanState:
+        """Return the state at sensed angles [rad], shape (rows, n)."""
         edge = INSIDE * self.limit
         rows = len(sensed)
         return PlanState(np.clip(sensed, -edge, edge), np.zeros((rows, 5)), np.zeros(rows))
 
-    def plan(self, poses: Array, state: PlanState, begin: NDArray[np.bool_]) -> PlanState:
-        """Return the state with set-points for poses (rows, 6); ``begin``: rows without a past."""
+    def plan(self, poses: Array, state: PlanState) -> PlanState:
+        """Return the state with set-points for poses, shape (rows, 6)."""
         angles, multipliers, missed = (np.array(part) for part in state)
         for i, pose in enumerate(poses):
-            given = None if begin[i] else multipliers[i]
             if not np.any(pose[3:]):
                 missed[i] += 1
                 continue
             try:
-                found = self._resolve(pose, angles[i], given)
+                found = self._resolve(pose, angles[i], multipliers[i])
             except UnreachablePose:
                 missed[i] += 1
                 continue
@@ -125,6 +126,18 @@ def make_inverse_kinematics(
 ) -> InverseKinematics:
     """Return the controller for the chain and the range of angles of a nominal arm."""
     return InverseKinematics(plant.chain, signals, action_signals, plant.angle_range[1])
+
+
+ENTRIES = {
+    "joint_inverse_kinematics": Entry(
+        "set-points for the desired pose of the tool, resolved in each period; no inverse",
+        "nominal model",
+        make_inverse_kinematics,
+        citation="fluidic_muscles",
+        envs=ARM,
+        plants=(RedundantManipulator,),
+    ),
+}
 
 
 @dataclass(frozen=True)

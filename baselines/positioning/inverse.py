@@ -20,13 +20,22 @@ the aim as soon as the travel to it takes ``EARLY`` times what is left of the ti
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Answer, Array, Reader, answer, beginning, choose, reader
+from baselines.core.controller import (
+    Array,
+    Prediction,
+    Reader,
+    encode_action,
+    preview_names,
+    reader,
+    reset_rows,
+)
+from baselines.core.entry import Entry
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.positioning.nominal import HysteresisState, Nominal
 from pam_envs.parameters import Signal, Signals
@@ -79,11 +88,6 @@ def preview_weights(samples: int, spacing: float, ahead: float) -> Array:
     return np.array([np.interp(ahead, nodes, row) for row in np.eye(samples + 1)])
 
 
-def preview_count(signals: Signals) -> int:
-    """Return how many preview samples an observation has."""
-    return sum(name.startswith("reference_") for name in signals.names())
-
-
 @dataclass(frozen=True)
 class Inverse:
     """Exact inverse of the nominal muscle; see this module's page.
@@ -120,22 +124,18 @@ class Inverse:
         state: InverseState | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
-    ) -> Answer:
+    ) -> Prediction:
         """Return the inverse's set-point; see :class:`~baselines.core.controller.Controller`."""
         measured = self.reader.rows(observation)
-        now = self.begin(measured, state, episode_start)
-        set_point = self.feed_forward(measured, now)
-        return answer(self.action_signal, set_point, observation), self.move(
-            now, set_point, measured[2]
+        now = reset_rows(
+            state, episode_start, measured.shape[1], lambda: self.initial_state(measured)
         )
+        set_point = self.feed_forward(measured, now)
+        after = self.advance(now, set_point, measured[2])
+        return encode_action(self.action_signal, set_point, observation), after
 
-    def begin(
-        self, measured: Array, state: InverseState | None, episode_start: ArrayLike | None
-    ) -> InverseState:
-        """Return the state, new in rows that begin an episode."""
-        begin = beginning(state, episode_start, measured.shape[1])
-        if state is not None and not begin.any():
-            return state
+    def initial_state(self, measured: Array) -> InverseState:
+        """Return the state that explains first measurements, rows as in ``reader``."""
         contraction, pressure, load = measured[:3]
         hysteresis: Any = None
         for muscle, rows in self.nominal.groups(load):
@@ -144,7 +144,7 @@ class Inverse:
         drive = np.empty(len(load))
         for muscle, rows in self.nominal.groups(load):
             drive[rows] = muscle.felt(pressure[rows], _taken(hysteresis, rows))[0]
-        return choose(begin, InverseState(pressure, drive, hysteresis), state)
+        return InverseState(pressure, drive, hysteresis)
 
     def feed_forward(self, measured: Array, now: InverseState) -> Array:
         """Return the set-point [Pa], shape (n_env,), that the reference needs."""
@@ -169,7 +169,7 @@ class Inverse:
         last = len(aims) - 1 - np.argmax(due[::-1], axis=0)
         return np.asarray(wanted[last, np.arange(len(load))])
 
-    def move(self, now: InverseState, set_point: Array, load: Array) -> InverseState:
+    def advance(self, now: InverseState, set_point: Array, load: Array) -> InverseState:
         """Return the nominal muscle's state one control period on."""
         pressure = self.nominal.next_pressure(now.pressure, set_point)
         drive = np.empty(len(load))
@@ -228,19 +228,38 @@ def make_inverse(
         Of ``KNOBS``: factors on the horizon, on the lead that goes with it, and on ``EARLY``.
     """
     nominal = Nominal(plant)
-    samples = preview_count(signals) if preview else 0
+    references = preview_names("reference", signals) if preview else ["reference"]
+    samples = len(references) - 1
     horizon = knob(knobs, "horizon") * horizon
     delay = plant.regulator.dead_time + horizon + nominal.mechanical_lag
     lead, early = knob(knobs, "lead") * delay, knob(knobs, "early") * EARLY
-    names = ["contraction", "set_point", "load", "reference"]
-    names += [f"reference_{i + 1}" for i in range(samples)]
     spacing = signals["reference_1"].ahead if samples else 0.0
     aims, due = aims_of(samples, spacing, lead, early)
     return Inverse(
         nominal,
-        reader(signals, names),
+        reader(signals, ["contraction", "set_point", "load", *references]),
         action_signals["pressure_set_point"],
         aims,
         due,
         horizon,
     )
+
+
+INVERSE = partial(
+    Entry,
+    knowledge="nominal model",
+    citation="krejci2001; mayergoyz1991",
+    plants=(SingleMuscle,),
+)
+ENTRIES = {
+    "inverse_no_preview": INVERSE(
+        "exact inverse of hysteresis, static law and regulator at the present reference",
+        make=partial(make_inverse, preview=False),
+    ),
+    "inverse": INVERSE(
+        "exact inverse of hysteresis, static law and regulator, with preview of dead time and lag",
+        make=make_inverse,
+        preview=True,
+        knobs=KNOBS,
+    ),
+}

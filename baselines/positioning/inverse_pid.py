@@ -12,13 +12,14 @@ chapter 5.)
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Answer, Array, answer, beginning, choose
+from baselines.core.controller import Array, Prediction, encode_action, reset_rows
+from baselines.core.entry import Entry
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs
 from baselines.linear.simc import PID_KNOBS
 from baselines.positioning.inverse import HORIZON, Inverse, InverseState, make_inverse
@@ -73,10 +74,12 @@ class InversePid:
         state: InversePidState | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
-    ) -> Answer:
+    ) -> Prediction:
         """Return the sum's set-point; see :class:`~baselines.core.controller.Controller`."""
         measured = self.inverse.reader.rows(observation)
-        now = self._begin(measured, state, episode_start)
+        now = reset_rows(
+            state, episode_start, measured.shape[1], lambda: self._initial_state(measured)
+        )
         contraction, load = measured[0], measured[2]
         forward = self.inverse.feed_forward(measured, now.inverse)
         whole, part = self._delay
@@ -91,25 +94,19 @@ class InversePid:
             signal.high - forward,
             self.inverse.nominal.plant.control_period,
         )
-        inverse = self.inverse.move(now.inverse, forward, load)
+        inverse = self.inverse.advance(now.inverse, forward, load)
         newest = self._at_rest(inverse, load)[:, None]
         after = InversePidState(inverse, pid, np.hstack([newest, now.expected[:, :-1]]))
-        return answer(signal, forward + correction, observation), after
+        return encode_action(signal, forward + correction, observation), after
 
-    def _begin(
-        self, measured: Array, state: InversePidState | None, episode_start: ArrayLike | None
-    ) -> InversePidState:
-        begin = beginning(state, episode_start, measured.shape[1])
-        if state is not None and not begin.any():
-            return state
-        inverse = self.inverse.begin(measured, None, None)
+    def _initial_state(self, measured: Array) -> InversePidState:
+        inverse = self.inverse.initial_state(measured)
         expected = self._at_rest(inverse, measured[2])
-        fresh = InversePidState(
+        return InversePidState(
             inverse,
             pid_start(np.zeros_like(expected), measured[0] - expected),
             np.repeat(expected[:, None], self._delay[0] + 2, axis=1),
         )
-        return choose(begin, fresh, state)
 
     def _at_rest(self, state: InverseState, load: Array) -> Array:
         """Return the nominal contraction at rest [m], shape (n_env,)."""
@@ -131,3 +128,24 @@ def make_inverse_pid(
     """Return the controller; the parameters are those of ``make_inverse`` and ``make_pid``."""
     inverse = make_inverse(plant, signals, action_signals, preview, horizon, knobs)
     return InversePid(inverse, simc(plant, knobs=knobs) if gains is None else gains)
+
+
+INVERSE_PID = partial(
+    Entry,
+    knowledge="nominal model",
+    feedback=True,
+    citation="krejci2001; mayergoyz1991; skogestad2003",
+    plants=(SingleMuscle,),
+)
+ENTRIES = {
+    "inverse_pid_no_preview": INVERSE_PID(
+        "inverse_no_preview, and a PID on the deviation from the nominal muscle",
+        make=partial(make_inverse_pid, preview=False),
+    ),
+    "inverse_pid": INVERSE_PID(
+        "inverse, and a PID on the deviation from the nominal muscle",
+        make=make_inverse_pid,
+        preview=True,
+        knobs=KNOBS,
+    ),
+}

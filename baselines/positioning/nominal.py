@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.core.controller import Array, by_load
+from baselines.core.controller import Array, group_by_load
 from baselines.positioning.contraction_tables import LOADS
 from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.protocol import Rows, RowsState, operator_of
@@ -119,7 +119,7 @@ class Nominal:
 
     def groups(self, load: Array) -> Iterator[tuple[LoadedMuscle, Any]]:
         """Yield each load's plant with the index of its rows."""
-        for key, rows in by_load(load):
+        for key, rows in group_by_load(load):
             yield self.at(key), rows
 
     # --- constants of the motion ------------------------------------------------------------

@@ -22,7 +22,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Answer, Array, Reader, answer, beginning, choose, reader
+from baselines.core.controller import (
+    Array,
+    Prediction,
+    Reader,
+    encode_action,
+    reader,
+    reset_rows,
+)
+from baselines.core.entry import Entry
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.linear.simc import PID_KNOBS, WAIT, simc_rule
 from baselines.positioning.nominal import Nominal
@@ -182,12 +190,12 @@ class Pid:
         state: PidState | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
-    ) -> Answer:
+    ) -> Prediction:
         """Return the PID's set-point; see :class:`~baselines.core.controller.Controller`."""
         contraction, pressure, set_point, reference = self.reader.rows(observation)
-        begin = beginning(state, episode_start, len(contraction))
-        if state is None or begin.any():
-            state = choose(begin, pid_start(set_point, contraction), state)
+        state = reset_rows(
+            state, episode_start, len(contraction), lambda: pid_start(set_point, contraction)
+        )
         signal = self.action_signal
         output, after = pid_step(
             self.gains,
@@ -198,7 +206,7 @@ class Pid:
             np.minimum(pressure + self.reach, signal.high),
             self.period,
         )
-        return answer(signal, output, observation), after
+        return encode_action(signal, output, observation), after
 
 
 def make_pid(
@@ -220,3 +228,16 @@ def make_pid(
         plant.control_period,
         reach=knob(knobs, "reach") * REACH * law.slew_rate * (law.dead_time + law.time_constant),
     )
+
+
+ENTRIES = {
+    "pid": Entry(
+        "PID on the present error, SIMC tuning",
+        "nominal model",
+        make_pid,
+        feedback=True,
+        citation="skogestad2003",
+        plants=(SingleMuscle,),
+        knobs=KNOBS,
+    ),
+}

@@ -1,47 +1,62 @@
-"""Open-loop positioning with one pressure curve for each load and branch.
+"""Open-loop positioning from measured tables: one pressure curve for each load and branch.
 
-The method of positioning2021: the controller holds curves p(contraction), one for inflation and
-one for deflation at each load, and sends the regulator what the curve of the present branch says
-for the present reference (``baselines.positioning.branch`` decides which one). Nothing is measured
-after the start.
+The method of positioning2021: curves p(contraction), one for inflation and one for deflation at
+each load; the set-point is the curve of the present branch (:mod:`baselines.positioning.branch`) at
+the present reference. Nothing is measured after the start. The curves are
 
-The curves here interpolate the readings (monotone piecewise cubics through the means), which has
-no fitting error; ``baselines.positioning.plc_polynomial`` uses the cubics that the paper programs.
+- monotone piecewise cubics through the mean readings, without fitting error ("table");
+- the six published cubics (Eqs. 7 to 12) exactly as printed ("plc_as_printed"): some coefficients
+  were truncated in print (0.00399 became 0.003 in Eq. 11), so that at 4.55 kg the pressure is up to
+  2.6 bar wrong;
+- the same cubics refitted to Table 6 in full precision, with its one wrong entry (4.55 kg,
+  inflation, 2 mm) replaced by the value of Table 5 ("plc_refitted");
+- one cubic a load for both branches ("one_cubic"), and a straight line a load ("linear"): without
+  hysteresis.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from baselines.core.controller import (
-    Answer,
     Array,
+    Prediction,
     Reader,
-    answer,
-    beginning,
-    by_load,
-    choose,
+    encode_action,
+    group_by_load,
     reader,
+    reset_rows,
 )
+from baselines.core.entry import Entry
 from baselines.positioning.branch import DEAD_BAND, Branch, first_branch, next_branch
-from baselines.positioning.contraction_tables import ContractionInverse, pchip_inverse
+from baselines.positioning.contraction_tables import (
+    LOADS,
+    ContractionInverse,
+    one_cubic_inverse,
+    pchip_inverse,
+    published_inverse,
+    table_6_inverse,
+)
+from pam_envs.data.tables import load_contraction_table
 from pam_envs.parameters import Signal, Signals
 
 LOWEST, HIGHEST = -0.01, 0.02
-"""Contractions [m] between which a curve is looked up; beyond, its ends hold."""
+"""Range of contractions [m] of the look-up tables; the end values hold beyond."""
 SPACING = 2e-6
-"""Spacing [m] at which a curve is looked up; what lies between is straight, to 0.02 Pa."""
+"""Spacing [m] of the look-up tables; linear interpolation between is exact to 0.02 Pa."""
 
 
 @dataclass(frozen=True)
 class TwoBranch:
     """Curve of the present branch at the present reference.
 
-    A load's two curves are written into a look-up table when that load is first met.
+    The two curves of a load are tabulated when that load first occurs.
 
     Attributes
     ----------
@@ -65,49 +80,112 @@ class TwoBranch:
         state: Branch | None = None,
         episode_start: ArrayLike | None = None,
         deterministic: bool = True,
-    ) -> Answer:
-        """Return the curve's set-point; see :class:`~baselines.core.controller.Controller`."""
+    ) -> Prediction:
+        """Return the set-point; see :class:`~baselines.core.controller.Controller`."""
         contraction, load, reference = self.reader.rows(observation)
-        begin = beginning(state, episode_start, len(load))
-        if state is None or begin.any():
-            state = choose(begin, first_branch(reference, contraction), state)
+        state = reset_rows(
+            state, episode_start, len(load), lambda: first_branch(reference, contraction)
+        )
         branch = next_branch(state, reference, self.dead_band)
         pressure = np.empty(len(load))
-        for key, rows in by_load(load):
-            grid, inflation, deflation = self._curves_at(key)
+        for key, rows in group_by_load(load):
+            grid, inflation, deflation = self._tabulated(key)
             up = np.interp(reference[rows], grid, inflation)
             down = np.interp(reference[rows], grid, deflation)
             pressure[rows] = np.where(branch.inflating[rows], up, down)
-        return answer(self.action_signal, pressure, observation), branch
+        return encode_action(self.action_signal, pressure, observation), branch
 
     @cached_property
-    def _met(self) -> dict[float, tuple[Array, Array, Array]]:
+    def _tables(self) -> dict[float, tuple[Array, Array, Array]]:
         return {}
 
-    def _curves_at(self, load: float) -> tuple[Array, Array, Array]:
+    def _tabulated(self, load: float) -> tuple[Array, Array, Array]:
         """Return contractions [m] and the pressures [Pa] of inflation and deflation at a load."""
-        if load not in self._met:
+        if load not in self._tables:
             grid = np.arange(LOWEST, HIGHEST + 0.5 * SPACING, SPACING)
             up, down = (self.curves.pressure(grid, inflating, load) for inflating in (True, False))
-            self._met[load] = grid, up, down
-        return self._met[load]
+            self._tables[load] = grid, up, down
+        return self._tables[load]
 
 
-def make_two_branch(
-    curves: ContractionInverse,
+@dataclass(frozen=True)
+class Line:
+    """``set_point = slope * reference``: straight line through the end points of a table.
+
+    Attributes
+    ----------
+    reader : Reader
+        Of load and reference.
+    action_signal : Signal
+    loads : tuple of float
+        Loads [kg] of the tables.
+    slopes : tuple of float
+        Pressure over contraction [Pa/m] at each; that of the nearest load applies.
+    """
+
+    reader: Reader
+    action_signal: Signal
+    loads: tuple[float, ...]
+    slopes: tuple[float, ...]
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: Any = None,
+        episode_start: ArrayLike | None = None,
+        deterministic: bool = True,
+    ) -> Prediction:
+        """Return the set-point; see :class:`~baselines.core.controller.Controller`."""
+        load, reference = self.reader.rows(observation)
+        nearest = np.abs(load[:, None] - np.array(self.loads)).argmin(axis=1)
+        value = np.array(self.slopes)[nearest] * reference
+        return encode_action(self.action_signal, value, observation), None
+
+
+def make_table_inverse(
+    _plant: Any,
     signals: Signals,
     action_signals: Signals,
-    dead_band: float = DEAD_BAND,
+    curves: Callable[[], ContractionInverse] = pchip_inverse,
 ) -> TwoBranch:
-    """Return the controller for any inverse curves."""
-    return TwoBranch(
-        curves,
-        reader(signals, ["contraction", "load", "reference"]),
+    """Return the controller for inverse curves; the default interpolates the readings."""
+    names = ["contraction", "load", "reference"]
+    return TwoBranch(curves(), reader(signals, names), action_signals["pressure_set_point"])
+
+
+def make_linear(_plant: Any, signals: Signals, action_signals: Signals) -> Line:
+    """Return the straight line from (0, 0) to the mean contraction at the highest pressure."""
+    table = load_contraction_table()
+    ends = [(p[-1], x[-1].mean()) for p, x in (table.branch(load, True) for load in LOADS)]
+    return Line(
+        reader(signals, ["load", "reference"]),
         action_signals["pressure_set_point"],
-        dead_band,
+        LOADS,
+        tuple(float(p / x) for p, x in ends),
     )
 
 
-def make_table_inverse(signals: Signals, action_signals: Signals) -> TwoBranch:
-    """Return the controller that interpolates the published readings."""
-    return make_two_branch(pchip_inverse(), signals, action_signals)
+TABLES = partial(Entry, knowledge="tables", citation="positioning2021")
+ENTRIES = {
+    "linear": Entry(
+        "straight line through the end points of the table at the nearest load",
+        "tables",
+        make_linear,
+    ),
+    "one_cubic": TABLES(
+        "one cubic a load for both branches: hysteresis ignored",
+        make=partial(make_table_inverse, curves=one_cubic_inverse),
+    ),
+    "plc_as_printed": TABLES(
+        "the paper's Equations 7-12 exactly as printed, misprints included",
+        make=partial(make_table_inverse, curves=published_inverse),
+    ),
+    "plc_refitted": TABLES(
+        "the paper's cubics refitted to its Table 6 at full precision",
+        make=partial(make_table_inverse, curves=table_6_inverse),
+    ),
+    "table": TABLES(
+        "monotone interpolation of the tables' means, a curve for each load and branch",
+        make=make_table_inverse,
+    ),
+}

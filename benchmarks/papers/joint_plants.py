@@ -52,7 +52,7 @@ def plant_run(joint: AntagonisticJoint, name: str, size: float) -> Array:
     """
     import gymnasium
 
-    from baselines.joint.catalogue import JOINT_MAKERS
+    from baselines.core.catalogue import make_controller
     from benchmarks.runs.rollout import run
 
     joint = joint.without_noise()
@@ -65,7 +65,7 @@ def plant_run(joint: AntagonisticJoint, name: str, size: float) -> Array:
         start="straight",
         episode_seconds=PERIOD * len(reference),
     ).unwrapped
-    controller = JOINT_MAKERS[name](joint, env.signals, env.action_signals)
+    controller = make_controller(name, joint, env.signals, env.action_signals)
     return np.concatenate([[0.0], run(env, controller, 0).signals["output"]])
 
 

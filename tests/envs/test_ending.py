@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from baselines.joint.catalogue import JOINT_MAKERS
+from baselines.core.catalogue import make_controller
 from benchmarks.runs.rollout import run
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
@@ -61,7 +61,7 @@ def test_a_crash_is_worse_than_doing_nothing_and_control_is_better(
     assert infos[-1]["margin/angle"] < 0.0
     nothing, _ = rewards(env, 0.0)
     assert len(nothing) == PERIODS
-    pid = JOINT_MAKERS["joint_pid"](plant, env.signals, env.action_signals)
+    pid = make_controller("joint_pid", plant, env.signals, env.action_signals)
     signals = run(env, pid, 0).signals
     controlled = sum(signals[key] for key in signals if key.startswith("reward/"))
     assert len(controlled) == PERIODS

@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from baselines.core.entry import Entry
+from baselines.trivial import make_zero
 from benchmarks.__main__ import main
 from benchmarks.board import cite
 from benchmarks.runs.controllers import available
@@ -116,7 +117,7 @@ def test_a_row_is_cited_with_what_runs_it_again(
 def test_the_author_is_the_one_that_the_catalogue_names(
     track: ScenarioSet, folder: Any, capsys: pytest.CaptureFixture[str], monkeypatch: Any
 ) -> None:
-    entry = Entry("with an integrator", "nominal model", author="Doe, J. and Roe, R.")
+    entry = Entry("with an integrator", "nominal model", make_zero, author="Doe, J. and Roe, R.")
     monkeypatch.setitem(bench_fakes.CONTROLLERS, "integral", entry)
     (path,) = score(track, folder, "integral").rows
     assert main(["cite", str(path)]) == 0

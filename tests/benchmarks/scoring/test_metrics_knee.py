@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from baselines.positioning.trivial import Constant
+from baselines.trivial import Constant
 from benchmarks.runs import rollout, rows
 from benchmarks.scenarios.scenario import ScenarioSet, available
 from benchmarks.scoring import knee as metrics_knee
@@ -100,7 +100,7 @@ def test_a_sample_in_which_sensor_and_truth_disagree_moves_no_score(seen: float)
 
 def test_a_valve_that_is_open_is_no_help_to_the_wearer() -> None:
     env: Any = gym.make("PAM/KneeWalk-v0", start="heel_contact", episode_seconds=16.0).unwrapped
-    full = Constant(env.action_signals["pressure_set_point"], 4.5e5)
+    full = Constant(tuple(env.action_signals), (4.5e5,))
     made = rollout.run(env, full, 0).signals
     window = (made["time"] > 5.0) & (made["time"] < 15.0 + 0.5 * PERIOD)
     ratios = metrics_knee.emg(made, window, PERIOD, "walk")

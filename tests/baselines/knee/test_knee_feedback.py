@@ -14,7 +14,7 @@ from baselines.linear.systems import LinearSystem
 from benchmarks.scoring.knee import landings
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from tests.baselines.conftest import built
-from tests.baselines.knee_runs import make_knee, quiet, run, walked
+from tests.baselines.knee.knee_runs import make_knee, quiet, run, walked
 
 CASES = [
     (mounting, hysteresis, output)

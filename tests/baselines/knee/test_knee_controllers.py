@@ -5,65 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.core.catalogue import PUBLISHED, make_controller
-from baselines.knee.catalogue import KNEE, KNEE_CONTROLLERS, KNEE_MAKERS
-from pam_envs.plants.single_muscle.plant import SingleMuscle
-from tests.baselines.conftest import built, check_form, observations_of
-from tests.baselines.knee_runs import make_knee, quiet, run
-
-PAIRS = [
-    (env.split("/")[1].split("-")[0], name)
-    for name, entry in PUBLISHED.items()
-    for env in entry.envs
-    if env in KNEE
-]
-
-
-def test_catalogue_and_makers_name_the_same():
-    assert set(KNEE_CONTROLLERS) == set(KNEE_MAKERS)
-
-
-@pytest.mark.parametrize("normalize", [True, False])
-@pytest.mark.parametrize(("family", "name"), PAIRS)
-def test_action_is_in_the_space_and_has_the_form_of_the_observation(family, name, normalize):
-    env = make_knee(family, normalize=normalize)
-    check_form(built(name, env), env)
-
-
-@pytest.mark.parametrize(("family", "name"), [p for p in PAIRS if p[1] != "random"])
-def test_rows_of_a_batch_are_single_runs(family, name):
-    env = make_knee(family)
-    controller = built(name, env)
-    seen = observations_of(env, steps=31, rows=3)
-    state, together = None, []
-    for observation in seen:
-        action, state = controller.predict(observation, state)
-        together.append(action[:, 0])
-    for row in range(3):
-        state, alone = None, []
-        for observation in seen[:, row]:
-            action, state = controller.predict(observation, state)
-            alone.append(action[0])
-        np.testing.assert_array_equal(np.array(together)[:, row], alone)
-
-
-@pytest.mark.parametrize("name", ["knee_inverse_ltr", "knee_ltr", "knee_pid"])
-def test_a_row_that_begins_anew_forgets(name):
-    env = make_knee("KneeWalk")
-    controller = built(name, env)
-    first = np.array([env.reset(seed=s)[0] for s in (0, 1)])
-    later = np.array([env.step(np.array([0.5], np.float32))[0]] * 2)
-    begun, state = controller.predict(first)
-    _, state = controller.predict(later, state)
-    again, _ = controller.predict(first, state, np.array([True, False]))
-    assert again[0] == begun[0]
-    assert again[1] != begun[1]
-
-
-def test_a_plant_of_another_family_is_refused():
-    env = make_knee("KneeTension")
-    with pytest.raises(ValueError, match="knee_pid is for a KneeOrthosis"):
-        make_controller("knee_pid", SingleMuscle.mas10(), env.signals, env.action_signals)
+from tests.baselines.conftest import built
+from tests.baselines.knee.knee_runs import make_knee, quiet, run
 
 
 @pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach", "none"])

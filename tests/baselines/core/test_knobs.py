@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 import pam_envs  # noqa: F401  registers the ids
-from baselines.core import catalogue, tuned
+from baselines.core import tuned
 from baselines.core.catalogue import CONTROLLERS, PUBLISHED, make_controller
 from baselines.joint import model as joint_model
 from baselines.joint.tracking import make_model_loop
@@ -155,7 +155,7 @@ def test_elbow():
 @pytest.mark.parametrize(
     ("name", "knobs", "message"),
     [
-        ("pid", {"reach": 5.0}, r"pid: knob reach is 5.0, and goes from 0.67 to 2; give"),
+        ("pid", {"reach": 5.0}, r"pid: knob reach is 5.0, outside 0.67 to 2; give"),
         ("pid", {"reech": 1.0}, r"pid has no knob 'reech'; choose from closed_loop_time"),
         ("pid", {"reach": float("nan")}, r"knob reach is nan"),
         ("table", {"reach": 1.0}, r"table has no knob 'reach'; it has none"),
@@ -203,7 +203,7 @@ def test_an_entry_is_the_published_controller_with_its_knobs(monkeypatch, tmp_pa
     entry = tuned.entries(PUBLISHED, read)["pid_tuned"]
     assert entry.citation == PUBLISHED["pid"].citation and entry.trials == 20
     assert not entry.knobs and "closed_loop_time, reach" in entry.summary
-    monkeypatch.setattr(catalogue, "TUNED", read)
+    monkeypatch.setitem(CONTROLLERS, "pid_tuned", entry)
     env = made_env("PAM/MusclePositioning-v0")
     assert object_digest(built("pid_tuned", env)) == object_digest(built("pid", env, **FOUND.knobs))
 
@@ -219,7 +219,7 @@ def test_names_tell_environments_apart():
     ("change", "message"),
     [
         ({"knobs": {"reach": 9.0}}, "knob reach is 9.0"),
-        ({"controller": "pyd"}, "is of pyd in PAM/MusclePositioning-v0; name it pyd_tuned"),
+        ({"controller": "pyd"}, "belongs to pyd in PAM/MusclePositioning-v0; name it pyd_tuned"),
         ({"env": "PAM/KneeWalk-v0"}, "name it pid_tuned_walk"),
         ({"more": 1}, "unexpected keyword argument 'more'; search again"),
     ],
@@ -233,5 +233,5 @@ def test_a_file_that_is_not_as_a_search_writes_it_is_refused(tmp_path, change, m
 def test_another_schema_is_refused(tmp_path):
     file = tmp_path / "tuned.yaml"
     file.write_text("schema: 2\n")
-    with pytest.raises(ValueError, match="not of schema 1; take the one of the last commit"):
+    with pytest.raises(ValueError, match="not of schema 1; restore the file of the last commit"):
         tuned.read(file)

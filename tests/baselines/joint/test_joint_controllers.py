@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import copy
-
 import numpy as np
 import pytest
 
-from baselines.core.catalogue import CONTROLLERS, make_controller
-from baselines.joint.catalogue import ARM, JOINT, JOINT_CONTROLLERS, JOINT_MAKERS
+from baselines.core.catalogue import PUBLISHED, make_controller
+from baselines.core.environments import JOINT
 from baselines.joint.gravity import Gravity
 from baselines.joint.poles import FREQUENCIES, phase
 from baselines.joint.view import make_joint_signal_map
@@ -27,9 +25,9 @@ from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 
-BOUND = [n for n in JOINT_CONTROLLERS if n.endswith(("_gravity", "_ahead", "_kinematics"))]
-"""Need a plant that knows its weight, or its chain."""
-NAMES = [name for name in JOINT_CONTROLLERS if name not in BOUND]
+BOUND = ("_gravity", "_ahead", "_kinematics")
+"""Suffixes of controllers that need the weight or the chain of the plant."""
+NAMES = [n for n, e in PUBLISHED.items() if JOINT[0] in e.envs and not n.endswith(BOUND)]
 RIG = ReducedRig()
 
 
@@ -41,60 +39,13 @@ def _two(name):
     names = ["angle_0", "angle_1", "set_point_0", "set_point_1"]
     names += ["joint_reference_0", "joint_reference_1"]
     actions = _signals(["angle_set_point_0", "angle_set_point_1"], True)
-    made = JOINT_MAKERS[name](RIG, _signals(names), actions)
+    made = PUBLISHED[name].make(RIG, _signals(names), actions)
     return made, actions
 
 
 def _observations(rows=3, steps=40):
     draw = np.random.default_rng(1)
     return RANGE * draw.uniform(-1.0, 1.0, (steps, rows, 3))
-
-
-def _arrays(state):
-    if isinstance(state, tuple):
-        return [a for part in state for a in _arrays(part)]
-    return [] if state is None else [state]
-
-
-def test_catalogue_and_makers_name_the_same():
-    assert set(JOINT_CONTROLLERS) == set(JOINT_MAKERS)
-    for name, entry in JOINT_CONTROLLERS.items():
-        assert CONTROLLERS[name] is entry
-        assert entry.envs == (ARM if name == "joint_inverse_kinematics" else JOINT)
-        assert entry.summary
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_rows_of_a_batch_are_single_runs(name):
-    made, seen = controller(name, RIG), _observations()
-    together, state = [], None
-    for batch in seen:
-        action, state = made.predict(batch, state)
-        assert action.shape == (3, 1) and action.dtype == np.float32
-        assert np.all(np.abs(action) <= np.float32(RANGE))
-        together.append(action[:, 0])
-    rows = (0,) if name == "joint_random" else range(3)
-    for row in rows:
-        state = None
-        for k, batch in enumerate(seen):
-            action, state = made.predict(batch[row], state)
-            assert action.shape == (1,)
-            assert action[0] == together[k][row]
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_row_that_begins_anew_forgets_and_the_callers_state_stays(name):
-    made, seen, state = controller(name, RIG), _observations(), None
-    for batch in seen[:20]:
-        _, state = made.predict(batch, state)
-    before = copy.deepcopy(_arrays(state))
-    action, _ = made.predict(seen[20], state, np.array([False, True, False]))
-    kept, _ = made.predict(seen[20], state)
-    fresh, _ = made.predict(seen[20])
-    np.testing.assert_array_equal(action[[0, 2]], kept[[0, 2]])
-    assert action[1] == fresh[1]
-    for old, now in zip(before, _arrays(state), strict=True):
-        np.testing.assert_array_equal(old, now)
 
 
 @pytest.mark.parametrize("name", [n for n in NAMES if n != "joint_random"])
@@ -113,29 +64,6 @@ SETUPS = {
     JOINT[0]: (AntagonisticJoint.paper, antagonistic_joint.make_setup),
     JOINT[1]: (RedundantManipulator.paper, redundant_manipulator.make_setup),
 }
-
-
-@pytest.mark.parametrize(
-    ("name", "env"), [(n, e) for n in BOUND for e in JOINT_CONTROLLERS[n].envs]
-)
-def test_rows_are_single_runs_on_the_plants_themselves_whatever_is_observed(name, env):
-    plant, setup = SETUPS[env][0](), SETUPS[env][1]()
-    made = make_controller(name, plant, setup.signals, setup.action_signals)
-    seen = np.random.default_rng(3).uniform(-1.0, 1.0, (6, 2, len(setup.signals))).astype("f4")
-    state, alone = None, [None, None]
-    for batch in seen:
-        actions, state = made.predict(batch, state)
-        assert actions.shape == (2, plant.stages) and np.all(np.abs(actions) <= 1.0)
-        for i, row in enumerate(batch):
-            action, alone[i] = made.predict(row, alone[i])
-            np.testing.assert_array_equal(action, actions[i])
-
-
-def test_joint_without_a_chain_has_no_inverse_kinematics():
-    setup = antagonistic_joint.make_setup()
-    with pytest.raises(ValueError, match="is for a RedundantManipulator"):
-        told = (setup.signals, setup.action_signals)
-        make_controller("joint_inverse_kinematics", AntagonisticJoint.paper(), *told)
 
 
 def test_arm_without_a_plan_is_refused_and_the_remedy_named():

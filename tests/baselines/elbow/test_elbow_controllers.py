@@ -9,16 +9,13 @@ import numpy as np
 import pytest
 
 import pam_envs  # noqa: F401  registers the ids
-from baselines.core.catalogue import PUBLISHED, make_controller
-from baselines.elbow.catalogue import ELBOW, ELBOW_CONTROLLERS, ELBOW_MAKERS
+from baselines.core.catalogue import make_controller
 from baselines.elbow.friction import make_elbow_friction
 from baselines.elbow.torque_stiffness import Allocation
 from baselines.elbow.valves import make_pressure_loop
 from baselines.elbow.view import make_elbow_signal_map
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
-from pam_envs.plants.single_muscle.plant import SingleMuscle
 
-NAMES = [name for name, entry in PUBLISHED.items() if set(ELBOW) & set(entry.envs)]
 VALVES = ("proportional", "on_off")
 PROMPT = {"regulator.time_constant": 2e-3, "regulator.slew_rate": 1e9}
 
@@ -60,50 +57,6 @@ def rms(record: dict[str, np.ndarray], what: str = "torque") -> float:
     return float(np.sqrt(np.mean(off[50:] ** 2)))
 
 
-def test_catalogue_and_makers_name_the_same():
-    assert set(ELBOW_CONTROLLERS) == set(ELBOW_MAKERS) == set(NAMES)
-
-
-@pytest.mark.parametrize("valves", VALVES)
-@pytest.mark.parametrize("normalize", [True, False])
-@pytest.mark.parametrize("name", NAMES)
-def test_action_is_in_the_space_and_has_the_form_of_the_observation(name, normalize, valves):
-    env = make_env(normalize=normalize, valves=valves)
-    controller = built(name, env)
-    batch = np.array([env.reset(seed=s)[0] for s in range(3)])
-    for observation, shape in ((batch[0], (2,)), (batch, (3, 2))):
-        state = None
-        for _ in range(3):
-            action, state = controller.predict(observation, state)
-            assert action.shape == shape
-            assert action.dtype == np.float32
-            assert all(row in env.action_space for row in action.reshape(-1, 2))
-
-
-@pytest.mark.parametrize("valves", VALVES)
-@pytest.mark.parametrize("name", [name for name in NAMES if name != "elbow_random"])
-def test_rows_of_a_batch_are_single_runs_and_forget_alone(name, valves):
-    env = make_env(valves=valves, hysteresis="preisach")
-    controller = built(name, env)
-    seen = []
-    for row in range(3):
-        seen.append([env.reset(seed=row)[0]])
-        for k in range(20):
-            action = np.array([np.sin(0.3 * k + row), np.cos(0.2 * k)], np.float32)
-            seen[-1].append(env.step(action)[0])
-    state, together = None, []
-    for k, observation in enumerate(np.array(seen).swapaxes(0, 1)):
-        start = np.array([k in (0, 9), k == 0, k == 0])
-        action, state = controller.predict(observation, state, start)
-        together.append(action)
-    for row in range(3):
-        state, alone = None, []
-        for k, observation in enumerate(seen[row]):
-            action, state = controller.predict(observation, state, row == 0 and k == 9)
-            alone.append(action)
-        np.testing.assert_array_equal(np.array(together)[:, row], alone)
-
-
 def test_random_draws_each_bundle_by_itself_and_by_its_seed():
     env = make_env()
     observation = env.reset(seed=0)[0]
@@ -117,10 +70,7 @@ def test_random_draws_each_bundle_by_itself_and_by_its_seed():
     assert not np.intersect1d(first, other).size
 
 
-def test_plants_and_actions_of_other_kinds_are_refused():
-    env = make_env()
-    with pytest.raises(ValueError, match="elbow_pid is for a ElbowOrthosis"):
-        make_controller("elbow_pid", SingleMuscle.mas10(), env.signals, env.action_signals)
+def test_actions_of_another_kind_are_refused():
     other = make_env(action="torque_stiffness")
     with pytest.raises(ValueError, match="make the environment with action='pressures'"):
         built("elbow_allocation", other)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from baselines.joint.catalogue import JOINT_CONTROLLERS
 from baselines.joint.feedback import (
     make_joint_feedback,
     pid_delay,
@@ -101,8 +100,3 @@ def test_sine_is_followed_without_the_delay():
         made = make_joint_feedback(RIG, SIGNALS, ACTIONS, kind=kind, ahead=True)
         alone = make_joint_feedback(RIG, SIGNALS, ACTIONS, kind=kind)
         assert _error(made) < 0.1 * _error(alone)
-
-
-def test_catalogue_says_who_reads_previews():
-    for name, entry in JOINT_CONTROLLERS.items():
-        assert entry.preview == name.endswith("_ahead")

@@ -1,0 +1,136 @@
+"""Catalogue: names, plants, and controllers added from outside the package."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from baselines.core import catalogue
+from baselines.core.catalogue import CONTROLLERS, PUBLISHED, load, make_controller, register
+from baselines.core.checks import check_controller
+from benchmarks.runs import controllers as benchmarked
+from pam_envs import citations
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from pam_envs.plants.single_muscle.plant import SingleMuscle
+from tests.baselines.conftest import built, make_env, observations_of, rollout
+
+TOY = '''
+from dataclasses import dataclass
+
+import numpy as np
+
+from baselines.core.controller import Reader, encode_action, reader, reset_rows
+from baselines.core.entry import Entry
+from pam_envs.parameters import Signal
+
+
+@dataclass(frozen=True)
+class Integrator:
+    """Integral control of the contraction."""
+
+    reader: Reader
+    action_signal: Signal
+    gain: float
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        contraction, set_point, reference = self.reader.rows(observation)
+        state = reset_rows(state, episode_start, len(contraction), lambda: (set_point,))
+        command = state[0] + self.gain * (reference - contraction)
+        return encode_action(self.action_signal, command, observation), (command,)
+
+
+def make(plant, signals, action_signals, knobs=()):
+    names = ["contraction", "set_point", "reference"]
+    gain = dict(knobs).get("gain", 1.0) * 2e6
+    return Integrator(reader(signals, names), action_signals["pressure_set_point"], gain)
+
+
+ENTRIES = {
+    "toy_integrator": Entry("integral", "nothing", make, feedback=True, knobs={"gain": (0.5, 2.0)})
+}
+'''
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "toy.py").write_text(TOY)
+    for catalogued in (CONTROLLERS, PUBLISHED):
+        monkeypatch.setitem(catalogued, "toy_integrator", None)  # restores the absence afterwards
+        del catalogued["toy_integrator"]
+    return tmp_path
+
+
+def test_controller_in_a_folder_outside_joins_the_catalogue_the_battery_and_the_benchmark(folder):
+    assert load(folder) == ["toy_integrator"]
+    env = make_env(load=2.55, reference="staircase", episode_seconds=3.0)
+    toy = built("toy_integrator", env)
+    check_controller(toy, observations_of(env, steps=8, rows=3), env.action_signals)
+    record = rollout(env, toy)
+    assert abs(record["output"] - record["reference"]).mean() < abs(record["reference"]).mean()
+    told = (env.plant, env.signals, env.action_signals)
+    assert make_controller("toy_integrator", *told, knobs={"gain": 2.0}).gain == 4e6
+    assert benchmarked.find("toy_integrator").runs_in("PAM/MusclePositioning-v0")
+    with pytest.raises(ValueError, match="'toy_integrator' is registered already"):
+        load(folder)
+
+
+def test_environment_variable_names_folders_of_controllers(folder):
+    program = (
+        "from baselines.core.catalogue import CONTROLLERS; print('toy_integrator' in CONTROLLERS)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, catalogue.VARIABLE: str(folder)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == "True"
+
+
+def test_folder_without_controllers_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="no Python file with ENTRIES"):
+        load(tmp_path)
+
+
+def test_registered_names_are_unique():
+    with pytest.raises(ValueError, match="'pid' is registered already; choose another name"):
+        register("pid", PUBLISHED["pid"])
+
+
+def test_catalogue_is_imported_without_python_control_and_cvxpy():
+    program = "import sys, baselines.core.catalogue; print({'control', 'cvxpy'} & set(sys.modules))"
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "set()"
+
+
+def test_unknown_name_lists_the_known_ones():
+    with pytest.raises(ValueError, match="inverse_pid"):
+        built("pdi", make_env())
+
+
+@pytest.mark.parametrize(
+    ("name", "plant", "message"),
+    [
+        ("knee_pid", SingleMuscle.mas10(), "knee_pid is for a KneeOrthosis"),
+        ("elbow_pid", SingleMuscle.mas10(), "elbow_pid is for a ElbowOrthosis"),
+        ("joint_pi", SingleMuscle.mas10(), "for a AntagonisticJoint or RedundantManipulator"),
+        ("joint_inverse_kinematics", AntagonisticJoint.paper(), "is for a RedundantManipulator"),
+    ],
+)
+def test_plant_of_another_family_is_refused(name, plant, message):
+    env = make_env()
+    with pytest.raises(ValueError, match=message):
+        make_controller(name, plant, env.signals, env.action_signals)
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_citation_consists_of_keys_of_references(name):
+    for key in filter(None, CONTROLLERS[name].citation.split("; ")):
+        assert key in citations.entries()
