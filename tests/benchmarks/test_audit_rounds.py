@@ -253,7 +253,7 @@ def test_a_policy_needs_the_agents_that_answer_and_the_controller_that_it_correc
     names = [{file.relative_to(controllers.ROOT).as_posix() for file in part} for part in found]
     assert {f"agents/{name}" for name in NEEDED} < names[0]
     assert all(name.startswith("agents/") for name in names[0])
-    assert [part for part in names[1:] if "baselines/positioning/trivial.py" in part] == names[1:]
+    assert [part for part in names[1:] if "baselines/trivial.py" in part] == names[1:]
     assert len(names) == 1 + (kind == "residual")
 
 
