@@ -150,7 +150,10 @@ def test_a_course_scores_as_the_board_does_and_turns_the_knobs(short):
     ("arguments", "message"),
     [
         ({"controller": "table"}, "table has no knobs; choose from elbow_allocation, "),
-        ({"controller": "pyd"}, "pyd is no controller of the catalogue; choose from elbow_allocation"),
+        (
+            {"controller": "pyd"},
+            "pyd is no controller of the catalogue; choose from elbow_allocation",
+        ),
         ({"controller": "knee_pid"}, "runs in several environments; give --env as one of PAM/Kn"),
         ({"controller": "pid", "env": "KneeWalk-v0"}, "runs not in KneeWalk-v0; give --env as"),
         ({"controller": "pid", "trials": 0}, "trials = 0 must be at least 1"),
