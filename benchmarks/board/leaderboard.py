@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.board import accessors as views
-from benchmarks.board import plots
+from benchmarks.board import plots, standings
 from benchmarks.board import summary as board_summary
 from benchmarks.board.format import number, table
 from benchmarks.board.tables import Column, track_page, with_costs
@@ -17,7 +17,6 @@ from benchmarks.identity import audit, verified
 from benchmarks.runs import controllers, rows
 from benchmarks.runs.rows import Row, shown
 from benchmarks.runs.store import write_text
-from benchmarks.scoring import standings
 
 BOARD = Path(__file__).parents[1] / "LEADERBOARD.md"
 

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.board import leaderboard, plots, site_data
+from benchmarks.board import leaderboard, plots, site_data, standings
 from benchmarks.identity.hashing import plain
 from benchmarks.runs import rows
 from benchmarks.runs.rows import Row
 from benchmarks.runs.store import read_json, write_text
-from benchmarks.scoring import standings
 
 ASSETS = Path(__file__).parent / "site_assets"
 OUT = Path(__file__).parents[1] / "site"

@@ -8,18 +8,17 @@ from typing import Any
 import numpy as np
 
 from benchmarks.board import accessors as views
-from benchmarks.board import cite
+from benchmarks.board import cite, claims, standings
 from benchmarks.board import summary as board_summary
 from benchmarks.board import tables as board_tables
+from benchmarks.board.claims import Claim
 from benchmarks.board.format import percent
 from benchmarks.board.leaderboard import columns_of
+from benchmarks.board.standings import Changes, Listing, Track
 from benchmarks.board.tables import Column, with_costs
 from benchmarks.identity import audit
 from benchmarks.runs.rows import Row, shown
 from benchmarks.runs.store import CHECKSUM
-from benchmarks.scoring import claims, standings
-from benchmarks.scoring.claims import Claim
-from benchmarks.scoring.standings import Changes, Listing, Track
 from benchmarks.scoring.statistics import Interval
 
 GROUPS = {

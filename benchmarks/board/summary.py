@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from benchmarks.board import accessors as views
+from benchmarks.board import claims, standings
+from benchmarks.board.claims import Claim
 from benchmarks.board.format import (
     bounded,
     chance,
@@ -16,10 +18,8 @@ from benchmarks.board.format import (
     percent,
     table,
 )
+from benchmarks.board.standings import Changes, Track
 from benchmarks.runs.rows import Row, shown
-from benchmarks.scoring import claims, standings
-from benchmarks.scoring.claims import Claim
-from benchmarks.scoring.standings import Changes, Track
 
 Tracks = Mapping[str, Track]
 

@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from benchmarks.board import accessors as views
+from benchmarks.board import claims, standings
+from benchmarks.board.claims import Claim
 from benchmarks.board.format import bounded, chance, folded, linked, number, signed, table
+from benchmarks.board.standings import Listing
 from benchmarks.board.summary import plain_verdict
 from benchmarks.runs.rows import Row, shown
-from benchmarks.scoring import claims, standings
-from benchmarks.scoring.claims import Claim
 from benchmarks.scoring.metrics import headline_of
-from benchmarks.scoring.standings import Listing
 
 Column = tuple[str, str, float]
 """Metric, heading and factor from SI."""

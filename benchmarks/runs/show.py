@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.board import plots
 from benchmarks.runs import controllers, rollout
 from benchmarks.runs.cells import make_env
+from benchmarks.runs.episode_plot import episode_figure
 from benchmarks.scoring import metrics
 
 
@@ -140,5 +140,5 @@ def draw(
 ) -> None:
     """Write the figure of an episode, its output in a unit of that factor from SI."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure = plots.episode_figure(episode.signals, set_points, title, shown)
+    figure = episode_figure(episode.signals, set_points, title, shown)
     figure.savefig(path, dpi=150)

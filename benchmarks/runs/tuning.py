@@ -45,8 +45,7 @@ from benchmarks.runs.store import write_text
 from benchmarks.scenarios import scenario as scenarios
 from benchmarks.scenarios.scenario import ScenarioSet
 from benchmarks.scenarios.scenario_env import make_env, model_of
-from benchmarks.scoring.claims import COST_FLOOR, COST_RATIO, COSTS
-from benchmarks.scoring.metrics import headline_of
+from benchmarks.scoring.metrics import COST_FLOOR, COST_RATIO, COSTS, headline_of
 from pam_envs.envs.registration import full_id
 from sweeps.progress import Start
 

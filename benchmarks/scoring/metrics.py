@@ -41,6 +41,18 @@ GROUPS: dict[str, dict[str, str]] = {
 }
 """What a track may be scored by beside ``METRICS``, by the names that its file gives."""
 
+COST_RATIO = 1.1
+"""Largest ratio of effort or constraint cost to the paper controller's, of a better controller."""
+COST_FLOOR = {"constraint_cost": 1e-3}
+"""Costs that count as none: a thousandth of a scale at all times."""
+COSTS = {
+    "emg_ratio": "EMG ratio",
+    "pressure_travel": "pressure travel",
+    "air_use": "air",
+    "constraint_cost": "constraint cost",
+}
+"""Metrics that count as the costs of a lower error, where a track has them."""
+
 
 def of_track(content: Mapping[str, Any]) -> dict[str, str]:
     """Return the metrics and units of a track from the content of its scenario file."""

@@ -8,10 +8,9 @@ from pathlib import Path
 import bench_fakes
 
 from benchmarks.board import accessors as views
-from benchmarks.board import leaderboard, site_build
+from benchmarks.board import leaderboard, site_build, standings
 from benchmarks.identity import verified
 from benchmarks.runs.store import CHECKSUM, read_json
-from benchmarks.scoring import standings
 from tests.benchmarks.row_helpers import commit, draw, place, run_row
 
 

@@ -11,13 +11,12 @@ import board_fakes as fakes
 import pytest
 
 from benchmarks.board import accessors as views
-from benchmarks.board import leaderboard, plots
+from benchmarks.board import claims, leaderboard, plots, standings
 from benchmarks.board.format import duration, number, table
 from benchmarks.board.tables import with_costs
 from benchmarks.identity import audit, verified
 from benchmarks.runs import cells, rows
 from benchmarks.runs.controllers import available, find
-from benchmarks.scoring import claims, standings
 from benchmarks.scoring.metrics import of_track
 
 

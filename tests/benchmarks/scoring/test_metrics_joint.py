@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 import pam_envs  # noqa: F401 (registers)
+from benchmarks.board import standings
 from benchmarks.board.leaderboard import columns_of
 from benchmarks.runs import rollout, rows
 from benchmarks.scenarios.scenario import ScenarioSet, available
 from benchmarks.scenarios.scenario_env import make_env
 from benchmarks.scoring import joint as metrics_joint
-from benchmarks.scoring import metrics, standings
+from benchmarks.scoring import metrics
 
 PERIOD = 0.01
 N = 1000

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from benchmarks.board import accessors as views
+from benchmarks.board import claims, standings
 from benchmarks.board import summary as board_summary
 from benchmarks.runs import knowledge
-from benchmarks.scoring import claims, standings
 
 TEN = np.linspace(0.4e-3, 0.6e-3, 10)
 PAPER = fakes.row("inverse", 1e-3, audit=1e-3, constraint_cost=0.01, air_use=1e-5)

@@ -7,28 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from benchmarks.board import accessors as views
+from benchmarks.board import standings
 from benchmarks.runs import knowledge
 from benchmarks.runs.rows import Row
-from benchmarks.scoring import standings
-from benchmarks.scoring.metrics import of_track
+from benchmarks.scoring.metrics import COST_FLOOR, COST_RATIO, COSTS, of_track
 from benchmarks.scoring.statistics import NOTHING, Interval
 
 CLAIM_SEEDS = 10
 """Training seeds that a claim needs."""
 PROBABILITY, LOWER_BOUND = 0.95, 0.5
 """What the probability of improvement has to exceed, and its lower 95 % bound."""
-COST_RATIO = 1.1
-"""By how much effort and constraint cost may exceed the paper controller's."""
-COST_FLOOR = {"constraint_cost": 1e-3}
-"""Costs below which there is nothing to compare: a thousandth of a scale, all the time."""
-COSTS = {
-    "emg_ratio": "EMG ratio",
-    "pressure_travel": "pressure travel",
-    "air_use": "air",
-    "constraint_cost": "constraint cost",
-}
-"""Metrics that a lower error must not be bought with, where a track has them."""
-
 BETTER, DEARER, NOT_SHOWN = "better", "better error, higher cost", "not shown to be better"
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.board import accessors as views
-from benchmarks.scoring import standings
+from benchmarks.board import standings
 
 
 def places(rows: list[dict]) -> dict[str, str]:
