@@ -13,7 +13,7 @@ import tyro
 from benchmarks.runs import controllers, rows
 from benchmarks.scenarios import scenario as scenarios
 from pam_envs.envs.registration import full_id
-from sweeps.command_line import answered
+from sweeps.command_line import run_cli
 from sweeps.progress import progress
 
 Positional = tyro.conf.Positional
@@ -457,7 +457,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
 def main(arguments: list[str] | None = None) -> int:
     """Run a command and return the exit code; a wrong argument is one sentence, no traceback."""
     ask = tyro.extras.subcommand_cli_from_dict
-    return answered(
+    return run_cli(
         lambda: ask(COMMANDS, prog="python -m benchmarks", args=arguments),
         "interrupted; what was done is kept: the same command goes on",
     )

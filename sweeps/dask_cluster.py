@@ -1,7 +1,7 @@
 """Tasks on a running Dask cluster.
 
-Dask is spoken to directly. Its joblib backend waits for ever where a task has no result: its
-worker died too often, or cannot import what it is given (joblib 1.6).
+This uses Dask's own client: its joblib backend waits for ever for a task without a result, whose
+worker died too often or cannot import its code (joblib 1.6).
 """
 
 from __future__ import annotations
@@ -19,18 +19,17 @@ from sweeps.engine import Act, Done, Task
 from sweeps.worker import do_in_cluster
 
 SECONDS = 10.0
-"""How long the scheduler has for its first answer."""
+"""Timeout of the first connection."""
 
 LOOK = 5.0
-"""Seconds without a result after which the scheduler is asked whether anybody works."""
+"""Seconds without a result after which the number of workers is checked."""
 
 
 def run(act: Act, tasks: Mapping[str, Task], address: str) -> Iterator[Done]:
-    """Do tasks on the workers of the scheduler at ``address``.
+    """Execute tasks on the workers of the scheduler at ``address``.
 
-    Dask gives the tasks of a lost worker to others, and gives a task up when several workers have
-    died with it. Where that are more than one, a task may only have been beside the one that did
-    it: each is tried again, alone.
+    Dask assigns the tasks of a lost worker to others, and abandons a task after several workers
+    died with it. Of several abandoned tasks one may be the cause: each is tried again, alone.
 
     Raises
     ------
@@ -39,7 +38,7 @@ def run(act: Act, tasks: Mapping[str, Task], address: str) -> Iterator[Done]:
     """
     with _client(address) as client:
         workers = _Workers(client, address)
-        workers.look()
+        workers.check()
         given_up = []
         for done in _round(client, act, tasks, workers):
             if done.lost:
@@ -63,36 +62,32 @@ def _client(address: str) -> Client:
 
 
 class _Workers:
-    """Says so, once, where nobody is there to do anything.
-
-    Dask waits for a worker without a word. That is right for a cluster that grows by itself, and
-    for ever where every ``dask worker`` has ended.
-    """
+    """Reports once that the cluster has no worker, since Dask waits for one in silence."""
 
     def __init__(self, client: Client, address: str) -> None:
-        self.client, self.address, self.told = client, address, False
+        self.client, self.address, self.reported = client, address, False
 
-    def look(self) -> None:
-        with suppress(OSError):  # the futures tell when the scheduler is gone
+    def check(self) -> None:
+        with suppress(OSError):  # the futures report a lost scheduler
             alone = not self.client.nthreads()
-            if alone and not self.told:
+            if alone and not self.reported:
                 print(
                     f"no worker is at {self.address}; waiting for one: `dask worker "
-                    f"{self.address}` in a checkout adds one (Ctrl-C ends this, and what was done "
-                    "is kept)",
+                    f"{self.address}` in a checkout adds one (Ctrl-C ends this; finished results "
+                    "are kept)",
                     file=sys.stderr,
                 )
-            self.told = alone
+            self.reported = alone
 
 
 def _round(
     client: Client, act: Act, tasks: Mapping[str, Task], workers: _Workers
 ) -> Iterator[Done]:
-    """Return what became of tasks, as they are done.
+    """Yield the outcomes of tasks in order of completion.
 
-    Each is followed to its value, and not only to its end: a worker that dies in between takes the
-    value with it, and the task is done again. ``as_completed`` forgets one that then fails, and
-    one whose value is on its way when the scheduler goes (distributed 2026.8).
+    Each task is awaited to its value: a worker that dies after the task's end takes the value with
+    it, and the task is executed again. ``as_completed`` loses a task that then fails, and one whose
+    value is in transit when the scheduler ends (distributed 2026.8).
     """
     found: SimpleQueue[Done | None] = SimpleQueue()
 
@@ -120,9 +115,9 @@ def _next(found: SimpleQueue[Done | None], workers: _Workers) -> Done | None:
         try:
             done = found.get(timeout=LOOK)
         except Empty:
-            workers.look()
+            workers.check()
         else:
-            workers.told = False
+            workers.reported = False
             return done
 
 

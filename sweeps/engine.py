@@ -1,9 +1,9 @@
-"""Run many tasks, and lose nothing when a worker is lost.
+"""Execution of many independent tasks that survives the loss of any worker.
 
 A task is anything that pickles and has a ``key``, the digest of all that its result depends on.
-Workers compute and hand back; only the caller keeps results, so that no half-written file, no
-orphan and no cluster without a common disk can do harm. What a caller has kept is its checkpoint:
-it asks again for the tasks that are missing, and gets the same bits.
+Workers return results, and the caller alone stores them, so a killed worker leaves no partial file
+and a cluster needs no common disk. Stored results are the checkpoint: the caller asks again for
+the missing tasks, and gets the same bits.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ BACKENDS = ("loky", "dask")
 
 
 class Task(Protocol):
-    """Something to do."""
+    """A unit of work."""
 
     @property
     def key(self) -> str:
@@ -25,22 +25,22 @@ class Task(Protocol):
 
 
 Act = Callable[[Any], Any]
-"""What is done with a task in a worker: a function of a module that workers can import."""
+"""Executes a task in a worker: a function of a module that workers can import."""
 
 
 @dataclass(frozen=True)
 class Done:
-    """What became of a task.
+    """Outcome of a task.
 
     Attributes
     ----------
     key : str
     value : object
-        What the function returned.
+        Return value of the function.
     error : str, optional
-        Why there is no value.
+        Reason for a missing value.
     lost : bool
-        Whether that is because its workers died.
+        Whether the reason is that its workers died.
     """
 
     key: str
@@ -51,16 +51,16 @@ class Done:
 
 @dataclass(frozen=True)
 class Cluster:
-    """Where to compute.
+    """Backend of the computation.
 
     Attributes
     ----------
     jobs : int
-        Processes of this machine; 1 computes in this one. A Dask cluster has its own number.
+        Processes of this machine; 1 computes in the calling process. Ignored by a Dask cluster.
     backend : {"loky", "dask"}
         Processes of this machine, or a running Dask cluster.
     address : str
-        Of the Dask scheduler, like ``tcp://host:8786``.
+        Of the Dask scheduler, for example ``tcp://host:8786``.
     """
 
     jobs: int = 1
@@ -68,7 +68,7 @@ class Cluster:
     address: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be meant."""
+        """Refuse contradictory arguments."""
         if self.backend not in BACKENDS:
             raise ValueError(
                 f"backend = {self.backend!r}; choose {' or '.join(map(repr, BACKENDS))}"
@@ -83,17 +83,17 @@ class Cluster:
 
 
 def run(act: Act, tasks: Iterable[Task], cluster: Cluster) -> Iterator[Done]:
-    """Do all tasks and return them as they are done, in any order.
+    """Execute all tasks and yield their outcomes in order of completion.
 
-    An exception in ``act`` is that task's error. A task whose worker dies is done again; one
-    whose worker dies every time is an error, too.
+    An exception in ``act`` is the task's error. A task whose worker dies is executed again, and
+    is an error if its worker dies every time.
 
     Parameters
     ----------
     act : callable
-        Does one task.
+        Executes one task.
     tasks : iterable
-        With keys of their own.
+        With distinct keys.
     cluster : Cluster
     """
     named = {task.key: task for task in tasks}

@@ -1,8 +1,8 @@
-"""Tasks on processes of this machine, with joblib's loky.
+"""Tasks on processes of this machine, with joblib's loky backend.
 
-When a process dies (killed, out of memory, a crash), joblib ends its whole pool. The tasks that
-were being done then are done again, each alone: those that are innocent succeed, and one that
-kills its process every time is known by name. The others go on together.
+When a process dies (killed, out of memory, a crash), joblib ends its whole pool. The tasks that it
+had handed out are then executed again, each alone, which identifies a task that kills its process
+every time. The others continue together.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ from sweeps.engine import Act, Done, Task
 from sweeps.worker import do, starter
 
 ATTEMPTS = 3
-"""How often a process may die of one task."""
+"""Attempts at a task whose process dies."""
 
 
 def run(act: Act, tasks: Mapping[str, Task], jobs: int) -> Iterator[Done]:
-    """Do tasks on ``jobs`` processes."""
+    """Execute tasks on ``jobs`` processes."""
     left = dict(tasks)
     while left:
-        begun: list[str] = []
-        for done in _round(act, left, jobs, begun):
+        started: list[str] = []
+        for done in _round(act, left, jobs, started):
             left.pop(done.key)
             yield done
-        for key in [key for key in begun if key in left]:
+        for key in [key for key in started if key in left]:
             yield _alone(act, key, left.pop(key), jobs)
 
 
@@ -36,14 +36,14 @@ def _alone(act: Act, key: str, task: Task, jobs: int) -> Done:
     return Done(key, error=text, lost=True)
 
 
-def _round(act: Act, tasks: Mapping[str, Task], jobs: int, begun: list[str]) -> Iterator[Done]:
-    """Do tasks until all are done or a process dies; ``begun`` gets those that were handed out."""
+def _round(act: Act, tasks: Mapping[str, Task], jobs: int, started: list[str]) -> Iterator[Done]:
+    """Execute tasks until all are done or a process dies; ``started`` gets their keys."""
     from joblib import Parallel, delayed, parallel_config
     from joblib.externals.loky.process_executor import BrokenProcessPool
 
     def handed_out() -> Iterator[tuple]:
         for key, task in list(tasks.items()):
-            begun.append(key)
+            started.append(key)
             yield delayed(do)(act, task, key)
 
     start, arguments = starter()

@@ -1,10 +1,11 @@
-"""What a sweep says while it runs: a bar on a terminal, now and then a line elsewhere."""
+"""Progress of long work: a bar on a terminal, a line a minute elsewhere."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Protocol
 
 from rich.console import Console
 from rich.progress import (
@@ -20,12 +21,21 @@ from rich.text import Text
 
 LINE_SECONDS = 60.0
 
-Advance = Callable[[], None]
-Start = Callable[[int], Advance]
+
+class Advance(Protocol):
+    """Counts what was done, and shows a note beside it."""
+
+    def __call__(self, count: int = 1, note: str = "") -> None:
+        """Count ``count`` more."""
+        ...
+
+
+Start = Callable[..., Advance]
+"""``start(total, done=0)`` begins the count at ``done`` and returns what advances it."""
 
 
 def left(elapsed: float | None, done: float, total: float | None) -> str:
-    """Return the time that is left, at the rate since the beginning: ``about 1:02:03``."""
+    """Return the remaining time at the mean rate so far: ``about 1:02:03``."""
     if elapsed is None or not done or total is None:
         return "?"
     seconds = round(elapsed / done * (total - done))
@@ -33,20 +43,22 @@ def left(elapsed: float | None, done: float, total: float | None) -> str:
 
 
 class _Left(ProgressColumn):
-    """Rich's own column looks at the last half minute, in which a long task advances nothing."""
+    """Remaining time; Rich's own column uses the last 30 s, too few for long tasks."""
 
     def render(self, task: Task) -> Text:
-        return Text(left(task.elapsed, task.completed, task.total))
+        before = task.fields["before"]
+        total = None if task.total is None else task.total - before
+        return Text(left(task.elapsed, task.completed - before, total) + task.fields["note"])
 
 
 @contextmanager
 def progress(title: str, console: Console | None = None) -> Iterator[Start]:
-    """Show how many tasks are done and the time left, and hand out what starts the count.
+    """Show the share done and the remaining time, and yield the function that starts the count.
 
     Parameters
     ----------
     title : str
-        What the tasks are, in the plural.
+        Name of the tasks, in the plural.
     console : Console, optional
         Standard error by default.
     """
@@ -61,24 +73,31 @@ def progress(title: str, console: Console | None = None) -> Iterator[Start]:
     )
     with Progress(*columns, console=out, disable=not out.is_terminal) as bar:
 
-        def start(total: int) -> Advance:
-            task = bar.add_task(title, total=total)
-            return (lambda: bar.advance(task)) if out.is_terminal else _lines(title, total, out)
+        def start(total: int, done: int = 0) -> Advance:
+            if not out.is_terminal:
+                return _lines(title, total, out, done)
+            task = bar.add_task(title, total=total, completed=done, before=done, note="")
+
+            def advance(count: int = 1, note: str = "") -> None:
+                bar.update(task, advance=count, note=note)
+
+            return advance
 
         yield start
 
 
-def _lines(title: str, total: int, out: Console) -> Advance:
-    """Return what counts, and says so in a line from time to time."""
+def _lines(title: str, total: int, out: Console, done: int = 0) -> Advance:
+    """Return a counter that prints a line from time to time and at the end."""
     began = said = time.monotonic()
-    done = 0
+    before = done
 
-    def advance() -> None:
+    def advance(count: int = 1, note: str = "") -> None:
         nonlocal done, said
-        done += 1
+        done += count
         now = time.monotonic()
         if now - said >= LINE_SECONDS or done == total:
             said = now
-            out.print(f"{title}: {done} of {total}, left: {left(now - began, done, total)}")
+            rest = left(now - began, done - before, total - before)
+            out.print(f"{title}: {done:,} of {total:,}, left: {rest}{note}")
 
     return advance

@@ -1,4 +1,4 @@
-"""What runs in a worker."""
+"""Execution of a task in a worker process."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ from typing import Any
 from sweeps.engine import Act, Done, Task
 
 LOOK = 0.25
-"""Seconds between two looks at whether somebody still waits for the result."""
+"""Seconds between two checks that the driver is alive."""
 
-_alone = threading.Lock()
+_one_at_a_time = threading.Lock()
 
 
 def do(act: Act, task: Task, key: str) -> Done:
-    """Do a task; an exception is returned as a sentence.
+    """Execute a task; an exception becomes the error of the result.
 
-    A worker that has other sources or packages than the caller, or another kind of processor where
-    that is part of a task's key, would give another result. It has another key for the task, and
-    gives none.
+    A worker with other sources or packages than the caller, or another type of processor where the
+    key depends on it, computes another key for the task and refuses it.
     """
     try:
         if task.key != key:
@@ -36,25 +35,24 @@ def do(act: Act, task: Task, key: str) -> Done:
 
 
 def do_in_cluster(act: Act, task: Task, key: str) -> Done:
-    """As :func:`do`, one task at a time in a process, whatever number of threads it has.
+    """Execute as :func:`do`, one task at a time in a process with any number of threads.
 
     Compiled kernels, random numbers and caches of a process are for one thread.
     """
-    with _alone:
+    with _one_at_a_time:
         if wanted():
             done = do(act, task, key)
             if done.error is None or wanted():
                 return done
     from distributed import Reschedule
 
-    raise Reschedule  # should somebody wait after all, Dask gives the task out again
+    raise Reschedule  # should the result be needed after all, Dask assigns the task again
 
 
 def wanted() -> bool:
-    """Return whether somebody waits for what this thread does.
+    """Return whether the result of this thread's task is still needed.
 
-    A Dask worker is told when the caller is gone, and goes on with what it has begun. This lets
-    long tasks end.
+    A Dask worker continues a task whose caller is gone. Long tasks ask here and end.
     """
     distributed = sys.modules.get("distributed")
     if distributed is None:
@@ -68,10 +66,7 @@ def wanted() -> bool:
 
 
 def end_with(driver: int) -> None:
-    """Let this process end when the one that started it is gone.
-
-    Called as a process of loky begins: a driver that is killed would leave it behind otherwise.
-    """
+    """End this process when its driver is gone; loky calls this when it starts a process."""
     threading.Thread(target=_watch, args=(driver,), daemon=True).start()
 
 
@@ -82,5 +77,5 @@ def _watch(driver: int) -> None:
 
 
 def starter() -> tuple[Any, tuple[int]]:
-    """Return what a process of this one has to call first, with its arguments."""
+    """Return the initializer of this process's workers, with its arguments."""
     return end_with, (os.getpid(),)

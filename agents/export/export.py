@@ -56,7 +56,7 @@ def export_policy(
     Parameters
     ----------
     model : PPO, RecurrentPPO, SAC or TQC
-        With its environment (a :class:`agents.vec_envs.sb3.BatchVecEnv`, wrapped or not), from
+        With its environment (a :class:`agents.vec_envs.batch.BatchVecEnv`, wrapped or not), from
         which come the signals and the observation's normaliser.
     path : str or Path
         ``policy.onnx``; the training record is written to ``policy.json``.

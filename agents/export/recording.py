@@ -10,7 +10,7 @@ import numpy as np
 
 import pam_envs  # noqa: F401  (registers the environments)
 from agents.settings import seeds
-from agents.settings.settings import SettingsError
+from agents.settings.schema import SettingsError
 from baselines.core.recorded_answers import Array, RecordedAnswers
 
 STEPS = 48

@@ -17,7 +17,7 @@ from agents.policies.policy_file import PolicyFileError, read, record_of
 from agents.policies.residual import ResidualPolicy, with_controller
 from agents.settings import presets as configs
 from agents.settings.presets import Config
-from agents.settings.settings import SettingsError
+from agents.settings.schema import SettingsError
 from baselines.core.catalogue import CONTROLLERS as CLASSICAL
 from pam_envs.parameters import Signals
 from pam_envs.wording import near

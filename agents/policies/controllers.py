@@ -7,7 +7,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from agents.settings.settings import SettingsError
+from agents.settings.schema import SettingsError
 from baselines.core import catalogue
 from pam_envs.parameters import Signals
 from pam_envs.wording import near

@@ -21,7 +21,7 @@ from agents.policies.policy_file import (
     write_policy,
 )
 from agents.settings import presets as configs
-from agents.settings.settings import SettingsError
+from agents.settings.schema import SettingsError
 
 
 @dataclass(frozen=True)

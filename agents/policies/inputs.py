@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from agents.settings.presets import Config
-from agents.settings.settings import SettingsError
+from agents.settings.schema import SettingsError
 from pam_envs.parameters import Signals
 from pam_envs.wording import near
 

@@ -19,7 +19,7 @@ from torch import Tensor, nn
 from agents.policies import inputs
 from agents.settings.parts import Network
 from agents.settings.presets import ON_POLICY, Config
-from agents.settings.settings import SettingsError
+from agents.settings.schema import SettingsError
 from pam_envs.parameters import Signals
 
 ACTIVATIONS: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU, "elu": nn.ELU}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from agents.settings.settings import choice, number
+from agents.settings.schema import choice, number
 
 
 @dataclass(frozen=True)

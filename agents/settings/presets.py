@@ -21,7 +21,7 @@ import yaml
 import pam_envs  # noqa: F401  (registers the environments)
 from agents.settings import parts
 from agents.settings.parts import Evaluation, History, Network, Normalize, Plants, Residual, Search
-from agents.settings.settings import SettingsError, build, choice, number
+from agents.settings.schema import SettingsError, build, choice, number
 from pam_envs.wording import near
 
 FOLDER = Path(__file__).resolve().parents[1] / "configs"

@@ -44,7 +44,7 @@ class Best:
             names = () if normaliser is None else ("mean", "var")
             self.moments = {name: np.array(getattr(normaliser, name)) for name in names}
 
-    def put_into(self, model: BaseAlgorithm) -> None:
+    def restore(self, model: BaseAlgorithm) -> None:
         """Give the model these weights, and its environment this normaliser: to ship it."""
         if self.steps < 0:
             return

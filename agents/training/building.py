@@ -17,11 +17,11 @@ from agents.policies import controllers, inputs
 from agents.policies.networks import policy_arguments, silence
 from agents.settings import seeds
 from agents.settings.presets import ON_POLICY, Config
-from agents.settings.settings import SettingsError
+from agents.settings.schema import SettingsError
+from agents.vec_envs.batch import make_batch_vec_env
 from agents.vec_envs.history import HistoryVecEnv
 from agents.vec_envs.mixed import MixedVecEnv
 from agents.vec_envs.residual import ResidualVecEnv
-from agents.vec_envs.sb3 import make_batch_vec_env
 
 ALGORITHMS: dict[str, type[BaseAlgorithm]] = {
     "ppo": PPO,

@@ -1,4 +1,4 @@
-"""What happens now and then in a training: the critic's lead, evaluations, checkpoints."""
+"""Callbacks of a training: critic warm-up, evaluations, checkpoints, cancellation."""
 
 from __future__ import annotations
 
@@ -13,21 +13,30 @@ from agents.export.export import facts, plants_of, policy_bytes
 from agents.policies.networks import critic_alone
 from agents.policies.policy import OnnxPolicy
 from agents.settings.presets import Config
-from agents.training import checkpoint, snapshot, sources
+from agents.training import checkpoint, snapshot
 from agents.training.best import Best
 from agents.training.building import warm_up_steps
 from agents.training.evaluation import Score, evaluate, value_of
 from agents.training.record import Clock
+from sweeps.worker import wanted
 
 PARTS, PASSES = 16, 10
-"""The critic's lead: into so many smaller batches a batch is cut, and so often each is used."""
+"""Critic warm-up: number of parts that a batch is split into, and epochs per rollout."""
 SMALLEST = 32
+"""Smallest batch of the warm-up."""
 
 
-class WarmUp(BaseCallback):
-    """Lets the critic alone learn in a training's first rollouts, thoroughly.
+class RolloutCallback(BaseCallback):
+    """Callback that acts between rollouts alone."""
 
-    What it does follows from the number of steps alone, so that a resumed training does the same.
+    def _on_step(self) -> bool:
+        return True
+
+
+class WarmUp(RolloutCallback):
+    """Train the critic alone in the first rollouts.
+
+    The effect depends on the number of steps alone, so a resumed training repeats it.
     """
 
     def __init__(self, config: Config) -> None:
@@ -45,12 +54,17 @@ class WarmUp(BaseCallback):
         model.batch_size = small if alone else usual.batch_size
         model.n_epochs = PASSES if alone else usual.n_epochs
 
-    def _on_step(self) -> bool:
-        return True
+
+class Cancellation(RolloutCallback):
+    """Stop a training of a Dask cluster whose result nobody waits for."""
+
+    def _on_rollout_start(self) -> None:
+        if not wanted():
+            raise RuntimeError("the sweep that asked for this training is gone")
 
 
-class Now(BaseCallback):
-    """Acts at the first rollout's start after every ``interval`` steps; 0 for never."""
+class PeriodicCallback(RolloutCallback):
+    """Act at the first rollout start after every ``interval`` steps; 0 for never."""
 
     def __init__(self, interval: int) -> None:
         super().__init__()
@@ -69,25 +83,22 @@ class Now(BaseCallback):
             self.act()
             self.due = self._next()
 
-    def _on_step(self) -> bool:
-        return True
-
     def act(self) -> None:
-        """Do it now; only between rollouts."""
+        """Act now; only between rollouts."""
         raise NotImplementedError
 
 
-class Evaluations(Now):
-    """Evaluates the policy on tuning seeds, as TensorBoard and the card then show.
+class Evaluations(PeriodicCallback):
+    """Evaluate the policy on tuning seeds, for TensorBoard, the card and the choice of the best.
 
-    Also before any training: a residual's first entry is its controller's.
+    The first evaluation is before any training: that of a residual is its controller's.
 
     Attributes
     ----------
     found : list of dict
-        Entries of the card so far.
+        The card's entries.
     best : Best
-        The best of them, which is shipped.
+        The best policy so far, which is exported at the end.
     """
 
     def __init__(self, config: Config, found: list[dict[str, Any]], best: Best) -> None:
@@ -114,7 +125,7 @@ class Evaluations(Now):
                 self.logger.record(f"tuning/{name}", self.found[-1][name])
 
     def last(self) -> None:
-        """Evaluate at the end, unless that was just done."""
+        """Evaluate at the end, unless the last evaluation was at this step."""
         if not self.config.evaluation.episodes:
             return
         if not self.found or self.found[-1]["steps"] != self.model.num_timesteps:
@@ -123,13 +134,13 @@ class Evaluations(Now):
 
 
 def score_of(model: Any, config: Config) -> Score:
-    """Return how well the model would track on tuning seeds if it were exported now."""
+    """Return the score on tuning seeds of the model as it would be exported now."""
     card = facts(model)
     return evaluate(OnnxPolicy(policy_bytes(model, card), card), config)
 
 
-class Checkpoints(Now):
-    """Writes checkpoints.
+class Checkpoints(PeriodicCallback):
+    """Write checkpoints.
 
     Parameters
     ----------
@@ -138,7 +149,7 @@ class Checkpoints(Now):
     seed : int
     clock : Clock
     evaluations : Evaluations
-        Made before a checkpoint of the same step is written.
+        Called before: a checkpoint holds the evaluation of its step.
     """
 
     def __init__(
@@ -154,9 +165,8 @@ class Checkpoints(Now):
         """Write the checkpoint now."""
         env = self.model.get_env()
         assert env is not None
-        trained_with = {"plants": plants_of(env), "sources": sources.digests()}
         content = {
-            "settings": json.dumps({**self.settings, **trained_with}),
+            "settings": json.dumps({**self.settings, "plants": plants_of(env)}),
             "spent": self.clock.spent(),
             "evaluations": self.evaluations.found,
             "best": vars(self.evaluations.best),

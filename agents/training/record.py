@@ -1,4 +1,4 @@
-"""What a training cost: time, machine, and the search before it, in words and numbers."""
+"""Cost of a training: time, machine and the number of settings tried before it."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ CPU_FILE = Path("/proc/cpuinfo")
 
 @dataclass
 class Clock:
-    """Time spent on a run, over all its interruptions.
+    """Time spent on a run, over all interruptions.
 
     Attributes
     ----------
     wall, cpu : float
-        Spent before [s], as the checkpoint says.
+        Spent before [s], from the checkpoint.
     """
 
     wall: float = 0.0
@@ -32,7 +32,7 @@ class Clock:
     )
 
     def spent(self) -> dict[str, float]:
-        """Return the time until now, as a checkpoint keeps it."""
+        """Return the time until now [s], as a checkpoint keeps it."""
         wall, cpu = self._began
         return {
             "wall": self.wall + time.perf_counter() - wall,
@@ -41,27 +41,22 @@ class Clock:
 
 
 def hardware() -> str:
-    """Return the machine in words: processor and number of cores; no name, no place."""
+    """Return processor and number of cores of this machine in words."""
     model = platform.processor() or platform.machine()
     try:
         lines = CPU_FILE.read_text(encoding="utf-8").splitlines()
         model = next(li.partition(":")[2].strip() for li in lines if li.startswith("model name"))
     except (OSError, StopIteration):
         pass
-    cores = os.cpu_count() or 1
-    return f"{model} ({platform.machine()}), {cores} cores, one used"
+    return f"{model} ({platform.machine()}), {os.cpu_count() or 1} cores, one used"
 
 
-def training(
-    config: Config,
-    seed: int,
-    command: str,
-    spent: dict[str, float],
-    steps: int | None = None,
+def cost(
+    config: Config, seed: int, command: str, spent: dict[str, float], steps: int
 ) -> dict[str, Any]:
-    """Return what stands under ``training`` in the file beside a policy.
+    """Return the entry ``training`` of the record beside a policy.
 
-    ``tuning_trials`` is None for settings that were chosen by hand, which nobody counted.
+    ``tuning_trials`` is None for settings that were chosen by hand and not counted.
 
     Parameters
     ----------
@@ -69,18 +64,17 @@ def training(
     seed : int
         Training seed.
     command : str
-        That starts this training again.
+        Repeats this training.
     spent : mapping
         Of :meth:`Clock.spent`.
-    steps : int, optional
-        That were done, whole rollouts; default: those that were asked for.
+    steps : int
+        Control periods done, in whole rollouts.
     """
-    done = config.steps if steps is None else steps
     return {
-        "steps": done,
+        "steps": steps,
         "seconds": round(spent["wall"], 1),
         "cpu_seconds": round(spent["cpu"], 1),
-        "frames_per_second": round(done / max(spent["wall"], 1e-9)),
+        "frames_per_second": round(steps / max(spent["wall"], 1e-9)),
         "hardware": hardware(),
         "seed": seed,
         "first_env_seed": seeds.first_training(seed),

@@ -47,7 +47,7 @@ def take(model: BaseAlgorithm) -> dict[str, Any]:
     }
 
 
-def put_back(model: BaseAlgorithm, snapshot: dict[str, Any]) -> None:
+def restore(model: BaseAlgorithm, snapshot: dict[str, Any]) -> None:
     """Put a snapshot back into a model that was built with the same settings."""
     env = model.get_env()
     assert env is not None
@@ -63,15 +63,15 @@ def put_back(model: BaseAlgorithm, snapshot: dict[str, Any]) -> None:
         ({"r": r, "l": int(length), "t": t} for r, length, t in rows), maxlen=100
     )
     model.ep_success_buffer = deque(maxlen=100)
-    _put_replay(model, snapshot["replay"])
+    _restore_replay(model, snapshot["replay"])
     places = [part for pair in _lstm(model) for part in pair]
     for place, tensor in zip(places, snapshot["lstm"], strict=True):
         place.copy_(tensor)
     for layer in _layers(env):
-        _put_layer(layer, snapshot["layers"][type(layer).__name__])
+        _restore_layer(layer, snapshot["layers"][type(layer).__name__])
     state = {name: value.numpy().copy() for name, value in snapshot["env"].items()}
     env.unwrapped.set_state(state)  # type: ignore[attr-defined]
-    _put_random_state(model, snapshot["random"])
+    _restore_random_state(model, snapshot["random"])
 
 
 def _episodes(model: BaseAlgorithm) -> np.ndarray[Any, Any]:
@@ -114,9 +114,9 @@ def _layer(layer: VecEnv) -> dict[str, Any]:
     return made
 
 
-def _put_layer(layer: VecEnv, saved: dict[str, Any]) -> None:
+def _restore_layer(layer: VecEnv, saved: dict[str, Any]) -> None:
     if isinstance(layer, (HistoryVecEnv, ResidualVecEnv)):
-        layer.put_back(saved)
+        layer.restore(saved)
         return
     if isinstance(layer, VecMonitor):
         layer.episode_returns = saved["returns"].numpy().copy()
@@ -127,16 +127,16 @@ def _put_layer(layer: VecEnv, saved: dict[str, Any]) -> None:
     layer.returns = saved["returns"].numpy().copy()
     layer.old_obs = saved["old_obs"].numpy().copy()
     layer.old_reward = saved["old_reward"].numpy().copy()
-    _put_moments(layer.ret_rms, saved["ret_rms"])
+    _restore_moments(layer.ret_rms, saved["ret_rms"])
     if layer.norm_obs:
-        _put_moments(layer.obs_rms, saved["obs_rms"])  # type: ignore[arg-type]
+        _restore_moments(layer.obs_rms, saved["obs_rms"])  # type: ignore[arg-type]
 
 
 def _moments(moments: RunningMeanStd) -> dict[str, Any]:
     return {"mean": np.array(moments.mean), "var": np.array(moments.var), "count": moments.count}
 
 
-def _put_moments(moments: RunningMeanStd, saved: dict[str, Any]) -> None:
+def _restore_moments(moments: RunningMeanStd, saved: dict[str, Any]) -> None:
     moments.mean, moments.var = saved["mean"].numpy().copy(), saved["var"].numpy().copy()
     moments.count = float(saved["count"])
 
@@ -153,7 +153,7 @@ def _replay(model: BaseAlgorithm) -> dict[str, Any] | None:
     return made
 
 
-def _put_replay(model: BaseAlgorithm, saved: dict[str, Any] | None) -> None:
+def _restore_replay(model: BaseAlgorithm, saved: dict[str, Any] | None) -> None:
     if saved is None:
         return
     assert isinstance(model, OffPolicyAlgorithm)
@@ -175,7 +175,7 @@ def _random_state(model: BaseAlgorithm) -> dict[str, Any]:
     }
 
 
-def _put_random_state(model: BaseAlgorithm, saved: dict[str, Any]) -> None:
+def _restore_random_state(model: BaseAlgorithm, saved: dict[str, Any]) -> None:
     torch.set_rng_state(saved["torch"])
     keys, position, has_gauss, cached = saved["numpy"]
     state = ("MT19937", keys.numpy().astype(np.uint32), position, has_gauss, cached)

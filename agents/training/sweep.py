@@ -1,33 +1,30 @@
-"""Training seeds side by side: each in a process of its own, on this machine or a Dask cluster.
+"""Several training seeds in parallel, on this machine or a Dask cluster.
 
-A training whose policy is there is left alone; one whose process was killed goes on from its
-checkpoint. The policies are those that ``python -m agents train`` gives, bit for bit.
+A finished training is kept, and a killed one continues from its checkpoint. The policies are those
+of ``python -m agents train``, bit for bit.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import subprocess
-import sys
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
+
+from filelock import FileLock
 
 from agents.policies.policy_file import POLICY, RECORD, finished, write_atomically
 from agents.settings import presets as configs
 from agents.settings.presets import Config
-from agents.settings.settings import SettingsError
-from agents.training import sources
+from agents.settings.schema import SettingsError
 from sweeps import engine
 from sweeps.versions import versions_of
-from sweeps.worker import LOOK, wanted
 
 ROOT = Path(__file__).resolve().parents[2]
-LOG = "log.txt"
-ATTEMPTS = 3
-"""How often the process of a training may be killed."""
+LOG, LOCK = "log.txt", "training.lock"
+SOURCES = ("agents", "baselines", "pam_envs")
 PACKAGES = (
     *("numpy", "scipy", "numba", "gymnasium"),
     *("torch", "stable_baselines3", "sb3_contrib", "onnx"),
@@ -43,7 +40,7 @@ class Training:
     config : Config
     seed : int
     folder : Path
-        Absolute. The workers of a cluster that see it go on from each other's checkpoints.
+        Absolute. Workers of a cluster that share it continue from each other's checkpoints.
     """
 
     config: Config
@@ -52,13 +49,15 @@ class Training:
 
     @property
     def key(self) -> str:
-        """Digest of what decides the policy: settings, seed, sources and package versions."""
-        code = sources.digests()
-        parts = [self.config.as_dict(), self.seed, str(self.folder), versions(), code]
+        """Digest of settings, seed, folder, package versions and code.
+
+        A worker with other code or packages computes another key and refuses the training.
+        """
+        parts = [self.config.as_dict(), self.seed, str(self.folder), versions_of(PACKAGES), code()]
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:32]
 
     def finished(self) -> bool:
-        """Return whether the policy is there, with its record.
+        """Return whether the folder holds the policy and its record.
 
         Raises
         ------
@@ -75,10 +74,20 @@ class Training:
         return True
 
 
+@cache
+def code() -> str:
+    """Return a digest of the Python files that a training runs, as first read by this process."""
+    state = hashlib.sha256()
+    for path in sorted(path for name in SOURCES for path in (ROOT / name).rglob("*.py")):
+        state.update(path.relative_to(ROOT).as_posix().encode())
+        state.update(path.read_bytes())
+    return state.hexdigest()[:16]
+
+
 def trainings(
     wanted: Sequence[Config], seeds: Sequence[int], out: Path, name: str
 ) -> list[Training]:
-    """Return every settings with every seed, each in its folder below ``out``.
+    """Return each configuration with each seed, in folders below ``out``.
 
     Parameters
     ----------
@@ -86,7 +95,7 @@ def trainings(
     seeds : sequence of int
     out : Path
     name : str
-        Algorithm and variant, like ``ppo-residual``.
+        Algorithm and variant, for example ``ppo-residual``.
     """
     return [
         Training(config, seed, out.resolve() / config.env.replace("/", "-") / f"{name}-seed{seed}")
@@ -95,19 +104,14 @@ def trainings(
     ]
 
 
-def versions() -> dict[str, str]:
-    """Return what a policy's bits may depend on besides its settings."""
-    return versions_of(PACKAGES)
-
-
 @dataclass
 class Report:
-    """What a sweep did.
+    """Outcome of a sweep.
 
     Attributes
     ----------
     trained, found : list of Path
-        Policies that were made now, and that were there already.
+        Policies that were trained now, and before.
     missing : list of str
         Trainings without a policy, with the reason.
     """
@@ -122,33 +126,32 @@ def run(
     cluster: engine.Cluster,
     start: Callable[[int], Callable[[], None]] = lambda total: lambda: None,
 ) -> Report:
-    """Train what is missing.
+    """Run the trainings that are not finished.
 
     Parameters
     ----------
     trainings : sequence of Training
     cluster : Cluster
     start : callable
-        Called with the number of trainings to do; returns what to call after each of them.
+        Called with the number of trainings; returns the function to call after each of them.
     """
-    there = {training.key: training.finished() for training in trainings}
     named = {training.key: training for training in trainings}
-    report = Report(found=[named[key].folder / POLICY for key in named if there[key]])
-    left = [training for key, training in named.items() if not there[key]]
+    left = {key: training for key, training in named.items() if not training.finished()}
+    report = Report(found=[named[key].folder / POLICY for key in named if key not in left])
     advance = start(len(left))
-    for done in engine.run(train, left, cluster):
-        training = named[done.key]
+    for done in engine.run(train, left.values(), cluster):
+        folder = named[done.key].folder
         if done.error is None:
-            _keep(training.folder, done.value)
-            report.trained.append(training.folder / POLICY)
+            _keep(folder, done.value)
+            report.trained.append(folder / POLICY)
         else:
-            report.missing.append(f"{training.folder}: {done.error}")
+            report.missing.append(f"{folder}: {done.error}")
         advance()
     return report
 
 
 def _keep(folder: Path, files: dict[str, bytes]) -> None:
-    """Write a policy that was made where this folder is not seen, its record first."""
+    """Write the files of a worker that does not share this folder, the record first."""
     if finished(folder / POLICY) is not None:
         return
     folder.mkdir(parents=True, exist_ok=True)
@@ -157,57 +160,17 @@ def _keep(folder: Path, files: dict[str, bytes]) -> None:
 
 
 def train(training: Training) -> dict[str, bytes]:
-    """Train in a process of its own and return the policy's files; called in workers.
+    """Start or continue a training and return the policy's files; called in workers.
 
-    Raises
-    ------
-    RuntimeError
-        If there is no policy in the end, with the last words of the log.
+    A lock makes a second process that trains in the same folder wait and use its policy.
     """
-    training.folder.mkdir(parents=True, exist_ok=True)
-    for _ in range(ATTEMPTS):
-        code = _process(training)
-        if code == 0:
-            return {name: (training.folder / name).read_bytes() for name in (POLICY, RECORD)}
-        if code > 0:
-            break
-    else:
-        raise RuntimeError(f"its process was killed {ATTEMPTS} times (signal {-code})")
-    log = (training.folder / LOG).read_text(encoding="utf-8", errors="replace").splitlines()
-    raise RuntimeError(log[-1] if log else f"its process ended with {code}")
+    from rich.console import Console
 
+    from agents.training.train import Run, train_to_the_end
 
-def _process(training: Training) -> int:
-    """Run the process of a training to its end; it ends, too, when this one does.
-
-    Its standard input stays open as long as somebody waits for the policy.
-    """
-    task = {"config": training.config.as_dict(), "seed": training.seed}
-    line = json.dumps(task | {"folder": str(training.folder)}) + "\n"
-    with (training.folder / LOG).open("ab") as log:
-        child = subprocess.Popen(
-            [sys.executable, "-m", "agents.training.sweep_one"],
-            cwd=ROOT,
-            stdin=subprocess.PIPE,
-            stdout=log,
-            stderr=log,
-        )
-    with child:
-        try:
-            assert child.stdin is not None
-            with suppress(BrokenPipeError):  # killed as it began
-                child.stdin.write(line.encode())
-                child.stdin.flush()
-            while (code := _ended(child)) is None:
-                if not wanted():
-                    raise RuntimeError("nobody waits for it")
-        finally:
-            child.kill()
-    return code
-
-
-def _ended(child: subprocess.Popen[bytes]) -> int | None:
-    try:
-        return child.wait(LOOK)
-    except subprocess.TimeoutExpired:
-        return None
+    folder = training.folder
+    folder.mkdir(parents=True, exist_ok=True)
+    with FileLock(folder / LOCK), (folder / LOG).open("a", encoding="utf-8") as log:
+        run = Run(training.config, training.seed, folder)
+        train_to_the_end(run, Console(file=log, width=100))
+        return {name: (folder / name).read_bytes() for name in (POLICY, RECORD)}

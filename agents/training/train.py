@@ -1,19 +1,14 @@
-"""Training: settings, a seed and a folder give a policy; a killed run goes on where it was.
+"""Training: a policy from settings, a seed and a folder; a killed run continues.
 
-The folder holds ``checkpoint.pt`` (everything the future depends on, see
-:mod:`agents.training.snapshot`), ``tensorboard/``, and at the end ``policy.onnx`` with
-``policy.json``.
+The folder holds ``checkpoint.pt`` (:mod:`agents.training.snapshot`), ``tensorboard/`` and, at the
+end, ``policy.onnx`` with its record ``policy.json``. The exported policy is the best of those that
+were evaluated (:mod:`agents.training.best`), or the last without evaluations.
 
-What is shipped is the best policy of those that were evaluated (:mod:`agents.training.best`), or
-the last one where none was.
-
-Exactness. Checkpoints are taken at the start of a rollout, where nothing is half done. A run that
-was killed and resumed ends with the same bits, and the same ``policy.onnx``, as one that was not:
-for every algorithm, with memory, history and controller, with the same package versions on the
-same type of processor. Torch uses one thread; with several, sums depend on their number. What
-differs is the log: the steps between the last checkpoint and the kill are in it twice.
-
-Seeds. Training and the evaluations during it use the seeds of :mod:`agents.settings.seeds` alone.
+Exactness: a checkpoint is taken at the start of a rollout. A run that was killed and resumed ends
+with the same bits and the same ``policy.onnx`` as an uninterrupted one, for every algorithm,
+recurrent or not, with history and controller, given the same package versions and type of
+processor. Torch uses one thread, since sums depend on the number of threads. The log alone
+differs: it holds the steps between the last checkpoint and the kill twice.
 """
 
 from __future__ import annotations
@@ -33,13 +28,14 @@ from agents.export.export import export_policy, facts, plants_of
 from agents.policies.policy_file import POLICY, finished
 from agents.settings import presets as configs
 from agents.settings.presets import Config
-from agents.training import checkpoint, snapshot, sources
+from agents.training import checkpoint, snapshot
 from agents.training.best import Best
 from agents.training.building import logs_each_rollout, make_env, make_model
-from agents.training.callbacks import Checkpoints, Evaluations, WarmUp
+from agents.training.callbacks import Cancellation, Checkpoints, Evaluations, WarmUp
 from agents.training.checkpoint import CheckpointError
 from agents.training.progress import TrainingProgress
-from agents.training.record import Clock, training
+from agents.training.record import Clock, cost
+from sweeps.progress import progress
 
 
 @dataclass(frozen=True)
@@ -52,7 +48,7 @@ class Run:
     seed : int
         Of weights, exploration and episodes.
     folder : Path
-        Where its files go.
+        For its files.
     """
 
     config: Config
@@ -61,11 +57,14 @@ class Run:
 
     @property
     def checkpoint(self) -> Path:
-        """The checkpoint's place."""
+        """Path of the checkpoint."""
         return self.folder / checkpoint.NAME
 
     def command(self) -> str:
-        """Return the command that gives the same policy, run in its folder if need be."""
+        """Return the command that trains the same policy again.
+
+        Without a preset of these settings it takes them from ``policy.onnx``.
+        """
         config = self.config
         words = ["python -m agents train", config.env, "--algo", config.algo]
         words += ["--steps", str(config.steps), "--seed", str(self.seed)]
@@ -77,13 +76,12 @@ class Run:
         return " ".join(words)
 
     def _variant(self) -> str | None:
-        """Return the variant of the preset that this is, None if it is none."""
+        """Return the variant of the preset with these settings, None without one."""
         config = self.config
         for env, algo, variant in configs.presets():
             if (env, algo) == (config.env, config.algo):
                 preset = configs.preset(env, algo, variant)
-                own = {"steps": config.steps, "search": config.search}
-                if dataclasses.replace(preset, **own) == config:
+                if dataclasses.replace(preset, steps=config.steps, search=config.search) == config:
                     return variant
         return None
 
@@ -102,11 +100,11 @@ def start(run: Run) -> BaseAlgorithm:
     CheckpointError
         If the folder already holds a run.
     ValueError
-        If the policy could not be exported in the end.
+        If the policy could not be exported at the end.
     """
     if run.checkpoint.exists():
         raise CheckpointError(
-            f"{run.folder} already holds a training; go on with it (--resume) or give another --out"
+            f"{run.folder} already holds a training; continue it (--resume) or give another --out"
         )
     run.folder.mkdir(parents=True, exist_ok=True)
     checkpoint.sweep(run.folder)
@@ -117,7 +115,7 @@ def start(run: Run) -> BaseAlgorithm:
 
 
 def saved_run(folder: Path, steps: int | None = None) -> Run:
-    """Return the run that a folder's checkpoint belongs to, perhaps made longer."""
+    """Return the run of a folder's checkpoint, with another number of steps if given."""
     settings = _settings(checkpoint.load(folder / checkpoint.NAME))
     given = settings["config"]
     if steps is not None:
@@ -128,27 +126,31 @@ def saved_run(folder: Path, steps: int | None = None) -> Run:
 def _settings(content: dict[str, Any]) -> dict[str, Any]:
     try:
         settings: dict[str, Any] = json.loads(content["settings"])
-        return {key: settings[key] for key in ("config", "seed", "plants", "sources")}
+        return {key: settings[key] for key in ("config", "seed", "plants")}
     except (KeyError, TypeError, ValueError) as error:
-        raise CheckpointError("the checkpoint does not say how it was trained") from error
+        raise CheckpointError("the checkpoint lacks the settings of its training") from error
 
 
 def resume(run: Run) -> BaseAlgorithm:
-    """Return the model of a run as its checkpoint left it.
+    """Return the model of a run at its checkpoint.
 
     Raises
     ------
     CheckpointError
-        If there is no sound checkpoint, or plants or sources have changed since.
+        If there is no sound checkpoint, or the plants have changed since.
     """
     checkpoint.sweep(run.folder)
     content = checkpoint.load(run.checkpoint)
     env = make_env(run.config)
-    _check_unchanged(_settings(content), plants_of(env))
+    then, now = _settings(content)["plants"], plants_of(env)
+    if then != now:
+        raise CheckpointError(
+            f"the run was trained on the plants {then}, which are now {now}; train anew"
+        )
     model = make_model(run.config, run.seed, env)
     model.ep_info_buffer = None
     try:
-        snapshot.put_back(model, content["snapshot"])
+        snapshot.restore(model, content["snapshot"])
     except (KeyError, RuntimeError, ValueError, AttributeError) as error:
         raise CheckpointError(
             f"{run.checkpoint.name} does not fit its settings: {error}"
@@ -156,55 +158,43 @@ def resume(run: Run) -> BaseAlgorithm:
     return model
 
 
-def _check_unchanged(settings: dict[str, Any], plants: list[str]) -> None:
-    """Raise if a run would go on with other plants or sources than it began with."""
-    if settings["plants"] != plants:
-        raise CheckpointError(
-            f"the run was trained on the plants {settings['plants']}, which are now {plants}; "
-            "train anew"
-        )
-    then, now = settings["sources"], sources.digests()
-    other = sorted(name for name in {*then, *now} if then.get(name) != now.get(name))
-    if other:
-        raise CheckpointError(
-            f"the sources of {', '.join(other)} have changed since the run began, so that it would "
-            "end as no other; train anew, or go back to them"
-        )
-
-
 def train(run: Run, model: BaseAlgorithm, console: Console) -> Path:
-    """Train to the end of the run and write its policy; return the policy's place."""
+    """Train to the end of the run, write its policy and return the policy's path."""
     sinks = ["tensorboard"] if find_spec("tensorboard") else []
     model.set_logger(configure(str(run.folder / "tensorboard"), sinks))
     clock, evaluations = _so_far(run, model.num_timesteps)
     checkpoints = Checkpoints(run.checkpoint, run.config, run.seed, clock, evaluations)
     left = run.config.steps - model.num_timesteps
     if left > 0:
-        model.learn(
-            left,
-            callback=[
-                WarmUp(run.config),
-                evaluations,
-                checkpoints,
-                TrainingProgress(run.config.steps, console),
-            ],
-            reset_num_timesteps=model.num_timesteps == 0,
-            log_interval=1 if logs_each_rollout(run.config) else 100,
-        )
+        with progress("steps", console) as begin:
+            model.learn(
+                left,
+                callback=[
+                    Cancellation(),
+                    WarmUp(run.config),
+                    evaluations,
+                    checkpoints,
+                    TrainingProgress(run.config.steps, begin),
+                ],
+                reset_num_timesteps=model.num_timesteps == 0,
+                log_interval=1 if logs_each_rollout(run.config) else 100,
+            )
         evaluations.last()
         checkpoints.act()
-    card = {"seed": run.seed, "command": run.command(), "config": run.config.as_dict()}
+    model.logger.close()
+    command = run.command()
+    card = {"seed": run.seed, "command": command, "config": run.config.as_dict()}
     if evaluations.found:
         card["evaluation"] = evaluations.found
         card["chosen"] = evaluations.best.chosen(len(evaluations.found))
-        evaluations.best.put_into(model)
-    cost = training(run.config, run.seed, run.command(), clock.spent(), steps=model.num_timesteps)
-    export_policy(model, run.folder / POLICY, card, cost)
+        evaluations.best.restore(model)
+    record = cost(run.config, run.seed, command, clock.spent(), model.num_timesteps)
+    export_policy(model, run.folder / POLICY, card, record)
     return run.folder / POLICY
 
 
 def train_to_the_end(run: Run, console: Console) -> Path:
-    """Start a run, go on with it or, where its policy is there, leave it; return the policy.
+    """Start or continue a run unless its policy is finished; return the policy's path.
 
     Raises
     ------
@@ -222,7 +212,7 @@ def train_to_the_end(run: Run, console: Console) -> Path:
 
 
 def _so_far(run: Run, steps: int) -> tuple[Clock, Evaluations]:
-    """Return the time spent and the evaluations made until the checkpoint."""
+    """Return the time spent and the evaluations made before the checkpoint."""
     if not steps:
         return Clock(), Evaluations(run.config, [], Best())
     content = checkpoint.load(run.checkpoint)
@@ -232,4 +222,4 @@ def _so_far(run: Run, steps: int) -> tuple[Clock, Evaluations]:
         evaluations = Evaluations(run.config, list(content["evaluations"]), best)
         return Clock(spent["wall"], spent["cpu"]), evaluations
     except (KeyError, TypeError, AttributeError) as error:
-        raise CheckpointError(f"{run.checkpoint.name} lacks what was evaluated: {error}") from error
+        raise CheckpointError(f"{run.checkpoint.name} lacks its evaluations: {error}") from error

@@ -59,6 +59,6 @@ class HistoryVecEnv(VecEnvWrapper):
         """Return what the future depends on."""
         return {"past": self.past.copy(), "last": self.last.copy()}
 
-    def put_back(self, saved: dict[str, Any]) -> None:
+    def restore(self, saved: dict[str, Any]) -> None:
         """Go back to a snapshot."""
         self.past, self.last = saved["past"].numpy().copy(), saved["last"].numpy().copy()

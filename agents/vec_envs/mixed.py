@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
-from agents.vec_envs.sb3 import BatchVecEnv
+from agents.vec_envs.batch import BatchVecEnv
 
 
 class MixedVecEnv(VecEnv):

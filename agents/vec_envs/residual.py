@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from agents.policies.controllers import mapped, restored
-from agents.settings.settings import SettingsError
+from agents.settings.schema import SettingsError
 
 Make = Callable[[Any], Any]
 
@@ -111,7 +111,7 @@ class ResidualVecEnv(VecEnvWrapper):
             "states": [_plain(state) for state in self.states],
         }
 
-    def put_back(self, saved: dict[str, Any]) -> None:
+    def restore(self, saved: dict[str, Any]) -> None:
         """Go back to a snapshot."""
         self.seen, self.given = saved["seen"].numpy().copy(), saved["given"].numpy().copy()
         for i, (rows, controller) in enumerate(self.controllers):

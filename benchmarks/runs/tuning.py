@@ -2,7 +2,7 @@
 
 The settings of learned controllers are searched for; so that classical ones have the same chance,
 this gives them as many trials, by the same sampler, on the same seeds
-(:mod:`agents.training.tune`, :mod:`agents.settings.seeds`). The episodes are those of an
+(:mod:`agents.search.tune`, :mod:`agents.settings.seeds`). The episodes are those of an
 environment's nominal track but for their seeds, which no score is ever taken from, and they are
 scored by the same code.
 

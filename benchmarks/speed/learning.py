@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import time
 from collections.abc import Callable, Iterator
@@ -9,13 +10,14 @@ from typing import Any
 
 from benchmarks.speed.rates import Chunk, Measurement, Missing, interleaved, median, ratio
 
+ENV = "PAM/MusclePositioning-v0"
 MOST = 0.05
 """The largest share of a training's time that its environments may take."""
 
 
 def learning(rounds: int) -> list[Measurement]:
     """PPO at 256 environments against the default on one Pendulum."""
-    (speed,) = _agents("training.speed")
+    chunk = preset_chunk(ENV, 256)
     import torch
     from stable_baselines3 import PPO
 
@@ -26,7 +28,7 @@ def learning(rounds: int) -> list[Measurement]:
         peer.learn(2048, reset_num_timesteps=False)
         return 2048
 
-    subjects: dict[str, Chunk] = {"ours": speed.ppo_chunk(256), "peer": default}
+    subjects: dict[str, Chunk] = {"ours": chunk, "peer": default}
     rates = interleaved(subjects, min(rounds, 3))
     ours, peers = rates["ours"], rates["peer"]
     gain = "PPO N = 256 / default on one Pendulum"
@@ -51,15 +53,34 @@ def _agents(*names: str) -> list[Any]:
         raise Missing(f"agents cannot be imported: {error.name} is not installed") from error
 
 
+def preset_chunk(env: str, num_envs: int) -> Chunk:
+    """Return a function that trains the PPO preset for one rollout and returns its steps."""
+    building, presets = _agents("training.building", "settings.presets")
+    config = dataclasses.replace(presets.preset(env, "ppo"), num_envs=num_envs)
+    return rollouts_of(building.make_model(config, 0, building.make_env(config)))
+
+
+def rollouts_of(model: Any) -> Chunk:
+    """Return a function that trains for one rollout and returns its steps, after a first one."""
+    size = model.n_steps * model.n_envs
+
+    def once() -> int:
+        model.learn(size, reset_num_timesteps=model.num_timesteps == 0)
+        return int(size)
+
+    once()
+    return once
+
+
 def shares(rounds: int) -> list[Measurement]:
     """Environments' share of the time of each PPO preset."""
-    building, presets, speed = _agents("training.building", "settings.presets", "training.speed")
+    building, presets = _agents("training.building", "settings.presets")
     from pam_envs.__main__ import env_ids
 
     found = []
     for preset in (presets.preset(env, "ppo") for env in env_ids()):
         env = building.make_env(preset)
-        chunk = speed.stepper(building.make_model(preset, 0, env))
+        chunk = rollouts_of(building.make_model(preset, 0, env))
         name = preset.env.removeprefix("PAM/").rpartition("-")[0]
         found.append(_share(f"{name}, N = {preset.num_envs}", env, chunk, min(rounds, 3)))
         env.close()

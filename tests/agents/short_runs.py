@@ -5,10 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pytest
+import torch
 from rich.console import Console
 
 from agents.settings import presets as configs
 from agents.training import train
+
+QUIET = Console(quiet=True)
 
 ID = "PAM/MusclePositioning-v0"
 SHORT = {"episode_seconds": 0.3, "reference": "mixed", "load": None}
@@ -85,5 +90,26 @@ def trained(folder: Path, config: configs.Config, seed: int = 3) -> Any:
     """Train and return the model; the folder holds checkpoint and policy."""
     run = train.Run(config, seed, folder)
     model = train.start(run)
-    train.train(run, model, Console(quiet=True))
+    train.train(run, model, QUIET)
     return model
+
+
+class Killed(Exception):
+    """Takes the place of a kill."""
+
+
+def killed_after(run: train.Run, steps: int) -> None:
+    """Train, and stop without any clean-up once ``steps`` are passed."""
+    model = train.start(run)
+    ordinary = model.collect_rollouts
+
+    def collect(*arguments: Any, **keywords: Any) -> Any:
+        if model.num_timesteps >= steps:
+            raise Killed
+        return ordinary(*arguments, **keywords)
+
+    model.collect_rollouts = collect  # type: ignore[method-assign]
+    with pytest.raises(Killed):
+        train.train(run, model, QUIET)
+    np.random.seed(999)  # noqa: NPY002  (a new process starts with other random numbers)
+    torch.manual_seed(999)

@@ -40,7 +40,7 @@ def test_a_sweep_of_a_short_id_has_the_folders_of_the_long_one(
         (["tune", "KneeWalk-v0", "--steps", "0"], "steps = 0 is below 1"),
         (["train", "KneeWalk-v0", "--seed", "-1"], "seed = -1 is below 0"),
         (["train", "KneeWalk-v0", "--out", "file/run"], "Not a directory; give another place"),
-        (["looks"], "name policies"),
+        (["evaluations"], "name policies"),
     ],
 )
 def test_mistakes_are_one_sentence_and_leave_nothing(

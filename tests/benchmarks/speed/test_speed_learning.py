@@ -43,7 +43,7 @@ def test_all_batches_of_a_preset_are_found(variant: str) -> None:
         "agents.training.building", reason="the extra 'agents' is not there"
     )
     from agents.settings.presets import preset
-    from agents.vec_envs.sb3 import BatchVecEnv
+    from agents.vec_envs.batch import BatchVecEnv
 
     wanted = preset("PAM/KneeTension-v0", "ppo", variant)
     env = building.make_env(wanted)

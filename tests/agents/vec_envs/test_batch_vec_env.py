@@ -13,7 +13,7 @@ from short_runs import ID
 from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
-from agents.vec_envs.sb3 import NO_INFO, BatchVecEnv, make_batch_vec_env
+from agents.vec_envs.batch import NO_INFO, BatchVecEnv, make_batch_vec_env
 
 N, SEED = 5, 40
 SHORT = {"episode_seconds": 0.12, "reference": "mixed", "load": None}

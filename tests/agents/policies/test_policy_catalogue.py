@@ -10,7 +10,7 @@ import pytest
 from agents.policies import catalogue
 from agents.policies.policy_file import PolicyFileError
 from agents.settings import presets as configs
-from agents.settings.settings import SettingsError
+from agents.settings.schema import SettingsError
 
 BASE = "extends: KneeWalk-v0.ppo\n"
 

@@ -7,14 +7,13 @@ from typing import Any
 
 import pytest
 import torch
-from rich.console import Console
-from short_runs import tiny
+from short_runs import QUIET, killed_after, tiny
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 
 from agents.policies.networks import CRITIC
 from agents.settings import presets as configs
-from agents.settings.settings import SettingsError
+from agents.settings.schema import SettingsError
 from agents.training import train
 from agents.training.building import learning_rate, make_env, make_model, warm_up_steps
 from agents.training.callbacks import WarmUp
@@ -109,13 +108,11 @@ def test_off_policy_algorithms_have_no_lead() -> None:
 def test_a_run_that_is_killed_in_its_lead_ends_with_the_same_bits(
     name: str, tmp_path: Path
 ) -> None:
-    from test_train import killed_after
-
     config = config_of(name, 4)
-    whole = train.train_to_the_end(train.Run(config, 3, tmp_path / "whole"), Console(quiet=True))
+    whole = train.train_to_the_end(train.Run(config, 3, tmp_path / "whole"), QUIET)
     run = train.Run(config, 3, tmp_path / "killed")
     killed_after(run, 3 * ROLLOUT)
     model = train.resume(run)
     assert 0 < model.num_timesteps < warm_up_steps(config)
-    policy = train.train(run, model, Console(quiet=True))
+    policy = train.train(run, model, QUIET)
     assert policy.read_bytes() == whole.read_bytes()

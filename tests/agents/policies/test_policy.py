@@ -37,10 +37,10 @@ from agents.policies.policy_file import (
     write_policy,
 )
 from agents.settings import presets as configs
-from agents.settings.settings import SettingsError
+from agents.settings.schema import SettingsError
 from agents.training import checkpoint, sweep
 from agents.training.train import saved_run
-from agents.vec_envs.sb3 import make_batch_vec_env
+from agents.vec_envs.batch import make_batch_vec_env
 from pam_envs.parameters import Signals
 
 MODELS = ("ppo", "normalized_ppo", "sac")

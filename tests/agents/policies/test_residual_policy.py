@@ -20,7 +20,7 @@ from agents.policies.policy import OnnxPolicy
 from agents.policies.policy_file import PolicyFileError
 from agents.policies.residual import ResidualPolicy, ResidualState, with_controller
 from agents.settings import presets as configs
-from agents.settings.settings import SettingsError
+from agents.settings.schema import SettingsError
 from agents.training import checkpoint
 from agents.training.building import make_env, signals_of
 from agents.vec_envs.residual import ResidualVecEnv, parts_of
@@ -174,7 +174,7 @@ def test_states_of_controllers_survive_a_checkpoint(
     then = [residual.step(push)[0] for push in pushes[5:]]
     residual.reset()
     saved = checkpoint.load(tmp_path / "x")
-    residual.put_back(saved["layer"])
+    residual.restore(saved["layer"])
     base.set_state({name: value.numpy().copy() for name, value in saved["env"].items()})
     again = [residual.step(push)[0] for push in pushes[5:]]
     assert np.array_equal(then, again)

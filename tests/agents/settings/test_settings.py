@@ -14,7 +14,7 @@ from agents.policies.networks import input_matrix
 from agents.settings import presets as configs
 from agents.settings import seeds
 from agents.settings.parts import TQC, Network, Search
-from agents.settings.settings import SettingsError
+from agents.settings.schema import SettingsError
 from agents.training import evaluation
 
 TWO = {"hysteresis": ["maxwell_slip", "preisach"]}

@@ -14,21 +14,18 @@ from typing import Any
 import optuna
 import pytest
 from optuna.trial import TrialState
-from rich.console import Console
-from short_runs import ID, KINDS, kind, tiny
+from short_runs import ID, KINDS, QUIET, kind, tiny
 
-from agents.settings import preset_text
+from agents.search import preset_text, tune
+from agents.search.spaces import as_settings, from_settings, space_of, with_settings
 from agents.settings import presets as configs
 from agents.settings.parts import Plants, Search
 from agents.settings.presets import Config
-from agents.settings.search_spaces import as_settings, from_settings, space_of, with_settings
-from agents.settings.settings import SettingsError
-from agents.training import tune
+from agents.settings.schema import SettingsError
 from agents.training.evaluation import Score, value_of
 
-QUIET = Console(quiet=True)
 LOOK = {"episodes": 2, "settle_seconds": 0.1}
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def small(**changes: Any) -> Config:
@@ -76,11 +73,11 @@ def test_a_trial_whose_process_was_killed_is_done_again(
 ) -> None:
     code = f"""
 import sys, time
-sys.path.insert(0, {str(Path(__file__).parent)!r})
+sys.path[:0] = {[str(path) for path in Path(__file__).parents[:2]]!r}
 import optuna
 optuna.logging.disable_default_handler()
 from pathlib import Path
-from agents.training import tune
+from agents.search import tune
 import test_tune
 tune.HEARTBEAT = 1
 def hang(*_):

@@ -12,15 +12,14 @@ from typing import Any
 import psutil
 import pytest
 import yaml
-from rich.console import Console
-from short_runs import ID, tiny
+from short_runs import ID, QUIET, tiny
 
 from agents.__main__ import main
 from agents.export import export
 from agents.policies import policy_file
 from agents.settings import presets as configs
-from agents.settings.settings import SettingsError
-from agents.training import sources, sweep, train
+from agents.settings.schema import SettingsError
+from agents.training import callbacks, sweep, train
 from sweeps.engine import Cluster
 from tests.sweeps.dask_processes import DaskProcesses
 from tests.sweeps.processes_of import alive, new_family, start, wait_until
@@ -50,7 +49,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[int, bytes]:
     policies = {}
     for seed in SEEDS:
         run = train.Run(CONFIG, seed, tmp_path_factory.mktemp(f"seed{seed}"))
-        policies[seed] = train.train_to_the_end(run, Console(quiet=True)).read_bytes()
+        policies[seed] = train.train_to_the_end(run, QUIET).read_bytes()
     return policies
 
 
@@ -83,9 +82,9 @@ class Driver:
         )
         return all((each.folder / "checkpoint.pt").exists() for each in self.trainings)
 
-    def trainers(self) -> list[psutil.Process]:
+    def workers(self) -> list[psutil.Process]:
         """Return the processes that train."""
-        return trainers(self.family)
+        return alive(self.family, "popen_loky")
 
     def policies(self) -> dict[int, bytes]:
         """Return the policies by seed."""
@@ -94,11 +93,6 @@ class Driver:
             for training in self.trainings
             if training.finished()
         }
-
-
-def trainers(family: str) -> list[psutil.Process]:
-    """Return the processes of a family that train."""
-    return alive(family, "agents.training.sweep_one")
 
 
 def test_whoever_is_killed_the_policies_are_those_of_lone_trainings(
@@ -112,28 +106,37 @@ def test_whoever_is_killed_the_policies_are_those_of_lone_trainings(
     wait_until(lambda: not alive(driver.family))
     assert len(driver.policies()) < len(SEEDS)
     first, second = driver.start(), driver.start()  # one waits for what the other trains
-    wait_until(driver.trainers)
-    driver.trainers()[0].kill()
+    wait_until(driver.workers)
+    driver.workers()[0].kill()
     assert first.wait() == second.wait() == 0, driver.log.read_text()
     assert driver.policies() == whole
     wait_until(lambda: not alive(driver.family))
 
 
-def test_a_dask_cluster_loses_no_training_and_keeps_none_that_nobody_wants(
+def test_killed_dask_worker_and_driver_lose_no_training(
     tmp_path: Path, dask: DaskProcesses, whole: dict[int, bytes]
 ) -> None:
     driver = Driver(tmp_path, dask.address)
     running = driver.start()
     wait_until(driver.under_way)
-    before = {process.pid for process in trainers(dask.family)}
-    dask.workers()[0].kill()
-    wait_until(lambda: {process.pid for process in trainers(dask.family)} - before)
     running.kill()
     running.wait()
-    wait_until(lambda: not trainers(dask.family))
     assert len(driver.policies()) < len(SEEDS)
-    assert driver.start().wait() == 0, driver.log.read_text()
+    again = driver.start()
+    dask.workers()[0].kill()
+    assert again.wait() == 0, driver.log.read_text()
     assert driver.policies() == whole
+
+
+def test_training_that_nobody_waits_for_stops(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers = iter([True, True, False])
+    monkeypatch.setattr(callbacks, "wanted", lambda: next(answers))
+    (training,) = sweep.trainings([CONFIG], (3,), tmp_path, "ppo")
+    with pytest.raises(RuntimeError, match="the sweep that asked for this training is gone"):
+        sweep.train(training)
+    assert not training.finished()
 
 
 def test_a_policy_made_elsewhere_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -163,7 +166,7 @@ def test_a_policy_without_its_own_record_is_made_again(
 ) -> None:
     """A process may be killed between the two files."""
     run = train.Run(CONFIG, 3, tmp_path / "there")
-    train.train_to_the_end(run, Console(quiet=True))
+    train.train_to_the_end(run, QUIET)
     training = sweep.Training(CONFIG, 3, run.folder)
     record, policy = run.folder / "policy.json", run.folder / "policy.onnx"
     assert training.finished()
@@ -187,16 +190,12 @@ def test_the_record_is_written_before_the_policy(
     assert written == ["policy.json", "policy.onnx"]
 
 
-@pytest.mark.parametrize("package", ["agents", "baselines", "pam_envs"])
-def test_other_sources_are_another_training(
-    package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_other_code_is_another_training(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A worker that computes another key than the driver's refuses the task."""
     training = sweep.Training(CONFIG, 3, tmp_path)
-    key, digests = training.key, sources.digests()
+    key = training.key
     assert sweep.Training(CONFIG, 3, tmp_path).key == key
-    assert set(digests) == {"agents", "baselines", "pam_envs"}
-    monkeypatch.setattr(sources, "digests", lambda: {**digests, package: "0"})
+    monkeypatch.setattr(sweep, "code", lambda: "0")
     assert training.key != key
 
 
@@ -214,15 +213,27 @@ def test_other_versions_are_another_training(
     assert training.key != key
 
 
-def test_sources_are_every_python_file_of_a_package(tmp_path: Path) -> None:
-    (tmp_path / "a.py").write_text("1")
-    first = sources.digest_of(tmp_path)
-    (tmp_path / "notes.txt").write_text("x")
-    assert sources.digest_of(tmp_path) == first
-    (tmp_path / "a.py").write_text("2")
-    second = sources.digest_of(tmp_path)
-    (tmp_path / "a.py").rename(tmp_path / "b.py")
-    assert len({first, second, sources.digest_of(tmp_path)}) == 3
+def test_code_is_every_python_file_of_the_packages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sweep, "ROOT", tmp_path)
+    folders = [tmp_path / name for name in ("agents", "baselines", "pam_envs")]
+
+    def digest() -> str:
+        sweep.code.cache_clear()
+        return sweep.code()
+
+    seen = {digest()}
+    for folder in folders:
+        folder.mkdir()
+        (folder / "a.py").write_text("1")
+        (folder / "notes.txt").write_text("x")
+        seen.add(digest())
+    (folders[0] / "notes.txt").write_text("y")
+    assert len(seen | {digest()}) == 4
+    (folders[0] / "a.py").rename(folders[0] / "b.py")
+    assert len(seen | {digest()}) == 5
+    sweep.code.cache_clear()
 
 
 def test_a_training_that_fails_is_missing_and_says_why(tmp_path: Path) -> None:

@@ -18,8 +18,7 @@ import numpy as np
 import pytest
 import torch
 import yaml
-from rich.console import Console
-from short_runs import ID, KINDS, kind, tiny, trained
+from short_runs import ID, KINDS, QUIET, Killed, killed_after, kind, tiny, trained
 from stable_baselines3.common.evaluation import evaluate_policy
 
 from agents.__main__ import main
@@ -28,36 +27,14 @@ from agents.policies.policy_file import finished
 from agents.settings import presets as configs
 from agents.settings import seeds
 from agents.settings.parts import Evaluation
-from agents.training import checkpoint, sources, train
+from agents.training import checkpoint, train
 from agents.training.building import make_env, make_model
 from agents.training.checkpoint import MARK, CheckpointError
-from agents.vec_envs.sb3 import make_batch_vec_env
+from agents.vec_envs.batch import make_batch_vec_env
 from benchmarks.scenarios import scenario as scenarios
 from tests.sweeps.processes_of import wait_until
 
-QUIET = Console(quiet=True)
-ROOT = Path(__file__).resolve().parents[2]
-
-
-class Killed(Exception):
-    """Stands for the moment at which a process is killed."""
-
-
-def killed_after(run: train.Run, steps: int) -> None:
-    """Train, and stop without any clearing up once ``steps`` are passed."""
-    model = train.start(run)
-    ordinary = model.collect_rollouts
-
-    def collect(*arguments: Any, **keywords: Any) -> Any:
-        if model.num_timesteps >= steps:
-            raise Killed
-        return ordinary(*arguments, **keywords)
-
-    model.collect_rollouts = collect  # type: ignore[method-assign]
-    with pytest.raises(Killed):
-        train.train(run, model, QUIET)
-    np.random.seed(999)  # noqa: NPY002  (a new process starts with other random numbers)
-    torch.manual_seed(999)
+ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -201,15 +178,6 @@ def test_a_changed_plant_is_not_trained_on_unnoticed(ppo: tuple[Any, Path], tmp_
     checkpoint.save(tmp_path / checkpoint.NAME, content)
     with pytest.raises(CheckpointError, match=r"trained on the plants .*train anew"):
         train.resume(train.saved_run(tmp_path))
-
-
-def test_changed_sources_are_not_trained_with_unnoticed(
-    ppo: tuple[Any, Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    now = sources.digests()
-    monkeypatch.setattr(sources, "digests", lambda: {**now, "pam_envs": "0123456789abcdef"})
-    with pytest.raises(CheckpointError, match="the sources of pam_envs have changed"):
-        train.resume(train.saved_run(ppo[1]))
 
 
 @pytest.mark.parametrize(

@@ -25,14 +25,14 @@ from optuna.trial import TrialState
 from rich.console import Console
 from stable_baselines3.common.logger import Logger
 
-from agents.settings import preset_text
+from agents.search import preset_text
+from agents.search.spaces import as_settings, from_settings, space_of, with_settings
 from agents.settings import presets as configs
 from agents.settings.parts import Search
 from agents.settings.presets import Config
-from agents.settings.search_spaces import as_settings, from_settings, space_of, with_settings
-from agents.settings.settings import SettingsError
+from agents.settings.schema import SettingsError
 from agents.training.building import make_env, make_model
-from agents.training.callbacks import Now, WarmUp, score_of
+from agents.training.callbacks import PeriodicCallback, WarmUp, score_of
 from agents.training.evaluation import value_of
 
 HEARTBEAT = 60
@@ -172,7 +172,7 @@ def _trained(config: Config, seed: int, reports: Reports) -> float:
     return min(reports.values)
 
 
-class Reports(Now):
+class Reports(PeriodicCallback):
     """Tells the search how a trial does, and stops it if it is told to.
 
     Parameters

@@ -19,7 +19,7 @@ from agents.export.export import facts, policy_bytes
 from agents.policies.policy import OnnxPolicy
 from agents.policies.residual import with_controller
 from agents.settings import presets as configs
-from agents.settings.settings import SettingsError
+from agents.settings.schema import SettingsError
 from agents.training import evaluation
 from agents.training.building import make_env, signals_of
 from agents.vec_envs.mixed import MixedVecEnv
@@ -30,7 +30,7 @@ Run = Callable[[str], tuple[Any, Path]]
 REMEMBERS = ("recurrent", "plain_recurrent", "history", "residual_sac", "residual_recurrent")
 CORRECTS = ("residual", "residual_sac", "residual_recurrent")
 PLAIN = ("ppo", "sac", "tqc")
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def seen_and_done(name: str, model: Any, steps: int) -> Iterator[tuple[Any, Any, Any, VecEnv]]:

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from rich.console import Console
-from short_runs import LOOK, NARROW, tiny
+from short_runs import LOOK, NARROW, QUIET, killed_after, tiny
 
 from agents.__main__ import main
 from agents.policies.policy import OnnxPolicy
@@ -17,7 +16,6 @@ from agents.settings import presets as configs
 from agents.training import best, callbacks, train
 from agents.training.evaluation import Score
 
-QUIET = Console(quiet=True)
 NORMALIZED = {"observation": True, "reward": True}
 WIDE = {"ppo": NARROW, "sac": NARROW, "tqc": NARROW, "recurrent_ppo": {"hidden": [16]}}
 
@@ -73,11 +71,11 @@ def test_what_was_found_can_be_looked_at(
 ) -> None:
     judged(run_in(tmp_path), {0: 5.0, 512: 1.0, 1024: 3.0}, monkeypatch)
     capsys.readouterr()
-    assert main(["looks", str(tmp_path / "policy.onnx")]) == 0
+    assert main(["evaluations", str(tmp_path / "policy.onnx")]) == 0
     head, *lines = capsys.readouterr().out.splitlines()
     assert head.endswith("3 evaluations")
     assert [line.split()[0] for line in lines] == ["0", "512", "1,024"]
-    assert ["shipped" in line for line in lines] == [False, True, False]
+    assert ["exported" in line for line in lines] == [False, True, False]
 
 
 def test_the_normaliser_is_that_of_the_best(
@@ -113,8 +111,6 @@ def test_what_cannot_be_judged_is_not_preferred(
 def test_a_killed_run_remembers_its_best(
     normalize: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from test_train import killed_after
-
     values = {0: 5.0, 512: 1.0, 1024: 3.0}
     _, _, card = judged(run_in(tmp_path / "whole", **normalize), values, monkeypatch)
     assert card["chosen"]["steps"] == 512

@@ -13,12 +13,12 @@ SPENT = {"wall": 2.0, "cpu": 1.0}
 
 
 def test_steps_are_those_that_were_done() -> None:
-    done = record.training(tiny(), 3, "x", SPENT, steps=1_030)
+    done = record.cost(tiny(), 3, "x", SPENT, 1_030)
     assert (done["steps"], done["frames_per_second"]) == (1_030, 515)
 
 
 def test_settings_by_hand_were_not_tried_zero_times() -> None:
     by_hand = configs.from_mapping({"env": ID})
-    assert json.loads(json.dumps(record.training(by_hand, 3, "x", SPENT)))["tuning_trials"] is None
+    assert json.loads(json.dumps(record.cost(by_hand, 3, "x", SPENT, 7)))["tuning_trials"] is None
     searched = configs.changed(by_hand, ["search.trials=40"])
-    assert record.training(searched, 3, "x", SPENT)["tuning_trials"] == 40
+    assert record.cost(searched, 3, "x", SPENT, 7)["tuning_trials"] == 40
