@@ -9,7 +9,7 @@ import gymnasium as gym
 import pygame
 
 import pam_envs  # noqa: F401 (registers the environments)
-from pam_envs.envs.rendering.demonstrators import POLICIES
+from pam_envs.envs.rendering.scene import view_of
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -52,7 +52,7 @@ def frame(name: str, path: Path, seconds: float, **arguments: object) -> None:
     env = gym.make(name, render_mode="rgb_array", episode_seconds=60.0, **arguments)
     inner = env.unwrapped
     observation, _ = env.reset(seed=0)
-    policy = POLICIES[inner.plant.family](inner)
+    policy = view_of(inner).demonstrator(inner)
     for _ in range(round(seconds / inner.control_period)):
         observation, *_ = env.step(policy(observation))
     save(env, path)

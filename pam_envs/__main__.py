@@ -19,8 +19,8 @@ import tyro
 from numpy.typing import NDArray
 
 from pam_envs.envs.registration import full_id, register_all
-from pam_envs.envs.rendering.demonstrators import POLICIES
 from pam_envs.envs.rendering.film import write_film
+from pam_envs.envs.rendering.scene import view_of
 from pam_envs.hysteresis.protocol import kinds
 from pam_envs.parameters import Signals
 
@@ -187,7 +187,7 @@ def _pictures(env: Any, options: Render) -> Iterator[NDArray[np.uint8]]:
     inner = env.unwrapped
     observation, _ = env.reset(seed=options.seed)
     yield env.render()
-    policy, shown = POLICIES[inner.plant.family](inner), 1
+    policy, shown = view_of(inner).demonstrator(inner), 1
     steps = round(options.seconds / inner.control_period)
     for step in track(range(1, steps + 1), description="filming"):
         observation, _, terminated, truncated, _ = env.step(policy(observation))

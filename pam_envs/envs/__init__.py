@@ -1,1 +1,1 @@
-"""Gymnasium environments: a plant, a reference and a task."""
+"""Gymnasium environments: a plant, a reference and a task. One folder a family."""

@@ -1,36 +1,57 @@
-"""Registration of the environments on ``import pam_envs``."""
+"""Registration of environment families with Gymnasium."""
 
 from __future__ import annotations
+
+import importlib
+import pkgutil
+from types import ModuleType
 
 import gymnasium as gym
 
 NAMESPACE = "PAM/"
-ENVIRONMENTS = {
-    "PAM/MusclePositioning-v0": "positioning.env:MusclePositioning",
-    "PAM/KneeTension-v0": "knee.brace:KneeTension",
-    "PAM/KneeStiffness-v0": "knee.brace:KneeStiffness",
-    "PAM/KneeWalk-v0": "knee.gait:KneeWalk",
-    "PAM/KneeStairsUp-v0": "knee.gait:KneeStairsUp",
-    "PAM/KneeStairsDown-v0": "knee.gait:KneeStairsDown",
-    "PAM/ElbowOrthosis-v0": "elbow.env:ElbowOrthosis",
-    "PAM/AntagonisticJoint-v0": "joint.env:AntagonisticJoint",
-    "PAM/RedundantManipulator-v0": "manipulator.env:RedundantManipulator",
-}
-"""Module in this folder, and what stands before ``Env`` and ``VectorEnv`` in its classes' names."""
+
+
+def register_family(family: ModuleType | str) -> tuple[str, ...]:
+    """Register the environments of a family and return their ids.
+
+    Parameters
+    ----------
+    family : module or str
+        A package, or its import name. Its ``ENVIRONMENTS`` maps each id to
+        ``module:Name``: ``NameEnv`` in that module is the single environment and
+        ``NameVectorEnv`` the batch. Ids that are registered already stay as they are.
+
+    Raises
+    ------
+    ValueError
+        If the package declares no environments.
+    """
+    package = importlib.import_module(family) if isinstance(family, str) else family
+    declared: dict[str, str] = getattr(package, "ENVIRONMENTS", {})
+    if not declared:
+        raise ValueError(
+            f"{package.__name__} declares no ENVIRONMENTS; give a mapping from id to 'module:Name'"
+        )
+    for name, place in declared.items():
+        if name not in gym.registry:
+            gym.register(
+                name,
+                entry_point=f"{package.__name__}.{place}Env",
+                vector_entry_point=f"{package.__name__}.{place}VectorEnv",
+                order_enforce=False,  # the environment itself requires reset() before step()
+                disable_env_checker=True,  # the checks run in the tests, not in every user's steps
+            )
+    return tuple(declared)
 
 
 def register_all() -> None:
-    """Register every environment with Gymnasium, once."""
-    for name, place in ENVIRONMENTS.items():
-        if name in gym.registry:
-            continue
-        gym.register(
-            name,
-            entry_point=f"pam_envs.envs.{place}Env",
-            vector_entry_point=f"pam_envs.envs.{place}VectorEnv",
-            order_enforce=False,  # the environment itself asks for reset() before step()
-            disable_env_checker=True,  # the checks run in the tests, not in every user's steps
-        )
+    """Register every family: each folder beside this module that declares environments."""
+    package = __name__.rpartition(".")[0]
+    for found in pkgutil.iter_modules(importlib.import_module(package).__path__, f"{package}."):
+        if found.ispkg:
+            family = importlib.import_module(found.name)
+            if hasattr(family, "ENVIRONMENTS"):
+                register_family(family)
 
 
 def full_id(name: str) -> str:

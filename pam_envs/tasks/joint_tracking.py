@@ -1,4 +1,4 @@
-"""Tracking with joints of antagonistic muscles: what a step is worth, what it costs."""
+"""Tracking with antagonistic joints: weights of the reward and soft limits."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
+from pam_envs.tasks.rewards import weight
 
 
 @dataclass(frozen=True)
@@ -16,17 +17,13 @@ class JointTracking:
     ``reward = reward/tracking + reward/effort + reward/ended``.
     """
 
-    tracking_weight: float = parameter(
-        1.0, "1", 0.0, 1e3, "assumed", "reward per control period at an error of error_scale"
-    )
+    tracking_weight: float = weight(1.0, "reward per control period at an error of error_scale")
     error_scale: float = parameter(
         0.01745, "rad", 1e-5, 3.0, "assumed", "an error of 1 degree costs tracking_weight"
     )
-    effort_weight: float = parameter(
-        0.2, "1", 0.0, 1e3, "assumed", "cost of moving both pressures over their whole range"
-    )
+    effort_weight: float = weight(0.2, "cost of moving both pressures over their whole range")
     soft_share: float = parameter(
-        0.95, "1", 0.1, 1.0, "assumed", "share of the joint limit from where on the angle costs"
+        0.95, "1", 0.1, 1.0, "assumed", "share of the joint limit above which the angle costs"
     )
     soft_pressure: float = parameter(
         6.4e5, "Pa", 0.0, 1e7, "assumed", "just below the largest pressure of 6.5 bar"
@@ -39,28 +36,22 @@ class JointTracking:
 
 @dataclass(frozen=True)
 class PathTracking:
-    """Weights and limits of a chain of joints whose tool follows a path.
+    """Weights and limits of path tracking with the tool of a chain of joints.
 
     ``reward = reward/position + reward/pointing + reward/effort + reward/ended``.
     """
 
-    position_weight: float = parameter(
-        1.0, "1", 0.0, 1e3, "assumed", "reward per control period at position_scale"
-    )
+    position_weight: float = weight(1.0, "reward per control period at position_scale")
     position_scale: float = parameter(
         0.02, "m", 1e-5, 10.0, "assumed", "the tool 2 cm off its path costs position_weight"
     )
-    pointing_weight: float = parameter(
-        0.5, "1", 0.0, 1e3, "assumed", "reward per control period at pointing_scale"
-    )
+    pointing_weight: float = weight(0.5, "reward per control period at pointing_scale")
     pointing_scale: float = parameter(
         0.03491, "1", 1e-5, 3.0, "assumed", "a tool 2 degrees aside costs pointing_weight"
     )
-    effort_weight: float = parameter(
-        0.2, "1", 0.0, 1e3, "assumed", "cost of moving all pressures over their whole range"
-    )
+    effort_weight: float = weight(0.2, "cost of moving all pressures over their whole range")
     soft_share: float = parameter(
-        0.95, "1", 0.1, 1.0, "assumed", "share of the joint limit from where on angles cost"
+        0.95, "1", 0.1, 1.0, "assumed", "share of the joint limit above which angles cost"
     )
     soft_pressure: float = parameter(
         6.4e5, "Pa", 0.0, 1e7, "assumed", "just below the largest pressure of 6.5 bar"

@@ -1,11 +1,11 @@
-"""Torque and stiffness at once: virtual objects in a wearer's hand, and what a step is worth.
+"""Tracking of torque and stiffness: virtual objects, weights of the reward, limits.
 
-The orthosis makes objects felt that are not there. Each is a torque and a stiffness for every angle
-of the elbow; bending is positive, the upper arm hangs.
+The orthosis renders virtual objects to its wearer (haptic rendering). An object is a torque and a
+stiffness for every angle of the elbow; flexion is positive, the upper arm hangs.
 
 * a *weight* in the hand pulls the forearm down, ``Q = -m g l sin(q)``, at a moderate stiffness;
-* a *wall* is not felt before an angle and is a stiff spring beyond it;
-* *free* motion: no torque, and as little stiffness as is asked for.
+* a *wall* is a stiff spring beyond an angle, and nothing before it;
+* *free* motion: no torque, and a low stiffness.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pam_envs.kernels.arithmetic import sine_of_turns
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
+from pam_envs.tasks.rewards import weight
 
 OBJECTS = ("weight", "wall", "free", "mixed")
 WEIGHT, WALL, FREE, MIXED = range(len(OBJECTS))
@@ -25,7 +26,7 @@ RANGES = (
     ("nearest_wall", "farthest_wall"),
     ("softest_wall", "stiffest_wall"),
 )
-"""Parameters between which an episode's object is drawn."""
+"""Pairs of parameters that bound the range of an episode's object."""
 PER_TURN = 0.15915494309189535
 
 
@@ -36,31 +37,18 @@ class TorqueStiffness:
     ``reward = reward/torque + reward/stiffness + reward/effort + reward/ended``.
     """
 
-    torque_weight: float = parameter(
-        1.0, "1", 0.0, 1e3, "assumed", "reward per control period at an error of torque_scale"
-    )
+    torque_weight: float = weight(1.0, "reward per control period at an error of torque_scale")
     torque_scale: float = parameter(
-        0.5, "N m", 1e-4, 1e3, "assumed", "a torque off by 0.5 N m costs torque_weight"
+        0.5, "N m", 1e-4, 1e3, "assumed", "an error of 0.5 N m costs torque_weight"
     )
-    stiffness_weight: float = parameter(
-        0.2,
-        "1",
-        0.0,
-        1e3,
-        "assumed",
-        "1 N m/rad costs as much as 0.2 N m: the torque that it is off by 0.2 rad "
-        "away, the angle of the headline of the tracks",
+    stiffness_weight: float = weight(
+        0.2, "1 N m/rad costs as much as 0.2 N m, the torque error that it causes 0.2 rad away"
     )
     stiffness_scale: float = parameter(
-        0.5, "N m/rad", 1e-4, 1e3, "assumed", "a stiffness off by 0.5 costs stiffness_weight"
+        0.5, "N m/rad", 1e-4, 1e3, "assumed", "an error of 0.5 N m/rad costs stiffness_weight"
     )
-    effort_weight: float = parameter(
-        0.2,
-        "1",
-        0.0,
-        1e3,
-        "assumed",
-        "cost of moving both set-points over their range, or of coils that are always on",
+    effort_weight: float = weight(
+        0.2, "cost of moving both set-points over their range, or of coils that are always on"
     )
     soft_pressure: float = parameter(
         5.9e5, "Pa", 0.0, 1e7, "assumed", "just below the supply of 600 kPa, chakarov2018"
@@ -100,7 +88,7 @@ class TorqueStiffness:
     )
 
     def __post_init__(self) -> None:
-        """Refuse ranges of the objects that are the wrong way round."""
+        """Check that no range of the objects is reversed."""
         for low, high in RANGES:
             first, last = getattr(self, low), getattr(self, high)
             if first > last:
@@ -109,12 +97,12 @@ class TorqueStiffness:
                 )
 
     def worst(self, torque: float, stiffness: float) -> float:
-        """Return what a control period costs at most.
+        """Return the largest cost of a control period.
 
         Parameters
         ----------
         torque, stiffness : float
-            Largest errors that there can be [N m], [N m/rad].
+            Largest possible errors [N m], [N m/rad].
         """
         off = self.torque_weight * torque / self.torque_scale
         return off + self.stiffness_weight * stiffness / self.stiffness_scale + self.effort_weight
@@ -151,14 +139,9 @@ def object_stiffness(
     level : float
         Stiffness where there is no wall [N m/rad].
     depth : float
-        Over which it grows to that of the wall [rad]; the others as in :func:`object_torque`.
+        Angle over which it grows to that of the wall [rad]; the others as in
+        :func:`object_torque`.
     """
     if kind == WALL:
         return level + (strength - level) * max(0.0, min(1.0, (angle - place) / depth))
     return level
-
-
-@kernel
-def error_reward(error: float, scale: float, weight: float) -> float:
-    """Return the reward for an error: linear, 0 at best."""
-    return -weight * abs(error) / scale

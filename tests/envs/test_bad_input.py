@@ -159,7 +159,7 @@ def test_bad_arguments_that_all_take(name: str, arguments: dict[str, Any], said:
     [
         ({"reference": "stairs"}, "choose one of 'steps'"),
         ({"reference": [0.0, np.nan]}, "finite sample"),
-        ({"reference": [5.0]}, "reference reaches 5 m; at most 0.2 m is taken"),
+        ({"reference": [5.0]}, "reference reaches 5 m; at most 0.2 m is accepted"),
         ({"load": -1.0}, "load = -1.0 must be a number from 0 to 5 kg"),
         ({"load": 25.0}, "from 0 to 5 kg"),
         ({"load": []}, "load = "),

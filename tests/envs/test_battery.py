@@ -77,7 +77,7 @@ def test_observations_lie_in_their_space_and_every_entry_moves(name: str, varian
 
 
 @EVERY
-def test_steps_share_no_hysteresis(name: str) -> None:
+def test_steps_share_no_memory(name: str) -> None:
     env = gym.make(name)
     kept = [env.reset(seed=0)[0]]
     infos = []
@@ -85,7 +85,7 @@ def test_steps_share_no_hysteresis(name: str) -> None:
         observation, _, _, _, info = env.step(action)
         kept.append(observation)
         infos.append(info)
-    assert not any(np.shares_hysteresis(a, b) for a, b in itertools.pairwise(kept))
+    assert not any(np.shares_memory(a, b) for a, b in itertools.pairwise(kept))
     times = [info["time"] for info in infos]  # looked at long after the step
     assert times == sorted(times)
     assert len(set(times)) == len(times)

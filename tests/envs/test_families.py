@@ -1,4 +1,4 @@
-"""What a family adds to the common step, shown on three carts that are pushed at once."""
+"""Kernels of a family in the common step, with three carts that are pushed at once."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pam_envs.envs.core.arguments import common
+from pam_envs.envs.core.arguments import Common
 from pam_envs.envs.core.families import Kernels
+from pam_envs.envs.core.layout import Report, computed
 from pam_envs.envs.core.plant_env import PlantEnv
 from pam_envs.envs.core.setup import Setup, compose
-from pam_envs.envs.core.step import PERIOD, write_references
+from pam_envs.envs.core.step import PERIOD, copy_rows, write_references
 from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import normal, uniform
@@ -25,10 +26,11 @@ from pam_envs.parameters import Signal, Signals
 CARTS = 3
 PLACE, PUSH, OLD_PUSH, DRIFT = 0, CARTS, 2 * CARTS, 3 * CARTS
 MASS = 0
-INFO = ("time", "reference", "output", "reward/near", "reward/calm", "state/drift", "saturated")
-TIME, REF, OUT, NEAR, CALM, S_DRIFT, SATURATED = range(len(INFO))
-ENDED = len(INFO)
-SIGNALS = ENDED + 1
+REPORT = Report(
+    {**computed("reward", "near", "calm"), "state/drift": DRIFT},
+    scratch=0,
+)
+INFO, ENDED, SIGNALS = REPORT.rows, REPORT.ended, REPORT.signals
 FARTHEST = 5.0
 
 
@@ -56,7 +58,7 @@ def roll(
 
 
 @kernel
-def wanted(
+def desired(
     rows: Any,
     fixed: Any,
     samples: Any,
@@ -73,16 +75,16 @@ def wanted(
 def judge(
     rows: Any, fixed: Any, counts: Any, ahead: Any, settings: Any, choices: Any, work: Any
 ) -> None:
+    copy_rows(rows, work)
     for j in range(LANES):
-        work[TIME][j] = counts[3][j] * settings[0][PERIOD]
+        work[INFO.time][j] = counts[3][j] * settings[0][PERIOD]
         far, change = 0.0, 0.0
         for k in range(CARTS):
             work[SIGNALS + k][j] = rows[PLACE + k][j]
             far = max(far, abs(rows[PLACE + k][j]))
             change = change + abs(rows[PUSH + k][j] - rows[OLD_PUSH + k][j])
-        work[REF][j], work[OUT][j] = fixed[MASS][j], far
-        work[NEAR][j], work[CALM][j] = -far, -change
-        work[S_DRIFT][j] = rows[DRIFT][j]
+        work[INFO.reference][j], work[INFO.output][j] = fixed[MASS][j], far
+        work[INFO.reward_near][j], work[INFO.reward_calm][j] = -far, -change
         work[ENDED][j] = 1.0 if far > FARTHEST else 0.0
     write_references(counts, ahead, choices, work, SIGNALS + CARTS)
 
@@ -107,24 +109,20 @@ def begin(
 
 
 def carts() -> Kernels:
-    functions = {
-        "env_apply": drift,
-        "env_advance": roll,
-        "env_reference": wanted,
-        "env_evaluate": judge,
-        "env_begin": begin,
-    }
     return Kernels(
         f"carts_{hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:12]}",
         carts,
         (),
-        functions,
-        info=INFO,
+        REPORT,
+        apply=drift,
+        advance=roll,
+        reference=desired,
+        evaluate=judge,
+        begin=begin,
         rows=3 * CARTS + 1,
         parameters=1,
         counts=4,
-        scratch=0,
-        signals=CARTS + 2 * 5,
+        signals=CARTS,
         set_points=PUSH,
         old_set_points=OLD_PUSH,
         channels=2,
@@ -142,7 +140,7 @@ class Plant(SimpleNamespace):
 
 
 def setup(normalize: bool = True, seconds: float = 0.4) -> Setup:
-    given = common(4, 3, seconds, normalize, None)
+    given = Common(None, 4, 3, seconds, normalize=normalize, randomize=True)
     names = [f"place_{k}" for k in range(CARTS)]
     names += [f"{n}_{k}" for n in ("first", "second") for k in range(5)]
     return compose(
@@ -153,13 +151,9 @@ def setup(normalize: bool = True, seconds: float = 0.4) -> Setup:
         actions=Signals(
             Signal(f"push_{k}", "N", -10.0, 10.0 * (k + 1), k, normalize) for k in range(CARTS)
         ),
-        config=(),
-        choices=(),
-        own=np.zeros((1, 1)),
-        samples=np.zeros((2, 1)),
-        tables=np.zeros((1, 2, 2)),
+        config={},
+        choices={},
         spread=np.array([[MASS, 1.0, 3.0]]),
-        drawn=True,
     )
 
 
@@ -212,7 +206,7 @@ def test_a_wrong_number_of_actions_names_them() -> None:
 
 def test_rows_of_a_batch_are_single_environments_through_ends_and_restarts() -> None:
     number = 40
-    batch = PlantVectorEnv(setup(), number)
+    batch = PlantVectorEnv(number, setup=setup())
     singles = {i: PlantEnv(setup()) for i in (0, 31, 32, 39)}
     observations, _ = batch.reset(seed=5)
     for i, env in singles.items():

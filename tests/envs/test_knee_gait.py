@@ -193,7 +193,7 @@ def test_paces_have_their_stride(name: str) -> None:
         ({"start": "toe_off"}, "choose one of 'random', 'heel_contact'"),
         ({"plant": KneeOrthosis.no_load()}, r"give KneeOrthosis.on_leg\('walk'\)"),
         ({"plant": KneeOrthosis.on_leg("stairs_up")}, r"give KneeOrthosis.on_leg\('walk'\)"),
-        ({"reference": [1e3]}, "reference reaches 1000 N m; at most 100 N m is taken"),
+        ({"reference": [1e3]}, "reference reaches 1000 N m; at most 100 N m is accepted"),
     ],
 )
 def test_bad_arguments(arguments: dict[str, Any], said: str) -> None:

@@ -1,1 +1,1 @@
-"""core."""
+"""Step, single environment, batch and arguments of every family of environments."""

@@ -1,4 +1,4 @@
-"""Keyword arguments that all environments share, checked and turned into what a setup holds."""
+"""Keyword arguments that all environments share: checks, and conversion to numbers."""
 
 from __future__ import annotations
 
@@ -6,102 +6,133 @@ import dataclasses
 import difflib
 import functools
 import inspect
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.envs.core.setup import check_choice, check_number, check_whole
+from pam_envs.envs.core.setup import Setup, check_choice, check_number, check_whole
 from pam_envs.envs.core.step import MOST_PREVIEW
 from pam_envs.hysteresis.protocol import kinds, model_of
-from pam_envs.parameters import check, declarations
+from pam_envs.parameters import Signal, Signals, check, declarations
 
 T = TypeVar("T")
+Part = tuple[str, str, float, float]
+"""Name, unit and range of a signal."""
 
 RENDER_MODES = (None, "rgb_array", "human")
 
 
-F = TypeVar("F", bound=Callable[..., Any])
-
-
-def named_arguments(make: F) -> F:
-    """Let a function of keyword arguments say, of one that it does not have, which it has."""
-    parameters = inspect.signature(make).parameters
-    known = [name for name, p in parameters.items() if p.default is not p.empty]
-
-    @functools.wraps(make)
-    def made(*given: Any, **arguments: Any) -> Any:
-        for name in arguments:
-            if name not in parameters:
-                close = difflib.get_close_matches(name, known, n=1)
-                hint = f", but {close[0]!r}" if close else ""
-                raise TypeError(
-                    f"there is no argument {name!r}{hint}; the arguments are {', '.join(known)}"
-                )
-        return make(*given, **arguments)
-
-    return made  # type: ignore[return-value]
-
-
 @dataclass(frozen=True)
 class Common:
-    """Arguments that mean the same in every environment.
+    """Arguments of every environment.
 
     Attributes
     ----------
-    preview, stride : int
-        Future reference samples, and control periods between them.
-    seconds : float
-        Duration of an episode [s].
+    hysteresis : {"maxwell_slip", "preisach", "none"}, optional
+        Hysteresis model of the muscles. Default: that of ``plant``, or Maxwell-slip.
+    plant : plant or path, optional
+        Plant of the environment's family, as an object or a YAML file. Default: the published one.
+    reference : str or array_like
+        Family of references, or samples, one per control period (the last one holds).
+    preview : int
+        Future reference samples in the observation, 0 to 20.
+    preview_stride : int
+        Control periods between them.
+    episode_seconds : float
+        Duration of an episode [s], 0.02 to 3,600.
+    randomize : bool or mapping
+        True: every episode draws one of the equally good fits (where there are several) and the
+        assumed parameters within their declared ranges. A mapping {"mass.damping": (low, high)}:
+        only those.
     normalize : bool
         Observation and action in [-1, 1], or SI.
     render_mode : {None, "rgb_array", "human"}
-        As Gymnasium means it.
+        As in Gymnasium; a batch has no "human".
+    reward : mapping, optional
+        Weights, scales and limits of the environment's task to change.
     """
 
+    reference: Any
     preview: int
-    stride: int
-    seconds: float
-    normalize: bool
-    render_mode: str | None
+    preview_stride: int
+    episode_seconds: float
+    hysteresis: str | None = None
+    plant: Any = None
+    randomize: Any = False
+    normalize: bool = True
+    render_mode: str | None = None
+    reward: Mapping[str, float] | None = None
+
+    def __post_init__(self) -> None:
+        """Check the arguments that do not depend on the family."""
+        check_choice("render_mode", self.render_mode, RENDER_MODES)
+        check_choice("normalize", self.normalize, (True, False))
+        check_whole("preview", self.preview, 0, MOST_PREVIEW)
+        check_whole("preview_stride", self.preview_stride, 1, 1000)
+        check_number("episode_seconds", self.episode_seconds, 0.02, 3600.0, "s")
 
 
-def common(
-    preview: Any, preview_stride: Any, episode_seconds: Any, normalize: Any, render_mode: Any
-) -> Common:
-    """Return the shared arguments, checked."""
-    check_choice("render_mode", render_mode, RENDER_MODES)
-    check_choice("normalize", normalize, (True, False))
-    return Common(
-        preview=check_whole("preview", preview, 0, MOST_PREVIEW),
-        stride=check_whole("preview_stride", preview_stride, 1, 1000),
-        seconds=check_number("episode_seconds", episode_seconds, 0.02, 3600.0, "s"),
-        normalize=normalize,
-        render_mode=render_mode,
-    )
+def environment_arguments(
+    reference: Any, preview: int, preview_stride: int, episode_seconds: float
+) -> Callable[[Callable[..., Setup]], Callable[..., Setup]]:
+    """Give a function the arguments of :class:`Common`, with these defaults, beside its own.
+
+    The function gets a :class:`Common` as its first argument. Without keyword arguments of an
+    unknown name: a ``TypeError`` lists the known ones.
+    """
+    defaults = Common(reference, preview, preview_stride, episode_seconds)
+
+    def decorate(make: Callable[..., Setup]) -> Callable[..., Setup]:
+        signature = inspect.signature(make)
+        own = list(signature.parameters.values())[1:]
+        shared = [
+            inspect.Parameter(f.name, inspect.Parameter.KEYWORD_ONLY, default=value)
+            for f in dataclasses.fields(Common)
+            for value in (getattr(defaults, f.name),)
+        ]
+        fixed = [p for p in own if p.default is p.empty]
+        known = [p.name for p in shared] + [p.name for p in own if p.default is not p.empty]
+
+        @functools.wraps(make)
+        def made(*given: Any, **arguments: Any) -> Setup:
+            for name in arguments:
+                if name not in known and name not in signature.parameters:
+                    close = difflib.get_close_matches(name, known, n=1)
+                    hint = f", but {close[0]!r}" if close else ""
+                    raise TypeError(
+                        f"there is no argument {name!r}{hint}; the arguments are {', '.join(known)}"
+                    )
+            names = {p.name for p in shared} & set(arguments)
+            common = dataclasses.replace(defaults, **{n: arguments.pop(n) for n in names})
+            return make(common, *given, **arguments)
+
+        keywords = [p.replace(kind=p.KEYWORD_ONLY) for p in own if p.default is not p.empty]
+        made.__signature__ = inspect.Signature([*fixed, *shared, *keywords])  # type: ignore[attr-defined]
+        return made
+
+    return decorate
 
 
-def plant_of(kind: type[T], plant: Any, hysteresis: Any, stock: Callable[[Any], T]) -> T:
-    """Return the plant that ``plant`` and ``hysteresis`` name.
+def plant_of(kind: type[T], given: Common, default: Callable[[Any], T]) -> T:
+    """Return the plant that ``given.plant`` and ``given.hysteresis`` name.
 
     Parameters
     ----------
     kind : type
         Class of the plants.
-    plant : object, path or None
-        As given by the user.
-    hysteresis : str or None
-        As given by the user.
-    stock : callable
-        Returns the plant to take without ``plant``, by its hysteresis.
+    given : Common
+    default : callable
+        Returns the default plant with a hysteresis model.
     """
+    plant, hysteresis = given.plant, given.hysteresis
     if hysteresis is not None:
         check_choice("hysteresis", hysteresis, kinds())
     if plant is None:
-        return stock(hysteresis or "maxwell_slip")
+        return default(hysteresis or "maxwell_slip")
     made: Any = kind.from_yaml(plant) if isinstance(plant, (str, Path)) else plant  # type: ignore[attr-defined]
     if not isinstance(made, kind):
         raise ValueError(
@@ -126,18 +157,18 @@ def reference_of(
     largest: float | Sequence[float],
     channels: int = 1,
 ) -> tuple[int, NDArray[np.float64]]:
-    """Return the number of the reference's family, and its samples where it is given as such.
+    """Return the number of the reference's family, and its samples if it is given as samples.
 
     Parameters
     ----------
     reference : str or array_like, shape (n,) or (n, channels)
         As given by the user.
     families : sequence of str
-        Those there are; ``len(families)`` is the number of given samples.
+        Known families; ``len(families)`` is the number of given samples.
     unit : str
-        Of the samples; of several channels with a comma between them.
+        Of the samples; of several channels, separated by commas.
     largest : float or sequence of float
-        Largest size of a sample, of each channel.
+        Largest magnitude of a sample, of each channel.
     channels : int
         References that are tracked at once.
 
@@ -168,17 +199,19 @@ def reference_of(
     sizes, bounds = np.abs(shaped).max(axis=0), np.broadcast_to(largest, channels)
     for size, bound, own in zip(sizes, bounds, unit.split(", "), strict=True):
         if size > bound:
-            raise ValueError(f"reference reaches {size:g} {own}; at most {bound:g} {own} is taken")
+            raise ValueError(
+                f"reference reaches {size:g} {own}; at most {bound:g} {own} is accepted"
+            )
     return len(families), np.ascontiguousarray(shaped.T)
 
 
 def payloads_of(payload: Any, most: float) -> NDArray[np.float64]:
-    """Return the payloads [kg] that episodes draw from, shape (1, n).
+    """Return the payloads [kg] from which episodes draw, shape (1, n).
 
     Parameters
     ----------
     payload : float, sequence of float or None
-        As given by the user; None is any up to ``most``.
+        As given by the user; None: any up to ``most``.
     most : float
         Largest payload [kg].
     """
@@ -206,33 +239,39 @@ def task_of(kind: type[T], changes: Any) -> T:
     return task  # type: ignore[no-any-return]
 
 
-def spread_of(
-    plant: Any,
-    names: Sequence[str],
-    fixed: Sequence[str],
-    randomize: Any,
-    example: str,
-    corner: Mapping[str, Callable[..., float]],
-) -> NDArray[np.float64]:
-    """Return (row, low, high) of each parameter that is drawn anew every episode.
+@dataclass(frozen=True)
+class Randomisation:
+    """Parameters of a family that ``randomize`` may draw.
 
-    Parameters
+    Attributes
     ----------
-    plant : object
-        Whose ``replace`` refuses values that are out of bounds or cannot be simulated.
-    names : sequence of str
-        Its parameters in the order of the kernels' rows.
+    parameters : sequence of str
+        Parameters of the plant in the order of the kernels' rows.
     fixed : sequence of str
         Those that cannot be drawn: they scale the action or enter derived numbers.
-    randomize : bool or mapping
-        As given by the user.
     example : str
-        A mapping that would do, for the error's sentence.
+        A valid mapping, for the error message.
     corner : mapping of callable
-        ``min`` or ``max`` of each parameter that makes the plant harder to follow.
+        ``min`` or ``max``: the end of a range at which the motion is fastest or a limit nearest.
     """
-    ranges = _ranges(plant, names, fixed, randomize, example)
-    allowed = tuple(name for name in names if name not in fixed)
+
+    parameters: Sequence[str]
+    fixed: Sequence[str]
+    example: str
+    corner: Mapping[str, Callable[..., float]] = field(default_factory=dict)
+
+
+def spread_of(plant: Any, which: Randomisation, randomize: Any) -> NDArray[np.float64]:
+    """Return (row, low, high) of each parameter that every episode draws.
+
+    Raises
+    ------
+    ValueError
+        If a parameter cannot be drawn, or a range is out of bounds or cannot be simulated.
+    """
+    names, corner = list(which.parameters), which.corner
+    ranges = _ranges(plant, which, randomize)
+    allowed = tuple(name for name in names if name not in which.fixed)
     table = []
     for name, span in ranges.items():
         if name not in allowed:
@@ -256,9 +295,7 @@ def spread_of(
     return np.array(table, float).reshape(-1, 3)
 
 
-def _ranges(
-    plant: Any, names: Sequence[str], fixed: Sequence[str], randomize: Any, example: str
-) -> dict[str, Any]:
+def _ranges(plant: Any, which: Randomisation, randomize: Any) -> dict[str, Any]:
     """Return the range of each parameter that ``randomize`` asks for."""
     if randomize is False:
         return {}
@@ -267,12 +304,40 @@ def _ranges(
     if randomize is not True:
         raise ValueError(
             f"randomize = {randomize!r} must be True, False or a mapping from parameter to "
-            f"(low, high), for example {example}"
+            f"(low, high), for example {which.example}"
         )
     ranges = {}
-    for name in names:
-        component, _, field = name.partition(".")
-        declared = declarations(getattr(plant, component))[field]
-        if declared.spread is not None and name not in fixed:
+    for name in which.parameters:
+        component, _, attribute = name.partition(".")
+        declared = declarations(getattr(plant, component))[attribute]
+        if declared.spread is not None and name not in which.fixed:
             ranges[name] = declared.spread
     return ranges
+
+
+def observed(
+    now: Iterable[Part], references: Iterable[Part], given: Common, period: float
+) -> Signals:
+    """Return the signals of an observation: present ones, then references with their previews.
+
+    Parameters
+    ----------
+    now, references : iterable of (name, unit, low, high)
+    given : Common
+    period : float
+        Control period [s].
+    """
+    parts = [(part, 0.0) for part in now]
+    for name, unit, low, high in references:
+        parts.append(((name, unit, low, high), 0.0))
+        for i in range(1, given.preview + 1):
+            ahead = i * given.preview_stride * period
+            parts.append(((f"{name}_{i}", unit, low, high), ahead))
+    return Signals(
+        Signal(*part, i, given.normalize, ahead) for i, (part, ahead) in enumerate(parts)
+    )
+
+
+def acted(parts: Iterable[Part], given: Common) -> Signals:
+    """Return the signals of an action."""
+    return Signals(Signal(*part, i, given.normalize) for i, part in enumerate(parts))

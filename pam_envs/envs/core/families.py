@@ -1,4 +1,4 @@
-"""The common step with a family's functions and sizes in it."""
+"""Kernels of a family of environments: the common step with the family's functions in it."""
 
 from __future__ import annotations
 
@@ -6,34 +6,42 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
-from pam_envs.envs.core.step import N_SEED, step_by_address, step_tiles
+from pam_envs.envs.core.layout import Report
+from pam_envs.envs.core.step import MOST_PREVIEW, N_SEED, do_nothing, step_by_address, step_tiles
 from pam_envs.kernels.build import LANES, build, interpreted
 
 
 class Kernels:
-    """The functions for one family of environments, built when first asked for.
+    """Kernels of one family, built on first use.
 
     Parameters
     ----------
     name : str
-        Of the family and what tells its kernels apart; the compiled code is kept under it.
+        Name of the machine code on disk: the family and what its kernels depend on.
     maker, key : callable, tuple
-        ``maker(*key)`` returns these kernels again: compiled code is not copied.
-    functions : mapping
-        What takes the place of ``env_apply`` (what the world does at the start of a period),
-        ``env_advance`` (the plant's step), ``env_reference`` (a reference at a control period),
-        ``env_evaluate`` (report and observation) and ``env_begin`` (the start of an episode), and
-        of placeholders in the plant's kernels.
-    info : tuple of str
-        Keys of ``info`` in the order in which ``env_evaluate`` writes them.
+        ``maker(*key)`` returns these kernels again: machine code is not pickled.
+    report : Report
+        Entries of ``info``, in the order in which ``evaluate`` writes them.
+    advance : kernel
+        Advances the plant by a control period.
+    reference : kernel
+        Returns a reference at a control period.
+    evaluate : kernel
+        Writes report and observation.
+    begin : routine
+        Starts an episode.
+    apply : kernel
+        Applies actions and disturbances at the start of a control period; default: nothing.
+    config, choices : named tuple of int
+        Index of each of the family's own numbers and whole numbers in the configuration.
+    placeholders : mapping
+        Values of further global names in the call graph, such as those of the plant's kernels.
     rows, parameters, counts : int
         Rows of the state, of the parameters, and of the integers without those of the seed.
-    scratch : int
-        Rows of scratch that the plant needs; ``info`` follows them in ``work``.
     signals : int
-        Most signals of an observation.
+        Signals of an observation without its references and their previews, at most.
     set_points, old_set_points : int
-        First row of the set-points, and of those of the period before.
+        First row of the set-points, and of those of the previous period.
     channels : int
         References that are tracked at once.
     """
@@ -43,37 +51,50 @@ class Kernels:
         name: str,
         maker: Callable[..., Any],
         key: tuple[Any, ...],
-        functions: Mapping[str, Any],
+        report: Report,
         *,
-        info: tuple[str, ...],
+        advance: Callable[..., Any],
+        reference: Callable[..., Any],
+        evaluate: Callable[..., Any],
+        begin: Callable[..., Any],
         rows: int,
         parameters: int,
         counts: int,
-        scratch: int,
         signals: int,
         set_points: int,
         old_set_points: int,
         channels: int = 1,
+        config: Any = (),
+        choices: Any = (),
+        apply: Callable[..., Any] = do_nothing,
+        placeholders: Mapping[str, Any] | None = None,
     ) -> None:
         self.name, self._made_by = name, (maker, key)
-        self.info, self.channels = info, channels
+        self.info, self.channels = report.keys, channels
+        self.config, self.choices = getattr(config, "_fields", ()), getattr(choices, "_fields", ())
         self.n_rows, self.n_parameters, self.n_counts = rows, parameters, counts + N_SEED
         self.names = {
-            **functions,
+            **(placeholders or {}),
+            "env_apply": apply,
+            "env_advance": advance,
+            "env_reference": reference,
+            "env_evaluate": evaluate,
+            "env_begin": begin,
             "N_ROWS": rows,
             "N_PARAMETERS": parameters,
             "N_COUNTS": self.n_counts,
-            "N_WORK_ROWS": scratch + len(info) + 1 + signals,
-            "FIRST_INFO": scratch,
-            "N_INFO": len(info),
-            "N_REWARDS": sum(name.startswith("reward/") for name in info),
+            "N_WORK_ROWS": report.signals + signals + channels * (1 + MOST_PREVIEW),
+            "FIRST_INFO": report.scratch,
+            "N_INFO": len(report.keys),
+            "N_REWARDS": sum(name.startswith("reward/") for name in report.keys),
+            "COPIED": report.copied,
             "CHANNELS": channels,
             "FIRST_SET_POINT": set_points,
             "FIRST_OLD_SET_POINT": old_set_points,
         }
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle by the key: compiled code is not copied."""
+        """Pickle the key instead of machine code."""
         return self._made_by
 
     def _build(self, name: str, lanes: int, parallel: bool = False) -> Callable[..., Any]:
@@ -87,7 +108,7 @@ class Kernels:
 
     @cached_property
     def single(self) -> Callable[..., Any]:
-        """One environment, by an address book of the arrays."""
+        """One environment, called with the address book of its arrays."""
         return build(step_by_address, f"single_{self.name}", **{**self.names, "LANES": 1})
 
     @cached_property
@@ -97,5 +118,5 @@ class Kernels:
 
     @cached_property
     def parallel(self) -> Callable[..., Any]:
-        """Tiles over all cores."""
+        """Tiles on all cores."""
         return self._build("parallel", LANES, parallel=True)

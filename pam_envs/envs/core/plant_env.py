@@ -1,7 +1,8 @@
-"""The single environment: the only ``step`` there is."""
+"""The single environment, around any plant."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import isfinite
 from typing import Any
 
@@ -16,7 +17,7 @@ from pam_envs.kernels.random import seed_words
 from pam_envs.parameters import Signals
 
 INTERPRETED_CALLS = 50
-"""Steps after which an environment changes from plain Python to machine code."""
+"""Steps in plain Python before an environment changes to machine code."""
 
 
 def space_of(signals: Signals) -> gym.spaces.Box[np.float32]:
@@ -32,15 +33,29 @@ def fresh_seed() -> int:
 
 
 class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
-    """An environment around a plant: a batch of one, run by the kernels that run a batch.
+    """Environment around a plant: a batch of one, run by the kernels that run a batch.
 
     ``reset(seed=s)`` starts episode 0 of the seed; ``reset()`` starts the next one. All random
-    numbers are a function of seed, episode, stream and draw; ``np_random`` is never drawn from.
+    numbers are a function of seed, episode, stream and draw; ``np_random`` is not used.
+
+    Parameters
+    ----------
+    setup : Setup, optional
+        Configuration; default: ``make_setup(**arguments)``.
+    **arguments : object
+        Keyword arguments of the environment.
     """
 
     metadata = {"render_modes": ["rgb_array", "human"], "render_fps": 100}
+    make_setup: Callable[..., Setup]
 
-    def __init__(self, setup: Setup) -> None:
+    def __init_subclass__(cls, make_setup: Callable[..., Setup] | None = None) -> None:
+        """Take the function that turns an environment's keyword arguments into its setup."""
+        if make_setup is not None:
+            cls.make_setup = staticmethod(make_setup)
+
+    def __init__(self, setup: Setup | None = None, **arguments: Any) -> None:
+        setup = self.make_setup(**arguments) if setup is None else setup
         self.setup = setup
         self.plant = setup.plant
         self.signals = setup.signals
@@ -61,11 +76,10 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._use(setup.kernels.interpreted, compiled=False)
 
     def _use(self, function: Any, compiled: bool) -> None:
-        """Run on ``function`` from here on: plain Python on lists, or machine code on arrays.
+        """Use ``function`` for all further steps: plain Python on lists, or machine code on arrays.
 
-        A new environment begins in plain Python, which is ready at once, and changes to machine
-        code, which takes a while to load or to compile, when it has been stepped a few times. The
-        bits are the same.
+        A new environment starts in plain Python, which is ready at once, and changes to machine
+        code, which takes time to load or to compile, after a few steps. The bits are the same.
         """
         setup = self.setup
         arrays = [
@@ -133,7 +147,7 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return observation, reward, terminated, truncated, info
 
     def _take(self, action: Any) -> None:
-        """Check an action and hand it to the kernel."""
+        """Check an action and pass it to the kernel."""
         if self._warming:
             self._warm()
         cells, i = self._action_cells, 0
@@ -150,13 +164,13 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 cells[i] = value
 
     def _warm(self) -> None:
-        """Count a step in plain Python, and change to machine code after enough of them."""
+        """Count a step in plain Python; change to machine code after ``INTERPRETED_CALLS``."""
         self._warming -= 1
         if not self._warming:
             self._use(self.setup.kernels.single, compiled=True)
 
     def _as_action(self, action: Any) -> list[float]:
-        """Return an action as a list of numbers, or say what is wrong with it."""
+        """Return an action as a list of numbers, or raise saying what is wrong with it."""
         shape = (self._n_actions,)
         try:
             if np.iscomplexobj(action):
@@ -186,8 +200,8 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         if self._compiled:
             flags, cells = self._flag_cells, self._info_cells
             info = Info(self._keys, cells[0], cells.tobytes())
-            given: float = self._reward_cell[0]
-            return self._observation.copy(), info, given, flags[0] == 1, flags[1] == 1
+            reward: float = self._reward_cell[0]
+            return self._observation.copy(), info, reward, flags[0] == 1, flags[1] == 1
         reward, *values = (float(row[0]) for row in self._infos[0])
         observation = np.array(self._observations[0][0], np.float32)
         ended = [row[0] == 1 for row in self._flags]
@@ -195,11 +209,11 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         return observation, info, reward, ended[0], ended[1]
 
     def _draw(self, info: Info, start: bool = False) -> None:
-        """Keep what a picture needs, and show it at once in the ``human`` mode."""
+        """Record a step for pictures; show the picture at once in the ``human`` mode."""
         if self._renderer is None:
-            from pam_envs.envs.rendering.renderer import make_renderer
+            from pam_envs.envs.rendering.renderer import Renderer
 
-            self._renderer = make_renderer(self)
+            self._renderer = Renderer(self)
         self._renderer.record(info, start)
         if self.render_mode == "human":
             self._renderer.show()
@@ -235,7 +249,7 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         }
 
     def set_state(self, state: dict[str, NDArray[Any]]) -> None:
-        """Go back to a state of :meth:`get_state`, to the last bit.
+        """Restore a state of :meth:`get_state`, to the last bit.
 
         Raises
         ------
@@ -252,7 +266,7 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         for to, part in zip(self._all, parts, strict=True):
             for i, value in enumerate(part[0].tolist()):
                 to[0][i][0] = value[0]
-        for to, part in zip(self._infos, infos, strict=True):  # the last report, for a picture
+        for to, part in zip(self._infos, infos, strict=True):  # the last info, for a picture
             for k, value in enumerate(part.tolist()):
                 to[k][0] = value[0]
         self._steps, self._seed = steps, None if seed < 0 else seed

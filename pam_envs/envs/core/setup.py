@@ -1,25 +1,25 @@
-"""What an environment is made of, checked and laid out for the kernels.
+"""Configuration of an environment: checked, and laid out as arrays for the kernels.
 
-A :class:`Setup` is built once from the keyword arguments. The single environment and the batched
-one hold the same setup and differ only in the number of lanes.
+A :class:`Setup` is built once from the keyword arguments. The single environment and the batch hold
+the same setup and differ only in the number of lanes.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.envs.core.step import EPISODE, N_SEED
+from pam_envs.envs.core.step import CHOICE, EPISODE, N_SEED
 from pam_envs.kernels.build import COMPILED, LANES
 from pam_envs.parameters import Signals
 
 STEP, STEP_AND_RESTART, BEGIN = 0, 1, 2
-"""Modes of the kernels: step; step and start what has ended anew; start what is flagged."""
+"""Modes of the kernels: step; step and reset what has ended; reset what is flagged."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Setup:
     plant : object
         The plant that is simulated.
     signals, action_signals : Signals
-        What the observation and the action hold.
+        Signals of observation and action.
     kernels : object
         With ``single``, ``batch`` and ``parallel``, which take the arrays of a batch and a mode.
     rows, fixed, counts : int
@@ -39,19 +39,19 @@ class Setup:
     drawn : bool
         Whether environments differ in their parameters; otherwise all tiles share them.
     ring : int
-        References that are kept for the previews: a power of two for each channel.
+        Length of the ring buffers of previewed references: a power of two for each channel.
     seed_rows : tuple of int
         Integer rows of the two key words and of the episode number.
     info_keys : tuple of str
         Keys of ``info``, in the order in which the kernels write them.
     shared : tuple of arrays
-        What all environments share, in the order of the kernels' arguments.
+        Arrays that all environments share, in the order of the kernels' arguments.
     control_period, episode_seconds : float
         Seconds.
     render_mode : str or None
-        As Gymnasium means it.
+        As in Gymnasium.
     view : str
-        What pictures show, by its name in ``rendering_scene``.
+        Import name of the view that draws pictures.
     """
 
     plant: Any
@@ -88,58 +88,76 @@ def compose(
     *,
     signals: Signals,
     actions: Signals,
-    config: Sequence[float],
-    choices: Sequence[int],
-    own: NDArray[np.float64],
-    samples: NDArray[np.float64],
-    tables: NDArray[np.float64],
+    config: Mapping[str, float],
+    choices: Mapping[str, int],
     spread: NDArray[np.float64],
-    drawn: bool,
-    view: str | None = None,
+    reference: int = 0,
+    sines: int = 0,
+    own: NDArray[np.float64] | None = None,
+    samples: NDArray[np.float64] | None = None,
+    tables: NDArray[np.float64] | None = None,
+    view: str = "",
 ) -> Setup:
-    """Return the setup of an environment from what its family adds to what all share.
+    """Return the setup of an environment.
 
     Parameters
     ----------
     plant : object
-        With ``control_period``, ``substeps``, ``members``, ``parameter_rows``, ``family``.
+        With ``control_period``, ``substeps``, ``members``, ``parameter_rows``, ``digest`` and,
+        where it has hysteresis, ``elements``.
     kernels : Kernels
         Of :mod:`pam_envs.envs.core.families`.
     given : Common
         Of :mod:`pam_envs.envs.core.arguments`.
     signals, actions : Signals
         Of observation and action.
-    config, choices : sequence of numbers
-        The family's own, behind those that all families share.
-    own : ndarray, shape (n, m)
-        The family's own rows of the settings.
-    samples : ndarray, shape (channels, n)
-        References that are given as samples.
-    tables : ndarray, shape (members, n, m)
-        What the hysteresis models of the plant and its members are made of.
+    config, choices : mapping of numbers
+        The family's own, by the names that ``kernels`` declares.
     spread : ndarray, shape (n, 3)
-        Row, low and high of each parameter that is drawn.
-    drawn : bool
-        Whether episodes differ in their parameters.
-    view : str, optional
-        What pictures show; default: the plant's family.
+        Row, low and high of each parameter that every episode draws.
+    reference, sines : int
+        Number of the reference's family, and how many sines its evaluation sums.
+    own : ndarray, shape (n, m), optional
+        The family's own rows of the settings.
+    samples : ndarray, shape (channels, n), optional
+        References that are given as samples.
+    tables : ndarray, shape (members, n, m), optional
+        Tables of the hysteresis models of the plant and its members.
+    view : str
+        Import name of the :class:`~pam_envs.envs.rendering.scene.View`, like ``my_family.view:VIEW``.
     """
+    drawn = given.randomize is not False
     members = plant.members() if drawn else (plant,)
+    none = np.zeros((kernels.channels, 1))
+    tables = np.zeros((len(members), 1, 1)) if tables is None else tables[: len(members)]
+    own_numbers = [config[name] for name in kernels.config]
     blocks = [
-        np.array([(plant.control_period, given.seconds, *config)]),
+        np.array([(plant.control_period, given.episode_seconds, *own_numbers)], np.float64),
         np.array([_action_scale(signal) for signal in actions]),
         scales_of(signals),
         spread,
         np.array([member.parameter_rows() for member in members]),
-        own,
+        np.zeros((1, 1)) if own is None else own,
     ]
     first = np.cumsum([0, *map(len, blocks)]).tolist()
     settings = np.zeros((first[-1], max(block.shape[1] for block in blocks)))
     for begin, block in zip(first, blocks, strict=False):
         settings[begin : begin + len(block), : block.shape[1]] = block
-    sizes = (plant.substeps, len(actions), len(signals), given.preview, given.stride)
-    whole = (*sizes, len(spread), len(members), *first[1:6], *choices)
-    ring = 1 << (given.preview * given.stride).bit_length()
+    whole = {
+        "substeps": plant.substeps,
+        "actions": len(actions),
+        "signals": len(signals),
+        "preview": int(given.preview),
+        "stride": int(given.preview_stride),
+        "spread": len(spread),
+        "members": len(members),
+        "elements": getattr(plant, "elements", 0),
+        "reference": reference,
+        "sines": sines,
+        **dict(zip(CHOICE._fields[-5:], first[1:6], strict=True)),
+    }
+    numbers = *(whole[name] for name in CHOICE._fields), *(choices[n] for n in kernels.choices)
+    ring = 1 << (whole["preview"] * whole["stride"]).bit_length()
     return Setup(
         plant=plant,
         signals=signals,
@@ -152,11 +170,16 @@ def compose(
         ring=kernels.channels * ring,
         seed_rows=(kernels.n_counts - N_SEED, kernels.n_counts - N_SEED + 1, EPISODE),
         info_keys=kernels.info,
-        shared=(tables[: len(members)], samples, settings, np.array(whole, np.int64)),
+        shared=(
+            tables,
+            none if samples is None else samples,
+            settings,
+            np.array(numbers, np.int64),
+        ),
         control_period=plant.control_period,
-        episode_seconds=given.seconds,
+        episode_seconds=float(given.episode_seconds),
         render_mode=given.render_mode,
-        view=view or plant.family,
+        view=view,
     )
 
 
@@ -168,7 +191,7 @@ def _action_scale(signal: Any) -> tuple[float, float, float, float]:
 
 
 def for_kernels(array: Any) -> Any:
-    """Return an array as the kernels want it: itself, or nested lists when uncompiled."""
+    """Return an array as the kernels take it: itself, or nested lists when uncompiled."""
     return array if COMPILED else array.tolist()
 
 
@@ -180,7 +203,7 @@ def tiles_for(number: int) -> int:
 def scales_of(signals: Signals) -> NDArray[np.float64]:
     """Return ``a, b, low, high`` of each signal: its entry is ``clip(a * si + b, low, high)``.
 
-    The bounds are rounded to single precision inwards, so that a clipped value lies in the space.
+    The bounds are rounded to single precision inwards, so that a clipped value is in the space.
     """
     table = np.empty((len(signals), 4))
     for i, signal in enumerate(signals):
@@ -202,7 +225,7 @@ def check_number(name: str, value: Any, low: float, high: float, unit: str) -> f
     if not good or not math.isfinite(value) or not low <= value <= high:
         raise ValueError(
             f"{name} = {value!r} must be a number from {low:g} to {high:g} {unit}".rstrip()
-            + "; change it to lie within"
+            + "; choose a value in this range"
         )
     return float(value)
 
@@ -212,7 +235,7 @@ def check_whole(name: str, value: Any, low: int, high: int) -> int:
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)):
         raise ValueError(f"{name} = {value!r} must be a whole number from {low} to {high}")
     if not low <= value <= high:
-        raise ValueError(f"{name} = {value} must be from {low} to {high}; change it to lie within")
+        raise ValueError(f"{name} = {value} must be from {low} to {high}")
     return int(value)
 
 
@@ -235,26 +258,26 @@ def saved(parts: tuple[Any, ...]) -> dict[str, NDArray[Any]]:
     }
 
 
-def check_state(state: Any, wanted: tuple[NDArray[Any], ...]) -> list[NDArray[Any]]:
+def check_state(state: Any, like: tuple[NDArray[Any], ...]) -> list[NDArray[Any]]:
     """Return the parts of a saved state as new arrays.
 
     Raises
     ------
     ValueError
-        If a part is missing, has the shape of other arguments, or holds what no state holds.
+        If a part is missing, has another shape, or holds values that no state has.
     """
     parts = []
-    for name, like in zip(STATE_KEYS, wanted, strict=True):
+    for name, zeros in zip(STATE_KEYS, like, strict=True):
         if name not in state:
             raise ValueError(f"the state has no {name!r}: it was not made by get_state")
         shape = np.shape(state[name])
-        if shape != like.shape:
+        if shape != zeros.shape:
             raise ValueError(
-                f"the state's {name!r} has shape {shape}, this environment {like.shape}: it was "
+                f"the state's {name!r} has shape {shape}, this environment {zeros.shape}: it was "
                 "taken with other arguments"
             )
         try:
-            part = np.array(state[name], like.dtype)
+            part = np.array(state[name], zeros.dtype)
         except (TypeError, ValueError, OverflowError) as error:
             raise ValueError(f"the state's {name!r} are not numbers: {error}") from error
         wrong = part < 0 if name == "counts" else ~np.isfinite(part)

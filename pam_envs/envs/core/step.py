@@ -1,90 +1,77 @@
 """One step of any environment: actions, plant, references, observation, reward, end, reset.
 
-The same functions serve one environment (a tile of one lane) and a batch (tiles of 32 lanes). What
-sets a family apart is five functions and a few sizes, which take the place of the placeholders
-below when the kernels are built (see :mod:`pam_envs.envs.core.families`).
+The same kernels serve one environment (a tile of one lane) and a batch (tiles of 32 lanes). A
+family of environments adds five kernels and a few sizes, which replace the placeholders below when
+the kernels are built (see :mod:`pam_envs.envs.core.families`).
 
-Layout that all families share:
+Arguments of the kernels, of every family:
 
-* ``counts``: KEY_A, KEY_B, EPISODE, STEP, the family's own, and last the two words of the seed.
-* ``rows``: the family's; the set-points stand in one block, those of the period before in another.
-* ``work``: the plant's scratch, ``info`` (time, reference, output, the reward's terms, ...,
-  saturated), whether a limit has been broken, the observation in SI.
-* ``settings``: row 0 the configuration; the rows of ``choices[AT_...]``: ``scale, offset, low,
-  high`` of each action, ``a, b, low, high`` of each signal, ``row, low, high`` of each drawn
-  parameter, the parameters of each member, and the family's own.
+* ``rows``, shape (n, lanes): the state. The set-points are one block of rows, those of the previous
+  period another.
+* ``fixed``, shape (n, lanes): the parameters.
+* ``counts``, shape (n, lanes): integers. KEY_A, KEY_B, EPISODE, STEP, the family's own, and last
+  the two words of the seed.
+* ``ahead``, shape (n, lanes): ring buffer of references up to the preview horizon.
+* ``tables``: hysteresis models of the members; ``samples``, shape (channels, n): references given
+  as samples.
+* ``settings``, shape (n, m): row 0 is the configuration. From the rows ``choices[CHOICE.at_...]``
+  on: ``scale, offset, low, high`` of each action, ``a, b, low, high`` of each signal, ``row, low,
+  high`` of each drawn parameter, the parameters of each member, and the family's own.
+* ``choices``, shape (n,): whole numbers of the configuration.
+* ``work``, shape (n, lanes): the plant's scratch, ``info`` (time, reference, output, terms of the
+  reward, ..., saturated), the flag of a broken limit, the observation in SI.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+from pam_envs.envs.core.layout import indices
 from pam_envs.kernels.build import LANES, array_at, kernel, prange, routine, scratch, tile_view
 from pam_envs.kernels.random import episode_key, uniform
 
 KEY_A, KEY_B, EPISODE, STEP = range(4)
-"""Integer rows that every family begins with."""
+"""Integer rows that come first in every family."""
 N_SEED = 2
-"""Integer rows that every family ends with: the key words of the seed."""
+"""Integer rows that come last in every family: the key words of the seed."""
 
-CONFIG = ("period", "episode_seconds")
-"""Numbers that every configuration begins with."""
-PERIOD, EPISODE_SECONDS = range(len(CONFIG))
-FIRST_CONFIG = len(CONFIG)
+PERIOD, EPISODE_SECONDS = range(2)
+"""Numbers [s] that every configuration begins with."""
+FIRST_CONFIG = 2
 """First number of the configuration that is the family's own."""
 
-CHOICES = (
-    "substeps",
-    "actions",
-    "signals",
-    "preview",
-    "stride",
-    "spread",
-    "members",
-    "at_actions",
-    "at_scales",
-    "at_spread",
-    "at_members",
-    "at_own",
+CHOICE = indices(
+    (
+        *("substeps", "actions", "signals", "preview", "stride", "spread", "members", "elements"),
+        *("reference", "sines", "at_actions", "at_scales", "at_spread", "at_members", "at_own"),
+    )
 )
-(
-    SUBSTEPS,
-    N_ACTIONS,
-    N_SIGNALS,
-    PREVIEW,
-    STRIDE,
-    N_SPREAD,
-    N_MEMBERS,
-    AT_ACTIONS,
-    AT_SCALES,
-    AT_SPREAD,
-    AT_MEMBERS,
-    AT_OWN,
-) = range(len(CHOICES))
-FIRST_CHOICE = len(CHOICES)
+"""Index of each whole number that every configuration begins with: ``reference`` is the number of
+the reference's family, ``sines`` how many sines its evaluation sums, ``at_...`` the first row of a
+part of the settings."""
+FIRST_CHOICE = len(CHOICE)
 """First whole number of the configuration that is the family's own."""
 MOST_PREVIEW = 20
 
 TIME, REFERENCE, OUTPUT, REWARDS = range(4)
-"""Places in ``info`` that every family begins with; ``saturated`` is the last one."""
+"""Entries of ``info`` that come first in every family; ``saturated`` comes last."""
 
 RANDOM = 4
-"""Random stream of member and parameters; families number theirs around it."""
+"""Random stream of member and parameters; families use other numbers."""
 
-N_ROWS = N_PARAMETERS = N_COUNTS = N_WORK_ROWS = 0  # placeholders, filled in for each family
+N_ROWS = N_PARAMETERS = N_COUNTS = N_WORK_ROWS = 0  # placeholders, replaced for each family
 FIRST_INFO = N_INFO = N_REWARDS = CHANNELS = FIRST_SET_POINT = FIRST_OLD_SET_POINT = 0
 env_apply: Any = None
 env_advance: Any = None
 env_reference: Any = None
 env_evaluate: Any = None
 env_begin: Any = None
+COPIED: tuple[tuple[int, int], ...] = ()
 
 
 @kernel
-def nothing_happens(
-    rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any
-) -> None:
-    """Leave the world as it is: an ``env_apply`` for plants that carry their world inside."""
+def do_nothing(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
+    """Apply nothing: the default ``env_apply``."""
 
 
 @kernel
@@ -93,24 +80,28 @@ def take_actions(
 ) -> None:
     """Turn actions into set-points."""
     saturated, last = work[FIRST_INFO + N_INFO - 1], len(actions) - 1
-    for k in range(choices[N_ACTIONS]):
-        scale = settings[choices[AT_ACTIONS] + k]
+    for k in range(choices[CHOICE.actions]):
+        scale = settings[choices[CHOICE.at_actions] + k]
         set_point, older = rows[FIRST_SET_POINT + k], rows[FIRST_OLD_SET_POINT + k]
         for j in range(LANES):
-            wanted = float(actions[min(start + j, last)][k])
-            held = max(scale[2], min(scale[3], wanted))
-            clipped = 0.0 if held == wanted else 1.0
+            desired = float(actions[min(start + j, last)][k])
+            held = max(scale[2], min(scale[3], desired))
+            clipped = 0.0 if held == desired else 1.0
             saturated[j] = clipped if k == 0 else max(saturated[j], clipped)
             older[j] = set_point[j]
             set_point[j] = scale[0] * held + scale[1]
 
 
 @kernel
-def look_ahead(
+def extend_preview(
     rows: Any, fixed: Any, counts: Any, ahead: Any, samples: Any, settings: Any, choices: Any
 ) -> None:
-    """Add the newest previewed references to the rings of those to come."""
-    step, ring, far = counts[STEP], len(ahead) // CHANNELS, choices[PREVIEW] * choices[STRIDE]
+    """Add the references at the preview horizon to the ring buffers."""
+    step, ring, far = (
+        counts[STEP],
+        len(ahead) // CHANNELS,
+        choices[CHOICE.preview] * choices[CHOICE.stride],
+    )
     for channel in range(CHANNELS):
         first = channel * ring
         for j in range(LANES):
@@ -123,13 +114,22 @@ def look_ahead(
 @kernel
 def write_references(counts: Any, ahead: Any, choices: Any, work: Any, first: int) -> None:
     """Write each channel's reference and its preview to ``work``, channel after channel."""
-    step, ring, stride = counts[STEP], len(ahead) // CHANNELS, choices[STRIDE]
-    count = choices[PREVIEW] + 1
+    step, ring, stride = counts[STEP], len(ahead) // CHANNELS, choices[CHOICE.stride]
+    count = choices[CHOICE.preview] + 1
     for channel in range(CHANNELS):
         for i in range(count):
             sample = work[first + channel * count + i]
             for j in range(LANES):
                 sample[j] = ahead[channel * ring + ((step[j] + i * stride) & (ring - 1))][j]
+
+
+@kernel
+def copy_rows(rows: Any, work: Any) -> None:
+    """Copy rows of the state into ``info``, as the family's report declares."""
+    for k in range(len(COPIED)):
+        to, source = work[COPIED[k][0]], rows[COPIED[k][1]]
+        for j in range(LANES):
+            to[j] = source[j]
 
 
 @routine
@@ -145,23 +145,23 @@ def reset_lane(
     work: Any,
     j: int,
 ) -> None:
-    """Start the episode of lane ``j`` that its episode counter names."""
+    """Start the episode of lane ``j`` that its counter gives."""
     seed = N_COUNTS - N_SEED
     key_a = episode_key(counts[seed][j], counts[EPISODE][j])
     key_b = episode_key(counts[seed + 1][j], counts[EPISODE][j])
     counts[KEY_A][j], counts[KEY_B][j], counts[STEP][j] = key_a, key_b, 0
-    member = int(uniform(key_a, key_b, RANDOM, 0) * choices[N_MEMBERS])
+    member = int(uniform(key_a, key_b, RANDOM, 0) * choices[CHOICE.members])
     for k in range(N_PARAMETERS):
-        fixed[k][j] = settings[choices[AT_MEMBERS] + member][k]
-    for k in range(choices[N_SPREAD]):
-        drawn = settings[choices[AT_SPREAD] + k]
+        fixed[k][j] = settings[choices[CHOICE.at_members] + member][k]
+    for k in range(choices[CHOICE.spread]):
+        drawn = settings[choices[CHOICE.at_spread] + k]
         u = uniform(key_a, key_b, RANDOM, 1 + k)
         fixed[int(drawn[0])][j] = drawn[1] + (drawn[2] - drawn[1]) * u
     work[FIRST_INFO + N_INFO - 1][j] = 0.0
     env_begin(rows, fixed, counts, tables, samples, settings, choices, work, member, j)
     ring = len(ahead) // CHANNELS
     for channel in range(CHANNELS):
-        for k in range(choices[PREVIEW] * choices[STRIDE] + 1):
+        for k in range(choices[CHOICE.preview] * choices[CHOICE.stride] + 1):
             ahead[channel * ring + k][j] = env_reference(
                 rows, fixed, samples, settings, choices, k, j, channel
             )
@@ -185,8 +185,8 @@ def write_lane(
     work: Any, settings: Any, choices: Any, observation: Any, info: Any, row: int, j: int
 ) -> None:
     """Copy lane ``j`` of ``work`` to row ``row`` of the outputs."""
-    for i in range(choices[N_SIGNALS]):
-        scale = settings[choices[AT_SCALES] + i]
+    for i in range(choices[CHOICE.signals]):
+        scale = settings[choices[CHOICE.at_scales] + i]
         value = scale[0] * work[FIRST_INFO + N_INFO + 1 + i][j] + scale[1]
         observation[row][i] = max(scale[2], min(scale[3], value))
     for k in range(1, len(info)):
@@ -218,8 +218,8 @@ def write_tile(
         for k in range(1, N_REWARDS):
             total = total + work[FIRST_INFO + REWARDS + k][j]
         reward[start + j] = total
-    for i in range(choices[N_SIGNALS]):
-        value, scale = work[FIRST_INFO + N_INFO + 1 + i], settings[choices[AT_SCALES] + i]
+    for i in range(choices[CHOICE.signals]):
+        value, scale = work[FIRST_INFO + N_INFO + 1 + i], settings[choices[CHOICE.at_scales] + i]
         a, b, low, high = scale[0], scale[1], scale[2], scale[3]
         for j in range(lanes):
             observation[start + j][i] = max(low, min(high, a * value[j] + b))
@@ -249,10 +249,14 @@ def step_tiles(
 ) -> None:
     """Step or reset a batch, tile by tile.
 
-    ``mode`` 0 steps; 1 steps and starts the next episode of what has ended; 2 starts the episodes
-    of the environments whose ``flags[0]`` is set, and does not step. ``observations[0]`` and
-    ``infos[0]`` are the present ones, ``[1]`` those at the end of an episode that has been
-    followed by the next. ``infos[...][0]`` is the reward.
+    Parameters
+    ----------
+    mode : int
+        0: step. 1: step, and reset environments whose episode ended. 2: reset the environments
+        whose ``flags[0]`` is set.
+    observations, infos : arrays
+        ``[0]`` holds the present ones, ``[1]`` the last ones of episodes that ended in this step;
+        ``infos[...][0]`` is the reward.
     """
     observation, info = observations[0], infos[0]
     for tile in prange(len(all_rows)):
@@ -269,14 +273,14 @@ def step_tiles(
             env_advance(rows, fixed, counts, tables, samples, settings, choices, work)
             for j in range(LANES):
                 counts[STEP][j] = counts[STEP][j] + 1
-            look_ahead(rows, fixed, counts, ahead, samples, settings, choices)
+            extend_preview(rows, fixed, counts, ahead, samples, settings, choices)
         else:
             for j in range(lanes):
                 if flags[0][start + j] > 0:
                     reset_lane(
                         rows, fixed, counts, ahead, tables, samples, settings, choices, work, j
                     )
-            for j in range(lanes, LANES):  # the rest of the last tile computes along, unseen
+            for j in range(lanes, LANES):  # unused lanes of the last tile
                 copy_lane(rows, fixed, counts, ahead, lanes - 1, j)
         for again in range(2):
             env_evaluate(rows, fixed, counts, ahead, settings, choices, work)
@@ -300,7 +304,7 @@ def step_tiles(
 
 @kernel
 def step_by_address(book: Any, mode: int) -> None:
-    """Step or reset one environment whose arrays stand in an address book."""
+    """Step or reset one environment, given the address book of its arrays."""
     step_tiles(
         array_at(book, 0, 3, 0),
         array_at(book, 1, 3, 0),

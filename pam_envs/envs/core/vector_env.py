@@ -1,7 +1,8 @@
-"""The batched environment: the same step over rows, in tiles of lanes and over cores."""
+"""The batch of environments: the same step over rows, in tiles of lanes and over cores."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium as gym
@@ -27,27 +28,29 @@ from pam_envs.kernels.build import COMPILED, LANES
 from pam_envs.kernels.random import seed_words
 
 PARALLEL_FROM = 4096
-"""Environments from which a batch is spread over the cores."""
+"""Rows from which on a batch is spread over the cores."""
 
 
 class PlantVectorEnv(VectorEnv[Any, Any, Any]):
     """``num_envs`` environments stepped by one kernel call.
 
     Row ``i`` of a batch reset with seed ``s`` is the single environment reset with ``s + i``, bit
-    for bit, through every automatic reset. Resets happen in the same step: the observation of a
-    row that has ended is the first of its next episode, and ``infos["final_obs"]`` and
-    ``infos["final_info"]`` hold the last of the ended one.
+    for bit, through every automatic reset. Resets happen in the same step: where an episode ends, the
+    observation is the first one of the next episode, and ``infos["final_obs"]`` and
+    ``infos["final_info"]`` hold the last ones of the ended episode.
 
     Parameters
     ----------
-    setup : Setup
-        The configuration.
     num_envs : int
         Number of rows.
     info : bool
-        Whether steps report ``info``; learning needs none, and it is faster without.
+        Whether steps return ``info``; learning needs none and is faster without.
     threads : int or None
-        1 keeps to one core; None spreads batches of 4,096 and more over all.
+        1: one core. None: all cores for batches of 4,096 rows and more.
+    setup : Setup, optional
+        Configuration; default: ``make_setup(**arguments)``.
+    **arguments : object
+        Keyword arguments of the environment.
     """
 
     metadata = {
@@ -56,13 +59,26 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
         "autoreset_mode": AutoresetMode.SAME_STEP,
     }
 
+    make_setup: Callable[..., Setup]
+
+    def __init_subclass__(cls, make_setup: Callable[..., Setup] | None = None) -> None:
+        """Take the function that turns an environment's keyword arguments into its setup."""
+        if make_setup is not None:
+            cls.make_setup = staticmethod(make_setup)
+
     def __init__(
-        self, setup: Setup, num_envs: int, info: bool = True, threads: int | None = None
+        self,
+        num_envs: int = 1,
+        info: bool = True,
+        threads: int | None = None,
+        setup: Setup | None = None,
+        **arguments: Any,
     ) -> None:
+        setup = self.make_setup(**arguments) if setup is None else setup
         self.num_envs = check_whole("num_envs", num_envs, 1, 2**24)
         check_choice("a batch's render_mode", setup.render_mode, (None, "rgb_array"))
         if setup.render_mode is not None and not info:
-            raise ValueError("render_mode = 'rgb_array' draws what steps report; leave info=True")
+            raise ValueError("render_mode = 'rgb_array' needs info; leave info=True")
         self.setup = setup
         self.plant = setup.plant
         self.signals = setup.signals
@@ -123,7 +139,7 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
                 counts[episode][lane] = 0
 
     def _outputs(self) -> tuple[NDArray[Any], ...]:
-        """Return fresh arrays: observations, reward with info (both with a final part), flags."""
+        """Return fresh arrays: observations, reward with info (both also of ended episodes), flags."""
         n, keys = self.num_envs, self._keys if self.with_info else 0
         return (
             np.empty((2, n, len(self.signals)), np.float32),
@@ -191,15 +207,15 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
         return observations[0], reports[0, 0], flags[0], flags[1], infos
 
     def _checked(self, actions: Any) -> NDArray[np.float64]:
-        wanted = (self.num_envs, len(self.action_signals))
+        shape = (self.num_envs, len(self.action_signals))
         try:
             if np.iscomplexobj(actions):
                 raise TypeError("complex numbers")
             made = np.asarray(actions, np.float64)
         except (TypeError, ValueError, OverflowError) as error:
-            raise ValueError(f"the actions are not an array of shape {wanted}: {error}") from error
-        if made.shape != wanted:
-            raise ValueError(f"the actions have shape {made.shape}, expected {wanted}")
+            raise ValueError(f"the actions are not an array of shape {shape}: {error}") from error
+        if made.shape != shape:
+            raise ValueError(f"the actions have shape {made.shape}, expected {shape}")
         if not np.isfinite(made).all():
             row, column = np.argwhere(~np.isfinite(made))[0]
             raise ValueError(
@@ -230,12 +246,12 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
     def _record(
         self, report: NDArray[np.float64], rows: NDArray[np.int64], starts: NDArray[np.bool_]
     ) -> None:
-        """Keep what the pictures of some rows need; ``starts`` tells which begin an episode."""
+        """Record a step of some rows for pictures; ``starts`` marks rows that start an episode."""
         if not self._renderers:
-            from pam_envs.envs.rendering.renderer import make_renderer
+            from pam_envs.envs.rendering.renderer import Renderer
 
-            first = make_renderer(self)
-            others = [make_renderer(self, first.canvas) for _ in range(self.num_envs - 1)]
+            first = Renderer(self)
+            others = [Renderer(self, first.canvas) for _ in range(self.num_envs - 1)]
             self._renderers = [first, *others]
         for row in rows.tolist():
             info = dict(zip(self.setup.info_keys, report[1:, row].tolist(), strict=True))
@@ -252,7 +268,7 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
         return tuple(renderer.picture() for renderer in drawn)
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Forget the pictures."""
+        """Discard the pictures."""
         self._renderers = []
 
     def get_state(self) -> dict[str, NDArray[Any]]:
@@ -264,7 +280,7 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
         }
 
     def set_state(self, state: dict[str, NDArray[Any]]) -> None:
-        """Go back to a state of :meth:`get_state`, to the last bit.
+        """Restore a state of :meth:`get_state`, to the last bit.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""How far torque and stiffness of an elbow orthosis reach, and how far off they can be."""
+"""Ranges and largest errors of torque and stiffness of an elbow orthosis."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from pam_envs.parameters import declarations
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 
 LEAST_RANGES, ROUND = (30.0, 15.0), 5.0
-"""Torque [N m] and stiffness [N m/rad] that the signals reach at least, and a multiple of which
-they do."""
+"""Smallest ranges of torque [N m] and stiffness [N m/rad], and the step to which they are rounded."""
 
 
 def _corners(plant: ElbowOrthosis) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -21,10 +20,9 @@ def _corners(plant: ElbowOrthosis) -> tuple[NDArray[np.float64], NDArray[np.floa
 
 
 def signal_ranges(plant: ElbowOrthosis) -> tuple[float, float]:
-    """Return the largest torque [N m] and stiffness [N m/rad] that signals can show.
+    """Return the ranges of the signals of torque [N m] and stiffness [N m/rad].
 
-    The largest at any corner of the pressures, rounded up: nothing that the nominal bundles can do
-    is cut off.
+    The largest values at any corner of the pressures, rounded up.
     """
     return tuple(  # type: ignore[return-value]
         max(least, ROUND * math.ceil(float(np.abs(values).max()) / ROUND))
@@ -33,10 +31,10 @@ def signal_ranges(plant: ElbowOrthosis) -> tuple[float, float]:
 
 
 def largest_errors(plant: ElbowOrthosis) -> tuple[float, float]:
-    """Return more than torque [N m] and stiffness [N m/rad] can ever be off.
+    """Return upper bounds of the errors of torque [N m] and stiffness [N m/rad].
 
-    References lie between the corners of the nominal bundles; true ones can be stronger by the
-    largest gain that is allowed.
+    References are between the corners of the nominal bundles; the true bundles can be stronger by
+    the largest allowed gain.
     """
     torques, stiffnesses = _corners(plant)
     strongest = declarations(plant.bundle_a)["gain"].high

@@ -1,60 +1,32 @@
-"""The picture of the elbow orthosis: arm, bundles, object, and what the pressures can give."""
+"""View of the elbow orthosis: arm, bundles, object, reachable torque and stiffness."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, Any
 
-from pam_envs.envs.rendering.scene import (
-    COLD,
-    GRID,
-    HOT,
-    INK,
-    MUTED,
-    OUTPUT,
-    PANEL,
-    PAPER,
-    REFERENCE,
-    STEEL,
-    Axes,
-    Color,
-    Point,
-    Strip,
-    Trace,
-    View,
-    blend,
-    pressure_scale,
-)
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.envs.rendering import scene as S
 from pam_envs.tasks.torque_stiffness import WALL, WEIGHT
 
 if TYPE_CHECKING:
     from pam_envs.envs.rendering.renderer import Canvas
 
-ELBOW: Point = (92.0, 300.0)
-"""Where the elbow stands [pixels]; the upper arm comes down to it."""
+ELBOW: S.Point = (92.0, 300.0)
+"""Position of the elbow [pixels], at the lower end of the upper arm."""
 PER_METRE = 470.0
 PULLEY = 30.0
-SKIN = (232, 214, 198)
 PULL_A, PULL_B = (170, 90, 160), (0, 140, 100)
-"""Colours of what belongs to bundle a and to bundle b."""
+"""Colours of bundle a and of bundle b."""
 TORQUE_SPAN = 12.0
 """Torque [N m] at the end of a bar."""
 
 
-def bent(angle: float, length: float) -> Point:
+def bent(angle: float, length: float) -> S.Point:
     """Return the end of a line from the elbow, ``angle`` [rad] ahead of straight down."""
     return ELBOW[0] + length * math.sin(angle), ELBOW[1] + length * math.cos(angle)
-
-
-def _limb(canvas: Canvas, a: Point, b: Point, thick: float, thin: float) -> None:
-    """Fill a limb that tapers from ``a`` to ``b``."""
-    length = max(1e-9, math.dist(a, b))
-    x, y = (a[1] - b[1]) / length, (b[0] - a[0]) / length
-    corners = [(a[0] + thick * x, a[1] + thick * y), (b[0] + thin * x, b[1] + thin * y)]
-    corners += [(b[0] - thin * x, b[1] - thin * y), (a[0] - thick * x, a[1] - thick * y)]
-    canvas.polygon(corners, SKIN)
-    canvas.disc(a, thick, SKIN)
-    canvas.disc(b, thin, SKIN)
 
 
 def _bundle(canvas: Canvas, side: float, share: float, contracted: float, muscles: float) -> None:
@@ -68,47 +40,34 @@ def _bundle(canvas: Canvas, side: float, share: float, contracted: float, muscle
         y = top + (end - top) * k / 16
         left.append((x - bulge, y))
         right.append((x + bulge, y))
-    tint = blend(COLD, HOT, share)
-    canvas.line([(x, top - 10), (x, top)], STEEL, 5)
-    canvas.line([(x, end), (x, ELBOW[1])], STEEL, 3)
+    tint = S.blend(S.COLD, S.HOT, share)
+    canvas.line([(x, top - 10), (x, top)], S.STEEL, 5)
+    canvas.line([(x, end), (x, ELBOW[1])], S.STEEL, 3)
     canvas.polygon(left + right[::-1], tint)
-    for k in range(1, 15, 2):
-        canvas.line([left[k], right[k + 2]], blend(tint, PAPER, 0.4), 1.2)
-        canvas.line([right[k], left[k + 2]], blend(tint, PAPER, 0.4), 1.2)
+    S.thread(canvas, left, right, tint, 2)
 
 
-def _object(canvas: Canvas, info: Any, hand: Point) -> None:
-    """Draw the weight in the hand, or say what else there is to feel."""
+def _object(canvas: Canvas, info: Any, hand: S.Point) -> None:
+    """Draw the weight in the hand, or name the object."""
     kind, torque = info["state/object"], info["state/object_torque"]
     words = "free motion"
     if kind == WEIGHT:
-        canvas.line([hand, (hand[0], hand[1] + 26.0)], INK, 2)
-        canvas.rectangle((hand[0] - 13.0, hand[1] + 26.0, 26.0, 22.0), REFERENCE, 4)
+        canvas.line([hand, (hand[0], hand[1] + 26.0)], S.INK, 2)
+        canvas.rectangle((hand[0] - 13.0, hand[1] + 26.0, 26.0, 22.0), S.REFERENCE, 4)
         words = "a weight in the hand"
     if kind == WALL:
         words = "in the wall" if torque < 0.0 else "before the wall"
-    canvas.text(words, (20, 24), REFERENCE, 14)
-
-
-def _bar(canvas: Canvas, row: int, name: str, torque: float, color: Color) -> None:
-    """Draw a bar of a torque [N m], bending to the right."""
-    top, zero, half = 492.0 + 20.0 * row, 196.0, 76.0
-    end = zero + half * max(-1.0, min(1.0, torque / TORQUE_SPAN))
-    canvas.text(name, (112, top - 1), MUTED, 11, "right")
-    canvas.rectangle((zero - half, top, 2 * half, 12), GRID, 2)
-    canvas.rectangle((min(zero, end), top, max(1.0, abs(end - zero)), 12), color, 2)
-    canvas.line([(zero, top - 3), (zero, top + 15)], MUTED, 1)
-    canvas.text(f"{torque:+.1f}", (314, top - 1), color, 11, "right")
+    canvas.text(words, (20, 24), S.REFERENCE, 14)
 
 
 def elbow_scene(canvas: Canvas, env: Any, info: Any) -> None:
-    """Draw the arm with the orthosis on it, what is to be felt, and torques."""
+    """Draw the arm with the orthosis, the virtual object and torques."""
     plant, angle = env.plant, info["state/angle"]
     length = plant.wearer.handle * PER_METRE
     hand = bent(angle, length)
-    _limb(canvas, (ELBOW[0], 84.0), ELBOW, 23.0, 18.0)
-    _limb(canvas, ELBOW, hand, 17.0, 11.0)
-    canvas.dashed(ELBOW, bent(info["state/intent"], length + 22.0), MUTED)
+    S.limb(canvas, (ELBOW[0], 84.0), ELBOW, 23.0, 18.0, S.SKIN)
+    S.limb(canvas, ELBOW, hand, 17.0, 11.0, S.SKIN)
+    canvas.dashed(ELBOW, bent(info["state/intent"], length + 22.0), S.MUTED)
     stroke, full = plant.pulley.stroke, plant.full_pressure
     bent_by = plant.pulley.radius * (angle - plant.pulley.lowest)
     for side, name, bundle, contraction in (
@@ -117,85 +76,86 @@ def elbow_scene(canvas: Canvas, env: Any, info: Any) -> None:
     ):
         share = info[f"state/pressure_{name}"] / full
         _bundle(canvas, side, share, contraction / bundle.nominal_length, bundle.muscles)
-    canvas.disc(ELBOW, PULLEY, STEEL)
-    canvas.disc(ELBOW, PULLEY - 5.0, PAPER)
-    canvas.line([ELBOW, bent(angle, 0.72 * length)], STEEL, 7)
-    canvas.line([ELBOW, bent(angle, PULLEY - 5.0)], INK, 4)
-    canvas.disc(ELBOW, 5.0, INK)
-    canvas.disc(hand, 9.0, blend(SKIN, INK, 0.35))
+    canvas.disc(ELBOW, PULLEY, S.STEEL)
+    canvas.disc(ELBOW, PULLEY - 5.0, S.PAPER)
+    canvas.line([ELBOW, bent(angle, 0.72 * length)], S.STEEL, 7)
+    canvas.line([ELBOW, bent(angle, PULLEY - 5.0)], S.INK, 4)
+    canvas.disc(ELBOW, 5.0, S.INK)
+    canvas.disc(hand, 9.0, S.blend(S.SKIN, S.INK, 0.35))
     _object(canvas, info, hand)
-    pressure_scale(canvas, info["state/pressure_b"], full)
+    S.pressure_scale(canvas, info["state/pressure_b"], full)
     for x, name, color in ((46.0, "a", PULL_A), (138.0, "b", PULL_B)):
         canvas.text(f"bundle {name}", (x, 62), color, 11, "center")
-    _bar(canvas, 0, "to be felt", info["state/object_torque"], REFERENCE)
-    _bar(canvas, 1, "felt", info["state/felt"], INK)
-    _bar(canvas, 2, "orthosis", info["state/torque"], OUTPUT)
-    _bar(canvas, 3, "wearer", info["state/wearer"], MUTED)
-    canvas.text("N m, bending to the right", (314, 574), MUTED, 11, "right")
+    bars = [
+        ("object", info["state/object_torque"], S.REFERENCE),
+        ("hand", info["state/felt"], S.INK),
+        ("orthosis", info["state/torque"], S.OUTPUT),
+        ("wearer", info["state/wearer"], S.MUTED),
+    ]
+    S.torque_bars(canvas, bars, TORQUE_SPAN, 492.0, "N m, flexion to the right")
 
 
-def _reach(canvas: Canvas, env: Any, info: Any, points: Trace) -> None:
-    """Draw torque and stiffness in what the pressures can give at this angle."""
-    axes = Axes(canvas, PANEL, (-15.0, 30.0), (0.0, 15.0))
+def _reach(canvas: Canvas, env: Any, info: Any, points: S.Trace) -> None:
+    """Draw torque and stiffness within the reach of the pressures at this angle."""
+    axes = S.Axes(canvas, S.PANEL, (-15.0, 30.0), (0.0, 15.0))
     axes.frame(range(-10, 31, 10), range(0, 16, 5), "torque [N m]", "stiffness [N m/rad]")
     torque, stiffness = env.plant.corners(info["state/angle"])
     corners = [axes.at(q, s) for q, s in zip(torque.tolist(), stiffness.tolist(), strict=True)]
-    canvas.polygon(corners, blend(PAPER, OUTPUT, 0.12))
-    canvas.line([*corners, corners[0]], blend(PAPER, OUTPUT, 0.5), 1.5)
+    canvas.polygon(corners, S.blend(S.PAPER, S.OUTPUT, 0.12))
+    canvas.line([*corners, corners[0]], S.blend(S.PAPER, S.OUTPUT, 0.5), 1.5)
     places = [axes.at(q, s) for q, s in points]
     for i in range(0, len(places) - 1, 12):
-        shade = blend(GRID, OUTPUT, 0.15 + 0.85 * i / len(places))
+        shade = S.blend(S.GRID, S.OUTPUT, 0.15 + 0.85 * i / len(places))
         canvas.line(places[i : i + 13], shade, 2)
-    asked = axes.at(info["reference"], info["state/stiffness_reference"])
-    canvas.disc(asked, 6.0, REFERENCE)
-    canvas.disc(asked, 3.5, PAPER)
+    desired = axes.at(info["reference"], info["state/stiffness_reference"])
+    canvas.disc(desired, 6.0, S.REFERENCE)
+    canvas.disc(desired, 3.5, S.PAPER)
     if places:
-        canvas.disc(places[-1], 4.5, OUTPUT)
+        canvas.disc(places[-1], 4.5, S.OUTPUT)
 
 
-def _strip(
-    name: str, unit: str, keys: tuple[str, str], colors: tuple[Color, Color], box: tuple[int, int],
-    span: Point, step: int, scale: float = 1.0,
-) -> Strip:  # fmt: skip
-    return Strip(
-        name,
-        unit,
-        scale,
-        ((keys[0], colors[0], 1.5), (keys[1], colors[1], 2.0)),
-        *box,
-        lambda _: span,
-        lambda _: range(int(span[0]), int(span[1]) + 1, step),
-    )
+class ElbowAllocation:
+    """Pressures that give torque and stiffness at the present angle, or pulses towards them."""
+
+    pulse_gain = 2e-6
+    """Width of a pulse over the pressure error [s/Pa]."""
+
+    def __init__(self, env: Any) -> None:
+        self.plant, self.signals, self.actions = env.plant, env.signals, env.action_signals
+
+    def __call__(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the action for an observation."""
+        names = ("angle", "reference", "stiffness_reference")
+        angle, torque, stiffness = (float(self.signals.decode(observation, n)) for n in names)
+        values = [torque, stiffness]
+        if self.actions[0].unit != "N m":
+            pressures = self.plant.allocate(angle, torque, stiffness)
+            values = [min(max(0.0, float(p)), self.plant.full_pressure) for p in pressures]
+        if self.actions[0].unit == "s":
+            present = [float(self.signals.decode(observation, f"pressure_{k}")) for k in "ab"]
+            values = [self.pulse_gain * (p - q) for p, q in zip(values, present, strict=True)]
+        encoded = [s.encode(v) for s, v in zip(self.actions, values, strict=True)]
+        return np.asarray(encoded, np.float32)
 
 
-BOTH = (REFERENCE, OUTPUT)
-VIEWS = {
-    "elbow_orthosis": View(
-        elbow_scene,
-        (
-            _strip("torque", "N m", ("reference", "output"), BOTH, (350, 56), (-8.0, 8.0), 4),
-            _strip(
-                "stiffness",
-                "N m/rad",
-                ("state/stiffness_reference", "state/stiffness"),
-                BOTH,
-                (442, 46),
-                (0.0, 12.0),
-                4,
-            ),
-            _strip(
-                "pressures, a and b",
-                "bar",
-                ("state/pressure_a", "state/pressure_b"),
-                (PULL_A, PULL_B),
-                (524, 40),
-                (0.0, 6.0),
-                3,
-                1e-5,
-            ),
+STIFFNESS_LINES = (
+    ("state/stiffness_reference", S.REFERENCE, 1.5),
+    ("state/stiffness", S.OUTPUT, 2.0),
+)
+PRESSURE_LINES = (("state/pressure_a", PULL_A, 1.5), ("state/pressure_b", PULL_B, 2.0))
+VIEW = S.View(
+    elbow_scene,
+    (
+        S.fixed_strip("torque", "N m", 1.0, S.LINES, (350, 56), (-8.0, 8.0), range(-8, 9, 4)),
+        S.fixed_strip(
+            "stiffness", "N m/rad", 1.0, STIFFNESS_LINES, (442, 46), (0.0, 12.0), range(0, 13, 4)
         ),
-        number=("felt", "N m", lambda info: info["state/felt"]),
-        trace=lambda info: (info["state/torque"], info["state/stiffness"]),
-        panel=_reach,
+        S.fixed_strip(
+            "pressures, a and b", "bar", 1e-5, PRESSURE_LINES, (524, 40), (0.0, 6.0), (0, 3, 6)
+        ),
     ),
-}
+    ElbowAllocation,
+    number=("torque at the hand", "N m", lambda info: info["state/felt"]),
+    trace=lambda info: (info["state/torque"], info["state/stiffness"]),
+    panel=_reach,
+)

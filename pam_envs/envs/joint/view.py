@@ -1,56 +1,39 @@
-"""The picture of an antagonistic joint: lever, both muscles, where it should be, what pushes it."""
+"""View of an antagonistic joint: lever, both muscles, reference, disturbance."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, Any
 
-from pam_envs.envs.rendering.scene import (
-    COLD,
-    GRID,
-    HOT,
-    INK,
-    MUTED,
-    OUTPUT,
-    PANEL,
-    PAPER,
-    REFERENCE,
-    STEEL,
-    Axes,
-    Point,
-    Strip,
-    Trace,
-    View,
-    blend,
-    draw_loop,
-    full_bar,
-    pressure_scale,
-)
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.envs.rendering import scene as S
 
 if TYPE_CHECKING:
     from pam_envs.envs.rendering.renderer import Canvas
 
-PIVOT: Point = (140.0, 196.0)
-"""Where the joint's axis stands [pixels]."""
+PIVOT: S.Point = (140.0, 196.0)
+"""Position of the joint's axis [pixels]."""
 PER_METRE = 1350.0
 ARM = 0.14
 """Length [m] of the arm that is drawn below the axis."""
 TORQUE_PER_RADIAN = 2.5
 """Torque [N m] whose arrow spans a radian."""
 PULL_A, PULL_B = (0, 114, 178), (170, 90, 160)
-"""Colours of what belongs to muscle A and to muscle B."""
+"""Colours of muscle A and of muscle B."""
 
 
-def turned(angle: float, across: float, along: float) -> Point:
+def turned(angle: float, across: float, along: float) -> S.Point:
     """Return a point [m] of the hanging arm, which leans right by ``angle`` [rad], in pixels."""
     sine, cosine = math.sin(angle), math.cos(angle)
     x, y = across * cosine + along * sine, along * cosine - across * sine
     return PIVOT[0] + PER_METRE * x, PIVOT[1] + PER_METRE * y
 
 
-def _muscle(canvas: Canvas, lower: Point, upper: Point, share: float, shortened: float) -> None:
+def _muscle(canvas: Canvas, lower: S.Point, upper: S.Point, share: float, shortened: float) -> None:
     """Draw a muscle between its fittings; it bulges as it shortens."""
-    tint, steps = blend(COLD, HOT, share), 24
+    tint, steps = S.blend(S.COLD, S.HOT, share), 24
     length = max(1e-9, math.dist(lower, upper))
     across = ((lower[1] - upper[1]) / length, (upper[0] - lower[0]) / length)
     ends = 31.0  # pixels of each fitting
@@ -63,13 +46,11 @@ def _muscle(canvas: Canvas, lower: Point, upper: Point, share: float, shortened:
         wide = 6.0 + (radius - 6.0) * min(1.0, math.sin(math.pi * s) * 2.2) ** 0.7
         left.append((x - wide * across[0], y - wide * across[1]))
         right.append((x + wide * across[0], y + wide * across[1]))
-    canvas.line([lower, upper], STEEL, 5)
+    canvas.line([lower, upper], S.STEEL, 5)
     canvas.polygon(left + right[::-1], tint)
-    for i in range(2, steps - 1, 3):
-        canvas.line([left[i], right[i + 2]], blend(tint, PAPER, 0.4), 1.2)
-        canvas.line([right[i], left[i + 2]], blend(tint, PAPER, 0.4), 1.2)
+    S.thread(canvas, left, right, tint, 3)
     for side in (left, right):
-        canvas.line(side, blend(tint, INK, 0.5), 1.5)
+        canvas.line(side, S.blend(tint, S.INK, 0.5), 1.5)
 
 
 def _arc(canvas: Canvas, torque: float) -> None:
@@ -78,34 +59,36 @@ def _arc(canvas: Canvas, torque: float) -> None:
         return
     span, radius = max(-1.2, min(1.2, torque / TORQUE_PER_RADIAN)), ARM + 0.042
     points = [turned(span * k / 20, 0.0, radius) for k in range(21)]
-    canvas.line(points, HOT, 3)
+    canvas.line(points, S.HOT, 3)
     side = 0.011 if span > 0 else -0.011
     root = span - 2.0 * side / radius
     head = [turned(span, 0.0, radius)]
     head += [turned(root, 0.0, radius + way * abs(side)) for way in (1.0, -1.0)]
-    canvas.polygon(head, HOT)
-    canvas.text(f"{torque:+.1f} N m", (PIVOT[0], 458), HOT, 12, "center")
+    canvas.polygon(head, S.HOT)
+    canvas.text(f"{torque:+.1f} N m", (PIVOT[0], 458), S.HOT, 12, "center")
 
 
 def _scale(canvas: Canvas, largest: float) -> None:
     """Draw a scale of degrees below the arm."""
     radius, end = ARM + 0.012, math.degrees(largest)
-    canvas.line([turned(math.radians(end * k / 20), 0.0, radius) for k in range(-20, 21)], GRID, 2)
+    canvas.line(
+        [turned(math.radians(end * k / 20), 0.0, radius) for k in range(-20, 21)], S.GRID, 2
+    )
     for degrees in range(-10 * int(end // 10), int(end) + 1, 10):
         angle = math.radians(degrees)
         ends = [turned(angle, 0.0, radius), turned(angle, 0.0, radius + 0.008)]
-        canvas.line(ends, MUTED, 1)
+        canvas.line(ends, S.MUTED, 1)
         x, y = turned(angle, 0.0, radius + 0.019)
-        canvas.text(f"{degrees}", (x, y - 7), MUTED, 10, "center")
+        canvas.text(f"{degrees}", (x, y - 7), S.MUTED, 10, "center")
 
 
 def joint_scene(canvas: Canvas, env: Any, info: Any) -> None:
-    """Draw the joint with its muscles, the wanted angle, the disturbance and the payload."""
+    """Draw the joint with its muscles, the reference, the disturbance and the payload."""
     plant, angle = env.plant, info["state/angle"]
     lever, full = plant.lever, plant.regulator.max_pressure
-    pressure_scale(canvas, info["state/pressure_a"], full, 282.0, 290.0)
+    S.pressure_scale(canvas, info["state/pressure_a"], full, 282.0, 290.0)
     _scale(canvas, plant.angle_range[1])
-    canvas.dashed(PIVOT, turned(info["reference"], 0.0, ARM + 0.004), REFERENCE)
+    canvas.dashed(PIVOT, turned(info["reference"], 0.0, ARM + 0.004), S.REFERENCE)
     base = lever.l_u
     for side, letter in ((1.0, "a"), (-1.0, "b")):
         fixed = (PIVOT[0] + side * PER_METRE * lever.r_u, PIVOT[1] - PER_METRE * base)
@@ -114,27 +97,27 @@ def joint_scene(canvas: Canvas, env: Any, info: Any) -> None:
         share = info[f"state/pressure_{letter}"] / full
         _muscle(canvas, fixed, moved, share, 1.0 - length / plant.muscle.rest_length)
     ceiling, wide = PIVOT[1] - PER_METRE * base, lever.r_o * PER_METRE
-    canvas.rectangle((PIVOT[0] - wide - 22, ceiling - 10, 2 * wide + 44, 10), STEEL, 3)
-    canvas.line([PIVOT, (PIVOT[0], ceiling)], INK, 9)
+    canvas.rectangle((PIVOT[0] - wide - 22, ceiling - 10, 2 * wide + 44, 10), S.STEEL, 3)
+    canvas.line([PIVOT, (PIVOT[0], ceiling)], S.INK, 9)
     plate = [turned(angle, way * (lever.r_o + 0.012), lever.l_o) for way in (1, -1)]
-    canvas.line([PIVOT, turned(angle, 0.0, ARM)], INK, 7)
-    canvas.line(plate, INK, 7)
-    canvas.disc(PIVOT, 8.0, PAPER)
-    canvas.disc(PIVOT, 5.0, INK)
+    canvas.line([PIVOT, turned(angle, 0.0, ARM)], S.INK, 7)
+    canvas.line(plate, S.INK, 7)
+    canvas.disc(PIVOT, 8.0, S.PAPER)
+    canvas.disc(PIVOT, 5.0, S.INK)
     _payload(canvas, turned(angle, 0.0, ARM), info["state/payload"])
     _arc(canvas, info["state/disturbance"])
     _numbers(canvas, info)
 
 
-def _payload(canvas: Canvas, at: Point, mass: float) -> None:
+def _payload(canvas: Canvas, at: S.Point, mass: float) -> None:
     """Draw the payload [kg] at the end of the arm."""
-    canvas.disc(at, 6.0 + 9.0 * max(0.0, mass) ** (1 / 3), blend(STEEL, INK, 0.55))
+    canvas.disc(at, 6.0 + 9.0 * max(0.0, mass) ** (1 / 3), S.blend(S.STEEL, S.INK, 0.55))
     if mass > 0.005:
-        canvas.text(f"{mass:.2f} kg", (at[0] - 20, at[1] - 6), MUTED, 11, "right")
+        canvas.text(f"{mass:.2f} kg", (at[0] - 20, at[1] - 6), S.MUTED, 11, "right")
 
 
 def _numbers(canvas: Canvas, info: Any) -> None:
-    """Write the muscles' pressures and forces, and what they make of them."""
+    """Write pressures and forces of the muscles, and the stiffness of the joint."""
     for column, name, color in ((96, "muscle B", PULL_B), (176, "muscle A", PULL_A)):
         letter = name[-1].lower()
         values = (
@@ -143,13 +126,13 @@ def _numbers(canvas: Canvas, info: Any) -> None:
         )
         canvas.text(name, (column, 484), color, 12)
         for row, value in enumerate(values):
-            canvas.text(value, (column, 504 + 20 * row), INK, 13)
+            canvas.text(value, (column, 504 + 20 * row), S.INK, 13)
     for row, words in enumerate(("pressure", "force")):
-        canvas.text(words, (24, 504 + 20 * row), MUTED, 13)
-    canvas.text("stiffness", (24, 548), MUTED, 13)
-    canvas.text(f"{info['state/stiffness']:.1f} N m/rad", (96, 548), INK, 13)
+        canvas.text(words, (24, 504 + 20 * row), S.MUTED, 13)
+    canvas.text("stiffness", (24, 548), S.MUTED, 13)
+    canvas.text(f"{info['state/stiffness']:.1f} N m/rad", (96, 548), S.INK, 13)
     if info["state/slack"] > 0.0:
-        canvas.text("a muscle is slack", (24, 570), HOT, 13)
+        canvas.text("a muscle is slack", (24, 570), S.HOT, 13)
 
 
 def both_pressures(info: Any) -> float:
@@ -157,10 +140,10 @@ def both_pressures(info: Any) -> float:
     return float(1e-5 * (info["state/pressure_a"] - info["state/pressure_b"]))
 
 
-def _difference_loop(canvas: Canvas, env: Any, _: Any, points: Trace) -> None:
+def _difference_loop(canvas: Canvas, env: Any, _: Any, points: S.Trace) -> None:
     """Draw the angle over the difference of the pressures."""
-    first, full = ANGLE, full_bar(env.plant)
-    axes = Axes(canvas, PANEL, (-full, full), first.span(env.plant))
+    first, full = ANGLE, S.full_bar(env.plant)
+    axes = S.Axes(canvas, S.PANEL, (-full, full), first.span(env.plant))
     across = tuple(first.ticks(env.plant))
     axes.frame(
         range(-int(full), int(full) + 1, max(1, round(full / 4))),
@@ -168,10 +151,10 @@ def _difference_loop(canvas: Canvas, env: Any, _: Any, points: Trace) -> None:
         "pressure of A minus B [bar]",
         f"{first.name} [{first.unit}]",
     )
-    draw_loop(canvas, points, axes, first.scale)
+    S.draw_loop(canvas, points, axes, first.scale)
 
 
-def _degrees(plant: Any) -> Point:
+def _degrees(plant: Any) -> S.Point:
     end = math.degrees(plant.angle_range[1]) + 3.0
     return -end, end
 
@@ -182,32 +165,48 @@ def angle_ticks(plant: Any) -> range:
     return range(-end, end + 1, 10)
 
 
-ANGLE = Strip(
-    "angle",
-    "deg",
-    180.0 / math.pi,
-    (("reference", REFERENCE, 1.5), ("output", OUTPUT, 2.0)),
-    350,
-    116,
-    _degrees,
-    angle_ticks,
-)
-PRESSURES = Strip(
+class JointIntegral:
+    """Angle set-points: reference, shift by the declared weight, slow integral of the error."""
+
+    gain = 0.03
+    """Integral gain per control period."""
+
+    def __init__(self, env: Any) -> None:
+        self.plant, self.signals, self.actions = env.plant, env.signals, env.action_signals
+        names = [signal.name for signal in self.actions if signal.unit == "rad"]
+        self.angles = [name.replace("angle_set_point", "angle") for name in names]
+        word = "joint_reference" if "reference" not in set(env.signals.names()) else "reference"
+        self.references = [name.replace("angle_set_point", word) for name in names]
+        self.integral = np.zeros(len(names))
+
+    def __call__(self, observation: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the action for an observation."""
+        read = self.signals.decode
+        references = np.array([float(read(observation, name)) for name in self.references])
+        angles = np.array([float(read(observation, name)) for name in self.angles])
+        self.integral = self.integral + self.gain * (references - angles)
+        shift = self.plant.gravity_shift(references, float(read(observation, "payload")))
+        values = references + shift + self.integral
+        encoded = [s.encode(v) for s, v in zip(self.actions, values, strict=True)]
+        return np.asarray(encoded, np.float32)
+
+
+ANGLE = S.Strip("angle", "deg", 180.0 / math.pi, S.LINES, 350, 116, _degrees, angle_ticks)
+PRESSURES = S.Strip(
     "pressures",
     "bar",
     1e-5,
     (("state/pressure_b", PULL_B, 1.5), ("state/pressure_a", PULL_A, 2.0)),
     498,
     60,
-    lambda plant: (0.0, full_bar(plant)),
-    lambda plant: (0.0, 0.5 * full_bar(plant), full_bar(plant)),
+    lambda plant: (0.0, S.full_bar(plant)),
+    lambda plant: (0.0, 0.5 * S.full_bar(plant), S.full_bar(plant)),
 )
-VIEWS = {
-    "antagonistic_joint": View(
-        joint_scene,
-        (ANGLE, PRESSURES),
-        number=("pressures, A - B", "bar", both_pressures),
-        trace=lambda info: (both_pressures(info), info["output"]),
-        panel=_difference_loop,
-    )
-}
+VIEW = S.View(
+    joint_scene,
+    (ANGLE, PRESSURES),
+    JointIntegral,
+    number=("pressures, A - B", "bar", both_pressures),
+    trace=lambda info: (both_pressures(info), info["output"]),
+    panel=_difference_loop,
+)

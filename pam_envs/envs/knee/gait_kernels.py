@@ -1,10 +1,9 @@
-"""What sets ``PAM/KneeWalk-v0`` and the stairs apart in a step: sensors, references, wearer.
+"""Kernels of ``PAM/KneeWalk-v0`` and of stairs: sensors, references, wearer, report, start.
 
-The step itself stands in :mod:`pam_envs.envs.core.step`. Each control period, once the plant has
-moved, the sensors are read; the estimate of the knee torque passes the low-pass; the heel's load
-says stance or swing; and the references follow from these. Beside that, :mod:`gait_plan
-<pam_envs.envs.knee.gait_plan>` computes the same ahead of time from the planned stride: the
-preview.
+In each control period, after the plant has moved, the sensors are read, the estimate of the knee
+torque passes the low-pass filter, the load on the heel distinguishes stance from swing, and the
+references follow from these. :mod:`gait_plan <pam_envs.envs.knee.gait_plan>` computes the same in
+advance for the planned stride: the preview.
 """
 
 from __future__ import annotations
@@ -13,155 +12,72 @@ from functools import lru_cache
 from typing import Any
 
 from pam_envs.envs.core.families import Kernels
-from pam_envs.envs.core.step import (
-    AT_OWN,
-    MOST_PREVIEW,
-    PERIOD,
-    PREVIEW,
-    SUBSTEPS,
-    nothing_happens,
-    write_references,
-)
-from pam_envs.envs.knee.gait_layout import (
-    ANGLE_SCALE,
-    ANGLE_WEIGHT,
-    BEARS,
-    BEARS_FREE,
-    C_DEVIATION,
-    C_PRESSURE,
-    CHANNELS,
-    COPIED_ROWS,
-    DEMAND,
-    DEMAND_SHARE,
-    E_AIR,
-    E_OVER,
-    E_TRAVEL,
-    EFFORT_WEIGHT,
-    ENDED,
-    FILTER,
-    FIRST_COPIED,
-    FIXED_SIGNALS,
-    HIGHEST_TENSION,
-    HYSTERESIS,
-    INFO,
-    KNOWN_ARM,
-    KNOWN_RELAXED,
-    KNOWN_SHANK,
-    KNOWN_WIRE,
-    LARGEST_DEVIATION,
-    LOWEST_TORQUE,
-    M_DEVIATION,
-    M_PRESSURE,
-    M_TENSION,
-    MISMATCH,
-    N_ELEMENTS,
-    NOISE,
-    OUTPUT,
-    OVER_SCALE,
-    OVER_WEIGHT,
-    R_ANGLE,
-    R_EFFORT,
-    R_OVER,
-    R_TENSION,
-    RATIO,
-    READ_ANGLE,
-    READ_ANKLE,
-    READ_COP,
-    READ_GROUND,
-    READ_HEEL,
-    READ_STANCE,
-    READ_TENSION,
-    REF,
-    S_IDEAL,
-    SAMPLES,
-    SEEN_ROWS,
-    SENSORS,
-    SIGNALS,
-    SOFT_DEVIATION,
-    SOFT_PRESSURE,
-    SOURCE,
-    START,
-    START_PHASE,
-    START_SPREAD,
-    TENSION_SCALE,
-    TENSION_WEIGHT,
-    TIME,
-    WANTED_ANGLE,
-    WANTED_TENSION,
-    WANTED_TORQUE,
-)
+from pam_envs.envs.core.kernels import sense
+from pam_envs.envs.core.step import CHOICE, PERIOD, copy_rows, write_references
+from pam_envs.envs.knee import gait_layout as L
 from pam_envs.envs.knee.gait_plan import lean, planned_reference, pressure_for, prime
+from pam_envs.envs.knee.kernels import advance_knee
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import LANES, kernel, routine
-from pam_envs.kernels.random import normal, uniform
-from pam_envs.mechanics.knee_lever import wanted_tension
+from pam_envs.kernels.random import uniform
+from pam_envs.mechanics.knee_lever import wanted_tension as tension_for
 from pam_envs.mechanics.leg import sine_and_cosine
 from pam_envs.muscle.emg import activation, excitation, left_of_gap
 from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.step import (
-    N_WORK,
-    advance,
-    begin_lane,
-    replacements,
-)
+from pam_envs.plants.knee_orthosis.step import begin_lane, replacements
 from pam_envs.sensing.butterworth import butterworth
-from pam_envs.sensing.sensor import read_sensor
 from pam_envs.sensing.shoe import estimated_torque
-from pam_envs.tasks.gait_assistance import assistance_wanted, gated_reward, over_assistance
-from pam_envs.tasks.tracking import effort_reward, excess
+from pam_envs.tasks.gait_assistance import desired_assistance, gated_reward, over_assistance
+from pam_envs.tasks.rewards import effort_reward, excess
 
 VENTED = 1e3
-"""Gauge pressure [Pa] up to which a muscle that grows draws ambient air, which costs nothing."""
+"""Gauge pressure [Pa] up to which a growing muscle draws ambient air, at no cost."""
 
 
 @kernel
-def sense(rows: Any, fixed: Any, counts: Any, k: int, step: int, j: int) -> None:
+def read(rows: Any, fixed: Any, counts: Any, k: int, step: int, j: int) -> None:
     """Read sensor ``k`` of lane ``j`` at a control period."""
-    row, noise = SENSORS[k]
-    rows[READ_TENSION + k][j] = read_sensor(
-        rows[row][j],
-        fixed[noise][j],
-        fixed[noise + 1][j],
-        fixed[noise + 2][j],
-        normal(counts[K.KEY_A][j], counts[K.KEY_B][j], NOISE + k, step),
-    )
+    row, noise = L.SENSORS[k]
+    rows[L.READ_TENSION + k][j] = sense(rows[row][j], fixed, counts, noise, L.NOISE + k, step, j)
 
 
 @kernel
 def share_of_torque(rows: Any, fixed: Any, settings: Any, choices: Any, j: int) -> float:
-    """Return the assistance [N m] of lane ``j`` before the low-pass, and tell stance from swing."""
-    rows[READ_GROUND][j] = max(0.0, rows[READ_GROUND][j])
-    rows[READ_STANCE][j] = 1.0 if rows[READ_HEEL][j] > fixed[K.SHOE_THRESHOLD][j] else 0.0
-    ankle, config = rows[READ_ANKLE][j], settings[0]
+    """Return the assistance [N m] of lane ``j`` before the low-pass; detect stance and swing."""
+    rows[L.READ_GROUND][j] = max(0.0, rows[L.READ_GROUND][j])
+    rows[L.READ_STANCE][j] = 1.0 if rows[L.READ_HEEL][j] > fixed[K.SHOE_THRESHOLD][j] else 0.0
+    ankle, config = rows[L.READ_ANKLE][j], settings[0]
     shank = rows[K.SHANK][j] + (ankle - rows[K.ANKLE][j])
     sine, _ = sine_and_cosine(lean(shank, ankle, fixed[K.SHOE_FLAT_FOOT][j]))
-    estimate = estimated_torque(rows[READ_GROUND][j], rows[READ_COP][j], sine, config[KNOWN_SHANK])
-    if choices[SOURCE] == DEMAND:
+    estimate = estimated_torque(
+        rows[L.READ_GROUND][j], rows[L.READ_COP][j], sine, config[L.CONFIG.known_shank]
+    )
+    if choices[CHOICE.reference] == L.DEMAND:
         estimate = rows[K.DEMAND][j]
-    return assistance_wanted(estimate, config[RATIO], config[LOWEST_TORQUE])
+    return desired_assistance(estimate, config[L.CONFIG.ratio], config[L.CONFIG.lowest_torque])
 
 
 @kernel
 def set_references(rows: Any, fixed: Any, settings: Any, j: int) -> None:
-    """Write what tension and angle lane ``j`` should have, and what it should have off-line.
+    """Write the references of tension and angle of lane ``j``.
 
-    In stance the tension gives the wanted torque at the angle as sensed, and the angle's reference
-    is the angle itself; in swing the angle's reference is the wearer's path, and the tension's is
-    that of no assistance, but for a mismatch. Where the brace was drawn, it is not the one that
-    the tension is computed for.
+    In stance the tension gives the desired torque at the sensed angle, and the reference of the
+    angle is the sensed angle. In swing the reference of the angle is the wearer's path, and that of
+    the tension is for no assistance, plus a mismatch. The tension is computed for the nominal
+    brace, also where the true one is drawn.
     """
-    config, torque, shift = settings[0], rows[WANTED_TORQUE][j], 0.0
-    wanted = rows[READ_ANGLE][j]
-    if rows[READ_STANCE][j] < 0.5:
-        torque, shift = 0.0, config[MISMATCH]
-        wanted = fixed[K.LEVER_MOUNT_ANGLE][j] + rows[K.KNEE][j]
-    rows[WANTED_ANGLE][j] = wanted
-    rows[WANTED_TENSION][j] = shift + wanted_tension(
-        rows[READ_ANGLE][j],
+    config, torque, shift = settings[0], rows[L.DESIRED_TORQUE][j], 0.0
+    angle = rows[L.READ_ANGLE][j]
+    if rows[L.READ_STANCE][j] < 0.5:
+        torque, shift = 0.0, config[L.CONFIG.mismatch]
+        angle = fixed[K.LEVER_MOUNT_ANGLE][j] + rows[K.KNEE][j]
+    rows[L.DESIRED_ANGLE][j] = angle
+    rows[L.DESIRED_TENSION][j] = shift + tension_for(
+        rows[L.READ_ANGLE][j],
         torque,
-        config[KNOWN_ARM],
-        config[KNOWN_WIRE],
-        config[KNOWN_RELAXED],
+        config[L.CONFIG.known_arm],
+        config[L.CONFIG.known_wire],
+        config[L.CONFIG.known_relaxed],
     )
 
 
@@ -171,52 +87,34 @@ def work_of_wearer(rows: Any, fixed: Any, settings: Any, period: float, j: int) 
 
     It counts from the muscle's resting level, as the calibration does.
     """
-    demand = settings[0][DEMAND_SHARE] * rows[K.ESTIMATE][j]
+    demand = settings[0][L.CONFIG.demand_share] * rows[K.ESTIMATE][j]
     largest = fixed[K.ACTIVATION_LARGEST_TORQUE][j]
     risen = left_of_gap(period, fixed[K.ACTIVATION_RISE_TIME][j])
     fallen = left_of_gap(period, fixed[K.ACTIVATION_FALL_TIME][j])
     helped = excitation(demand - rows[K.TORQUE][j], largest, 0.0)
     alone = excitation(demand, largest, 0.0)
-    rows[BEARS][j] = activation(rows[BEARS][j], helped, risen, fallen)
-    rows[BEARS_FREE][j] = activation(rows[BEARS_FREE][j], alone, risen, fallen)
+    rows[L.BEARS][j] = activation(rows[L.BEARS][j], helped, risen, fallen)
+    rows[L.BEARS_FREE][j] = activation(rows[L.BEARS_FREE][j], alone, risen, fallen)
 
 
 @kernel
 def advance_leg(
-    rows: Any,
-    fixed: Any,
-    counts: Any,
-    tables: Any,
-    samples: Any,
-    settings: Any,
-    choices: Any,
+    rows: Any, fixed: Any, counts: Any, tables: Any, samples: Any, settings: Any, choices: Any,
     work: Any,
-) -> None:
+) -> None:  # fmt: skip
     """Advance plant and wearer by a control period, read the sensors, set the references."""
-    period = settings[0][PERIOD]
-    advance(
-        rows,
-        fixed,
-        counts,
-        tables,
-        settings[choices[AT_OWN] :],
-        HYSTERESIS,
-        choices[N_ELEMENTS],
-        choices[SUBSTEPS],
-        period,
-        work,
-    )
-    step, wanted = counts[K.STEP], rows[WANTED_TORQUE]
-    for k in range(len(SENSORS)):
+    advance_knee(rows, fixed, counts, tables, samples, settings, choices, work)
+    step, torque, period = counts[K.STEP], rows[L.DESIRED_TORQUE], settings[0][PERIOD]
+    for k in range(len(L.SENSORS)):
         for j in range(LANES):
-            sense(rows, fixed, counts, k, step[j] + 1, j)
+            read(rows, fixed, counts, k, step[j] + 1, j)
     for j in range(LANES):
-        wanted[j] = share_of_torque(rows, fixed, settings, choices, j)
+        torque[j] = share_of_torque(rows, fixed, settings, choices, j)
     for j in range(LANES):
-        wanted[j] = butterworth(rows, FILTER, j, wanted[j])
-    if choices[SOURCE] == SAMPLES:
+        torque[j] = butterworth(rows, L.FILTER, j, torque[j])
+    if choices[CHOICE.reference] == L.SAMPLES:
         for j in range(LANES):
-            wanted[j] = samples[0][min(step[j] + 1, len(samples[0]) - 1)]
+            torque[j] = samples[0][min(step[j] + 1, len(samples[0]) - 1)]
     for j in range(LANES):
         set_references(rows, fixed, settings, j)
     for j in range(LANES):
@@ -227,22 +125,19 @@ def advance_leg(
 def evaluate(
     rows: Any, fixed: Any, counts: Any, ahead: Any, settings: Any, choices: Any, work: Any
 ) -> None:
-    """Write what can be observed and reported of a tile into ``work``."""
-    for k in range(len(COPIED_ROWS)):
-        source, to = rows[COPIED_ROWS[k]], work[FIRST_COPIED + k]
-        for j in range(LANES):
-            to[j] = source[j]
+    """Write observation and report of a tile into ``work``."""
+    copy_rows(rows, work)
     judge(rows, fixed, counts, settings, work)
-    for k in range(FIXED_SIGNALS):
-        source, to = rows[SEEN_ROWS[k]], work[SIGNALS + k]
+    for k in range(L.FIXED_SIGNALS):
+        source, to = rows[L.OBSERVED_ROWS[k]], work[L.SIGNALS + k]
         for j in range(LANES):
             to[j] = source[j]
-    first = SIGNALS + FIXED_SIGNALS
+    first = L.SIGNALS + L.FIXED_SIGNALS
     write_references(counts, ahead, choices, work, first)
-    other = first + choices[PREVIEW] + 1
-    for j in range(LANES):  # of the present, the true references and not the planned ones
-        work[first][j] = rows[WANTED_TENSION][j]
-        work[other][j] = rows[WANTED_ANGLE][j]
+    other = first + choices[CHOICE.preview] + 1
+    for j in range(LANES):  # the present references are the true ones and not the planned ones
+        work[first][j] = rows[L.DESIRED_TENSION][j]
+        work[other][j] = rows[L.DESIRED_ANGLE][j]
 
 
 @kernel
@@ -252,102 +147,104 @@ def judge(rows: Any, fixed: Any, counts: Any, settings: Any, work: Any) -> None:
     pressure, set_point, older = rows[K.PRESSURE], rows[K.SET_POINT], rows[K.OLD_SET_POINT]
     for j in range(LANES):
         stance, tension, off = rows[K.STANCE][j], rows[K.TENSION][j], abs(rows[K.DEVIATION][j])
-        seen, demand = rows[READ_STANCE][j], rows[K.DEMAND][j]
+        seen, demand = rows[L.READ_STANCE][j], rows[K.DEMAND][j]
         over = over_assistance(rows[K.TORQUE][j], demand)
-        work[TIME][j] = step[j] * config[PERIOD]
-        work[REF][j] = rows[WANTED_TENSION][j]
-        work[OUTPUT][j] = tension
-        work[S_IDEAL][j] = config[RATIO] * demand
-        work[R_TENSION][j] = gated_reward(
-            tension - rows[WANTED_TENSION][j],
+        work[L.INFO.time][j] = step[j] * config[PERIOD]
+        work[L.INFO.reference][j] = rows[L.DESIRED_TENSION][j]
+        work[L.INFO.output][j] = tension
+        work[L.INFO.state_torque_ideal][j] = config[L.CONFIG.ratio] * demand
+        work[L.INFO.reward_tension][j] = gated_reward(
+            tension - rows[L.DESIRED_TENSION][j],
             stance * seen,
-            config[TENSION_SCALE],
-            config[TENSION_WEIGHT],
+            config[L.CONFIG.tension_scale],
+            config[L.CONFIG.tension_weight],
         )
-        work[R_ANGLE][j] = gated_reward(
-            off, (1.0 - stance) * (1.0 - seen), config[ANGLE_SCALE], config[ANGLE_WEIGHT]
+        work[L.INFO.reward_angle][j] = gated_reward(
+            off,
+            (1.0 - stance) * (1.0 - seen),
+            config[L.CONFIG.angle_scale],
+            config[L.CONFIG.angle_weight],
         )
-        work[R_OVER][j] = gated_reward(over, 1.0, config[OVER_SCALE], config[OVER_WEIGHT])
-        work[R_EFFORT][j] = effort_reward(
-            set_point[j] - older[j], fixed[K.MAX_PRESSURE][j], config[EFFORT_WEIGHT]
+        work[L.INFO.reward_over_assistance][j] = gated_reward(
+            over, 1.0, config[L.CONFIG.over_scale], config[L.CONFIG.over_weight]
         )
-        work[C_PRESSURE][j] = excess(pressure[j], config[SOFT_PRESSURE])
-        work[C_DEVIATION][j] = excess(off, config[SOFT_DEVIATION])
-        work[M_TENSION][j] = config[HIGHEST_TENSION] - tension
-        work[M_DEVIATION][j] = config[LARGEST_DEVIATION] - off
-        work[M_PRESSURE][j] = config[SOFT_PRESSURE] - pressure[j]
-        broken = min(work[M_TENSION][j], work[M_DEVIATION][j])
-        work[ENDED][j] = 1.0 if broken < 0.0 else 0.0
-        work[E_OVER][j] = over
-        work[E_TRAVEL][j] = abs(pressure[j] - rows[K.OLD_PRESSURE][j])
+        work[L.INFO.reward_effort][j] = effort_reward(
+            set_point[j] - older[j], fixed[K.MAX_PRESSURE][j], config[L.CONFIG.effort_weight]
+        )
+        work[L.INFO.cost_pressure][j] = excess(pressure[j], config[L.CONFIG.soft_pressure])
+        work[L.INFO.cost_deviation][j] = excess(off, config[L.CONFIG.soft_deviation])
+        work[L.INFO.margin_tension][j] = config[L.CONFIG.highest_tension] - tension
+        work[L.INFO.margin_deviation][j] = config[L.CONFIG.largest_deviation] - off
+        work[L.INFO.margin_pressure][j] = config[L.CONFIG.soft_pressure] - pressure[j]
+        broken = min(work[L.INFO.margin_tension][j], work[L.INFO.margin_deviation][j])
+        work[L.ENDED][j] = 1.0 if broken < 0.0 else 0.0
+        work[L.INFO.effort_over_assistance][j] = over
+        work[L.INFO.effort_pressure_travel][j] = abs(pressure[j] - rows[K.OLD_PRESSURE][j])
         drawn = max(0.0, rows[K.AIR][j] - rows[K.OLD_AIR][j])
-        work[E_AIR][j] = drawn if pressure[j] > VENTED else 0.0
+        work[L.INFO.effort_air][j] = drawn if pressure[j] > VENTED else 0.0
         rows[K.OLD_PRESSURE][j] = pressure[j]
         rows[K.OLD_AIR][j] = rows[K.AIR][j]
 
 
 @routine
 def begin_leg(
-    rows: Any,
-    fixed: Any,
-    counts: Any,
-    tables: Any,
-    samples: Any,
-    settings: Any,
-    choices: Any,
-    work: Any,
-    member: int,
-    j: int,
-) -> None:
-    """Put lane ``j`` at a phase of the stride, under a pressure near that of no assistance."""
+    rows: Any, fixed: Any, counts: Any, tables: Any, samples: Any, settings: Any, choices: Any,
+    work: Any, member: int, j: int,
+) -> None:  # fmt: skip
+    """Start lane ``j`` at a phase of the stride, near the pressure that the reference needs."""
     key_a, key_b, config = counts[K.KEY_A][j], counts[K.KEY_B][j], settings[0]
     counts[K.MEMBER][j] = member
-    gait = settings[choices[AT_OWN] :]
-    phase = config[START_PHASE]
+    gait = settings[choices[CHOICE.at_own] :]
+    phase = config[L.CONFIG.start_phase]
     if phase < 0.0:
-        phase = uniform(key_a, key_b, START, 0)
-    share = 1.0 + config[START_SPREAD] * (2.0 * uniform(key_a, key_b, START, 1) - 1.0)
+        phase = uniform(key_a, key_b, L.START, 0)
+    share = 1.0 + config[L.CONFIG.start_spread] * (2.0 * uniform(key_a, key_b, L.START, 1) - 1.0)
     torque = prime(rows, fixed, settings, choices, phase, j)
     pressure = share * pressure_for(fixed, gait, torque, phase, j)
     begin_lane(
-        rows, fixed, counts, tables, gait, HYSTERESIS, choices[N_ELEMENTS], j, phase, pressure
+        rows,
+        fixed,
+        counts,
+        tables,
+        gait,
+        L.HYSTERESIS,
+        choices[CHOICE.elements],
+        j,
+        phase,
+        pressure,
     )
-    for k in range(len(SENSORS)):
-        sense(rows, fixed, counts, k, 0, j)
+    for k in range(len(L.SENSORS)):
+        read(rows, fixed, counts, k, 0, j)
     share_of_torque(rows, fixed, settings, choices, j)
-    rows[WANTED_TORQUE][j] = torque
-    if choices[SOURCE] == SAMPLES:
-        rows[WANTED_TORQUE][j] = samples[0][0]
+    rows[L.DESIRED_TORQUE][j] = torque
+    if choices[CHOICE.reference] == L.SAMPLES:
+        rows[L.DESIRED_TORQUE][j] = samples[0][0]
     set_references(rows, fixed, settings, j)
     largest = fixed[K.ACTIVATION_LARGEST_TORQUE][j]
-    demand = config[DEMAND_SHARE] * rows[K.ESTIMATE][j]
-    rows[BEARS][j] = excitation(demand - rows[K.TORQUE][j], largest, 0.0)
-    rows[BEARS_FREE][j] = excitation(demand, largest, 0.0)
+    demand = config[L.CONFIG.demand_share] * rows[K.ESTIMATE][j]
+    rows[L.BEARS][j] = excitation(demand - rows[K.TORQUE][j], largest, 0.0)
+    rows[L.BEARS_FREE][j] = excitation(demand, largest, 0.0)
 
 
 @lru_cache(maxsize=16)
 def kernels_for(kind: str, dynamics: str) -> Kernels:
     """Return the kernels for a kind of hysteresis and the dynamics of the pressure."""
-    functions = {
-        "env_apply": nothing_happens,
-        "env_advance": advance_leg,
-        "env_reference": planned_reference,
-        "env_evaluate": evaluate,
-        "env_begin": begin_leg,
-        **replacements(kind, "leg", dynamics),
-    }
     return Kernels(
         f"gait_{kind}_{dynamics}",
         kernels_for,
         (kind, dynamics),
-        functions,
-        info=INFO,
-        rows=HYSTERESIS + state_rows(kind),
+        L.REPORT,
+        advance=advance_leg,
+        reference=planned_reference,
+        evaluate=evaluate,
+        begin=begin_leg,
+        config=L.CONFIG,
+        placeholders={"FIRST_HYSTERESIS": L.HYSTERESIS, **replacements(kind, "leg", dynamics)},
+        rows=L.HYSTERESIS + state_rows(kind),
         parameters=K.N_PARAMETERS,
         counts=K.N_COUNTS,
-        scratch=N_WORK,
-        signals=FIXED_SIGNALS + CHANNELS * (1 + MOST_PREVIEW),
+        signals=L.FIXED_SIGNALS,
         set_points=K.SET_POINT,
         old_set_points=K.OLD_SET_POINT,
-        channels=CHANNELS,
+        channels=L.CHANNELS,
     )

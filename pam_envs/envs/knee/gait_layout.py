@@ -1,11 +1,14 @@
-"""Where the numbers of the gait's environments stand: rows, report, observation, configuration."""
+"""Rows, report, observation and configuration of the gait kernels."""
 
 from __future__ import annotations
 
-from pam_envs.envs.core.step import FIRST_CHOICE, FIRST_CONFIG
+from pam_envs.envs.core.layout import Report, computed, indices
+from pam_envs.envs.core.step import FIRST_CONFIG
+from pam_envs.parameters import declarations
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.step import N_WORK
 from pam_envs.sensing.butterworth import ROWS as FILTER_ROWS
+from pam_envs.tasks.gait_assistance import GaitAssistance
 
 # the environment's own state, after the plant's
 (
@@ -17,16 +20,16 @@ from pam_envs.sensing.butterworth import ROWS as FILTER_ROWS
     READ_COP,
     READ_ANKLE,
     READ_STANCE,
-    WANTED_TORQUE,
-    WANTED_TENSION,
-    WANTED_ANGLE,
+    DESIRED_TORQUE,
+    DESIRED_TENSION,
+    DESIRED_ANGLE,
     BEARS,
     BEARS_FREE,
     FILTER,
 ) = range(K.END, K.END + 14)
 PLAN_FILTER = FILTER + FILTER_ROWS
 HYSTERESIS = PLAN_FILTER + FILTER_ROWS
-"""First row of the hysteresis's state."""
+"""First row of the state of the hysteresis."""
 
 SENSORS = (
     (K.TENSION, K.TENSION_NOISE),
@@ -37,156 +40,79 @@ SENSORS = (
     (K.COP, K.COP_NOISE),
     (K.ANKLE, K.ANKLE_NOISE),
 )
-"""What each reading from ``READ_TENSION`` on is of, and the first row of its sensor's parameters:
-noise, resolution, bias."""
+"""Measured row of each reading from ``READ_TENSION`` on, and first row of its sensor's parameters."""
 
-COPIED = {
-    "effort/extensors": K.QUADS,
-    "effort/extensors_free": K.QUADS_FREE,
-    "effort/extensors_calibrated": BEARS,
-    "effort/extensors_free_calibrated": BEARS_FREE,
-    "effort/flexors": K.FLEXORS,
-    "effort/flexors_free": K.FLEXORS_FREE,
-    "state/tension": K.TENSION,
-    "state/stiffness": K.STIFFNESS,
-    "state/length": K.LENGTH,
-    "state/angle": K.ANGLE,
-    "state/velocity": K.VELOCITY,
-    "state/angle_reference": WANTED_ANGLE,
-    "state/deviation": K.DEVIATION,
-    "state/pressure": K.PRESSURE,
-    "state/torque": K.TORQUE,
-    "state/torque_reference": WANTED_TORQUE,
-    "state/demand": K.DEMAND,
-    "state/estimate": K.ESTIMATE,
-    "state/ground_force": K.GROUND_Z,
-    "state/ground_force_ahead": K.GROUND_X,
-    "state/cop": K.COP,
-    "state/knee": K.KNEE,
-    "state/shank": K.SHANK,
-    "state/ankle": K.ANKLE,
-    "state/phase": K.PHASE,
-    "state/stance": K.STANCE,
-    "sensor/tension": READ_TENSION,
-    "sensor/angle": READ_ANGLE,
-    "sensor/pressure": READ_PRESSURE,
-    "sensor/ground_force": READ_GROUND,
-    "sensor/stance": READ_STANCE,
-}
-"""Keys of ``info`` that hold a row of the state as it is."""
-COPIED_ROWS = tuple(COPIED.values())
-JUDGED = (
-    "time",
-    "reference",
-    "output",
-    "reward/tension",
-    "reward/angle",
-    "reward/over_assistance",
-    "reward/effort",
-    "cost/pressure",
-    "cost/deviation",
-    "margin/tension",
-    "margin/deviation",
-    "margin/pressure",
-    "effort/pressure_travel",
-    "effort/air",
-    "effort/over_assistance",
-    "state/torque_ideal",
+REPORT = Report(
+    {
+        **computed("reward", "tension", "angle", "over_assistance", "effort"),
+        **computed("cost", "pressure", "deviation"),
+        **computed("margin", "tension", "deviation", "pressure"),
+        **computed("effort", "pressure_travel", "air", "over_assistance"),
+        **computed("state", "torque_ideal"),
+        "effort/extensors": K.QUADS,
+        "effort/extensors_free": K.QUADS_FREE,
+        "effort/extensors_calibrated": BEARS,
+        "effort/extensors_free_calibrated": BEARS_FREE,
+        "effort/flexors": K.FLEXORS,
+        "effort/flexors_free": K.FLEXORS_FREE,
+        "state/tension": K.TENSION,
+        "state/stiffness": K.STIFFNESS,
+        "state/length": K.LENGTH,
+        "state/angle": K.ANGLE,
+        "state/velocity": K.VELOCITY,
+        "state/angle_reference": DESIRED_ANGLE,
+        "state/deviation": K.DEVIATION,
+        "state/pressure": K.PRESSURE,
+        "state/torque": K.TORQUE,
+        "state/torque_reference": DESIRED_TORQUE,
+        "state/demand": K.DEMAND,
+        "state/estimate": K.ESTIMATE,
+        "state/ground_force": K.GROUND_Z,
+        "state/ground_force_ahead": K.GROUND_X,
+        "state/cop": K.COP,
+        "state/knee": K.KNEE,
+        "state/shank": K.SHANK,
+        "state/ankle": K.ANKLE,
+        "state/phase": K.PHASE,
+        "state/stance": K.STANCE,
+        "sensor/tension": READ_TENSION,
+        "sensor/angle": READ_ANGLE,
+        "sensor/pressure": READ_PRESSURE,
+        "sensor/ground_force": READ_GROUND,
+        "sensor/stance": READ_STANCE,
+    },
+    N_WORK,
 )
-(
-    TIME,
-    REF,
-    OUTPUT,
-    R_TENSION,
-    R_ANGLE,
-    R_OVER,
-    R_EFFORT,
-    C_PRESSURE,
-    C_DEVIATION,
-    M_TENSION,
-    M_DEVIATION,
-    M_PRESSURE,
-    E_TRAVEL,
-    E_AIR,
-    E_OVER,
-    S_IDEAL,
-    FIRST_COPIED,
-) = range(N_WORK, N_WORK + len(JUDGED) + 1)
-INFO = (*JUDGED, *COPIED, "saturated")
-ENDED = N_WORK + len(INFO)
-SIGNALS = ENDED + 1
-"""First work row of the observation, in SI."""
-SEEN_ROWS = (
+INFO, ENDED, SIGNALS = REPORT.rows, REPORT.ended, REPORT.signals
+OBSERVED_ROWS = (
     READ_TENSION,
     READ_ANGLE,
     READ_PRESSURE,
     K.SET_POINT,
     READ_STANCE,
     READ_GROUND,
-    WANTED_TORQUE,
+    DESIRED_TORQUE,
 )
-"""Rows of the state that are observed as they are."""
-FIXED_SIGNALS = len(SEEN_ROWS)
+"""Rows of the state that are copied into the observation."""
+FIXED_SIGNALS = len(OBSERVED_ROWS)
 CHANNELS = 2
 TENSION_CHANNEL, ANGLE_CHANNEL = range(CHANNELS)
 
-CONFIG = (
-    "tension_weight",
-    "tension_scale",
-    "angle_weight",
-    "angle_scale",
-    "over_weight",
-    "over_scale",
-    "effort_weight",
-    "soft_pressure",
-    "soft_deviation",
-    "highest_tension",
-    "largest_deviation",
-    "ratio",
-    "lowest_torque",
-    "mismatch",
-    "demand_share",
-    "start_phase",
-    "start_spread",
-    "known_arm",
-    "known_wire",
-    "known_relaxed",
-    "known_shank",
-    "known_mass",
+CONFIG = indices(
+    (
+        *declarations(GaitAssistance),
+        *("ratio", "lowest_torque", "mismatch", "demand_share", "start_phase", "start_spread"),
+        *("known_arm", "known_wire", "known_relaxed", "known_shank", "known_mass"),
+    ),
+    FIRST_CONFIG,
 )
-"""The last five are what the orthosis knows of itself and its wearer, in SI: the parameters of the
+"""The last five are the orthosis' knowledge of itself and its wearer, in SI: the parameters of the
 plant before any is drawn. Its references follow from these."""
-(
-    TENSION_WEIGHT,
-    TENSION_SCALE,
-    ANGLE_WEIGHT,
-    ANGLE_SCALE,
-    OVER_WEIGHT,
-    OVER_SCALE,
-    EFFORT_WEIGHT,
-    SOFT_PRESSURE,
-    SOFT_DEVIATION,
-    HIGHEST_TENSION,
-    LARGEST_DEVIATION,
-    RATIO,
-    LOWEST_TORQUE,
-    MISMATCH,
-    DEMAND_SHARE,
-    START_PHASE,
-    START_SPREAD,
-    KNOWN_ARM,
-    KNOWN_WIRE,
-    KNOWN_RELAXED,
-    KNOWN_SHANK,
-    KNOWN_MASS,
-) = range(FIRST_CONFIG, FIRST_CONFIG + len(CONFIG))
-CHOICES = ("elements", "source")
-N_ELEMENTS, SOURCE = range(FIRST_CHOICE, FIRST_CHOICE + len(CHOICES))
 SOURCES = ("estimate", "demand")
 ESTIMATE, DEMAND, SAMPLES = range(len(SOURCES) + 1)
-"""What the wanted assistance is a share of, or samples of it."""
+"""Torque of which the assistance is a share, or samples of the assistance."""
 
 NOISE, START = 8, 15
 """Random streams: of the first sensor, and of the start."""
 PRIMING = 100
-"""Control periods that the low-pass has run before an episode."""
+"""Control periods that the low-pass runs before an episode."""

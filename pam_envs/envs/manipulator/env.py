@@ -1,14 +1,14 @@
 """``PAM/RedundantManipulator-v0``: a hanging arm of six antagonistic joints, fluidic_muscles.
 
-Twelve pneumatic muscles bend an arm of six links about axes x, y, x, y, x, y by turns. Its tool has
-to follow a path in position and direction: five numbers for six joints, so that how the arm gets
-there is open. The path's joint angles are planned ahead, with the weight of the paper's Eq. (2.1)
-that keeps joints away from their limits, and can be observed. The action is a set-point of each
-angle, which the static laws of its muscles turn into pressures; or all pressures. Weight, links and
+Twelve pneumatic muscles bend an arm of six links about axes x, y, x, y, x, y. Its tool has to follow
+a path in position and direction: five numbers for six joints, so that the arm is redundant. The
+joint angles along the path are planned in advance, with the weight of Eq. (2.1) of the paper that
+keeps joints away from their limits, and can be observed. The action is a set-point of each angle,
+which the static laws of the muscles convert to pressures; or all pressures. Weight, links and
 payload couple the joints.
 
-Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=False``), of n joints
-that count from the base, k = 0 .. n - 1:
+Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=False``), for n joints
+counted from the base, k = 0 .. n - 1:
 
 | how many | signal | unit | range |
 |----------|--------|------|-------|
@@ -27,26 +27,33 @@ Action: angle_set_point_k, over the joints' range; or pressure_ka_set_point and
 pressure_kb_set_point, 0 .. 6.5e5 Pa.
 
 Reward: ``-|tip - path| / 2 cm - 0.5 |direction - path's| / 2 degrees - 0.2 (change of all
-pressures' set-points) / (2 n 6.5 bar)`` each control period; where a limit ends the episode, the
-worst that a period can cost for each one that is left as well, so that it never pays.
+pressures' set-points) / (2 n 6.5 bar)`` each control period. Where a limit ends the episode,
+``reward/ended`` adds the lowest possible reward of each remaining period, so that ending an episode
+never pays.
 
 Start: at the beginning of the path. End: truncated after ``episode_seconds``; terminated when a
 joint is beyond its hard limit.
+
+Arguments: :func:`make_setup`, and those of every environment
+(:class:`~pam_envs.envs.core.arguments.Common`). Versions: v0, the first.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.envs.core.arguments import (
-    common,
-    named_arguments,
+    Common,
+    Part,
+    Randomisation,
+    acted,
+    environment_arguments,
+    observed,
     payloads_of,
     plant_of,
     spread_of,
@@ -58,7 +65,7 @@ from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.envs.manipulator.kernels import kernels_for
 from pam_envs.envs.manipulator.layout import MODES, POSE, joint_names, muscle_names
 from pam_envs.envs.manipulator.paths import paths_for
-from pam_envs.parameters import Signal, Signals
+from pam_envs.parameters import Signals
 from pam_envs.plants.antagonistic_joint.bearing import bearable_payload, check_borne
 from pam_envs.plants.redundant_manipulator import rows as R
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
@@ -70,48 +77,37 @@ ANGLES = (-0.8, 0.8)
 RATES = (-6.0, 6.0)
 """Range [rad/s] of their rates."""
 MOST_PAYLOAD = 0.1
-"""Largest payload [kg]. Some paths bear less, which is checked."""
-NOT_DRAWN = ("regulator.max_pressure", "link.limit", "link.stop", "nominal.prestress")
-"""Parameters that ``randomize`` may not draw: they scale the action or enter derived numbers."""
-CORNER = {
-    "lever.r_u": min,
-    "lever.r_o": min,
-    "lever.l_u": max,
-    "lever.l_o": max,
-}
-"""Which end of a range brings the lever's toggle nearer."""
-
-Part = tuple[str, str, float, float]
+"""Largest payload [kg]. The largest one on some paths is less, which is checked."""
+RANDOMISATION = Randomisation(
+    R.PARAMETERS,
+    ("regulator.max_pressure", "link.limit", "link.stop", "nominal.prestress"),
+    "{'regulator.time_constant': (0.03, 0.06)}",
+    {"lever.r_u": min, "lever.r_o": min, "lever.l_u": max, "lever.l_o": max},
+)
 
 
 @lru_cache(maxsize=8)
-def _stock(hysteresis: Kind) -> RedundantManipulator:
+def _default(hysteresis: Kind) -> RedundantManipulator:
     return RedundantManipulator.paper(hysteresis)
 
 
 def _pose(plant: RedundantManipulator, key: str) -> list[Part]:
-    """Return name, unit and range of a pose's numbers."""
+    """Return the signals of a pose."""
     reach = float(plant.chain.reach)
     spans = [("m", -reach, reach)] * 3 + [("1", -1.0, 1.0)] * 3
     return [(f"{key}{name}", *span) for name, span in zip(POSE, spans, strict=True)]
 
 
-def _actions(plant: RedundantManipulator, action: str, normalize: bool) -> Signals:
-    names, span = joint_names("angle_set_point", plant.stages), ("rad", *plant.angle_range)
+def _actions(plant: RedundantManipulator, action: str) -> list[Part]:
     if action == "pressures":
-        names = [f"{name}_set_point" for name in muscle_names("pressure", plant.stages)]
-        span = ("Pa", 0.0, plant.regulator.max_pressure)
-    return Signals(Signal(name, *span, i, normalize) for i, name in enumerate(names))
+        full = plant.regulator.max_pressure
+        names = muscle_names("pressure", plant.stages)
+        return [(f"{name}_set_point", "Pa", 0.0, full) for name in names]
+    names = joint_names("angle_set_point", plant.stages)
+    return [(name, "rad", *plant.angle_range) for name in names]
 
 
-def _signals(
-    plant: RedundantManipulator,
-    action: str,
-    plan: bool,
-    preview: int,
-    spacing: float,
-    normalize: bool,
-) -> Signals:
+def _signals(plant: RedundantManipulator, action: str, plan: bool, given: Common) -> Signals:
     n, pressures = plant.stages, ("Pa", 0.0, plant.regulator.max_pressure)
     angles = ("rad", *ANGLES)
     parts: list[Part] = [(name, *angles) for name in joint_names("angle", n)]
@@ -122,25 +118,17 @@ def _signals(
         parts += [(name, "rad", *plant.angle_range) for name in joint_names("set_point", n)]
     else:
         parts += [(name, *pressures) for name in muscle_names("set_point", n)]
-    wanted = _pose(plant, "reference_")
+    references = _pose(plant, "reference_")
     if plan:
-        wanted += [(name, *angles) for name in joint_names("joint_reference", n)]
-    made, ahead = list(parts), [0.0] * len(parts)
-    for name, unit, low, high in wanted:
-        names = [name, *(f"{name}_{i + 1}" for i in range(preview))]
-        made += [(each, unit, low, high) for each in names]
-        ahead += [i * spacing for i in range(preview + 1)]
-    return Signals(
-        Signal(*part, i, normalize, late)
-        for i, (part, late) in enumerate(zip(made, ahead, strict=True))
-    )
+        references += [(name, *angles) for name in joint_names("joint_reference", n)]
+    return observed(parts, references, given, plant.control_period)
 
 
 def _payloads(
     plant: RedundantManipulator, payload: Any, change: float, paths: Mapping[str, Any],
     by_pressure: bool,
 ) -> NDArray[np.float64]:  # fmt: skip
-    """Return the payloads [kg] to draw from, shape (1, n), if all paths' weights are borne."""
+    """Return the payloads [kg] to draw from, shape (1, n), all of which the paths allow."""
     plans = {name: path[len(POSE) :].T for name, path in paths.items()}
     most = MOST_PAYLOAD
     if payload is None:
@@ -152,17 +140,9 @@ def _payloads(
     return payloads
 
 
-@named_arguments
+@environment_arguments(reference="paths", preview=3, preview_stride=5, episode_seconds=11.0)
 def make_setup(
-    hysteresis: Kind | None = None,
-    plant: RedundantManipulator | str | Path | None = None,
-    reference: Any = "paths",
-    preview: int = 3,
-    preview_stride: int = 5,
-    episode_seconds: float = 11.0,
-    randomize: Any = False,
-    normalize: bool = True,
-    render_mode: str | None = None,
+    given: Common,
     action: str = "angle",
     plan: bool = True,
     weighted: bool = True,
@@ -170,48 +150,32 @@ def make_setup(
     rest_seconds: float = 1.0,
     payload: Any = 0.0,
     payload_change: float = 0.0,
-    reward: Mapping[str, float] | None = None,
 ) -> Setup:
     """Return the checked configuration of an environment with a redundant manipulator.
 
     Parameters
     ----------
-    hysteresis : {"maxwell_slip", "preisach", "none"}, optional
-        The muscles' hysteresis. Default: that of ``plant``, or Maxwell-slip.
-    plant : RedundantManipulator or path, optional
-        Another plant, with any chain. Default: ``RedundantManipulator.paper()``.
-    reference : str or array_like, shape (k, 6)
-        "path_1", "path_2", "path_3": a path of 41 poses; "paths": each episode draws one of them;
-        "drawn": one of 16 paths between random ends. Or the poses of a path: x, y, z [m] and a
-        unit vector in each row.
-    preview, preview_stride : int
-        Future samples of pose and planned angles, and control periods between them.
-    episode_seconds : float
-        Duration [s].
-    randomize : bool or mapping
-        True: every episode draws the assumed parameters within their declared ranges. A mapping
-        {"regulator.time_constant": (low, high)}: just those.
-    normalize : bool
-        Observation and action in [-1, 1], or SI.
-    render_mode : {None, "rgb_array", "human"}
-        As Gymnasium means it.
+    given : Common
+        Plant: a ``RedundantManipulator`` with any chain, by default
+        ``RedundantManipulator.paper()``. Reference: "path_1", "path_2", "path_3" (a path of 41
+        poses), "paths" (each episode draws one of them), "drawn" (one of 16 paths between random
+        ends); or the poses of a path, shape (k, 6): x, y, z [m] and a unit vector in each row.
+        Reward: :class:`~pam_envs.tasks.joint_tracking.PathTracking`.
     action : {"angle", "pressures"}
         A set-point of each angle, under a fixed prestress; or of each pressure.
     plan : bool
         Whether the planned joint angles are observed.
     weighted : bool
-        Plan with the weight of Eq. (2.1), which keeps joints off their limits, or for the smallest
-        angles alone.
+        Plan with the weight of Eq. (2.1), which keeps joints away from their limits, or for the
+        smallest angles alone.
     path_seconds, rest_seconds : float
-        Duration [s] of the way along the path, and of the rest at either end.
+        Duration [s] of the motion along the path, and of the rest at either end.
     payload : float, sequence of float or None
-        Mass [kg] at the tip; several: each episode draws one; None: any that the paths bear, up to
-        0.1 kg. The muscles have to bear the heaviest at rest, with its change, in every pose of the
-        plan; where set-points are angles, with set-points within their range.
+        Mass [kg] at the tip; of several, each episode draws one; None: any that the paths allow, up
+        to 0.1 kg. The muscles have to hold the heaviest one, with its change, at rest in every pose
+        of the plan; with set-points of angles, with set-points within their range.
     payload_change : float
-        By how much [kg] the payload grows or shrinks, untold, in the middle of an episode.
-    reward : mapping, optional
-        Fields of :class:`pam_envs.tasks.joint_tracking.PathTracking` to change.
+        Change of the payload [kg], up or down, at an unannounced time.
 
     Raises
     ------
@@ -222,62 +186,49 @@ def make_setup(
     ValueError
         Naming the argument, its value, the bounds and the remedy.
     """
-    made = plant_of(RedundantManipulator, plant, hysteresis, _stock)
-    given = common(preview, preview_stride, episode_seconds, normalize, render_mode)
+    made = plant_of(RedundantManipulator, given, _default)
     check_choice("action", action, MODES)
     check_choice("plan", plan, (True, False))
     check_choice("weighted", weighted, (True, False))
-    task = task_of(PathTracking, reward)
+    task = task_of(PathTracking, given.reward)
     change = check_number("payload_change", payload_change, 0.0, MOST_PAYLOAD, "kg")
-    paths = paths_for(made, reference, True)
+    paths = paths_for(made, given.reference, True)
     payloads = _payloads(made, payload, change, paths, action == "pressures")
     if not weighted:
-        paths = paths_for(made, reference, weighted)
-    config = (
-        task.position_weight,
-        task.position_scale,
-        task.pointing_weight,
-        task.pointing_scale,
-        task.effort_weight,
-        task.soft_share * made.angle_range[1],
-        task.soft_pressure,
-        made.largest_angle,
-        made.prestress,
-        change,
-        check_number("path_seconds", path_seconds, 0.1, 600.0, "s"),
-        check_number("rest_seconds", rest_seconds, 0.0, 600.0, "s"),
-        task.worst(float(made.chain.reach)),
-    )
-    spacing = given.stride * made.control_period
-    example = "{'regulator.time_constant': (0.03, 0.06)}"
+        paths = paths_for(made, given.reference, weighted)
+    config = {
+        **vars(task),
+        "soft_angle": task.soft_share * made.angle_range[1],
+        "largest_angle": made.largest_angle,
+        "prestress": made.prestress,
+        "payload_change": change,
+        "path_seconds": check_number("path_seconds", path_seconds, 0.1, 600.0, "s"),
+        "rest_seconds": check_number("rest_seconds", rest_seconds, 0.0, 600.0, "s"),
+        "worst_period": task.worst(float(made.chain.reach)),
+    }
     return compose(
         made,
         kernels_for(made.hysteresis.kind, made.stages),
         given,
-        signals=_signals(made, action, plan, given.preview, spacing, normalize),
-        actions=_actions(made, action, normalize),
+        signals=_signals(made, action, plan, given),
+        actions=acted(_actions(made, action), given),
         config=config,
-        choices=(made.elements, MODES.index(action), payloads.size, len(paths)),
+        choices={
+            "mode": MODES.index(action),
+            "payloads": payloads.size,
+            "paths": len(paths),
+        },
         own=payloads,
         samples=np.concatenate(list(paths.values())),
         tables=made.hysteresis_tables(),
-        spread=spread_of(made, R.PARAMETERS, NOT_DRAWN, randomize, example, CORNER),
-        drawn=randomize is not False,
-        view=f"{made.family}_{made.stages}",
+        spread=spread_of(made, RANDOMISATION, given.randomize),
+        view="pam_envs.envs.manipulator.view:view",
     )
 
 
-class RedundantManipulatorEnv(PlantEnv):
-    """The single environment (see the module's page)."""
-
-    def __init__(self, **arguments: Any) -> None:
-        super().__init__(make_setup(**arguments))
+class RedundantManipulatorEnv(PlantEnv, make_setup=make_setup):
+    """Single environment (see the module's page)."""
 
 
-class RedundantManipulatorVectorEnv(PlantVectorEnv):
-    """The batched environment (see the module's page)."""
-
-    def __init__(
-        self, num_envs: int = 1, info: bool = True, threads: int | None = None, **arguments: Any
-    ) -> None:
-        super().__init__(make_setup(**arguments), num_envs, info, threads)
+class RedundantManipulatorVectorEnv(PlantVectorEnv, make_setup=make_setup):
+    """Batch of environments (see the module's page)."""

@@ -1,4 +1,4 @@
-"""What a step of ``PAM/RedundantManipulator-v0`` reports: observation, poses, rewards, limits."""
+"""Observation and report of ``PAM/RedundantManipulator-v0``: poses, rewards, limits."""
 
 from __future__ import annotations
 
@@ -6,63 +6,15 @@ import math
 from typing import Any
 
 from pam_envs.envs.core.step import (
+    CHOICE,
     EPISODE_SECONDS,
     FIRST_INFO,
     N_INFO,
     PERIOD,
-    PREVIEW,
+    copy_rows,
     write_references,
 )
-from pam_envs.envs.manipulator.layout import (
-    ACTION,
-    BY_ANGLE,
-    C_ANGLE,
-    C_PRESSURE,
-    E_AIR,
-    E_TRAVEL,
-    EFFORT_WEIGHT,
-    FIRST_COPIED,
-    JOINT_ROWS,
-    LARGEST_ANGLE,
-    M_ANGLE,
-    M_PRESSURE,
-    MODE,
-    MUSCLE_ROWS,
-    N_POSE,
-    OLD_AIR,
-    OLD_PRESSURE,
-    OLD_SET_POINT,
-    OUTPUT,
-    PATH,
-    PATH_SECONDS,
-    POINTING_SCALE,
-    POINTING_WEIGHT,
-    POSITION_SCALE,
-    POSITION_WEIGHT,
-    R_EFFORT,
-    R_ENDED,
-    R_POINTING,
-    R_POSITION,
-    RATE,
-    READ_ANGLE,
-    READ_PRESSURE,
-    REF,
-    REST_SECONDS,
-    S_JOINTS,
-    S_PATH,
-    S_PAYLOAD,
-    S_POINTING,
-    S_POSE,
-    S_REFERENCE,
-    S_RESTING,
-    S_SLACK,
-    SEEN_OUTPUT,
-    SOFT_ANGLE,
-    SOFT_PRESSURE,
-    TIME,
-    TOLD_PAYLOAD,
-    WORST_PERIOD,
-)
+from pam_envs.envs.manipulator import layout as L
 from pam_envs.kernels.build import LANES, kernel
 from pam_envs.mechanics.serial_chain_kinematics import N_STAGES, place_chain
 from pam_envs.mechanics.serial_chain_rows import DIRECTION, POINT, block
@@ -70,7 +22,7 @@ from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.step import CHAIN_WORK
 from pam_envs.references.path import along
 from pam_envs.tasks.joint_tracking import distance
-from pam_envs.tasks.tracking import effort_reward, ended_reward, excess, tracking_reward
+from pam_envs.tasks.rewards import effort_reward, ended_reward, error_reward, excess
 
 
 @kernel
@@ -82,7 +34,7 @@ def copy_row(source: Any, to: Any) -> None:
 
 @kernel
 def copy_pose(work: Any, to: int) -> None:
-    """Copy the pose that :func:`place_chain` has left in the scratch."""
+    """Copy the pose that :func:`place_chain` wrote to the scratch."""
     tip = block(CHAIN_WORK, N_STAGES, N_STAGES)
     for i in range(3):
         copy_row(work[tip + POINT + i], work[to + i])
@@ -91,85 +43,77 @@ def copy_pose(work: Any, to: int) -> None:
 
 @kernel
 def observe(rows: Any, fixed: Any, choices: Any, work: Any) -> int:
-    """Write the readings of a tile, their pose, and what was asked for; return the next row."""
+    """Write readings, their pose and the actions of a tile; return the next row."""
     first = FIRST_INFO + N_INFO + 1
     for k in range(N_STAGES):
-        copy_row(rows[READ_ANGLE + k], work[first + k])
-        copy_row(rows[RATE + k], work[first + N_STAGES + k])
+        copy_row(rows[L.READ_ANGLE + k], work[first + k])
+        copy_row(rows[L.RATE + k], work[first + N_STAGES + k])
     first = first + 2 * N_STAGES
     for k in range(2 * N_STAGES):
-        copy_row(rows[READ_PRESSURE + k], work[first + k])
+        copy_row(rows[L.READ_PRESSURE + k], work[first + k])
     first = first + 2 * N_STAGES
-    copy_row(rows[TOLD_PAYLOAD], work[first])
-    place_chain(rows, fixed, work, READ_ANGLE, M.CHAIN, CHAIN_WORK)
+    copy_row(rows[L.DECLARED_PAYLOAD], work[first])
+    place_chain(rows, fixed, work, L.READ_ANGLE, M.CHAIN, CHAIN_WORK)
     copy_pose(work, first + 1)
-    first = first + 1 + N_POSE
-    asked = N_STAGES if choices[MODE] == BY_ANGLE else 2 * N_STAGES
-    for k in range(asked):
-        copy_row(rows[ACTION + k], work[first + k])
-    return first + asked  # type: ignore[no-any-return]
+    first = first + 1 + L.N_POSE
+    actions = N_STAGES if choices[L.CHOICE.mode] == L.BY_ANGLE else 2 * N_STAGES
+    for k in range(actions):
+        copy_row(rows[L.ACTION + k], work[first + k])
+    return first + actions  # type: ignore[no-any-return]
 
 
 @kernel
 def report(rows: Any, fixed: Any, choices: Any, work: Any, references: int) -> None:
-    """Write poses, and all that is reported as it stands in the state."""
+    """Write poses, planned angles, and copies of the state."""
     place_chain(rows, fixed, work, M.ANGLE, M.CHAIN, CHAIN_WORK)
-    copy_pose(work, FIRST_INFO + S_POSE)
-    count = choices[PREVIEW] + 1
-    for i in range(N_POSE):
-        copy_row(work[references + i * count], work[FIRST_INFO + S_REFERENCE + i])
-    to = FIRST_INFO + FIRST_COPIED
-    for i in range(len(JOINT_ROWS)):
-        for k in range(N_STAGES):
-            copy_row(rows[JOINT_ROWS[i] + k], work[to + i * N_STAGES + k])
-    to = to + len(JOINT_ROWS) * N_STAGES
-    for i in range(len(MUSCLE_ROWS)):
-        for k in range(2 * N_STAGES):
-            copy_row(rows[MUSCLE_ROWS[i] + k], work[to + 2 * i * N_STAGES + k])
-    to = to + 2 * len(MUSCLE_ROWS) * N_STAGES
+    copy_pose(work, FIRST_INFO + L.INFO.state_x)
+    count = choices[CHOICE.preview] + 1
+    for i in range(L.N_POSE):
+        copy_row(work[references + i * count], work[FIRST_INFO + L.INFO.state_reference_x + i])
+    copy_rows(rows, work)
+    planned = FIRST_INFO + N_INFO - 1 - N_STAGES
     for k in range(N_STAGES):
-        copy_row(work[references + (N_POSE + k) * count], work[to + k])
+        copy_row(work[references + (L.N_POSE + k) * count], work[planned + k])
 
 
 @kernel
 def evaluate(
     rows: Any, fixed: Any, counts: Any, ahead: Any, settings: Any, choices: Any, work: Any
 ) -> None:
-    """Write what can be observed and reported of a tile into ``work``."""
+    """Write observation and report of a tile into ``work``."""
     references = observe(rows, fixed, choices, work)
     write_references(counts, ahead, choices, work, references)
     report(rows, fixed, choices, work, references)
     planned = FIRST_INFO + N_INFO - 1 - N_STAGES
     for j in range(LANES):
-        off, largest, higher, slack = 0.0, 0.0, 0.0, rows[M.SLACK][j]
+        off, largest, higher = 0.0, 0.0, 0.0
         for k in range(N_STAGES):
             angle = rows[M.ANGLE + k][j]
             error = angle - work[planned + k][j]
             off = off + error * error
             largest = max(largest, abs(angle))
-        asked, travel = 0.0, 0.0
+        moved, travel = 0.0, 0.0
         for k in range(2 * N_STAGES):
             pressure = rows[M.PRESSURE + k][j]
             higher = max(higher, pressure)
-            travel = travel + abs(pressure - rows[OLD_PRESSURE + k][j])
-            asked = asked + abs(rows[M.SET_POINT + k][j] - rows[OLD_SET_POINT + k][j])
-            rows[OLD_PRESSURE + k][j] = pressure
-        work[FIRST_INFO + TIME][j] = counts[M.STEP][j] * settings[0][PERIOD]
-        work[FIRST_INFO + S_JOINTS][j] = math.sqrt(off / N_STAGES)
-        work[FIRST_INFO + S_PAYLOAD][j] = rows[M.PAYLOAD][j]
-        work[FIRST_INFO + S_SLACK][j] = slack
-        work[FIRST_INFO + S_PATH][j] = rows[PATH][j]
+            travel = travel + abs(pressure - rows[L.OLD_PRESSURE + k][j])
+            moved = moved + abs(rows[M.SET_POINT + k][j] - rows[L.OLD_SET_POINT + k][j])
+            rows[L.OLD_PRESSURE + k][j] = pressure
+        work[FIRST_INFO + L.INFO.time][j] = counts[M.STEP][j] * settings[0][PERIOD]
+        work[FIRST_INFO + L.INFO.state_joint_error][j] = math.sqrt(off / N_STAGES)
         share = along(
-            work[FIRST_INFO + TIME][j], settings[0][REST_SECONDS], settings[0][PATH_SECONDS]
+            work[FIRST_INFO + L.INFO.time][j],
+            settings[0][L.CONFIG.rest_seconds],
+            settings[0][L.CONFIG.path_seconds],
         )
-        work[FIRST_INFO + S_RESTING][j] = 0.0 if 0.0 < share < 1.0 else 1.0
-        work[FIRST_INFO + E_TRAVEL][j] = travel
-        judge(rows, fixed, settings[0], work, largest, higher, asked, j)
+        work[FIRST_INFO + L.INFO.state_resting][j] = 0.0 if 0.0 < share < 1.0 else 1.0
+        work[FIRST_INFO + L.INFO.effort_pressure_travel][j] = travel
+        judge(rows, fixed, settings[0], work, largest, higher, moved, j)
 
 
 @kernel
 def apart(work: Any, one: int, other: int, j: int) -> float:
-    """Return how far apart two vectors are that begin in two rows."""
+    """Return the distance between two vectors, given their first rows."""
     return distance(  # type: ignore[no-any-return]
         work[one][j] - work[other][j],
         work[one + 1][j] - work[other + 1][j],
@@ -179,39 +123,41 @@ def apart(work: Any, one: int, other: int, j: int) -> float:
 
 @kernel
 def judge(
-    rows: Any, fixed: Any, config: Any, work: Any, largest: float, higher: float, asked: float,
+    rows: Any, fixed: Any, config: Any, work: Any, largest: float, higher: float, moved: float,
     j: int,
 ) -> None:  # fmt: skip
     """Write output, rewards, costs and margins of lane ``j``.
 
     ``largest`` is the size of the largest angle [rad], ``higher`` the highest pressure [Pa],
-    ``asked`` the change of all set-points [Pa].
+    ``moved`` the change of all set-points [Pa].
     """
-    pose, wanted = FIRST_INFO + S_POSE, FIRST_INFO + S_REFERENCE
-    off = apart(work, pose, wanted, j)
-    aside = apart(work, pose + 3, wanted + 3, j)
+    pose, reference = FIRST_INFO + L.INFO.state_x, FIRST_INFO + L.INFO.state_reference_x
+    off = apart(work, pose, reference, j)
+    aside = apart(work, pose + 3, reference + 3, j)
     seen = FIRST_INFO + N_INFO + 2 + 4 * N_STAGES
-    work[FIRST_INFO + SEEN_OUTPUT][j] = apart(work, seen, wanted, j)
-    work[FIRST_INFO + REF][j] = 0.0
-    work[FIRST_INFO + OUTPUT][j] = off
-    work[FIRST_INFO + S_POINTING][j] = aside
-    work[FIRST_INFO + R_POSITION][j] = tracking_reward(
-        off, config[POSITION_SCALE], config[POSITION_WEIGHT]
+    work[FIRST_INFO + L.INFO.sensor_output][j] = apart(work, seen, reference, j)
+    work[FIRST_INFO + L.INFO.reference][j] = 0.0
+    work[FIRST_INFO + L.INFO.output][j] = off
+    work[FIRST_INFO + L.INFO.state_pointing_error][j] = aside
+    work[FIRST_INFO + L.INFO.reward_position][j] = error_reward(
+        off, config[L.CONFIG.position_scale], config[L.CONFIG.position_weight]
     )
-    work[FIRST_INFO + R_POINTING][j] = tracking_reward(
-        aside, config[POINTING_SCALE], config[POINTING_WEIGHT]
+    work[FIRST_INFO + L.INFO.reward_pointing][j] = error_reward(
+        aside, config[L.CONFIG.pointing_scale], config[L.CONFIG.pointing_weight]
     )
     full = 2 * N_STAGES * fixed[M.MAX_PRESSURE][j]
-    work[FIRST_INFO + R_EFFORT][j] = effort_reward(asked, full, config[EFFORT_WEIGHT])
-    work[FIRST_INFO + C_ANGLE][j] = excess(largest, config[SOFT_ANGLE])
-    work[FIRST_INFO + C_PRESSURE][j] = excess(higher, config[SOFT_PRESSURE])
-    work[FIRST_INFO + M_ANGLE][j] = config[LARGEST_ANGLE] - largest
-    work[FIRST_INFO + M_PRESSURE][j] = config[SOFT_PRESSURE] - higher
-    ended = 1.0 if largest > config[LARGEST_ANGLE] else 0.0
+    work[FIRST_INFO + L.INFO.reward_effort][j] = effort_reward(
+        moved, full, config[L.CONFIG.effort_weight]
+    )
+    work[FIRST_INFO + L.INFO.cost_angle][j] = excess(largest, config[L.CONFIG.soft_angle])
+    work[FIRST_INFO + L.INFO.cost_pressure][j] = excess(higher, config[L.CONFIG.soft_pressure])
+    work[FIRST_INFO + L.INFO.margin_angle][j] = config[L.CONFIG.largest_angle] - largest
+    work[FIRST_INFO + L.INFO.margin_pressure][j] = config[L.CONFIG.soft_pressure] - higher
+    ended = 1.0 if largest > config[L.CONFIG.largest_angle] else 0.0
     work[FIRST_INFO + N_INFO][j] = ended
-    work[FIRST_INFO + R_ENDED][j] = ended_reward(
-        ended, work[FIRST_INFO + TIME][j], config[EPISODE_SECONDS], config[PERIOD],
-        config[WORST_PERIOD],
+    work[FIRST_INFO + L.INFO.reward_ended][j] = ended_reward(
+        ended, work[FIRST_INFO + L.INFO.time][j], config[EPISODE_SECONDS], config[PERIOD],
+        config[L.CONFIG.worst_period],
     )  # fmt: skip
-    work[FIRST_INFO + E_AIR][j] = max(0.0, rows[M.AIR][j] - rows[OLD_AIR][j])
-    rows[OLD_AIR][j] = rows[M.AIR][j]
+    work[FIRST_INFO + L.INFO.effort_air][j] = max(0.0, rows[M.AIR][j] - rows[L.OLD_AIR][j])
+    rows[L.OLD_AIR][j] = rows[M.AIR][j]

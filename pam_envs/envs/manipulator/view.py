@@ -1,4 +1,4 @@
-"""The picture of a redundant manipulator: the arm with its muscles, its path, its shadow."""
+"""View of a redundant manipulator: the arm with its muscles, its path, its shadow."""
 
 from __future__ import annotations
 
@@ -8,39 +8,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.envs.joint.view import angle_ticks
+from pam_envs.envs.joint.view import JointIntegral, angle_ticks
+from pam_envs.envs.rendering import scene as S
 from pam_envs.envs.rendering.camera import Camera
-from pam_envs.envs.rendering.scene import (
-    COLD,
-    GRID,
-    HOT,
-    INK,
-    MUTED,
-    OUTPUT,
-    PANEL,
-    PAPER,
-    REFERENCE,
-    STEEL,
-    Axes,
-    Color,
-    Point,
-    Strip,
-    Trace,
-    View,
-    blend,
-    pressure_scale,
-)
 
 if TYPE_CHECKING:
     from pam_envs.envs.rendering.renderer import Canvas
 
 BOX = (26.0, 40.0, 262.0, 428.0)
-"""What the arm has of the picture: left, top, width, height [pixels]."""
+"""Area of the arm in the picture: left, top, width, height [pixels]."""
 SCENE = (0, 0, 330, 600)
 PLATE = ((-0.15, -0.15), (0.15, -0.15), (0.15, 0.15), (-0.15, 0.15))
 CAMERA = Camera(math.radians(-32.0), math.radians(17.0))
 BELOW = 0.12
-"""How far [m] the floor lies below the straight arm."""
+"""Distance [m] of the floor below the straight arm."""
 POINTER = 0.09
 """Length [m] of the tool's pointer."""
 SHADE = (214, 216, 218)
@@ -67,22 +48,9 @@ def _grid(canvas: Canvas, camera: Camera, points: NDArray[np.float64], depth: fl
     low = np.floor(points.min(axis=0) / 0.2 - 0.5) * 0.2
     high = np.ceil(points.max(axis=0) / 0.2 + 0.5) * 0.2
     for x in np.arange(low[0], high[0] + 0.01, 0.2):
-        canvas.line(camera.line([(x, low[1], depth), (x, high[1], depth)]), GRID, 1)
+        canvas.line(camera.line([(x, low[1], depth), (x, high[1], depth)]), S.GRID, 1)
     for y in np.arange(low[1], high[1] + 0.01, 0.2):
-        canvas.line(camera.line([(low[0], y, depth), (high[0], y, depth)]), GRID, 1)
-
-
-def _strip(canvas: Canvas, ends: list[Point], wide: float, color: Color) -> None:
-    """Fill a straight strip with round ends."""
-    a, b = ends
-    length = max(1e-9, math.dist(a, b))
-    x, y = wide * (a[1] - b[1]) / length, wide * (b[0] - a[0]) / length
-    canvas.polygon(
-        [(a[0] + x, a[1] + y), (b[0] + x, b[1] + y), (b[0] - x, b[1] - y), (a[0] - x, a[1] - y)],
-        color,
-    )
-    canvas.disc(a, wide, color)
-    canvas.disc(b, wide, color)
+        canvas.line(camera.line([(low[0], y, depth), (high[0], y, depth)]), S.GRID, 1)
 
 
 def _arm(canvas: Canvas, camera: Camera, plant: Any, info: Any) -> None:
@@ -98,23 +66,23 @@ def _arm(canvas: Canvas, camera: Camera, plant: Any, info: Any) -> None:
             out = way * plant.lever.r_o * np.cross(axes[k], directions[k])
             root = way * plant.lever.r_u * np.cross(axes[k], before)
             span = 0.4 * plant.chain.lengths[k]
-            tint = blend(COLD, HOT, info[f"state/pressure_{k}{muscle}"] / full)
+            tint = S.blend(S.COLD, S.HOT, info[f"state/pressure_{k}{muscle}"] / full)
             ends = camera.line([start + root - span * before, start + out + span * directions[k]])
             depth = float(out @ np.array([-math.sin(CAMERA.azimuth), math.cos(CAMERA.azimuth), 0]))
             sides.append((depth, ends, tint))
         sides.sort(key=lambda side: side[0])
         far, near = sides
-        _strip(canvas, far[1], 4.5, blend(far[2], PAPER, 0.25))
+        S.limb(canvas, far[1][0], far[1][1], 4.5, 4.5, S.blend(far[2], S.PAPER, 0.25))
         bone = camera.line([start, end])
-        _strip(canvas, bone, 3.5, blend(STEEL, INK, 0.25))
-        _strip(canvas, near[1], 4.5, near[2])
-        canvas.disc(bone[0], 6.0, INK)
-        canvas.disc(bone[0], 3.0, PAPER)
+        S.limb(canvas, bone[0], bone[1], 3.5, 3.5, S.blend(S.STEEL, S.INK, 0.25))
+        S.limb(canvas, near[1][0], near[1][1], 4.5, 4.5, near[2])
+        canvas.disc(bone[0], 6.0, S.INK)
+        canvas.disc(bone[0], 3.0, S.PAPER)
 
 
 def _tool(canvas: Canvas, camera: Camera, info: Any) -> None:
-    """Draw the tool's tip and where it points, beside where both should be."""
-    for key, color, wide in (("reference_", REFERENCE, 2.0), ("", OUTPUT, 3.0)):
+    """Draw position and direction of the tool, and their references."""
+    for key, color, wide in (("reference_", S.REFERENCE, 2.0), ("", S.OUTPUT, 3.0)):
         tip = np.array([info[f"state/{key}{name}"] for name in ("x", "y", "z")])
         to = np.array([info[f"state/{key}point_{name}"] for name in ("x", "y", "z")])
         ends = camera.line([tip, tip + POINTER * to])
@@ -133,12 +101,12 @@ def arm_scene(canvas: Canvas, env: Any, info: Any) -> None:
         for line, width in ((path[:2].T, 2), (points[:, :2], 6)):
             shadow = np.column_stack([line, np.full(len(line), floor)])
             canvas.line(camera.line(shadow), SHADE, width)
-        canvas.polygon(camera.line([(x, y, 0.0) for x, y in PLATE]), STEEL)
-        canvas.line(camera.line(planned), blend(PAPER, REFERENCE, 0.35), 2)
+        canvas.polygon(camera.line([(x, y, 0.0) for x, y in PLATE]), S.STEEL)
+        canvas.line(camera.line(planned), S.blend(S.PAPER, S.REFERENCE, 0.35), 2)
         _arm(canvas, camera, plant, info)
-        canvas.line(camera.line(path[:3].T), REFERENCE, 2.5)
+        canvas.line(camera.line(path[:3].T), S.REFERENCE, 2.5)
         _tool(canvas, camera, info)
-    pressure_scale(canvas, _mean_pressure(info), plant.regulator.max_pressure, 284.0, 120.0)
+    S.pressure_scale(canvas, _mean_pressure(info), plant.regulator.max_pressure, 284.0, 120.0)
     _numbers(canvas, plant, info)
 
 
@@ -149,18 +117,15 @@ def _mean_pressure(info: Any) -> float:
 
 
 def _numbers(canvas: Canvas, plant: Any, info: Any) -> None:
-    """Write how far the tool is off, and the largest joint angle."""
+    """Write the errors of the tool, and the largest joint angle."""
     largest = max(abs(info[f"state/angle_{k}"]) for k in range(plant.stages))
-    for row, (name, value) in enumerate(
-        (
-            ("tip off its path", f"{1e3 * info['output']:.1f} mm"),
-            ("pointing off", f"{math.degrees(info['state/pointing_error']):.2f} deg"),
-            ("joints off (RMS)", f"{math.degrees(info['state/joint_error']):.2f} deg"),
-            ("largest joint angle", f"{math.degrees(largest):.1f} deg"),
-        )
-    ):
-        canvas.text(name, (92, 508 + 20 * row), MUTED, 12)
-        canvas.text(value, (310, 508 + 20 * row), INK, 12, "right")
+    rows = [
+        ("position error", f"{1e3 * info['output']:.1f} mm"),
+        ("pointing error", f"{math.degrees(info['state/pointing_error']):.2f} deg"),
+        ("joint error (RMS)", f"{math.degrees(info['state/joint_error']):.2f} deg"),
+        ("largest joint angle", f"{math.degrees(largest):.1f} deg"),
+    ]
+    S.table(canvas, rows, 92, 508)
 
 
 def _tip(info: Any) -> tuple[float, ...]:
@@ -172,22 +137,22 @@ def _upright(path: NDArray[np.float64]) -> NDArray[np.float64]:
     return path * np.array([[1.0], [1.0], [-1.0]])
 
 
-def _plan_view(canvas: Canvas, env: Any, info: Any, points: Trace) -> None:
-    """Draw path and way of the tip in the plane of two axes in which the path is longest."""
+def _plan_view(canvas: Canvas, env: Any, info: Any, points: S.Trace) -> None:
+    """Draw reference path and path of the tip in the plane in which the reference is longest."""
     path, tips = _upright(path_of(env, info)[:3]), _upright(np.array(points).T)
     seen = sorted(np.argsort(np.ptp(path, axis=1))[1:].tolist())
     middle = 0.5 * (path.max(axis=1) + path.min(axis=1))
-    ratio = PANEL[2] / PANEL[3]
+    ratio = S.PANEL[2] / S.PANEL[3]
     tall = 1.3 * max(np.ptp(path[seen[1]]), np.ptp(path[seen[0]]) / ratio, 0.02)
     sides = (0.5 * tall * ratio, 0.5 * tall)
     spans = [(middle[k] - half, middle[k] + half) for k, half in zip(seen, sides, strict=True)]
-    axes = Axes(canvas, PANEL, *spans)
+    axes = S.Axes(canvas, S.PANEL, *spans)
     across, up = (f"{('x', 'y', 'height')[k]} [m]" for k in seen)
     axes.frame(_round_ticks(*spans[0]), _round_ticks(*spans[1]), across, up)
-    canvas.line([axes.at(*point) for point in path[seen].T], REFERENCE, 2)
+    canvas.line([axes.at(*point) for point in path[seen].T], S.REFERENCE, 2)
     ways = [axes.at(*point) for point in tips[seen].T]
-    canvas.line(ways, OUTPUT, 2)
-    canvas.disc(ways[-1], 4.5, OUTPUT)
+    canvas.line(ways, S.OUTPUT, 2)
+    canvas.disc(ways[-1], 4.5, S.OUTPUT)
 
 
 def _round_ticks(low: float, high: float) -> list[float]:
@@ -198,46 +163,34 @@ def _round_ticks(low: float, high: float) -> list[float]:
     return [round(k * step, 6) for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
 
 
-def _joint_lines(stages: int) -> tuple[tuple[str, Color, float], ...]:
-    wanted = [(f"state/joint_reference_{k}", REFERENCE, 1.0) for k in range(stages)]
-    tints = [blend(OUTPUT, (0, 170, 150), k / max(1, stages - 1)) for k in range(stages)]
+def _joint_lines(stages: int) -> tuple[tuple[str, S.Color, float], ...]:
+    wanted = [(f"state/joint_reference_{k}", S.REFERENCE, 1.0) for k in range(stages)]
+    tints = [S.blend(S.OUTPUT, (0, 170, 150), k / max(1, stages - 1)) for k in range(stages)]
     return (*wanted, *((f"state/angle_{k}", tints[k], 1.5) for k in range(stages)))
 
 
-def _off_path(height: int) -> Strip:
-    return Strip(
-        "tip off its path",
-        "mm",
-        1e3,
-        (("output", OUTPUT, 2.0),),
-        350,
-        height,
-        lambda _: (0.0, 100.0),
-        lambda _: (0, 50, 100),
-    )
+OFF_PATH = S.fixed_strip(
+    "position error", "mm", 1e3, (("output", S.OUTPUT, 2.0),), (350, 64), (0.0, 100.0), (0, 50, 100)
+)
 
 
-def _joint_strip(stages: int) -> Strip:
-    return Strip(
+def view(plant: Any) -> S.View:
+    """Return the view of an arm."""
+    joints = S.Strip(
         "joint angles, planned and true",
         "deg",
         180.0 / math.pi,
-        _joint_lines(stages),
+        _joint_lines(plant.stages),
         456,
         102,
         lambda plant: (-math.degrees(plant.largest_angle), math.degrees(plant.largest_angle)),
         angle_ticks,
     )
-
-
-VIEWS = {
-    f"redundant_manipulator_{stages}": View(
+    return S.View(
         arm_scene,
-        (_off_path(64), _joint_strip(stages)),
+        (OFF_PATH, joints),
+        JointIntegral,
         number=("mean pressure", "bar", lambda info: 1e-5 * _mean_pressure(info)),
         trace=_tip,
         panel=_plan_view,
     )
-    for stages in range(1, 9)
-}
-"""One for each number of joints."""

@@ -1,7 +1,4 @@
-"""What sets ``PAM/MusclePositioning-v0`` apart in a step: reference, report, reward, start.
-
-The step itself stands in :mod:`pam_envs.envs.core.step`.
-"""
+"""Kernels of ``PAM/MusclePositioning-v0``: load change, report, reward, start."""
 
 from __future__ import annotations
 
@@ -10,26 +7,24 @@ from typing import Any
 
 from pam_envs.constants import ATMOSPHERE, DENSITY_PER_PRESSURE
 from pam_envs.envs.core.families import Kernels
+from pam_envs.envs.core.kernels import advance_plant, sense, trajectory_at
 from pam_envs.envs.core.step import (
-    AT_OWN,
+    CHOICE,
     EPISODE_SECONDS,
-    FIRST_CHOICE,
-    FIRST_CONFIG,
-    MOST_PREVIEW,
     PERIOD,
-    SUBSTEPS,
+    copy_rows,
     write_references,
 )
+from pam_envs.envs.positioning import layout as L
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.history import N_HISTORY
-from pam_envs.kernels.random import normal, uniform
+from pam_envs.kernels.random import uniform
 from pam_envs.muscle.effective_area import volume
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.effects import replacements
 from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.step import (
-    N_WORK,
     advance,
     begin_effects,
     rest_contraction,
@@ -37,99 +32,10 @@ from pam_envs.plants.single_muscle.step import (
     seen_pressure,
     true_position,
 )
-from pam_envs.references.trajectory import ROWS as REFERENCE_ROWS
-from pam_envs.references.trajectory import SAMPLES, draw_reference, reference_value
-from pam_envs.sensing.sensor import read_sensor
-from pam_envs.tasks.tracking import effort_reward, excess, tracking_reward
+from pam_envs.references.trajectory import SAMPLES, draw_reference
+from pam_envs.tasks.rewards import effort_reward, error_reward, excess
 
-REFERENCE = R.END
-HYSTERESIS = R.END + REFERENCE_ROWS
-"""First row of the hysteresis's state."""
-
-INFO = (
-    "time",
-    "reference",
-    "output",
-    "reward/tracking",
-    "reward/effort",
-    "cost/contraction",
-    "cost/pressure",
-    "margin/contraction",
-    "margin/pressure",
-    "effort/pressure_travel",
-    "effort/air",
-    "state/contraction",
-    "state/velocity",
-    "state/pressure",
-    "state/drive",
-    "state/load",
-    "sensor/contraction",
-    "sensor/pressure",
-    "saturated",
-)
-(
-    TIME,
-    REF,
-    OUTPUT,
-    R_TRACKING,
-    R_EFFORT,
-    C_CONTRACTION,
-    C_PRESSURE,
-    M_CONTRACTION,
-    M_PRESSURE,
-    E_TRAVEL,
-    E_AIR,
-    S_CONTRACTION,
-    S_VELOCITY,
-    S_PRESSURE,
-    S_DRIVE,
-    S_LOAD,
-    SENSOR_X,
-    SENSOR_P,
-    SATURATED,
-) = range(N_WORK, N_WORK + len(INFO))
-ENDED = N_WORK + len(INFO)
-SIGNALS = ENDED + 1
-"""First work row of the observation, in SI: contraction, pressure, set-point, load, references."""
-FIXED_SIGNALS = 4
-
-# numbers of the configuration, after those that all families share
-CONFIG = (
-    "tracking_weight",
-    "error_scale",
-    "effort_weight",
-    "soft_contraction",
-    "soft_pressure",
-    "lowest_contraction",
-    "highest_contraction",
-    "reference_low",
-    "reference_high",
-    "start_share",
-    "load_change",
-)
-(
-    TRACKING_WEIGHT,
-    ERROR_SCALE,
-    EFFORT_WEIGHT,
-    SOFT_CONTRACTION,
-    SOFT_PRESSURE,
-    LOWEST,
-    HIGHEST,
-    REFERENCE_LOW,
-    REFERENCE_HIGH,
-    START_SHARE,
-    LOAD_CHANGE,
-) = range(FIRST_CONFIG, FIRST_CONFIG + len(CONFIG))
-CHOICES = ("elements", "family", "sines", "loads")
-N_ELEMENTS, FAMILY, SINES, N_LOADS = range(FIRST_CHOICE, FIRST_CHOICE + len(CHOICES))
-"""Whole numbers of the configuration, after those that all families share. The one own row of the
-settings holds the loads [kg] to draw from."""
-
-
-NOISE_X, NOISE_P, START = 1, 2, 3
-"""Random streams."""
-
-remember: Any = None  # a placeholder, filled in for each hysteresis
+remember: Any = None  # a placeholder, replaced for each hysteresis
 
 
 @kernel
@@ -141,152 +47,96 @@ def air_in_muscle(rows: Any, fixed: Any, j: int) -> float:
 
 
 @kernel
-def reference_at(
-    rows: Any,
-    fixed: Any,
-    samples: Any,
-    settings: Any,
-    choices: Any,
-    step: int,
-    lane: int,
-    channel: int,
-) -> float:
-    """Return the reference [m] of one lane at a control period."""
-    if choices[FAMILY] == SAMPLES:
-        return samples[0][min(step, len(samples[0]) - 1)]  # type: ignore[no-any-return]
-    return reference_value(rows, REFERENCE, lane, step * settings[0][PERIOD], choices[SINES])
-
-
-@kernel
 def change_load(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
-    """Let the load change at its time."""
+    """Change the load at its time."""
     step, load, period = counts[R.STEP], rows[R.LOAD], settings[0][PERIOD]
-    told, when, change = rows[R.TOLD_LOAD], rows[R.CHANGE_TIME], rows[R.CHANGE]
+    declared, when, change = rows[R.TOLD_LOAD], rows[R.CHANGE_TIME], rows[R.CHANGE]
     for j in range(LANES):
-        load[j] = told[j] + (change[j] if step[j] * period >= when[j] else 0.0)
-
-
-@kernel
-def advance_muscle(
-    rows: Any,
-    fixed: Any,
-    counts: Any,
-    tables: Any,
-    samples: Any,
-    settings: Any,
-    choices: Any,
-    work: Any,
-) -> None:
-    """Advance the plant by a control period."""
-    advance(
-        rows,
-        fixed,
-        counts,
-        tables,
-        HYSTERESIS,
-        choices[N_ELEMENTS],
-        choices[SUBSTEPS],
-        settings[0][PERIOD],
-        work,
-    )
+        load[j] = declared[j] + (change[j] if step[j] * period >= when[j] else 0.0)
 
 
 @kernel
 def evaluate(
-    rows: Any,
-    fixed: Any,
-    counts: Any,
-    ahead: Any,
-    settings: Any,
-    choices: Any,
-    work: Any,
+    rows: Any, fixed: Any, counts: Any, ahead: Any, settings: Any, choices: Any, work: Any
 ) -> None:
-    """Write what can be observed and reported of a tile into ``work``."""
-    step, key_a, key_b = counts[R.STEP], counts[R.KEY_A], counts[R.KEY_B]
-    velocity, pressure = rows[R.VELOCITY], rows[R.PRESSURE]
-    set_point, older = rows[R.SET_POINT], rows[R.OLD_SET_POINT]
-    config = settings[0]
-    period = config[PERIOD]
+    """Write observation and report of a tile into ``work``."""
+    step, set_point = counts[R.STEP], rows[R.SET_POINT]
+    copy_rows(rows, work)
     for j in range(LANES):
-        work[TIME][j] = step[j] * period
-        contraction = true_position(rows, j)
-        work[OUTPUT][j] = contraction
-        work[S_CONTRACTION][j] = contraction
-        work[S_VELOCITY][j] = velocity[j]
-        work[S_PRESSURE][j] = pressure[j]
-        work[S_DRIVE][j] = rows[R.DRIVE][j]
-        work[S_LOAD][j] = rows[R.LOAD][j]
-        work[SENSOR_X][j] = read_sensor(
-            seen_position(rows, j),
-            fixed[R.POSITION_NOISE][j],
-            fixed[R.POSITION_RESOLUTION][j],
-            fixed[R.POSITION_BIAS][j],
-            normal(key_a[j], key_b[j], NOISE_X, step[j]),
+        work[L.INFO.state_contraction][j] = true_position(rows, j)
+        position = sense(
+            seen_position(rows, j), fixed, counts, R.POSITION_NOISE, L.NOISE_X, step[j], j
         )
-        work[SENSOR_P][j] = read_sensor(
-            seen_pressure(rows, j),
-            fixed[R.PRESSURE_NOISE][j],
-            fixed[R.PRESSURE_RESOLUTION][j],
-            fixed[R.PRESSURE_BIAS][j],
-            normal(key_a[j], key_b[j], NOISE_P, step[j]),
+        pressure = sense(
+            seen_pressure(rows, j), fixed, counts, R.PRESSURE_NOISE, L.NOISE_P, step[j], j
         )
-        work[SIGNALS][j] = work[SENSOR_X][j]
-        work[SIGNALS + 1][j] = work[SENSOR_P][j]
-        work[SIGNALS + 2][j] = set_point[j]
-        work[SIGNALS + 3][j] = rows[R.TOLD_LOAD][j]
-    write_references(counts, ahead, choices, work, SIGNALS + FIXED_SIGNALS)
-    now = work[SIGNALS + FIXED_SIGNALS]
+        work[L.INFO.sensor_contraction][j] = work[L.SIGNALS][j] = position
+        work[L.INFO.sensor_pressure][j] = work[L.SIGNALS + 1][j] = pressure
+        work[L.SIGNALS + 2][j] = set_point[j]
+        work[L.SIGNALS + 3][j] = rows[R.TOLD_LOAD][j]
+    write_references(counts, ahead, choices, work, L.SIGNALS + L.FIXED_SIGNALS)
+    judge(rows, fixed, counts, settings[0], work)
+
+
+@kernel
+def judge(rows: Any, fixed: Any, counts: Any, config: Any, work: Any) -> None:
+    """Write time, output, rewards, costs, margins and efforts of a tile into ``work``."""
+    pressure, set_point, older = rows[R.PRESSURE], rows[R.SET_POINT], rows[R.OLD_SET_POINT]
+    reference = work[L.SIGNALS + L.FIXED_SIGNALS]
     for j in range(LANES):
-        output = work[OUTPUT][j]
-        work[REF][j] = now[j]
-        work[R_TRACKING][j] = tracking_reward(
-            output - now[j], config[ERROR_SCALE], config[TRACKING_WEIGHT]
+        output = work[L.INFO.state_contraction][j]
+        work[L.INFO.time][j] = counts[R.STEP][j] * config[PERIOD]
+        work[L.INFO.output][j] = output
+        work[L.INFO.reference][j] = reference[j]
+        work[L.INFO.reward_tracking][j] = error_reward(
+            output - reference[j], config[L.CONFIG.error_scale], config[L.CONFIG.tracking_weight]
         )
-        work[R_EFFORT][j] = effort_reward(
-            set_point[j] - older[j], fixed[R.MAX_PRESSURE][j], config[EFFORT_WEIGHT]
+        work[L.INFO.reward_effort][j] = effort_reward(
+            set_point[j] - older[j], fixed[R.MAX_PRESSURE][j], config[L.CONFIG.effort_weight]
         )
-        work[C_CONTRACTION][j] = excess(output, config[SOFT_CONTRACTION])
-        work[C_PRESSURE][j] = excess(pressure[j], config[SOFT_PRESSURE])
-        work[M_CONTRACTION][j] = min(config[HIGHEST] - output, output - config[LOWEST])
-        work[ENDED][j] = 1.0 if work[M_CONTRACTION][j] < 0.0 else 0.0
-        work[M_PRESSURE][j] = config[SOFT_PRESSURE] - pressure[j]
+        work[L.INFO.cost_contraction][j] = excess(output, config[L.CONFIG.soft_contraction])
+        work[L.INFO.cost_pressure][j] = excess(pressure[j], config[L.CONFIG.soft_pressure])
+        margin = min(
+            config[L.CONFIG.highest_contraction] - output,
+            output - config[L.CONFIG.lowest_contraction],
+        )
+        work[L.INFO.margin_contraction][j] = margin
+        work[L.ENDED][j] = 1.0 if margin < 0.0 else 0.0
+        work[L.INFO.margin_pressure][j] = config[L.CONFIG.soft_pressure] - pressure[j]
         air = air_in_muscle(rows, fixed, j)
-        work[E_TRAVEL][j] = abs(pressure[j] - rows[R.OLD_PRESSURE][j])
-        work[E_AIR][j] = max(0.0, air - rows[R.OLD_AIR][j])
+        work[L.INFO.effort_pressure_travel][j] = abs(pressure[j] - rows[R.OLD_PRESSURE][j])
+        work[L.INFO.effort_air][j] = max(0.0, air - rows[R.OLD_AIR][j])
         rows[R.OLD_PRESSURE][j] = pressure[j]
         rows[R.OLD_AIR][j] = air
 
 
 @routine
 def begin_muscle(
-    rows: Any,
-    fixed: Any,
-    counts: Any,
-    tables: Any,
-    samples: Any,
-    settings: Any,
-    choices: Any,
-    work: Any,
-    member: int,
-    j: int,
-) -> None:
-    """Bring lane ``j`` to rest under a load and a history that are drawn, and its reference."""
+    rows: Any, fixed: Any, counts: Any, tables: Any, samples: Any, settings: Any, choices: Any,
+    work: Any, member: int, j: int,
+) -> None:  # fmt: skip
+    """Bring lane ``j`` to rest under a drawn load and pressure history, and draw its reference."""
     key_a, key_b, config = counts[R.KEY_A][j], counts[R.KEY_B][j], settings[0]
     counts[R.MEMBER][j] = member
-    load = settings[choices[AT_OWN]][int(uniform(key_a, key_b, START, 0) * choices[N_LOADS])]
+    number = choices[L.CHOICE.loads]
+    load = settings[choices[CHOICE.at_own]][int(uniform(key_a, key_b, L.START, 0) * number)]
+    change = config[L.CONFIG.load_change]
     rows[R.TOLD_LOAD][j] = load
     rows[R.LOAD][j] = load
-    rows[R.CHANGE_TIME][j] = config[EPISODE_SECONDS] * (0.3 + 0.4 * uniform(key_a, key_b, START, 1))
-    rows[R.CHANGE][j] = config[LOAD_CHANGE]
-    if uniform(key_a, key_b, START, 2) < 0.5:
-        rows[R.CHANGE][j] = max(-load, -config[LOAD_CHANGE])
-    _start_hysteresis(rows, counts, j)
-    peak = config[START_SHARE] * fixed[R.MAX_PRESSURE][j] * uniform(key_a, key_b, START, 3)
-    begin = peak * uniform(key_a, key_b, START, 4)
+    when = 0.3 + 0.4 * uniform(key_a, key_b, L.START, 1)
+    rows[R.CHANGE_TIME][j] = config[EPISODE_SECONDS] * when
+    rows[R.CHANGE][j] = change
+    if uniform(key_a, key_b, L.START, 2) < 0.5:
+        rows[R.CHANGE][j] = max(-load, -change)
+    _clear_hysteresis(rows, counts, j)
+    share = config[L.CONFIG.start_share]
+    peak = share * fixed[R.MAX_PRESSURE][j] * uniform(key_a, key_b, L.START, 3)
+    begin = peak * uniform(key_a, key_b, L.START, 4)
     rows[R.REST][j] = rest_contraction(fixed, j, 0.0, load)
+    elements = choices[CHOICE.elements]
     for pressure in (0.0, peak, begin):
         rows[R.PRESSURE][j] = pressure
-        remember(rows, fixed, counts, tables, HYSTERESIS, j, j + 1, choices[N_ELEMENTS], work)
+        remember(rows, fixed, counts, tables, L.HYSTERESIS, j, j + 1, elements, work)
     for k in range(N_HISTORY):
         rows[R.HISTORY + k][j] = begin
     rows[R.SET_POINT][j] = begin
@@ -296,52 +146,48 @@ def begin_muscle(
     rows[R.OLD_PRESSURE][j] = begin
     rows[R.OLD_AIR][j] = air_in_muscle(rows, fixed, j)
     begin_effects(rows, fixed, j)
-    if choices[FAMILY] != SAMPLES:
-        draw_reference(
-            rows,
-            REFERENCE,
-            j,
-            key_a,
-            key_b,
-            choices[FAMILY],
-            config[REFERENCE_LOW],
-            config[REFERENCE_HIGH],
-        )
+    family = choices[CHOICE.reference]
+    if family != SAMPLES:
+        low, high = config[L.CONFIG.reference_low], config[L.CONFIG.reference_high]
+        draw_reference(rows, L.REFERENCE, j, key_a, key_b, family, low, high)
 
 
 @routine
-def _start_hysteresis(rows: Any, counts: Any, j: int) -> None:
-    """Forget everything: the muscle as it rests before its first pressure."""
-    for k in range(len(rows) - HYSTERESIS):
-        rows[HYSTERESIS + k][j] = 0.0
+def _clear_hysteresis(rows: Any, counts: Any, j: int) -> None:
+    """Set the hysteresis to its state before the first pressure."""
+    for k in range(len(rows) - L.HYSTERESIS):
+        rows[L.HYSTERESIS + k][j] = 0.0
     counts[R.STACK_COUNT][j] = 1
 
 
 @lru_cache(maxsize=8)
 def kernels_for(kind: str, extended: bool = False) -> Kernels:
-    """Return the kernels for a kind of hysteresis, plain or with effects."""
-    rows = HYSTERESIS + state_rows(kind)
-    functions = {
-        "env_apply": change_load,
-        "env_advance": advance_muscle,
-        "env_reference": reference_at,
-        "env_evaluate": evaluate,
-        "env_begin": begin_muscle,
-        **hysteresis_kernels(kind),
-    }
-    if extended:
-        functions |= replacements(kind, rows)
+    """Return the kernels for a hysteresis model, plain or with effects."""
+    rows = L.HYSTERESIS + state_rows(kind)
+    effects = replacements(kind, rows) if extended else {}
     return Kernels(
         f"positioning_{kind}" + ("_extended" if extended else ""),
         kernels_for,
         (kind, extended),
-        functions,
-        info=INFO,
+        L.REPORT,
+        apply=change_load,
+        advance=advance_plant,
+        reference=trajectory_at,
+        evaluate=evaluate,
+        begin=begin_muscle,
+        config=L.CONFIG,
+        choices=L.CHOICE,
+        placeholders={
+            "FIRST_HYSTERESIS": L.HYSTERESIS,
+            "FIRST_REFERENCE": L.REFERENCE,
+            **hysteresis_kernels(kind),
+            **effects,
+            "plant_advance": effects.get("advance", advance),
+        },
         rows=rows + (R.N_EFFECTS if extended else 0),
         parameters=R.N_PARAMETERS,
         counts=R.N_COUNTS,
-        scratch=N_WORK,
-        signals=FIXED_SIGNALS + 1 + MOST_PREVIEW,
+        signals=L.FIXED_SIGNALS,
         set_points=R.SET_POINT,
         old_set_points=R.OLD_SET_POINT,
     )

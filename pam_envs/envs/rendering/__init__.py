@@ -1,1 +1,1 @@
-"""rendering."""
+"""Pictures of environments: canvas, camera, plots and films, without code of a family."""

@@ -1,13 +1,12 @@
-"""Pictures of an environment: the plant at work, its loop, and the last seconds.
+"""Pictures of an environment: the plant, its loop, and the last seconds.
 
-Drawn with pygame-ce on a plain surface, so that ``rgb_array`` needs no display. Drawing reads what
-``step`` returned and touches neither the simulation nor its random numbers. What is drawn of a
-family stands in its view (``VIEWS`` names the modules); frame, loop and strips are common.
+Drawn with pygame-ce on a plain surface, so that ``rgb_array`` needs no display. Drawing reads the
+``info`` of the steps and changes neither the simulation nor its random numbers. The view of a
+family draws the plant; frame, loop and strips are common.
 """
 
 from __future__ import annotations
 
-import importlib
 import math
 import os
 from collections import deque
@@ -29,37 +28,23 @@ from pam_envs.envs.rendering.scene import (
     Color,
     Point,
     Strip,
-    View,
     pressure_loop,
+    view_of,
 )
 
 SIZE = (800, 600)
 SCALE = 2
-"""Everything is drawn this many times larger and smoothed down: anti-aliased edges everywhere."""
+"""Everything is drawn this many times larger and smoothed down, for anti-aliased edges."""
 STRIP_SECONDS = 8.0
 LOOP_SAMPLES = 1500
-VIEWS = {
-    "single_muscle": "positioning",
-    "knee_tension": "knee",
-    "knee_stiffness": "knee",
-    "knee_gait": "knee",
-    "elbow_orthosis": "elbow",
-    "antagonistic_joint": "joint",
-    **{f"redundant_manipulator_{n}": "manipulator" for n in range(1, 9)},
-}
-"""Folder whose module ``view`` holds what is shown of an environment, by the view in its setup."""
-
-
-def view_of(name: str) -> View:
-    """Return the view of that name."""
-    found: View = importlib.import_module(f"pam_envs.envs.{VIEWS[name]}.view").VIEWS[name]
-    return found
+WINDOW_FPS = 50
+"""Pictures per second in the window, at the pace of the plant."""
 
 
 def _pygame() -> Any:
-    """Import the drawing library, or say how to get it.
+    """Import the drawing library, or raise saying how to install it.
 
-    Its import sets variables of the process's environment; they are put back.
+    Its import sets environment variables of the process; they are removed again.
     """
     before = dict(os.environ)
     try:
@@ -71,10 +56,6 @@ def _pygame() -> Any:
     for name in set(os.environ) - set(before):
         del os.environ[name]
     return pygame
-
-
-WINDOW_FPS = 50
-"""Pictures a second in the window, at the pace of the plant."""
 
 
 class Canvas:
@@ -110,7 +91,7 @@ class Canvas:
 
     @contextmanager
     def within(self, box: tuple[int, int, int, int]) -> Iterator[None]:
-        """Draw nothing outside of a box given by left, top, width and height."""
+        """Clip drawing to a box given by left, top, width and height."""
         self.surface.set_clip(self.pygame.Rect([v * SCALE for v in box]))
         yield
         self.surface.set_clip(None)
@@ -132,7 +113,7 @@ class Canvas:
     def text(
         self, words: str, place: Point, color: Color = INK, size: int = 13, align: str = "left"
     ) -> None:
-        """Write words, with ``place`` at the left, centre or right of their upper edge."""
+        """Write text, with ``place`` at the left, centre or right of their upper edge."""
         if size not in self._fonts:
             self._fonts[size] = self.pygame.font.Font(None, round(1.45 * size * SCALE))
         drawn = self._fonts[size].render(words, True, color)
@@ -145,12 +126,15 @@ class Canvas:
 
 
 class Renderer:
-    """Keeps the recent past of one environment and draws it."""
+    """Record of the recent past of one environment, and its pictures.
+
+    The renderers of a batch may share a ``canvas``: a picture is a copy.
+    """
 
     def __init__(self, env: Any, canvas: Canvas | None = None) -> None:
         self.env = env
         self.canvas = Canvas() if canvas is None else canvas
-        self.view = view_of(env.setup.view)
+        self.view = view_of(env)
         plant, strips = env.plant, self.view.strips
         self._keys = ("time", *dict.fromkeys(key for strip in strips for key, _, _ in strip.lines))
         self.strip: deque[tuple[float, ...]] = deque(
@@ -164,7 +148,7 @@ class Renderer:
         self._dismissed = False
 
     def record(self, info: Any, start: bool) -> None:
-        """Take note of a step (or, at the start of an episode, forget the one before)."""
+        """Record a step; at the start of an episode, discard the previous episode."""
         if start:
             self.strip.clear()
             self.loop.clear()
@@ -211,7 +195,7 @@ class Renderer:
         self.canvas.text("output", (770, top), OUTPUT, 12, "right")
 
     def _draw_strip(self, strip: Strip, number: int, seconds: Point) -> None:
-        """Draw one plot of the last seconds; the lowest one has the numbers of the time."""
+        """Draw one plot of the last seconds; the lowest one has the time axis."""
         lowest, (span, across) = number == len(self.view.strips) - 1, self._spans[number]
         whole = range(2 * math.ceil(0.5 * seconds[0]), math.floor(seconds[1]) + 1, 2)
         axes = Axes(self.canvas, (360, strip.top, 410, strip.height), seconds, span)
@@ -257,11 +241,3 @@ class Renderer:
         if self._window is not None:
             self.canvas.pygame.display.quit()
             self._window = None
-
-
-def make_renderer(env: Any, canvas: Canvas | None = None) -> Renderer:
-    """Return a renderer for an environment (see ``PlantEnv.render``).
-
-    Those of a batch may share the ``canvas`` of one of them: a picture is a copy.
-    """
-    return Renderer(env, canvas)

@@ -1,11 +1,13 @@
-"""What scenes are drawn with: colours, a box with ticks, a scale of pressures, what a view shows.
+"""Elements of scenes: colours, plots with axes, limbs, scales, and the declaration of a view.
 
-A view says what the pictures of an environment show; the frame around it is common. Scenes read
-the plant and ``info`` and change neither; they draw in the left 320 pixels.
+A view draws the plant of an environment in the left 320 pixels; the frame around it is common.
+Views read the plant and ``info`` and change neither.
 """
 
 from __future__ import annotations
 
+import importlib
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -19,11 +21,13 @@ Point = tuple[float, float]
 
 PAPER, INK, MUTED, GRID = (250, 250, 248), (38, 42, 48), (112, 118, 126), (226, 228, 230)
 OUTPUT, REFERENCE, PRESSURE = (0, 114, 178), (213, 94, 0), (0, 140, 100)
-STEEL, COLD, HOT = (150, 156, 164), (88, 96, 108), (222, 92, 58)
+STEEL, COLD, HOT, SKIN = (150, 156, 164), (88, 96, 108), (222, 92, 58), (232, 214, 198)
+LINES = (("reference", REFERENCE, 1.5), ("output", OUTPUT, 2.0))
+"""Lines of the strip of output and reference."""
 
 
 def blend(a: Color, b: Color, share: float) -> Color:
-    """Return the colour that is ``share`` of the way from ``a`` to ``b``."""
+    """Return the mixture of two colours with ``share`` of ``b``."""
     s = min(1.0, max(0.0, share))
     red, green, blue = (round(x + s * (y - x)) for x, y in zip(a, b, strict=True))
     return red, green, blue
@@ -38,15 +42,15 @@ class Strip:
     name, unit : str
         Of the axis.
     scale : float
-        The unit's number over the SI number.
+        Value in the unit divided by the SI value.
     lines : tuple of (str, Color, float)
         Key of ``info``, colour and width of each line.
     top, height : int
-        Where it stands [pixels].
+        Position and size [pixels].
     span : callable
         Lowest and highest value on the axis, in the unit, from the plant.
     ticks : callable
-        Values with a line across, from the plant.
+        Values of the grid lines, from the plant.
     """
 
     name: str
@@ -63,27 +67,34 @@ Trace = Sequence[tuple[float, ...]]
 Panel = Callable[["Canvas", Any, Any, Trace], None]
 
 
+Policy = Callable[[Any], Any]
+"""Returns the action for an observation."""
+
+
 @dataclass(frozen=True)
 class View:
-    """What the pictures of a family of environments show.
+    """Declaration of the pictures of a family of environments.
 
     Attributes
     ----------
     scene : callable
-        ``draw(canvas, env, info)``: the plant at work.
+        ``draw(canvas, env, info)``: the plant.
     strips : tuple of Strip
         From top to bottom; the first one holds output and reference.
+    demonstrator : callable
+        Returns the policy that moves the plant in films, from the environment.
     number : tuple of str, str, callable
-        Name, unit and value (from ``info``) of what stands beside time and error.
+        Name, unit and value (from ``info``) of the number beside time and error.
     trace : callable
-        ``trace(info)``: what a step adds to the panel.
+        ``trace(info)``: the point that a step adds to the panel.
     panel : callable, optional
-        ``panel(canvas, env, info, points)``: the plot above the strips, from all that was traced;
-        default: the loop of the output over the pressure.
+        ``panel(canvas, env, info, points)``: the plot above the strips, of all points; default:
+        the loop of the output over the pressure.
     """
 
     scene: Callable[[Canvas, Any, Any], None]
     strips: tuple[Strip, ...]
+    demonstrator: Callable[[Any], Policy]
     number: tuple[str, str, Callable[[Any], float]] = (
         "pressure",
         "bar",
@@ -94,6 +105,23 @@ class View:
         info["output"],
     )
     panel: Panel | None = None
+
+
+def view_of(env: Any) -> View:
+    """Return the view that the setup of an environment names, like ``my_family.view:VIEW``.
+
+    The name may also be that of a function that returns the view for a plant.
+
+    Raises
+    ------
+    ValueError
+        If the setup names none.
+    """
+    module, _, name = env.setup.view.partition(":")
+    if not name:
+        raise ValueError("the environment has no view; name one in compose(view='module:NAME')")
+    found = getattr(importlib.import_module(module), name)
+    return found if isinstance(found, View) else found(env.plant)
 
 
 def full_bar(plant: Any) -> float:
@@ -116,7 +144,7 @@ def pressure_strip(top: int, height: int) -> Strip:
 
 
 PANEL: Box = (360, 88, 410, 200)
-"""Where the plot above the strips stands."""
+"""Position and size of the plot above the strips."""
 
 
 def draw_loop(
@@ -125,7 +153,7 @@ def draw_loop(
     axes: Axes,
     scale: float,
 ) -> None:
-    """Draw a path of points whose second coordinate is SI: old ones pale, a disc at the present."""
+    """Draw a path of points whose second coordinate is SI: pale where old, a disc at the end."""
     places, step = [axes.at(x, scale * y) for x, y in points], 12
     for i in range(0, len(places) - 1, step):
         age = i / len(places)
@@ -135,7 +163,7 @@ def draw_loop(
 
 
 def pressure_loop(canvas: Canvas, plant: Any, first: Strip, points: Trace) -> None:
-    """Draw the output, as the first strip has it, over the pressure [bar]."""
+    """Draw the output, in the unit of the first strip, over the pressure [bar]."""
     full = full_bar(plant)
     axes = Axes(canvas, PANEL, (0.0, full), first.span(plant))
     ticks = range(0, int(full) + 1, max(1, round(full / 6)))
@@ -145,13 +173,13 @@ def pressure_loop(canvas: Canvas, plant: Any, first: Strip, points: Trace) -> No
 
 
 class Axes:
-    """A box with ticks, into which curves are drawn."""
+    """A plot: box, ticks and curves."""
 
     def __init__(self, canvas: Canvas, box: Box, x: Point, y: Point) -> None:
         self.canvas, self.box, self.x, self.y = canvas, box, x, y
 
     def at(self, x: float, y: float) -> Point:
-        """Return where a point stands in the picture; what is outside stands on the edge."""
+        """Return the position of a point [pixels]; a point outside is moved to the edge."""
         left, top, width, height = self.box
         across = min(1.0, max(0.0, (x - self.x[0]) / (self.x[1] - self.x[0])))
         up = min(1.0, max(0.0, (y - self.y[0]) / (self.y[1] - self.y[0])))
@@ -165,7 +193,7 @@ class Axes:
         y_name: str,
         numbers: bool = True,
     ) -> None:
-        """Draw grid, ticks and names; ``numbers=False`` leaves out those below the box."""
+        """Draw grid, ticks and names; ``numbers=False`` omits those below the box."""
         left, top, width, height = self.box
         bottom = top + height
         for value in x_ticks:
@@ -185,7 +213,7 @@ class Axes:
 def pressure_scale(
     canvas: Canvas, pressure: float, full: float, left: float = 262.0, top: float = 100.0
 ) -> None:
-    """Draw the colours of the pressures [Pa] from 0 to ``full``, with a pointer at the present."""
+    """Draw the colour scale of pressures [Pa] from 0 to ``full``, with a pointer at ``pressure``."""
     height = 120.0
     for i in range(60):
         color = blend(HOT, COLD, i / 59)
@@ -196,3 +224,51 @@ def pressure_scale(
     canvas.text("bar", (left + 6, top - 22), MUTED, 11, "center")
     y = top + height * (1.0 - min(1.0, max(0.0, pressure / full)))
     canvas.polygon([(left - 2, y), (left - 12, y - 6), (left - 12, y + 6)], PRESSURE)
+
+
+def limb(canvas: Canvas, a: Point, b: Point, thick: float, thin: float, color: Color) -> None:
+    """Fill a limb with round ends that tapers from ``a`` to ``b``."""
+    length = max(1e-9, math.dist(a, b))
+    x, y = (a[1] - b[1]) / length, (b[0] - a[0]) / length
+    corners = [(a[0] + thick * x, a[1] + thick * y), (b[0] + thin * x, b[1] + thin * y)]
+    corners += [(b[0] - thin * x, b[1] - thin * y), (a[0] - thick * x, a[1] - thick * y)]
+    canvas.polygon(corners, color)
+    canvas.disc(a, thick, color)
+    canvas.disc(b, thin, color)
+
+
+def torque_bars(
+    canvas: Canvas, bars: Sequence[tuple[str, float, Color]], span: float, top: float, note: str
+) -> None:
+    """Draw horizontal bars of torques [N m] up to ``span``, positive to the right."""
+    zero, half = 196.0, 76.0
+    for row, (name, torque, color) in enumerate(bars):
+        y, end = top + 20.0 * row, zero + half * max(-1.0, min(1.0, torque / span))
+        canvas.text(name, (112, y - 1), MUTED, 11, "right")
+        canvas.rectangle((zero - half, y, 2 * half, 12), GRID, 2)
+        canvas.rectangle((min(zero, end), y, max(1.0, abs(end - zero)), 12), color, 2)
+        canvas.line([(zero, y - 3), (zero, y + 15)], MUTED, 1)
+        canvas.text(f"{torque:+.1f}", (314, y - 1), color, 11, "right")
+    canvas.text(note, (314, 574), MUTED, 11, "right")
+
+
+def table(canvas: Canvas, rows: Iterable[tuple[str, str]], left: float, top: float) -> None:
+    """Write rows of names and values."""
+    for row, (name, value) in enumerate(rows):
+        canvas.text(name, (left, top + 20 * row), MUTED, 12)
+        canvas.text(value, (310, top + 20 * row), INK, 12, "right")
+
+
+def thread(canvas: Canvas, left: list[Point], right: list[Point], tint: Color, step: int) -> None:
+    """Draw crossing threads on a muscle with the given outlines."""
+    for k in range(step - 1, len(left) - 2, step):
+        canvas.line([left[k], right[k + 2]], blend(tint, PAPER, 0.4), 1.2)
+        canvas.line([right[k], left[k + 2]], blend(tint, PAPER, 0.4), 1.2)
+
+
+def fixed_strip(
+    name: str, unit: str, scale: float, lines: Sequence[tuple[str, Color, float]],
+    box: tuple[int, int], span: Point, ticks: Sequence[float],
+) -> Strip:  # fmt: skip
+    """Return a strip whose axis is the same for every plant; ``box`` is top and height."""
+    return Strip(name, unit, scale, tuple(lines), *box, lambda _: span, lambda _: ticks)

@@ -1,0 +1,40 @@
+"""Reward terms and soft-limit costs that tasks share."""
+
+from __future__ import annotations
+
+from pam_envs.kernels.build import kernel
+from pam_envs.parameters import parameter
+
+
+def weight(default: float, meaning: str) -> float:
+    """Declare the weight of a reward term as a field of a task."""
+    return parameter(default, "1", 0.0, 1e3, "assumed", meaning)
+
+
+@kernel
+def error_reward(error: float, scale: float, weight: float) -> float:
+    """Return the reward for an error: linear, at most 0."""
+    return -weight * abs(error) / scale
+
+
+@kernel
+def effort_reward(change: float, full: float, weight: float) -> float:
+    """Return the reward for a change of set-point relative to its range: at most 0."""
+    return -weight * abs(change) / full
+
+
+@kernel
+def ended_reward(ended: float, time: float, seconds: float, period: float, worst: float) -> float:
+    """Return the reward for the end of an episode at a limit; 0 if ``ended`` is 0.
+
+    As if this period and all that are left of ``seconds`` had the reward ``-worst``, the lowest
+    possible one: a policy never gains by ending an episode, at any discount factor up to 1.
+    """
+    left = max(0.0, seconds - time) / period + 1.0
+    return -worst * left if ended > 0.0 else 0.0
+
+
+@kernel
+def excess(value: float, limit: float) -> float:
+    """Return by how much ``value`` exceeds ``limit``."""
+    return max(0.0, value - limit)
