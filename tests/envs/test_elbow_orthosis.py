@@ -271,7 +271,7 @@ def test_no_period_costs_as_much_as_one_that_is_left() -> None:
         ({"reference": [[1.0, 2.0, 3.0]]}, "give 2 numbers"),
         ({"pace": 0.0}, "pace = 0.0 must be a number"),
         ({"weight": -1.0}, "weight = -1.0"),
-        ({"weight": 1.0, "reference": "wall"}, "no weight is to be felt"),
+        ({"weight": 1.0, "reference": "wall"}, "the reference has no weight"),
         ({"reference": [[100.0, 2.0]]}, "reaches 100 N m; at most 60 N m"),
         ({"reference": [[1.0, 31.0]]}, "reaches 31 N m/rad; at most 30 N m/rad"),
         ({"reference": [[1.0, -2.0]]}, "stiffness of -2 N m/rad"),
