@@ -10,8 +10,8 @@ from pam_envs.envs.core.kernels import advance_plant, sense, trajectory_at
 from pam_envs.envs.core.payload import change_payload, draw_payload
 from pam_envs.envs.core.step import CHOICE, EPISODE_SECONDS, PERIOD, copy_rows, write_references
 from pam_envs.envs.joint import layout as L
-from pam_envs.kernels.arithmetic import sine_of_turns
 from pam_envs.hysteresis.protocol import state_rows
+from pam_envs.kernels.arithmetic import sine_of_turns
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import uniform
 from pam_envs.plants.antagonistic_joint import rows as K
