@@ -373,7 +373,7 @@ class Study:
                 if np.isfinite(m).any()
             }
 
-        effects = effect_traces(self.problem, self.family, self.base, self.model)
+        effects = effect_traces(self.problem, self.family, self.model)
         return Traces(
             self.problem.time,
             r.segment,

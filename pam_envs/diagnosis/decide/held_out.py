@@ -1,4 +1,4 @@
-"""What is left out for the reported errors and gains, and the models fitted without it."""
+"""Held-out data for the reported errors and gains, and the models fitted without them."""
 
 from __future__ import annotations
 
@@ -26,27 +26,27 @@ from pam_envs.diagnosis.fit.least_squares import FEW_DAMPINGS, Problem, evaluate
 Array = NDArray[np.float64]
 
 SHARE = (0.15, 0.4)
-"""Part of a record that is held out."""
+"""Least and largest share of a record that is held out."""
 LEAST_BLOCKS = 8
-"""With fewer held-out blocks no interval is given."""
+"""Number of held-out blocks that a confidence interval needs."""
 ROUNDS = 3
-"""Rounds of a rival's fit without what is held out."""
+"""Rounds of a rival's fit to the training data."""
 DRAWS = 400
 LEVEL = (0.025, 0.975)
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What is held out.
+    """Choice of the held-out data.
 
     Attributes
     ----------
     rows : ndarray of bool, shape (T,)
-        Samples.
+        Held-out samples.
     by : {"kinds", "blocks"}
         Whole kinds of experiment, or interleaved blocks of time.
     kinds : tuple of str
-        Which kinds; empty for blocks.
+        The held-out kinds; empty for blocks.
     """
 
     rows: NDArray[np.bool_]
@@ -56,26 +56,24 @@ class Choice:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Models fitted without some samples, and what they do on those.
-
-    Errors of the candidates are sums over what is held out alone.
+    """Models fitted to the training samples, with their errors on the held-out samples.
 
     Attributes
     ----------
     choice : Choice
-        What none of the fits has seen.
+        Held-out data.
     problem : Problem
-        With the other samples to train on.
+        With the other samples for training.
     blocks : Blocks
-        Those that hold held-out samples.
+        Blocks that contain held-out samples.
     seed : int
-        Of the blocks drawn again.
+        Seed of the block bootstrap.
     base, model : Candidate
-        The base, and that with the causes named.
+        The base, and the base with the named causes.
     rivals : list of Candidate or None
-        As those of the decision; None for one that kinds of experiment cannot judge.
+        Rivals of the decision; None for one that held-out kinds of experiment cannot judge.
     without : dict of str to Candidate
-        The model less one of its causes.
+        The model without each of its causes.
     """
 
     choice: Choice
@@ -89,38 +87,38 @@ class HeldOut:
 
     @property
     def rows(self) -> NDArray[np.bool_]:
-        """Samples that are held out, shape (T,)."""
+        """Held-out samples, shape (T,)."""
         return self.choice.rows
 
     @cached_property
     def draws(self) -> NDArray[np.int64]:
-        """How often each block is drawn in bootstrap samples."""
+        """Count of each block in the bootstrap samples."""
         return self.blocks.draws(DRAWS, self.seed)
 
     def interval(self, values: Array) -> list[float] | None:
-        """Return the 95 % interval of what was found in bootstrap samples, if blocks suffice."""
+        """Return the 95 % interval of bootstrap values, or None with too few blocks."""
         if int(self.blocks.held_out.sum()) < LEAST_BLOCKS:
             return None
         return [float(v) for v in np.quantile(values, LEVEL)]
 
     def gain(self, before: Candidate, after: Candidate) -> dict[str, Any]:
-        """Return the gain of one candidate over another, with a paired interval."""
+        """Return the gain of one candidate over another with a paired bootstrap interval."""
         gains = self.blocks.gains(before.errors, after.errors, self.draws)
         value = self.blocks.gain(before.errors, after.errors)
         return {"value": value, "interval": self.interval(gains)}
 
 
 def kind_of(label: str) -> str:
-    """Return the kind of experiment that a label names: ``random_b`` is of the kind random."""
+    """Return the kind of experiment of a label: ``random_b`` is of the kind ``random``."""
     return re.sub(r"[\s_.-]+(?:[A-Za-z]|\d+)$|(?<=[A-Za-z])\d+$", "", label) or label
 
 
 def choose(recording: Recording, blocks: Blocks) -> Choice:
-    """Return what is held out.
+    """Choose the held-out data of a recording.
 
-    Whole kinds of experiment, so that a model is judged on another kind of motion than it was
-    fitted to; those that hold much but not most of the record. Where a recording has fewer than
-    three kinds the interleaved blocks are held out.
+    Whole kinds of experiment with much but not most of the record, so that a model is judged on
+    another kind of motion than it was fitted to. With fewer than three kinds the interleaved
+    blocks are held out.
     """
     kinds = [kind_of(label) for label in recording.segments]
     names = sorted(set(kinds))
@@ -131,7 +129,7 @@ def choose(recording: Recording, blocks: Blocks) -> Choice:
     rows, left = np.zeros(len(of), bool), []
     if len(candidates) < 3:
         return interleaved(blocks)
-    for k in candidates[1::2]:  # every second one by length: the longest kind stays
+    for k in candidates[1::2]:  # every second one by length: the longest kind is for training
         if rows.mean() + counts[k] <= SHARE[1]:
             rows |= of == k
             left.append(names[k])
@@ -139,20 +137,20 @@ def choose(recording: Recording, blocks: Blocks) -> Choice:
 
 
 def interleaved(blocks: Blocks) -> Choice:
-    """Return the blocks on which causes are compared as what is held out."""
+    """Return the choice of the interleaved blocks on which causes are compared."""
     return Choice(np.asarray(~blocks.train), "blocks")
 
 
 def compared(
     problem: Problem, blocks: Blocks, base: Candidate, model: Candidate, seed: int = 0
 ) -> HeldOut:
-    """Return base and model as causes were compared: by fits without the interleaved blocks."""
+    """Return base and model of the decision, fitted without the interleaved blocks."""
     part = _held_blocks(problem, blocks, interleaved(blocks).rows)
     return HeldOut(interleaved(blocks), problem, part, seed, base, model)
 
 
 def _held_blocks(problem: Problem, blocks: Blocks, rows: NDArray[np.bool_]) -> Blocks:
-    """Return the blocks with what they hold of some samples."""
+    """Return the blocks with their counts of some samples."""
     some, n = np.isfinite(problem.measured) & rows, len(blocks.held_out)
     counts = np.stack([np.bincount(blocks.of, s, minlength=n) for s in some])
     return replace(blocks, held_out=counts.sum(axis=0) > 0, counts=counts.astype(np.float64))
@@ -168,27 +166,27 @@ def hold_out(
     close: Sequence[Candidate] = (),
     seed: int = 0,
 ) -> HeldOut:
-    """Fit all candidates without what is held out.
+    """Fit all candidates to the training data.
 
-    The base begins where its fit to other samples ended, all others at the base so found with what
-    they add; model and close rivals also where theirs ended, and what fits better the samples it
-    sees counts. What happens once cannot be told from kinds of experiment that were left out: a
-    rival with such a cause is left to the interleaved blocks.
+    The base starts from its fit to the decision's samples, all others from the new base with their
+    own parameters; model and close rivals also start from their previous fits, and the better fit
+    to the training data counts. A rival with a cause that happens once cannot be judged on
+    held-out kinds of experiment and is left to the interleaved blocks.
 
     Parameters
     ----------
     problem, blocks : Problem, Blocks
-        Of the whole record.
+        Whole record.
     choice : Choice
-        What is held out.
+        Held-out data.
     base, model : Candidate
-        The base, and that with the causes named.
+        The base, and the base with the named causes.
     rivals : sequence of Candidate
-        To be compared with the model, which may be among them.
+        Models to compare with the model, which may be among them.
     close : sequence of Candidate
-        Those of them that are fitted as thoroughly as the model.
+        Rivals that are fitted as thoroughly as the model.
     seed : int
-        Of the blocks drawn again.
+        Seed of the block bootstrap.
     """
     rows, again = choice.rows, replace(problem, train=~choice.rows)
     part = _held_blocks(problem, blocks, rows)
@@ -226,7 +224,7 @@ def hold_out(
 def _side_by_side(
     problem: Problem, base: Candidate, candidates: Sequence[Candidate]
 ) -> list[Candidate]:
-    """Return candidates fitted anew, by the base's Jacobian for the base's parameters."""
+    """Return candidates refitted with the base's Jacobian for the base's parameters."""
     if not candidates:
         return []
     complete_jacobian(problem, base.fit)
@@ -238,7 +236,7 @@ def _side_by_side(
 
 
 def _thoroughly(problem: Problem, blocks: Blocks, base: Candidate, model: Candidate) -> Candidate:
-    """Return a candidate fitted anew; also from the base, where that looks better."""
+    """Return a candidate refitted from its previous optimum or from the base, the better one."""
     there, here = refit(problem, blocks, model), _side_by_side(problem, base, [model])[0]
     if here.fit.cost < there.fit.cost:
         polish(problem, [here.fit])
@@ -246,5 +244,5 @@ def _thoroughly(problem: Problem, blocks: Blocks, base: Candidate, model: Candid
 
 
 def starting_point_from(base: Candidate, candidate: Candidate) -> Array:
-    """Return where a candidate's fit begins if its base is another one."""
+    """Return the starting point of a candidate on another base."""
     return np.concatenate([base.fit.z, candidate.fit.z[len(base.fit.z) :]])

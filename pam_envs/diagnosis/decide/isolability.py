@@ -1,10 +1,9 @@
-"""Which causes a recording can tell apart, before any residual is looked at."""
+"""Isolability of causes in a recording, computed from simulations before any residual is used."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,23 +11,24 @@ from numpy.typing import NDArray
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.fit.candidate import initial_fits
 from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, column_of
+from pam_envs.diagnosis.fit.plant_protocol import PlantFamily
 
 Array = NDArray[np.float64]
 
 DIRECTIONS = 1e-8
-"""Directions of the base's Jacobian below this part of the largest are not fitted away."""
+"""Relative size of the singular directions of the base's Jacobian that count."""
 TOGETHER = 96
-"""Columns that are simulated in one replay."""
+"""Number of columns simulated in one replay."""
 NO_TRACE = 1e-3
-"""Size over the noise below which an effect shows nothing."""
+"""Size over the noise below which an effect is invisible."""
 FAR, FAR_LOG = 30.0, 6.0
-"""How far beyond its start a parameter is tried, as a factor and as a power."""
+"""Factor, and power for logarithmic ones, of the largest tried value over the starting value."""
 ALIKE = 0.9
-"""Cosine from which two causes are told apart by nothing but a further sensor."""
+"""Cosine above which two causes can only be separated by a further sensor."""
 
 
 def base_subspace(base: Fit) -> Array:
-    """Return an orthonormal basis of what refitting the base can change, shape (k, m)."""
+    """Return an orthonormal basis of the changes that a refit of the base can make, (k, m)."""
     j = base.slopes
     spreads = np.array([1.0 / f.prior if np.isfinite(f.prior) else 0.0 for f in base.frees])
     values, vectors = np.linalg.eigh(j @ j.T + np.diag(spreads**2))
@@ -38,13 +38,13 @@ def base_subspace(base: Fit) -> Array:
 
 
 def projected(traces: Array, basis: Array) -> Array:
-    """Return traces, shape (n, m), without what refitting the base would take up."""
+    """Return traces, shape (n, m), without the part that a refit of the base absorbs."""
     return np.asarray(traces - (traces @ basis.T) @ basis)
 
 
 @dataclass(frozen=True)
 class Isolability:
-    """Cosines between what is left of the effects once the base is refitted.
+    """Cosines between the effects of causes after a refit of the base.
 
     Attributes
     ----------
@@ -53,9 +53,9 @@ class Isolability:
     cosine : ndarray, shape (n, n)
         Absolute cosines.
     absorbed : ndarray, shape (n,)
-        Part of each effect's RMS that refitting the base takes up; NaN where it shows nothing.
+        Share of each effect's RMS absorbed by a refit of the base; NaN for an invisible effect.
     reach : ndarray, shape (n,)
-        Largest size, over the noise of the channel where it is largest: where its fits begin, or
+        Largest size over the noise, on the channel where it is largest, at the starting points or
         at the bounds.
     """
 
@@ -67,16 +67,16 @@ class Isolability:
 
 @dataclass(frozen=True)
 class Shown:
-    """What one column shows beside the base.
+    """Effect of one parameter column relative to the base.
 
     Attributes
     ----------
     left : ndarray, shape (m,)
-        What refitting the base does not take up.
+        Part that a refit of the base does not absorb.
     size : float
-        Of that, over the noise of the channel where it is largest.
+        RMS of that part over the noise, on the channel where it is largest.
     raw : float
-        RMS before the refit, over the noise.
+        RMS before the refit over the noise.
     """
 
     left: Array
@@ -85,13 +85,15 @@ class Shown:
 
     @property
     def absorbed(self) -> float:
-        """Part of the RMS that refitting takes up; NaN where there is nothing."""
+        """Share of the RMS absorbed by the refit; NaN for an invisible effect."""
         rms = float(np.linalg.norm(self.left)) / np.sqrt(self.left.size)
         return 1.0 - rms / self.raw if self.raw > NO_TRACE else np.nan
 
 
-def isolability(problem: Problem, family: Any, base: Fit, causes: Sequence[Cause]) -> Isolability:
-    """Simulate each cause where its fits begin and at its bounds, and compare what is left."""
+def isolability(
+    problem: Problem, family: PlantFamily, base: Fit, causes: Sequence[Cause]
+) -> Isolability:
+    """Simulate each cause at its starting points and bounds, and compare the effects."""
     columns: list[Array] = []
     begins: dict[str, list[int]] = {}
     bounds: dict[str, list[int]] = {}
@@ -118,9 +120,9 @@ def isolability(problem: Problem, family: Any, base: Fit, causes: Sequence[Cause
 
 
 def ends(fits: Sequence[Fit]) -> list[Array]:
-    """Return columns with all amounts of a form at their bounds, and far from where it starts.
+    """Return columns with all amounts of a form at their bounds and far from their starts.
 
-    Not every effect grows all the way: far beyond its usual size it may be taken up by the refit.
+    An effect need not grow monotonically: far beyond its usual size the refit may absorb it.
     """
     if not fits:
         return []
@@ -138,7 +140,7 @@ def ends(fits: Sequence[Fit]) -> list[Array]:
 
 
 def far(free: Free, here: float) -> float:
-    """Return a value far beyond where a fit starts, seen from the base's, within the bounds."""
+    """Return a value far beyond a parameter's starting value, within its bounds."""
     value = FAR * free.start
     if free.log:
         value = here * (free.start / here) ** FAR_LOG if here > 0.0 else free.start
@@ -146,7 +148,7 @@ def far(free: Free, here: float) -> float:
 
 
 def _shown(problem: Problem, base: Fit, columns: Sequence[Array]) -> Iterator[Shown]:
-    """Yield what each column shows beside the base."""
+    """Yield the effect of each column relative to the base."""
     basis, without = base_subspace(base), problem.residuals(column_of(base, base.z)[None])[0]
     for at in range(0, len(columns), TOGETHER):
         traces = problem.residuals(np.array(columns[at : at + TOGETHER])) - without
@@ -156,7 +158,7 @@ def _shown(problem: Problem, base: Fit, columns: Sequence[Array]) -> Iterator[Sh
 
 
 def lookalikes(found: Isolability, causes: Sequence[Cause]) -> dict[str, str]:
-    """Return, for causes of the valve or line, another one that looks the same without pressure."""
+    """Return, for causes in valve or line, another cause with the same effect if any."""
     names = {cause.name: k for k, cause in enumerate(causes)}
     made = {}
     for k, name in enumerate(found.names):
@@ -167,7 +169,7 @@ def lookalikes(found: Isolability, causes: Sequence[Cause]) -> dict[str, str]:
 
 
 def size_over_noise(trace: Array, problem: Problem) -> float:
-    """Return the RMS over the noise on the channel where it is largest."""
+    """Return the RMS of a trace over the noise, on the channel where it is largest."""
     good = np.isfinite(problem.measured)
     rows = problem.rows(trace)
     sizes = [float(np.sqrt(np.mean(r[g] ** 2))) for r, g in zip(rows, good, strict=True) if g.any()]

@@ -1,6 +1,6 @@
-"""The rule of a diagnosis: numbers, and how they word a verdict on plain evidence.
+"""Decision rule: its thresholds, and the verdict on plain evidence.
 
-Its thresholds were chosen on drawn cases that no benchmark reports.
+The thresholds were set on drawn cases that no benchmark reports.
 """
 
 from __future__ import annotations
@@ -14,48 +14,48 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Rule:
-    """The numbers of the decision.
+    """Thresholds of the decision.
 
     Attributes
     ----------
     version : str
         Part of every report.
     least_gain : float
-        Log mean-square gain on held-out blocks below which nothing is called missing.
+        Log mean-square gain on held-out blocks below which no cause is named.
     least_total : float
-        The same, times the number of held-out blocks: what little data has to gain.
-    look : float
-        What a gain loses for each factor of e in the number of beginnings its best was chosen from.
+        The same, times the number of held-out blocks, for short recordings.
+    trial_penalty : float
+        Multiple-comparison penalty: loss of gain for each factor of e in the number of starting
+        values from which the best fit was selected.
     flexible : float
-        Share of a residual that a flexible model may explain before it counts as structure.
+        Share of a residual explained by a flexible model above which it has structure.
     peak : float
-        Height of a spectral peak, over its neighbourhood, that counts as structure.
+        Height of a spectral peak over its neighbourhood above which a residual has structure.
     excess : float
-        Held-out mean square over that of the noise floor that counts as structure.
+        Held-out mean square over that of the noise floor above which a residual has structure.
     explained : float
-        Unexplained when structure is left and less of the excess than this part has gone.
+        Unexplained if structure is left and less than this share of the excess was removed.
     least_blocks : int
-        With fewer held-out blocks in which something moves nothing is decided.
+        Number of held-out blocks with motion that a decision needs.
     close, apart : float
-        A rival within this part of the best gain, or no further below it than this, is not
-        excluded...
+        A rival within this share of the best gain, or this far below it, is not excluded...
     doubt : float
-        ... if the difference is not surer than this (one-sided, blocks drawn again).
+        ... unless the difference is significant at this level (one-sided, block bootstrap).
     second_gain : float
-        A further cause has to gain this much...
+        Least gain of a further cause...
     second_share, second_enough, second_clear : float
-        ... and this part of the first's gain, or this much, or this part of what a model that
-        leaves nothing but noise would: else it corrects the form of the first.
+        ... which also needs this share of the first cause's gain, or this gain, or this share of
+        the gain of a model that leaves only noise; otherwise it corrects the form of the first.
     hint : float
-        A search for a further cause goes on if its first rounds promise this part of it.
+        Share of the required gain that the first rounds of a further search must reach.
     beam : int
-        First causes from which a second is looked for.
+        Number of first causes from which a second is searched.
     most : int
-        Most causes named.
+        Largest number of named causes.
     simpler, simpler_share : float
-        What a cause that contains another one must gain over it, and what part of the gain.
+        Gain, and share of the gain, that a cause must have over one that it contains.
     folds : int
-        Ways to hold blocks out on which close rivals are compared.
+        Folds of the cross-validation of close rivals.
     draws : int
         Bootstrap samples.
     """
@@ -87,7 +87,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class Judgement:
-    """A verdict on plain evidence: how many causes, and which rivals are not excluded."""
+    """A verdict on plain evidence: number of causes, and the rivals that are not excluded."""
 
     verdict: str
     level: int
@@ -95,68 +95,60 @@ class Judgement:
 
 
 def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
-    """Word the verdict on evidence.
-
-    Parameters
-    ----------
-    evidence : mapping
-        From :func:`evidence_of`.
-    rule : Rule
-        The numbers of the decision.
-    """
+    """Return the verdict on evidence (:meth:`pam_envs.diagnosis.decide.verdict.Ladder.evidence`)."""
     levels = evidence["levels"]
     least = max(rule.least_gain, rule.least_total / max(1, evidence["blocks"]))
     if len(levels) < 2 or not is_accepted(levels[1], least, rule):
-        return Judgement("unexplained" if structured(levels[0]["left"], rule) else "adequate", 0)
+        return Judgement("unexplained" if has_structure(levels[0]["left"], rule) else "adequate", 0)
     level, first = 1, levels[1]["gain"]
     while level + 1 < len(levels) and level < rule.most:
-        wanted = max(least, required_gain(first, levels[level + 1]["possible"], rule))
-        if not is_accepted(levels[level + 1], wanted, rule):
+        required = max(least, required_gain(first, levels[level + 1]["possible"], rule))
+        if not is_accepted(levels[level + 1], required, rule):
             break
         level += 1
     found = levels[level]
-    if structured(found["left"], rule) and explained_fraction(levels[0], found) < rule.explained:
+    if has_structure(found["left"], rule) and explained_fraction(levels[0], found) < rule.explained:
         return Judgement("unexplained", level)
     still = not_excluded(found["rivals"], rule)
     return Judgement("ambiguous" if still else "named", level, still)
 
 
-def structured(left: dict[str, Any], rule: Rule) -> bool:
-    """Return whether there is more in a residual than noise."""
+def has_structure(left: dict[str, Any], rule: Rule) -> bool:
+    """Return whether a residual contains more than noise."""
     return bool(
         max(left["r2"]) > rule.flexible or left["peak"] > rule.peak or left["excess"] > rule.excess
     )
 
 
 def required_gain(first: float, possible: float, rule: Rule) -> float:
-    """Return what a further cause has to gain, after a first that gained so much.
+    """Return the gain that a further cause needs.
 
     Parameters
     ----------
     first : float
         Gain of the first cause.
     possible : float
-        Gain of a model that leaves nothing but noise over what is named so far.
+        Gain of a model that leaves only noise over the present model.
     rule : Rule
-        The numbers of the decision.
+        Thresholds.
     """
     ways = (rule.second_share * first, rule.second_enough, rule.second_clear * possible)
     return max(rule.second_gain, min(ways))
 
 
-def is_accepted(level: Mapping[str, Any], wanted: float, rule: Rule) -> bool:
-    """Return whether a further cause gains as much as is wanted, and surely gains."""
-    return bool(level["added"] >= wanted and level["unsure"] <= rule.doubt)
+def is_accepted(level: Mapping[str, Any], required: float, rule: Rule) -> bool:
+    """Return whether a further cause has the required gain, and a significant one."""
+    return bool(level["added"] >= required and level["unsure"] <= rule.doubt)
 
 
 def explained_fraction(before: Mapping[str, Any], after: Mapping[str, Any]) -> float:
-    """Return the part of the mean square over the noise that is gone (infinite: of none)."""
+    """Return the removed share of the mean square above the noise (infinite if there was none)."""
     over = float(before["left"]["excess"]) - 1.0
     return 1.0 - (float(after["left"]["excess"]) - 1.0) / over if over > 0.0 else np.inf
 
 
 def not_excluded(rivals: Sequence[Mapping[str, Any]], rule: Rule) -> tuple[int, ...]:
-    """Return which rivals are close to the first and not surely worse."""
+    """Return the indices of rivals that are close to the first and not significantly worse."""
     best = rivals[0]
     return tuple(
         k

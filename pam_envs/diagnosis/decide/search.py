@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -18,27 +17,29 @@ from pam_envs.diagnosis.fit.least_squares import (
     improve,
     share,
 )
+from pam_envs.diagnosis.fit.plant_protocol import PlantFamily
 
 SCHEDULE = ((2, 8, 0.4), (2, 5, 0.6), (4, 4, 0.8))
-"""Rounds with the base's Jacobian held; how many fits then go on, or what part of the best gain."""
+"""Rounds with the base's Jacobian held; number of fits kept then, or their least share of the best
+gain."""
 FIRST_SIGHT = 0.3
-"""A search that wants a gain ends if its first round promises less than this part of it."""
+"""Share of a required gain that the first round of a search must reach."""
 POLISHED = 3
-"""How many of the best rivals are polished."""
+"""Number of the best rivals that are polished."""
 
 
 def search(
     problem: Problem,
-    family: Any,
+    family: PlantFamily,
     blocks: Blocks,
     base: Candidate,
     causes: Iterable[Cause],
     polished: int = POLISHED,
     least: float = 0.0,
 ) -> list[Candidate]:
-    """Return the base extended by each cause in its best form, the best first.
+    """Return the base extended by each cause in its best form, best first.
 
-    Where the first rounds promise no gain of ``least`` nothing is returned.
+    The result is empty if the first rounds do not reach a gain of ``least``.
     """
     complete_jacobian(problem, base.fit)
     shared = share(problem, base.fit)
@@ -82,7 +83,7 @@ def _gain(problem: Problem, blocks: Blocks, base: Candidate, fit: Fit) -> float:
 
 
 def _drop(fits: Sequence[Fit], start: float, kept: int, part: float) -> None:
-    """End the fits that have gained little, but for some of the best."""
+    """Stop fits with little gain, except for some of the best."""
     gains = np.log([max(start / f.cost, 1e-12) for f in fits])
     line = np.sort(gains)[::-1][min(kept, len(fits)) - 1]
     for fit, gain in zip(fits, gains, strict=True):

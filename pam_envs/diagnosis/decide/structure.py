@@ -1,6 +1,6 @@
-"""What is left in a residual: against what it varies, how much a flexible model explains, peaks.
+"""Structure of a residual: explaining variables, a flexible model, spectral peaks, whiteness.
 
-None of this names a cause. It says whether there is anything left to name.
+None of this names a cause; it shows whether anything is left to explain.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ LAGS = 20
 FILTERS = (0.05, 0.2, 1.0, 5.0, 20.0, 60.0)
 """Time constants [s] of the flexible model's filters."""
 LOWEST_PEAK = 0.15
-"""Peaks of the spectrum are looked for above this frequency [Hz]."""
+"""Lowest frequency of a spectral peak [Hz]."""
 WINDOW, NEAR, LEAST_WINDOWS = 80.0, 12, 4
-"""Longest window [s] of a spectrum, bins on either side of a peak's neighbourhood, and how many
-windows a record has at least: a spectrum that is not averaged has peaks of noise."""
+"""Longest window [s] of a spectrum, bins on either side of a peak's neighbourhood, and least number
+of windows: a spectrum without averaging has peaks of noise."""
 MOVED = 6.0
-"""Height of a peak in the spectrum of the motion above which the experiment put it there."""
+"""Height of a peak in the spectrum of the motion above which it is due to the experiment."""
 CYCLE = 5e4
-"""A turn of the pressure counts when it is so large [Pa]."""
+"""Least reversal of the pressure that counts [Pa]."""
 
 
 @dataclass(frozen=True)
 class Regressors:
-    """What a residual may vary against, each of shape (T,); absent ones are left out."""
+    """Variables that may explain a residual, each of shape (T,), and features (n, T) of them."""
 
     values: dict[str, Array]
     features: Array
@@ -69,7 +69,7 @@ class Regressors:
 
 
 def direction_of(pressure: Array) -> Array:
-    """Return +1 while inflating and -1 while deflating, by play of 2 kPa."""
+    """Return +1 while inflating and -1 while deflating, by a play operator of 2 kPa."""
     state, out = pressure[0], np.empty(len(pressure))
     way = 1.0
     for i, value in enumerate(pressure):
@@ -82,7 +82,7 @@ def direction_of(pressure: Array) -> Array:
 
 
 def turning_points(pressure: Array) -> NDArray[np.bool_]:
-    """Return where the pressure has turned by at least :data:`CYCLE`."""
+    """Return the samples at which the pressure has reversed by at least :data:`CYCLE`."""
     turned = np.zeros(len(pressure), bool)
     top = bottom = pressure[0]
     up = True
@@ -96,14 +96,14 @@ def turning_points(pressure: Array) -> NDArray[np.bool_]:
 
 
 def since(marks: NDArray[np.bool_], period: float) -> Array:
-    """Return the time [s] since the last mark."""
+    """Return the time since the last mark [s]."""
     index = np.arange(len(marks))
     last = np.maximum.accumulate(np.where(marks, index, 0))
     return np.asarray((index - last) * period, np.float64)
 
 
 def low_pass(signal: Array, tau: float, period: float) -> Array:
-    """Return a first-order low-pass that starts at the first value."""
+    """Return the first-order low-pass of a signal, starting at its first value."""
     a = np.exp(-period / tau)
     filtered, _ = lfilter([1.0 - a], [1.0, -a], signal, zi=[a * signal[0]])
     return np.asarray(filtered)
@@ -144,7 +144,7 @@ def _features(
 
 
 def flexible_r2(residual: Array, regressors: Regressors, blocks: Blocks) -> tuple[float, Array]:
-    """Return what ridge regression on generic features explains on held-out blocks.
+    """Return the share of a residual that ridge regression explains on held-out blocks.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def flexible_r2(residual: Array, regressors: Regressors, blocks: Blocks) -> tupl
     r2 : float
         At least 0.
     prediction : ndarray, shape (T,)
-        What it would add.
+        Predicted residual.
     """
     good = np.isfinite(residual)
     train, test = good & blocks.train, good & ~blocks.train
@@ -176,7 +176,7 @@ def flexible_r2(residual: Array, regressors: Regressors, blocks: Blocks) -> tupl
 
 
 def binned_r2(residual: Array, variable: Array, blocks: Blocks) -> float:
-    """Return what a table of means over a variable explains on held-out blocks, at least 0."""
+    """Return the share of a residual explained by its means over bins of a variable, at least 0."""
     good = np.isfinite(residual) & np.isfinite(variable)
     train, test = good & blocks.train, good & ~blocks.train
     if train.sum() < 100 or test.sum() < 50 or np.ptp(variable[good]) == 0.0:
@@ -195,17 +195,17 @@ def binned_r2(residual: Array, variable: Array, blocks: Blocks) -> float:
 def spectral_peak(
     residual: Array, period: float, motion: Array | None = None
 ) -> tuple[float, float]:
-    """Return frequency [Hz] and height, over its neighbourhood, of the sharpest spectral peak.
+    """Return frequency [Hz] and relative height of the sharpest spectral peak.
 
     Parameters
     ----------
     residual : ndarray, shape (T,)
         NaN where there is no reading.
     period : float
-        [s].
+        Sampling period [s].
     motion : ndarray, shape (T,), optional
-        Where its own spectrum has a peak none is looked for: an experiment's sines leave lines in
-        every residual, an outside vibration does not care for them.
+        Motion whose own spectral peaks are ignored: sines of an experiment leave lines in every
+        residual, an external vibration does not depend on them.
     """
     frequency, heights = _heights(residual, period)
     usable = frequency > LOWEST_PEAK
@@ -217,13 +217,13 @@ def spectral_peak(
 
 
 def _heights(signal: Array, period: float) -> tuple[Array, Array]:
-    """Return frequencies and the power there over the median of the neighbourhood."""
+    """Return frequencies and the power over the median of the neighbourhood."""
     r = np.nan_to_num(signal - np.nanmean(signal))
     length = max(4 * NEAR, min(int(WINDOW / period), len(r) // LEAST_WINDOWS))
     frequency, power = welch(r, 1.0 / period, nperseg=length, noverlap=length // 2)
     near = median_filter(power, 2 * NEAR + 1, mode="reflect")
     heights = power / np.maximum(near, 1e-300)
-    heights[-NEAR:] = 0.0  # what is next to half the sampling rate has no neighbourhood
+    heights[-NEAR:] = 0.0  # no neighbourhood next to half the sampling rate
     return frequency, heights
 
 

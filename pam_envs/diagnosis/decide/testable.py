@@ -1,9 +1,8 @@
-"""Which causes a recording can decide, and why not the others."""
+"""Testable causes of a recording, with the reason for each that is not testable."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import Rig
@@ -12,24 +11,25 @@ from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.decide.isolability import Isolability, isolability, lookalikes
 from pam_envs.diagnosis.fit.blocks import BLOCK_SECONDS, EVERY
 from pam_envs.diagnosis.fit.least_squares import Fit, Problem
+from pam_envs.diagnosis.fit.plant_protocol import PlantFamily
 
 SHORT = "The recording is too short to decide anything"
 """Beginning of the warning on a short recording."""
 LEAST_SIZE = 1.0
-"""A cause that cannot reach this size over the noise within its bounds is not testable."""
+"""Size over the noise that a testable cause must reach within its bounds."""
 LEAST_TESTABLE, LEAST_SHARE = 5, 0.5
-"""With fewer testable causes, and a smaller share of those asked for, nothing is decided."""
+"""Least number of testable causes, or least share of the requested ones, for a decision."""
 
 
 def not_testable(
     problem: Problem,
-    family: Any,
+    family: PlantFamily,
     base: Fit,
     causes: Sequence[Cause],
     recording: Recording,
     sheet: Rig,
 ) -> tuple[Isolability, dict[str, str]]:
-    """Return how alike the causes look here, and the reason for each that cannot be decided."""
+    """Return the isolability of the causes, and the reason for each that is not testable."""
     reasons = undecidable(recording, sheet, causes)
     present = {f.name for f in base.frees}
     for cause in causes:
@@ -52,20 +52,20 @@ def _too_small(found: Isolability, causes: Sequence[Cause]) -> dict[str, str]:
             "here, once the plant is refitted"
         )
         for cause in causes
-        # where something happens once is looked for in the residual
+        # the time of an event is searched in the residual
         if not (cause.once and cause.forms[0].search is not None)
         and reach.get(cause.name, 0.0) < LEAST_SIZE
     }
 
 
 def too_few_testable(testable: int, asked: int) -> bool:
-    """Return whether so few causes can be tested that a recording decides nothing."""
+    """Return whether too few causes are testable for a decision."""
     few = testable < LEAST_TESTABLE and testable < LEAST_SHARE * asked
     return testable == 0 or few
 
 
 def shortness_warning(moved: int, least: int) -> str:
-    """Return what to say of a recording in which little moves."""
+    """Return the warning on a recording with too little motion."""
     return (
         f"{SHORT}: the command moves in {moved} of the {BLOCK_SECONDS:g} s blocks that are held "
         f"out, and {least} are needed; record at least {EVERY * least * BLOCK_SECONDS:.0f} s of "

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 BLOCK_SECONDS = 4.0
-"""Length of the interleaved blocks on which causes are compared."""
+"""Length of the interleaved blocks [s]."""
 EVERY = 3
-"""Every third block is held out."""
+"""Period of the held-out blocks: every third one."""
 
 
 @dataclass(frozen=True)
@@ -24,9 +24,9 @@ class Blocks:
     of : ndarray of int, shape (T,)
         Block of each sample.
     held_out : ndarray of bool, shape (n,)
-        Which blocks fits do not see.
+        Blocks that are excluded from fits.
     counts : ndarray, shape (channels, n)
-        Readings in each.
+        Number of readings in each block.
     """
 
     of: NDArray[np.int64]
@@ -35,7 +35,7 @@ class Blocks:
 
     @classmethod
     def make(cls, time: Array, measured: Array) -> Blocks:
-        """Cut a record into blocks, every third one held out."""
+        """Divide a record into blocks, every third one held out."""
         of = ((time - time[0]) / BLOCK_SECONDS + 1e-9).astype(np.int64)
         n = int(of.max()) + 1
         counts = np.stack(
@@ -45,7 +45,7 @@ class Blocks:
 
     @property
     def train(self) -> NDArray[np.bool_]:
-        """Samples that fits see, shape (T,)."""
+        """Training samples, shape (T,)."""
         return ~self.held_out[self.of]
 
     def errors(self, rows: Array) -> Array:
@@ -54,7 +54,7 @@ class Blocks:
         return np.stack([np.bincount(self.of, r * r, minlength=n) for r in rows])
 
     def means(self, errors: Array, selected: NDArray[np.bool_] | None = None) -> Array:
-        """Return the mean square by channel over chosen blocks (the held-out ones)."""
+        """Return the mean square by channel over some blocks (default: those held out)."""
         use = self.held_out if selected is None else selected
         counts = self.counts[:, use].sum(axis=1)
         return errors[:, use].sum(axis=1) / np.maximum(counts, 1)
@@ -66,7 +66,7 @@ class Blocks:
         return float(np.sum(np.log(np.maximum(a, 1e-12) / np.maximum(b, 1e-12))))
 
     def draws(self, number: int, seed: int) -> NDArray[np.int64]:
-        """Return how often each block is drawn in bootstrap samples, shape (number, n)."""
+        """Return the count of each block in bootstrap samples, shape (number, n)."""
         rng = np.random.default_rng(seed)
         places = np.flatnonzero(self.held_out)
         drawn = np.zeros((number, len(self.held_out)), np.int64)
@@ -75,7 +75,7 @@ class Blocks:
         return drawn
 
     def gains(self, before: Array, after: Array, draws: NDArray[np.int64]) -> Array:
-        """Return the gain in bootstrap samples, shape (number,)."""
+        """Return the gain in each bootstrap sample, shape (number,)."""
         some = self.counts.sum(axis=1) > 0
         a, b = before[some] @ draws.T, after[some] @ draws.T
         return np.asarray(np.sum(np.log(np.maximum(a, 1e-12) / np.maximum(b, 1e-12)), axis=0))

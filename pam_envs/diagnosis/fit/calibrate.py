@@ -1,4 +1,4 @@
-"""Refit the plant's present parameters, so that a wrong number is not called a missing effect."""
+"""Calibration of the plant's base parameters, so that wrong values are not taken for effects."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 
 PRESSURE = ("regulator.gain", "regulator.time_constant")
 FAST = 0.04
-"""Below this lag [s] the replay takes finer steps."""
+"""Lag [s] below which the replay takes finer steps."""
 FINE_STEP = 0.0101
 GUESS_ROUNDS, ROUNDS = 6, 12
 FAR = 8.0
-"""Cost a reading above which a fit may have ended in the wrong place."""
+"""Cost per reading above which a fit may be in a local optimum."""
 
 
 def calibrate(
@@ -30,22 +30,22 @@ def calibrate(
 ) -> tuple[MuscleFamily, Problem, Candidate]:
     """Return the family, the problem and the fitted base.
 
-    The regulator is fitted first, on the pressure alone; then the static map and the friction by a
-    regression of the force balance; then everything by simulation. Where that ends far from the
-    readings the fit begins anew at the plant as it was given, and the better of the two stays.
+    The regulator is fitted first, to the pressure alone; then the static map and the friction by a
+    regression of the force balance; then all parameters by simulation. If that fit is far from the
+    readings, a second one starts from the given plant, and the better of the two is kept.
 
     Parameters
     ----------
     family : MuscleFamily
-        With the plant to refit.
+        Plant and inputs.
     measured : ndarray, shape (channels, T)
-        NaN where there is no reading.
+        Readings; NaN where there is none.
     noise : ndarray, shape (channels,)
-        Its standard deviation.
+        Standard deviation of their noise.
     blocks : Blocks
-        Of the record.
+        Blocks of the record.
     time : ndarray, shape (T,)
-        [s].
+        Time [s].
     """
     problem = Problem(family.simulate, measured, noise, blocks.train, time, family.tie)
     frees, column = family.base(), family.column
@@ -83,14 +83,14 @@ def calibrate(
 
 
 def _from_rest(family: MuscleFamily, contraction: Array) -> Array:
-    """Return positions counted from the unloaded rest length."""
+    """Return contractions relative to the unloaded rest length."""
     first = float(family.inputs.load[0])
     below = float(family.plant._absolute(np.zeros(1), np.array([first]))[0]) if first > 0 else 0.0
     return contraction + below
 
 
 def _regulator(problem: Problem, family: MuscleFamily) -> Fit:
-    """Return a fit of gain and lag to the pressure."""
+    """Return the fit of the regulator's gain and lag to the pressure."""
     frees = tuple(f for f in family.base() if f.name in PRESSURE)
     alone = problem.measured.copy()
     alone[0] = np.nan

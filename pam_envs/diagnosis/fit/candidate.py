@@ -22,20 +22,21 @@ from pam_envs.diagnosis.fit.least_squares import (
     improve,
     share,
 )
+from pam_envs.diagnosis.fit.plant_protocol import PlantFamily
 
 Array = NDArray[np.float64]
 
 POLISH = 6
-"""Rounds, at most, with all of the Jacobian."""
+"""Largest number of rounds with the full Jacobian."""
 FEW_ROUNDS = 3
-"""Rounds of a model with a cause less."""
+"""Rounds of a model without one of its causes."""
 POLISHED_ENOUGH = 1e-3
-"""Part of the cost that a round has to gain for another one."""
+"""Relative decrease of the cost below which polishing ends."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A model: the base and some causes, each in one form, fitted."""
+    """A fitted model: the base and some causes, each in one form."""
 
     causes: tuple[tuple[Cause, Form], ...]
     fit: Fit
@@ -47,8 +48,8 @@ class Candidate:
         return tuple(c.name for c, _ in self.causes)
 
 
-def frees_for(family: Any, form: Form, values: Sequence[float]) -> tuple[Free, ...]:
-    """Return how a fit moves the parameters of a form, from starting values."""
+def frees_for(family: PlantFamily, form: Form, values: Sequence[float]) -> tuple[Free, ...]:
+    """Return the free parameters of a form with their starting values."""
     made = []
     for term, value in zip(form.terms, values, strict=True):
         given = {k: getattr(term, k) for k in ("low", "high", "scale")}
@@ -57,8 +58,10 @@ def frees_for(family: Any, form: Form, values: Sequence[float]) -> tuple[Free, .
     return tuple(made)
 
 
-def starts(problem: Problem, family: Any, base: Fit, form: Form) -> list[tuple[float, ...]]:
-    """Return where the fits of a form begin."""
+def starting_points(
+    problem: Problem, family: PlantFamily, base: Fit, form: Form
+) -> list[tuple[float, ...]]:
+    """Return the starting values of a form's fits; a search for them is done once for a base."""
     if form.search is not None:
         key = id(form)
         if key not in base.begins:
@@ -70,18 +73,18 @@ def starts(problem: Problem, family: Any, base: Fit, form: Form) -> list[tuple[f
 
 def initial_fits(
     problem: Problem,
-    family: Any,
+    family: PlantFamily,
     base: Fit,
     cause: Cause,
     form: Form,
     shared: Shared | None = None,
 ) -> list[Fit]:
-    """Return the fits of a form, at their starts, with the base's Jacobian."""
+    """Return the fits of a form at their starting points, with the base's Jacobian."""
     names = {f.name for f in base.frees}
     if any(t.name in names for t in form.terms):
         return []
     fits = []
-    for values in starts(problem, family, base, form):
+    for values in starting_points(problem, family, base, form):
         frees = frees_for(family, form, values)
         z = np.concatenate([base.z, [f.inner(f.start) for f in frees]])
         fits.append(Fit((*base.frees, *frees), z, base.column, shared=shared, label=(cause, form)))
@@ -89,14 +92,14 @@ def initial_fits(
 
 
 def polish(problem: Problem, fits: Sequence[Fit], rounds: int = POLISH) -> None:
-    """Take rounds with a fresh Jacobian of all parameters."""
+    """Improve fits with the Jacobian of all their parameters."""
     for fit in fits:
         fit.done, fit.damping, fit.shared = False, 1.0, None
     improve(problem, fits, rounds, POLISHED_ENOUGH)
 
 
 def complete_jacobian(problem: Problem, fit: Fit) -> None:
-    """Give a fit a Jacobian of all its parameters."""
+    """Compute the Jacobian of a fit by all its parameters, if it is missing."""
     if fit.shared is not None or len(fit.slopes) != len(fit.frees):
         fit.shared = None
         differentiate(problem, [fit])
@@ -105,7 +108,7 @@ def complete_jacobian(problem: Problem, fit: Fit) -> None:
 def fit_base(
     problem: Problem, blocks: Blocks, column: Array, frees: tuple[Free, ...], rounds: int = 25
 ) -> Candidate:
-    """Refit the plant's present parameters."""
+    """Fit the base parameters of a plant."""
     fit = Fit(frees, np.array([f.inner(f.start) for f in frees]), column)
     evaluate(problem, [fit])
     improve(problem, [fit], rounds, 1e-5)
@@ -114,7 +117,7 @@ def fit_base(
 
 
 def refit(problem: Problem, blocks: Blocks, candidate: Candidate, rounds: int = 6) -> Candidate:
-    """Return a candidate fitted anew to a problem with other training samples."""
+    """Return a candidate refitted to other training samples."""
     fit = replace(candidate.fit, done=False, damping=1.0, shared=None, begins={})
     evaluate(problem, [fit])
     improve(problem, [fit], rounds, 1e-5)
@@ -122,7 +125,7 @@ def refit(problem: Problem, blocks: Blocks, candidate: Candidate, rounds: int = 
 
 
 def restarted(fit: Fit, **changes: Any) -> Fit:
-    """Return a copy of a fit that has not begun."""
+    """Return a copy of a fit in its initial state."""
     empty = np.zeros((0, 0))
     return replace(fit, done=False, damping=1.0, begins={}, slopes=empty, **changes)
 
@@ -130,16 +133,16 @@ def restarted(fit: Fit, **changes: Any) -> Fit:
 def without_each_cause(
     problem: Problem, blocks: Blocks, base: Candidate, model: Candidate
 ) -> dict[str, Candidate]:
-    """Return the model refitted without each one of its causes, the better of two beginnings."""
+    """Return the model refitted without each of its causes, from the better of two starts."""
     fits, labels = [], []
-    for gone, form in model.causes:
+    for removed, form in model.causes:
         dropped = {t.name for t in form.terms}
         kept = [k for k, f in enumerate(model.fit.frees) if f.name not in dropped]
         frees, z = tuple(model.fit.frees[k] for k in kept), model.fit.z[kept]
         of_base = np.concatenate([base.fit.z, z[len(base.fit.z) :]])
         for start in (z, of_base):
             fits.append(restarted(replace(model.fit, frees=frees, z=start.copy()), shared=None))
-            labels.append(gone.name)
+            labels.append(removed.name)
     complete_jacobian(problem, base.fit)
     shared = share(problem, base.fit)
     for fit in fits:

@@ -1,8 +1,7 @@
-"""A first guess of the static map and the friction, by linear regression of the force balance.
+"""Initial guess of static map and friction by linear regression of the force balance.
 
-Where nothing moves fast the load equals the force of the law, which is linear in its coefficients
-once the plays are computed from the pressure. The guess only starts the fit by simulation: its
-errors are those of regressors that carry noise.
+In slow motion the load equals the force law, which is linear in its coefficients for given play
+outputs. The guess only starts the fit by simulation, since its regressors contain noise.
 """
 
 from __future__ import annotations
@@ -21,13 +20,13 @@ from pam_envs.hysteresis.elements import move_plays, simulate_plays
 Array = NDArray[np.float64]
 
 SLOW = 0.008
-"""Speed [m/s] below which a sample counts as a balance of forces."""
+"""Speed [m/s] below which a sample is an equilibrium of forces."""
 MOST = 4000
-"""Samples used."""
+"""Largest number of samples."""
 
 
 def play_gaps(pressure: Array, thresholds: tuple[float, ...]) -> Array:
-    """Return pressure minus each play of it, shape (n_plays, T), from a virgin start."""
+    """Return pressure minus the output of each play operator, shape (plays, T), initially at 0."""
     gaps = np.empty((len(thresholds), len(pressure)))
     for k, threshold in enumerate(thresholds):
         output = np.empty(len(pressure))
@@ -47,16 +46,24 @@ def balance(
     thresholds: tuple[float, ...],
     usable: NDArray[np.bool_],
 ) -> dict[str, float] | None:
-    """Return coefficients of the static law and play weights, or None if too little is at rest.
+    """Return coefficients of the static law and play weights, or None with too few slow samples.
 
     Parameters
     ----------
     contraction : ndarray, shape (T,)
-        From the unloaded rest length [m].
+        Relative to the unloaded rest length [m].
     pressure : ndarray, shape (T,)
-        [Pa].
+        Pressure [Pa].
     load : ndarray, shape (T,)
-        [kg].
+        Load [kg].
+    period : float
+        Sampling period [s].
+    rest_length : float
+        Unloaded rest length [m].
+    braid_strain : float
+        Strain constant of the braid force [1].
+    thresholds : tuple of float
+        Thresholds of the play operators [Pa].
     usable : ndarray of bool, shape (T,)
         Samples with readings.
     """
@@ -99,7 +106,7 @@ def balance(
 
 
 def start_at_guess(frees: tuple[Any, ...], found: dict[str, float]) -> tuple[Any, ...]:
-    """Return frees that start at the guess, within their bounds."""
+    """Return free parameters that start at the guess, within their bounds."""
     made = []
     for free in frees:
         if free.name not in found:

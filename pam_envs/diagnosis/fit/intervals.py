@@ -9,33 +9,32 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from pam_envs.diagnosis.fit.blocks import Blocks
-from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, differentiate, normal_equations
+from pam_envs.diagnosis.fit.candidate import complete_jacobian
+from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, normal_equations
 
 Array = NDArray[np.float64]
 Json = dict[str, Any]
 
 LEAST_LEFT = 2
-"""Degrees of freedom that are assumed where there are hardly more blocks than parameters."""
+"""Least number of degrees of freedom, for records with hardly more blocks than parameters."""
 WIDE_LOG, WIDE = 10.0, 0.5
-"""An interval over a wider factor, or a larger part of the bounds, identifies nothing."""
+"""An interval wider than this factor, or this share of the bounds, is not identified."""
 
 
 def at_bound(free: Free, value: float) -> bool:
-    """Return whether a fit stopped at a bound of a parameter."""
+    """Return whether a parameter is at one of its bounds."""
     return bool(value <= free.low or value >= free.high)
 
 
 def interval_half_widths(problem: Problem, blocks: Blocks, fit: Fit) -> Array:
-    """Return half the widths of the 95 % intervals of a fit's internal coordinates.
+    """Return half-widths of the 95 % confidence intervals of a fit's internal coordinates.
 
-    From the curvature of the fit and the scatter of the blocks' gradients, so that noise that is
-    correlated within a block counts as it should; never less than what white noise of the declared
-    size gives. Each parameter takes a block's worth of freedom, and Student's t has what is left.
-    What stands at a bound does not widen the rest.
+    Sandwich estimate from the curvature of the fit and the scatter of the blocks' gradients, valid
+    for noise that is correlated within a block; never less than the value for white noise of the
+    declared size. Student's t with the number of blocks less that of parameters. Parameters at a
+    bound do not widen the other intervals.
     """
-    if fit.shared is not None or len(fit.slopes) != len(fit.frees):
-        fit.shared = None
-        differentiate(problem, [fit])
+    complete_jacobian(problem, fit)
     normal, _ = normal_equations(problem, fit)
     n = problem.seen
     of = np.tile(blocks.of, len(problem.measured))[problem.order[:n]]
@@ -56,7 +55,7 @@ def interval_half_widths(problem: Problem, blocks: Blocks, fit: Fit) -> Array:
 
 
 def spans(problem: Problem, blocks: Blocks, fit: Fit) -> dict[str, Json]:
-    """Return, by parameter, its 95 % interval in SI and what is to be said of it."""
+    """Return the 95 % confidence interval of each parameter [SI] and its flags."""
     made, values = {}, fit.values()
     for free, z, half in zip(
         fit.frees, fit.z, interval_half_widths(problem, blocks, fit), strict=True
@@ -66,7 +65,7 @@ def spans(problem: Problem, blocks: Blocks, fit: Fit) -> dict[str, Json]:
 
 
 def span(free: Free, value: float, z: float, half: float) -> Json:
-    """Return the interval of one parameter; open on the side on which the fit hit a bound."""
+    """Return the interval of one parameter, open on the side where the fit is at a bound."""
     low, high = (float(v) for v in free.outer(np.array([z - half, z + half])))
     if free.log:
         wide = low <= 0.0 or high > WIDE_LOG * low

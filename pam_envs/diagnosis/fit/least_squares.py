@@ -1,9 +1,9 @@
-"""Least squares on simulation error, many fits side by side.
+"""Simulation-error least squares, many fits side by side.
 
-A *column* holds all parameters of a plant, a *free* is one that a fit moves. Every perturbed or
-tried parameter set is a lane of one replay. Fits that share their first free parameters (the
-base) and differ in a few more (a cause) share the base's Jacobian, taken once at the base's
-optimum: near it the steps are nearly Gauss-Newton's, at a tenth of the simulations.
+A *column* holds all parameters of a plant; a *free* parameter is changed by a fit. Every perturbed
+or tried parameter set is a lane of one replay. Fits that share their first free parameters (the
+base) and differ in a few more (a cause) share the base's Jacobian, computed once at the base's
+optimum: near it the steps are close to Gauss-Newton, at a tenth of the simulations.
 """
 
 from __future__ import annotations
@@ -18,36 +18,36 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 DAMPINGS = (1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
-"""Levenberg-Marquardt dampings tried side by side: each is a lane, so many cost little."""
+"""Levenberg-Marquardt dampings tried side by side, each in a lane of the replay."""
 FEW_DAMPINGS = (1e-6, 1e-3, 0.3)
 LEAST_DAMPING = 1e-9
-"""Keeps the normal equations regular."""
+"""Regularisation of the normal equations."""
 STALLED = 1e3
-"""By how much dampings grow where none of them helped."""
+"""Factor on all dampings after a round without improvement."""
 REACH_LOG, REACH = 1.0, 30.0
-"""Longest steps, in internal coordinates."""
+"""Longest steps in internal coordinates."""
 WORST = 1e4
-"""Largest weighted residual, and that of a simulation that broke down."""
+"""Largest weighted residual, also of a diverged simulation."""
 
 
 @dataclass(frozen=True)
 class Free:
-    """A parameter that a fit may move.
+    """A free parameter of a fit.
 
     Attributes
     ----------
     name : str
         Dotted name.
     place : int
-        Where it stands in the column.
+        Index in the column.
     low, high : float
         Bounds, in its unit.
     scale : float
-        Size of a meaningful change, in its unit; ignored for logarithmic ones.
+        Size of a meaningful change, in its unit; not used on a logarithmic scale.
     log : bool
         Fitted on a logarithmic scale.
     start : float
-        Where a fit begins.
+        Starting value.
     prior : float
         Standard deviation of a weak prior about ``start``, in internal units (infinite: none).
     """
@@ -66,29 +66,29 @@ class Free:
         return float(np.log(value)) if self.log else value / self.scale
 
     def outer(self, z: Array) -> Array:
-        """Return values, within the bounds, of internal coordinates."""
+        """Return the values of internal coordinates, clipped to the bounds."""
         raw = np.exp(np.clip(z, -700, 700)) if self.log else z * self.scale
         return np.clip(raw, self.low, self.high)
 
     @property
     def span(self) -> tuple[float, float]:
-        """The bounds as internal coordinates."""
+        """Bounds in internal coordinates."""
         return self.inner(max(self.low, 1e-300) if self.log else self.low), self.inner(self.high)
 
     @property
     def step(self) -> float:
-        """Difference step, as an internal coordinate."""
+        """Step of finite differences in internal coordinates."""
         return 0.01 if self.log else 0.02
 
 
 @dataclass(frozen=True)
 class Shared:
-    """The Jacobian by the leading parameters of several fits, taken once.
+    """Jacobian by the leading parameters that several fits have in common.
 
     Attributes
     ----------
     slopes : ndarray, shape (n, m)
-        Over the training samples.
+        Derivatives on the training samples.
     gram : ndarray, shape (n, n)
         ``slopes @ slopes.T``.
     """
@@ -99,26 +99,32 @@ class Shared:
 
 @dataclass
 class Fit:
-    """A fit on its way, or done.
+    """State of a fit.
 
     Attributes
     ----------
     frees : tuple of Free
-        The base's first.
+        Free parameters, those of the base first.
     z : ndarray, shape (n,)
         Internal coordinates.
     column : ndarray
         All other parameters.
     cost : float
-        Sum of squares over the training samples, of residuals over noise, priors included.
+        Sum of squared weighted residuals on the training samples, priors included.
     residual : ndarray, shape (m,)
         Weighted residuals, simulation minus measurement, in the problem's order.
     slopes : ndarray, shape (k, m)
-        Derivative of the residuals by the last k coordinates.
+        Derivatives of the residuals by the last k coordinates.
     shared : Shared or None
-        The derivative by those before them.
+        Derivatives by the coordinates before them.
+    damping : float
+        Factor on the dampings of the next round.
+    done : bool
+        Whether the fit has converged or was stopped.
+    label : object
+        Cause and form of the fit.
     begins : dict
-        Where fits of further causes begin, by form.
+        Starting points of further causes, by form.
     """
 
     frees: tuple[Free, ...]
@@ -135,7 +141,7 @@ class Fit:
 
     @property
     def held(self) -> int:
-        """How many leading parameters keep the Jacobian they have."""
+        """Number of leading parameters with a shared Jacobian."""
         return 0 if self.shared is None else len(self.shared.gram)
 
     def values(self) -> dict[str, float]:
@@ -145,24 +151,24 @@ class Fit:
 
 @dataclass(frozen=True)
 class Problem:
-    """What fits have in common.
+    """Data and simulation shared by fits.
 
-    Weighted residuals of all channels stand in one vector, the training samples first.
+    The weighted residuals of all channels form one vector, the training samples first.
 
     Attributes
     ----------
     simulate : callable
         From columns (n, p) to outputs (channels, T, n).
     measured : ndarray, shape (channels, T)
-        NaN where there is no reading.
+        Readings; NaN where there is none.
     noise : ndarray, shape (channels,)
         Standard deviation of each channel's noise.
     train : ndarray of bool, shape (T,)
-        Samples that fits see.
+        Training samples.
     time : ndarray, shape (T,)
-        [s].
+        Time [s].
     tie : callable
-        Completes columns whose parameters depend on others, in place.
+        Completes, in place, columns whose parameters depend on one another.
     """
 
     simulate: Callable[[Array], Array]
@@ -174,17 +180,17 @@ class Problem:
 
     @cached_property
     def order(self) -> NDArray[np.int64]:
-        """Place in the flattened (channels, T) of each entry of a residual vector."""
+        """Index into the flattened (channels, T) of each entry of a residual vector."""
         mask = np.tile(self.train, len(self.measured))
         return np.concatenate([np.flatnonzero(mask), np.flatnonzero(~mask)])
 
     @cached_property
     def seen(self) -> int:
-        """How many leading entries of a residual vector are training samples."""
+        """Number of leading entries of a residual vector that are training samples."""
         return int(self.train.sum()) * len(self.measured)
 
     def residuals(self, columns: Array) -> Array:
-        """Return weighted residuals, shape (n, channels * T); zero where there is no reading."""
+        """Return weighted residuals, shape (n, channels * T); zero for missing readings."""
         self.tie(columns)
         outputs = self.simulate(columns)
         outputs -= self.measured[:, :, None]
@@ -198,14 +204,14 @@ class Problem:
         return np.take(flat, self.order, axis=1)
 
     def rows(self, residual: Array) -> Array:
-        """Return a residual vector by channel and sample, shape (channels, T)."""
+        """Return a residual vector as an array of shape (channels, T)."""
         out = np.empty(residual.size)
         out[self.order] = residual
         return out.reshape(self.measured.shape)
 
 
 def column_of(fit: Fit, z: Array) -> Array:
-    """Return the column at other internal coordinates."""
+    """Return the column of a fit at internal coordinates ``z``."""
     column = fit.column.copy()
     for free, value in zip(fit.frees, z, strict=True):
         column[free.place] = free.outer(value)
@@ -213,7 +219,7 @@ def column_of(fit: Fit, z: Array) -> Array:
 
 
 def prior_cost(fit: Fit, z: Array) -> float:
-    """Return what the weak priors add to the cost."""
+    """Return the contribution of the weak priors to the cost."""
     return float(
         sum(
             ((v - f.inner(f.start)) / f.prior) ** 2
@@ -229,7 +235,7 @@ def _cost(problem: Problem, fit: Fit, z: Array, residual: Array) -> float:
 
 
 def evaluate(problem: Problem, fits: Sequence[Fit]) -> None:
-    """Simulate fits where they stand, and take residual and cost."""
+    """Compute residual and cost of fits at their present coordinates."""
     found = problem.residuals(np.array([column_of(f, f.z) for f in fits]))
     for fit, residual in zip(fits, found, strict=True):
         fit.residual = residual.copy()
@@ -237,7 +243,7 @@ def evaluate(problem: Problem, fits: Sequence[Fit]) -> None:
 
 
 def _shifted(fit: Fit, k: int) -> tuple[Array, float]:
-    """Return coordinates with the ``k``-th moved inwards by its step, and the step taken."""
+    """Return coordinates with the ``k``-th shifted within its bounds, and the shift."""
     z, high = fit.z.copy(), fit.frees[k].span[1]
     step = fit.frees[k].step
     if z[k] + step > high:
@@ -247,7 +253,7 @@ def _shifted(fit: Fit, k: int) -> tuple[Array, float]:
 
 
 def differentiate(problem: Problem, fits: Sequence[Fit]) -> None:
-    """Take the Jacobian of each fit by the parameters whose Jacobian it does not share."""
+    """Compute the Jacobian of each fit by its parameters without a shared Jacobian."""
     columns, steps = [], []
     for fit in fits:
         for k in range(fit.held, len(fit.frees)):
@@ -265,7 +271,7 @@ def differentiate(problem: Problem, fits: Sequence[Fit]) -> None:
 
 
 def share(problem: Problem, fit: Fit) -> Shared:
-    """Return a fit's Jacobian for others to share."""
+    """Return the Jacobian of a fit for sharing with fits that extend it."""
     slopes = np.ascontiguousarray(fit.slopes[:, : problem.seen])
     return Shared(slopes, np.einsum("im,jm->ij", slopes, slopes))
 
@@ -287,7 +293,7 @@ def normal_equations(problem: Problem, fit: Fit) -> tuple[Array, Array]:
 
 
 def _steps(problem: Problem, fit: Fit, dampings: Sequence[float]) -> list[Array]:
-    """Return where the dampings lead."""
+    """Return the coordinates reached with each damping."""
     normal, gradient = normal_equations(problem, fit)
     spans = np.array([f.span for f in fit.frees])
     reach = np.array([REACH_LOG if f.log else REACH for f in fit.frees])
@@ -303,7 +309,7 @@ def _steps(problem: Problem, fit: Fit, dampings: Sequence[float]) -> list[Array]
 
 
 def bounded_step(normal: Array, gradient: Array, damping: float, low: Array, high: Array) -> Array:
-    """Return the damped Gauss-Newton step within bounds, by an active set."""
+    """Return the damped Gauss-Newton step within bounds, by an active-set method."""
     n = len(gradient)
     step, free = np.zeros(n), ~(((low >= 0.0) & (gradient > 0)) | ((high <= 0.0) & (gradient < 0)))
     damped = normal + (damping + LEAST_DAMPING) * np.eye(n)
@@ -311,11 +317,11 @@ def bounded_step(normal: Array, gradient: Array, damping: float, low: Array, hig
         if not free.any():
             break
         held = damped[np.ix_(free, ~free)] @ step[~free]
-        inner, wanted = damped[np.ix_(free, free)], -gradient[free] - held
+        inner, right = damped[np.ix_(free, free)], -gradient[free] - held
         try:
-            step[free] = np.linalg.solve(inner, wanted)
+            step[free] = np.linalg.solve(inner, right)
         except np.linalg.LinAlgError:
-            step[free] = np.linalg.lstsq(inner, wanted, rcond=None)[0]
+            step[free] = np.linalg.lstsq(inner, right, rcond=None)[0]
         out = free & ((step < low) | (step > high))
         if not out.any():
             break
@@ -331,20 +337,20 @@ def improve(
     tolerance: float,
     dampings: Sequence[float] = DAMPINGS,
 ) -> None:
-    """Take rounds of damped Gauss-Newton steps, all fits side by side.
+    """Improve fits by damped Gauss-Newton steps, all fits side by side.
 
     Parameters
     ----------
     problem : Problem
-        With the data.
+        Data and simulation.
     fits : sequence of Fit
-        Evaluated; changed in place.
+        Evaluated fits; changed in place.
     rounds : int
-        At most so many steps.
+        Largest number of steps.
     tolerance : float
-        A fit is done when a step lowers its cost by a smaller part.
+        Relative decrease of the cost below which a fit is done.
     dampings : sequence of float
-        Levenberg-Marquardt dampings to try in each round.
+        Levenberg-Marquardt dampings tried in each round.
     """
     for _ in range(rounds):
         active = [f for f in fits if not f.done]

@@ -1,4 +1,4 @@
-"""The single muscle as the diagnosis sees it: inputs of a recording, base parameters, columns."""
+"""Single muscle as a diagnosable plant: recorded inputs, base parameters, parameter columns."""
 
 from __future__ import annotations
 
@@ -65,21 +65,21 @@ SCALES = {
 
 
 def declared(plant: SingleMuscle, name: str) -> Any:
-    """Return the declaration of a parameter by dotted name."""
+    """Return the declaration of a parameter by its dotted name."""
     component, _, field = name.partition(".")
     return declarations(getattr(plant, component))[field]
 
 
 @dataclass(frozen=True)
 class MuscleFamily:
-    """A plant, what its base consists of, and how it is simulated.
+    """Single muscle with the inputs of a recording.
 
     Attributes
     ----------
     plant : SingleMuscle
-        Whose parameters are refitted.
+        Plant whose parameters are fitted.
     inputs : Inputs
-        Of the recording.
+        Recorded inputs.
     """
 
     plant: SingleMuscle
@@ -91,20 +91,20 @@ class MuscleFamily:
     units = ("mm", "bar")
 
     def finer(self, step: float) -> MuscleFamily:
-        """Return the family simulated with another longest sub-step [s]."""
+        """Return the family with another longest sub-step of the simulation [s]."""
         return dataclasses.replace(self, inputs=dataclasses.replace(self.inputs, longest_step=step))
 
     @property
     def column(self) -> Array:
-        """Return the plant's parameters as a column."""
+        """Parameters of the plant, shape (p,)."""
         return self.plant.parameter_rows()
 
     def simulate(self, columns: Array) -> Array:
-        """Return what the sensors would show, shape (2, T, n)."""
+        """Return sensor readings for parameter columns (n, p), shape (2, T, n)."""
         return replay_rows(self.plant, columns, self.inputs)
 
     def tie(self, columns: Array) -> None:
-        """Keep the hysteresis's total slope at 1."""
+        """Keep the total slope of the hysteresis at 1."""
         n = self.plant.elements
         if n == 0:
             return
@@ -114,7 +114,7 @@ class MuscleFamily:
         columns[:, R.LINEAR] = 1.0 - weights.sum(axis=1)
 
     def free(self, name: str, **changes: Any) -> Free:
-        """Return how a fit moves a parameter."""
+        """Return the fit settings of a parameter; ``changes`` override its declaration."""
         if name.startswith("hysteresis.weight["):
             k = int(name.removeprefix("hysteresis.weight[")[:-1])
             start = float(self.column[R.WEIGHT + k])
@@ -136,7 +136,7 @@ class MuscleFamily:
         return Free(name, R.place(name), **{**made, **changes})
 
     def base(self) -> tuple[Free, ...]:
-        """Return what is refitted before anything is called missing."""
+        """Return the base parameters, with those of effects that the plant already has."""
         names = [*BASE, *(f"hysteresis.weight[{k}]" for k in range(self.plant.elements))]
         present = [
             name
@@ -168,7 +168,7 @@ class MuscleFamily:
 
 
 FINER = (6, 8, 12, 20, 40)
-"""Sub-steps for a fitted plant whose motion is too fast for those of the plant it came from."""
+"""Numbers of sub-steps tried for a fitted plant that is unstable with those of the given plant."""
 DECLARED = ("mass.carried",)
 OLD_NEUTRAL = {
     "regulator.dead_time": 0.0,
@@ -176,11 +176,11 @@ OLD_NEUTRAL = {
     "hysteresis.stretch": 0.0,
     "hysteresis.width_per_load": 0.0,
 }
-"""Effects that were parameters of the plant from the beginning."""
+"""Effects with plain parameters, which the extended step does not list as neutral."""
 
 
 def start_plant(rig: Any) -> SingleMuscle:
-    """Return the plant to begin with: the measured muscle, scaled, without any effect."""
+    """Return the default plant of a rig: the shipped muscle, scaled, without any effect."""
     stock = SingleMuscle.mas10("maxwell_slip")
     weights = np.full(len(THRESHOLDS), 0.7 / len(THRESHOLDS))
     values: dict[str, Any] = {
@@ -212,13 +212,13 @@ GIVEN = {
     "muscle.diameter": "diameter",
     "regulator.max_pressure": "max_pressure",
 }
-"""Parameters that a rig file can give, with the rig's attribute."""
+"""Parameters that a rig file may declare, with the attribute of the rig."""
 
 
 def known_of(rig: Any, values: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
-    """Return provenance and source of what a plant to begin with takes for granted.
+    """Return provenance and source of the assumed parameters of the default plant.
 
-    None of it is a published number of the rig at hand, even where it is one of the shipped muscle.
+    They are not published values of the rig, even where they are of the shipped muscle.
     """
     made = {name: ("assumed", TAKEN) for name in values if name != "hysteresis.operator"}
     for name, attribute in GIVEN.items():
@@ -228,17 +228,17 @@ def known_of(rig: Any, values: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
     return made
 
 
-TAKEN = "taken for granted by pam-envs diagnose, not refitted"
+TAKEN = "assumed by pam-envs diagnose, not fitted"
 
 
 def identified(plant: SingleMuscle, frees: Iterable[Free], source: str) -> SingleMuscle:
-    """Return a plant whose refitted parameters say so."""
+    """Return a plant with the provenance of its fitted parameters."""
     found = {f.name: ("identified", source) for f in frees if f.name in R.NAMES}
     return dataclasses.replace(plant, provenance={**plant.provenance, **found})
 
 
 def inputs_of(recording: Any, rig: Any) -> Inputs:
-    """Return a recording's inputs as the replay reads them."""
+    """Return the inputs of a recording for the replay."""
     n = len(recording.time)
     command = np.where(recording.valve_closed, -1.0, recording.command)
     first = np.zeros(n, bool)

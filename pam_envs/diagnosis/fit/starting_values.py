@@ -1,8 +1,7 @@
-"""Where fits begin whose starting values have to be looked for.
+"""Searches for the starting values of fits with many local optima.
 
-A step or a drift begins where it explains most of the base's residual; an effect
-of events (a valve that opens, a guide that breaks away) has many local optima, and begins at the
-best points of a grid.
+A step or a drift starts where it explains most of the base's residual; an effect of events (a valve
+that opens, a guide that breaks away) starts at the best points of a grid.
 """
 
 from __future__ import annotations
@@ -14,23 +13,26 @@ from typing import Any
 import numpy as np
 
 from pam_envs.diagnosis.fit.least_squares import Fit, Problem, column_of
+from pam_envs.diagnosis.fit.plant_protocol import PlantFamily
 
 Starts = Sequence[tuple[float, ...]]
 
 EARLIEST = 0.03
-"""Part of a record at either end in which a step is not looked for: there it is a bias."""
+"""Share of a record at either end without candidates for a step: there it is a bias."""
 SLOW = (30.0, 120.0)
-"""Durations [s] that a slow drift is first given."""
+"""Starting values of the duration of a slow drift [s]."""
 APART = 0.02
-"""Part of a record by which two candidates differ."""
+"""Least distance of two candidates, as a share of the record."""
 CANDIDATES = 2
 
 
-def step_starts(problem: Problem, family: Any, base: Fit, form: Any, output: int = 0) -> Starts:
-    """Return sizes [m], [Pa] and times [s] of steps of an output, the best explanations first.
+def step_starts(
+    problem: Problem, family: PlantFamily, base: Fit, form: Any, output: int = 0
+) -> Starts:
+    """Return sizes [m], [Pa] and times [s] of steps of an output, best explanation first.
 
-    For every sample the step from there on is projected on what refitting the base cannot take up;
-    the sums over all tails cost one pass.
+    A step at each sample is projected on the complement of the base's Jacobian; cumulative sums
+    give all samples in one pass.
     """
     samples = problem.measured.shape[1]
     good = problem.train & np.isfinite(problem.measured[output])
@@ -62,8 +64,10 @@ def step_starts(problem: Problem, family: Any, base: Fit, form: Any, output: int
 step_starts.trials = 100  # type: ignore[attr-defined]
 
 
-def ramp_starts(problem: Problem, family: Any, base: Fit, form: Any, output: int = 0) -> Starts:
-    """Return sizes [m], middles [s] and durations [s] of slow drifts, about the best steps."""
+def ramp_starts(
+    problem: Problem, family: PlantFamily, base: Fit, form: Any, output: int = 0
+) -> Starts:
+    """Return sizes [m], [Pa], middles [s] and durations [s] of slow drifts about the best step."""
     found = step_starts(problem, family, base, form, output)[:1]
     return [(size, middle, slow) for size, middle in found for slow in SLOW]
 
@@ -71,8 +75,8 @@ def ramp_starts(problem: Problem, family: Any, base: Fit, form: Any, output: int
 ramp_starts.trials = 200  # type: ignore[attr-defined]
 
 
-def pressure_ramp_starts(problem: Problem, family: Any, base: Fit, form: Any) -> Starts:
-    """Return sizes [Pa], middles [s] and durations [s] of slow drifts of the pressure's reading."""
+def pressure_ramp_starts(problem: Problem, family: PlantFamily, base: Fit, form: Any) -> Starts:
+    """Return the starting values of slow drifts of the pressure reading."""
     return ramp_starts(problem, family, base, form, output=1)
 
 
@@ -80,17 +84,17 @@ pressure_ramp_starts.trials = 200  # type: ignore[attr-defined]
 
 
 def grid(*values: Sequence[float], best: int = 3) -> Callable[..., Starts]:
-    """Return a function that looks for starts on a grid, all points in one replay.
+    """Return a search for starting values on a grid, evaluated in one replay.
 
     Parameters
     ----------
     *values : sequence of float
-        Of each term of the form, in SI.
+        Grid of each term of the form [SI].
     best : int
-        How many points to begin at.
+        Number of returned points.
     """
 
-    def starts(problem: Problem, family: Any, base: Fit, form: Any) -> Starts:
+    def starts(problem: Problem, family: PlantFamily, base: Fit, form: Any) -> Starts:
         points = list(product(*values))
         places = [family.free(t.name, log=False).place for t in form.terms]
         columns = np.tile(column_of(base, base.z), (len(points), 1))

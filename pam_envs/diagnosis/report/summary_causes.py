@@ -43,7 +43,7 @@ def causes(study: Any) -> list[Json]:
         return []
     found = spans(problem, study.blocks, model.fit)
     values = model.fit.values()
-    traces = effect_traces(problem, family, study.base, model)
+    traces = effect_traces(problem, family, model)
     basis = base_subspace(study.base.fit)
     made = []
     for cause, form in model.causes:

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from pam_envs.diagnosis.decide.compare import p_value
 from pam_envs.diagnosis.decide.held_out import kind_of
 from pam_envs.diagnosis.decide.rule import Rule, judge
 from pam_envs.diagnosis.decide.structure import spectral_peak
-from pam_envs.diagnosis.decide.verdict import p_value
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import Candidate
 from pam_envs.diagnosis.fit.least_squares import Fit, Problem
