@@ -1,4 +1,4 @@
-"""What a simulation gets wrong of a rig, why, and the better model."""
+"""Diagnose model error from a recording; extend the plant; quantify the improvement."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    """Return what lies one module deeper, loaded when it is first asked for."""
+    """Return a public name, imported on first use."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import importlib

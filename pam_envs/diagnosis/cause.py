@@ -1,4 +1,4 @@
-"""What a cause is: parameters that a plain plant has switched off, and how to tell it."""
+"""Cause of model error: an effect that a plain plant has switched off, and its signature."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NEEDS = {
     "rest": "a muscle that had rested (`cycles_since_rest` in RIG.yaml)",
     "exhaust": "a command that falls by more than 0.5 bar",
 }
-"""What a cause may need of a recording, in words."""
+"""Requirements of a cause on a recording, in words."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Term:
     name : str
         Dotted name of the plant's parameter.
     starts : tuple of float
-        Where fits begin, in SI; forms with several terms begin at the i-th of each.
+        Starting values of fits [SI]; forms with several terms start at the i-th of each.
     low, high : float, optional
         Bounds narrower than those of the parameter's declaration.
     scale : float, optional
@@ -37,7 +37,7 @@ class Term:
     log : bool
         Fitted on a logarithmic scale.
     amount : bool
-        Whether the effect vanishes with it (the others shape it).
+        Whether the effect vanishes with it; other terms only shape the effect.
     """
 
     name: str
@@ -56,12 +56,12 @@ class Form:
     Attributes
     ----------
     name : str
-        In a word or two.
+        One or two words.
     terms : tuple of Term
         Its parameters.
-    seeds : callable, optional
-        Makes starts from the base's fit (see :mod:`pam_envs.diagnosis.fit.starting_values`)
-        instead of ``Term.starts``.
+    search : callable, optional
+        Search for starting values from the base's fit, instead of ``Term.starts``
+        (:mod:`pam_envs.diagnosis.fit.starting_values`).
     """
 
     name: str
@@ -70,39 +70,39 @@ class Form:
 
     @property
     def trials(self) -> int:
-        """Among how many beginnings the best was chosen."""
+        """Number of starting points among which the best is selected."""
         own = max(len(t.starts) for t in self.terms)
         return int(getattr(self.search, "trials", own)) if self.search is not None else own
 
 
 @dataclass(frozen=True)
 class Cause:
-    """Something that a plant may lack.
+    """An effect that a plant may lack.
 
     Attributes
     ----------
     name : str
-        As in the report.
+        Name in the report.
     title : str
-        As in a sentence, "creep of the muscle".
+        Name in a sentence, "creep of the muscle".
     forms : tuple of Form
         Rival mathematical forms; the best one counts.
     signature : str
-        How it shows in a residual.
+        Appearance in a residual.
     neighbours : tuple of str
-        Causes that it is easily taken for.
+        Causes with a similar signature.
     experiment : str
-        What separates it from them.
+        Experiment that separates it from them.
     source : str
-        Where the physics is described.
+        Source of the physics.
     needs : tuple of str
-        What a recording must hold for it to be decided: words of :data:`NEEDS`.
+        Requirements on a recording that can decide it: words of :data:`NEEDS`.
     once : bool
-        It happens once, so that segments left out by kind do not show it.
+        Whether it happens once, so that held-out kinds of segment need not show it.
     sensor : str
-        What would measure it directly.
+        Sensor that would measure it directly.
     contains : tuple of str
-        Causes that it can imitate in a limit: where both fit alike the simpler one is named.
+        Causes that it contains as a limit: if both fit equally well the simpler one is named.
     compensable : bool
         Whether a controller that knows of it can reduce its effect on the true position; decided
         before any controller was run.
@@ -126,7 +126,7 @@ class Cause:
     settled: str = "settled readings have no time"
 
     def __post_init__(self) -> None:
-        """Refuse a need that no recording is checked for."""
+        """Refuse an unknown requirement."""
         if isinstance(self.needs, str):
             raise ValueError(f"needs of {self.name} is {self.needs!r}; give a tuple of words")
         for word in self.needs:
@@ -136,6 +136,6 @@ class Cause:
 
     @property
     def in_valve(self) -> bool:
-        """Whether all of it acts before the pressure, or in the reading of it."""
+        """Whether all forms act upstream of the pressure, or on its reading."""
         amounts = [t.name for form in self.forms for t in form.terms if t.amount]
         return all(name.startswith(("regulator.", "pressure.")) for name in amounts)

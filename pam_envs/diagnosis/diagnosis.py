@@ -1,4 +1,4 @@
-"""What a plant gets wrong on a recording, why, the better plant, and what it gains."""
+"""Diagnose model error from a recording; extend the plant; quantify the improvement."""
 
 from __future__ import annotations
 
@@ -51,9 +51,10 @@ from pam_envs.plants.single_muscle.plant import SingleMuscle
 Array = NDArray[np.float64]
 
 UNDECLARED, BELIEVED = 1.15, 1.5
-"""Noise over what repeats or holds show: where none is declared, and the most that is believed."""
+"""Noise over the estimate from repeats or holds: without a declaration, and the largest declared
+ratio that is accepted."""
 THOROUGH = 3
-"""How many open rivals are fitted as thoroughly as the model without what is held out."""
+"""Number of open rivals that are fitted to the training data as thoroughly as the model."""
 
 
 def diagnose(
@@ -70,38 +71,40 @@ def diagnose(
     rule: Rule | None = None,
     closed_loop: bool = True,
 ) -> Diagnosis:
-    """Replay a recording through a plant and say what the plant gets wrong.
+    """Replay a recording through a plant and diagnose the error of the plant.
 
     Parameters
     ----------
     recording : Recording
         See :func:`pam_envs.data.recording.recording.load_recording`.
     plant : SingleMuscle, optional
-        Whose present parameters are refitted; what is not neutral in it counts as present.
-        Default: the shipped muscle, scaled to the rig's, without any effect.
+        Plant to refit; effects that are not neutral in it are part of the base. Default: the
+        shipped muscle, scaled to the rig, without any effect.
     rig : Rig, optional
-        What is known of the rig; see :class:`pam_envs.data.rig_file.Rig`.
+        Known properties of the rig; see :class:`pam_envs.data.rig_file.Rig`.
     design : callable, optional
         From a plant to a controller, for the comparison in closed loop
         (:mod:`pam_envs.diagnosis.closed_loop.gain`).
     causes : sequence of Cause or str, optional
-        Causes, or names of the catalogue's. Default: :func:`pam_envs.diagnosis.causes.catalogue`.
+        Causes, or names of shipped ones; :func:`pam_envs.diagnosis.causes.causes_in` reads those
+        of a folder. Default: :func:`pam_envs.diagnosis.causes.catalogue`.
     seed : int
-        Of all draws.
+        Seed of all random draws.
     progress : bool
-        Show a bar.
+        Show a progress bar.
     simulated : object, optional
-        The rig itself, where it can be run (:class:`pam_envs.diagnosis.closed_loop.gain.Rig`).
+        The rig itself, if it can be run (:class:`pam_envs.diagnosis.closed_loop.gain.Rig`).
     oracle : SingleMuscle or Simulated, optional
-        What the rig really is, where that is known.
+        True plant of the rig, if it is known.
     rule : Rule, optional
-        Numbers of the decision.
+        Thresholds of the decision.
     closed_loop : bool
         Whether to compare controllers.
 
     Returns
     -------
     Diagnosis
+        Verdict, causes, report, refitted and extended plant.
 
     Raises
     ------
@@ -120,14 +123,14 @@ def diagnose(
         step("refitting the plant")
         start = plant if plant is not None else start_plant(sheet)
         study = Study.begin(recording, sheet, start, floor)
-        step("which causes can be told apart")
-        study.exclude(asked, recording, sheet)
+        step("isolability of causes")
+        study.find_testable(asked, recording, sheet)
         step("fitting rival causes")
         study.decide(rule, seed)
-        study.weigh(rule, seed)
+        study.recheck_loads(rule, seed)
         step("held-out experiments")
         study.hold_out(seed)
-        step("the next experiment, and closed loop")
+        step("next experiment, closed loop")
         study.experiment(sheet)
         if closed_loop:
             study.close_loop(design, simulated, oracle, seed)
@@ -147,10 +150,10 @@ def diagnose(
 
 
 def _noise(floor: ChannelFloor) -> float:
-    """Return the noise that residuals are weighed by.
+    """Return the noise that weights the residuals.
 
-    Repeats and holds are short: they miss its slow part. What is declared counts as long as the
-    data do not contradict it.
+    Repeats and holds are short and miss the slow part of the noise, so that a declared value is
+    used as long as the data do not contradict it.
     """
     if floor.declared is None:
         return UNDECLARED * floor.value
@@ -159,7 +162,7 @@ def _noise(floor: ChannelFloor) -> float:
 
 @dataclass
 class Study:
-    """A diagnosis on its way: each stage adds its part."""
+    """State of a diagnosis, completed stage by stage."""
 
     recording: Recording
     sheet: Rig
@@ -179,11 +182,11 @@ class Study:
     compared: HeldOut | None = None
     proposal: dict[str, Any] | None = None
     loop: dict[str, Any] | None = None
-    loop_reason: str | None = "it was not asked for"
+    loop_reason: str | None = "it was not requested"
 
     @classmethod
     def begin(cls, recording: Recording, sheet: Rig, plant: SingleMuscle, floor: Floor) -> Study:
-        """Refit the plant's present parameters."""
+        """Fit the base parameters of a plant to a recording."""
         family = MuscleFamily(plant, inputs_of(recording, sheet))
         measured = np.full((len(family.channels), len(recording.time)), np.nan)
         noise = np.empty(len(family.channels))
@@ -207,45 +210,45 @@ class Study:
         return cls(recording, sheet, plant, floor, family, problem, blocks, base, regressors)
 
     def floor_of(self, channel: str) -> tuple[float, str]:
-        """Return the error [m], [Pa] of a perfect model, and what says so."""
+        """Return the error [m], [Pa] of a perfect model, and its source."""
         floor = self.floor[channel]
         believed = floor.declared is not None and floor.declared > floor.value
         return (_noise(floor), "declared") if believed else (floor.value, floor.source)
 
     @property
     def model(self) -> Candidate:
-        """The base with what was decided to be missing."""
+        """The base with the causes of the decision."""
         return self.base if self.decision is None else self.decision.model
 
     def plant_of(self, candidate: Candidate) -> SingleMuscle:
-        """Return a candidate's plant."""
+        """Return the plant of a candidate."""
         return self.family.plant_of(self.column(candidate.fit))
 
     def identified(self, candidate: Candidate, rule: Rule) -> SingleMuscle:
-        """Return a candidate's plant, which says where its numbers come from."""
+        """Return the plant of a candidate with the provenance of its fitted parameters."""
         digest = self.recording.digest[:12]
         source = f"pam-envs diagnose, recording {digest}, rule {rule.version}"
         return identified(self.plant_of(candidate), candidate.fit.frees, source)
 
     def column(self, fit: Fit) -> Array:
-        """Return a fit's parameters, tied."""
+        """Return the completed parameter column of a fit."""
         columns = column_of(fit, fit.z)[None]
         self.problem.tie(columns)
         return np.asarray(columns[0])
 
     def outputs(self, candidate: Candidate) -> Array:
-        """Return what the sensors would show, shape (channels, T)."""
+        """Return the simulated readings of a candidate, shape (channels, T)."""
         return self.family.simulate(self.column(candidate.fit)[None])[:, :, 0]
 
-    def exclude(self, causes: Sequence[Cause], recording: Recording, sheet: Rig) -> None:
-        """Leave out what the recording cannot show."""
+    def find_testable(self, causes: Sequence[Cause], recording: Recording, sheet: Rig) -> None:
+        """Keep the causes that the recording can show."""
         self.isolability, self.not_testable = not_testable(
             self.problem, self.family, self.base.fit, causes, recording, sheet
         )
         self.causes = [c for c in causes if c.name not in self.not_testable]
 
-    def weigh(self, rule: Rule, seed: int) -> None:
-        """Decide anew with the loads refitted within their tolerance, where that may be all."""
+    def recheck_loads(self, rule: Rule, seed: int) -> None:
+        """Repeat the decision with loads refitted within their tolerance if they may explain it."""
         if self.decision is None:
             return
         known, loads = self.sheet.tolerance.get(LOAD), self.recording.load / GRAVITY
@@ -280,7 +283,7 @@ class Study:
         )
 
     def hold_out(self, seed: int) -> None:
-        """Fit base, model and rivals again without some kinds of experiment."""
+        """Fit base, model and rivals without the held-out data."""
         assert self.decision is not None
         once = any(c.once for c, _ in self.model.causes)
         choice = interleaved(self.blocks) if once else choose(self.recording, self.blocks)
@@ -297,7 +300,7 @@ class Study:
         )
 
     def experiment(self, sheet: Rig) -> None:
-        """Look for the experiment that tells the open rivals apart."""
+        """Propose the experiment that separates the open rivals."""
         decision = self.decision
         if decision is None or decision.verdict != "ambiguous" or not decision.open_rivals:
             return
@@ -343,10 +346,10 @@ class Study:
             seed=seed,
         )
         if self.loop is None:
-            self.loop_reason = f"under {load:.3g} kg the stroke is too short to follow a reference"
+            self.loop_reason = f"under {load:.3g} kg the stroke is too short for a reference"
 
     def _no_loop(self) -> str | None:
-        """Return why there is nothing to compare controllers on."""
+        """Return the reason against a comparison of controllers, if any."""
         causes = [cause for cause, _ in self.model.causes]
         if not causes:
             return "no cause was added to the plant"
@@ -356,14 +359,14 @@ class Study:
         return None
 
     def _far_from_room(self) -> float | None:
-        """Return the temperature [K] of the recording that is furthest from 20 deg C."""
+        """Return the recorded temperature [K] furthest from 20 deg C."""
         celsius = self.recording.temperature
         if celsius is None:
             return None
         return float(celsius[np.argmax(np.abs(celsius - 20.0))]) + CELSIUS
 
     def traces(self) -> Traces:
-        """Return what a report draws."""
+        """Return the time series of the report's figures."""
         r, channels = self.recording, self.family.channels
 
         def split(values: Array) -> dict[str, Array]:

@@ -1,4 +1,4 @@
-"""What to know of a recording before anything is concluded from it."""
+"""Audit of a recording or a table before its diagnosis: problems, warnings, undecidable causes."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from pam_envs.diagnosis.fit.tolerance import LOAD, unknown_names, unused_toleran
 
 BAR = 1e5
 LOAD_STEP = 0.5
-"""Loads [N] closer than this are one level."""
+"""Largest difference of loads of one level [N]."""
 REST_PRESSURE = 0.1e5
 REST_SECONDS = 2.0
 WARMING = 1.0
-"""Kelvin by which the temperature must vary for its effect to be told."""
+"""Least variation of the temperature [K] that shows its effect."""
 SHUT_SECONDS = 2.0
 MANY_CYCLES = 5
 
 
 @dataclasses.dataclass(frozen=True)
 class Audit:
-    """What the checks found.
+    """Result of an audit.
 
     Attributes
     ----------
     problems : tuple of str
-        Why no diagnosis can be made; empty if one can.
+        Reasons against a diagnosis; empty if one can be made.
     warnings : tuple of str
-        What to bear in mind.
+        Limitations of the data.
     """
 
     problems: tuple[str, ...]
@@ -86,7 +86,7 @@ def audit(recording: Recording | ContractionTable, rig: Rig | None = None) -> Au
 def undecidable(
     recording: Recording, rig: Rig | None = None, causes: Sequence[Cause] | None = None
 ) -> dict[str, str]:
-    """Return the causes that need what a recording does not hold, and what that is.
+    """Return the causes that a recording cannot decide, with the reason.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def undecidable(
     Returns
     -------
     dict of str to str
-        Reason by name of the cause. A cause that is not listed may still not be excited.
+        Reason by name of the cause. Other causes may still not be excited.
     """
     missing = {word: lack(recording, rig or Rig()) for word, lack in LACKS.items()}
     reasons = {}
@@ -154,13 +154,16 @@ LACKS: dict[str, Callable[[Recording, Rig], str]] = {
     "temperature": _lack_of_warmth,
     "valve_closed": _lack_of_shutting,
     "rest": _lack_of_rest,
-    "exhaust": lambda r, _: "" if _falls(r) else "the command never falls by more than 0.5 bar",
+    "exhaust": lambda r, _: (
+        "" if _command_falls(r) else "the command never falls by more than 0.5 bar"
+    ),
 }
-"""What a recording lacks, by what a cause may need (:data:`pam_envs.diagnosis.cause.NEEDS`)."""
+"""Function for each need of a cause (:data:`pam_envs.diagnosis.cause.NEEDS`): the reason why a
+recording does not meet it, or an empty string."""
 
 
 def load_levels(recording: Recording) -> list[float]:
-    """Return the loads [N] that were hung, ascending."""
+    """Return the load levels of a recording [N], ascending."""
     levels: list[float] = []
     for load in np.unique(recording.load):
         if not levels or load - levels[-1] > LOAD_STEP:
@@ -183,13 +186,13 @@ def _empty_outputs(recording: Recording) -> list[str]:
 
 
 def _noise(floor: Floor, channel: str) -> float:
-    """Return the noise to judge a resolution by; what rounding adds to it does not count."""
+    """Return the noise to compare a resolution with, without the part due to rounding."""
     found = floor[channel]
     return found.reading if found.declared is None else found.declared
 
 
 def _repeats(recording: Recording, rig: Rig) -> list[str]:
-    """Return which segments do not repeat one another though the rig says so."""
+    """Return warnings on declared repeats with different commands."""
     warnings = []
     for names, group in zip(rig.repeats, repeat_rows(recording, rig), strict=True):
         for label, rows in zip(names[1:], group[1:], strict=True):
@@ -204,7 +207,7 @@ def _repeats(recording: Recording, rig: Rig) -> list[str]:
 
 
 def _lacks(recording: Recording, rig: Rig) -> list[str]:
-    """Return what the campaign leaves out, and what cannot be decided for it."""
+    """Return warnings on what the campaign lacks, with the consequence."""
     warnings = []
     levels = load_levels(recording)
     if len(levels) < 2:
@@ -214,43 +217,39 @@ def _lacks(recording: Recording, rig: Rig) -> list[str]:
         )
     if not rig.repeats:
         warnings.append(
-            "no segments repeat one another: the noise floor rests on holds; record one segment "
-            "twice and name both under repeats in RIG.yaml"
+            "no segments repeat one another: the noise floor is estimated from holds; record one "
+            "segment twice and name both under repeats in RIG.yaml"
         )
     for field, column, loss in (
-        ("temperature", "temperature_C", "an effect of temperature cannot be told from drift"),
-        (
-            "pressure",
-            "pressure_bar",
-            "what the valve does cannot be told from what the muscle does",
-        ),
+        ("temperature", "temperature_C", "an effect of temperature looks like drift"),
+        ("pressure", "pressure_bar", "effects of valve and muscle cannot be separated"),
         ("contraction", "contraction_mm", "only the valve and the air can be judged"),
     ):
         if getattr(recording, field) is None:
             warnings.append(f"there is no column {column}: {loss}")
     if not _rests(recording):
         warnings.append(
-            f"the command never rests near 0 bar for {REST_SECONDS:g} s: the sensors' zeros cannot "
+            f"the command is never near 0 bar for {REST_SECONDS:g} s: the sensors' zeros cannot "
             "be checked; start each run with a rest"
         )
     return warnings
 
 
 def _not_used(recording: Recording, rig: Rig) -> list[str]:
-    """Return what was told, but does not enter the replay."""
+    """Return warnings on declarations that the replay does not use."""
     warnings = [
         f"tolerance of {name} is not used: no refit moves it"
         for name in unused_tolerances(rig.tolerance)
     ]
     if recording.supply is not None:
         warnings.append(
-            "supply_pressure_bar is not used: the replay takes the supply as constant but for the "
-            "droop that it fits"
+            "supply_pressure_bar is not used: the replay assumes a constant supply, except for a "
+            "fitted droop"
         )
     if rig.cycles_since_rest > 0:
         warnings.append(
-            f"history.cycles_since_rest = {rig.cycles_since_rest} does not enter the replay, which "
-            "begins with a muscle that has rested"
+            f"history.cycles_since_rest = {rig.cycles_since_rest} is not used: the replay starts "
+            "with a rested muscle"
         )
     return warnings
 
@@ -269,6 +268,6 @@ def _longest_shut(recording: Recording) -> float:
     return max((b - a + 1 for a, b in channels.runs(same)), default=0) * recording.period
 
 
-def _falls(recording: Recording) -> bool:
+def _command_falls(recording: Recording) -> bool:
     free = recording.command[~recording.valve_closed]
     return len(free) > 0 and bool(np.any(np.maximum.accumulate(free) - free > 0.5 * BAR))

@@ -1,6 +1,6 @@
-"""Checks of one measured channel: does it stand still, clip, jump, repeat itself, or is it coarse.
+"""Checks of a measured channel: stuck, clipped, coarse, with spikes or copied stretches.
 
-Each returns sentences with rows of the file.
+Each check returns sentences with rows of the file.
 """
 
 from __future__ import annotations
@@ -27,33 +27,32 @@ UNITS = {
 """Column, unit and the unit in SI, by field of a recording."""
 STILL_SECONDS = 2.0
 ANSWER_SECONDS = 1.0
-"""Seconds in which a reading may wait before it follows the command."""
+"""Time in which a reading may lag behind the command [s]."""
 STILL_COMMAND = 0.5e5
-"""A reading that does not move while the command moves by this much [Pa] may be stuck."""
+"""Change of the command [Pa] above which a constant reading may be stuck."""
 TURNING = 1.5e5
-"""Move of the command [Pa] that a contraction may sleep through where it turns back."""
+"""Reversal of the command [Pa] below which a contraction may be constant due to friction."""
 CLIPPED_ROWS = 20
 SPIKE = 10.0
 COPIED_ROWS = 50
 COPIED_CHANGES = 0.5
-"""Share of samples that differ from the last one in a copied stretch: a sensor at its end repeats
-itself rightly."""
+"""Least share of samples of a copied stretch that differ from the previous one."""
 COARSE = 2.0
-"""Steps of resolution in an RMS of noise, from which rounding hides the noise."""
+"""Ratio of resolution to RMS noise above which rounding hides the noise."""
 
 
 def runs(same: Flags) -> Iterator[tuple[int, int]]:
-    """Yield first and last sample of each stretch of samples alike; ``same[i]`` joins i, i + 1."""
+    """Yield first and last sample of runs of equal samples; ``same[i]`` compares i and i + 1."""
     edges = np.diff(np.r_[False, same, False].astype(np.int8))
     for first, last in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
         yield int(first), int(last)
 
 
 def stuck(recording: Recording, channel: str) -> tuple[list[str], list[str]]:
-    """Return problems and warnings on readings that stand still while the command moves.
+    """Return problems and warnings on readings that are constant while the command changes.
 
-    A muscle may stand still rightly, below its threshold and where the pressure turns back; a
-    sensor that is cut off is :func:`clipped`.
+    A muscle may be at rest below its threshold and at reversals of the pressure; for a sensor at
+    the end of its range see :func:`clipped`.
     """
     column, unit, scale = UNITS[channel]
     values = getattr(recording, channel)
@@ -68,7 +67,7 @@ def stuck(recording: Recording, channel: str) -> tuple[list[str], list[str]]:
         if moved <= STILL_COMMAND:
             continue
         text = (
-            f"{column} stands at {values[first] / scale:.6g} {unit} in "
+            f"{column} is constant at {values[first] / scale:.6g} {unit} in "
             f"{span_text(recording.row[first], recording.row[last])} while the command moves by "
             f"{moved / 1e5:.2g} bar"
         )
@@ -81,7 +80,7 @@ def stuck(recording: Recording, channel: str) -> tuple[list[str], list[str]]:
 
 
 def _at_its_end(values: Array, command: Array, first: int, end: int) -> bool:
-    """Return whether readings stand at an end of their range, and the command on that side."""
+    """Return whether readings are at an end of their range with the command on the same side."""
     usual = np.median(np.r_[command[:first], command[end:]]) if end - first < len(values) else 0.0
     lowest, highest = values.min(), values.max()
     below = values[first] == lowest < highest and command[first:end].max() <= usual
@@ -102,7 +101,7 @@ def clipped(recording: Recording, channel: str) -> list[str]:
         inner = max((b - a for a, b in found if values.min() < values[a] < values.max()), default=0)
         longest = max(at, key=lambda ab: ab[1] - ab[0], default=(0, -1))
         length = longest[1] - longest[0] + 1
-        # readings coarser than their noise stand still everywhere, clipped ones only at the end
+        # readings coarser than their noise are constant anywhere, clipped ones only at the end
         if length >= CLIPPED_ROWS and length > 3 * (inner + 1):
             rows = int(np.sum(values == extreme))
             warnings.append(
@@ -114,7 +113,7 @@ def clipped(recording: Recording, channel: str) -> list[str]:
 
 
 def coarse(recording: Recording, channel: str, noise: float) -> list[str]:
-    """Return a warning if the readings' steps hide the noise (RMS, in SI)."""
+    """Return a warning if the resolution of the readings hides the noise (RMS, SI)."""
     column, unit, scale = UNITS[channel]
     step = resolution(getattr(recording, channel))
     if step <= COARSE * noise or step == 0.0:
@@ -126,7 +125,7 @@ def coarse(recording: Recording, channel: str, noise: float) -> list[str]:
 
 
 def spikes(recording: Recording, channel: str) -> list[str]:
-    """Return a warning on single readings far off neighbours that agree with one another."""
+    """Return a warning on single readings far from neighbours that agree with one another."""
     column, _, _ = UNITS[channel]
     values = getattr(recording, channel)
     if len(values) < 7:
@@ -152,13 +151,14 @@ def spikes(recording: Recording, channel: str) -> list[str]:
 
 
 def copies(recording: Recording, noise: Mapping[str, float]) -> list[str]:
-    """Return a warning if a stretch of readings stands twice: a copy, not a measurement.
+    """Return a warning if a stretch of readings occurs twice: a copy, not a measurement.
 
     Parameters
     ----------
     recording : Recording
+        Readings.
     noise : mapping of str to float
-        RMS of each channel's noise, in SI. Channels coarser than it repeat themselves rightly.
+        RMS noise of each channel [SI]. Channels with a coarser resolution are not checked.
     """
     fine = [
         values
@@ -183,17 +183,17 @@ def copies(recording: Recording, noise: Mapping[str, float]) -> list[str]:
     one = span_text(row[first], row[first + length - 1])
     two = span_text(row[first + lag], row[first + lag + length - 1])
     return [
-        f"the readings of {one} stand once more in {two}, digit by digit: noise never repeats, so "
-        "one of them is a copy (or there is no noise, as in a simulation); take it out, or the "
-        "noise is judged too small"
+        f"the readings of {one} occur again in {two}, digit by digit: noise never repeats, so one "
+        "of them is a copy (or there is no noise, as in a simulation); remove it, or the noise is "
+        "underestimated"
     ]
 
 
 def _lags(columns: Array, changes: Flags, size: int = COPIED_ROWS // 2) -> list[int]:
-    """Return distances at which stretches of ``size`` samples come again.
+    """Return distances at which stretches of ``size`` samples recur.
 
-    A copied stretch of twice that length holds one of the stretches that start at multiples of
-    ``size``, whose hashes are looked up among those of all stretches.
+    A copied stretch of twice that length contains one of the stretches that start at multiples of
+    ``size``, whose hashes are searched among those of all stretches.
     """
     n = len(columns)
     if n < 2 * size:
@@ -221,7 +221,7 @@ def _lags(columns: Array, changes: Flags, size: int = COPIED_ROWS // 2) -> list[
 
 
 def _first(sentences: list[str], shown: int = 3) -> list[str]:
-    """Return the first sentences, and how many more there are."""
+    """Return the first sentences and the number of further ones."""
     if len(sentences) <= shown:
         return sentences
     return [*sentences[:shown], f"and {len(sentences) - shown} more stretches like these"]

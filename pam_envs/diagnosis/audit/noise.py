@@ -1,10 +1,9 @@
-"""The noise floor: how far a sensor's readings scatter where nothing else changes.
+"""Noise floor: scatter of a sensor's readings with everything else constant.
 
-Three estimates, best first: what differs between segments that repeat one another; what is left of
-the end of each hold once a straight line is taken off; and the white part alone, from second
-differences where the command is quiet. A declared noise is compared with them. Repeats that differ
-by more than noise, since something changed between them, give way: what changed is for the
-diagnosis to explain.
+Three estimates, best first: differences between segments that repeat one another; the residual of a
+straight line at the end of each hold; and the white part alone, from second differences while the
+command is constant. A declared noise is compared with them. Repeats that differ by more than noise
+are not used: the change between them is for the diagnosis to explain.
 """
 
 from __future__ import annotations
@@ -24,22 +23,22 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 CHANNELS = {"contraction": ("mm", MM), "pressure": ("bar", BAR)}
-"""Measured outputs, with the unit that people read them in."""
+"""Measured outputs with unit and scale of display."""
 SETTLING = 1.5
-"""Seconds after a change of the command that are never taken for noise."""
+"""Time after a change of the command that is not used [s]."""
 SHORTEST = 1.0
 LONGEST = 10.0
-"""Seconds of a hold's end that are used."""
+"""Shortest and longest used end of a hold [s]."""
 WINDOWS = (1.0, 1.5, 2.5, 5.0, 10.0)
-"""Lengths [s] that the ends of holds are cut to."""
+"""Lengths of the windows at the ends of holds [s]."""
 CORRELATIONS = (0.1, 0.2, 0.4, 0.7, 1.2, 2.0)
-"""Correlation times [s] that coloured noise may have."""
+"""Candidate correlation times of coloured noise [s]."""
 TOLERANCE = 1.1
-"""Misfit over the best one up to which a correlation time is as good as the best."""
+"""Misfit over the smallest one up to which a correlation time is used."""
 SAME = 10.0
-"""Commands [Pa] closer than this are one hold."""
+"""Largest difference of commands of one hold [Pa]."""
 START = 2.0
-"""Seconds at the start of a repeat in which what was done before may still show."""
+"""Time at the start of a repeat that previous motion may influence [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,19 +48,19 @@ class ChannelFloor:
     Attributes
     ----------
     value : float
-        RMS of the noise of a sample [m] or [Pa].
+        RMS noise of a sample [m] or [Pa].
     reading : float
-        RMS of the noise of a single reading, above ``value`` where readings were averaged.
+        RMS noise of a single reading, above ``value`` if readings were averaged.
     source : {"repeats", "holds", "innovations", "declared"}
-        Where it comes from.
+        Source of ``value``.
     estimates : mapping of str to float
-        Every estimate that the recording allows, by source.
+        All available estimates, by source.
     declared : float or None
-        What the rig's owner says.
+        Declared noise.
     correlation_time : float or None
         Lag at which the autocorrelation of the noise falls below 1/e [s].
     warnings : tuple of str
-        Sentences.
+        Sentences on doubtful estimates.
     """
 
     value: float
@@ -75,19 +74,19 @@ class ChannelFloor:
 
 @dataclasses.dataclass(frozen=True)
 class Floor:
-    """Noise of the channels that were recorded."""
+    """Noise of the recorded channels."""
 
     contraction: ChannelFloor | None
     pressure: ChannelFloor | None
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the owner of the rig should look at."""
+        """Warnings of all channels."""
         both = (self.contraction, self.pressure)
         return tuple(text for floor in both if floor is not None for text in floor.warnings)
 
     def __getitem__(self, channel: str) -> ChannelFloor:
-        """Return the floor of a channel that was recorded."""
+        """Return the noise of a recorded channel."""
         floor = {"contraction": self.contraction, "pressure": self.pressure}[channel]
         if floor is None:
             raise KeyError(f"{channel} was not recorded")
@@ -100,13 +99,14 @@ def noise_floor(recording: Recording, rig: Rig | None = None) -> Floor:
     Parameters
     ----------
     recording : Recording
+        Readings.
     rig : Rig, optional
-        Which segments repeat one another, and the noise its owner declares.
+        Repeated segments and declared noise.
 
     Returns
     -------
     Floor
-        In SI.
+        In SI units.
     """
     rig = rig or Rig()
     declared = {"contraction": rig.contraction_noise, "pressure": rig.pressure_noise}
@@ -136,7 +136,7 @@ def _channel(recording: Recording, rig: Rig, channel: str, declared: float | Non
     time = _correlation_time(
         differences if source == "repeats" else [detrended(e) for e in ends], recording.period
     )
-    rounding = float(resolution(values) / np.sqrt(12.0))  # which a hold does not show
+    rounding = float(resolution(values) / np.sqrt(12.0))  # not visible in a hold
     value = max(estimates.get(source, declared or 0.0), rounding)
     reading = _reading(recording, channel, estimates.get(source, 0.0))
     warnings = (
@@ -147,7 +147,7 @@ def _channel(recording: Recording, rig: Rig, channel: str, declared: float | Non
 
 
 def _reading(recording: Recording, channel: str, value: float) -> float:
-    """Return the noise before the averaging, which lowers the white part alone."""
+    """Return the noise before averaging, which only reduces the white part."""
     raw = recording.raw
     if raw is None:
         return value
@@ -157,17 +157,7 @@ def _reading(recording: Recording, channel: str, value: float) -> float:
 
 
 def resolution(values: Array) -> float:
-    """Return the step between neighbouring readings, or 0 where they have none in common.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-
-    Returns
-    -------
-    float
-        In the unit of ``values``.
-    """
+    """Return the common step between neighbouring values (n,), in their unit; 0 without one."""
     levels = np.unique(values)
     if len(levels) < 3:
         return float(levels[-1] - levels[0])
@@ -182,7 +172,7 @@ def resolution(values: Array) -> float:
 def _weak(
     channel: str, estimates: Mapping[str, float], source: Source, declared: float | None
 ) -> list[str]:
-    """Return warnings on a floor that rests on less than the rig's owner meant it to."""
+    """Return warnings on a noise floor from a weaker source than intended."""
     unit, scale = CHANNELS[channel]
     if source != "repeats" and "repeats" in estimates:
         value = declared if source == "declared" else estimates[source]
@@ -191,7 +181,7 @@ def _weak(
         return [
             f"{channel}: the repeats differ by more than noise, by "
             f"{estimates['repeats'] / scale:.3g} {unit}, while {what} {value / scale:.3g} {unit}; "
-            "the muscle or the rig changed between the repeats, so they do not count"
+            "the muscle or the rig changed between the repeats, so they are not used"
         ]
     if not estimates:
         more = "the declared noise is used" if declared is not None else "declare the sensor's"
@@ -215,7 +205,7 @@ def _misdeclared(
 
 
 def _differences(recording: Recording, rig: Rig, values: Array) -> list[Array]:
-    """Return the differences between segments that repeat one another, without large offsets."""
+    """Return the differences between repeated segments, without large offsets."""
     found = []
     for group in repeat_rows(recording, rig):
         n = len(group[0])
@@ -223,20 +213,20 @@ def _differences(recording: Recording, rig: Rig, values: Array) -> list[Array]:
         for i, one in enumerate(group):
             for other in group[:i]:
                 difference = (values[one] - values[other])[skipped:]
-                if np.ptp(difference) > 0.0:  # else a copy, which says nothing
+                if np.ptp(difference) > 0.0:  # otherwise a copy
                     found.append(_without_offset(difference))
     return found
 
 
 def _without_offset(difference: Array) -> Array:
-    """Return a difference less its middle, if that is more than slow noise would leave."""
+    """Return a difference less its median, if that is larger than slow noise would cause."""
     middle = float(np.median(difference))
     low, high = np.quantile(difference, [0.1587, 0.8413])
     return difference - middle if abs(middle) > 0.25 * (high - low) else difference
 
 
 def _scatter(pieces: list[Array]) -> float:
-    """Return the standard deviation of what is left after far outliers are left out."""
+    """Return the standard deviation without far outliers."""
     if not pieces:
         return float("nan")
     joined = np.concatenate(pieces)
@@ -248,7 +238,7 @@ def _scatter(pieces: list[Array]) -> float:
 
 
 def holds(recording: Recording) -> Iterator[Indices]:
-    """Yield the samples of each stretch under one command (or with the valve shut)."""
+    """Yield the samples of each stretch of constant command or closed valve."""
     shut, segment = recording.valve_closed, recording.segment
     changed = (np.abs(np.diff(recording.command)) > SAME) & ~(shut[1:] & shut[:-1])
     changed |= (np.diff(recording.load) != 0.0) | (shut[1:] != shut[:-1])
@@ -260,7 +250,7 @@ def holds(recording: Recording) -> Iterator[Indices]:
 
 
 def hold_ends(recording: Recording) -> list[Indices]:
-    """Return the samples of the settled second half of each hold that is long enough."""
+    """Return the samples of the settled second half of each sufficiently long hold."""
     ends = []
     for rows in holds(recording):
         seconds = len(rows) * recording.period
@@ -271,7 +261,7 @@ def hold_ends(recording: Recording) -> list[Indices]:
 
 
 def _hold_scatter(ends: list[Array], period: float) -> float:
-    """Return the RMS of the noise in the ends of holds, without those that still move."""
+    """Return the RMS noise at the ends of holds, without those that are still moving."""
     if not ends:
         return float("nan")
     variances = np.array([np.sum(detrended(end) ** 2) / (len(end) - 2) for end in ends])
@@ -282,11 +272,10 @@ def _hold_scatter(ends: list[Array], period: float) -> float:
 
 
 def _coloured(ends: list[Array], period: float) -> float:
-    """Return the RMS of white noise with first-order coloured noise, of which a line was taken off.
+    """Return the RMS of white plus first-order coloured noise from detrended pieces.
 
-    Taking off a line takes most of the slow part with it. The expected autocovariance of what is
-    left is linear in the two variances, for each of a few correlation times; windows of several
-    lengths are taken together.
+    Detrending removes most of the slow part. The expected autocovariance of the rest is linear in
+    the two variances for each candidate correlation time; windows of several lengths are combined.
     """
     windows = _windows(ends, period)
     if not windows:
@@ -306,7 +295,7 @@ def _coloured(ends: list[Array], period: float) -> float:
 
 
 def _windows(ends: list[Array], period: float) -> dict[int, list[Array]]:
-    """Return the ends cut to a few lengths, by length, each less its straight line."""
+    """Return the detrended ends of holds, cut to a few lengths, by length."""
     sizes = [round(seconds / period) for seconds in WINDOWS]
     windows: dict[int, list[Array]] = {}
     for end in ends:
@@ -326,7 +315,7 @@ def _first_order(n: int, step: float) -> Array:
 
 
 def _expected(covariance: Array, lags: Indices) -> Array:
-    """Return the mean autocovariance at some lags once a line is taken off."""
+    """Return the expected autocovariance at some lags after detrending."""
     n = len(covariance)
     x = np.column_stack([np.ones(n), np.arange(n) - 0.5 * (n - 1)])
     x /= np.linalg.norm(x, axis=0)
@@ -338,14 +327,15 @@ def _expected(covariance: Array, lags: Indices) -> Array:
 def white_noise(recording: Recording, values: Array) -> float:
     """Return the RMS of the white part of a channel, from second differences.
 
-    Only the third of the recording with the quietest command counts, in windows of a second.
+    Only the third of the recording with the smallest change of the command is used, in windows of
+    one second.
     """
     size = max(25, round(1.0 / recording.period))
     n = len(values) // size * size
     if n < 3 * size:
         size, n = len(values), len(values)
     windows = np.arange(n).reshape(-1, size)
-    before = np.r_[windows[:1], windows[:-1]]  # what has just moved has not settled
+    before = np.r_[windows[:1], windows[:-1]]  # recent motion has not settled
     moved = np.ptp(recording.command[np.hstack([before, windows])], axis=1)
     broken = recording.restart[windows[:, 1:]].any(axis=1) | recording.filled[windows].any(axis=1)
     whole = np.flatnonzero(~broken)
@@ -357,7 +347,7 @@ def white_noise(recording: Recording, values: Array) -> float:
 
 
 def _correlation_time(pieces: list[Array], period: float) -> float | None:
-    """Return the lag at which the autocorrelation falls below 1/e, between two samples' lags."""
+    """Return the lag [s] at which the autocorrelation falls below 1/e, interpolated."""
     pieces = [p - p.mean() for p in pieces if len(p) >= 25]
     if not pieces or not any(np.any(p) for p in pieces):
         return None

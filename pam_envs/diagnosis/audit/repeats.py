@@ -1,4 +1,4 @@
-"""Whether segments that repeat one another do, so that what differs between them is noise."""
+"""Test whether repeated segments differ by noise alone."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ Array = NDArray[np.float64]
 Source = Literal["repeats", "holds", "innovations", "declared"]
 
 DISAGREE = 1.5
-"""Ratio from which two figures for one noise are told apart."""
+"""Ratio above which two estimates of one noise disagree."""
 SURELY = 2.5
 """Standard deviations beyond which repeats differ by more than noise..."""
 LEAST_EXCESS = 0.1
-"""... and at least by this part."""
+"""... with at least this relative excess."""
 GUESSED = 0.5
-"""Standard deviation of what slow noise adds to holds, which is guessed, over it."""
+"""Relative standard deviation of the slow part of the noise of holds."""
 FAST = 1.15
-"""Ratio of fast parts, in windows of a second, from which the excess is noise of motion."""
+"""Ratio of the scatter within a second above which the excess is noise of motion."""
 
 
 @dataclass(frozen=True)
 class Trust:
-    """How far repeats and holds are to be believed.
+    """Reliability of the noise estimates from repeats and holds.
 
     Attributes
     ----------
     repeats : float
-        Standard deviation of their estimate, over it.
+        Relative standard deviation of the estimate from repeats.
     fast : float
-        Ratio of the repeats' to the holds' scatter within a second.
+        Ratio of the scatter of repeats to that of holds within a second.
     """
 
     repeats: float
@@ -41,7 +41,7 @@ class Trust:
 
     @classmethod
     def of(cls, differences: list[Array], ends: list[Array], second: int, white: float) -> Trust:
-        """Look at the pieces, of so many samples a second; ``white`` stands in for holds."""
+        """Compare pieces of ``second`` samples a second; ``white`` replaces missing holds."""
         squares = _mean_squares([d - d.mean() for d in differences], 2 * second)
         spread = np.nan
         if len(squares) > 1:
@@ -51,13 +51,13 @@ class Trust:
 
 
 def _mean_squares(pieces: list[Array], size: int) -> Array:
-    """Return the mean squares of stretches of so many samples."""
+    """Return the mean squares of stretches of ``size`` samples."""
     rows = [p[: len(p) // size * size].reshape(-1, size) for p in pieces]
     return np.concatenate([(r**2).mean(axis=1) for r in rows] or [np.zeros(0)])
 
 
 def _local(pieces: list[Array], size: int) -> float:
-    """Return the mean variance within stretches of so many samples, each less its line."""
+    """Return the mean variance within detrended stretches of ``size`` samples."""
     rows = [w for p in pieces for w in p[: len(p) // size * size].reshape(-1, size)]
     if not rows:
         return 0.0
@@ -66,9 +66,9 @@ def _local(pieces: list[Array], size: int) -> float:
 
 
 def best(estimates: Mapping[str, float], declared: float | None, trust: Trust) -> Source:
-    """Return the estimate to use: repeats, unless they differ by more than noise.
+    """Return the source to use: repeats, unless they differ by more than noise.
 
-    Then the larger of holds and what is declared, if the holds do not contradict that.
+    Otherwise the larger of holds and declared noise, if the holds do not contradict the latter.
     """
     repeats, holds = estimates.get("repeats"), estimates.get("holds")
     known = holds if holds is not None else estimates.get("innovations")
@@ -84,10 +84,10 @@ def best(estimates: Mapping[str, float], declared: float | None, trust: Trust) -
 
 
 def _exceeds(repeats: float, reference: float, slow: float, trust: Trust) -> bool:
-    """Return whether repeats differ by more than noise of a reference would have them.
+    """Return whether repeats differ by more than a reference noise.
 
-    Of a reference the part ``slow`` is guessed. An excess that is there within a second is noise of
-    the motion, which holds do not show.
+    The share ``slow`` of the reference is uncertain. An excess within one second is noise of the
+    motion, which is not visible in holds.
     """
     if repeats > DISAGREE * reference:
         return True
@@ -96,7 +96,7 @@ def _exceeds(repeats: float, reference: float, slow: float, trust: Trust) -> boo
 
 
 def detrended(values: Array) -> Array:
-    """Return values less their straight line."""
+    """Return values less their regression line."""
     x = np.arange(len(values)) - 0.5 * (len(values) - 1)
     left = values - values.mean()
     return left - x * (x @ left) / (x @ x)

@@ -1,4 +1,4 @@
-"""Checks of settled readings: do repeats drift, are they copies, do they scatter alike."""
+"""Checks of a table of settled readings: drift over repeats, copies, unequal scatter."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 MM = 1e-3
 SIGNIFICANT = 0.05
 TREND = 2.5
-"""Size of a t value from which a trend over the repeats is told."""
+"""Absolute t value above which a trend over the repeats is reported."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,12 +26,12 @@ class Trend:
     Attributes
     ----------
     slope : float
-        [m] a repeat.
+        Drift per repeat [m].
     t : float
-        Slope over its standard error, from the scatter of the readings about it.
+        Slope over its standard error, from the scatter of the readings.
     t_means : float
-        The same from the means of the repeats alone, which holds even where the readings of a
-        repeat err together; NaN for fewer than three repeats.
+        The same from the means of the repeats, valid for common errors of the readings of a
+        repeat; NaN for fewer than three repeats.
     """
 
     slope: float
@@ -40,7 +40,7 @@ class Trend:
 
 
 def repeat_trend(table: ContractionTable, load: float) -> Trend:
-    """Return the drift over the repeats at ``load`` [kg]; every repeat went the same path."""
+    """Return the drift over repeats of the same path at ``load`` [kg]."""
     left = _deviations(table, load)
     cells, repeats = left.shape
     if repeats < 2:
@@ -64,29 +64,19 @@ def scatter(table: ContractionTable, load: float) -> float:
 
 
 def scatter_homogeneity(table: ContractionTable) -> float:
-    """Return the p value that repeats scatter alike at all loads (Levene, about medians)."""
+    """Return the p-value of equal scatter at all loads (Levene test about medians)."""
     groups = [_deviations(table, load).ravel() for load in table.loads]
     groups = [group for group in groups if group.size and np.any(group)]
     return float(stats.levene(*groups).pvalue) if len(groups) > 1 else 1.0
 
 
 def audit_table(table: ContractionTable) -> list[str]:
-    """Return what to bear in mind about a table.
-
-    Parameters
-    ----------
-    table : ContractionTable
-
-    Returns
-    -------
-    list of str
-        Sentences.
-    """
+    """Return warnings on a table of settled readings."""
     warnings = _loads(table)
     if not one_path(table):
         return [
             *warnings,
-            "the repeats went different ways: their scatter and their drift were not checked",
+            "the repeats follow different paths: their scatter and drift were not checked",
         ]
     for load in table.loads:
         warnings += _copied(table, load)
@@ -101,7 +91,7 @@ def audit_table(table: ContractionTable) -> list[str]:
 
 
 def _deviations(table: ContractionTable, load: float) -> Array:
-    """Return readings less their mean over the repeats, without those zero by definition."""
+    """Return readings less their mean over repeats, without those that are zero by definition."""
     _, contraction = table.cycles(load)
     cells = contraction[np.any(contraction != 0.0, axis=1)]
     return np.asarray(cells - cells.mean(axis=1, keepdims=True))
@@ -115,7 +105,7 @@ def _loads(table: ContractionTable) -> list[str]:
         return ["there are two loads: whether an effect is in proportion to the load is not known"]
     if n == 3:
         return [
-            "there are three loads: a quadratic law of the load cannot be told from a dead zone; "
+            "there are three loads: a quadratic load law cannot be separated from a dead zone; "
             "measure at least five"
         ]
     return []
@@ -125,8 +115,8 @@ def _copied(table: ContractionTable, load: float) -> list[str]:
     _, contraction = table.cycles(load)
     numbers = table.repeats(load)
     return [
-        f"repeats {numbers[j]} and {numbers[i]} at {load:g} kg are alike digit by digit: one is a "
-        "copy; take it out, or the noise is judged too small"
+        f"repeats {numbers[j]} and {numbers[i]} at {load:g} kg are equal digit by digit: one is a "
+        "copy; remove it, or the noise is underestimated"
         for i in range(len(numbers))
         for j in range(i)
         if np.array_equal(contraction[:, i], contraction[:, j])
@@ -148,5 +138,5 @@ def _unequal(table: ContractionTable) -> list[str]:
     p = scatter_homogeneity(table)
     if p >= SIGNIFICANT:
         return []
-    told = ", ".join(f"{scatter(table, load) / MM:.3f} mm at {load:g} kg" for load in table.loads)
-    return [f"the repeats do not scatter alike at all loads (Levene p = {p:.2g}): {told}"]
+    sizes = ", ".join(f"{scatter(table, load) / MM:.3f} mm at {load:g} kg" for load in table.loads)
+    return [f"the repeats scatter differently between loads (Levene p = {p:.2g}): {sizes}"]

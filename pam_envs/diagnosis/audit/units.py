@@ -1,4 +1,4 @@
-"""Units that cannot be right: which factor would put a column right."""
+"""Detection of wrong units, with the factor that corrects a column."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ PRESSURES = {
     "Pa": (1e5, "divide by 1e5"),
     "mbar": (1e3, "divide by 1000"),
 }
-"""Other units of pressure: how many make a bar."""
+"""Other units of pressure: number of units in a bar, and the correction."""
 HIGHEST = 15.0
 USUAL = 6.0
-"""Gauge pressure [bar] that muscles are run at."""
+"""Usual gauge pressure of muscles [bar]."""
 LARGEST_SHARE = 0.4
-"""Contraction over rest length that no muscle reaches."""
+"""Largest contraction of a muscle over its rest length."""
 SMALLEST_STROKE, SMALLEST_SHARE = 0.5e-3, 0.002
-"""Stroke [m], and part of the rest length, below which no muscle stays over a wide range..."""
+"""Smallest stroke of a muscle [m], and over its rest length, over a wide range..."""
 WIDE, WIDE_SHARE = 3.0 * BAR, 0.6
-"""... of pressures [Pa]: this wide, or this part of the regulator's."""
+"""... of pressures: its width [Pa], and over the regulator's range."""
 FOLLOWS = 0.5
-"""Correlation with the command from which a contraction follows it."""
+"""Correlation with the command above which a contraction follows it."""
 
 
 def wrong_units(recording: Recording, rig: Rig) -> tuple[list[str], list[str]]:
-    """Return problems and warnings on columns in other units than their names say."""
+    """Return problems and warnings on columns with wrong units."""
     problems = _command(recording, rig)
     problems += [] if problems else _pressure(recording)
     problems += _contraction(recording, rig)
@@ -42,10 +42,10 @@ def wrong_units(recording: Recording, rig: Rig) -> tuple[list[str], list[str]]:
     return problems + wrong, warnings + _suspicions(recording, rig)
 
 
-def _looks_like(value: float, wanted: float) -> tuple[str, str] | None:
-    """Return unit and recipe that bring ``value`` nearest to ``wanted`` [bar], if near."""
+def _looks_like(value: float, expected: float) -> tuple[str, str] | None:
+    """Return unit and correction that bring ``value`` nearest to ``expected`` [bar], if near."""
     distance = {
-        unit: abs(math.log(value / factor / wanted)) for unit, (factor, _) in PRESSURES.items()
+        unit: abs(math.log(value / factor / expected)) for unit, (factor, _) in PRESSURES.items()
     }
     unit = min(distance, key=lambda name: distance[name])
     return (unit, PRESSURES[unit][1]) if distance[unit] < math.log(2.5) else None
@@ -53,15 +53,15 @@ def _looks_like(value: float, wanted: float) -> tuple[str, str] | None:
 
 def _advice(found: tuple[str, str] | None) -> str:
     if found is None:
-        return "no muscle is run like this; check its unit"
+        return "no muscle runs at this pressure; check its unit"
     return f"it looks like {found[0]}: {found[1]}"
 
 
 def _command(recording: Recording, rig: Rig) -> list[str]:
     highest = float(np.max(recording.command)) / BAR
-    wanted = USUAL if rig.max_pressure is None else rig.max_pressure / BAR
+    expected = USUAL if rig.max_pressure is None else rig.max_pressure / BAR
     if highest > HIGHEST:
-        advice = _advice(_looks_like(highest, wanted))
+        advice = _advice(_looks_like(highest, expected))
         return [f"pressure_command_bar goes up to {highest:.4g}; {advice}"]
     pressure = 0.0 if recording.pressure is None else float(np.max(recording.pressure)) / BAR
     if highest < 0.25 * pressure and 0.5 < pressure <= HIGHEST:
@@ -90,8 +90,8 @@ def _pressure(recording: Recording) -> list[str]:
     return []
 
 
-def _low(value: float, wanted: float) -> tuple[str, str] | None:
-    return _looks_like(value, wanted) if value > 0.0 else None
+def _low(value: float, expected: float) -> tuple[str, str] | None:
+    return _looks_like(value, expected) if value > 0.0 else None
 
 
 def _contraction(recording: Recording, rig: Rig) -> list[str]:
@@ -104,16 +104,16 @@ def _contraction(recording: Recording, rig: Rig) -> list[str]:
     if rig.rest_length is None or largest <= LARGEST_SHARE * rig.rest_length:
         return []
     falls = _follows(recording) < -FOLLOWS
-    told = "it looks like the muscle's length: give rest length minus length"
+    advice = "it looks like the muscle's length: give rest length minus length"
     return [
         f"contraction_mm goes up to {largest / MM:.4g} mm, more than {LARGEST_SHARE:.0%} of the "
         f"rest length of {rig.rest_length / MM:.4g} mm; "
-        + (told if falls else "check its unit and the rest length")
+        + (advice if falls else "check its unit and the rest length")
     ]
 
 
 def _metres(recording: Recording, rig: Rig) -> list[str]:
-    """Return what is wrong with a stroke that is too small for the pressures."""
+    """Return a problem with a stroke that is too small for the range of pressures."""
     assert recording.contraction is not None
     wide = WIDE if rig.max_pressure is None else WIDE_SHARE * rig.max_pressure
     if np.ptp(recording.command) < wide or _follows(recording) < FOLLOWS:
@@ -132,7 +132,7 @@ def _metres(recording: Recording, rig: Rig) -> list[str]:
 
 
 def _follows(recording: Recording) -> float:
-    """Return the correlation of contraction with command."""
+    """Return the correlation of contraction and command."""
     if recording.contraction is None or np.ptp(recording.contraction) == 0.0:
         return 0.0
     if np.ptp(recording.command) == 0.0:
@@ -165,7 +165,7 @@ def _load(recording: Recording) -> tuple[list[str], list[str]]:
 
 
 def _suspicions(recording: Recording, rig: Rig) -> list[str]:
-    """Return what may be right, but seldom is."""
+    """Return warnings on unusual values."""
     warnings = []
     highest = float(np.max(recording.command))
     if highest <= 0.05 * BAR:
@@ -186,7 +186,7 @@ def _suspicions(recording: Recording, rig: Rig) -> list[str]:
         offset = float(np.median(recording.pressure - recording.command)) / BAR
         if abs(offset - 1.013) < 0.08:
             warnings.append(
-                f"pressure_bar lies {offset:.3g} bar above the command; gauge pressure is wanted: "
+                f"pressure_bar is {offset:.3g} bar above the command; gauge pressure is expected: "
                 "if it is absolute, subtract 1.013"
             )
     if recording.contraction is not None and highest > BAR:

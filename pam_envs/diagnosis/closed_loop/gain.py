@@ -1,8 +1,8 @@
-"""What the better model is worth in closed loop.
+"""Improvement of the tracking error in closed loop by the extended model.
 
-The same design routine makes a controller of the plant before and one of the extended plant; both
-are run against the rig where it is simulated, otherwise against the extended plant with residuals
-of held-out experiments replayed on it. What counts is the true position.
+The same design routine makes a controller from the plant before and one from the extended plant.
+Both are run on the rig if it can be simulated, otherwise on the extended plant with residuals of
+held-out experiments added. The error is that of the true position.
 """
 
 from __future__ import annotations
@@ -23,25 +23,25 @@ from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 Array = NDArray[np.float64]
 Design = Callable[[Any], Controller]
-"""From a plant to a controller; ``mass.load`` and ``muscle.temperature`` are those of the runs."""
+"""Design routine from a plant, with load and temperature of the runs, to a controller."""
 
 COMPENSABLE: tuple[str, ...] = tuple(cause.name for cause in catalogue() if cause.compensable)
-"""Causes that a controller can compensate."""
+"""Shipped causes that a controller can compensate."""
 
 SETTLING = 2.0
-"""Time [s] at the start of a reference that does not count."""
+"""Time at the start of a reference that is not scored [s]."""
 SEGMENT = 2.0
-"""Length [s] of what is drawn anew for an interval, and of the pieces of a replayed residual."""
+"""Length of the bootstrap blocks, and of the pieces of a resampled residual [s]."""
 DRAWS = 2000
 LEVEL = 0.95
 LEAST_STROKE = 1e-3
 LEAST_GAP = 0.05
-"""Gap to the oracle, over the error, below which no share of it is reported."""
+"""Relative gap to the oracle below which the recovered share is not reported."""
 MM = 1e3
 
 
 class Rig(Protocol):
-    """A rig to run controllers on, or a simulation of one."""
+    """A rig, or a simulation of one, on which controllers run."""
 
     @property
     def position(self) -> float:
@@ -49,17 +49,17 @@ class Rig(Protocol):
         ...
 
     def reset(self, seed: int | None = None) -> None:
-        """Bring it to rest without pressure and start its noise anew."""
+        """Reset to rest without pressure and restart the noise."""
         ...
 
     def step(self, set_point: float) -> tuple[float, float]:
-        """Hold a set-point [Pa] for a period; return contraction [m] and pressure [Pa] read."""
+        """Hold a setpoint [Pa] for a period; return contraction [m] and pressure [Pa] read."""
         ...
 
 
 @dataclass(frozen=True)
 class Residuals:
-    """What the extended plant leaves of held-out experiments.
+    """Residuals of the extended plant in held-out experiments.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Residuals:
     period: float
 
     def resampled(self, seed: int, period: float, samples: int) -> Array:
-        """Return pieces of ``SEGMENT`` seconds drawn at random and put together, (samples,)."""
+        """Return randomly drawn pieces of ``SEGMENT`` seconds, concatenated, shape (samples,)."""
         rng = np.random.default_rng(seed)
         every = np.arange(0.0, (len(self.contraction) - 1) * self.period + 1e-9, period)
         trace = np.interp(every, np.arange(len(self.contraction)) * self.period, self.contraction)
@@ -83,13 +83,14 @@ class Residuals:
 
 
 class ReplayedRig:
-    """A plant on which held-out residuals are replayed, in the reading and in the position.
+    """A plant with held-out residuals added to reading and position.
 
     Parameters
     ----------
     plant : SingleMuscle
-        Its sensor noise is in the residuals; without any, the plant's own noise acts.
+        Plant to step; its own sensor noise acts only without residuals.
     residuals : Residuals, optional
+        Residuals, which contain the sensor noise.
     """
 
     def __init__(self, plant: SingleMuscle, residuals: Residuals | None) -> None:
@@ -98,7 +99,7 @@ class ReplayedRig:
         self.reset(0)
 
     def reset(self, seed: int | None = None) -> None:
-        """Bring the plant to rest and draw the residuals anew."""
+        """Reset the plant to rest and resample the residuals."""
         given = self._residuals
         self._stepper.reset(seed if given is None else None)
         self._count, self._extra = 0, np.zeros(1)
@@ -108,11 +109,11 @@ class ReplayedRig:
 
     @property
     def position(self) -> float:
-        """Return the true contraction [m]."""
+        """True contraction [m]."""
         return self._stepper.position + float(self._extra[self._count % len(self._extra)])
 
     def step(self, set_point: float) -> tuple[float, float]:
-        """Hold a set-point [Pa] for a period; return contraction [m] and pressure [Pa] read."""
+        """Hold a setpoint [Pa] for a period; return contraction [m] and pressure [Pa] read."""
         reading, pressure = self._stepper.step(set_point)
         self._count += 1
         return reading + float(self._extra[self._count % len(self._extra)]), pressure
@@ -122,7 +123,7 @@ class ReplayedRig:
 
 
 def reach(rig: Rig, full: float, period: float) -> float:
-    """Return the contraction [m] at which a rig is after two seconds of full pressure."""
+    """Return the contraction [m] of a rig after two seconds of full pressure."""
     rig.reset(0)
     for _ in range(round(2.0 / period)):
         rig.step(full)
@@ -130,22 +131,20 @@ def reach(rig: Rig, full: float, period: float) -> float:
 
 
 def run(controller: Controller, rig: Rig, reference: Array, load: float, seed: int) -> Array:
-    """Return the error [m] of the true position after each control period.
+    """Return the error [m] of the true position after each control period, shape (n,).
 
     Parameters
     ----------
     controller : Controller
+        Controller to run.
     rig : Rig
+        Where it runs.
     reference : ndarray, shape (n + PREVIEW,)
-        Wanted contraction [m].
+        Desired contraction [m].
     load : float
         Load [kg].
     seed : int
-        Of the rig's noise.
-
-    Returns
-    -------
-    ndarray, shape (n,)
+        Seed of the rig's noise.
     """
     rig.reset(seed)
     controller.reset()
@@ -159,26 +158,26 @@ def run(controller: Controller, rig: Rig, reference: Array, load: float, seed: i
 
 
 def segment_squares(errors: Array, period: float) -> Array:
-    """Return mean squares [m2] over the segments after settling, shape (segments,)."""
+    """Return mean squares [m2] of the segments after settling, shape (segments,)."""
     size, first = round(SEGMENT / period), round(SETTLING / period)
     whole = (len(errors) - first) // size
     return np.asarray((errors[first : first + whole * size].reshape(whole, size) ** 2).mean(axis=1))
 
 
 def rms(squares: Array) -> Array:
-    """Return the root of the mean over the last axis."""
+    """Return the square root of the mean over the last axis."""
     return np.asarray(np.sqrt(squares.mean(axis=-1)))
 
 
 def spread(values: Array) -> list[float]:
-    """Return the interval of level ``LEVEL``."""
+    """Return the confidence interval of level ``LEVEL``."""
     tail = 50.0 * (1.0 - LEVEL)
     low, high = np.percentile(values, [tail, 100.0 - tail])
     return [float(low), float(high)]
 
 
 def prepared(plant: Any, load: float, kelvin: float | None) -> Any:
-    """Return a plant at the load and temperature of the runs; what slipped once is left out."""
+    """Return a plant at the load and temperature of the runs, without a single slip."""
     if not isinstance(plant, SingleMuscle):
         return plant
     values = {"mass.load": load, "position.slip": 0.0}
@@ -215,25 +214,25 @@ def closed_loop(
         From a plant to a :class:`Controller`; default
         :func:`~pam_envs.diagnosis.closed_loop.plant_inverse.design`.
     rig : Rig, optional
-        Where the controllers run; default: the extended plant with ``residuals`` replayed.
+        Where the controllers run; default: the extended plant with ``residuals`` added.
     oracle : SingleMuscle or Simulated, optional
-        What the rig really is: what a third controller is designed on.
+        True plant of the rig, for a third controller.
     references : mapping of str to ndarray, shape (n + PREVIEW,), optional
-        Wanted contractions [m], one sample a control period; default :func:`fixed_references`.
+        Desired contractions [m], one sample a control period; default :func:`fixed_references`.
     residuals : Residuals, optional
-        What the extended plant leaves of held-out experiments.
+        Residuals of the extended plant in held-out experiments.
     load : float
-        Load [kg] of the runs.
+        Load of the runs [kg].
     kelvin : float, optional
-        Temperature [K] of the runs; default: that of each plant.
+        Temperature of the runs [K]; default: that of each plant.
     seed : int
-        Of the noise and of the intervals; the same for every controller.
+        Seed of noise and bootstrap, the same for every controller.
 
     Returns
     -------
     dict or None
-        As under ``closed_loop`` in the report, and ``references`` with the errors on each. None
-        where the stroke is less than ``LEAST_STROKE`` under this load.
+        As ``closed_loop`` in the report, with the errors on each of the ``references``. None if
+        the stroke under this load is less than ``LEAST_STROKE``.
     """
     make = default_design if design is None else design
     plants = [prepared(p, load, kelvin) for p in (before, after, oracle) if p is not None]
@@ -259,7 +258,7 @@ def closed_loop(
     return {**found, "text": sentence(found)}
 
 
-REPLAYED = "the extended plant with held-out residuals replayed"
+REPLAYED = "the extended plant with held-out residuals added"
 NOISY = "the extended plant with its sensor noise"
 
 
@@ -268,16 +267,16 @@ def _name(design: Design) -> str:
 
 
 def scores(squares: Array, names: list[str], seed: int) -> dict[str, Any]:
-    """Return errors and gain with intervals.
+    """Return errors and improvement with confidence intervals.
 
     Parameters
     ----------
     squares : ndarray, shape (2 or 3, references, segments)
         Mean squares [m2] of before, after and the oracle.
     names : list of str
-        Of the references.
+        Names of the references.
     seed : int
-        Of the draws: of segments, the same ones for each controller.
+        Seed of the segment bootstrap, the same for each controller.
     """
     flat = squares.reshape(len(squares), -1)
     rng = np.random.default_rng(seed)
@@ -306,21 +305,21 @@ def scores(squares: Array, names: list[str], seed: int) -> dict[str, Any]:
 
 
 def sentence(found: Mapping[str, Any]) -> str:
-    """Return what was found in words."""
+    """Return the result in words."""
     old, new = found["before"]["value"], found["after"]["value"]
     better, (low, high) = found["better_percent"]["value"], found["better_percent"]["interval"]
     text = (
-        f"Designed on the extended plant instead of the plant before, the same controller misses "
-        f"the reference on {found['where']} by {new:.3g} instead of {old:.3g} mm RMS: "
+        "Designed on the extended plant instead of the plant before, the same controller has a "
+        f"tracking error of {new:.3g} instead of {old:.3g} mm RMS on {found['where']}: "
     )
     if low <= 0.0 <= high:
-        text += f"no difference that these runs could show ({low:.0f} to {high:.0f} %)."
+        text += f"no significant difference ({low:.0f} to {high:.0f} %)."
     else:
         word = "less" if better > 0.0 else "more"
         ends = sorted((abs(low), abs(high)))
         text += f"{abs(better):.0f} % {word} (95 % interval {ends[0]:.0f} to {ends[1]:.0f} %)."
     if found["oracle"] is not None:
-        text += f" Designed on the rig itself it misses by {found['oracle']['value']:.3g} mm"
+        text += f" Designed on the rig itself the error is {found['oracle']['value']:.3g} mm"
         share = found["recovered"]
-        text += "." if share is None else f"; {100.0 * share:.0f} % of the way there is gone."
+        text += "." if share is None else f"; {100.0 * share:.0f} % of that gap is closed."
     return text

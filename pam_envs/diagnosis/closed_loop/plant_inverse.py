@@ -1,18 +1,17 @@
-"""A controller made from a plant: its own inverse by simulation, and a PI loop outside.
+"""Controller from a plant: feedforward by inverse simulation and a PI feedback loop.
 
-Feed-forward. A copy of the plant runs inside, open loop. In every control period a fan of ramps of
-the set-point, all beginning at the last one, is tried on copies of that copy; the ramp that brings
-the position to the reference at the horizon is taken, and its first set-point acts. What the plant
-has is so compensated, history and dead time included: creep, threshold, friction, droop, leak,
-dead band, asymmetry, temperature. Where the reference would later get out of the reach of the
-fan's steepest ramp (a slow valve), that ramp is taken at once. Nothing is measured for it.
+Feedforward: a copy of the plant runs in open loop. In every control period a fan of setpoint ramps
+from the last setpoint is simulated on further copies; the ramp that meets the reference at the
+horizon is selected, and its first setpoint is applied. All effects of the plant are compensated,
+with history and dead time: creep, threshold, friction, droop, leak, dead band, asymmetry,
+temperature. If the reference would later be out of reach of the steepest ramp (a slow valve), that
+ramp starts at once. The feedforward uses no measurement.
 
-PI. It compares the reading with what the sensor *inside* shows, so that delays and lags that the
-plant has are not fought, and rests while the plant is right. Its gains are the best of a grid on
-that same plant, whose set-point is disturbed, scaled and late in a way that is fixed: a loop
-tuned without any error of the model would be no loop.
+Feedback: a PI controller acts on the difference between the reading and the simulated reading, so
+that known delays and lags cause no feedback. Its gains are the best of a grid on the same plant,
+with a fixed disturbance, scaling and delay of the setpoint as model error.
 
-Everything is the same for every plant: horizons, grid, disturbances, seeds.
+Horizons, grid, disturbances and seeds are the same for every plant.
 """
 
 from __future__ import annotations
@@ -29,52 +28,52 @@ from pam_envs.plants.single_muscle.plant import SingleMuscle
 Array = NDArray[np.float64]
 
 PREVIEW = 60
-"""Samples of the reference that a controller is shown, the present one among them."""
+"""Preview of the reference [samples], with the present one."""
 LEVELS = 15
 SMALLEST, LARGEST = 5e-5, 1.0
-"""Slopes of the fan, full pressures a period: geometric on both sides of the last slope."""
+"""Slopes of the fan [full pressures a period], geometric on both sides of the last slope."""
 HORIZONS = (2, 3, 5, 8)
-"""Periods after the dead time at which a ramp shall meet the reference."""
-LOOKS = (10, 28)
-"""Periods after it in which the reference shall not get out of reach, with the second horizon."""
+"""Candidate horizons: periods after the dead time at which a ramp meets the reference."""
+REACHES = (10, 28)
+"""Periods after it in which the reference is kept within reach, with the second horizon."""
 SLIGHT = 2e-5
-"""Distance [m] out of reach that is not worth an early start."""
+"""Distance out of reach that needs no early start [m]."""
 PROPORTIONAL = (0.0, 0.25, 0.6, 1.0)
 INTEGRAL = (0.0, 0.5, 1.0, 2.0, 3.5, 6.0, 10.0, 16.0)
-"""Grid of the loop, over the pressure that the stroke takes: [1] and [1/s]."""
+"""Grid of the gains over full pressure per stroke: [1] and [1/s]."""
 MISTAKES = ((1.2, 2), (0.85, 0), (1.0, 5))
-"""Factors on the set-point and periods by which it is late, while the loop is tuned."""
+"""Model errors while the loop is tuned: factor on the setpoint, delay [periods]."""
 DISTURBANCE = 0.02
-"""Size of the pressure that is added meanwhile, over the full pressure."""
+"""Amplitude of the pressure disturbance while the loop is tuned, over the full pressure."""
 AUTHORITY = 0.4
-"""Largest part of the full pressure that the loop adds or takes away."""
+"""Largest contribution of the integral over the full pressure."""
 TUNING_TIME = 9.0
 TUNING_SEED = 20_220_613
 SHORTEST = 1e-6
-"""Stroke [m] below which gains are those of this stroke."""
+"""Least stroke for the scale of the gains [m]."""
 
 
 class Batch(Protocol):
-    """Copies of a plant, each with a set-point of its own."""
+    """Copies of a plant, each with its own setpoint."""
 
     position: Array
 
     def step(self, set_points: ArrayLike) -> tuple[Array, Array]:
-        """Hold set-points [Pa] for a period; return contractions [m] and pressures [Pa] read."""
+        """Hold setpoints [Pa] for a period; return contractions [m] and pressures [Pa] read."""
         ...
 
 
 class Simulated(Protocol):
-    """A plant that a controller can carry inside; see :class:`PlantStepper`.
+    """A plant that a controller can simulate; see :class:`PlantStepper`.
 
     Attributes
     ----------
     period : float
         Control period [s].
     max_pressure : float
-        Largest set-point [Pa].
+        Largest setpoint [Pa].
     noise : float
-        RMS noise [m] of the contraction that is read.
+        RMS noise of the contraction reading [m].
     """
 
     period: float
@@ -87,15 +86,15 @@ class Simulated(Protocol):
         ...
 
     def reset(self, seed: int | None = None) -> None:
-        """Bring it to rest without pressure; without a seed it is free of noise."""
+        """Reset to rest without pressure; without a seed it is free of noise."""
         ...
 
     def step(self, set_point: float) -> tuple[float, float]:
-        """Hold a set-point [Pa] for a period; return contraction [m] and pressure [Pa] read."""
+        """Hold a setpoint [Pa] for a period; return contraction [m] and pressure [Pa] read."""
         ...
 
     def try_ahead(self, set_points: ArrayLike, periods: int) -> Array:
-        """Return where copies would be [m], shape (periods, m).
+        """Return future positions of copies [m], shape (periods, m).
 
         ``set_points`` [Pa] are held, shape (m,), or one a period, shape (periods, m).
         """
@@ -110,20 +109,20 @@ class Controller(Protocol):
     """Stateful controller that :func:`~pam_envs.diagnosis.closed_loop.gain.closed_loop` runs."""
 
     def reset(self) -> None:
-        """Begin anew, with the plant at rest without pressure."""
+        """Reset, with the plant at rest without pressure."""
         ...
 
     def act(self, reference: Array, reading: float, pressure: float, load: float) -> float:
-        """Return the set-point [Pa] for the period that begins now.
+        """Return the setpoint [Pa] of the present period.
 
         Parameters
         ----------
         reference : ndarray, shape (k,)
-            Wanted contraction [m] now and in the following periods, k >= 1.
+            Desired contraction [m] now and in the following periods, k >= 1.
         reading : float
-            Contraction read now [m].
+            Contraction reading [m].
         pressure : float
-            Pressure read now [Pa].
+            Pressure reading [Pa].
         load : float
             Load [kg].
         """
@@ -139,9 +138,9 @@ FAN = _fan()
 
 
 def crossing(slopes: Array, errors: Array, middle: int) -> float:
-    """Return the slope at which the error vanishes: the one nearest the middle of the fan.
+    """Return the slope at which the error vanishes, nearest to the middle of the fan.
 
-    Where it vanishes nowhere, the slope of the smallest error, and of those the most gentle.
+    Without a zero crossing the slope of the smallest error, the gentlest of several.
     """
     below = errors < 0.0
     turns = np.flatnonzero(below[1:] != below[:-1])
@@ -155,21 +154,21 @@ def crossing(slopes: Array, errors: Array, middle: int) -> float:
 
 
 class PlantInverse:
-    """Feed-forward by simulation.
+    """Feedforward by inverse simulation.
 
     Parameters
     ----------
     model : Simulated
-        The plant inside; it is stepped by :meth:`act`.
+        Internal plant; it is stepped by :meth:`act`.
     horizon : int
-        Periods after which a ramp of the set-point shall meet the reference.
+        Periods after which a setpoint ramp meets the reference.
     look : int
-        Periods over which the reference is kept within reach; up to ``horizon``: none.
+        Periods over which the reference is kept within reach; none if at most ``horizon``.
 
     Attributes
     ----------
     expected : float
-        Contraction [m] that the sensor inside shows now.
+        Simulated contraction reading [m].
     """
 
     def __init__(self, model: Simulated, horizon: int, look: int = 0) -> None:
@@ -180,12 +179,12 @@ class PlantInverse:
         self.reset()
 
     def reset(self) -> None:
-        """Bring the plant inside to rest."""
+        """Reset the internal plant to rest."""
         self.model.reset(None)
         self.set_point = self.slope = self.expected = 0.0
 
     def _in_time(self, reference: Array, paths: Array, slopes: Array, slope: float) -> float:
-        """Return the steepest slope where less of it would come too late."""
+        """Return the steepest slope if a gentler one would miss the later reference."""
         later = reference[self.horizon + 1 : self.look + 1]
         if len(later) == 0:
             return slope
@@ -197,7 +196,7 @@ class PlantInverse:
         return float(slopes[-1] if above > below else slopes[0])
 
     def act(self, reference: Array) -> float:
-        """Return the set-point [Pa] of this period and let the plant inside run through it."""
+        """Return the setpoint [Pa] of this period and step the internal plant."""
         full = self.model.max_pressure
         slopes = self.slope + full * FAN
         plans = np.clip(self.set_point + self._steps * slopes, 0.0, full)
@@ -206,8 +205,8 @@ class PlantInverse:
         slope = crossing(slopes, paths[self.horizon - 1] - aim, LEVELS)
         if self.look > self.horizon:
             slope = self._in_time(reference, paths, slopes, slope)
-        wanted = self.set_point + slope
-        was, self.set_point = self.set_point, float(min(max(wanted, 0.0), full))
+        desired = self.set_point + slope
+        was, self.set_point = self.set_point, float(min(max(desired, 0.0), full))
         self.slope = self.set_point - was
         self.expected, _ = self.model.step(self.set_point)
         return self.set_point
@@ -215,14 +214,14 @@ class PlantInverse:
 
 @dataclass(frozen=True)
 class Gains:
-    """Of the loop: ``proportional`` [Pa/m] and ``integral`` [Pa/(m s)]."""
+    """Gains of the feedback loop: ``proportional`` [Pa/m] and ``integral`` [Pa/(m s)]."""
 
     proportional: float
     integral: float
 
 
 class InversePi:
-    """The plant's inverse as feed-forward, and a PI loop outside."""
+    """Feedforward by inverse simulation with PI feedback."""
 
     def __init__(self, inverse: PlantInverse, gains: Gains) -> None:
         self.inverse = inverse
@@ -230,12 +229,12 @@ class InversePi:
         self.reset()
 
     def reset(self) -> None:
-        """Begin anew, with the plant at rest without pressure."""
+        """Reset, with the plant at rest without pressure."""
         self.inverse.reset()
         self._sum = 0.0
 
     def act(self, reference: Array, reading: float, pressure: float, load: float) -> float:
-        """Return the set-point [Pa]; see :class:`Controller`."""
+        """Return the setpoint [Pa]; see :class:`Controller`."""
         model = self.inverse.model
         error = self.inverse.expected - reading
         forward = self.inverse.act(reference)
@@ -253,19 +252,19 @@ class InversePi:
 def correction(
     error: Any, total: Any, forward: Any, proportional: Any, integral: Any, full: float
 ) -> tuple[Any, Any]:
-    """Return the set-point [Pa] and the integral [Pa], numbers or arrays.
+    """Return the setpoint [Pa] and the integral [Pa], numbers or arrays.
 
-    The integral stops where the set-point is at a limit and would be driven beyond it.
+    Anti-windup: the integral stops while the setpoint is at a limit and would exceed it.
     """
     summed = np.minimum(np.maximum(total + integral * error, -AUTHORITY * full), AUTHORITY * full)
-    wanted = forward + proportional * error + summed
-    output = np.minimum(np.maximum(wanted, 0.0), full)
-    beyond = (wanted - output) * error > 0.0
+    desired = forward + proportional * error + summed
+    output = np.minimum(np.maximum(desired, 0.0), full)
+    beyond = (desired - output) * error > 0.0
     return output, np.where(beyond, total, summed)
 
 
 def stroke(model: Simulated) -> float:
-    """Return the contraction [m] that full pressure reaches in two seconds."""
+    """Return the contraction [m] after two seconds of full pressure."""
     one = model.batch(1)
     for _ in range(round(2.0 / model.period)):
         one.step([model.max_pressure])
@@ -273,7 +272,7 @@ def stroke(model: Simulated) -> float:
 
 
 def dead_periods(model: Simulated) -> int:
-    """Return after how many periods a set-point begins to act, by a twentieth of its effect."""
+    """Return the dead time [periods] until a setpoint has a twentieth of its effect."""
     full, periods = model.max_pressure, round(0.5 / model.period)
     two, apart = model.batch(2), np.empty(periods)
     for _ in range(round(2.0 / model.period)):
@@ -285,7 +284,7 @@ def dead_periods(model: Simulated) -> int:
 
 
 def tuning_reference(model: Simulated, top: float) -> Array:
-    """Return the reference [m] on which a controller is tuned: sines, then ramps and holds."""
+    """Return the reference for tuning [m]: sines, then ramps and holds."""
     t = np.arange(round(TUNING_TIME / model.period) + PREVIEW) * model.period
     sines = 0.5 + 0.2 * np.sin(1.9 * t) + 0.1 * np.sin(4.4 * t + 1.0) + 0.05 * np.sin(8.2 * t + 2.0)
     nodes = np.array([0.0, 4.5, 4.9, 5.7, 6.1, 6.9, 7.5, 8.1, 8.3, 9.0])
@@ -296,7 +295,7 @@ def tuning_reference(model: Simulated, top: float) -> Array:
 
 
 def feed_forward(inverse: PlantInverse, reference: Array) -> tuple[Array, Array, Array]:
-    """Return set-points [Pa], readings before them [m] and positions after them [m]."""
+    """Return setpoints [Pa], readings before them [m] and positions after them [m]."""
     inverse.reset()
     rows = []
     for k in range(len(reference) - PREVIEW):
@@ -307,7 +306,7 @@ def feed_forward(inverse: PlantInverse, reference: Array) -> tuple[Array, Array,
 
 
 def disturbance(periods: int, period: float, full: float) -> Array:
-    """Return the pressure [Pa] that disturbs the tuning: slow sines and a step every 1.5 s."""
+    """Return the pressure disturbance of the tuning [Pa]: slow sines and a step every 1.5 s."""
     t = np.arange(periods) * period
     rng = np.random.default_rng(TUNING_SEED)
     steps = rng.uniform(-1.0, 1.0, int(t[-1] / 1.5) + 1)[(t / 1.5).astype(int)]
@@ -317,7 +316,7 @@ def disturbance(periods: int, period: float, full: float) -> Array:
 def errors_of(
     model: Simulated, forward: Array, expected: Array, reference: Array, gains: Array
 ) -> Array:
-    """Return the RMS error [m] of every pair of gains over the mistakes, shape (n,)."""
+    """Return the RMS error [m] of every pair of gains over the model errors, shape (n,)."""
     full, n = model.max_pressure, len(gains)
     kp, ki = np.tile(gains.T, len(MISTAKES))
     factor, late = np.repeat(np.array(MISTAKES), n, axis=0).T
@@ -339,7 +338,7 @@ def errors_of(
 
 
 def best_inverse(model: Simulated, reference: Array) -> tuple[PlantInverse, Array, Array]:
-    """Return the inverse that follows best, its set-points [Pa] and its readings [m]."""
+    """Return the inverse with the smallest error, its setpoints [Pa] and readings [m]."""
     dead, first = dead_periods(model), round(1.5 / model.period)
 
     def tried(horizon: int, look: int) -> tuple[float, PlantInverse, Array, Array]:
@@ -349,18 +348,18 @@ def best_inverse(model: Simulated, reference: Array) -> tuple[PlantInverse, Arra
         return float(np.mean(missed[first:] ** 2)), inverse, forward, expected
 
     found = [tried(dead + beyond, 0) for beyond in HORIZONS]
-    found += [tried(dead + HORIZONS[1], dead + look) for look in LOOKS]
+    found += [tried(dead + HORIZONS[1], dead + look) for look in REACHES]
     _, inverse, forward, expected = min(found, key=lambda made: made[0])
     return inverse, forward, expected
 
 
 def design(plant: SingleMuscle | Simulated) -> InversePi:
-    """Return the controller for a plant: inverse by simulation and a PI loop.
+    """Return the controller of a plant: feedforward by inverse simulation with PI feedback.
 
     Parameters
     ----------
     plant : SingleMuscle or Simulated
-        Of a muscle, ``mass.load`` and ``muscle.temperature`` say where it works.
+        Plant to control; ``mass.load`` and ``muscle.temperature`` are those of the runs.
     """
     model: Simulated = (
         PlantStepper(plant, plant.mass.load) if isinstance(plant, SingleMuscle) else plant

@@ -1,7 +1,7 @@
-"""The references on which controllers are compared: always the same, scaled to the stroke.
+"""References of the closed-loop comparison: fixed shapes, scaled to the stroke.
 
-The steepest ramp takes a stroke in about three quarters of a second, so that a regulator of usual
-slew rate can follow, and a slow one is seen to be slow.
+The steepest ramp covers the stroke in about 0.75 s, so that a regulator of usual slew rate can
+follow it and a slow one cannot.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from pam_envs.plants.core.stepper import PERIOD
 Array = NDArray[np.float64]
 
 DURATION = 24.0
-"""Length of each [s]."""
+"""Duration of each reference [s]."""
 LOW, HIGH = 0.15, 0.85
-"""References stay between these shares of the stroke."""
+"""Range of the references over the stroke."""
 SEED = 20_030_113
 
 
 def smooth_path(
     t: NDArray[Any], times: NDArray[Any], levels: NDArray[Any], ramps: NDArray[Any]
 ) -> Array:
-    """Return a path that goes to each level at its time, within its ramp, without corners."""
+    """Return a smooth path that reaches each level within a ramp that starts at its time."""
     path = np.full(len(t), levels[0])
     for i in range(1, len(levels)):
         s = np.clip((t - times[i]) / ramps[i], 0.0, 1.0)
@@ -40,14 +40,14 @@ def fixed_references(top: float, period: float = PERIOD) -> dict[str, Array]:
     Parameters
     ----------
     top : float
-        Stroke [m]; the references stay between ``LOW`` and ``HIGH`` of it once they have risen.
+        Stroke [m]; after the initial rise references are between ``LOW`` and ``HIGH`` of it.
     period : float
         Control period [s].
 
     Returns
     -------
     dict of str to ndarray, shape (n + PREVIEW,)
-        ``DURATION`` seconds each and what a controller is shown at the end.
+        ``DURATION`` seconds each, and the preview at the end.
     """
     t = np.arange(round(DURATION / period) + PREVIEW) * period
     turns = np.array([0.08, 0.21, 0.47, 0.83])

@@ -95,7 +95,7 @@ class Judgement:
 
 
 def judge(evidence: Mapping[str, Any], rule: Rule) -> Judgement:
-    """Return the verdict on evidence (:meth:`pam_envs.diagnosis.decide.verdict.Ladder.evidence`)."""
+    """Return the verdict on evidence (``pam_envs.diagnosis.decide.verdict.Ladder.evidence``)."""
     levels = evidence["levels"]
     least = max(rule.least_gain, rule.least_total / max(1, evidence["blocks"]))
     if len(levels) < 2 or not is_accepted(levels[1], least, rule):

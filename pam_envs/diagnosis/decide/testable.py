@@ -40,7 +40,7 @@ def not_testable(
     reasons |= _too_small(found, left)
     if recording.pressure is None:
         for name, other in lookalikes(found, left).items():
-            reasons.setdefault(name, f"cannot be told from {other} without pressure_bar")
+            reasons.setdefault(name, f"cannot be separated from {other} without pressure_bar")
     return found, {c.name: reasons[c.name] for c in causes if c.name in reasons}
 
 

@@ -1,7 +1,7 @@
-"""The next experiment: which of a list tells the fitted rivals apart best.
+"""Design of the next experiment: the one of a list that best separates the fitted rivals.
 
-Two rivals count as apart in an experiment by what the one predicts and the other cannot follow,
-however its own parameters are refitted to the new data, seen by the sensors that there are.
+The separation of two rivals in an experiment is the difference of their predicted readings that a
+refit of either one's own parameters to the new data cannot remove.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from pam_envs.plants.single_muscle.replay import LONGEST_STEP, Inputs, replay_ro
 Array = NDArray[np.float64]
 
 ENOUGH = 1.0
-"""Mean squared difference of the rivals, in noise variances, that an experiment has to promise."""
+"""Least mean squared difference of the rivals, in noise variances, of a useful experiment."""
 RANK = 1e-6
-"""Directions of a rival's parameters below this part of the largest say nothing."""
+"""Relative size of the directions of a rival's parameters that count."""
 
 
 @dataclass(frozen=True)
 class Rival:
-    """A fitted model.
+    """A fitted model with its sensitivity to its own parameters.
 
     Attributes
     ----------
     names : tuple of str
-        Of its causes.
+        Names of its causes.
     column : ndarray, shape (p,)
         Its parameters.
     nearby : ndarray, shape (k, p)
-        The same with one parameter of its causes moved a little each.
+        The same with one parameter of its causes perturbed in each row.
     """
 
     names: tuple[str, ...]
@@ -48,19 +48,19 @@ class Rival:
 
     @property
     def label(self) -> str:
-        """Its name in the report."""
+        """Name in the report."""
         return "+".join(self.names)
 
     @property
     def columns(self) -> Array:
-        """All of it, shape (1 + k, p)."""
+        """Parameters and perturbed parameters, shape (1 + k, p)."""
         return (
             np.vstack([self.column[None], self.nearby]) if len(self.nearby) else self.column[None]
         )
 
 
 def rival_of(names: tuple[str, ...], fit: Fit, base: int, tie: Callable[[Array], None]) -> Rival:
-    """Return a fit as a rival; its parameters after the first ``base`` are its own."""
+    """Return the rival of a fit, whose own parameters follow the first ``base`` ones."""
     places = np.tile(fit.z, (1 + len(fit.z) - base, 1))
     for row, k in enumerate(range(base, len(fit.z)), 1):
         free = fit.frees[k]
@@ -73,27 +73,27 @@ def rival_of(names: tuple[str, ...], fit: Fit, base: int, tie: Callable[[Array],
 
 @dataclass(frozen=True)
 class Sensors:
-    """What is measured.
+    """Sensors of an experiment.
 
     Attributes
     ----------
     noise : ndarray, shape (channels,)
-        RMS, in SI; infinite where nothing is measured.
+        RMS noise [SI]; infinite for a channel without a sensor.
     """
 
     noise: Array
 
     def shown(self, outputs: Array) -> Array:
-        """Return what outputs (channels, T, n) show over the noise, shape (n, channels * T).
+        """Return outputs (channels, T, n) over the noise, shape (n, channels * T).
 
-        Without their means: a constant offset goes away where the sensors are zeroed again.
+        Means are removed: a constant offset disappears when the sensors are zeroed again.
         """
         flat = (outputs - outputs.mean(axis=1, keepdims=True)) / self.noise[:, None, None]
         return np.asarray(flat.transpose(2, 0, 1).reshape(outputs.shape[2], -1))
 
 
 def inputs_of(plan: Plan, longest_step: float = LONGEST_STEP) -> Inputs:
-    """Return a plan's inputs."""
+    """Return the inputs of a plan for the replay."""
     n = len(plan.command)
     fresh = np.zeros(n, bool)
     fresh[0] = True
@@ -112,24 +112,24 @@ def inputs_of(plan: Plan, longest_step: float = LONGEST_STEP) -> Inputs:
 def separations(
     plant: SingleMuscle, rivals: Sequence[Rival], inputs: Inputs, sensors: Sensors
 ) -> list[float]:
-    """Return how far the first of some rivals is from each other one in an experiment.
+    """Return the separation of the first rival from each other one in an experiment.
 
     Parameters
     ----------
     plant : SingleMuscle
-        Of the kind of all of them.
+        Plant of the same structure as the rivals.
     rivals : sequence of Rival
-        Fitted.
+        Fitted models.
     inputs : Inputs
-        Of the experiment.
+        Inputs of the experiment.
     sensors : Sensors
-        What is measured, and how well.
+        Sensors and their noise.
 
     Returns
     -------
     list of float
-        Mean squares in noise variances, summed over the outputs: what is left of the difference
-        once one of the two is refitted to the other, the smaller of both ways.
+        Mean squares in noise variances, summed over the outputs: the difference that remains after
+        one of the two is refitted to the other, the smaller of both directions.
     """
     found = sensors.shown(replay_rows(plant, np.vstack([r.columns for r in rivals]), inputs))
     samples, traces, at = len(inputs.command), [], 0
@@ -145,7 +145,7 @@ def separations(
 
 
 def _left(difference: Array, moves: Array) -> float:
-    """Return the sum of squares of a difference that small moves of parameters cannot follow."""
+    """Return the sum of squares of a difference outside the span of parameter perturbations."""
     sizes = np.linalg.norm(moves, axis=1)
     moves = moves[sizes > 0.0] / sizes[sizes > 0.0, None]
     if len(moves):
@@ -165,26 +165,26 @@ def propose(
     causes: Sequence[Cause],
     longest_step: float = LONGEST_STEP,
 ) -> dict[str, Any]:
-    """Return the experiment that tells the best model from all its rivals, for the report.
+    """Return the experiment that best separates a model from all its rivals, for the report.
 
-    The one in which the rival that is nearest to the best model is furthest from it.
+    The experiment with the largest separation from the nearest rival.
 
     Parameters
     ----------
     plant : SingleMuscle
-        Of the kind of the rivals.
+        Plant of the same structure as the rivals.
     first : Rival
         The best model.
     seconds : sequence of Rival
-        Those that are not excluded.
+        Rivals that are not excluded.
     noise : ndarray, shape (channels,)
-        Of the sensors; infinite where there is none.
+        RMS noise of the sensors [SI]; infinite without a sensor.
     means : Means
-        What the rig can do.
+        Capabilities of the rig.
     causes : sequence of Cause
-        Where the sensor that would measure one directly is looked up.
+        Causes with the sensors that would measure them directly.
     longest_step : float
-        Of the simulation [s].
+        Longest step of the simulation [s].
     """
     rivals = (first, *seconds)
     scored = [
@@ -199,7 +199,7 @@ def propose(
         "name": plan.name,
         "description": plan.description
         if least >= ENOUGH
-        else f"no experiment of the list tells {first.label} from {nearest.label}; a further "
+        else f"no experiment of the list separates {first.label} from {nearest.label}; a further "
         "sensor would",
         "segments": plan.segments,
         "separation": least,
@@ -209,7 +209,7 @@ def propose(
 
 
 def sensors_for(rivals: Sequence[Rival], causes: Sequence[Cause]) -> str:
-    """Return what would measure directly what is not in all of the rivals."""
+    """Return the sensors that would directly measure causes not common to all rivals."""
     by_name = {c.name: c for c in causes}
     names = dict.fromkeys(n for r in rivals for n in r.names)
     differing = [n for n in names if not all(n in r.names for r in rivals)]

@@ -1,7 +1,7 @@
-"""Experiments to choose from, as far as a rig can do them.
+"""List of experiments that a rig can do.
 
-Loads, pressures, a shut valve and a warmer muscle are proposed only where the recording shows that
-the rig has them; nothing goes beyond the loads and the largest command that were recorded.
+Loads, pressures, a closed valve and a warmer muscle are proposed only if the recording shows that
+the rig has them; no experiment exceeds the recorded loads and the largest recorded command.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ Array = NDArray[np.float64]
 
 PERIOD = 0.02
 WARMER = 10.0
-"""Kelvin by which a muscle is warmed."""
+"""Temperature rise of a warmed muscle [K]."""
 STAIRS = tuple(v / 10.0 for v in (*range(1, 10), *range(8, 0, -1)))
 
 
 @dataclass(frozen=True)
 class Means:
-    """What a rig can do.
+    """Capabilities of a rig.
 
     Attributes
     ----------
     full : float
-        Largest set-point [Pa].
+        Largest setpoint [Pa].
     loads : tuple of float
-        What can be hung [N], ascending.
+        Available loads [N], ascending.
     shut : bool
-        Whether the valve can be shut.
+        Whether the valve can be closed.
     warm : bool
         Whether the muscle's temperature is measured.
     """
@@ -48,7 +48,7 @@ class Means:
 
     @classmethod
     def of(cls, recording: Recording, rig: Rig) -> Means:
-        """Return what a recording shows of a rig."""
+        """Return the capabilities that a recording shows."""
         return cls(
             full=float(recording.command.max()),
             loads=tuple(load_levels(recording)),
@@ -57,25 +57,25 @@ class Means:
         )
 
     def near(self, share: float) -> float:
-        """Return the load nearest to a share of the way from the lightest to the heaviest."""
-        wanted = self.loads[0] + share * (self.loads[-1] - self.loads[0])
-        return min(self.loads, key=lambda load: abs(load - wanted))
+        """Return the load nearest to a share of the range from the lightest to the heaviest."""
+        target = self.loads[0] + share * (self.loads[-1] - self.loads[0])
+        return min(self.loads, key=lambda load: abs(load - target))
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A straight or swinging stretch of an experiment.
+    """A ramp or sine of an experiment.
 
     Attributes
     ----------
     seconds : float
-        How long.
+        Duration [s].
     start, end : float
-        Set-points over the largest; for a swing the lowest and the highest.
+        Setpoints over the largest one; for a sine the lowest and the highest.
     hertz : float
-        Of a swing; 0 for a straight line.
+        Frequency of a sine [Hz]; 0 for a ramp.
     shut : bool
-        Whether the valve is shut, so that no set-point acts.
+        Whether the valve is closed, so that no setpoint acts.
     """
 
     seconds: float
@@ -86,12 +86,12 @@ class Piece:
 
     @property
     def samples(self) -> int:
-        """How many."""
+        """Number of samples."""
         return round(self.seconds / PERIOD)
 
     @property
     def command(self) -> Array:
-        """Set-points over the largest, shape (n,); below zero: valve shut."""
+        """Setpoints over the largest one, shape (n,); negative with the valve closed."""
         n = self.samples
         if self.shut:
             return np.full(n, -1.0)
@@ -104,20 +104,20 @@ class Piece:
 
 @dataclass(frozen=True)
 class Plan:
-    """An experiment that may be done.
+    """An experiment.
 
     Attributes
     ----------
     name, description : str
-        In words.
-    pieces : tuple of tuple of Piece
-        Of the command, for each of ``loads`` in turn.
+        Name, and instruction in words.
+    pieces : tuple of Piece
+        Command, repeated for each load.
     loads : tuple of float
-        [N].
+        Loads in turn [N].
     full : float
-        Largest set-point [Pa].
+        Largest setpoint [Pa].
     warmer : float
-        Kelvin by which the muscle is warmed by the middle of it.
+        Temperature rise of the muscle until the middle of the experiment [K].
     """
 
     name: str
@@ -129,24 +129,24 @@ class Plan:
 
     @property
     def command(self) -> Array:
-        """Set-points [Pa], shape (n,); below zero: valve shut."""
+        """Setpoints [Pa], shape (n,); negative with the valve closed."""
         one = np.concatenate([p.command for p in self.pieces])
         return np.tile(np.where(one < 0.0, -1.0, self.full * one), len(self.loads))
 
     @property
     def load(self) -> Array:
-        """[N], shape (n,)."""
+        """Load [N], shape (n,)."""
         return np.repeat(self.loads, sum(p.samples for p in self.pieces))
 
     @property
     def kelvin(self) -> Array:
-        """Temperature over the usual [K], shape (n,)."""
+        """Temperature rise [K], shape (n,)."""
         n = len(self.load)
         return self.warmer * np.minimum(1.0, np.arange(n) / max(1, n // 2))
 
     @property
     def segments(self) -> list[dict[str, Any]]:
-        """What to run, piece by piece, as the report holds it."""
+        """Instructions piece by piece, for the report."""
         kelvin, made, at = self.kelvin, [], 0
         for load in self.loads:
             for piece in self.pieces:
@@ -171,12 +171,12 @@ def hold(level: float, seconds: float) -> Piece:
 
 
 def swing(middle: float, size: float, hertz: float, seconds: float) -> Piece:
-    """Return a sine about a level."""
+    """Return a sine about a mean level."""
     return Piece(seconds, middle - size, middle + size, hertz)
 
 
 def closed(level: float, seconds: float) -> Piece:
-    """Return a hold with the valve shut."""
+    """Return a hold with the valve closed."""
     return Piece(seconds, level, level, shut=True)
 
 
@@ -210,7 +210,7 @@ LIST: tuple[tuple[str, str, Sequence[Piece]], ...] = (
     ),
     ("full_pressure", "fill to the top again and again", FILLS * 16),
 )
-"""What any rig can do: name, in words, and the pieces after a rest."""
+"""Experiments of any rig: name, instruction, and the pieces after a rest."""
 
 
 def plans(means: Means) -> tuple[Plan, ...]:
@@ -225,7 +225,7 @@ def _plans(means: Means) -> Iterator[Plan]:
     slow = Plan("slow", "", (REST, *TRIANGLE * 2), usual, means.full)
     if means.shut:
         pieces = (REST, hold(0.4, 3.0), closed(0.4, 30.0), hold(0.8, 3.0), closed(0.8, 30.0))
-        words = "shut the valve for 30 s at two pressures"
+        words = "close the valve for 30 s at two pressures"
         yield Plan("valve_shut", words, pieces, usual, means.full)
     if means.warm:
         pieces = (REST, *(hold(v, 4.0) for v in STAIRS))

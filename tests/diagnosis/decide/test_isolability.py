@@ -167,8 +167,8 @@ def test_without_pressure_what_looks_alike_is_not_decided(blind, study):
     later = dataclasses.replace(late, name="later")
     reasons = told(blind, [late, later, by_name("leak")])
     assert reasons == {
-        "late": "cannot be told from later without pressure_bar",
-        "later": "cannot be told from late without pressure_bar",
+        "late": "cannot be separated from later without pressure_bar",
+        "later": "cannot be separated from late without pressure_bar",
     }
     assert told(study, [late, later]) == {}
     bow = cause_of("bow", "pressure.bow", 0.01)

@@ -126,7 +126,7 @@ def test_the_rig_can_be_traced(told: Callable[[str], Diagnosis]) -> None:
 def test_without_a_comparison_in_closed_loop_there_is_a_reason(
     told: Callable[[str], Diagnosis], tmp_path: Path
 ) -> None:
-    assert told("temperature").report["closed_loop_reason"] == "it was not asked for"
+    assert told("temperature").report["closed_loop_reason"] == "it was not requested"
     case = made("slip_step", 4.0, tmp_path)
     found = diagnose(case.recording, rig=case.rig, causes=CAUSES, progress=False)
     assert found.report["closed_loop"] is None
