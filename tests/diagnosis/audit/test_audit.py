@@ -128,7 +128,10 @@ def test_a_stuck_channel_is_a_problem():
     pressure = arrays()["pressure"].copy()
     pressure[1000:1500] = 2.5e5
     text = problem(made(pressure=pressure))
-    assert "pressure_bar is constant at 2.5 bar in rows 1002 to 1501 while the command moves by" in text
+    assert (
+        "pressure_bar is constant at 2.5 bar in rows 1002 to 1501 while the command moves by"
+        in text
+    )
     text = problem(made(contraction=np.full_like(pressure, 1e-3)))
     assert "contraction_mm holds one value in all rows" in text
 

@@ -188,7 +188,9 @@ def test_what_no_experiment_tells_apart_is_said():
     found = proposed(one, other)
     assert not found["enough"]
     assert found["separation"] == pytest.approx(0.0, abs=1e-9)
-    assert "no experiment of the list separates sensor_bias from sensor_drift" in found["description"]
+    assert (
+        "no experiment of the list separates sensor_bias from sensor_drift" in found["description"]
+    )
     assert by_name("sensor_bias").sensor in found["sensor"]
 
 
