@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 
 from pam_envs.hysteresis.everett import everett
 from pam_envs.kernels.arithmetic import clip
-from pam_envs.kernels.build import entry, kernel
+from pam_envs.kernels.build import LANES, entry, kernel, scratch
 
 Array = NDArray[np.float64]
 
 DEPTH = 24
 """Depth of the stack in the rows of a plant."""
-LOW, INVERSE_CELL, BOTTOM, START_OUTPUT = range(1, 5)
+LOW, INVERSE_CELL, HIGH, BOTTOM, START_OUTPUT = range(1, 6)
 """Rows of an operator's numbers, counted from the slope; the last two are the first point."""
 
 
@@ -274,7 +274,55 @@ def invert_rows(
         preisach_step(x[lane], stack, sums, count, lane, table, low, inverse_cell)
 
 
-# --- tiles of lanes: the same hysteresis, with the present branch in rows of its own -------------
+# --- tiles of lanes -----------------------------------------------------------------------------
+# Most inputs go on along the present branch. So its end points are kept in rows of their own, the
+# stack is read only where an input leaves the branch, and the outputs of all lanes are evaluated
+# in one loop without branches. The bits are those of preisach_step.
+
+PRESENT, OUTPUT, TURN, TURN_OUTPUT, PART, BOUND = range(2 * DEPTH, 2 * DEPTH + 6)
+"""State rows after stack and sums: present input and output, turn and output that the branch is
+counted from, factor on the map, and the input at which the next loop closes."""
+STATE_ROWS = 2 * DEPTH + 6
+EVERYTHING = 1e300
+"""Bound of a branch that closes no loop."""
+
+
+@kernel
+def _continues(x: float, present: float, turn: float, bound: float) -> float:
+    """Return 1 if an input goes on along the branch from a turn, 0 if it leaves it."""
+    if present > turn:
+        return 1.0 if x >= present and x < bound else 0.0
+    return 1.0 if x <= present and x > bound else 0.0
+
+
+@kernel
+def _bound(n: int, x: float, turn: float, closing: float, start: float, low: float) -> float:
+    """Return the input at which a branch from ``n`` stored points ends.
+
+    ``closing`` is the last but one of them. A virgin curve ends at once, and the first branch from
+    it at its largest excursion.
+    """
+    if n == 0:
+        return x
+    largest = EVERYTHING if start == low else abs(start)
+    if n == 1:
+        return largest if x > turn else -largest
+    return closing
+
+
+@kernel
+def _list_leaving(
+    x: Any, rows: Any, low: Any, high: Any, at: int, leaving: Any, first: int, last: int
+) -> int:
+    """List the lanes whose inputs leave their branches in row 0 of ``leaving``; return how many."""
+    present, turn, bound = rows[at + PRESENT], rows[at + TURN], rows[at + BOUND]
+    for j in range(first, last):
+        leaving[1][j] = _continues(_held(x[j], low[j], high[j]), present[j], turn[j], bound[j])
+    number = 0
+    for j in range(first, last):
+        leaving[0][number] = j
+        number = number + (1 - int(leaving[1][j]))
+    return number
 
 
 @kernel
@@ -283,11 +331,25 @@ def relays_step(
     model: int, count: int, member: int, first: int, last: int,
 ) -> None:  # fmt: skip
     """Advance the extrema of a tile (:class:`~pam_envs.hysteresis.protocol.Kernels`)."""
-    stack, sums = rows[at : at + DEPTH], rows[at + DEPTH : at + 2 * DEPTH]
-    low, inverse_cell, points = fixed[model + LOW], fixed[model + INVERSE_CELL], counts[count]
+    low, inverse_cell, high = fixed[model + LOW], fixed[model + INVERSE_CELL], fixed[model + HIGH]
+    present, output, turn = rows[at + PRESENT], rows[at + OUTPUT], rows[at + TURN]
+    turn_output, part, bound = rows[at + TURN_OUTPUT], rows[at + PART], rows[at + BOUND]
+    stack, sums, points = rows[at : at + DEPTH], rows[at + DEPTH : at + 2 * DEPTH], counts[count]
+    members, leaving = counts[member], scratch(2, LANES)
+    for q in range(_list_leaving(x, rows, low, high, at, leaving, first, last)):
+        j = int(leaving[0][q])
+        held, now = _held(x[j], low[j], high[j]), points[j] - 1
+        stack[now][j], sums[now][j] = present[j], output[j]
+        n, turn[j], turn_output[j], part[j] = _find_turn(held, stack, sums, points, j, low[j])
+        closing, start = stack[max(n - 2, 0)][j], stack[0][j]
+        bound[j] = _bound(n, held, turn[j], closing, start, low[j])
+        stack[n][j] = held
+        points[j] = n + 1
     for j in range(first, last):
-        own = table[counts[member][j]]
-        y[j] = preisach_step(x[j], stack, sums, points, j, own, low[j], inverse_cell[j])
+        held, own = _held(x[j], low[j], high[j]), table[members[j]]
+        a, b = (held - low[j]) * inverse_cell[j], (turn[j] - low[j]) * inverse_cell[j]
+        found = turn_output[j] + part[j] * everett(a, b, own)
+        present[j], output[j], y[j] = held, found, found
 
 
 @kernel
@@ -296,15 +358,26 @@ def relays_peek(
     at: int, model: int, count: int, member: int, first: int, last: int,
 ) -> None:  # fmt: skip
     """Write the lag at an input, and its growth since the state was last moved."""
-    stack, sums = rows[at : at + DEPTH], rows[at + DEPTH : at + 2 * DEPTH]
-    low, inverse_cell, points = fixed[model + LOW], fixed[model + INVERSE_CELL], counts[count]
+    low, inverse_cell, high = fixed[model + LOW], fixed[model + INVERSE_CELL], fixed[model + HIGH]
+    present, output, turn = rows[at + PRESENT], rows[at + OUTPUT], rows[at + TURN]
+    turn_output, part = rows[at + TURN_OUTPUT], rows[at + PART]
+    stack, sums, points = rows[at : at + DEPTH], rows[at + DEPTH : at + 2 * DEPTH], counts[count]
+    members, leaving, branch = counts[member], scratch(2, LANES), scratch(3, LANES)
     for j in range(first, last):
-        own = table[counts[member][j]]
-        output = preisach_peek(x[j], stack, sums, points, j, own, low[j], inverse_cell[j])
-        now = points[j] - 1
-        moved, lagged = x[j] - stack[now][j], stack[now][j] - sums[now][j]
-        lag[j] = x[j] - output
-        stick[j] = growth(x[j] - output - lagged, moved)
+        branch[0][j], branch[1][j], branch[2][j] = turn[j], turn_output[j], part[j]
+    for q in range(_list_leaving(x, rows, low, high, at, leaving, first, last)):
+        j = int(leaving[0][q])
+        held, now = _held(x[j], low[j], high[j]), points[j] - 1
+        stack[now][j], sums[now][j] = present[j], output[j]
+        _, branch[0][j], branch[1][j], branch[2][j] = _find_turn(
+            held, stack, sums, points, j, low[j]
+        )
+    for j in range(first, last):
+        held, own = _held(x[j], low[j], high[j]), table[members[j]]
+        a, b = (held - low[j]) * inverse_cell[j], (branch[0][j] - low[j]) * inverse_cell[j]
+        found = branch[1][j] + branch[2][j] * everett(a, b, own)
+        lag[j] = x[j] - found
+        stick[j] = growth(x[j] - found - (present[j] - output[j]), x[j] - present[j])
 
 
 @kernel
@@ -321,6 +394,8 @@ def relays_begin(
     member: int, j: int,
 ) -> None:  # fmt: skip
     """Put every relay of one lane down, or leave it virgin (see ``BOTTOM``)."""
-    rows[at][j] = fixed[model + BOTTOM][j]
-    rows[at + DEPTH][j] = fixed[model + START_OUTPUT][j]
+    bottom, output = fixed[model + BOTTOM][j], fixed[model + START_OUTPUT][j]
+    rows[at][j], rows[at + DEPTH][j] = bottom, output
+    rows[at + PRESENT][j] = rows[at + TURN][j] = rows[at + BOUND][j] = bottom
+    rows[at + OUTPUT][j] = output
     counts[count][j] = 1

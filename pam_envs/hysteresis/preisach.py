@@ -27,6 +27,7 @@ from pam_envs.hysteresis import everett as maps
 from pam_envs.hysteresis.checks import check_not_negative, floats, series
 from pam_envs.hysteresis.extrema import (
     DEPTH,
+    STATE_ROWS,
     advance_rows,
     invert_rows,
     preisach_inverse,
@@ -93,7 +94,7 @@ class Preisach(HysteresisModel):
 
     kind: ClassVar[str] = "preisach"
     kernels: ClassVar[Kernels] = Kernels(relays_step, peek=relays_peek, begin=relays_begin)
-    state_rows: ClassVar[int] = 2 * DEPTH
+    state_rows: ClassVar[int] = STATE_ROWS
 
     low: float
     high: float
@@ -252,13 +253,14 @@ class Preisach(HysteresisModel):
     # --- the protocol ---------------------------------------------------------------------------
 
     def numbers(self, full: float | None = None) -> list[float]:
-        """Return the slope of the chord, the lowest input and the cells per input, filled up."""
+        """Return the slope of the chord, range and cells per input, and the start."""
         cells = len(self.table) - 1
         low, per_input = self.low, cells / (self.high - self.low)
         if full is not None:
             low, per_input = -full, 0.5 * cells * (1.0 / full)
         bottom = self.low if self.start == "low" else 0.0
-        return padded([self.chord_slope, low, per_input, bottom, self.start_output])
+        high = low + cells / per_input  # as preisach_step has it
+        return padded([self.chord_slope, low, per_input, high, bottom, self.start_output])
 
     def table_rows(self) -> Array:
         """Return the Everett map."""

@@ -244,9 +244,9 @@ def test_bad_makes_and_hysteresis_models_are_refused() -> None:
     plays = travel_plays()
     steep = dataclasses.replace(plays, linear=0.5)
     many = dataclasses.replace(
-        plays, thresholds=tuple(0.001 * k for k in range(1, 11)), weights=(0.08,) * 10
+        plays, thresholds=tuple(0.001 * k for k in range(1, 14)), weights=(0.06,) * 13
     )
-    for operator, words in ((steep, "total slope"), (many, "at most 8")):
+    for operator, words in ((steep, "total slope"), (many, "at most 12")):
         with pytest.raises(ValueError, match=words):
             ElbowOrthosis.paper().replace({"hysteresis.operator": operator})
     relays = elbow_hysteresis("preisach").operator
