@@ -17,7 +17,7 @@ ELEMENTS = 4
 """Kelvin-Voigt elements."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CreepEffects:
     """Creep of the effective pressure, off unless a recording shows it."""
 

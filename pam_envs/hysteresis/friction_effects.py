@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
+from pam_envs.hysteresis.creep import CreepEffects
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FrictionEffects:
     """Shape and pressure dependence of the friction, neutral unless a recording shows them."""
 
@@ -24,7 +26,7 @@ class FrictionEffects:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FirstCycles:
     """Loss of force in the first cycles, none unless a recording shows it."""
 
@@ -36,12 +38,22 @@ class FirstCycles:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Threshold:
     """Pressure below which the muscle exerts no force, none unless a recording shows it."""
 
     threshold: float = parameter(
         0.0, "Pa", 0.0, 3e5, "assumed", "pressure before the tube meets the braid", neutral=0.0
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveEffects(FirstCycles, CreepEffects):
+    """Creep and first cycles of the effective pressure of a muscle."""
+
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = (
+        (*(f"creep_{k}" for k in (1, 2, 3, 4)), *(f"creep_time_{k}" for k in (1, 2, 3, 4))),
+        ("first_loss", "first_travel"),
     )
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pam_envs.constants import GRAVITY
+from pam_envs.mechanics.guide import BearingEffects
 from pam_envs.parameters import parameter
 
 _BODY = (
@@ -44,7 +45,7 @@ class Wearer:
 
 
 @dataclass(frozen=True)
-class OrthosisLink:
+class OrthosisLink(BearingEffects):
     """The moving part of the orthosis."""
 
     mass: float = parameter(0.5, "kg", 0.01, 10.0, "assumed", _SHELL, spread=(0.35, 0.8))

@@ -11,7 +11,7 @@ from pam_envs.kernels.motion import damped_motion
 from pam_envs.parameters import parameter, parameter_rows
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class GuideEffects:
     """Dry friction of the guide of a load, none unless a recording shows it."""
 
@@ -26,7 +26,7 @@ class GuideEffects:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class BearingEffects:
     """Dry friction of a joint's bearing, none unless a recording shows it."""
 

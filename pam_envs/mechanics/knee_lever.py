@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.arithmetic import sine_of_turns
 from pam_envs.kernels.build import kernel
+from pam_envs.mechanics.guide import BearingEffects
 from pam_envs.parameters import parameter
 
 _GEOMETRY = "reproduces 158 N at 2 bar and 22 cm with yeh2010's range of tension and stiffness"
@@ -28,7 +29,7 @@ PER_TURN = 1.0 / (2.0 * math.pi)
 
 
 @dataclass(frozen=True)
-class KneeLever:
+class KneeLever(BearingEffects):
     """Geometry, spring and inertia of the brace.
 
     ``mount_angle`` is the wire's angle at a straight knee: how the wearer straps the brace on.

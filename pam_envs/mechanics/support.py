@@ -10,7 +10,7 @@ from pam_envs.kernels.motion import resonator_step
 from pam_envs.parameters import named_rows, parameter
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SupportEffects:
     """A support that gives way under the load, none unless a recording shows it."""
 
@@ -25,7 +25,7 @@ class SupportEffects:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MountEffects:
     """A mount that gives way, rigid unless a recording shows a resonance."""
 

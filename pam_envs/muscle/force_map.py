@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import kernel
+from pam_envs.muscle.temperature import TemperatureEffects
 from pam_envs.parameters import parameter
 
 _FIT = "least squares on the measured map of a DMSP-10-250 (data/dmsp10_force_map.csv)"
@@ -38,7 +39,7 @@ PAPER_CONTRACTION = 0.25
 
 
 @dataclass(frozen=True)
-class ForceMap:
+class ForceMap(TemperatureEffects):
     """A muscle DMSP-10-150N.
 
     ``stretch`` lengthens the axis of contraction; ``gain`` and ``imbalance`` are of the specimens,

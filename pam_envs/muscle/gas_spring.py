@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import kernel
+from pam_envs.muscle.temperature import TemperatureEffects
 from pam_envs.parameters import parameter
 
 
 @dataclass(frozen=True)
-class GasSpring:
+class GasSpring(TemperatureEffects):
     """The muscle of the orthosis."""
 
     shortest_length: float = parameter(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pam_envs.parameters import parameter
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LengthCreepEffects:
     """Creep of the length with the time constants of the hysteresis, none unless shown."""
 

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import kernel
+from pam_envs.muscle.temperature import TemperatureEffects
 from pam_envs.parameters import parameter
 
 Array = NDArray[np.float64]
@@ -38,7 +39,7 @@ _ENDS = (
 
 
 @dataclass(frozen=True)
-class QuadraticBundle:
+class QuadraticBundle(TemperatureEffects):
     """Muscles side by side, fed together and joined at both ends."""
 
     muscles: float = parameter(3.0, "1", 1.0, 40.0, "published", "chakarov2018, section 3: 3 and 7")

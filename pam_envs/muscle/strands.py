@@ -14,7 +14,7 @@ BREAKS = (0.1, 0.3, 0.6, 1.0)
 STRANDS = len(BREAKS)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class StrandEffects:
     """Friction of strands against each other, none unless a recording shows it."""
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from pam_envs.constants import ROOM_TEMPERATURE
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TemperatureEffects:
     """Temperature of a muscle; without effect unless a recording shows one."""
+
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = (("temperature", "temperature_gain"),)
 
     temperature: float = parameter(
         ROOM_TEMPERATURE, "K", 230.0, 400.0, "assumed", "of the muscle; the law is that of 293.15 K"

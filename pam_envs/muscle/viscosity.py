@@ -9,7 +9,7 @@ from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ViscosityEffects:
     """Damping at small speeds, none unless a recording shows it."""
 

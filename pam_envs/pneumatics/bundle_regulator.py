@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pam_envs.parameters import parameter
+from pam_envs.pneumatics.regulator import DelayedEffects
 
 
 @dataclass(frozen=True)
-class BundleRegulator:
+class BundleRegulator(DelayedEffects):
     """A closed-loop pressure regulator in the place of the paper's valves."""
 
     max_pressure: float = parameter(

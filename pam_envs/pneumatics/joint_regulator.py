@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pam_envs.parameters import parameter
+from pam_envs.pneumatics.regulator import DelayedEffects
 
 
 @dataclass(frozen=True)
-class JointRegulator:
+class JointRegulator(DelayedEffects):
     """A proportional regulator for each muscle: a first-order lag with a limited rate."""
 
     max_pressure: float = parameter(

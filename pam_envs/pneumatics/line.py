@@ -10,7 +10,7 @@ from pam_envs.kernels.motion import TURN, resonator_step
 from pam_envs.parameters import named_rows, parameter, parameter_rows
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LineEffects:
     """Line of a regulator; rigid unless a recording shows a resonance."""
 

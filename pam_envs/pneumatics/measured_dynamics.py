@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pam_envs.kernels.arithmetic import decay, sine_of_turns
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import parameter
+from pam_envs.pneumatics.regulator import DelayedEffects
 
 NUMERATOR = ((1.0, 17.45, 75.79), (1.0, 7.39, 13.41))
 DENOMINATOR = ((0.0, 1.0, 12.33), (1.0, 17.97, 78.51), (1.0, 13.78, 47.43), (1.0, 8.11, 17.12))
@@ -29,7 +30,7 @@ MODES = REAL_MODES + 2
 
 
 @dataclass(frozen=True)
-class OrthosisRegulator:
+class OrthosisRegulator(DelayedEffects):
     """The electronic pressure valve (SMC ITV1031), as the muscle feels it.
 
     A first-order lag with a limited rate. A plant with ``dynamics="measured"`` has the paper's

@@ -25,7 +25,7 @@ UNCHOKED = 100.0
 """Exhaust rate [1/s] that limits nothing."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ValveEffects:
     """Effects of a regulator's valve, neutral unless a recording shows them."""
 
@@ -67,7 +67,7 @@ class ValveEffects:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RegulatorEffects(LineEffects, SupplyEffects, ValveEffects):
     """Effects of a regulator with its supply and its line."""
 
@@ -84,7 +84,7 @@ class RegulatorEffects(LineEffects, SupplyEffects, ValveEffects):
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DelayedEffects(RegulatorEffects):
     """The same, and a dead time, of regulators whose plain model has none."""
 

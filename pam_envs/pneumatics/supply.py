@@ -13,7 +13,7 @@ AMPLE = 2e7
 """Supply pressure [Pa] that limits nothing."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SupplyEffects:
     """Supply of a regulator; without limit unless a recording shows one."""
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from pam_envs.parameters import parameter
+from pam_envs.sensing.sensor import SensorEffects
 
 
 @dataclass(frozen=True)
-class JointEncoder:
+class JointEncoder(SensorEffects):
     """Angle at a joint."""
+
+    quantity: ClassVar[tuple[str, float]] = ("rad", 0.2)
 
     noise: float = parameter(
         5e-4, "rad", 0.0, 0.2, "assumed", "0.03 degrees RMS, of the order seen", neutral=0.0

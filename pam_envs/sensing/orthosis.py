@@ -6,16 +6,20 @@ None of their noise is published; the defaults are of the order seen on public r
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from pam_envs.parameters import parameter
+from pam_envs.sensing.sensor import SensorEffects
 
 _SEEN = "not published; of the order seen on public rigs"
 _NONE = "zeroed at rest"
 
 
 @dataclass(frozen=True)
-class TensionSensor:
+class TensionSensor(SensorEffects):
     """Load cell in series with the muscle (Omega LC201-300)."""
+
+    quantity: ClassVar[tuple[str, float]] = ("N", 50.0)
 
     noise: float = parameter(0.9, "N", 0.0, 100.0, "assumed", _SEEN, neutral=0.0)
     resolution: float = parameter(0.68, "N", 0.0, 50.0, "assumed", _SEEN, neutral=0.0)
@@ -23,8 +27,10 @@ class TensionSensor:
 
 
 @dataclass(frozen=True)
-class AngleSensor:
+class AngleSensor(SensorEffects):
     """Potentiometer at a joint."""
+
+    quantity: ClassVar[tuple[str, float]] = ("rad", 0.2)
 
     noise: float = parameter(0.0017, "rad", 0.0, 0.2, "assumed", _SEEN, neutral=0.0)
     resolution: float = parameter(0.0008, "rad", 0.0, 0.1, "assumed", _SEEN, neutral=0.0)
@@ -32,8 +38,10 @@ class AngleSensor:
 
 
 @dataclass(frozen=True)
-class GaugeSensor:
+class GaugeSensor(SensorEffects):
     """Pressure at the muscle."""
+
+    quantity: ClassVar[tuple[str, float]] = ("Pa", 1e5)
 
     noise: float = parameter(380.0, "Pa", 0.0, 1e5, "assumed", _SEEN, neutral=0.0)
     resolution: float = parameter(770.0, "Pa", 0.0, 1e5, "assumed", _SEEN, neutral=0.0)
@@ -41,8 +49,10 @@ class GaugeSensor:
 
 
 @dataclass(frozen=True)
-class HeelSensor:
+class HeelSensor(SensorEffects):
     """Mean of the load cells at the heel."""
+
+    quantity: ClassVar[tuple[str, float]] = ("kg", 10.0)
 
     noise: float = parameter(0.2, "kg", 0.0, 20.0, "assumed", _SEEN, neutral=0.0)
     resolution: float = parameter(0.0, "kg", 0.0, 5.0, "assumed", _SEEN, neutral=0.0)
@@ -50,8 +60,10 @@ class HeelSensor:
 
 
 @dataclass(frozen=True)
-class GroundSensor:
+class GroundSensor(SensorEffects):
     """Vertical ground force, the sum of the shoe's load cells."""
+
+    quantity: ClassVar[tuple[str, float]] = ("N", 200.0)
 
     noise: float = parameter(5.0, "N", 0.0, 200.0, "assumed", _SEEN, neutral=0.0)
     resolution: float = parameter(0.0, "N", 0.0, 50.0, "assumed", _SEEN, neutral=0.0)
@@ -59,8 +71,10 @@ class GroundSensor:
 
 
 @dataclass(frozen=True)
-class CopSensor:
+class CopSensor(SensorEffects):
     """Centre of pressure ahead of the ankle, from the shoe's load cells."""
+
+    quantity: ClassVar[tuple[str, float]] = ("m", 0.1)
 
     noise: float = parameter(0.002, "m", 0.0, 0.1, "assumed", _SEEN, neutral=0.0)
     resolution: float = parameter(0.0, "m", 0.0, 0.05, "assumed", _SEEN, neutral=0.0)

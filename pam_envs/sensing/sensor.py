@@ -8,13 +8,13 @@ from typing import Any, ClassVar
 from pam_envs.kernels.arithmetic import decay, quantise
 from pam_envs.kernels.build import kernel, routine
 from pam_envs.kernels.history import N_HISTORY, note, noted
-from pam_envs.parameters import named_rows, parameter, parameter_rows
+from pam_envs.parameters import parameter, parameter_rows
 
 SLIDE = 0.2
 """Time [s] that a slipping clamp takes."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SensorEffects:
     """Effects of any sensor, neutral unless a recording shows them.
 
@@ -79,9 +79,6 @@ class PressureSensor(SensorEffects):
 
 SENSOR = parameter_rows(SensorEffects)
 """Rows of a sensor's effects, from its first."""
-SENSED = named_rows("reading", "ring")
-"""Rows of a sensor's state: the undisturbed reading, then the ring of the measured quantity."""
-SENSOR_ROWS = SENSED.ring + N_HISTORY
 
 
 @kernel
@@ -105,7 +102,7 @@ def ramp_of(time: float, middle: float, over: float) -> float:
 
 @kernel
 def sense(
-    rows: Any, fixed: Any, j: int, state: int, effects: int, value: float, full: float, step: int,
+    rows: Any, fixed: Any, j: int, reading: int, ring: int, effects: int, value: float, full: float, step: int,
     time: float, period: float,
 ) -> None:  # fmt: skip
     """Write the reading of one lane, without bias, noise and quantisation.
@@ -116,8 +113,9 @@ def sense(
         State and parameters.
     j : int
         Lane.
-    state, effects : int
-        First row of the sensor's state (``SENSED``) and of its effects (``SENSOR``).
+    reading, ring, effects : int
+        Row of the reading, first row of the ring of the measured quantity (``N_HISTORY`` rows) and
+        of the sensor's effects (``SENSOR``).
     value, full : float
         The measured quantity and the full scale, in its unit.
     step : int
@@ -125,18 +123,18 @@ def sense(
     time, period : float
         Time of the episode and control period [s].
     """
-    note(rows, state + SENSED.ring, j, step, value)
+    note(rows, ring, j, step, value)
     age = fixed[effects + SENSOR.delay][j] / period
     whole = min(int(age), N_HISTORY - 2)
-    newer = noted(rows, state + SENSED.ring, j, step, whole)
-    older = noted(rows, state + SENSED.ring, j, step, whole + 1)
+    newer = noted(rows, ring, j, step, whole)
+    older = noted(rows, ring, j, step, whole + 1)
     x = newer + (age - whole) * (older - newer)
     slipped = max(0.0, min(1.0, (time - fixed[effects + SENSOR.slip_at][j]) / SLIDE + 0.5))
     drift = drift_of(time, fixed[effects + SENSOR.drift][j], fixed[effects + SENSOR.drift_time][j])
     ramp = fixed[effects + SENSOR.ramp][j] * ramp_of(
         time, fixed[effects + SENSOR.ramp_at][j], fixed[effects + SENSOR.ramp_over][j]
     )
-    rows[state + SENSED.reading][j] = (
+    rows[reading][j] = (
         x
         + fixed[effects + SENSOR.bow][j] * x * (x / full - 1.0)
         + drift
@@ -147,9 +145,9 @@ def sense(
 
 @kernel
 def begin_sensor(
-    rows: Any, fixed: Any, j: int, state: int, effects: int, value: float, full: float
+    rows: Any, fixed: Any, j: int, reading: int, ring: int, effects: int, value: float, full: float
 ) -> None:
     """Begin the sensor of one lane at a quantity that has been constant (see :func:`sense`)."""
     for k in range(N_HISTORY):
-        rows[state + SENSED.ring + k][j] = value
-    sense(rows, fixed, j, state, effects, value, full, 0, 0.0, 0.01)
+        rows[ring + k][j] = value
+    sense(rows, fixed, j, reading, ring, effects, value, full, 0, 0.0, 0.01)

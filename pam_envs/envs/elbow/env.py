@@ -81,7 +81,7 @@ ANGLES, RATES = (-0.2, 2.4), (-10.0, 10.0)
 MARGIN = math.radians(5.0)
 """Smallest distance [rad] of intended motions from the ends of the range."""
 RANDOMISATION = Randomisation(
-    R.PARAMETERS,
+    R.NAMES,
     (
         *("regulator.max_pressure", "valve.frequency", "pulley.radius", "pulley.lowest"),
         *("pulley.highest", "bundle_a.muscles", "bundle_b.muscles", "wearer.handle"),
@@ -318,9 +318,10 @@ def make_setup(
         "fixed_signals": L.COMMON_SIGNALS + (1 if pulsed else 0),
         "samples": samples.shape[1],
     }
+    spread = spread_of(made, RANDOMISATION, given.randomize)
     return compose(
         made,
-        kernels_for(made.hysteresis.kind, made.valves),
+        kernels_for(made.hysteresis.kind, made.valves, made.needs_effects(spread)),
         given,
         signals=_signals(made, given),
         actions=acted(_actions(made, action), given),
@@ -330,7 +331,7 @@ def make_setup(
         own=_own(made, samples),
         samples=samples,
         tables=made.hysteresis_tables(),
-        spread=spread_of(made, RANDOMISATION, given.randomize),
+        spread=spread,
         view="pam_envs.envs.elbow.view:VIEW",
     )
 

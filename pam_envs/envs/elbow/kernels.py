@@ -22,6 +22,8 @@ from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import uniform
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.step import (
+    SENSED_ANGLE,
+    SENSED_PRESSURE,
     advance,
     begin_lane,
     replacements,
@@ -93,11 +95,11 @@ def read_elbow(rows: Any, fixed: Any, counts: Any, j: int) -> None:
     """Read the sensors of lane ``j``."""
     step = counts[K.STEP][j]
     rows[L.READ_ANGLE][j] = sense(
-        rows[K.ANGLE][j], fixed, counts, K.ANGLE_NOISE, L.NOISE_ANGLE, step, j
+        rows[SENSED_ANGLE][j], fixed, counts, K.ANGLE_NOISE, L.NOISE_ANGLE, step, j
     )
     for k in range(2):
         rows[L.READ_A + k][j] = sense(
-            rows[K.PRESSURE_A + k][j], fixed, counts, K.PRESSURE_NOISE, L.NOISE_A + k, step, j
+            rows[SENSED_PRESSURE + k][j], fixed, counts, K.PRESSURE_NOISE, L.NOISE_A + k, step, j
         )
 
 
@@ -270,12 +272,13 @@ def begin_elbow(
 
 
 @lru_cache(maxsize=16)
-def kernels_for(kind: str, valves: str) -> Kernels:
-    """Return the kernels for a kind of hysteresis and a make of the valves."""
+def kernels_for(kind: str, valves: str, extended: bool = False) -> Kernels:
+    """Return the kernels for a kind of hysteresis and a make of the valves, plain or with effects."""
+    rows = L.HYSTERESIS + state_rows(kind)
     return Kernels(
-        f"elbow_{kind}_{valves}",
+        f"elbow_{kind}_{valves}" + ("_extended" if extended else ""),
         kernels_for,
-        (kind, valves),
+        (kind, valves, extended),
         L.REPORT,
         apply=apply_elbow,
         advance=advance_plant,
@@ -287,9 +290,9 @@ def kernels_for(kind: str, valves: str) -> Kernels:
         placeholders={
             "plant_advance": advance,
             "FIRST_HYSTERESIS": L.HYSTERESIS,
-            **replacements(kind, valves),
+            **replacements(kind, valves, rows if extended else None),
         },
-        rows=L.HYSTERESIS + state_rows(kind),
+        rows=rows + (K.STATE.end if extended else 0),
         parameters=K.N_PARAMETERS,
         counts=K.N_COUNTS,
         signals=L.COMMON_SIGNALS + 1,

@@ -76,7 +76,7 @@ USUAL_SHARE = 2.0 / 3.0
 NUMBERS = {len(L.REFERENCES): SAMPLES, len(FAMILIES): L.SINE, len(FAMILIES) + 1: L.STEP}
 """Numbers of references, by their position in ``REFERENCES``."""
 RANDOMISATION = Randomisation(
-    R.PARAMETERS,
+    R.NAMES,
     ("regulator.max_pressure", "link.limit", "link.stop", "nominal.prestress"),
     "{'regulator.time_constant': (0.03, 0.06)}",
     {
@@ -201,9 +201,10 @@ def make_setup(
         "worst_period": task.worst(made.largest_angle + most),
     }
     mode = L.MODES.index(action)
+    spread = spread_of(made, RANDOMISATION, given.randomize)
     return compose(
         made,
-        kernels_for(made.hysteresis.kind, made.dynamics),
+        kernels_for(made.hysteresis.kind, made.dynamics, made.needs_effects(spread)),
         given,
         signals=observed(now, [("reference", "rad", *ANGLES)], given, made.control_period),
         actions=acted(_actions(made, action), given),
@@ -214,7 +215,7 @@ def make_setup(
         own=payloads,
         samples=samples,
         tables=made.hysteresis_tables(),
-        spread=spread_of(made, RANDOMISATION, given.randomize),
+        spread=spread,
         view="pam_envs.envs.joint.view:VIEW",
     )
 

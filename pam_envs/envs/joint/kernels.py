@@ -17,6 +17,8 @@ from pam_envs.kernels.random import uniform
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.pair import command
 from pam_envs.plants.antagonistic_joint.step import (
+    SENSED_ANGLE,
+    SENSED_PRESSURE,
     advance,
     begin_lane,
     replacements,
@@ -88,11 +90,11 @@ def reference_at(
 def read_joint(rows: Any, fixed: Any, counts: Any, work: Any, j: int) -> None:
     """Write the readings of lane ``j``."""
     step = counts[K.STEP][j]
-    angle = sense(rows[K.ANGLE][j], fixed, counts, K.ANGLE_NOISE, L.NOISE_ANGLE, step, j)
+    angle = sense(rows[SENSED_ANGLE][j], fixed, counts, K.ANGLE_NOISE, L.NOISE_ANGLE, step, j)
     work[L.INFO.sensor_angle][j] = work[L.SIGNALS][j] = angle
     for k in range(2):
         pressure = sense(
-            rows[K.PRESSURE_A + k][j], fixed, counts, K.PRESSURE_NOISE, L.NOISE_A + k, step, j
+            rows[SENSED_PRESSURE + k][j], fixed, counts, K.PRESSURE_NOISE, L.NOISE_A + k, step, j
         )
         work[L.INFO.sensor_pressure_a + k][j] = work[L.SIGNALS + 1 + k][j] = pressure
 
@@ -189,12 +191,13 @@ def begin_joint(
 
 
 @lru_cache(maxsize=16)
-def kernels_for(kind: str, dynamics: str) -> Kernels:
-    """Return the kernels for a kind of hysteresis and a make of the plant."""
+def kernels_for(kind: str, dynamics: str, extended: bool = False) -> Kernels:
+    """Return the kernels for a kind of hysteresis and a make of the plant, plain or with effects."""
+    rows = L.HYSTERESIS + 2 * state_rows(kind)
     return Kernels(
-        f"joint_{kind}_{dynamics}",
+        f"joint_{kind}_{dynamics}" + ("_extended" if extended else ""),
         kernels_for,
-        (kind, dynamics),
+        (kind, dynamics, extended),
         L.REPORT,
         apply=apply_joint,
         advance=advance_plant,
@@ -207,9 +210,9 @@ def kernels_for(kind: str, dynamics: str) -> Kernels:
             "plant_advance": advance,
             "FIRST_HYSTERESIS": L.HYSTERESIS,
             "FIRST_REFERENCE": L.REFERENCE,
-            **replacements(kind, dynamics),
+            **replacements(kind, dynamics, rows if extended else None),
         },
-        rows=L.HYSTERESIS + 2 * state_rows(kind),
+        rows=rows + (K.STATE.end if extended else 0),
         parameters=K.N_PARAMETERS,
         counts=K.N_COUNTS,
         signals=L.COMMON_SIGNALS + 2,

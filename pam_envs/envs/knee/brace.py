@@ -68,7 +68,7 @@ REFERENCE_RANGES = {
 PAPER_PRESSURE = 0.69e5
 """Pressure [Pa], reached by inflation, at which the tension is 55 N as in yeh2010."""
 RANDOMISATION = Randomisation(
-    R.PARAMETERS,
+    R.NAMES,
     ("regulator.max_pressure", "lever.arm", "lever.fittings", "fixture.length"),
     "{'lever.stiffness': (25, 35)}",
 )
@@ -135,9 +135,10 @@ def make_setup(
         ("set_point", "Pa", 0.0, full),
     ]
     references = [("reference", unit, *RANGES[quantity])]
+    spread = spread_of(made, RANDOMISATION, given.randomize)
     return compose(
         made,
-        kernels_for(made.hysteresis.kind, made.mounting, made.dynamics),
+        kernels_for(made.hysteresis.kind, made.mounting, made.dynamics, made.needs_effects(spread)),
         given,
         signals=observed(now, references, given, made.control_period),
         actions=acted([("pressure_set_point", "Pa", 0.0, full)], given),
@@ -148,7 +149,7 @@ def make_setup(
         own=made.gait_table(),
         samples=samples,
         tables=made.hysteresis_tables(),
-        spread=spread_of(made, RANDOMISATION, given.randomize),
+        spread=spread,
         view=f"pam_envs.envs.knee.view:{L.QUANTITIES[quantity].upper()}",
     )
 

@@ -15,7 +15,7 @@ from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import uniform
 from pam_envs.mechanics.knee_lever import half_angle, muscle_length
 from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.step import begin_lane, replacements
+from pam_envs.plants.knee_orthosis.step import SENSED, begin_lane, replacements
 from pam_envs.references import trajectory as T
 from pam_envs.references.trajectory import draw_reference
 from pam_envs.tasks.rewards import effort_reward, error_reward, excess
@@ -25,9 +25,9 @@ from pam_envs.tasks.rewards import effort_reward, error_reward, excess
 def read_brace(rows: Any, fixed: Any, counts: Any, work: Any, j: int) -> None:
     """Write the readings of lane ``j``."""
     step = counts[K.STEP][j]
-    tension = sense(rows[K.TENSION][j], fixed, counts, K.TENSION_NOISE, L.NOISE_T, step, j)
-    angle = sense(rows[K.ANGLE][j], fixed, counts, K.ANGLE_NOISE, L.NOISE_A, step, j)
-    pressure = sense(rows[K.PRESSURE][j], fixed, counts, K.PRESSURE_NOISE, L.NOISE_P, step, j)
+    tension = sense(rows[SENSED[0]][j], fixed, counts, K.TENSION_NOISE, L.NOISE_T, step, j)
+    angle = sense(rows[SENSED[1]][j], fixed, counts, K.ANGLE_NOISE, L.NOISE_A, step, j)
+    pressure = sense(rows[SENSED[2]][j], fixed, counts, K.PRESSURE_NOISE, L.NOISE_P, step, j)
     sine, _ = half_angle(angle)
     length = muscle_length(sine, fixed[K.LEVER_ARM][j], fixed[K.LEVER_FITTINGS][j])
     stiffness = tension / max(1e-3, length - fixed[K.SHORTEST_LENGTH][j])
@@ -114,12 +114,13 @@ def draw_paper(rows: Any, j: int, low: float, high: float, frequency: float) -> 
 
 
 @lru_cache(maxsize=16)
-def kernels_for(kind: str, mounting: str, dynamics: str) -> Kernels:
-    """Return the kernels for a hysteresis model, a mounting and the dynamics of the pressure."""
+def kernels_for(kind: str, mounting: str, dynamics: str, extended: bool = False) -> Kernels:
+    """Return the kernels for a hysteresis model, a mounting and the dynamics of the pressure, plain or with effects."""
+    rows = L.HYSTERESIS + state_rows(kind)
     return Kernels(
-        f"brace_{kind}_{mounting}_{dynamics}",
+        f"brace_{kind}_{mounting}_{dynamics}" + ("_extended" if extended else ""),
         kernels_for,
-        (kind, mounting, dynamics),
+        (kind, mounting, dynamics, extended),
         L.REPORT,
         advance=advance_knee,
         reference=trajectory_at,
@@ -130,9 +131,9 @@ def kernels_for(kind: str, mounting: str, dynamics: str) -> Kernels:
         placeholders={
             "FIRST_HYSTERESIS": L.HYSTERESIS,
             "FIRST_REFERENCE": L.REFERENCE,
-            **replacements(kind, mounting, dynamics),
+            **replacements(kind, mounting, dynamics, rows if extended else None),
         },
-        rows=L.HYSTERESIS + state_rows(kind),
+        rows=rows + (K.STATE.end if extended else 0),
         parameters=K.N_PARAMETERS,
         counts=K.N_COUNTS,
         signals=L.FIXED_SIGNALS,

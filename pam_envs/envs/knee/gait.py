@@ -76,7 +76,7 @@ ASSISTANCE = {"signed": -1e9, "clipped": 0.0}
 """Lowest desired assistance [N m]."""
 TENSIONS, ANGLES, TORQUES = (0.0, 600.0), (1.0, 3.2), (-60.0, 60.0)
 RANDOMISATION = Randomisation(
-    R.PARAMETERS,
+    R.NAMES,
     (
         *("regulator.max_pressure", "lever.arm", "lever.fittings", "lever.mount_angle"),
         "fixture.length",
@@ -184,9 +184,10 @@ def make_setup(
         "known_shank": made.leg.shank,
         "known_mass": made.leg.body_mass,
     }
+    spread = spread_of(made, RANDOMISATION, given.randomize)
     return compose(
         made,
-        kernels_for(made.hysteresis.kind, made.dynamics),
+        kernels_for(made.hysteresis.kind, made.dynamics, made.needs_effects(spread)),
         given,
         signals=_signals(given, full, made.control_period),
         actions=acted([("pressure_set_point", "Pa", 0.0, full)], given),
@@ -196,7 +197,7 @@ def make_setup(
         own=made.gait_table(),
         samples=samples,
         tables=made.hysteresis_tables(),
-        spread=spread_of(made, RANDOMISATION, given.randomize),
+        spread=spread,
         view="pam_envs.envs.knee.view:GAIT",
     )
 

@@ -24,7 +24,7 @@ from pam_envs.mechanics.knee_lever import wanted_tension as tension_for
 from pam_envs.mechanics.leg import sine_and_cosine
 from pam_envs.muscle.emg import activation, excitation, left_of_gap
 from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.step import begin_lane, replacements
+from pam_envs.plants.knee_orthosis.step import SENSED, begin_lane, replacements
 from pam_envs.sensing.butterworth import butterworth
 from pam_envs.sensing.shoe import estimated_torque
 from pam_envs.tasks.gait_assistance import desired_assistance, gated_reward, over_assistance
@@ -37,8 +37,8 @@ VENTED = 1e3
 @kernel
 def read(rows: Any, fixed: Any, counts: Any, k: int, step: int, j: int) -> None:
     """Read sensor ``k`` of lane ``j`` at a control period."""
-    row, noise = L.SENSORS[k]
-    rows[L.READ_TENSION + k][j] = sense(rows[row][j], fixed, counts, noise, L.NOISE + k, step, j)
+    true, noise = rows[SENSED[k]][j], L.SENSORS[k]
+    rows[L.READ_TENSION + k][j] = sense(true, fixed, counts, noise, L.NOISE + k, step, j)
 
 
 @kernel
@@ -227,20 +227,24 @@ def begin_leg(
 
 
 @lru_cache(maxsize=16)
-def kernels_for(kind: str, dynamics: str) -> Kernels:
-    """Return the kernels for a kind of hysteresis and the dynamics of the pressure."""
+def kernels_for(kind: str, dynamics: str, extended: bool = False) -> Kernels:
+    """Return the kernels for a kind of hysteresis and the dynamics of the pressure, plain or with effects."""
+    rows = L.HYSTERESIS + state_rows(kind)
     return Kernels(
-        f"gait_{kind}_{dynamics}",
+        f"gait_{kind}_{dynamics}" + ("_extended" if extended else ""),
         kernels_for,
-        (kind, dynamics),
+        (kind, dynamics, extended),
         L.REPORT,
         advance=advance_leg,
         reference=planned_reference,
         evaluate=evaluate,
         begin=begin_leg,
         config=L.CONFIG,
-        placeholders={"FIRST_HYSTERESIS": L.HYSTERESIS, **replacements(kind, "leg", dynamics)},
-        rows=L.HYSTERESIS + state_rows(kind),
+        placeholders={
+            "FIRST_HYSTERESIS": L.HYSTERESIS,
+            **replacements(kind, "leg", dynamics, rows if extended else None),
+        },
+        rows=rows + (K.STATE.end if extended else 0),
         parameters=K.N_PARAMETERS,
         counts=K.N_COUNTS,
         signals=L.FIXED_SIGNALS,

@@ -32,15 +32,15 @@ HYSTERESIS = PLAN_FILTER + FILTER_ROWS
 """First row of the state of the hysteresis."""
 
 SENSORS = (
-    (K.TENSION, K.TENSION_NOISE),
-    (K.ANGLE, K.ANGLE_NOISE),
-    (K.PRESSURE, K.PRESSURE_NOISE),
-    (K.HEEL, K.HEEL_NOISE),
-    (K.GROUND_Z, K.GROUND_NOISE),
-    (K.COP, K.COP_NOISE),
-    (K.ANKLE, K.ANKLE_NOISE),
+    K.TENSION_NOISE,
+    K.ANGLE_NOISE,
+    K.PRESSURE_NOISE,
+    K.HEEL_NOISE,
+    K.GROUND_NOISE,
+    K.COP_NOISE,
+    K.ANKLE_NOISE,
 )
-"""Measured row of each reading from ``READ_TENSION`` on, and first row of its sensor's parameters."""
+"""First row of the parameters of each reading's sensor, from ``READ_TENSION`` on."""
 
 REPORT = Report(
     {

@@ -79,7 +79,7 @@ RATES = (-6.0, 6.0)
 MOST_PAYLOAD = 0.1
 """Largest payload [kg]. The largest one on some paths is less, which is checked."""
 RANDOMISATION = Randomisation(
-    R.PARAMETERS,
+    R.NAMES,
     ("regulator.max_pressure", "link.limit", "link.stop", "nominal.prestress"),
     "{'regulator.time_constant': (0.03, 0.06)}",
     {"lever.r_u": min, "lever.r_o": min, "lever.l_u": max, "lever.l_o": max},
@@ -206,9 +206,10 @@ def make_setup(
         "rest_seconds": check_number("rest_seconds", rest_seconds, 0.0, 600.0, "s"),
         "worst_period": task.worst(float(made.chain.reach)),
     }
+    spread = spread_of(made, RANDOMISATION, given.randomize)
     return compose(
         made,
-        kernels_for(made.hysteresis.kind, made.stages),
+        kernels_for(made.hysteresis.kind, made.stages, made.needs_effects(spread)),
         given,
         signals=_signals(made, action, plan, given),
         actions=acted(_actions(made, action), given),
@@ -221,7 +222,7 @@ def make_setup(
         own=payloads,
         samples=np.concatenate(list(paths.values())),
         tables=made.hysteresis_tables(),
-        spread=spread_of(made, RANDOMISATION, given.randomize),
+        spread=spread,
         view="pam_envs.envs.manipulator.view:view",
     )
 

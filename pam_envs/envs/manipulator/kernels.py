@@ -29,6 +29,8 @@ from pam_envs.mechanics.serial_chain_rows import parameter_rows
 from pam_envs.plants.antagonistic_joint.pair import command
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.step import (
+    SENSED_ANGLE,
+    SENSED_PRESSURE,
     advance,
     begin_lane,
     hysteresis_rows,
@@ -77,14 +79,14 @@ def advance_chain(
 def read_lane(rows: Any, fixed: Any, counts: Any, step: int, period: float, j: int) -> None:
     """Read the sensors of lane ``j`` at a control period, and filter the rates of the angles."""
     for k in range(N_STAGES):
-        true, draw = rows[M.ANGLE + k][j], step * N_STAGES + k
+        true, draw = rows[SENSED_ANGLE + k][j], step * N_STAGES + k
         angle = sense(true, fixed, counts, M.ANGLE_NOISE, L.NOISE_ANGLE, draw, j)
         rate = rows[L.RATE + k][j]
         change = angle - rows[L.READ_ANGLE + k][j] - period * rate
         rows[L.RATE + k][j] = 0.0 if step == 0 else rate + change / (L.RATE_TIME + period)
         rows[L.READ_ANGLE + k][j] = angle
     for k in range(2 * N_STAGES):
-        true, draw = rows[M.PRESSURE + k][j], 2 * step * N_STAGES + k
+        true, draw = rows[SENSED_PRESSURE + k][j], 2 * step * N_STAGES + k
         rows[L.READ_PRESSURE + k][j] = sense(
             true, fixed, counts, M.PRESSURE_NOISE, L.NOISE_PRESSURE, draw, j
         )
@@ -136,12 +138,13 @@ def begin_chain(
 
 
 @lru_cache(maxsize=16)
-def kernels_for(kind: str, stages: int) -> Kernels:
-    """Return the kernels for a kind of hysteresis and a number of joints."""
+def kernels_for(kind: str, stages: int, extended: bool = False) -> Kernels:
+    """Return the kernels for a kind of hysteresis and a number of joints, plain or with effects."""
+    rows = L.HYSTERESIS + hysteresis_rows(kind, stages)
     return Kernels(
-        f"manipulator_{kind}_{stages}",
+        f"manipulator_{kind}_{stages}" + ("_extended" if extended else ""),
         kernels_for,
-        (kind, stages),
+        (kind, stages, extended),
         L.report_for(stages),
         apply=apply_chain,
         advance=advance_chain,
@@ -153,9 +156,9 @@ def kernels_for(kind: str, stages: int) -> Kernels:
         placeholders={
             "plant_advance": advance,
             "FIRST_HYSTERESIS": L.HYSTERESIS,
-            **replacements(kind, stages),
+            **replacements(kind, stages, rows if extended else None),
         },
-        rows=L.HYSTERESIS + hysteresis_rows(kind, stages),
+        rows=rows + (M.STATE.end if extended else 0),
         parameters=M.CHAIN + parameter_rows(stages),
         counts=M.N_COUNTS,
         signals=6 * stages + 1 + L.N_POSE,

@@ -17,6 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from pam_envs.hysteresis.friction_effects import DriveEffects
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.protocol import preset
 from pam_envs.parameters import parameter
@@ -37,7 +38,7 @@ _SHARE = "friction in proportion to the pressure but for a rest of the empty mus
 
 
 @dataclass(frozen=True)
-class JointHysteresis(OperatorComponent):
+class JointHysteresis(DriveEffects, OperatorComponent):
     """Thread-on-thread friction of the muscles.
 
     ``operator`` turns contraction into the contraction that the friction follows (of the reduced

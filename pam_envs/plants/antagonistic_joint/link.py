@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pam_envs.constants import GRAVITY
+from pam_envs.mechanics.guide import BearingEffects
 from pam_envs.parameters import parameter
 
 _FORM = "a slender rod of 0.3 kg; the masses of fluidic_muscles's stages are not published"
@@ -38,7 +39,7 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class Link(Stage):
+class Link(BearingEffects, Stage):
     """The link of a single stage, which hangs from the joint; a payload is fixed to its end."""
 
     length: float = parameter(

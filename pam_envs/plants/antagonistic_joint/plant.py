@@ -27,7 +27,7 @@ from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint import statics as pair_statics
 from pam_envs.plants.antagonistic_joint.hysteresis import JointHysteresis, joint_hysteresis
 from pam_envs.plants.antagonistic_joint.link import Link, NominalPoint
-from pam_envs.plants.core.plant import Plant
+from pam_envs.plants.core.plant import Plant, effects_of, neutral_of
 from pam_envs.pneumatics.joint_regulator import JointRegulator
 from pam_envs.sensing.joint import JointEncoder
 from pam_envs.sensing.orthosis import GaugeSensor
@@ -45,6 +45,18 @@ PRESTRESS_RANGE = (20.0, 120.0)
 """Co-contractions [N] that the preset takes: more and the buckling lever leaves no stiffness."""
 
 
+PARTS: dict[str, type] = {
+    "regulator": JointRegulator,
+    "hysteresis": JointHysteresis,
+    "muscle": ForceMap,
+    "lever": AntagonisticLever,
+    "link": Link,
+    "nominal": NominalPoint,
+    "angle": JointEncoder,
+    "pressure": GaugeSensor,
+}
+
+
 @dataclass(frozen=True)
 class AntagonisticJoint(Plant):
     """The plant; another one is :meth:`replace` of it.
@@ -60,19 +72,11 @@ class AntagonisticJoint(Plant):
     """
 
     family: ClassVar[str] = "antagonistic_joint"
-    components: ClassVar[tuple[str, ...]] = (
-        "regulator",
-        "hysteresis",
-        "muscle",
-        "lever",
-        "link",
-        "nominal",
-        "angle",
-        "pressure",
-    )
+    components: ClassVar[tuple[str, ...]] = tuple(PARTS)
     names: ClassVar[tuple[str, ...]] = K.NAMES
     choices: ClassVar[tuple[str, ...]] = ("dynamics",)
-    extended: ClassVar[bool] = False
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = effects_of(PARTS)
+    neutral: ClassVar[Mapping[str, float]] = neutral_of(PARTS, K.EFFECTS)
     stages: ClassVar[int] = 1
 
     dynamics: Dynamics = "muscles"

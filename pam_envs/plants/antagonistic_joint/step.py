@@ -21,6 +21,7 @@ from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.motion import damped_motion
 from pam_envs.mechanics.antagonistic_lever import sine_and_cosine_of
 from pam_envs.plants.antagonistic_joint import rows as K
+from pam_envs.plants.antagonistic_joint.effects import effect_kernels
 from pam_envs.plants.antagonistic_joint.hysteresis_kernels import peek, remember
 from pam_envs.plants.antagonistic_joint.pair import (
     air_of,
@@ -82,6 +83,42 @@ N_WORK = 6
 move: Any = None
 rest: Any = None
 report: Any = None
+EFFECTIVE_A, SENSED_ANGLE, SENSED_PRESSURE = PRESSURE_A, ANGLE, PRESSURE_A
+"""Rows of effective pressures and undisturbed readings; those of the extended plant replace them."""
+
+
+@kernel
+def regulate(
+    rows: Any, fixed: Any, counts: Any, side: int, i: int, substeps: int, period: float, work: Any
+) -> None:
+    """Advance the pressure of one muscle of a tile through a sub-step."""
+    h = period / substeps
+    fill(rows[PRESSURE_A + side], rows[SET_POINT_A + side], work[side], fixed, h)
+
+
+@kernel
+def turn(
+    rows: Any, fixed: Any, j: int, velocity: float, acceleration: float, jerk: float,
+    stiffness: float, damping: float, per_inertia: float, h: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the turn [rad] of a joint in a sub-step and its velocity [rad/s] after it."""
+    damped = decay(0.5 * damping * h)
+    return damped_motion(velocity, acceleration, jerk, stiffness, damping, damped, h)
+
+
+@kernel
+def begin_muscles(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the effects of the muscles: a plain plant has none."""
+
+
+@kernel
+def begin_sensors(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the effects of the sensors: a plain plant has none."""
+
+
+@kernel
+def read_sensors(rows: Any, fixed: Any, j: int, step: int, period: float) -> None:
+    """Write readings with the effects of the sensors: a plain plant has none."""
 
 
 @kernel
@@ -129,25 +166,20 @@ def swing(
         load, slope = load_torque(rows, fixed, j, angle[j] + ahead)
         old_a, new_a, slope_a, drag_a = turning(
             fixed, j, 1.0, rows[AT_A][j] + straight[j], work[RATE_A][j], work[CURVE_A][j],
-            velocity[j], work[WAS_A][j], rows[PRESSURE_A][j], rows[LAG_A][j], rows[STICK_A][j],
+            velocity[j], work[WAS_A][j], rows[EFFECTIVE_A][j], rows[LAG_A][j], rows[STICK_A][j],
         )  # fmt: skip
         old_b, new_b, slope_b, drag_b = turning(
             fixed, j, -1.0, rows[AT_B][j] + straight[j], work[RATE_B][j], work[CURVE_B][j],
-            velocity[j], work[WAS_B][j], rows[PRESSURE_B][j], rows[LAG_B][j], rows[STICK_B][j],
+            velocity[j], work[WAS_B][j], rows[EFFECTIVE_A + 1][j], rows[LAG_B][j], rows[STICK_B][j],
         )  # fmt: skip
         old, new = load + old_a + old_b, load + new_a + new_b
         slope = max(1.0, slope + slope_a + slope_b)
         per_inertia = 1.0 / inertia_of(rows, fixed, j)
         drag = (fixed[DAMPING][j] + drag_a + drag_b) * per_inertia
-        du, velocity[j] = damped_motion(
-            velocity[j],
-            (old + slope * ahead) * per_inertia,
-            (new - old) * per_inertia / h,
-            slope * per_inertia,
-            drag,
-            decay(0.5 * drag * h),
-            h,
-        )
+        du, velocity[j] = turn(
+            rows, fixed, j, velocity[j], (old + slope * ahead) * per_inertia,
+            (new - old) * per_inertia / h, slope * per_inertia, drag, per_inertia, h,
+        )  # fmt: skip
         angle[j] = angle[j] + du
         contract(rows, fixed, j, angle[j], AT_A, STRAIGHT)
     remember(
@@ -217,12 +249,13 @@ def advance(
         ``N_WORK`` rows of scratch.
     """
     h = period / substeps
-    for _ in range(substeps):
+    for i in range(substeps):
         for side in range(2):
-            fill(rows[PRESSURE_A + side], rows[SET_POINT_A + side], work[side], fixed, h)
+            regulate(rows, fixed, counts, side, i, substeps, period, work)
         move(rows, fixed, counts, table, hysteresis, elements, h, work)
     for j in range(LANES):
         report(rows, fixed, j)
+        read_sensors(rows, fixed, j, counts[K.STEP][j] + 1, period)
 
 
 @kernel
@@ -233,7 +266,8 @@ def report_muscles(rows: Any, fixed: Any, j: int) -> None:
         sign, pressure = 1.0 - 2.0 * side, rows[PRESSURE_A + side][j]
         x, rate, curve = lever_of(fixed, j, rows[ANGLE][j], sign)
         speed = -rate * rows[VELOCITY][j] / fixed[REST_LENGTH][j]
-        force, k = pulled(fixed, j, sign, x, speed, pressure, rows[LAG_A + side][j])
+        effective = rows[EFFECTIVE_A + side][j]
+        force, k = pulled(fixed, j, sign, x, speed, effective, rows[LAG_A + side][j])
         rows[K.CONTRACTION_A + side][j], rows[K.FORCE_A + side][j] = x, force
         torque = torque - force * rate
         stiffness = stiffness + k * rate * rate / fixed[REST_LENGTH][j] + force * curve
@@ -273,9 +307,11 @@ def begin_lane(
     straight, _, _ = lever_of(fixed, j, 0.0, 1.0)
     rows[STRAIGHT][j] = straight
     rows[LAG_A][j] = rows[LAG_A + 1][j] = 0.0
+    begin_muscles(rows, fixed, j)
     rest(rows, fixed, counts, table, hysteresis, elements, j)
     rows[VELOCITY][j] = 0.0
     report(rows, fixed, j)
+    begin_sensors(rows, fixed, j)
 
 
 @kernel
@@ -285,7 +321,8 @@ def resting_torque(rows: Any, fixed: Any, j: int, angle: float) -> float:
     for side in range(2):
         sign = 1.0 - 2.0 * side
         x, rate, _ = lever_of(fixed, j, angle, sign)
-        force, _ = pulled(fixed, j, sign, x, 0.0, rows[PRESSURE_A + side][j], rows[LAG_A + side][j])
+        effective = rows[EFFECTIVE_A + side][j]
+        force, _ = pulled(fixed, j, sign, x, 0.0, effective, rows[LAG_A + side][j])
         torque = torque - force * rate
     return torque
 
@@ -340,6 +377,10 @@ DYNAMICS: dict[str, dict[str, Any]] = {
 }
 
 
-def replacements(kind: str, dynamics: str) -> dict[str, Any]:
-    """Return the kernels that a plant of this make puts in the place of the placeholders."""
-    return protocol.kernels(kind) | DYNAMICS[dynamics]
+def replacements(kind: str, dynamics: str, effects: int | None = None) -> dict[str, Any]:
+    """Return the kernels that a plant of this make puts in the place of the placeholders.
+
+    ``effects`` is the first row of the state of the effects; None for a plain plant.
+    """
+    extended = {} if effects is None else effect_kernels(effects)
+    return protocol.kernels(kind) | DYNAMICS[dynamics] | extended

@@ -31,7 +31,7 @@ LONGEST_PERIOD = 0.0101
 """Longest one [s]: it is one sub-step, whose errors stay below the noise of a good sensor."""
 READING, PRESSURE, POSITION = range(3)
 N_ROWS = 0  # placeholders, filled in for each hysteresis
-FIRST = 0
+EFFECTS_AT = 0
 
 Array = NDArray[np.float64]
 
@@ -71,10 +71,10 @@ def run_lanes(
         start = tile * LANES
         lanes = min(LANES, len(outputs[0][0]) - start)
         seen_x, seen_p = (
-            rows[FIRST + R.STATE.position_sensor],
-            rows[FIRST + R.STATE.pressure_sensor],
+            rows[EFFECTS_AT + R.STATE.position_reading],
+            rows[EFFECTS_AT + R.STATE.pressure_reading],
         )
-        true_x = rows[FIRST + R.STATE.position]
+        true_x = rows[EFFECTS_AT + R.STATE.position]
         for t in range(len(set_points)):
             for j in range(LANES):
                 rows[R.SET_POINT][j] = set_points[t][start + min(j, lanes - 1)]

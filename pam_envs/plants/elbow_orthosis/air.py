@@ -52,8 +52,11 @@ def begin_regulated(rows: Any, fixed: Any, j: int, period: float) -> None:
 
 
 @kernel
-def breathe_regulated(rows: Any, fixed: Any, h: float, work: Any) -> None:
+def breathe_regulated(
+    rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float, work: Any
+) -> None:
     """Advance both pressures of a tile towards their set-points."""
+    h = period / substeps
     for side in range(2):
         pressure, command = rows[PRESSURE_A + side], rows[COMMAND_A + side]
         was, now, gives = work[WAS_A + side], work[NOW_A + side], work[GIVES_A + side]
@@ -71,9 +74,15 @@ def settle_regulated(rows: Any, fixed: Any, work: Any) -> None:
     for side in range(2):
         for j in range(LANES):
             rows[PRESSURE_A + side][j] = work[NOW_A + side][j]
-            air = air_at(rows, fixed, j, side)
-            rows[USED][j] = rows[USED][j] + max(0.0, air - rows[AIR_A + side][j])
-            rows[AIR_A + side][j] = air
+            count_used_air(rows, fixed, j, side)
+
+
+@kernel
+def count_used_air(rows: Any, fixed: Any, j: int, side: int) -> None:
+    """Write the air [kg] in a bundle, and add its growth to the air used."""
+    air = air_at(rows, fixed, j, side)
+    rows[USED][j] = rows[USED][j] + max(0.0, air - rows[AIR_A + side][j])
+    rows[AIR_A + side][j] = air
 
 
 @kernel
@@ -99,8 +108,11 @@ def begin_pulsed(rows: Any, fixed: Any, j: int, period: float) -> None:
 
 
 @kernel
-def breathe_pulsed(rows: Any, fixed: Any, h: float, work: Any) -> None:
+def breathe_pulsed(
+    rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float, work: Any
+) -> None:
     """Let air through the valves of a tile, at the volumes of the middle of the sub-step."""
+    h = period / substeps
     for side in range(2):
         for j in range(LANES):
             contraction = contraction_at(fixed, j, side, work[MIDDLE][j])

@@ -27,6 +27,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.hysteresis.friction_effects import DriveEffects
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.hysteresis.protocol import preset
@@ -48,7 +49,7 @@ are all within the paper's stroke of 66 mm, which is why the loop there is the l
 
 
 @dataclass(frozen=True)
-class ElbowHysteresis(OperatorComponent):
+class ElbowHysteresis(DriveEffects, OperatorComponent):
     """Thread-on-thread friction of both bundles.
 
     ``operator`` turns travel [m] into the travel that the friction follows, with slope 1 and a

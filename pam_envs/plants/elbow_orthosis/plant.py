@@ -26,7 +26,7 @@ from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.mechanics.forearm import OrthosisLink, Wearer
 from pam_envs.mechanics.pulley import Pulley
 from pam_envs.muscle.quadratic_bundle import QuadraticBundle
-from pam_envs.plants.core.plant import Plant
+from pam_envs.plants.core.plant import Plant, effects_of, neutral_of
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.hysteresis import ElbowHysteresis, elbow_hysteresis
 from pam_envs.pneumatics.bundle_regulator import BundleRegulator
@@ -40,6 +40,20 @@ MAKES: tuple[Valves, ...] = ("proportional", "on_off")
 STOP_GIVES = 0.15
 """Depth [rad] of the mechanical stops."""
 SEVEN = ("published", "mus_b = 7: chakarov2018, section 3")
+
+
+PARTS: dict[str, type] = {
+    "bundle_a": QuadraticBundle,
+    "bundle_b": QuadraticBundle,
+    "regulator": BundleRegulator,
+    "valve": OnOffValve,
+    "hysteresis": ElbowHysteresis,
+    "pulley": Pulley,
+    "link": OrthosisLink,
+    "wearer": Wearer,
+    "angle": AngleSensor,
+    "pressure": GaugeSensor,
+}
 
 
 @dataclass(frozen=True)
@@ -58,21 +72,11 @@ class ElbowOrthosis(Plant):
     """
 
     family: ClassVar[str] = "elbow_orthosis"
-    components: ClassVar[tuple[str, ...]] = (
-        "bundle_a",
-        "bundle_b",
-        "regulator",
-        "valve",
-        "hysteresis",
-        "pulley",
-        "link",
-        "wearer",
-        "angle",
-        "pressure",
-    )
+    components: ClassVar[tuple[str, ...]] = tuple(PARTS)
     names: ClassVar[tuple[str, ...]] = K.NAMES
     choices: ClassVar[tuple[str, ...]] = ("valves",)
-    extended: ClassVar[bool] = False
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = effects_of(PARTS)
+    neutral: ClassVar[Mapping[str, float]] = neutral_of(PARTS, K.EFFECTS)
 
     valves: Valves = "proportional"
     bundle_a: QuadraticBundle = field(default_factory=QuadraticBundle)

@@ -1,14 +1,19 @@
-"""Where each number of the elbow orthosis stands in its rows (see ``single_muscle_rows``).
+"""Row indices of the elbow orthosis' state and parameters.
 
 A plant's numbers are rows of two matrices whose columns are environments (lanes): ``rows`` is the
-state, followed by that of the hysteresis, and ``fixed`` the parameters, which all tiles of a batch
-share unless they are drawn. This page is the only one that counts. Of what stands twice, the
-first is bundle a's, which straightens the elbow.
+state, followed by that of the hysteresis and that of the effects, and ``fixed`` the parameters,
+which all tiles of a batch share unless they are drawn. Of pairs, the first is that of bundle a,
+which straightens the elbow.
 """
 
 from __future__ import annotations
 
 from pam_envs.hysteresis.protocol import NUMBERS
+from pam_envs.kernels.history import N_HISTORY
+from pam_envs.mechanics.guide import GUIDE
+from pam_envs.parameters import row_blocks
+from pam_envs.plants.core.muscle_path import PATH, PATH_NAMES, PATH_STATE, WARM
+from pam_envs.sensing.sensor import SENSOR
 
 (
     ANGLE,
@@ -142,12 +147,42 @@ PARAMETERS = (
     PRESSURE_BIAS,
 ) = range(2 * BUNDLE_ROWS, len(PARAMETERS))
 
-MODEL = len(PARAMETERS)
+# parameters of effects, which are off in a plain plant
+EFFECTS = (
+    *PATH_NAMES,
+    *(f"{bundle}.{name}" for bundle in ("bundle_a", "bundle_b") for name in WARM._fields),
+    *(f"link.{name}" for name in GUIDE._fields),
+    *(f"angle.{name}" for name in SENSOR._fields),
+    *(f"pressure.{name}" for name in SENSOR._fields),
+)
+EFFECT = row_blocks(
+    len(PARAMETERS),
+    path=len(PATH),
+    warm=2 * len(WARM),
+    bearing=len(GUIDE),
+    angle_sensor=len(SENSOR),
+    pressure_sensor=len(SENSOR),
+)
+"""First rows of the parameters of effects."""
+STATE = row_blocks(
+    effective=2,
+    crept=2,
+    factor=2,
+    paths=2 * PATH_STATE.end,
+    stuck=1,
+    angle=1,
+    angle_ring=N_HISTORY,
+    pressures=2,
+    pressure_rings=2 * N_HISTORY,
+)
+"""State of the effects, counted from the first row after the hysteresis's."""
+
+MODEL = EFFECT.end
 """First row of the hysteresis operator's numbers."""
 LARGEST_LAG = MODEL + NUMBERS
 N_PARAMETERS = LARGEST_LAG + 1
-NAMES = PARAMETERS
-"""Every parameter by name; :func:`place` says where it stands."""
+NAMES = PARAMETERS + EFFECTS
+"""Every parameter by name, in the order of its rows."""
 
 # integer rows
 KEY_A, KEY_B, EPISODE, STEP, MEMBER, STACK_COUNT = range(6)
@@ -155,5 +190,5 @@ N_COUNTS = 6
 
 
 def place(name: str) -> int:
-    """Return where a parameter stands in the column that the kernels read."""
-    return PARAMETERS.index(name)
+    """Return the row of a parameter in the column that the kernels read."""
+    return NAMES.index(name)

@@ -38,6 +38,7 @@ from pam_envs.plants.elbow_orthosis.bundles import (
     travel_at,
     weight_of,
 )
+from pam_envs.plants.elbow_orthosis.effects import effect_kernels
 from pam_envs.plants.elbow_orthosis.rows import (
     AIR_A,
     ANGLE,
@@ -87,6 +88,34 @@ begin_period: Any = None
 breathe: Any = None
 settle: Any = None
 start_air: Any = None
+MODEL_STATE = 0
+EFFECTIVE_A, SENSED_ANGLE, SENSED_PRESSURE = PRESSURE_A, ANGLE, PRESSURE_A
+"""Rows of effective pressures and undisturbed readings; those of the extended plant replace them."""
+
+
+@kernel
+def turn(
+    rows: Any, fixed: Any, j: int, velocity: float, acceleration: float, jerk: float,
+    stiffness: float, damping: float, per_inertia: float, h: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the turn [rad] of the elbow in a sub-step and its velocity [rad/s] after it."""
+    damped = decay(0.5 * damping * h)
+    return damped_motion(velocity, acceleration, jerk, stiffness, damping, damped, h)
+
+
+@kernel
+def begin_muscles(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the effects of the bundles: a plain plant has none."""
+
+
+@kernel
+def begin_sensors(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the effects of the sensors: a plain plant has none."""
+
+
+@kernel
+def read_sensors(rows: Any, fixed: Any, j: int, step: int, period: float) -> None:
+    """Write readings with the effects of the sensors: a plain plant has none."""
 
 
 @kernel
@@ -158,15 +187,10 @@ def swing(rows: Any, fixed: Any, i: int, substeps: int, h: float, work: Any) -> 
         total = old + driven - hold * work[MIDDLE][j] + stiffness * ahead
         per_inertia = 1.0 / (fixed[LINK_INERTIA][j] + fixed[WEARER_INERTIA][j])
         drag = (fixed[LINK_DAMPING][j] + fixed[WEARER_DAMPING][j]) * per_inertia
-        du, velocity[j] = damped_motion(
-            velocity[j],
-            total * per_inertia,
-            (new - old + climb) * per_inertia / h,
-            stiffness * per_inertia,
-            drag,
-            decay(0.5 * drag * h),
-            h,
-        )
+        du, velocity[j] = turn(
+            rows, fixed, j, velocity[j], total * per_inertia,
+            (new - old + climb) * per_inertia / h, stiffness * per_inertia, drag, per_inertia, h,
+        )  # fmt: skip
         angle[j] = angle[j] + du
 
 
@@ -206,7 +230,7 @@ def advance(
             rows, fixed, counts, table, hysteresis, elements, AT, LAG, 1, MODEL, STACK_COUNT, MEMBER,
             0, LANES,
         )  # fmt: skip
-        breathe(rows, fixed, h, work)
+        breathe(rows, fixed, counts, i, substeps, period, work)
         swing(rows, fixed, i, substeps, h, work)
         settle(rows, fixed, work)
     for j in range(LANES):
@@ -217,6 +241,7 @@ def advance(
     )  # fmt: skip
     for j in range(LANES):
         report(rows, fixed, j)
+        read_sensors(rows, fixed, j, counts[K.STEP][j] + 1, period)
 
 
 @kernel
@@ -225,8 +250,8 @@ def report(rows: Any, fixed: Any, j: int) -> None:
     angle, velocity, radius = rows[ANGLE][j], rows[VELOCITY][j], fixed[RADIUS][j]
     torque, stiffness, slack = 0.0, 0.0, 0.0
     for side in range(2):
-        pressure = rows[PRESSURE_A + side][j]
-        force, growth, _ = pulled(fixed, j, side, angle, rows[LAG][j], pressure)
+        effective = rows[EFFECTIVE_A + side][j]
+        force, growth, _ = pulled(fixed, j, side, angle, rows[LAG][j], effective)
         rows[K.CONTRACTION_A + side][j] = contraction_at(fixed, j, side, angle)
         rows[K.FORCE_A + side][j] = force
         torque = torque + (2.0 * side - 1.0) * radius * force
@@ -259,7 +284,7 @@ def felt_torque(rows: Any, fixed: Any, j: int, torque: float) -> float:
 @kernel
 def start_hysteresis(rows: Any, counts: Any, hysteresis: int, j: int) -> None:
     """Put the hysteresis of one lane into its virgin state."""
-    for k in range(len(rows) - hysteresis):
+    for k in range(MODEL_STATE):
         rows[hysteresis + k][j] = 0.0
     counts[STACK_COUNT][j] = 1
 
@@ -269,8 +294,8 @@ def resting_torque(rows: Any, fixed: Any, j: int, angle: float) -> float:
     """Return the torque at rest [N m] at an angle, with the hysteresis's lag of that angle."""
     torque, _ = passive_torque(fixed, j, angle)
     for side in range(2):
-        pressure = rows[PRESSURE_A + side][j]
-        force, _, _ = pulled(fixed, j, side, angle, rows[LAG][j], pressure)
+        effective = rows[EFFECTIVE_A + side][j]
+        force, _, _ = pulled(fixed, j, side, angle, rows[LAG][j], effective)
         torque = torque + (2.0 * side - 1.0) * fixed[RADIUS][j] * force
     return torque + rows[DRIVE][j] + rows[DISTURBANCE][j] - fixed[WEARER_STIFFNESS][j] * angle
 
@@ -286,6 +311,7 @@ def begin_lane(
     ``DISTURBANCE`` and ``counts[MEMBER]`` are set before.
     """
     rows[PRESSURE_A][j], rows[PRESSURE_A + 1][j] = pressure_a, pressure_b
+    begin_muscles(rows, fixed, j)
     rows[INTENT_RATE][j] = rows[INTENT_ACCELERATION][j] = 0.0
     rows[VELOCITY][j] = rows[LAG][j] = rows[K.USED][j] = 0.0
     rows[DRIVE][j] = drive_of(rows, fixed, j)
@@ -307,6 +333,7 @@ def begin_lane(
     for side in range(2):
         rows[AIR_A + side][j] = air_at(rows, fixed, j, side)
     report(rows, fixed, j)
+    begin_sensors(rows, fixed, j)
 
 
 @kernel
@@ -327,6 +354,11 @@ def start_pulsed(rows: Any, fixed: Any, j: int) -> None:
 STARTS = {"proportional": start_regulated, "on_off": start_pulsed}
 
 
-def replacements(kind: str, valves: str) -> dict[str, Any]:
-    """Return the kernels that a plant of this make puts in the place of the placeholders."""
-    return protocol.kernels(kind) | {"start_air": STARTS[valves]} | AIR[valves]
+def replacements(kind: str, valves: str, effects: int | None = None) -> dict[str, Any]:
+    """Return the kernels that a plant of this make puts in the place of the placeholders.
+
+    ``effects`` is the first row of the state of the effects; None for a plain plant.
+    """
+    kernels = protocol.kernels(kind) | {"start_air": STARTS[valves]}
+    extended = {} if effects is None else effect_kernels(valves, effects)
+    return kernels | AIR[valves] | extended

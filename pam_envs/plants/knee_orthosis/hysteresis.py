@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
+from pam_envs.hysteresis.friction_effects import DriveEffects
 from pam_envs.hysteresis.modified_maxwell_slip import even_model
 from pam_envs.hysteresis.protocol import HysteresisModel, preset
 from pam_envs.parameters import parameter
@@ -19,7 +20,7 @@ MAP_POINTS = 46
 
 
 @dataclass(frozen=True)
-class KneeHysteresis(OperatorComponent):
+class KneeHysteresis(DriveEffects, OperatorComponent):
     """Thread-on-thread friction of the muscle.
 
     ``operator`` turns pressure [Pa] into stiffness ``T / dL`` [N/m] and starts vented; without it

@@ -17,6 +17,8 @@ from pam_envs.plants.knee_orthosis.rows import (
     STIFFNESS_RATIO,
 )
 
+EFFECTIVE = PRESSURE
+"""Row of the effective pressure; that of the extended plant replaces it."""
 hysteresis_scaled: Any = None  # a placeholder
 
 
@@ -26,7 +28,7 @@ def stiffness_of_line(
     elements: int,
 ) -> None:  # fmt: skip
     """Write the stiffness without hysteresis, proportional to the pressure."""
-    pressure, stiffness = rows[PRESSURE], rows[STIFFNESS]
+    pressure, stiffness = rows[EFFECTIVE], rows[STIFFNESS]
     for j in range(first, last):
         stiffness[j] = fixed[GAIN][j] * fixed[STIFFNESS_RATIO][j] * pressure[j]
 
@@ -39,7 +41,7 @@ def stiffness_of_model(
     """Write the stiffness by a hysteresis model of the pressure."""
     stiffness = rows[STIFFNESS]
     hysteresis_scaled(
-        rows[PRESSURE], stiffness, fixed[LOOP_WIDTH], rows, fixed, counts, table, elements,
+        rows[EFFECTIVE], stiffness, fixed[LOOP_WIDTH], rows, fixed, counts, table, elements,
         hysteresis, MODEL, STACK_COUNT, MEMBER, first, last,
     )  # fmt: skip
     for j in range(first, last):

@@ -55,6 +55,16 @@ N_WORK = 6
 
 
 @kernel
+def turn(
+    rows: Any, fixed: Any, j: int, velocity: float, acceleration: float, jerk: float,
+    stiffness: float, damping: float, per_inertia: float, h: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the turn [rad] of the brace in a sub-step and its velocity [rad/s] after it."""
+    damped = decay(0.5 * damping * h)
+    return damped_motion(velocity, acceleration, jerk, stiffness, damping, damped, h)
+
+
+@kernel
 def torque_and_slope(fixed: Any, j: int, angle: float, stiffness: float) -> tuple[float, float]:
     """Return the assistive torque [N m] at an angle [rad] and its slope [N m/rad]."""
     sine, cosine = half_angle(angle)
@@ -96,15 +106,10 @@ def swing_free(
         old, slope_old = torque_and_slope(fixed, j, angle[j] + ahead, was[j])
         new, slope_new = torque_and_slope(fixed, j, angle[j] + ahead, stiffness[j])
         slope = max(1.0, 0.5 * (slope_old + slope_new))
-        du, velocity[j] = damped_motion(
-            velocity[j],
-            (slope * ahead - old) * per_inertia,
-            (old - new) * per_inertia / h,
-            slope * per_inertia,
-            drag,
-            decay(0.5 * drag * h),
-            h,
-        )
+        du, velocity[j] = turn(
+            rows, fixed, j, velocity[j], (slope * ahead - old) * per_inertia,
+            (old - new) * per_inertia / h, slope * per_inertia, drag, per_inertia, h,
+        )  # fmt: skip
         angle[j] = angle[j] + du
 
 

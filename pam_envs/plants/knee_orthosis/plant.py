@@ -28,7 +28,7 @@ from pam_envs.mechanics.leg import Leg
 from pam_envs.muscle.emg import MuscleActivation
 from pam_envs.muscle.gas_spring import GasSpring
 from pam_envs.parameters import parameter
-from pam_envs.plants.core.plant import Plant
+from pam_envs.plants.core.plant import Plant, effects_of, neutral_of
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.hysteresis import KneeHysteresis, knee_hysteresis
 from pam_envs.pneumatics.measured_dynamics import OrthosisRegulator, mode_rows
@@ -79,6 +79,26 @@ class Stride:
     )
 
 
+PARTS: dict[str, type] = {
+    "regulator": OrthosisRegulator,
+    "hysteresis": KneeHysteresis,
+    "muscle": GasSpring,
+    "lever": KneeLever,
+    "fixture": Fixture,
+    "leg": Leg,
+    "stride": Stride,
+    "shoe": Shoe,
+    "activation": MuscleActivation,
+    "tension": TensionSensor,
+    "angle": AngleSensor,
+    "pressure": GaugeSensor,
+    "heel": HeelSensor,
+    "ground": GroundSensor,
+    "cop": CopSensor,
+    "ankle": AngleSensor,
+}
+
+
 @dataclass(frozen=True)
 class KneeOrthosis(Plant):
     """The plant; another one is :meth:`replace` of it.
@@ -100,27 +120,11 @@ class KneeOrthosis(Plant):
     """
 
     family: ClassVar[str] = "knee_orthosis"
-    components: ClassVar[tuple[str, ...]] = (
-        "regulator",
-        "hysteresis",
-        "muscle",
-        "lever",
-        "fixture",
-        "leg",
-        "stride",
-        "shoe",
-        "activation",
-        "tension",
-        "angle",
-        "pressure",
-        "heel",
-        "ground",
-        "cop",
-        "ankle",
-    )
+    components: ClassVar[tuple[str, ...]] = tuple(PARTS)
     names: ClassVar[tuple[str, ...]] = K.NAMES
     choices: ClassVar[tuple[str, ...]] = tuple(MAKES)
-    extended: ClassVar[bool] = False
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = effects_of(PARTS)
+    neutral: ClassVar[Mapping[str, float]] = neutral_of(PARTS, K.EFFECTS)
 
     mounting: Mounting = "no_load"
     dynamics: Dynamics = "lag"

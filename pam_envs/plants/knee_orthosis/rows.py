@@ -1,14 +1,19 @@
-"""Where each number of the knee orthosis stands in its rows (see ``single_muscle_rows``).
+"""Row indices of the knee orthosis' state and parameters.
 
 A plant's numbers are rows of two matrices whose columns are environments (lanes): ``rows`` is the
-state, followed by that of the hysteresis, and ``fixed`` the parameters, which all tiles of a batch
-share unless they are drawn. This page is the only one that counts.
+state, followed by that of the hysteresis and that of the effects, and ``fixed`` the parameters,
+which all tiles of a batch share unless they are drawn.
 """
 
 from __future__ import annotations
 
 from pam_envs.hysteresis.protocol import NUMBERS
+from pam_envs.kernels.history import N_HISTORY
+from pam_envs.mechanics.guide import GUIDE
+from pam_envs.parameters import row_blocks
+from pam_envs.plants.core.muscle_path import PATH, PATH_NAMES, PATH_STATE, WARM
 from pam_envs.pneumatics.measured_dynamics import MODE_ROWS, MODES
+from pam_envs.sensing.sensor import SENSOR
 
 # state: brace and muscle, then stride and wearer
 (
@@ -180,13 +185,38 @@ PARAMETERS = (
     ANKLE_BIAS,
 ) = range(len(PARAMETERS))
 
-MODE_TABLE = len(PARAMETERS)
+SENSORS = ("tension", "angle", "pressure", "heel", "ground", "cop", "ankle")
+# parameters of effects, which are off in a plain plant
+EFFECTS = (
+    *PATH_NAMES,
+    *(f"muscle.{name}" for name in WARM._fields),
+    *(f"lever.{name}" for name in GUIDE._fields),
+    *(f"{sensor}.{name}" for sensor in SENSORS for name in SENSOR._fields),
+)
+EFFECT = row_blocks(
+    len(PARAMETERS),
+    path=len(PATH),
+    warm=len(WARM),
+    bearing=len(GUIDE),
+    sensors=len(SENSORS) * len(SENSOR),
+)
+"""First rows of the parameters of effects."""
+STATE = row_blocks(
+    effective=1,
+    path=PATH_STATE.end,
+    stuck=1,
+    readings=len(SENSORS),
+    rings=len(SENSORS) * N_HISTORY,
+)
+"""State of the effects, counted from the first row after the hysteresis's."""
+
+MODE_TABLE = EFFECT.end
 """First row of what the modes are made of."""
 MODEL = MODE_TABLE + MODE_ROWS
 """First row of the hysteresis operator's numbers."""
 N_PARAMETERS = MODEL + NUMBERS
-NAMES = PARAMETERS
-"""Every parameter by name; :func:`place` says where it stands."""
+NAMES = PARAMETERS + EFFECTS
+"""Every parameter by name, in the order of its rows."""
 
 # integer rows
 KEY_A, KEY_B, EPISODE, STEP, STACK_COUNT, MEMBER = range(6)
@@ -194,5 +224,5 @@ N_COUNTS = 6
 
 
 def place(name: str) -> int:
-    """Return where a parameter stands in the column that the kernels read."""
-    return PARAMETERS.index(name)
+    """Return the row of a parameter in the column that the kernels read."""
+    return NAMES.index(name)

@@ -13,6 +13,7 @@ from typing import Any
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.plants.knee_orthosis import rows as K
+from pam_envs.plants.knee_orthosis.effects import effect_kernels
 from pam_envs.plants.knee_orthosis.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.knee_orthosis.motion import MOTIONS, N_WORK, WAS
 from pam_envs.plants.knee_orthosis.rows import (
@@ -42,11 +43,29 @@ begin_period: Any = None
 move: Any = None
 rest: Any = None
 report: Any = None
+SENSED = (K.TENSION, K.ANGLE, K.PRESSURE, K.HEEL, K.GROUND_Z, K.COP, K.ANKLE)
+"""Rows of undisturbed readings, in the order of ``SENSORS``; effects replace them."""
 
 
 @kernel
-def lag(rows: Any, fixed: Any, h: float) -> None:
+def begin_muscle(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the effects of the muscle: a plain plant has none."""
+
+
+@kernel
+def begin_sensors(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the effects of the sensors: a plain plant has none."""
+
+
+@kernel
+def read_sensors(rows: Any, fixed: Any, j: int, step: int, period: float) -> None:
+    """Write readings with the effects of the sensors: a plain plant has none."""
+
+
+@kernel
+def lag(rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float) -> None:
     """Advance the pressure behind a first-order lag."""
+    h = period / substeps
     pressure, set_point = rows[PRESSURE], rows[SET_POINT]
     for j in range(LANES):
         time, slew = fixed[TIME_CONSTANT][j], fixed[SLEW_RATE][j]
@@ -60,8 +79,9 @@ def settle_lag(rows: Any, fixed: Any, j: int) -> None:
 
 
 @kernel
-def measured(rows: Any, fixed: Any, h: float) -> None:
+def measured(rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float) -> None:
     """Advance the modes of the published frequency response."""
+    h = period / substeps
     set_point = rows[SET_POINT]
     for j in range(LANES):
         u = max(0.0, min(fixed[MAX_PRESSURE][j], set_point[j]))
@@ -111,13 +131,14 @@ def advance(
     h = period / substeps
     begin_period(rows, fixed, counts, gait, period, work)
     for i in range(substeps):
-        regulate(rows, fixed, h)
+        regulate(rows, fixed, counts, i, substeps, period)
         for j in range(LANES):
             work[WAS][j] = rows[STIFFNESS][j]
         remember(rows, fixed, counts, table, hysteresis, 0, LANES, elements)
         move(rows, fixed, counts, gait, i, substeps, h, work)
     for j in range(LANES):
         report(rows, fixed, j, period)
+        read_sensors(rows, fixed, j, counts[K.STEP][j] + 1, period)
 
 
 @kernel
@@ -141,14 +162,17 @@ def begin_lane(
         rows, fixed, counts, table, elements, hysteresis, K.MODEL, K.STACK_COUNT, K.MEMBER, j
     )
     rows[PRESSURE][j] = 0.0
+    begin_muscle(rows, fixed, j)
     remember(rows, fixed, counts, table, hysteresis, j, j + 1, elements)
     rows[PRESSURE][j] = pressure
+    begin_muscle(rows, fixed, j)
     remember(rows, fixed, counts, table, hysteresis, j, j + 1, elements)
     settle(rows, fixed, j)
     rows[SET_POINT][j] = rows[K.OLD_SET_POINT][j] = rows[K.OLD_PRESSURE][j] = pressure
     rows[K.START_PHASE][j] = start_phase
     rest(rows, fixed, gait, j)
     report(rows, fixed, j, 0.0)
+    begin_sensors(rows, fixed, j)
     rows[K.OLD_AIR][j] = rows[K.AIR][j]
 
 
@@ -158,6 +182,14 @@ REGULATORS: dict[str, dict[str, Any]] = {
 }
 
 
-def replacements(kind: str, mounting: str, dynamics: str) -> dict[str, Any]:
-    """Return the kernels that a plant of this make puts in the place of the placeholders."""
-    return hysteresis_kernels(kind) | MOTIONS[mounting] | REGULATORS[dynamics]
+def replacements(
+    kind: str, mounting: str, dynamics: str, effects: int | None = None
+) -> dict[str, Any]:
+    """Return the kernels that a plant of this make puts in the place of the placeholders.
+
+    ``effects`` is the first row of the state of the effects; None for a plain plant.
+    """
+    kernels = hysteresis_kernels(kind) | MOTIONS[mounting] | REGULATORS[dynamics]
+    if effects is None:
+        return kernels
+    return kernels | effect_kernels(dynamics, kernels["regulate"], effects)

@@ -45,7 +45,7 @@ from pam_envs.plants.antagonistic_joint.plant import (
     STRETCHED,
     AntagonisticJoint,
 )
-from pam_envs.plants.core.plant import Plant
+from pam_envs.plants.core.plant import Plant, effects_of, neutral_of
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.pneumatics.joint_regulator import JointRegulator
 from pam_envs.sensing.joint import JointEncoder
@@ -58,6 +58,19 @@ LINK = SerialChain.uniform()
 DAMPING_RATIO = 0.5
 MOST_DAMPING = 100.0
 LINKS = ("lengths", "masses", "centres", "across", "along")
+
+
+PARTS: dict[str, type] = {
+    "arm": ArmFactors,
+    "regulator": JointRegulator,
+    "hysteresis": JointHysteresis,
+    "muscle": ForceMap,
+    "lever": AntagonisticLever,
+    "link": Stage,
+    "nominal": StagePoint,
+    "angle": JointEncoder,
+    "pressure": GaugeSensor,
+}
 
 
 @dataclass(frozen=True)
@@ -81,20 +94,11 @@ class RedundantManipulator(Plant):
     """
 
     family: ClassVar[str] = "redundant_manipulator"
-    components: ClassVar[tuple[str, ...]] = (
-        "arm",
-        "regulator",
-        "hysteresis",
-        "muscle",
-        "lever",
-        "link",
-        "nominal",
-        "angle",
-        "pressure",
-    )
+    components: ClassVar[tuple[str, ...]] = tuple(PARTS)
     names: ClassVar[tuple[str, ...]] = M.NAMES
     choices: ClassVar[tuple[str, ...]] = ("axes", *LINKS, "gravity", "joint_damping")
-    extended: ClassVar[bool] = False
+    effects: ClassVar[tuple[tuple[str, ...], ...]] = effects_of(PARTS)
+    neutral: ClassVar[Mapping[str, float]] = neutral_of(PARTS, M.EFFECTS)
     dynamics: ClassVar[str] = "muscles"
 
     axes: str = "".join(LINK.axes)

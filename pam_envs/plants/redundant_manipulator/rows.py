@@ -1,14 +1,16 @@
-"""Where each number of the redundant manipulator stands in its rows (see ``single_muscle_rows``).
+"""Row indices of the redundant manipulator's state and parameters.
 
-Rows of one kind stand side by side, ``ANGLE + k`` of joint ``k``, ``PRESSURE + 2 k`` of its muscle
+Rows of one kind are neighbours, ``ANGLE + k`` of joint ``k``, ``PRESSURE + 2 k`` of its muscle
 A and ``PRESSURE + 2 k + 1`` of its muscle B. There is room for ``MOST_STAGES`` joints, however many
-a chain has. The parameters of the muscles stand where those of a single joint stand, so that the
+a chain has. The parameters of the muscles have the rows of those of a single joint, so that the
 kernels of the pair serve both.
 """
 
 from __future__ import annotations
 
 from pam_envs.hysteresis.protocol import NUMBERS
+from pam_envs.kernels.history import N_HISTORY
+from pam_envs.parameters import row_blocks
 from pam_envs.plants.antagonistic_joint.rows import (
     ANGLE_BIAS,
     ANGLE_NOISE,
@@ -26,6 +28,8 @@ from pam_envs.plants.antagonistic_joint.rows import (
     STOP,
     TIME_CONSTANT,
 )
+from pam_envs.plants.core.muscle_path import PATH, PATH_NAMES, PATH_STATE, WARM
+from pam_envs.sensing.sensor import SENSOR
 
 __all__ = [
     "ANGLE_BIAS",
@@ -71,14 +75,39 @@ END = SHARE + 1
 
 PARAMETERS = (*MUSCLE_PARAMETERS, "arm.mass_factor", "arm.damping_factor")
 MASS_FACTOR, DAMPING_FACTOR = range(len(MUSCLE_PARAMETERS), len(PARAMETERS))
-MODEL = len(PARAMETERS)
+# parameters of effects, which are off in a plain plant
+EFFECTS = (
+    *PATH_NAMES,
+    *(f"muscle.{name}" for name in WARM._fields),
+    *(f"angle.{name}" for name in SENSOR._fields),
+    *(f"pressure.{name}" for name in SENSOR._fields),
+)
+EFFECT = row_blocks(
+    len(PARAMETERS),
+    path=len(PATH),
+    warm=len(WARM),
+    angle_sensor=len(SENSOR),
+    pressure_sensor=len(SENSOR),
+)
+"""First rows of the parameters of effects."""
+STATE = row_blocks(
+    effective=2 * MOST_STAGES,
+    paths=2 * MOST_STAGES * PATH_STATE.end,
+    angles=MOST_STAGES,
+    angle_rings=MOST_STAGES * N_HISTORY,
+    pressures=2 * MOST_STAGES,
+    pressure_rings=2 * MOST_STAGES * N_HISTORY,
+)
+"""State of the effects, counted from the first row after the hysteresis's."""
+
+MODEL = EFFECT.end
 """First row of the hysteresis's operator."""
 JOINT_DAMPING = MODEL + NUMBERS
 """First row of the damping that each joint has beside ``link.damping`` [N m s/rad]."""
 CHAIN = JOINT_DAMPING + MOST_STAGES
 """First row of the chain's parameters (``serial_chain_rows``)."""
-NAMES = PARAMETERS
-"""Every parameter by name; :func:`place` says where it stands."""
+NAMES = PARAMETERS + EFFECTS
+"""Every parameter by name, in the order of its rows."""
 
 # integer rows
 KEY_A, KEY_B, EPISODE, STEP, MEMBER, STACK_COUNT = range(6)
@@ -87,5 +116,5 @@ N_COUNTS = STACK_COUNT + 2 * MOST_STAGES
 
 
 def place(name: str) -> int:
-    """Return where a parameter stands in the column that the kernels read."""
-    return PARAMETERS.index(name)
+    """Return the row of a parameter in the column that the kernels read."""
+    return NAMES.index(name)

@@ -46,6 +46,7 @@ from pam_envs.plants.antagonistic_joint.pair import (
     turning,
 )
 from pam_envs.plants.redundant_manipulator import rows as M
+from pam_envs.plants.redundant_manipulator.effects import effect_kernels
 from pam_envs.plants.redundant_manipulator.rows import (
     ANGLE,
     AT,
@@ -94,6 +95,32 @@ RESTING = 30
 """Steps to the pose at rest."""
 
 MODEL_STATE = 0  # a placeholder
+EFFECTIVE, SENSED_ANGLE, SENSED_PRESSURE = PRESSURE, ANGLE, PRESSURE
+"""Rows of effective pressures and undisturbed readings; those of the extended plant replace them."""
+
+
+@kernel
+def regulate(
+    rows: Any, fixed: Any, counts: Any, m: int, i: int, substeps: int, period: float, work: Any
+) -> None:
+    """Advance the pressure of muscle ``m`` of a tile through a sub-step."""
+    h = period / substeps
+    fill(rows[PRESSURE + m], rows[SET_POINT + m], work[WAS + m], fixed, h)
+
+
+@kernel
+def begin_muscles(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the effects of the muscles: a plain plant has none."""
+
+
+@kernel
+def begin_sensors(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the effects of the sensors: a plain plant has none."""
+
+
+@kernel
+def read_sensors(rows: Any, fixed: Any, j: int, step: int, period: float) -> None:
+    """Write readings with the effects of the sensors: a plain plant has none."""
 
 
 @kernel
@@ -123,12 +150,12 @@ def balance(rows: Any, fixed: Any, k: int, h: float, work: Any) -> None:
         stop, slope = stop_torque(fixed, j, rows[MIDDLE + k][j])
         old_a, new_a, slope_a, drag_a = turning(
             fixed, j, 1.0, rows[AT + a][j] + straight[j], work[RATE + a][j], work[CURVE + a][j],
-            velocity[j], work[WAS + a][j], rows[PRESSURE + a][j], rows[LAG + a][j],
+            velocity[j], work[WAS + a][j], rows[EFFECTIVE + a][j], rows[LAG + a][j],
             rows[STICK + a][j],
         )  # fmt: skip
         old_b, new_b, slope_b, drag_b = turning(
             fixed, j, -1.0, rows[AT + b][j] + straight[j], work[RATE + b][j], work[CURVE + b][j],
-            velocity[j], work[WAS + b][j], rows[PRESSURE + b][j], rows[LAG + b][j],
+            velocity[j], work[WAS + b][j], rows[EFFECTIVE + b][j], rows[LAG + b][j],
             rows[STICK + b][j],
         )  # fmt: skip
         torque = stop + disturbance[j] + 0.5 * (old_a + new_a + old_b + new_b)
@@ -199,12 +226,13 @@ def advance(
         ``work_rows(stages)`` rows of scratch.
     """
     h = period / substeps
-    for _ in range(substeps):
+    for i in range(substeps):
         for m in range(2 * N_STAGES):
-            fill(rows[PRESSURE + m], rows[SET_POINT + m], work[WAS + m], fixed, h)
+            regulate(rows, fixed, counts, m, i, substeps, period, work)
         swing(rows, fixed, counts, table, hysteresis, elements, h, work)
     for j in range(LANES):
         report(rows, fixed, j)
+        read_sensors(rows, fixed, j, counts[M.STEP][j] + 1, period)
 
 
 @kernel
@@ -215,8 +243,8 @@ def pull_of(rows: Any, fixed: Any, j: int, k: int, angle: float) -> tuple[float,
         m, sign = 2 * k + side, 1.0 - 2.0 * side
         x, rate, curve = lever_of(fixed, j, angle, sign)
         speed = -rate * rows[VELOCITY + k][j] / fixed[REST_LENGTH][j]
-        pressure = rows[PRESSURE + m][j]
-        force, slope = pulled(fixed, j, sign, x, speed, pressure, rows[LAG + m][j])
+        effective = rows[EFFECTIVE + m][j]
+        force, slope = pulled(fixed, j, sign, x, speed, effective, rows[LAG + m][j])
         rows[M.CONTRACTION + m][j], rows[M.FORCE + m][j] = x, force
         torque = torque - force * rate
         stiffness = stiffness + slope * rate * rate / fixed[REST_LENGTH][j] + force * curve
@@ -273,6 +301,7 @@ def begin_lane(
         rows[VELOCITY + k][j] = rows[MIDDLE_RATE + k][j] = 0.0
         rows[CHANGE + k][j] = weight_bound(rows, fixed, j, k)
         rows[ANGLE + k][j] = rows[COMMAND + k][j]
+    begin_muscles(rows, fixed, j)
     for _ in range(RESTING):
         for k in range(N_STAGES):
             rows[MIDDLE + k][j] = rows[ANGLE + k][j]
@@ -288,6 +317,7 @@ def begin_lane(
         MEMBER, j, j + 1,
     )  # fmt: skip
     report(rows, fixed, j)
+    begin_sensors(rows, fixed, j)
 
 
 @kernel
@@ -336,7 +366,7 @@ def settle(
     torque, slope = pull_of(rows, fixed, j, k, angle)
     for m in range(2 * k, 2 * k + 2):
         _, rate, _ = lever_of(fixed, j, angle, 1.0 - 2.0 * (m - 2 * k))
-        stuck = friction_of(fixed, j, rows[PRESSURE + m][j]) * rows[STICK + m][j]
+        stuck = friction_of(fixed, j, rows[EFFECTIVE + m][j]) * rows[STICK + m][j]
         slope = slope + stuck * rate * rate / fixed[REST_LENGTH][j]
     stop, hard = stop_torque(fixed, j, angle)
     off = torque + stop + rows[DISTURBANCE + k][j] - weight
@@ -354,6 +384,10 @@ def work_rows(stages: int) -> int:
     return CHAIN_WORK + chain_work_rows(stages)
 
 
-def replacements(kind: str, stages: int) -> dict[str, Any]:
-    """Return what a plant of this make puts in the place of the placeholders."""
-    return protocol.kernels(kind) | {"N_STAGES": stages}
+def replacements(kind: str, stages: int, effects: int | None = None) -> dict[str, Any]:
+    """Return what a plant of this make puts in the place of the placeholders.
+
+    ``effects`` is the first row of the state of the effects; None for a plain plant.
+    """
+    extended = {} if effects is None else effect_kernels(effects)
+    return protocol.kernels(kind) | {"N_STAGES": stages} | extended

@@ -20,7 +20,6 @@ from pam_envs.hysteresis.creep import begin_creep, creep_step, creeps_on
 from pam_envs.hysteresis.friction_effects import friction_with_effects, newness
 from pam_envs.kernels.arithmetic import count_on, decay
 from pam_envs.kernels.build import LANES, kernel, routine, scratch
-from pam_envs.kernels.history import note, noted
 from pam_envs.kernels.motion import damped_motion
 from pam_envs.mechanics.guide import stick_slip_step
 from pam_envs.mechanics.support import MOUNT_STATE, load_fraction, mount_step
@@ -33,21 +32,16 @@ from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.rows import EFFECT as P
 from pam_envs.plants.single_muscle.rows import STATE as S
-from pam_envs.pneumatics.line import line_step
+from pam_envs.pneumatics.air_path import air_step, delay_commands
 from pam_envs.pneumatics.regulator import (
-    AIR,
-    AIR_STATE,
-    DELAY_PERIODS,
     begin_air,
     delayed_fraction,
     line_effects_on,
-    regulate_with_effects,
-    regulate_with_gain,
     valve_effects_on,
 )
-from pam_envs.sensing.sensor import SENSED, begin_sensor, sense
+from pam_envs.sensing.sensor import begin_sensor, sense
 
-FIRST = 0  # placeholder: the row after the hysteresis's state
+EFFECTS_AT = 0  # placeholder: the row after the hysteresis's state
 plain_hysteresis: Any = None  # placeholder: one of the three hysteresis models
 
 FULL_STRAIN = 0.15
@@ -67,7 +61,7 @@ def effective_pressure(
 ) -> None:  # fmt: skip
     """Compute the effective pressure from the pressure, ``width`` seconds after the last time."""
     pressure, drive = rows[R.PRESSURE], rows[R.DRIVE]
-    true, friction, most = own[0], rows[FIRST + S.friction], own[2]
+    true, friction, most = own[0], rows[EFFECTS_AT + S.friction], own[2]
     for j in range(first, last):
         true[j] = pressure[j]
         pressure[j] = max(0.0, pressure[j] - fixed[P.hysteresis_threshold][j])
@@ -83,7 +77,7 @@ def effective_pressure(
         for j in range(first, last):
             most[j] = most[j] + fixed[R.WEIGHT + k][j] * fixed[R.THRESHOLD + k][j]
     for j in range(first, last if worn > 0 else first):
-        new = newness(rows[FIRST + S.travel][j], fixed[P.hysteresis_first_travel][j])
+        new = newness(rows[EFFECTS_AT + S.travel][j], fixed[P.hysteresis_first_travel][j])
         friction[j] = friction_with_effects(
             friction[j],
             most[j],
@@ -97,14 +91,16 @@ def effective_pressure(
         for j in range(first, last):
             most[j] = 0.0
         creep_step(
-            rows, fixed, FIRST + S.creep, P.hysteresis_creep_1, P.hysteresis_creep_time_1, first,
+            rows, fixed, EFFECTS_AT + S.creep, P.hysteresis_creep_1, P.hysteresis_creep_time_1, first,
             last, drive, width, most,
         )  # fmt: skip
         for j in range(first, last):
             drive[j] = drive[j] + most[j]
     for j in range(first, last if worn > 0 else first):
-        new = newness(rows[FIRST + S.travel][j], fixed[P.hysteresis_first_travel][j])
-        gained = temperature_factor(rows[FIRST + S.kelvin][j], fixed[P.muscle_temperature_gain][j])
+        new = newness(rows[EFFECTS_AT + S.travel][j], fixed[P.hysteresis_first_travel][j])
+        gained = temperature_factor(
+            rows[EFFECTS_AT + S.kelvin][j], fixed[P.muscle_temperature_gain][j]
+        )
         drive[j] = drive[j] * gained * (1.0 - fixed[P.hysteresis_first_loss][j] * new)
 
 
@@ -117,7 +113,7 @@ def settled(
     own = scratch(3, LANES)
     for j in range(first, last):
         own[1][j] = 1e9
-        rows[FIRST + S.kelvin][j] = fixed[P.muscle_temperature][j]
+        rows[EFFECTS_AT + S.kelvin][j] = fixed[P.muscle_temperature][j]
     effective_pressure(
         rows, fixed, counts, table, hysteresis, first, last, elements, work, own[1], own, 1, 1
     )
@@ -174,28 +170,37 @@ def rest_extended(fixed: Any, lane: int, drive: float, load: float) -> float:
 def begin_effects(rows: Any, fixed: Any, j: int) -> None:
     """Begin the effects of lane ``j`` at rest at its position and pressure."""
     x = rows[R.CONTRACTION][j]
-    begin_air(rows, j, FIRST + S.air, rows[R.PRESSURE][j])
-    rows[FIRST + S.travel][j] = 0.0
-    rows[FIRST + S.stuck][j] = 1.0
+    begin_air(rows, j, EFFECTS_AT + S.air, rows[R.PRESSURE][j])
+    rows[EFFECTS_AT + S.travel][j] = 0.0
+    rows[EFFECTS_AT + S.stuck][j] = 1.0
     for k in range(4):
-        rows[FIRST + S.strands + k][j] = x / fixed[R.REST_LENGTH][j]
-    rows[FIRST + S.kelvin][j] = fixed[P.muscle_temperature][j]
-    begin_creep(rows, fixed, j, FIRST + S.stretch, P.muscle_creep_1, x)
+        rows[EFFECTS_AT + S.strands + k][j] = x / fixed[R.REST_LENGTH][j]
+    rows[EFFECTS_AT + S.kelvin][j] = fixed[P.muscle_temperature][j]
+    begin_creep(rows, fixed, j, EFFECTS_AT + S.stretch, P.muscle_creep_1, x)
     crept = 0.0
     for k in range(4):
         crept = crept + fixed[P.muscle_creep_1 + k][j]
-    rows[FIRST + S.shown][j] = x * (1.0 + crept)
-    rows[FIRST + S.mount + MOUNT_STATE.position][j] = x * (1.0 + crept)
-    rows[FIRST + S.mount + MOUNT_STATE.rate][j] = 0.0
+    rows[EFFECTS_AT + S.shown][j] = x * (1.0 + crept)
+    rows[EFFECTS_AT + S.mount + MOUNT_STATE.position][j] = x * (1.0 + crept)
+    rows[EFFECTS_AT + S.mount + MOUNT_STATE.rate][j] = 0.0
     rows[R.REST][j] = rows[R.REST][j] * (1.0 + crept)
-    rows[FIRST + S.hung][j] = rows[R.LOAD][j]
-    rows[FIRST + S.hangs][j] = balance(fixed, j, 0.0, rows[R.LOAD][j], NO_SUPPORT)
+    rows[EFFECTS_AT + S.hung][j] = rows[R.LOAD][j]
+    rows[EFFECTS_AT + S.hangs][j] = balance(fixed, j, 0.0, rows[R.LOAD][j], NO_SUPPORT)
     position = x * (1.0 + crept) - rows[R.REST][j]
-    rows[FIRST + S.position][j] = position
+    rows[EFFECTS_AT + S.position][j] = position
     full = FULL_STRAIN * fixed[R.REST_LENGTH][j]
-    begin_sensor(rows, fixed, j, FIRST + S.position_sensor, R.POSITION_SENSOR, position, full)
     begin_sensor(
-        rows, fixed, j, FIRST + S.pressure_sensor, R.PRESSURE_SENSOR, rows[R.PRESSURE][j],
+        rows,
+        fixed,
+        j,
+        EFFECTS_AT + S.position_reading,
+        EFFECTS_AT + S.position_ring,
+        R.POSITION_SENSOR,
+        position,
+        full,
+    )
+    begin_sensor(
+        rows, fixed, j, EFFECTS_AT + S.pressure_reading, EFFECTS_AT + S.pressure_ring, R.PRESSURE_SENSOR, rows[R.PRESSURE][j],
         fixed[R.MAX_PRESSURE][j],
     )  # fmt: skip
 
@@ -205,11 +210,11 @@ def sense_muscle(rows: Any, fixed: Any, j: int, step: int, period: float) -> Non
     """Write the undisturbed readings of lane ``j`` at a control period."""
     time, full = step * period, FULL_STRAIN * fixed[R.REST_LENGTH][j]
     sense(
-        rows, fixed, j, FIRST + S.position_sensor, R.POSITION_SENSOR, rows[FIRST + S.position][j],
+        rows, fixed, j, EFFECTS_AT + S.position_reading, EFFECTS_AT + S.position_ring, R.POSITION_SENSOR, rows[EFFECTS_AT + S.position][j],
         full, step, time, period,
     )  # fmt: skip
     sense(
-        rows, fixed, j, FIRST + S.pressure_sensor, R.PRESSURE_SENSOR, rows[R.PRESSURE][j],
+        rows, fixed, j, EFFECTS_AT + S.pressure_reading, EFFECTS_AT + S.pressure_ring, R.PRESSURE_SENSOR, rows[R.PRESSURE][j],
         fixed[R.MAX_PRESSURE][j], step, time, period,
     )  # fmt: skip
 
@@ -217,19 +222,19 @@ def sense_muscle(rows: Any, fixed: Any, j: int, step: int, period: float) -> Non
 @kernel
 def true_position(rows: Any, j: int) -> float:
     """Return the position [m] of the load of lane ``j``, from its rest position."""
-    return rows[FIRST + S.position][j]  # type: ignore[no-any-return]
+    return rows[EFFECTS_AT + S.position][j]  # type: ignore[no-any-return]
 
 
 @kernel
 def seen_position(rows: Any, j: int) -> float:
     """Return the undisturbed reading of the position sensor [m]."""
-    return rows[FIRST + S.position_sensor + SENSED.reading][j]  # type: ignore[no-any-return]
+    return rows[EFFECTS_AT + S.position_reading][j]  # type: ignore[no-any-return]
 
 
 @kernel
 def seen_pressure(rows: Any, j: int) -> float:
     """Return the undisturbed reading of the pressure sensor [Pa]."""
-    return rows[FIRST + S.pressure_sensor + SENSED.reading][j]  # type: ignore[no-any-return]
+    return rows[EFFECTS_AT + S.pressure_reading][j]  # type: ignore[no-any-return]
 
 
 @kernel
@@ -249,7 +254,7 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) ->
         for j in range(LANES):
             strain[j] = (x[j] + 0.5 * h * v[j]) / fixed[R.REST_LENGTH][j]
         strand_forces(
-            rows, fixed, FIRST + S.strands, P.muscle_strand_1, P.muscle_strand_break, strain,
+            rows, fixed, EFFECTS_AT + S.strands, P.muscle_strand_1, P.muscle_strand_break, strain,
             friction, sticking,
         )  # fmt: skip
     for j in range(LANES):
@@ -291,7 +296,7 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) ->
             + sticking[j]
         )
         slack = fixed[P.mass_slack][j]
-        hangs = load_fraction(x[j] + ahead, rows[FIRST + S.hangs][j], slack)
+        hangs = load_fraction(x[j] + ahead, rows[EFFECTS_AT + S.hangs][j], slack)
         eased = weight * fixed[R.REST_LENGTH][j] / max(slack, 1e-6)
         slope = slope + (eased if 0.0 < hangs < 1.0 else 0.0)
         loss = fixed[R.DAMPING][j] + viscous_damping(
@@ -314,7 +319,7 @@ def move(
     stretches: int,
 ) -> None:  # fmt: skip
     """Move the load of a tile for ``h`` seconds, the effective pressure going from ``was``."""
-    x, v, stuck = rows[R.CONTRACTION], rows[R.VELOCITY], rows[FIRST + S.stuck]
+    x, v, stuck = rows[R.CONTRACTION], rows[R.VELOCITY], rows[EFFECTS_AT + S.stuck]
     before, width = own[0], own[1]
     springs, pushes, jerks, drags, lightness = own[3], own[4], own[5], own[6], own[7]
     forces(rows, fixed, was, h, own, strands)
@@ -335,58 +340,26 @@ def move(
     if strands > 0:
         for j in range(LANES):
             width[j] = x[j] / fixed[R.REST_LENGTH][j]
-        slip_strands(rows, fixed, FIRST + S.strands, P.muscle_strand_break, width)
-    shown = rows[FIRST + S.shown]
+        slip_strands(rows, fixed, EFFECTS_AT + S.strands, P.muscle_strand_break, width)
+    shown = rows[EFFECTS_AT + S.shown]
     for j in range(LANES):
         before[j] = shown[j]
         shown[j] = x[j]
         width[j] = h
     if stretches > 0:
         creep_step(
-            rows, fixed, FIRST + S.stretch, P.muscle_creep_1, P.hysteresis_creep_time_1, 0, LANES,
+            rows, fixed, EFFECTS_AT + S.stretch, P.muscle_creep_1, P.hysteresis_creep_time_1, 0, LANES,
             x, width, shown,
         )  # fmt: skip
     for j in range(LANES):
-        rows[FIRST + S.position][j] = shown[j] - rows[R.REST][j]
+        rows[EFFECTS_AT + S.position][j] = shown[j] - rows[R.REST][j]
     if mounts > 0:
         for j in range(LANES):
             position = mount_step(
-                rows, j, FIRST + S.mount, before[j], shown[j], fixed[P.mass_ring_share][j],
+                rows, j, EFFECTS_AT + S.mount, before[j], shown[j], fixed[P.mass_ring_share][j],
                 fixed[P.mass_ring_frequency][j], fixed[P.mass_ring_damping][j], h,
             )  # fmt: skip
-            rows[FIRST + S.position][j] = position - rows[R.REST][j]
-
-
-@kernel
-def deliver(
-    rows: Any, fixed: Any, target: Any, width: Any, own: Any, valve: int, lines: int
-) -> None:
-    """Advance the pressures of a tile towards their targets, each by its ``width`` [s]."""
-    pressure, regulated = rows[R.PRESSURE], rows[FIRST + S.air + AIR_STATE.regulated]
-    state = FIRST + S.air
-    for j in range(LANES):
-        before, lag, slew = regulated[j], fixed[R.TIME_CONSTANT][j], fixed[R.SLEW_RATE][j]
-        if valve > 0:
-            after = regulate_with_effects(
-                rows, fixed, j, state, R.REGULATOR, lag, slew, fixed[R.MAX_PRESSURE][j], target[j],
-                width[j],
-            )  # fmt: skip
-        else:
-            after = regulate_with_gain(
-                rows, fixed, j, state, R.REGULATOR, lag, slew, target[j], width[j]
-            )
-        after = after if width[j] > 0.0 else before
-        regulated[j] = after
-        own[0][j], own[1][j] = before, pressure[j]
-        pressure[j] = after
-    if lines > 0:
-        for j in range(LANES):
-            pressure[j] = line_step(
-                rows, fixed, j, state + AIR_STATE.line, R.REGULATOR + AIR.ring_share, own[0][j], pressure[j],
-                width[j],
-            )  # fmt: skip
-    for j in range(LANES):
-        rows[FIRST + S.travel][j] += abs(pressure[j] - own[1][j])
+            rows[EFFECTS_AT + S.position][j] = position - rows[R.REST][j]
 
 
 @kernel
@@ -397,7 +370,6 @@ def advance_extended(
     """Advance a tile by control period ``counts[STEP]``, with all effects."""
     h = period / substeps
     drive, load = rows[R.DRIVE], rows[R.LOAD]
-    set_point, step, dead = rows[R.SET_POINT], counts[R.STEP], fixed[R.DEAD_TIME]
     older, newer, switch, was, width = work[3], work[4], work[5], work[6], work[7]
     late = work[8]
     own = scratch(8, LANES)
@@ -416,15 +388,13 @@ def advance_extended(
     strands, sticks = strands_on(fixed, P.muscle_strand_1), count_on(fixed[P.mass_stick], 0.0)
     fine = sticks + count_on(fixed[P.muscle_viscosity], 0.0)
     for j in range(LANES):
-        if load[j] != rows[FIRST + S.hung][j]:
-            rows[FIRST + S.hung][j] = load[j]
-            rows[FIRST + S.hangs][j] = balance(fixed, j, 0.0, load[j], NO_SUPPORT)
-        age = dead[j] / period
-        whole = min(int(age), DELAY_PERIODS)
-        switch[j] = (age - whole) * period
-        note(rows, R.HISTORY, j, step[j], set_point[j])
-        newer[j] = noted(rows, R.HISTORY, j, step[j], whole)
-        older[j] = noted(rows, R.HISTORY, j, step[j], whole + 1)
+        if load[j] != rows[EFFECTS_AT + S.hung][j]:
+            rows[EFFECTS_AT + S.hung][j] = load[j]
+            rows[EFFECTS_AT + S.hangs][j] = balance(fixed, j, 0.0, load[j], NO_SUPPORT)
+    delay_commands(
+        rows, R.HISTORY, rows[R.SET_POINT], fixed[R.DEAD_TIME], counts[R.STEP], period, older,
+        newer, switch,
+    )  # fmt: skip
     for i in range(substeps):
         for j in range(LANES):
             late[j] = delayed_fraction((i + 1) * h, substeps / period, switch[j])
@@ -436,7 +406,13 @@ def advance_extended(
                 busy = busy + (1 if width[j] > 0.0 else 0)
             if busy == 0:
                 continue
-            deliver(rows, fixed, newer if stage == 1 else older, width, own, valve, lines)
+            air_step(
+                rows, fixed, EFFECTS_AT + S.air, R.REGULATOR, rows[R.PRESSURE], fixed[R.MAX_PRESSURE],
+                fixed[R.TIME_CONSTANT], fixed[R.SLEW_RATE], newer if stage == 1 else older, width,
+                own, valve, lines,
+            )  # fmt: skip
+            for j in range(LANES):
+                rows[EFFECTS_AT + S.travel][j] += abs(rows[R.PRESSURE][j] - own[1][j])
             effective_pressure(
                 rows, fixed, counts, table, hysteresis, 0, LANES, elements, work, width, own,
                 creeps, worn,
@@ -451,7 +427,7 @@ def advance_extended(
             for j in range(LANES):
                 was[j] = drive[j]
     for j in range(LANES):
-        sense_muscle(rows, fixed, j, step[j] + 1, period)
+        sense_muscle(rows, fixed, j, counts[R.STEP][j] + 1, period)
 
 
 def replacements(kind: str, first: int) -> dict[str, Any]:
@@ -460,7 +436,7 @@ def replacements(kind: str, first: int) -> dict[str, Any]:
     ``first`` is the row after the hysteresis's state.
     """
     return {
-        "FIRST": first,
+        "EFFECTS_AT": first,
         **hysteresis_kernels(kind, "plain_hysteresis"),
         "remember": settled,
         "advance": advance_extended,

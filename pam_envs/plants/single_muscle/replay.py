@@ -46,7 +46,7 @@ CHANNELS = ("contraction", "pressure")
 LONGEST_STEP = 0.0201
 """Longest sub-step [s] of a replay: errors of some micrometres, below the noise of a sensor."""
 N_ROWS = 0
-FIRST = 0
+EFFECTS_AT = 0
 COMMAND, LOAD, KELVIN, FRESH, START_PRESSURE = range(5)
 
 Array = NDArray[np.float64]
@@ -151,8 +151,8 @@ def run_replay(
                 for j in range(LANES):
                     rows[R.REST][j] = rest_extended(fixed, j, 0.0, rows[R.LOAD][j])
             seen_x, seen_p = (
-                rows[FIRST + R.STATE.position_sensor],
-                rows[FIRST + R.STATE.pressure_sensor],
+                rows[EFFECTS_AT + R.STATE.position_reading],
+                rows[EFFECTS_AT + R.STATE.pressure_reading],
             )
             bias_x, bias_p = fixed[R.POSITION_BIAS], fixed[R.PRESSURE_BIAS]
             for j in range(lanes):
@@ -160,7 +160,7 @@ def run_replay(
                 outputs[1][t][start + j] = seen_p[j] + bias_p[j]
             for j in range(LANES):
                 rows[R.SET_POINT][j] = inputs[COMMAND][t]
-                rows[FIRST + R.STATE.kelvin][j] = inputs[KELVIN][t]
+                rows[EFFECTS_AT + R.STATE.kelvin][j] = inputs[KELVIN][t]
             advance_extended(rows, fixed, counts, table, R.END, elements, substeps, period, work)
 
 

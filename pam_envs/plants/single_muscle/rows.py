@@ -21,7 +21,7 @@ from pam_envs.muscle.temperature import TemperatureEffects
 from pam_envs.muscle.viscosity import ViscosityEffects
 from pam_envs.parameters import declarations, named_rows, row_blocks
 from pam_envs.pneumatics.regulator import AIR, AIR_STATE
-from pam_envs.sensing.sensor import SENSOR, SENSOR_ROWS
+from pam_envs.sensing.sensor import SENSOR
 
 # state
 CONTRACTION, VELOCITY, PRESSURE, DRIVE, SET_POINT, OLD_SET_POINT, LOAD, OLD_PRESSURE, OLD_AIR = (
@@ -149,8 +149,10 @@ STATE = row_blocks(
     hung=1,
     hangs=1,
     position=1,
-    position_sensor=SENSOR_ROWS,
-    pressure_sensor=SENSOR_ROWS,
+    position_reading=1,
+    position_ring=N_HISTORY,
+    pressure_reading=1,
+    pressure_ring=N_HISTORY,
 )
 """State of the effects, counted from the first row after the hysteresis's."""
 N_EFFECTS = STATE.end
