@@ -1,28 +1,18 @@
-"""Tests of one family of environments run in one process, which then alone compiles its kernels."""
+"""Tests of environments with common machine code run in one process, which compiles it once."""
 
 from __future__ import annotations
 
+import gymnasium as gym
 import pytest
 
-FAMILIES = {
-    "MusclePositioning": "positioning",
-    "KneeTension": "brace",
-    "KneeStiffness": "brace",
-    "KneeWalk": "gait",
-    "KneeStairsUp": "gait",
-    "KneeStairsDown": "gait",
-    "ElbowOrthosis": "elbow",
-    "AntagonisticJoint": "joint",
-    "RedundantManipulator": "manipulator",
-}
-"""Environments with machine code in common."""
+import pam_envs  # noqa: F401 (registers)
 
 
 @pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Group the tests that have an environment's name among their arguments (see ``make test``)."""
+    """Group tests with the id of an environment among their arguments by its module."""
     for item in items:
-        name = getattr(getattr(item, "callspec", None), "params", {}).get("name", "")
-        family = FAMILIES.get(str(name).removeprefix("PAM/").removesuffix("-v0"))
-        if family:
-            item.add_marker(pytest.mark.xdist_group(family))
+        name = str(getattr(getattr(item, "callspec", None), "params", {}).get("name", ""))
+        if name in gym.registry:
+            module = str(gym.spec(name).entry_point).partition(":")[0]
+            item.add_marker(pytest.mark.xdist_group(module))

@@ -28,7 +28,7 @@ from pam_envs.plants.redundant_manipulator.rollout import simulate_manipulator
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.replay import Inputs, replay_rows
 from pam_envs.plants.single_muscle.rollout import simulate
-from tests.envs.cases import EVERY_EFFECT
+from tests.envs.positioning.variants import EVERY_EFFECT
 
 FILE = Path(__file__).with_name("golden_plants.json")
 KINDS = ("maxwell_slip", "preisach", "none")

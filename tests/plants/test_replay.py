@@ -8,7 +8,7 @@ import pytest
 from pam_envs.kernels.build import COMPILED
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.replay import TILE, Inputs, alike, replay, replay_rows
-from tests.envs.cases import EVERY_EFFECT
+from tests.envs.positioning.variants import EVERY_EFFECT
 
 SAMPLES = 200 if COMPILED else 40
 PERIOD = 0.02

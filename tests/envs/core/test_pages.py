@@ -1,8 +1,9 @@
-"""What the pages of the environments say of signals, info and arguments is what the code has."""
+"""Pages of the environments agree with the code in signals, info and arguments."""
 
 from __future__ import annotations
 
 import ast
+import importlib
 import inspect
 import re
 from pathlib import Path
@@ -10,29 +11,15 @@ from pathlib import Path
 import gymnasium as gym
 import pytest
 
-from pam_envs.envs.elbow import env as elbow_orthosis
-from pam_envs.envs.joint import env as antagonistic_joint
-from pam_envs.envs.knee import brace as knee_brace
-from pam_envs.envs.knee import gait as knee_gait
-from pam_envs.envs.manipulator import env as redundant_manipulator
-from pam_envs.envs.positioning import env as muscle_positioning
 from tests.envs.cases import IDS
 
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "envs"
-MODULES = {
-    "muscle_positioning": muscle_positioning,
-    "knee_brace": knee_brace,
-    "knee_gait": knee_gait,
-    "elbow_orthosis": elbow_orthosis,
-    "antagonistic_joint": antagonistic_joint,
-    "redundant_manipulator": redundant_manipulator,
-}
-FIXED_BY_THE_ID = {"self", "activity", "quantity", "mounting"}
+DOCS = Path(__file__).resolve().parents[3] / "docs" / "envs"
+FIXED_BY_THE_ID = {"activity", "quantity", "mounting"}
 EVERY = pytest.mark.parametrize("name", IDS)
 
 
 def page(name: str) -> str:
-    """Return the name of the page whose second line of text lists an id."""
+    """Return the name of the page that lists an id before its first picture."""
     (found,) = [p.stem for p in DOCS.glob("*.md") if f"`{name}`" in p.read_text().split("![")[0]]
     return found
 
@@ -48,13 +35,13 @@ def quoted(cell: str) -> list[str]:
     return re.findall(r"`([^`]+)`", cell)
 
 
-def told(cell: str) -> list[str]:
+def named(cell: str) -> list[str]:
     """Return the signals of a row: those in quotes at its beginning, or its first word."""
     return quoted(re.match(r"(`\w+`,? ?)*", cell)[0]) or [re.split(r"[ ,:;]", cell)[0]]
 
 
 @EVERY
-def test_spaces(name: str) -> None:
+def test_page_states_the_spaces(name: str) -> None:
     text = (DOCS / f"{page(name)}.md").read_text()
     env = gym.make(name).unwrapped
     assert f"| Action space | `Box(-1, 1, {env.action_space.shape}, float32)` |" in text
@@ -62,24 +49,24 @@ def test_spaces(name: str) -> None:
 
 
 @EVERY
-def test_signals_stand_in_their_order(name: str) -> None:
+def test_signals_are_listed_in_order(name: str) -> None:
     env = gym.make(name, preview=0).unwrapped
-    first = [word for row in table(name, "Observation") for word in told(row[1])]
+    first = [word for row in table(name, "Observation") for word in named(row[1])]
     coming = {s.name for s in gym.make(name, preview=1).unwrapped.signals if s.ahead > 0.0}
     assert [n for n in first if n and n not in coming] == list(env.signals.names())
     rows = table(name, "Action")
-    assert [word for row in rows for word in told(row[1])] == list(env.action_signals.names())
+    assert [word for row in rows for word in named(row[1])] == list(env.action_signals.names())
     for row in rows:
-        for word in told(row[1]):
+        for word in named(row[1]):
             action = env.action_signals[word]
             assert (float(row[3]), float(row[4]), row[2]) == (action.low, action.high, action.unit)
 
 
 @EVERY
-def test_ranges_of_signals(name: str) -> None:
+def test_page_states_ranges_and_units_of_signals(name: str) -> None:
     env = gym.make(name, preview=0).unwrapped
     for row in table(name, "Observation"):
-        for word in told(row[1]):
+        for word in named(row[1]):
             if word in env.signals.names() and " or " not in row[3] + row[4]:
                 signal = env.signals[word]
                 said = (float(row[3]), float(row[4]), row[2])
@@ -87,15 +74,16 @@ def test_ranges_of_signals(name: str) -> None:
 
 
 @EVERY
-def test_info_keys(name: str) -> None:
+def test_page_lists_every_info_key(name: str) -> None:
     listed = [key for row in table(name, "Info") for key in quoted(row[0])]
     assert len(listed) == len(set(listed))
     assert set(listed) == set(gym.make(name).unwrapped.setup.info_keys)
 
 
 @EVERY
-def test_arguments_and_their_defaults(name: str) -> None:
-    taken = inspect.signature(MODULES[page(name)].make_setup).parameters
+def test_page_lists_arguments_and_defaults(name: str) -> None:
+    module = importlib.import_module(str(gym.spec(name).entry_point).partition(":")[0])
+    taken = inspect.signature(module.make_setup).parameters
     listed = {}
     for row in table(name, "Arguments"):
         names = quoted(row[0])

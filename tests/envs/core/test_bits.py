@@ -15,7 +15,7 @@ import pytest
 from pam_envs.kernels.build import COMPILED
 from tests.envs.cases import CASES, IDS, SHARED, VARIANTS, actions_for, trajectory
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 EVERY = pytest.mark.parametrize("name", IDS)
 SIZES = (1, 2, 7, 64, 256) if COMPILED else (1, 7)
 TILED = ["PAM/MusclePositioning-v0", "PAM/KneeStairsDown-v0", "PAM/AntagonisticJoint-v0"]
@@ -128,7 +128,7 @@ def digest() -> str:
 
 @pytest.mark.parametrize("compile_kernels", ["0", "1"] if COMPILED else ["0"])
 def test_other_processes_and_plain_python_give_the_same_bits(compile_kernels: str) -> None:
-    code = "from tests.envs.test_bits import digest; print(digest())"
+    code = "from tests.envs.core.test_bits import digest; print(digest())"
     run = subprocess.run(
         [sys.executable, "-c", code],
         env={**os.environ, "PAM_ENVS_COMPILE": compile_kernels, "PYTHONPATH": str(ROOT)},
