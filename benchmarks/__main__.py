@@ -27,7 +27,8 @@ def _choose(names: tuple[str, ...], known: dict[str, Any], what: str) -> list[An
 
 
 def _tracks(env: str, track: tuple[str, ...]) -> list[scenarios.ScenarioSet]:
-    chosen = _choose(track, scenarios.available(), "track")
+    files = {name: scenarios.load(Path(name)) for name in track if name.endswith(".yaml")}
+    chosen = _choose(track, {**scenarios.available(), **files}, "track")
     found = [made for made in chosen if not env or made.env == full_id(env)]
     if not found:
         ids = sorted({made.env for made in scenarios.available().values()})
@@ -52,7 +53,7 @@ def run(
     Args:
         env: Id of an environment; all by default.
         controller: Names of controllers; all by default.
-        track: Names of scenario files; all by default.
+        track: Names of scenario files, or paths of such files; all files by default.
         jobs: Processes of this machine.
         force: Compute again what is there already.
         out: Folder of the rows.

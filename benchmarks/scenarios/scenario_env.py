@@ -1,7 +1,7 @@
 """Environments and nominal models of a scenario.
 
-A scenario may be a stranger's: it names one of this package's environments and plants of this
-checkout, and nothing else. ``gymnasium.make`` would import what stands before a colon.
+A scenario may be from a stranger: it names a registered environment and plants of this checkout, and
+nothing else. ``gymnasium.make`` would import the module before a colon.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from benchmarks.scenarios.scenario import Scenario
 
 PLANTS = Path(__file__).parent / "plants"
 """Plants that scenario files name."""
-_ID = re.compile(r"PAM/[A-Za-z0-9_]+-v[0-9]+")
+_ID = re.compile(r"[A-Za-z0-9_]+/[A-Za-z0-9_]+-v[0-9]+")
 _PLANT = re.compile(r"[A-Za-z0-9_]+\.yaml")
 
 
@@ -28,7 +28,7 @@ def make_env(env: str, kwargs: Mapping[str, Any]) -> Any:
     Raises
     ------
     ValueError
-        If the id is not one of this package, or the plant is not the mere name of a file.
+        If the id is not that of a registered environment, or the plant is not the mere name of a file.
     """
     return gym.make(_checked(env), disable_env_checker=True, **_arguments(kwargs))
 
@@ -42,8 +42,11 @@ def make_batch(env: str, kwargs: Mapping[str, Any], rows: int) -> Any:
 def _checked(env: str) -> str:
     import pam_envs  # noqa: F401  registers the ids
 
-    if not _ID.fullmatch(env):
-        raise ValueError(f"{env!r} is no environment of this package; give one like PAM/NAME-v0")
+    if not _ID.fullmatch(env) or env not in gym.registry:
+        raise ValueError(
+            f"{env!r} is no environment of this package; give one like PAM/NAME-v0, or register "
+            "its family with pam_envs.register_family"
+        )
     return env
 
 

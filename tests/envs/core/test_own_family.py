@@ -17,7 +17,7 @@ from gymnasium.utils.env_checker import check_env
 
 import pam_envs
 from benchmarks.__main__ import run
-from benchmarks.runs import controllers, rows
+from benchmarks.runs import controllers, rows, store
 from pam_envs.envs.rendering.scene import view_of
 from pam_envs.kernels.build import COMPILED
 from tests.envs.cases import actions_for
@@ -73,7 +73,7 @@ def test_its_view_draws_it_under_its_demonstrator() -> None:
     for _ in range(100):
         observation, *_, info = env.step(policy(observation))
     assert abs(info["output"] - info["reference"]) < 0.003
-    assert np.mean(first != env.render()) > 0.01
+    assert np.mean(first != env.render()) > 0.005
 
 
 def test_harness_scores_its_scenario_file(
@@ -86,7 +86,7 @@ def test_harness_scores_its_scenario_file(
     track = (str(family / "spring_muscle.yaml"),)
     assert run(controller=("zero",), track=track, jobs=1, out=out, cells=cells) == 0
     (path,) = rows.files(out)
-    row = rows.load(path)
+    row = store.read_record(path)
     assert {e["scenario"] for e in row["episodes"]} == {"steps", "sines"}
     assert all(not e["failed"] and e["scores"]["rms_error"] > 0.004 for e in row["episodes"])
 

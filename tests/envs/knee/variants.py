@@ -21,8 +21,16 @@ OWN: dict[str, dict[str, dict[str, Any]]] = {
 }
 PLAIN: dict[str, dict[str, dict[str, Any]]] = {
     "PAM/KneeTension-v0": {"none": {"hysteresis": "none", "normalize": False}},
-    "PAM/KneeStiffness-v0": {"preisach_random": {"hysteresis": "preisach", "randomize": True, "preview": 0}, "none": {"hysteresis": "none", "normalize": False}},
-    "PAM/KneeWalk-v0": {"preisach_random": {"hysteresis": "preisach", "randomize": True, "preview": 0}, "none": {"hysteresis": "none", "normalize": False}},
-    "PAM/KneeStairsUp-v0": {"preisach_random": {"hysteresis": "preisach", "randomize": True, "preview": 0}},
+    "PAM/KneeStiffness-v0": {
+        "preisach_random": {"hysteresis": "preisach", "randomize": True, "preview": 0},
+        "none": {"hysteresis": "none", "normalize": False},
+    },
+    "PAM/KneeWalk-v0": {
+        "preisach_random": {"hysteresis": "preisach", "randomize": True, "preview": 0},
+        "none": {"hysteresis": "none", "normalize": False},
+    },
+    "PAM/KneeStairsUp-v0": {
+        "preisach_random": {"hysteresis": "preisach", "randomize": True, "preview": 0}
+    },
     "PAM/KneeStairsDown-v0": {"none": {"hysteresis": "none", "normalize": False}},
 }

@@ -149,9 +149,7 @@ def begin(
         rows[k][j] = 0.0
     family = choices[CHOICE.reference]
     if family != SAMPLES:
-        draw_reference(
-            rows, REFERENCE, j, counts[KEY_A][j], counts[KEY_B][j], family, 0.005, 0.02
-        )
+        draw_reference(rows, REFERENCE, j, counts[KEY_A][j], counts[KEY_B][j], family, 0.005, 0.02)
 
 
 def kernels() -> Kernels:
