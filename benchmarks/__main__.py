@@ -27,8 +27,8 @@ def _choose(names: tuple[str, ...], known: dict[str, Any], what: str) -> list[An
 
 
 def _tracks(env: str, track: tuple[str, ...]) -> list[scenarios.ScenarioSet]:
-    files = {name: scenarios.load(Path(name)) for name in track if name.endswith(".yaml")}
-    chosen = _choose(track, {**scenarios.available(), **files}, "track")
+    named = tuple(scenarios.add(Path(n)).name if n.endswith(".yaml") else n for n in track)
+    chosen = _choose(named, scenarios.available(), "track")
     found = [made for made in chosen if not env or made.env == full_id(env)]
     if not found:
         ids = sorted({made.env for made in scenarios.available().values()})

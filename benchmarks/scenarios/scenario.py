@@ -217,11 +217,27 @@ def load(path: Path) -> ScenarioSet:
     return made
 
 
+_ADDED: dict[str, ScenarioSet] = {}
+"""Scenario files from elsewhere, by name."""
+
+
+def add(path: Path) -> ScenarioSet:
+    """Load a file from outside the folder; this process then knows it by its name."""
+    made = load(path)
+    _ADDED[made.name] = made
+    return made
+
+
 def names(folder: Path | None = None) -> tuple[str, ...]:
     """Return the names of the scenario files of a folder, by default of the checkout."""
-    return tuple(sorted(path.stem for path in (folder or FOLDER).glob("*.yaml")))
+    found = {path.stem for path in (folder or FOLDER).glob("*.yaml")}
+    return tuple(sorted(found | (set() if folder else set(_ADDED))))
 
 
 def available(folder: Path | None = None) -> dict[str, ScenarioSet]:
     """Return all scenario files by name."""
-    return {name: load((folder or FOLDER) / f"{name}.yaml") for name in names(folder)}
+    added = {} if folder else _ADDED
+    return {
+        name: added[name] if name in added else load((folder or FOLDER) / f"{name}.yaml")
+        for name in names(folder)
+    }

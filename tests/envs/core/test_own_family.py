@@ -17,7 +17,8 @@ from gymnasium.utils.env_checker import check_env
 
 import pam_envs
 from benchmarks.__main__ import run
-from benchmarks.runs import controllers, rows, store
+from benchmarks.runs import controllers, rows
+from benchmarks.scenarios import scenario
 from pam_envs.envs.rendering.scene import view_of
 from pam_envs.kernels.build import COMPILED
 from tests.envs.cases import actions_for
@@ -34,6 +35,7 @@ def family(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     shutil.copy(HERE / "spring_muscle.yaml", tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     assert pam_envs.register_family(importlib.import_module("spring_muscle")) == (ID,)
+    monkeypatch.setattr(scenario, "_ADDED", {})
     yield tmp_path
     del gym.registry[ID]
     for name in [n for n in sys.modules if n.partition(".")[0] == "spring_muscle"]:
@@ -86,7 +88,7 @@ def test_harness_scores_its_scenario_file(
     track = (str(family / "spring_muscle.yaml"),)
     assert run(controller=("zero",), track=track, jobs=1, out=out, cells=cells) == 0
     (path,) = rows.files(out)
-    row = store.read_record(path)
+    row = rows.load(path)
     assert {e["scenario"] for e in row["episodes"]} == {"steps", "sines"}
     assert all(not e["failed"] and e["scores"]["rms_error"] > 0.004 for e in row["episodes"])
 
