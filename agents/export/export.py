@@ -1,4 +1,4 @@
-"""From a trained model to a policy file: the deterministic action as a graph of arithmetic."""
+"""Export of a trained model: its deterministic action as a graph of arithmetic in ONNX."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from torch import nn
 import pam_envs
 from agents.export.graph import Graph, array
 from agents.export.recording import record
-from agents.policies.networks import LayersAndInputs, LinearFeatures, MemoryAndInputs
+from agents.policies.networks import LayersAndInputs, LinearFeatures
 from agents.policies.policy import describe
 from agents.policies.policy_file import (
     CARD,
@@ -34,14 +34,15 @@ from agents.policies.policy_file import (
 from agents.vec_envs.history import HistoryVecEnv
 from agents.vec_envs.residual import ResidualVecEnv
 
-ALGORITHMS: dict[type[BaseAlgorithm], str] = {
-    PPO: "ppo",
-    SAC: "sac",
-    TQC: "tqc",
-    RecurrentPPO: "recurrent_ppo",
+ALGORITHMS: dict[str, type[BaseAlgorithm]] = {
+    "ppo": PPO,
+    "sac": SAC,
+    "tqc": TQC,
+    "recurrent_ppo": RecurrentPPO,
 }
 OWN = ("info", "num_envs", "vectorization_mode", "threads")
-"""Arguments of the batch, which decide nothing that is learned."""
+"""Arguments of the batch, which do not affect the policy."""
+PACKAGES = ("torch", "stable_baselines3", "sb3_contrib", "gymnasium", "numpy", "onnx")
 L = TypeVar("L")
 
 
@@ -56,8 +57,8 @@ def export_policy(
     Parameters
     ----------
     model : PPO, RecurrentPPO, SAC or TQC
-        With its environment (a :class:`agents.vec_envs.batch.BatchVecEnv`, wrapped or not), from
-        which come the signals and the observation's normaliser.
+        With its environment (a :class:`agents.vec_envs.batch.BatchVecEnv`, wrapped or not), which
+        holds the signals and the observation's normaliser.
     path : str or Path
         ``policy.onnx``; the training record is written to ``policy.json``.
     card : mapping, optional
@@ -73,8 +74,8 @@ def export_policy(
     Raises
     ------
     ValueError
-        If the model has layers that have no counterpart here, or corrects a controller that is
-        mostly at a limit.
+        If the model has layers without a counterpart here, or corrects a controller that is mostly
+        at a limit.
     """
     full = {**facts(model), **(card or {})}
     write_policy(Path(path), policy_bytes(model, full), {"training": dict(training or {})})
@@ -82,7 +83,7 @@ def export_policy(
 
 
 def policy_bytes(model: Any, card: Mapping[str, Any]) -> bytes:
-    """Return the policy file's bytes: a function of weights, normaliser and card alone."""
+    """Return the bytes of the policy file, a function of weights, normaliser and card alone."""
     graph = Graph()
     env = model.get_env()
     corrects, past = _layer(env, ResidualVecEnv), _layer(env, HistoryVecEnv)
@@ -116,12 +117,12 @@ def _layer(env: Any, kind: type[L]) -> L | None:
 
 
 def facts(model: BaseAlgorithm) -> dict[str, Any]:
-    """Return what a card says of a model: where it was trained, what it reads, versions."""
+    """Return a card's entries on a model: environment, plants, signals, algorithm, versions."""
     env = model.get_env()
     if env is None:
         raise ValueError("the model has no environment; call model.set_env(env) first")
     spec = env.get_attr("spec")[0]
-    names = ("torch", "stable_baselines3", "sb3_contrib", "gymnasium", "numpy", "onnx")
+    names = {kind: name for name, kind in ALGORITHMS.items()}
     made = {
         "schema": SCHEMA,
         "env": spec.id,
@@ -129,13 +130,13 @@ def facts(model: BaseAlgorithm) -> dict[str, Any]:
         "plants": plants_of(env),
         "signals": describe(env.get_attr("signals")[0]),
         "action_signals": describe(env.get_attr("action_signals")[0]),
-        "algo": ALGORITHMS.get(type(model), type(model).__name__.lower()),
+        "algo": names.get(type(model), type(model).__name__.lower()),
         "steps": int(model.num_timesteps),
         "seed": model.seed,
         "versions": {
             "pam_envs": pam_envs.__version__,
             "python": platform.python_version(),
-            **{name: version(name) for name in names},
+            **{name: version(name) for name in PACKAGES},
         },
     }
     corrects = _layer(env, ResidualVecEnv)
@@ -143,7 +144,7 @@ def facts(model: BaseAlgorithm) -> dict[str, Any]:
 
 
 def plants_of(env: Any) -> list[str]:
-    """Return the digests of the nominal plants that the rows are on, each once."""
+    """Return the digests of the rows' nominal plants, each once."""
     return list(dict.fromkeys(plant.digest() for _, plant in _kinds(env)))
 
 
@@ -157,7 +158,7 @@ def _kinds(env: Any) -> Iterator[tuple[dict[str, Any], Any]]:
 
 
 def _in_common(kinds: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return the arguments that all kinds have alike."""
+    """Return the arguments that are equal in all kinds."""
     first, *others = ({name: _plain(value) for name, value in kind.items()} for kind in kinds)
     return {
         name: value
@@ -167,26 +168,24 @@ def _in_common(kinds: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _baseline(layer: ResidualVecEnv, env: str) -> dict[str, Any]:
-    """Return what the card says of the controller that the policy corrects."""
+    """Return the card's entry on the corrected controller, recorded once for an environment."""
+    if layer.record is not None:
+        return layer.record
     kinds: dict[str, list[dict[str, Any]]] = {}
     for kind, plant in _kinds(layer):
         kinds.setdefault(plant.digest(), []).append(kind)
-    made = {_plant_at(layer, rows): controller for rows, controller in layer.controllers}
+    plants = layer.get_attr("plant")
+    made = {plants[rows.start or 0].digest(): made for rows, made in layer.controllers}
     recorded = [
         {"plant": digest, **record(env, kinds[digest], controller, layer.name).as_dict()}
         for digest, controller in made.items()
     ]
-    return {"name": layer.name, "scale": float(layer.scale), "recorded": recorded}
-
-
-def _plant_at(layer: ResidualVecEnv, rows: slice) -> str:
-    """Return the digest of the plant of some rows, which is the same for all of them."""
-    digest: str = layer.get_attr("plant", [rows.start or 0])[0].digest()
-    return digest
+    layer.record = {"name": layer.name, "scale": float(layer.scale), "recorded": recorded}
+    return layer.record
 
 
 def _plain(value: Any) -> Any:
-    """Return an argument of the environment as JSON can hold it."""
+    """Return an argument of the environment as JSON values."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, (list, tuple)):
@@ -200,7 +199,7 @@ def _plain(value: Any) -> Any:
 
 
 def _normaliser(graph: Graph, model: BaseAlgorithm) -> None:
-    """Append VecNormalize's arithmetic, in double precision as there."""
+    """Append VecNormalize's arithmetic, in its double precision."""
     env = model.get_vec_normalize_env()
     if env is None or not env.norm_obs:
         return
@@ -223,43 +222,27 @@ def _features(graph: Graph, extractor: nn.Module) -> str:
 
 
 def _action(graph: Graph, model: Any) -> None:
-    if isinstance(model, RecurrentPPO):
-        _recurrent_action(graph, model.policy)
-    elif isinstance(model, PPO):
-        _ppo_action(graph, model.policy)
+    if isinstance(model, (PPO, RecurrentPPO)):
+        _gaussian_action(graph, model.policy)
     elif isinstance(model, (SAC, TQC)):
         _squashed_action(graph, model)
     else:
         raise ValueError(f"{type(model).__name__} cannot be exported; PPO, SAC and TQC can")
 
 
-def _ppo_action(graph: Graph, policy: Any) -> None:
-    _check_plain(policy)
-    inputs = _features(graph, policy.pi_features_extractor)
-    layers = policy.mlp_extractor
-    graph.layers(layers.policy_net)
-    if isinstance(layers, LayersAndInputs):
-        graph.join("Concat", [graph.last, inputs], axis=1)
-    graph.linear(policy.action_net)
-
-
-def _check_plain(policy: Any) -> None:
+def _gaussian_action(graph: Graph, policy: Any) -> None:
+    """Append the mean action of PPO, recurrent or not."""
     if policy.squash_output or not isinstance(policy.action_net, nn.Linear):
         raise ValueError("only PPO with a plain Gaussian action can be exported")
-
-
-def _recurrent_action(graph: Graph, policy: Any) -> None:
-    _check_plain(policy)
-    if policy.lstm_actor.num_layers != 1:
-        raise ValueError(
-            f"n_lstm_layers = {policy.lstm_actor.num_layers}: only one layer can be exported"
-        )
     inputs = _features(graph, policy.pi_features_extractor)
-    output = graph.lstm(policy.lstm_actor)
-    layers = policy.mlp_extractor
-    beside = isinstance(layers, MemoryAndInputs)
-    if beside:
-        graph.join("Concat", [output, inputs], axis=1)
+    layers, lstm = policy.mlp_extractor, getattr(policy, "lstm_actor", None)
+    beside = isinstance(layers, LayersAndInputs)
+    if lstm is not None:
+        if lstm.num_layers != 1:
+            raise ValueError(f"n_lstm_layers = {lstm.num_layers}: only one layer can be exported")
+        output = graph.lstm(lstm)
+        if beside:
+            graph.join("Concat", [output, inputs], axis=1)
     graph.layers(layers.policy_net)
     if beside:
         graph.join("Concat", [graph.last, inputs], axis=1)
@@ -280,6 +263,6 @@ def _squashed_action(graph: Graph, model: SAC | TQC) -> None:
 
 
 def _limits(graph: Graph, space: Any) -> None:
-    """Hold the action within a range."""
+    """Clip the action to a range."""
     graph.add("Max", np.asarray(space.low, np.float32))
     graph.add("Min", np.asarray(space.high, np.float32))

@@ -1,10 +1,10 @@
-"""An ONNX graph, written node by node so that the same weights give the same bytes.
+"""Construction of an ONNX graph node by node, so that the same weights give the same bytes.
 
-    observation (and controller) -> past -> normaliser -> fixed differences -> memory -> layers
-                                         -> action -> limits
+    observation (and controller) -> history -> normaliser -> fixed differences -> LSTM -> layers
+                                            -> action -> limits
 
-What a policy remembers is explicit: ``state`` goes in beside the observation, ``state_after`` comes
-out, and where ``start`` is 1 an episode begins and the state is forgotten, inside the graph.
+The state of a policy is explicit: ``state`` is an input beside the observation, ``state_after`` an
+output, and the graph resets the state where ``start`` is 1, at the beginning of an episode.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ ACTIVATIONS = {nn.Tanh: "Tanh", nn.ReLU: "Relu", nn.ELU: "Elu"}
 
 
 class Graph:
-    """A chain of nodes under construction; ``last`` is what the next one reads."""
+    """Chain of nodes under construction; ``last`` is the input of the next one."""
 
     def __init__(self) -> None:
         self.nodes: list[onnx.NodeProto] = []
         self.numbers: list[onnx.TensorProto] = []
         self.last = INPUT
-        self.remembered = 0
+        self.state_width = 0
         self._after: list[str] = []
-        self._going = ""
+        self._running = ""
 
     def number(self, value: NDArray[Any]) -> str:
         """Return the name of a constant."""
@@ -74,22 +74,22 @@ class Graph:
             else:
                 raise ValueError(f"a layer of {type(layer).__name__} cannot be exported")
 
-    # --- what is remembered -----------------------------------------------------------------
+    # --- state ------------------------------------------------------------------------------
 
     def recall(self, width: int) -> str:
-        """Return the next ``width`` numbers of the state, 0 where an episode begins."""
+        """Return the next ``width`` values of the state, 0 where an episode begins."""
         before = self.last
-        if not self._going:
-            self._going = self.join("Sub", [self.number(np.ones(1, np.float32)), START])
-        ends = (self.remembered, self.remembered + width)
+        if not self._running:
+            self._running = self.join("Sub", [self.number(np.ones(1, np.float32)), START])
+        ends = (self.state_width, self.state_width + width)
         part = self.cut(STATE, *ends)
-        self.remembered += width
-        kept = self.join("Mul", [part, self._going])
+        self.state_width += width
+        kept = self.join("Mul", [part, self._running])
         self.last = before
         return kept
 
     def keep(self, name: str) -> None:
-        """Let a value be the next part of the state afterwards, in the order of ``recall``."""
+        """Append a value to the state after the step, in the order of ``recall``."""
         self._after.append(name)
 
     def cut(self, name: str, first: int, end: int) -> str:
@@ -98,13 +98,13 @@ class Graph:
         return self.join("Slice", [name, *bounds])
 
     def past(self, columns: list[int], frames: int) -> None:
-        """Join what is read with its last ``frames`` values of some columns, the latest first."""
+        """Append the last ``frames`` values of some columns to the input, the latest first."""
         seen = self.last
         held = self.recall(frames * len(columns))
         chosen = self.join("Gather", [seen, self.number(np.array(columns, np.int64))], axis=1)
         fresh = self.join("Concat", [chosen] * frames, axis=1)
-        begun = self.join("Mul", [fresh, START])
-        past = self.join("Add", [held, begun])
+        first = self.join("Mul", [fresh, START])
+        past = self.join("Add", [held, first])
         recent = [] if frames == 1 else [self.cut(past, 0, (frames - 1) * len(columns))]
         self.keep(self.join("Concat", [chosen, *recent], axis=1))
         self.join("Concat", [seen, past], axis=1)
@@ -130,18 +130,18 @@ class Graph:
         self.last = output
         return output
 
-    # --- the whole --------------------------------------------------------------------------
+    # --- model ------------------------------------------------------------------------------
 
     def model(self, signals: int, actions: int, corrects: bool) -> onnx.ModelProto:
-        """Return the ONNX model that ends with ``last``."""
+        """Return the ONNX model whose output is ``last``."""
         self.nodes[-1].output[0] = OUTPUT
         inputs, outputs = [_row(INPUT, signals)], [_row(OUTPUT, actions)]
         if corrects:
             inputs.append(_row(CONTROLLER, actions))
-        if self.remembered:
+        if self.state_width:
             self.nodes.append(helper.make_node("Concat", self._after, [AFTER], axis=1))
-            inputs += [_row(STATE, self.remembered), _row(START, 1)]
-            outputs.append(_row(AFTER, self.remembered))
+            inputs += [_row(STATE, self.state_width), _row(START, 1)]
+            outputs.append(_row(AFTER, self.state_width))
         made = helper.make_model(
             helper.make_graph(self.nodes, "policy", inputs, outputs, self.numbers),
             opset_imports=[helper.make_opsetid("", OPSET)],

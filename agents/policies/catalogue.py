@@ -1,7 +1,7 @@
-"""Trained policies that come with the project, as controllers for benchmarks.
+"""Catalogue of the policies that come with the project, as controllers for benchmarks.
 
-A controller may have been trained several times: its file then has ``{seed}`` in its name, and
-``training_seed`` says which. A comparison is of all of them, since one lucky seed proves nothing.
+Each preset is an entry. Its policies, one a training seed, are compared together, since the result
+of a single seed is no evidence.
 """
 
 from __future__ import annotations
@@ -23,35 +23,32 @@ from pam_envs.parameters import Signals
 from pam_envs.wording import near
 
 FOLDER = Path(__file__).resolve().parents[1] / "pretrained"
-
-
 BY_HAND = "by hand"
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A policy as the board names it.
+    """Policies of one preset.
 
     Attributes
     ----------
     file : str
-        In ``agents/pretrained``, perhaps with ``{seed}``; its training is recorded in the JSON
-        file beside it.
+        Name in ``agents/pretrained``, with ``{seed}`` for the training seed.
     summary, citation : str
     knowledge : str
-        What a controller is told: "nominal model" for one that was trained in simulation of it.
+        Model knowledge: "nominal model" for a policy that was trained in simulation of it.
     envs : tuple of str
-        Ids that it runs in.
+        Environment ids.
     kind : {"learned", "residual"}
     baseline : str
         Name of the controller that a residual corrects.
     trials : int or None
-        Settings that were tried to choose the preset's, those of earlier searches and of a
-        residual's controller with them; None where nobody counted.
+        Number of settings tried for the preset, including earlier searches and those of a
+        residual's controller; None if not counted.
     tuning : str
-        How that number came about.
+        Origin of that number.
     found : mapping
-        What a search found for the knobs of that controller.
+        Knobs of that controller found by a search.
     """
 
     file: str
@@ -66,39 +63,39 @@ class Entry:
     found: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     @property
-    def author(self) -> str:
-        """Who trained it, as BibTeX wants it; empty for the authors of this package.
+    def preset(self) -> str:
+        """Name of the preset, for example ``KneeWalk-v0.ppo``."""
+        return self.file.removesuffix(".s{seed}.onnx")
 
-        The JSON file beside the policy of the lowest training seed says so, under ``author``.
+    @property
+    def first(self) -> Path | None:
+        """File of the lowest training seed, None without a file."""
+        return next(iter(self.files().values()), None)
+
+    @property
+    def author(self) -> str:
+        """Author in BibTeX form, from the record of the lowest training seed.
+
+        It is empty for the authors of this package.
         """
-        first = next(iter(self.files().values()), None)
-        return "" if first is None else str(record_of(first).get("author", ""))
+        return "" if self.first is None else str(record_of(self.first).get("author", ""))
 
     @property
     def trained_with(self) -> tuple[tuple[str, ...], tuple[str, ...]] | None:
-        """Names of signals and actions, by the lowest training seed; None without a file."""
-        first = next(iter(self.files().values()), None)
-        if first is None:
+        """Names of signals and actions of the lowest training seed; None without a file."""
+        if self.first is None:
             return None
-        card = read(first).card
+        card = read(self.first).card
         signals, actions = (
             tuple(s["name"] for s in card[p]) for p in ("signals", "action_signals")
         )
         return signals, actions
 
     def files(self) -> dict[int, Path]:
-        """Return the files that are there by training seed."""
-        start, mark, end = self.file.partition("{seed}")
-        if not mark:
-            return {0: FOLDER / self.file}
-        found = {
-            int(path.name[len(start) : len(path.name) - len(end)]): path
-            for path in FOLDER.glob(f"{start}*{end}")
-            if path.name[len(start) : len(path.name) - len(end)].isdigit()
-        }
-        single = FOLDER / (start.removesuffix(".s") + end)
-        if 0 not in found and single.is_file():
-            found[0] = single
+        """Return the existing files by training seed."""
+        start, _, end = self.file.partition("{seed}")
+        seeds = {path: path.name[len(start) : -len(end)] for path in FOLDER.glob(f"{start}*{end}")}
+        found = {int(seed): path for path, seed in seeds.items() if seed.isdigit()}
         return dict(sorted(found.items()))
 
 
@@ -113,17 +110,16 @@ TQC = (
 )
 LSTM = "Hochreiter, Schmidhuber, Long short-term memory, Neural Computation 9 (1997)"
 RESIDUAL = "Johannink et al., Residual reinforcement learning for robot control, ICRA 2019"
-MODEL = "nominal model"
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of training of which an environment may have a preset.
+    """Algorithm and variant of a preset.
 
     Attributes
     ----------
     name : str
-        What names of controllers begin with.
+        Prefix of controllers' names.
     summary, citation : str
     """
 
@@ -134,33 +130,25 @@ class Kind:
 
 KINDS: dict[str, Kind] = {
     "ppo": Kind("ppo", "PPO, two layers beside a linear path; no memory", PPO),
-    "ppo-history": Kind("history", "PPO that sees the last control periods", PPO),
+    "ppo-history": Kind("history", "PPO with a history of the last control periods", PPO),
     "ppo-randomized": Kind(
-        "randomized", "PPO that sees the last control periods, trained on drawn plants", PPO
+        "randomized", "PPO with a history of the last control periods, trained on drawn plants", PPO
     ),
-    "recurrent_ppo": Kind(
-        "recurrent", "PPO with a long short-term memory, inputs beside it", f"{PPO}; {LSTM}"
-    ),
+    "recurrent_ppo": Kind("recurrent", "PPO with an LSTM, inputs beside it", f"{PPO}; {LSTM}"),
     "sac": Kind("sac", "SAC, two layers; no memory", SAC),
     "tqc": Kind("tqc", "TQC, two layers; no memory", TQC),
 }
-"""By algorithm and variant, as in a preset's file name. Residuals are beside these, and presets
-of one's own."""
+"""By algorithm and variant, as in a preset's file name; residuals and a user's presets are apart."""
 NAME = re.compile(r"[a-z0-9_]+")
-"""What a row of the board may be named after."""
+"""Valid names of controllers."""
 HOW_TO_NAME = "name its file ENV.ALGO-VARIANT.yaml, the variant in small letters, digits and _"
 SUFFIXES: dict[str, str] = {
     "MusclePositioning-v0": "",
-    "KneeTension-v0": "_knee_tension",
-    "KneeStiffness-v0": "_knee_stiffness",
-    "KneeWalk-v0": "_knee_walk",
-    "KneeStairsUp-v0": "_knee_stairs_up",
-    "KneeStairsDown-v0": "_knee_stairs_down",
     "AntagonisticJoint-v0": "_joint",
     "RedundantManipulator-v0": "_manipulator",
     "ElbowOrthosis-v0": "_elbow",
 }
-"""What names of controllers end with, by environment."""
+"""Suffixes of controllers' names; the others are the environment's name in snake case."""
 WHERE: dict[str, str] = {
     "KneeTension-v0": "; trained on the brace that is free to move",
     "KneeWalk-v0": "; trained at 5 s a stride",
@@ -175,81 +163,61 @@ def offered() -> dict[str, Entry]:
     Raises
     ------
     ValueError
-        If a preset is of another environment or algorithm than its file's name says, or that
-        gives no name or the one of another.
+        If a preset is of another environment or algorithm than its file name, or its name is not
+        valid or not unique.
     """
     made: dict[str, Entry] = {}
     for (env_id, algo, variant), path in configs.presets().items():
-        env = env_id.removeprefix("PAM/")
         preset = f"{algo}-{variant}" if variant else algo
         config = configs.read(path)
         if (config.env, config.algo) != (env_id, algo):
             raise SettingsError(
                 f"{path.name} is for {config.env} with {config.algo}; {HOW_TO_NAME}"
             )
-        name = _name(preset) + _suffix(env)
+        name = _prefix(preset) + _suffix(env_id.removeprefix("PAM/"))
         if name in made or not NAME.fullmatch(name):
             raise SettingsError(
-                f"the preset {env}.{preset} would be the controller {name!r}, "
+                f"the preset {path.stem} would be the controller {name!r}, "
                 f"{'as another is' if name in made else 'which is no name'}; {HOW_TO_NAME}"
             )
-        if config.residual.controller:
-            made[name] = _residual(env, preset, config)
-        else:
-            made[name] = _learned(env, preset, KINDS.get(preset) or _own(preset, path), config)
+        made[name] = _entry(path, preset, config)
     return made
 
 
-def _name(preset: str) -> str:
-    """Return what names of a preset's controllers begin with."""
+def _prefix(preset: str) -> str:
     if preset == "ppo-residual":
         return "residual"
     return KINDS[preset].name if preset in KINDS else preset.replace("-", "_")
 
 
 def _suffix(env: str) -> str:
-    """Return what names end with: as listed, or made from the id of an unlisted environment."""
     words = re.findall(r"[A-Z]?[a-z0-9]+", env.partition("-")[0])
     return SUFFIXES.get(env, "".join(f"_{word.lower()}" for word in words))
 
 
-def _own(preset: str, path: Path) -> Kind:
-    """Return the kind of a preset of one's own; its file's first comment says what it is."""
-    algo, _, variant = preset.partition("-")
-    first = path.read_text(encoding="utf-8").partition("\n")[0]
-    said = first.removeprefix("#").strip(" .") if first.startswith("#") else ""
-    return Kind(preset, said or f"{algo}, variant {variant}", KINDS[algo].citation)
-
-
-def _learned(env: str, preset: str, kind: Kind, config: Config) -> Entry:
-    trials, tuning = budget(config)
-    return Entry(
-        file=f"{env}.{preset}.s{{seed}}.onnx",
-        summary=f"{kind.summary}{WHERE.get(env, '')}",
-        knowledge=MODEL,
-        citation=kind.citation,
-        envs=(f"PAM/{env}",),
-        trials=trials,
-        tuning=tuning,
-    )
-
-
-def _residual(env: str, preset: str, config: Config) -> Entry:
+def _entry(path: Path, preset: str, config: Config) -> Entry:
+    """Return the entry of a preset, learned or residual."""
+    where = WHERE.get(config.env.removeprefix("PAM/"), "")
     baseline = config.residual.controller
-    if baseline not in CLASSICAL:
-        raise SettingsError(
-            f"{env}.{preset}.yaml: residual.controller = {baseline!r} is no controller"
-            f"{near(baseline, CLASSICAL)}"
-        )
     trials, tuning = budget(config)
-    algo = preset.partition("-")[0]
-    policy, where = algo.upper().replace("_", " "), WHERE.get(env, "")
+    if not baseline:
+        kind = KINDS.get(preset) or _own(preset, path)
+        return Entry(
+            file=f"{path.stem}.s{{seed}}.onnx",
+            summary=f"{kind.summary}{where}",
+            knowledge="nominal model",
+            citation=kind.citation,
+            envs=(config.env,),
+            trials=trials,
+            tuning=tuning,
+        )
+    policy = config.algo.upper().replace("_", " ")
     return Entry(
-        file=f"{env}.{preset}.s{{seed}}.onnx",
+        file=f"{path.stem}.s{{seed}}.onnx",
         summary=f"{baseline} corrected by a {policy} policy, which sees its action{where}",
         knowledge=CLASSICAL[baseline].knowledge,
-        citation=f"{KINDS[algo].citation}; {RESIDUAL}",
-        envs=(f"PAM/{env}",),
+        citation=f"{KINDS[config.algo].citation}; {RESIDUAL}",
+        envs=(config.env,),
         kind="residual",
         baseline=baseline,
         trials=trials,
@@ -258,50 +226,59 @@ def _residual(env: str, preset: str, config: Config) -> Entry:
     )
 
 
+def _own(preset: str, path: Path) -> Kind:
+    """Return the kind of a user's preset, described by the first comment of its file."""
+    algo, _, variant = preset.partition("-")
+    first = path.read_text(encoding="utf-8").partition("\n")[0]
+    summary = first.removeprefix("#").strip(" .") if first.startswith("#") else ""
+    return Kind(preset, summary or f"{algo}, variant {variant}", KINDS[algo].citation)
+
+
 def budget(config: Config) -> tuple[int | None, str]:
-    """Return how many settings were tried to choose a preset's, and where."""
+    """Return the number of settings tried for a preset, and its origin."""
     search, corrected = config.search, config.residual.controller
+    if corrected and corrected not in CLASSICAL:
+        raise SettingsError(
+            f"residual.controller = {corrected!r} is no controller{near(corrected, CLASSICAL)}"
+        )
     if search.trials is None:
         return None, BY_HAND
     base = CLASSICAL[corrected].trials if corrected else 0
-    said = [f"search of {search.trials}"]
-    said += [f"{search.earlier} of searches before it"] if search.earlier else []
-    said += [f"{base} of its controller"] if base else []
-    return search.trials + search.earlier + base, ", ".join(said)
+    parts = [f"search of {search.trials}"]
+    parts += [f"{search.earlier} of searches before it"] if search.earlier else []
+    parts += [f"{base} of its controller"] if base else []
+    return search.trials + search.earlier + base, ", ".join(parts)
 
 
 def check_files(entries: Mapping[str, Entry]) -> None:
-    """Raise if a policy file is of no preset, and would be left out of every comparison.
+    """Raise if a policy file has no preset, and would be left out of every comparison.
 
     Raises
     ------
     PolicyFileError
         Naming the file.
     """
-    known = {preset_of(entry) for entry in entries.values()}
+    known = {entry.preset for entry in entries.values()}
     for path in sorted(FOLDER.glob("*.onnx")):
-        preset = re.sub(r"\.s[0-9]+$", "", path.stem)
-        if preset not in known:
+        named = re.fullmatch(r"(.+)\.s[0-9]+", path.stem)
+        if named is None:
             raise PolicyFileError(
-                f"{path.name} is of no preset: there is no {preset}.yaml in agents/configs; add "
+                f"{path.name} names no training seed, as {path.stem}.s0.onnx does"
+            )
+        if named[1] not in known:
+            raise PolicyFileError(
+                f"{path.name} is of no preset: there is no {named[1]}.yaml in agents/configs; add "
                 "that, or take the file out"
             )
 
 
-def preset_of(entry: Entry) -> str:
-    """Return the name of an entry's preset, like ``KneeWalk-v0.ppo``."""
-    return entry.file.removesuffix(".s{seed}.onnx")
-
-
 OFFERED: dict[str, Entry] = offered()
-"""All policies that the board would take, trained or not."""
+"""All presets' entries, trained or not."""
 check_files(OFFERED)
 CONTROLLERS: dict[str, Entry] = {n: entry for n, entry in OFFERED.items() if entry.files()}
-"""Those of which files are there."""
-PRETRAINED: dict[str, str] = {
-    name: str(next(iter(entry.files().values()))) for name, entry in CONTROLLERS.items()
-}
-"""The file of the lowest training seed of each."""
+"""Entries with files."""
+PRETRAINED: dict[str, str] = {name: str(entry.first) for name, entry in CONTROLLERS.items()}
+"""File of the lowest training seed by name."""
 
 
 def load_pretrained(
@@ -317,15 +294,15 @@ def load_pretrained(
     name : str
         A key of :data:`CONTROLLERS`.
     signals, action_signals : Signals, optional
-        The environment's; given, they must be those of the training.
+        Of the environment; if given, they must equal those of the training.
     training_seed : int, optional
-        Which of its trainings; default: the lowest that is there.
+        Default: the lowest that exists.
 
     Raises
     ------
     ValueError
-        If there is no such policy or training, the signals differ, or the file is of another
-        environment, algorithm or training seed than its name says.
+        If there is no such policy or training seed, the signals differ, or the card differs from
+        the file name in environment, algorithm, training seed or controller.
     """
     if name not in CONTROLLERS:
         raise ValueError(f"no policy named {name!r}{near(name, CONTROLLERS)}")
@@ -339,12 +316,12 @@ def load_pretrained(
 
 
 def _check_name(policy: OnnxPolicy, entry: Entry, seed: int) -> None:
-    """Raise unless a policy is the one that its file's name says."""
+    """Raise unless a policy's card agrees with its file name."""
     card = policy.card
-    said = (card["env"], card["algo"], card["seed"], policy.corrects)
+    found = (card["env"], card["algo"], card["seed"], policy.corrects)
     algo = entry.file.split(".")[1].partition("-")[0]
-    wanted = (entry.envs[0], algo, seed, entry.baseline)
-    for what, is_, should in zip(("env", "algo", "seed", "baseline"), said, wanted, strict=True):
+    named = (entry.envs[0], algo, seed, entry.baseline)
+    for what, is_, should in zip(("env", "algo", "seed", "baseline"), found, named, strict=True):
         if is_ != should:
             raise PolicyFileError(
                 f"{policy.name} is by its card of {what} {is_!r}, and should be of {should!r}; "
@@ -360,10 +337,10 @@ def make_controller(
     seed: int = 0,
     training_seed: int | None = None,
 ) -> OnnxPolicy | ResidualPolicy:
-    """Return a policy as benchmarks ask for controllers.
+    """Return a policy with the interface of benchmarks.
 
-    ``plant`` is what the controller that a residual corrects is told; other policies are told
-    nothing. ``seed`` is not used: no policy draws.
+    ``plant`` is the nominal plant of the controller that a residual corrects. ``seed`` is not used:
+    no policy draws random numbers.
     """
     policy = load_pretrained(name, signals, action_signals, training_seed)
     return with_controller(policy, plant)

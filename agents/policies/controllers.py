@@ -1,11 +1,8 @@
-"""The classical controllers that residual policies correct: made by name, told a nominal plant."""
+"""Classical controllers that residual policies correct, by name."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
-
-from numpy.typing import NDArray
 
 from agents.settings.schema import SettingsError
 from baselines.core import catalogue
@@ -14,7 +11,7 @@ from pam_envs.wording import near
 
 
 def make(name: str, plant: Any, signals: Signals, actions: Signals) -> Any:
-    """Return a controller by name, told a plant.
+    """Return a controller by name, built from a nominal plant.
 
     Raises
     ------
@@ -30,19 +27,3 @@ def make(name: str, plant: Any, signals: Signals, actions: Signals) -> Any:
 def names_for(env: str) -> list[str]:
     """Return the classical controllers of an environment."""
     return [name for name, entry in catalogue.CONTROLLERS.items() if env in entry.envs]
-
-
-def mapped(state: Any, change: Callable[[NDArray[Any]], Any]) -> Any:
-    """Return a controller's state, a tuple of arrays and of such tuples, each array changed."""
-    if isinstance(state, tuple):
-        made = [mapped(part, change) for part in state]
-        return type(state)(*made) if hasattr(state, "_fields") else tuple(made)
-    return None if state is None else change(state)
-
-
-def restored(template: Any, saved: Any) -> Any:
-    """Return a saved state in the form of a template: tuples and arrays."""
-    if isinstance(template, tuple):
-        made = [restored(t, s) for t, s in zip(template, saved, strict=True)]
-        return type(template)(*made) if hasattr(template, "_fields") else tuple(made)
-    return None if template is None else saved.numpy().astype(template.dtype)

@@ -1,8 +1,8 @@
-"""The policy's network: fixed differences of named signals, layers, and a linear path beside them.
+"""Policy networks: fixed differences of named signals, layers, and a linear path beside them.
 
-With hysteresis the set-point that holds a contraction depends on the past, so the policy must
-correct what it sees rather than know the answer: "the last set-point plus something of the error".
-The linear path says that from the first step on, and the layers learn the rest.
+With hysteresis the setpoint that holds a contraction depends on the past. The linear path can
+express "the last setpoint plus a gain times the error" from the first step on, and the layers learn
+the rest.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from pam_envs.parameters import Signals
 ACTIVATIONS: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU, "elu": nn.ELU}
 Matrix = tuple[tuple[float, ...], ...]
 CRITIC = ("value_net.", "mlp_extractor.value_net.", "lstm_critic.", "critic.")
-"""What names of the critic's parameters begin with, in policies of stable-baselines3."""
+"""Prefixes of the critic's parameters in policies of stable-baselines3."""
 
 
 def input_matrix(network: Network, names: tuple[str, ...]) -> Matrix:
-    """Return the fixed map from what is observed to the inputs, shape (n_inputs, n_names).
+    """Return the fixed map from the observation to the inputs, shape (n_inputs, n_names).
 
-    What is observed itself, then ``gain * (a - b)`` for each of ``network.differences``.
+    Its rows are the identity, then ``gain * (a - b)`` for each of ``network.differences``.
     """
     n = len(names)
     rows = [[1.0 if i == j else 0.0 for j in range(n)] for i in range(n)]
@@ -49,37 +49,57 @@ def input_matrix(network: Network, names: tuple[str, ...]) -> Matrix:
 class LinearFeatures(BaseFeaturesExtractor):
     """Inputs that are a fixed linear function of the observation."""
 
+    matrix: Tensor
+
     def __init__(self, observation_space: spaces.Box, matrix: Matrix) -> None:
         super().__init__(observation_space, len(matrix))
         self.register_buffer("matrix", torch.tensor(matrix, dtype=torch.float32))
 
     def forward(self, observation: Tensor) -> Tensor:
         """Return the inputs, shape (batch, n_inputs)."""
-        return torch.nn.functional.linear(observation.float(), self.matrix)  # type: ignore[arg-type]
+        return nn.functional.linear(observation.float(), self.matrix)
 
 
 class LayersAndInputs(nn.Module):
-    """Layers for policy and critic; the policy's output is joined by the inputs themselves."""
+    """Layers of policy and critic; the policy's output is joined by the inputs themselves.
 
-    def __init__(self, inputs: int, hidden: list[int], activation: type[nn.Module]) -> None:
+    Parameters
+    ----------
+    inputs, hidden, activation
+        Number of inputs, widths and activation of the layers.
+    recurrent : int
+        Width of a recurrent layer's output before the inputs; 0 for none.
+    critic : int
+        Width of what the critic reads.
+    """
+
+    def __init__(
+        self,
+        inputs: int,
+        hidden: list[int],
+        activation: type[nn.Module],
+        recurrent: int,
+        critic: int,
+    ) -> None:
         super().__init__()
-        self.policy_net = _layers(inputs, hidden, activation)
-        self.value_net = _layers(inputs, hidden, activation)
+        self.recurrent = recurrent
+        self.policy_net = _layers(recurrent + inputs, hidden, activation)
+        self.value_net = _layers(critic, hidden, activation)
         self.latent_dim_pi = hidden[-1] + inputs
         self.latent_dim_vf = hidden[-1]
 
-    def forward(self, inputs: Tensor) -> tuple[Tensor, Tensor]:
-        """Return what policy and critic read off, for stable-baselines3."""
-        return self.forward_actor(inputs), self.forward_critic(inputs)
+    def forward(self, latent: Tensor) -> tuple[Tensor, Tensor]:
+        """Return the latents of policy and critic, for stable-baselines3."""
+        return self.forward_actor(latent), self.forward_critic(latent)
 
-    def forward_actor(self, inputs: Tensor) -> Tensor:
+    def forward_actor(self, latent: Tensor) -> Tensor:
         """Return layers and inputs side by side, shape (batch, latent_dim_pi)."""
-        return torch.cat([self.policy_net(inputs), inputs], 1)
+        return torch.cat([self.policy_net(latent), latent[:, self.recurrent :]], 1)
 
-    def forward_critic(self, inputs: Tensor) -> Tensor:
+    def forward_critic(self, latent: Tensor) -> Tensor:
         """Return the critic's layers, shape (batch, latent_dim_vf)."""
-        latent: Tensor = self.value_net(inputs)
-        return latent
+        made: Tensor = self.value_net(latent)
+        return made
 
 
 def _layers(inputs: int, hidden: list[int], activation: type[nn.Module]) -> nn.Sequential:
@@ -90,8 +110,8 @@ def _layers(inputs: int, hidden: list[int], activation: type[nn.Module]) -> nn.S
     return nn.Sequential(*made)
 
 
-class StructuredPolicy(ActorCriticPolicy):
-    """An actor-critic whose action has a linear path; ``hold`` inputs pass through at first.
+class _LinearPath(ActorCriticPolicy):
+    """Part of both structured policies: ``hold`` inputs pass through the linear path at first.
 
     Parameters
     ----------
@@ -101,77 +121,33 @@ class StructuredPolicy(ActorCriticPolicy):
 
     def __init__(self, *args: Any, hold: tuple[int, ...] = (), **kwargs: Any) -> None:
         self.hold = hold
+        self.critic_lstm = bool(kwargs.get("enable_critic_lstm", True))
         super().__init__(*args, **kwargs)
 
     def _build_mlp_extractor(self) -> None:
+        seen = self.features_dim
+        recurrent = getattr(self, "lstm_output_dim", 0)
+        critic = recurrent + (seen if self.critic_lstm else 0)
         hidden = [int(width) for width in self.net_arch]
-        self.mlp_extractor = LayersAndInputs(  # type: ignore[assignment]
-            self.features_dim, hidden, self.activation_fn
-        )
+        made: Any = LayersAndInputs(seen, hidden, self.activation_fn, recurrent, critic)
+        self.mlp_extractor = made
 
     def _build(self, lr_schedule: Any) -> None:
         super()._build(lr_schedule)
         if self.hold:
-            _hold(self.action_net, self.mlp_extractor.latent_dim_pi - self.features_dim, self.hold)
+            beside = self.mlp_extractor.latent_dim_pi - self.features_dim
+            last = _zero(self.action_net)
+            with torch.no_grad():
+                for action, held in enumerate(self.hold):
+                    last.weight[action, beside + held] = 1.0
 
 
-class MemoryAndInputs(nn.Module):
-    """Layers behind a memory; the policy's output is joined by the inputs beside the memory.
-
-    Parameters
-    ----------
-    memory, inputs : int
-        Widths; the policy reads both.
-    critic : int
-        Width of what the critic reads.
-    """
-
-    def __init__(
-        self, memory: int, inputs: int, critic: int, hidden: list[int], activation: type[nn.Module]
-    ) -> None:
-        super().__init__()
-        self.memory = memory
-        self.policy_net = _layers(memory + inputs, hidden, activation)
-        self.value_net = _layers(critic, hidden, activation)
-        self.latent_dim_pi = hidden[-1] + inputs
-        self.latent_dim_vf = hidden[-1]
-
-    def forward_actor(self, latent: Tensor) -> Tensor:
-        """Return layers and inputs side by side, shape (batch, latent_dim_pi)."""
-        return torch.cat([self.policy_net(latent), latent[:, self.memory :]], 1)
-
-    def forward_critic(self, latent: Tensor) -> Tensor:
-        """Return the critic's layers, shape (batch, latent_dim_vf)."""
-        made: Tensor = self.value_net(latent)
-        return made
+class StructuredPolicy(_LinearPath):
+    """Actor-critic whose action has a linear path from the inputs."""
 
 
-class RecurrentStructuredPolicy(RecurrentActorCriticPolicy):
-    """A recurrent actor-critic in which the inputs also pass beside the memory.
-
-    Parameters
-    ----------
-    hold : tuple of int
-        As in :class:`StructuredPolicy`.
-    """
-
-    def __init__(self, *args: Any, hold: tuple[int, ...] = (), **kwargs: Any) -> None:
-        self.hold = hold
-        self.critic_remembers = bool(kwargs.get("enable_critic_lstm", True))
-        super().__init__(*args, **kwargs)
-
-    def _build_mlp_extractor(self) -> None:
-        hidden = [int(width) for width in self.net_arch]
-        memory, seen = self.lstm_output_dim, self.features_dim
-        critic = memory + (seen if self.critic_remembers else 0)
-        self.mlp_extractor = MemoryAndInputs(  # type: ignore[assignment]
-            memory, seen, critic, hidden, self.activation_fn
-        )
-
-    def _build(self, lr_schedule: Any) -> None:
-        super()._build(lr_schedule)
-        if self.hold:
-            _hold(self.action_net, self.mlp_extractor.latent_dim_pi - self.features_dim, self.hold)
+class RecurrentStructuredPolicy(_LinearPath, RecurrentActorCriticPolicy):
+    """Recurrent actor-critic whose inputs also pass beside the recurrent layer."""
 
     @staticmethod
     def _process_sequence(
@@ -183,25 +159,21 @@ class RecurrentStructuredPolicy(RecurrentActorCriticPolicy):
         return torch.cat([output, features], 1), after
 
 
-def _hold(last: Any, beside: int, hold: tuple[int, ...]) -> None:
-    """Let the untrained action be the held inputs, which begin at ``beside`` in the latent."""
+def _zero(last: Any) -> Any:
+    """Return a linear layer with all its parameters set to 0."""
     with torch.no_grad():
         last.weight.zero_()
         last.bias.zero_()
-        for action, held in enumerate(hold):
-            last.weight[action, beside + held] = 1.0
+    return last
 
 
 def silence(policy: Any) -> None:
-    """Let the untrained policy answer 0: a residual begins as its controller."""
-    last = policy.action_net if isinstance(policy, ActorCriticPolicy) else policy.actor.mu
-    with torch.no_grad():
-        last.weight.zero_()
-        last.bias.zero_()
+    """Set the untrained policy's action to 0, so that a residual begins as its controller."""
+    _zero(policy.action_net if isinstance(policy, ActorCriticPolicy) else policy.actor.mu)
 
 
 def critic_alone(policy: Any, alone: bool) -> None:
-    """Let the critic of an actor-critic learn alone, or both again."""
+    """Freeze all of an actor-critic but the critic, or nothing."""
     for name, parameter in policy.named_parameters():
         parameter.requires_grad_(not alone or name.startswith(CRITIC))
 

@@ -1,4 +1,4 @@
-"""The best policy that was looked at during a training: what is shipped in place of the last."""
+"""The best policy among the evaluations of a training, exported instead of the last."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-UNTRAINED = "nothing that was looked at later beat the untrained policy"
+UNTRAINED = "no later evaluation was better than the untrained policy's"
 
 
 @dataclass
@@ -22,11 +22,11 @@ class Best:
     steps : int
         Control periods of training at that evaluation; -1 before the first.
     value : float
-        What it was chosen by (see :func:`agents.training.evaluation.value_of`): less is better.
+        Criterion of the choice (:func:`agents.training.evaluation.value_of`): less is better.
     weights : dict of Tensor
-        The policy's.
+        Of the policy.
     moments : dict of ndarray
-        The observation's normaliser's; empty without one.
+        Of the observation's normaliser; empty without one.
     """
 
     steps: int = -1
@@ -35,7 +35,7 @@ class Best:
     moments: dict[str, Any] = field(default_factory=dict)
 
     def offer(self, model: BaseAlgorithm, value: float) -> None:
-        """Keep the model as it is now, if its value is less or none was known."""
+        """Keep the model's present weights if its value is less, or none is finite yet."""
         if value < self.value or math.isinf(self.value):
             state = model.policy.state_dict()
             self.steps, self.value = model.num_timesteps, value
@@ -45,7 +45,7 @@ class Best:
             self.moments = {name: np.array(getattr(normaliser, name)) for name in names}
 
     def restore(self, model: BaseAlgorithm) -> None:
-        """Give the model these weights, and its environment this normaliser: to ship it."""
+        """Load weights and normaliser into the model, for its export."""
         if self.steps < 0:
             return
         model.policy.load_state_dict(self.weights)
@@ -54,9 +54,9 @@ class Best:
             for name, moment in self.moments.items():
                 setattr(normaliser, name, np.array(moment))
 
-    def chosen(self, looks: int) -> dict[str, Any]:
-        """Return what a card says of the choice among so many evaluations."""
-        made: dict[str, Any] = {"steps": self.steps, "of": looks}
+    def chosen(self, evaluations: int) -> dict[str, Any]:
+        """Return the card's entry on the choice among ``evaluations`` evaluations."""
+        made: dict[str, Any] = {"steps": self.steps, "of": evaluations}
         if math.isfinite(self.value):
             made["value"] = self.value
         return made if self.steps else {**made, "note": UNTRAINED}

@@ -1,19 +1,18 @@
-"""From settings to the environment and the untrained model."""
+"""Environment and untrained model of a run, from its settings."""
 
 from __future__ import annotations
 
-import functools
 import random
 from collections.abc import Callable
 from typing import Any
 
 import torch
-from sb3_contrib import TQC, RecurrentPPO
-from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
-from agents.policies import controllers, inputs
+from agents.export.export import ALGORITHMS
+from agents.policies import inputs
+from agents.policies.controllers import make
 from agents.policies.networks import policy_arguments, silence
 from agents.settings import seeds
 from agents.settings.presets import ON_POLICY, Config
@@ -23,52 +22,43 @@ from agents.vec_envs.history import HistoryVecEnv
 from agents.vec_envs.mixed import MixedVecEnv
 from agents.vec_envs.residual import ResidualVecEnv
 
-ALGORITHMS: dict[str, type[BaseAlgorithm]] = {
-    "ppo": PPO,
-    "sac": SAC,
-    "tqc": TQC,
-    "recurrent_ppo": RecurrentPPO,
-}
 OWN = ("learning_rate", "lstm_size", "critic_lstm", "warm_up")
-"""Settings that are not handed to the algorithm as they stand."""
+"""Settings that are converted before the algorithm gets them."""
 
 
 def make_env(config: Config) -> VecEnv:
-    """Return the environment of a run: batched, monitored, corrected, with history, normalised."""
+    """Return the environment of a run: batch, monitor, controller, history, normaliser."""
     kinds = config.kinds()
     rows = config.num_envs // len(kinds)
     batches = [make_batch_vec_env(config.env, rows, **kind) for kind in kinds]
     env: VecEnv = VecMonitor(batches[0] if len(batches) == 1 else MixedVecEnv(batches))
     signals, actions = signals_of(env)
-    wanted = config.residual
-    if wanted.controller:
-        make = functools.partial(_controller, wanted.controller, signals, actions)
-        env = ResidualVecEnv(env, wanted.controller, make, wanted.scale)
+    corrected, scale = config.residual.controller, config.residual.scale
+    if corrected:
+        env = ResidualVecEnv(
+            env, corrected, lambda plant: make(corrected, plant, signals, actions), scale
+        )
     if config.history.frames:
         env = HistoryVecEnv(env, inputs.kept(config, signals, actions), config.history.frames)
     return _normalized(env, config)
 
 
-def _controller(name: str, signals: Any, actions: Any, plant: Any) -> Any:
-    return controllers.make(name, plant, signals, actions)
-
-
 def _normalized(env: VecEnv, config: Config) -> VecEnv:
-    wanted = config.normalize
-    if not (wanted.observation or wanted.reward):
+    normalize = config.normalize
+    if not (normalize.observation or normalize.reward):
         return env
     return VecNormalize(
         env,
-        norm_obs=wanted.observation,
-        norm_reward=wanted.reward,
-        clip_obs=wanted.clip_observation,
-        clip_reward=wanted.clip_reward,
+        norm_obs=normalize.observation,
+        norm_reward=normalize.reward,
+        clip_obs=normalize.clip_observation,
+        clip_reward=normalize.clip_reward,
         gamma=config.chosen.gamma,
     )
 
 
 def make_model(config: Config, seed: int, env: VecEnv) -> BaseAlgorithm:
-    """Return the untrained model of a run, with all random numbers seeded."""
+    """Return the untrained model of a run, with all random generators seeded."""
     torch.set_num_threads(1)
     random.seed(seed)
     chosen = config.chosen
@@ -88,25 +78,25 @@ def make_model(config: Config, seed: int, env: VecEnv) -> BaseAlgorithm:
 
 
 def warm_up_steps(config: Config) -> int:
-    """Return how many control periods the critic learns alone."""
+    """Return the number of control periods in which the critic learns alone."""
     chosen = config.chosen
     return chosen.warm_up * chosen.n_steps * config.num_envs if config.algo in ON_POLICY else 0
 
 
 def learning_rate(config: Config) -> Callable[[float], float]:
-    """Return the learning rate as a function of the share of the training that is left.
+    """Return the learning rate as a function of the remaining share of the training.
 
     Raises
     ------
     SettingsError
-        If the critic would learn alone to the end.
+        If the critic warm-up lasts to the end.
     """
     start, end = config.chosen.learning_rate
     alone = warm_up_steps(config)
     if alone >= config.steps:
         raise SettingsError(
             f"{config.algo}.warm_up = {config.chosen.warm_up} rollouts are {alone} steps of "
-            f"{config.steps}: nothing else would be learnt; choose fewer, or more steps"
+            f"{config.steps}, and the policy would never learn; choose fewer, or more steps"
         )
 
     def rate(remaining: float) -> float:
@@ -123,5 +113,5 @@ def signals_of(env: VecEnv) -> tuple[Any, Any]:
 
 
 def logs_each_rollout(config: Config) -> bool:
-    """Return whether a rollout is long enough for a line in the log."""
+    """Return whether each rollout gets a line in the log."""
     return config.algo in ON_POLICY

@@ -1,9 +1,7 @@
-"""Checkpoint files: written whole or not at all, read without running anything they hold.
+"""Checkpoint files: replaced atomically, and read without executing code.
 
-A file is a mark, the SHA-256 of what follows, and tensors, numbers and text in torch's format,
-which is read with ``weights_only=True``: nothing but those types is ever built. It is written
-beside its place, flushed to the disk and then renamed over the old one, so that a process that is
-killed at any moment leaves the old or the new checkpoint, never half of one.
+A file is a mark, the SHA-256 of the rest, and tensors, numbers and text in torch's format, which
+is read with ``weights_only=True``: no other types are built.
 """
 
 from __future__ import annotations

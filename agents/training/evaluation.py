@@ -1,6 +1,6 @@
-"""How well a policy tracks on tuning seeds: what it is chosen by, and settings; never a score.
+"""Evaluation of a policy on tuning seeds, the criterion for policies and settings.
 
-The policy is looked at as it will be shipped: exported, run by onnxruntime, with its controller.
+The policy runs as it will be exported: in onnxruntime, with its controller.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from agents.settings.presets import Config
 Array = NDArray[np.float64]
 TRAVEL = "effort/pressure_travel"
 MORE_TRAVEL = 1.05
-"""Up to this many times as much travel as a controller's, its correction is as good as for free."""
+"""Ratio of a policy's travel to its controller's up to which the travel costs nothing."""
 
 
 @dataclass(frozen=True)
@@ -34,14 +34,13 @@ class Score:
     Attributes
     ----------
     rms : float
-        RMS of ``output - reference`` (SI) over all episodes where it is tracked.
+        RMS of ``output - reference`` (SI) over the evaluated instants of all episodes.
     mean_return : float
         Sum of rewards of an episode, mean over episodes.
     failures : int
-        Episodes that a limit ended.
+        Number of episodes that a limit ended.
     travel : float
-        Change of the set-points' pressure in a control period [Pa], mean over the same instants:
-        what an error is bought with.
+        Change of the pressure setpoints in a control period [Pa], mean over the same instants.
     kinds : tuple of float
         ``rms`` of each kind of row (see :meth:`agents.settings.presets.Config.kinds`).
     """
@@ -69,11 +68,10 @@ def _known(value: float) -> float | None:
 
 
 def value_of(score: Score, config: Config, travel: float | None = None) -> float:
-    """Return what is to be small, as ``evaluation.objective`` says; infinite if unknown.
+    """Return the criterion of ``evaluation.objective``: less is better, infinite if unknown.
 
-    A number to choose by, no error: every episode that a limit ended adds the whole error again
-    (in a return it shows as it is), and a residual that moves the set-point more than its
-    controller pays in proportion.
+    Each episode that a limit ended adds the whole error again (a return includes such ends), and a
+    residual with more travel than its controller is penalised in proportion.
 
     Parameters
     ----------
@@ -90,28 +88,29 @@ def value_of(score: Score, config: Config, travel: float | None = None) -> float
         worth = error * (1.0 + score.failures)
     if not math.isfinite(worth):
         return math.inf
-    dearer = score.travel / (MORE_TRAVEL * travel) if travel else 1.0
-    return worth * dearer if dearer > 1.0 and worth > 0.0 else worth
+    excess = score.travel / (MORE_TRAVEL * travel) if travel else 1.0
+    return worth * excess if excess > 1.0 and worth > 0.0 else worth
 
 
 def evaluate(policy: OnnxPolicy | str, config: Config, episodes: int | None = None) -> Score:
-    """Return the score of a policy on the tuning seeds, on the plants that it is trained on.
+    """Return the score of a policy on tuning seeds, on the plants of its training.
 
     Parameters
     ----------
     policy : OnnxPolicy or str
-        A trained one, or the name of a classical controller, which is told the nominal plant.
+        A trained policy, or the name of a classical controller, built from the nominal plant.
     config : Config
-        Whose ``evaluation`` says what is counted.
+        Its ``evaluation`` defines the evaluated instants.
     episodes : int, optional
-        How many, shared out evenly among the kinds of rows (one each at least), which have the
-        same seeds; default: as ``evaluation`` says.
+        Number of episodes, split evenly among the kinds of rows (at least one each), which have
+        the same seeds; default: that of ``evaluation``.
     """
-    wanted = config.evaluation
-    count = wanted.episodes if episodes is None else episodes
+    count = config.evaluation.episodes if episodes is None else episodes
     kinds = config.kinds()
     chosen = seeds.tuning(max(count // len(kinds), 1))
-    parts = [_Part(policy, config, {**kind, **wanted.env_kwargs}, chosen) for kind in kinds]
+    parts = [
+        _Part(policy, config, {**kind, **config.evaluation.env_kwargs}, chosen) for kind in kinds
+    ]
     for part in parts:
         part.run()
     counted = sum(part.counted for part in parts)
@@ -134,13 +133,13 @@ class _Part:
         self.env: Any = gym.make_vec(
             config.env, len(chosen), vectorization_mode="vector_entry_point", **kwargs
         )
-        base = self.env.unwrapped
+        base: Any = self.env.unwrapped
         self.policy: Any = (
             controllers.make(policy, base.plant, base.signals, base.action_signals)
             if isinstance(policy, str)
             else with_controller(policy, base.plant)
         )
-        self.wanted = config.evaluation
+        self.evaluation = config.evaluation
         self.seeds = chosen
         self.returns = np.zeros(len(chosen))
         self.squares = self.travel = 0.0
@@ -166,11 +165,11 @@ class _Part:
         self.env.close()
 
     def _count(self, infos: Any, running: NDArray[np.bool_]) -> None:
-        """Add the present errors of the rows that go on: the others have begun anew."""
+        """Add the present errors of the rows whose first episode is still running."""
         if "output" not in infos:
             return
-        rows = running & (np.asarray(infos["time"]) > self.wanted.settle_seconds)
-        for name in self.wanted.gate:
+        rows = running & (np.asarray(infos["time"]) > self.evaluation.settle_seconds)
+        for name in self.evaluation.gate:
             rows &= np.asarray(infos[name]) > 0.5
         errors: Array = np.asarray(infos["output"]) - np.asarray(infos["reference"])
         self.squares += float(np.sum(np.square(errors[rows])))

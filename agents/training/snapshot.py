@@ -1,8 +1,8 @@
-"""All that a training's future depends on: taken at the start of a rollout, and put back there.
+"""Snapshot of a training at the start of a rollout, from which it continues bit for bit.
 
-Policy, optimisers, normalisation, replay buffer, environment, random numbers and counters. A
-training that is put back continues bit for bit as if it had never stopped, with the same
-libraries, the same processor type and one torch thread.
+It holds all that the future depends on: policy, optimisers, normalisation, replay buffer,
+environment, random generators and counters. The bits are equal for the same libraries, the same
+type of processor and one torch thread.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "t
 
 
 def take(model: BaseAlgorithm) -> dict[str, Any]:
-    """Return a snapshot, in arrays, tensors, numbers and text."""
+    """Return a snapshot of arrays, tensors, numbers and text."""
     env = model.get_env()
     assert env is not None
     tensors = model._get_torch_save_params()[1]
@@ -48,7 +48,7 @@ def take(model: BaseAlgorithm) -> dict[str, Any]:
 
 
 def restore(model: BaseAlgorithm, snapshot: dict[str, Any]) -> None:
-    """Put a snapshot back into a model that was built with the same settings."""
+    """Restore a snapshot in a model that was built with the same settings."""
     env = model.get_env()
     assert env is not None
     model.set_parameters(snapshot["parameters"], exact_match=True, device="cpu")
@@ -80,13 +80,13 @@ def _episodes(model: BaseAlgorithm) -> np.ndarray[Any, Any]:
 
 
 def _lstm(model: BaseAlgorithm) -> tuple[Any, ...]:
-    """Return the states of a recurrent policy's memories at the rollout's start."""
+    """Return the recurrent states of actor and critic at the rollout's start."""
     states = getattr(model, "_last_lstm_states", None)
     return () if states is None else (states.pi, states.vf)
 
 
 def _layers(env: VecEnv) -> Iterator[VecEnv]:
-    """Yield the wrappers that remember something."""
+    """Yield the wrappers with a state."""
     while hasattr(env, "venv"):
         if isinstance(env, (VecMonitor, VecNormalize, HistoryVecEnv, ResidualVecEnv)):
             yield env
@@ -165,7 +165,7 @@ def _restore_replay(model: BaseAlgorithm, saved: dict[str, Any] | None) -> None:
 
 
 def _random_state(model: BaseAlgorithm) -> dict[str, Any]:
-    """Return the state of every generator that training draws from."""
+    """Return the state of every random generator of a training."""
     _, keys, position, has_gauss, cached = np.random.get_state(legacy=True)  # noqa: NPY002
     return {
         "torch": torch.get_rng_state(),

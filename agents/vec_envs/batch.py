@@ -1,7 +1,7 @@
-"""The batched environment as stable-baselines3 wants it: one kernel call a step.
+"""Adapter of the batched environment to stable-baselines3: one kernel call a step.
 
-No processes and no loop over environments. stable-baselines3 asks for a list of ``info``
-dictionaries; here all rows that have not ended share one empty dictionary.
+There are no processes and no loop over environments. stable-baselines3 expects a list of ``info``
+dictionaries; here all rows whose episode continues share one empty dictionary.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ FINAL_KEYS = ("final_obs", "final_info")
 
 
 class NoInfo(dict[str, Any]):
-    """The empty ``info`` that rows share: it cannot be written to, so that nothing leaks."""
+    """The empty ``info`` that rows share, which refuses writes."""
 
     def _refuse(self, *_: Any, **__: Any) -> NoReturn:
         raise TypeError("this info is shared by all rows and stays empty; copy it to add to it")
@@ -43,8 +43,8 @@ def make_batch_vec_env(env_id: str, num_envs: int, **kwargs: Any) -> BatchVecEnv
     num_envs : int
         Number of rows.
     **kwargs
-        Arguments of the environment. ``info=True`` makes each step report ``info``, which
-        learning does not need and which is slower.
+        Arguments of the environment. ``info=True`` makes each step report ``info``, which is
+        slower and which learning does not need.
     """
     made = gym.make_vec(
         env_id,
@@ -56,11 +56,11 @@ def make_batch_vec_env(env_id: str, num_envs: int, **kwargs: Any) -> BatchVecEnv
 
 
 class BatchVecEnv(VecEnv):
-    """A ``VecEnv`` over a batched Gymnasium environment that resets in the same step.
+    """``VecEnv`` over a batched Gymnasium environment that resets in the same step.
 
     Row ``i`` after ``seed(s)`` is the single environment reset with ``s + i``, bit for bit.
-    ``infos[i]`` is empty unless row ``i`` has ended; then it holds ``terminal_observation`` and
-    ``TimeLimit.truncated``.
+    ``infos[i]`` is empty unless an episode ended in row ``i``; then it holds
+    ``terminal_observation`` and ``TimeLimit.truncated``.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class BatchVecEnv(VecEnv):
     Raises
     ------
     ValueError
-        If the environment resets otherwise.
+        If the environment has another reset mode.
     """
 
     def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
@@ -121,7 +121,7 @@ class BatchVecEnv(VecEnv):
         return observation, reward.astype(np.float32), done, rows
 
     def _rows_of(self, infos: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Return the infos row by row; without any, all rows share one."""
+        """Return the infos by row; rows without any share one."""
         keys = [k for k in infos if not k.startswith("_") and k not in FINAL_KEYS]
         if not keys:
             return [NO_INFO] * self.num_envs
@@ -141,10 +141,7 @@ class BatchVecEnv(VecEnv):
         self.env.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """Return an attribute of the batched environment, once for each row asked for.
-
-        The rows share it: one plant, one set of signals.
-        """
+        """Return an attribute of the batched environment, which the rows share, for each row."""
         return [getattr(self.env.unwrapped, attr_name)] * len(self._indices(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
@@ -153,7 +150,7 @@ class BatchVecEnv(VecEnv):
         Raises
         ------
         ValueError
-            If only some rows are asked for: they share their attributes.
+            If ``indices`` are only some rows: the rows share their attributes.
         """
         self._all_rows(f"set_attr({attr_name!r})", indices)
         setattr(self.env.unwrapped, attr_name, value)
@@ -170,7 +167,7 @@ class BatchVecEnv(VecEnv):
         Raises
         ------
         ValueError
-            If only some rows are asked for: a method acts on all.
+            If ``indices`` are only some rows: a method acts on all.
         """
         self._all_rows(f"env_method({method_name!r})", indices)
         result = getattr(self.env.unwrapped, method_name)(*method_args, **method_kwargs)
@@ -179,11 +176,11 @@ class BatchVecEnv(VecEnv):
     def env_is_wrapped(
         self, wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]], indices: VecEnvIndices = None
     ) -> list[bool]:
-        """Return False for each row: a single environment's wrapper cannot wrap a row."""
+        """Return False for each row: wrappers of single environments do not apply."""
         return [False] * len(self._indices(indices))
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
-        """Return a picture of each row that the batched environment draws."""
+        """Return an image of each row that the batched environment renders."""
         drawn: Any = self.env.render()
         return list(drawn) if drawn is not None else [None] * self.num_envs
 
@@ -203,10 +200,12 @@ class BatchVecEnv(VecEnv):
             )
 
     def get_state(self) -> dict[str, NDArray[Any]]:
-        """Return all that the rows' future depends on (see the batched environment)."""
-        state: dict[str, NDArray[Any]] = self.env.unwrapped.get_state()  # type: ignore[attr-defined]
+        """Return all that the future depends on; see the batched environment."""
+        base: Any = self.env.unwrapped
+        state: dict[str, NDArray[Any]] = base.get_state()
         return state
 
     def set_state(self, state: dict[str, NDArray[Any]]) -> None:
-        """Go back to a state of :meth:`get_state`, to the last bit."""
-        self.env.unwrapped.set_state(state)  # type: ignore[attr-defined]
+        """Return to a state of :meth:`get_state`, bit for bit."""
+        base: Any = self.env.unwrapped
+        base.set_state(state)

@@ -1,4 +1,4 @@
-"""Observations joined by what some signals were in the last control periods."""
+"""Environment whose observation includes signals of the last control periods."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 
 class HistoryVecEnv(VecEnvWrapper):
-    """Appends the past of some columns, the latest first; an episode begins as if at rest.
+    """Append past values of some columns, the latest first; an episode begins as if at rest.
 
-    The exported policy does the same inside its graph (see :mod:`agents.export.export`).
+    The exported policy does the same inside its graph (:mod:`agents.export.graph`).
 
     Parameters
     ----------
     venv : VecEnv
     columns : sequence of int
-        What is kept.
+        Of the observation.
     frames : int
-        For how many control periods.
+        Number of past control periods.
     """
 
     def __init__(self, venv: VecEnv, columns: Sequence[int], frames: int) -> None:
@@ -56,9 +56,9 @@ class HistoryVecEnv(VecEnvWrapper):
         return np.concatenate([observation, self.past], 1), reward, done, infos
 
     def snapshot(self) -> dict[str, Any]:
-        """Return what the future depends on."""
+        """Return all that the future depends on."""
         return {"past": self.past.copy(), "last": self.last.copy()}
 
     def restore(self, saved: dict[str, Any]) -> None:
-        """Go back to a snapshot."""
+        """Return to a snapshot."""
         self.past, self.last = saved["past"].numpy().copy(), saved["last"].numpy().copy()

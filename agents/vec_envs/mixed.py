@@ -1,4 +1,4 @@
-"""Several batches as one: rows on plants of different kinds, trained on together."""
+"""Several batches as one vectorised environment, with rows on different plants."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class MixedVecEnv(VecEnv):
         super().__init__(ends[-1], first.observation_space, first.action_space)
 
     def parts(self) -> Iterator[tuple[slice, Any]]:
-        """Yield which rows are on which plant; neighbours on equal plants as one."""
+        """Yield the rows of each plant; adjacent batches of equal plants are one entry."""
         plants = [batch.get_attr("plant")[0] for batch in self.batches]
         grouped = itertools.groupby(
             zip(self.slices, plants, strict=True), key=lambda pair: pair[1].digest()
@@ -76,26 +76,22 @@ class MixedVecEnv(VecEnv):
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Set an attribute of all batches; see :meth:`BatchVecEnv.set_attr`."""
-        if indices is not None:
-            raise ValueError(f"set_attr({attr_name!r}) acts on all rows; leave indices out")
+        self._check_all_rows(attr_name, indices)
         for batch in self.batches:
             batch.set_attr(attr_name, value)
 
     def env_method(
-        self,
-        method_name: str,
-        *method_args: Any,
-        indices: VecEnvIndices = None,
-        **method_kwargs: Any,
+        self, method_name: str, *args: Any, indices: VecEnvIndices = None, **kwargs: Any
     ) -> list[Any]:
         """Call a method of all batches; see :meth:`BatchVecEnv.env_method`."""
+        self._check_all_rows(method_name, indices)
+        made = [batch.env_method(method_name, *args, **kwargs) for batch in self.batches]
+        return [value for values in made for value in values]
+
+    @staticmethod
+    def _check_all_rows(name: str, indices: VecEnvIndices) -> None:
         if indices is not None:
-            raise ValueError(f"env_method({method_name!r}) acts on all rows; leave indices out")
-        return [
-            value
-            for batch in self.batches
-            for value in batch.env_method(method_name, *method_args, **method_kwargs)
-        ]
+            raise ValueError(f"{name!r} concerns all rows; leave indices out")
 
     def env_is_wrapped(
         self, wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]], indices: VecEnvIndices = None
@@ -104,7 +100,7 @@ class MixedVecEnv(VecEnv):
         return [False] * len(list(self._get_indices(indices)))
 
     def get_state(self) -> dict[str, NDArray[Any]]:
-        """Return all that the rows' future depends on."""
+        """Return all that the future depends on."""
         return {
             f"{i}/{name}": array
             for i, batch in enumerate(self.batches)
@@ -112,7 +108,7 @@ class MixedVecEnv(VecEnv):
         }
 
     def set_state(self, state: dict[str, NDArray[Any]]) -> None:
-        """Go back to a state of :meth:`get_state`, to the last bit."""
+        """Return to a state of :meth:`get_state`, bit for bit."""
         for i, batch in enumerate(self.batches):
             mark = f"{i}/"
             batch.set_state({k[len(mark) :]: v for k, v in state.items() if k.startswith(mark)})

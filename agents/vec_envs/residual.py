@@ -1,4 +1,4 @@
-"""An environment in which the action corrects that of a controller."""
+"""Environment in which the action corrects that of a controller."""
 
 from __future__ import annotations
 
@@ -11,32 +11,34 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
-from agents.policies.controllers import mapped, restored
 from agents.settings.schema import SettingsError
-
-Make = Callable[[Any], Any]
 
 
 class ResidualVecEnv(VecEnvWrapper):
-    """The plant gets ``controller's action + scale * action``, held within its range.
+    """The plant gets ``controller's action + scale * action``, clipped to its range.
 
-    The controller runs on all rows at once, with a state for each. What it answers is appended to
-    the observation, since the policy cannot know it otherwise. Rows on plants of different kinds
-    have controllers of their own, each told its rows' nominal plant.
+    The controller runs on all rows at once, with a state for each, and its action is appended to
+    the observation. Rows on different plants have a controller each, built from their nominal
+    plant.
 
     Parameters
     ----------
     venv : VecEnv
         With actions in [-1, 1].
     name : str
-        The controller's.
+        Of the controller.
     make : callable
-        From a nominal plant to the controller.
+        Makes the controller from a nominal plant.
     scale : float
         See :class:`agents.settings.parts.Residual`.
+
+    Attributes
+    ----------
+    record : dict or None
+        The card's entry on the controller, once it is recorded.
     """
 
-    def __init__(self, venv: VecEnv, name: str, make: Make, scale: float) -> None:
+    def __init__(self, venv: VecEnv, name: str, make: Callable[[Any], Any], scale: float) -> None:
         box, action = venv.observation_space, venv.action_space
         assert isinstance(box, spaces.Box)
         assert isinstance(action, spaces.Box)
@@ -45,17 +47,19 @@ class ResidualVecEnv(VecEnvWrapper):
                 f"a residual needs actions from -1 to 1, but they reach from {action.low.min():g} "
                 f"to {action.high.max():g}; leave normalize of the environment as it is (True)"
             )
-        ends = (np.concatenate(pair) for pair in ((box.low, action.low), (box.high, action.high)))
+        low = np.concatenate([box.low, action.low])
+        high = np.concatenate([box.high, action.high])
         width = action.shape[0]
         super().__init__(
             venv,
-            spaces.Box(*ends, dtype=np.float32),
+            spaces.Box(low, high, dtype=np.float32),
             spaces.Box(-1.0, 1.0, (width,), np.float32),
         )
         self.name = name
         self.range = action
         self.scale = np.float32(scale)
         self.controllers = [(rows, make(plant)) for rows, plant in parts_of(venv)]
+        self.record: dict[str, Any] | None = None
         self.states: list[Any] = [None] * len(self.controllers)
         self.given = np.zeros((venv.num_envs, width), np.float32)
         self.seen = np.zeros((venv.num_envs, box.shape[0]), np.float32)
@@ -67,7 +71,7 @@ class ResidualVecEnv(VecEnvWrapper):
         return self._joined(observation, np.ones(self.num_envs, bool))
 
     def _joined(self, observation: NDArray[Any], starts: NDArray[np.bool_]) -> NDArray[np.float32]:
-        """Ask the controllers and return the observation with their answers."""
+        """Run the controllers and return the observation with their actions."""
         self.seen = observation
         for i, (rows, controller) in enumerate(self.controllers):
             self.given[rows], self.states[i] = controller.predict(
@@ -90,21 +94,19 @@ class ResidualVecEnv(VecEnvWrapper):
         return self._joined(observation, done), reward, done, infos
 
     def _finish(self, done: NDArray[np.bool_], infos: list[dict[str, Any]]) -> None:
-        """Append what the controllers would have answered to the ended rows' last observations."""
+        """Append the controllers' actions to the terminal observations."""
         for (rows, controller), state in zip(self.controllers, self.states, strict=True):
             ended = np.flatnonzero(done[rows])
             if not len(ended):
                 continue
             places = (ended + (rows.start or 0)).tolist()
             last = np.array([infos[row]["terminal_observation"] for row in places])
-            answers, _ = controller.predict(
-                last, mapped(state, lambda a, e=ended: a[e]), np.zeros(len(ended), bool)
-            )
+            answers, _ = controller.predict(last, _rows(state, ended), np.zeros(len(ended), bool))
             for row, observation, answer in zip(places, last, answers, strict=True):
                 infos[row]["terminal_observation"] = np.concatenate([observation, answer])
 
     def snapshot(self) -> dict[str, Any]:
-        """Return what the future depends on."""
+        """Return all that the future depends on."""
         return {
             "seen": self.seen.copy(),
             "given": self.given.copy(),
@@ -112,24 +114,46 @@ class ResidualVecEnv(VecEnvWrapper):
         }
 
     def restore(self, saved: dict[str, Any]) -> None:
-        """Go back to a snapshot."""
+        """Return to a snapshot."""
         self.seen, self.given = saved["seen"].numpy().copy(), saved["given"].numpy().copy()
         for i, (rows, controller) in enumerate(self.controllers):
             seen = self.seen[rows]
             _, template = controller.predict(seen, None, np.ones(len(seen), bool))
-            self.states[i] = restored(template, saved["states"][i])
+            self.states[i] = _restored(template, saved["states"][i])
 
 
 def parts_of(venv: VecEnv) -> list[tuple[slice, Any]]:
-    """Return which rows are on which nominal plant."""
+    """Return the rows of each nominal plant."""
     base: Any = venv.unwrapped
     if hasattr(base, "parts"):
         return list(base.parts())
     return [(slice(0, venv.num_envs), base.get_attr("plant")[0])]
 
 
+# A controller's state is a tuple, perhaps named, of arrays, None and such tuples.
+
+
+def _rows(state: Any, rows: NDArray[np.intp]) -> Any:
+    """Return some rows of a state."""
+    if isinstance(state, tuple):
+        return _like(state, [_rows(part, rows) for part in state])
+    return None if state is None else state[rows]
+
+
 def _plain(state: Any) -> Any:
-    """Return nested lists of arrays that own their data."""
+    """Return a state as nested lists of arrays that own their data."""
     if isinstance(state, tuple):
         return [_plain(part) for part in state]
     return None if state is None else np.array(state)
+
+
+def _restored(template: Any, saved: Any) -> Any:
+    """Return a saved state in the form of a template."""
+    if isinstance(template, tuple):
+        pairs = zip(template, saved, strict=True)
+        return _like(template, [_restored(*pair) for pair in pairs])
+    return None if template is None else saved.numpy().astype(template.dtype)
+
+
+def _like(state: tuple[Any, ...], parts: list[Any]) -> Any:
+    return type(state)(*parts) if hasattr(state, "_fields") else tuple(parts)

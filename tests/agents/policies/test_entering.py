@@ -73,14 +73,14 @@ def test_the_older_files_of_a_preset_are_replaced_and_told(
     place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["enter", *runs(tmp_path / "old", [0, 1, 2])]) == 0
-    for other in both(NAME, "KneeWalk-v0.ppo-residual.s0", "KneeStairsUp-v0.ppo.s2"):
+    for other in both("KneeWalk-v0.ppo-residual.s0", "KneeStairsUp-v0.ppo.s2"):
         (place / other).write_text("{}")
     capsys.readouterr()
     assert main(["enter", *runs(tmp_path / "new", [0, 1]), "--author", "Doe, J."]) == 0
     kept = ("KneeWalk-v0.ppo-residual.s0", "KneeStairsUp-v0.ppo.s2")
     assert names(place) == both(f"{NAME}.s0", f"{NAME}.s1", *kept)
     told = capsys.readouterr().out.splitlines()
-    gone = both(NAME, *(f"{NAME}.s{seed}" for seed in range(3)))
+    gone = both(*(f"{NAME}.s{seed}" for seed in range(3)))
     replaced = [line for line in told if line.startswith("replaced ")]
     assert sorted(replaced) == sorted(f"replaced {place / name}" for name in gone)
     assert told[-1] == "ppo_knee_walk: training seeds 0, 1"

@@ -84,9 +84,11 @@ def test_a_policy_file_of_no_preset_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(catalogue, "FOLDER", tmp_path)
-    for name in ("KneeWalk-v0.ppo.s3", "KneeWalk-v0.ppo"):
-        (tmp_path / f"{name}.onnx").touch()
+    (tmp_path / "KneeWalk-v0.ppo.s3.onnx").touch()
     catalogue.check_files(catalogue.OFFERED)
     (tmp_path / "KneeWalk-v0.ppo-mine.s0.onnx").touch()
     with pytest.raises(PolicyFileError, match=r"there is no KneeWalk-v0.ppo-mine.yaml in agents"):
+        catalogue.check_files(catalogue.OFFERED)
+    (tmp_path / "KneeWalk-v0.ppo-mine.s0.onnx").rename(tmp_path / "KneeWalk-v0.ppo.onnx")
+    with pytest.raises(PolicyFileError, match=r"ppo.onnx names no training seed, as .*ppo.s0.onnx"):
         catalogue.check_files(catalogue.OFFERED)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import re
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +21,6 @@ from agents.settings import presets as configs
 from benchmarks.runs import controllers, rows
 
 FILES = [path for entry in catalogue.CONTROLLERS.values() for path in entry.files().values()]
-NUMBERED = [path for path in FILES if re.search(r"\.s[0-9]+$", path.stem)]
-"""Those with their training seed in the name. (One without is of a preset as it was.)"""
 RECORDED = {
     *("steps", "seconds", "cpu_seconds", "frames_per_second", "hardware", "seed"),
     *("first_env_seed", "tuning_seeds", "tuning_trials", "command"),
@@ -80,7 +77,7 @@ def test_the_file_is_small_and_its_training_is_recorded(path: Path) -> None:
     assert configs.from_mapping(card["config"]).env == card["env"]
 
 
-@pytest.mark.parametrize("path", NUMBERED, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_the_recorded_preset_is_the_one_that_ships(path: Path) -> None:
     card = OnnxPolicy.load(path).card
     read = configs.from_mapping(card["config"]).as_dict()
@@ -122,13 +119,11 @@ def test_several_trainings_of_one_policy_are_told_apart(
     monkeypatch.setattr(catalogue, "FOLDER", tmp_path)
     file = "MusclePositioning-v0.ppo.s{seed}.onnx"
     entry = dataclasses.replace(catalogue.CONTROLLERS["ppo"], file=file)
-    single = "MusclePositioning-v0.ppo.onnx"
-    for name, seed in ((file.format(seed=2), 2), (file.format(seed=11), 11), (single, 0)):
-        named(source, tmp_path / name, seed=seed)
+    for seed in (2, 11):
+        named(source, tmp_path / file.format(seed=seed), seed=seed)
     for name in (file.format(seed=1)[:-5] + ".json", file.format(seed="x")):
         (tmp_path / name).write_bytes(source.read_bytes())
     assert {seed: path.name for seed, path in entry.files().items()} == {
-        0: single,
         2: file.format(seed=2),
         11: file.format(seed=11),
     }
