@@ -9,13 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from baselines.core.controller import (
-    Array,
-    Prediction,
-    encode_actions,
-    reset_rows,
-    row_count,
-)
+from baselines.core.controller import Array, Prediction, encode_actions, reset_rows, row_count
 from baselines.core.entry import Entry
 from baselines.core.environments import ELBOW, KNEE, POSITIONING
 from baselines.knee.published import NOMINAL_PRESSURE

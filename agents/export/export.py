@@ -23,14 +23,7 @@ from agents.export.graph import Graph, array
 from agents.export.recording import record
 from agents.policies.networks import LayersAndInputs, LinearFeatures
 from agents.policies.policy import describe
-from agents.policies.policy_file import (
-    CARD,
-    CONTROLLER,
-    INPUT,
-    SCHEMA,
-    check_graph,
-    write_policy,
-)
+from agents.policies.policy_file import CARD, CONTROLLER, INPUT, SCHEMA, check_graph, write_policy
 from agents.vec_envs.history import HistoryVecEnv
 from agents.vec_envs.residual import ResidualVecEnv
 

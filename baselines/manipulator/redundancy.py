@@ -5,7 +5,7 @@ fluidic_muscles, section 2: of all joint angles that give a pose, those that min
 angles and multipliers of the period before, so that a few Newton iterations do; an episode starts
 from the sensed angles. A pose out of reach, or without a direction, leaves the set-points where
 they are, and is counted. A whole path is planned at once by
-:func:`pam_envs.mechanics.redundancy.resolve`, which raises there.
+:func:`pam_envs.mechanics.redundancy.resolution.resolve`, which raises there.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 from baselines.core.controller import Array, Prediction, reader, reset_rows
 from baselines.core.entry import Entry
 from baselines.core.environments import ARM
-from pam_envs.mechanics.redundancy import LIMIT, Resolution, UnreachablePose, resolve
-from pam_envs.mechanics.serial_chain import SerialChain
+from pam_envs.mechanics.redundancy.resolution import LIMIT, Resolution, UnreachablePose, resolve
+from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.parameters import Signals
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 

@@ -22,14 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import (
-    Array,
-    Prediction,
-    Reader,
-    encode_action,
-    reader,
-    reset_rows,
-)
+from baselines.core.controller import Array, Prediction, Reader, encode_action, reader, reset_rows
 from baselines.core.entry import Entry
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.linear.simc import PID_KNOBS, WAIT, simc_rule

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from baselines.manipulator.redundancy import Comparison, compare
 from benchmarks.papers.published import BEFORE, UNKNOWN, Figure, Group
 from pam_envs.envs.manipulator.paths import LEAP
-from pam_envs.mechanics.redundancy import LIMIT
-from pam_envs.mechanics.serial_chain import SerialChain
+from pam_envs.mechanics.redundancy.resolution import LIMIT
+from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.references.path import PATHS, POINTS, PathEnds, draw_ends, joint_line
 
 Array = NDArray[np.float64]

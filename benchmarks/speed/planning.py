@@ -14,8 +14,8 @@ REPEATS = 5
 
 def planning(rounds: int) -> list[Measurement]:
     """Joint angles for the poses of the arm's three paths, there and back."""
-    from pam_envs.mechanics.redundancy import resolve
-    from pam_envs.mechanics.serial_chain import SerialChain
+    from pam_envs.mechanics.redundancy.resolution import resolve
+    from pam_envs.mechanics.serial_chain.chain import SerialChain
     from pam_envs.references.path import PATHS
 
     arm = SerialChain.uniform()

@@ -8,18 +8,24 @@ import numpy as np
 import pytest
 
 from pam_envs.kernels.build import interpreted
-from pam_envs.mechanics import redundancy
-from pam_envs.mechanics.redundancy import LIMIT, Resolution, UnreachablePose, nearest, resolve
-from pam_envs.mechanics.redundancy_equations import (
+from pam_envs.mechanics.redundancy import resolution as redundancy
+from pam_envs.mechanics.redundancy.equations import (
     across,
     set_curvature,
     set_equations,
     slope_and_curvature,
     weight_of,
 )
-from pam_envs.mechanics.redundancy_newton import bends_upwards, resolve_path, solve_equations
-from pam_envs.mechanics.serial_chain import SerialChain
-from pam_envs.mechanics.serial_chain_rows import work_rows
+from pam_envs.mechanics.redundancy.newton import bends_upwards, resolve_path, solve_equations
+from pam_envs.mechanics.redundancy.resolution import (
+    LIMIT,
+    Resolution,
+    UnreachablePose,
+    nearest,
+    resolve,
+)
+from pam_envs.mechanics.serial_chain.chain import SerialChain
+from pam_envs.mechanics.serial_chain.rows import work_rows
 from pam_envs.references.path import joint_line
 
 ARM = SerialChain.uniform()

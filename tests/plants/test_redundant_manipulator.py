@@ -11,8 +11,8 @@ import pytest
 
 from pam_envs.hysteresis.protocol import kinds
 from pam_envs.kernels.build import COMPILED, interpreted
-from pam_envs.mechanics.redundancy import resolve
-from pam_envs.mechanics.serial_chain import SerialChain
+from pam_envs.mechanics.redundancy.resolution import resolve
+from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rollout import simulate_joint
 from pam_envs.plants.redundant_manipulator import rows as M

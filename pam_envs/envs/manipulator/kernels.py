@@ -12,20 +12,13 @@ from typing import Any
 from pam_envs.envs.core.families import Kernels
 from pam_envs.envs.core.kernels import advance_plant, sense
 from pam_envs.envs.core.payload import change_payload, draw_payload
-from pam_envs.envs.core.step import (
-    CHANNELS,
-    CHOICE,
-    EPISODE_SECONDS,
-    FIRST_INFO,
-    N_INFO,
-    PERIOD,
-)
+from pam_envs.envs.core.step import CHANNELS, CHOICE, EPISODE_SECONDS, FIRST_INFO, N_INFO, PERIOD
 from pam_envs.envs.manipulator import layout as L
 from pam_envs.envs.manipulator.report import evaluate
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import uniform
-from pam_envs.mechanics.serial_chain_kinematics import N_STAGES
-from pam_envs.mechanics.serial_chain_rows import parameter_rows
+from pam_envs.mechanics.serial_chain.kinematics import N_STAGES
+from pam_envs.mechanics.serial_chain.rows import parameter_rows
 from pam_envs.plants.antagonistic_joint.pair import command
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.step import (

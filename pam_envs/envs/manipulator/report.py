@@ -16,8 +16,8 @@ from pam_envs.envs.core.step import (
 )
 from pam_envs.envs.manipulator import layout as L
 from pam_envs.kernels.build import LANES, kernel
-from pam_envs.mechanics.serial_chain_kinematics import N_STAGES, place_chain
-from pam_envs.mechanics.serial_chain_rows import DIRECTION, POINT, block
+from pam_envs.mechanics.serial_chain.kinematics import N_STAGES, place_chain
+from pam_envs.mechanics.serial_chain.rows import DIRECTION, POINT, block
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.step import CHAIN_WORK
 from pam_envs.references.path import along

@@ -8,13 +8,7 @@ from typing import Any
 from pam_envs.constants import ATMOSPHERE, DENSITY_PER_PRESSURE
 from pam_envs.envs.core.families import Kernels
 from pam_envs.envs.core.kernels import advance_plant, sense, trajectory_at
-from pam_envs.envs.core.step import (
-    CHOICE,
-    EPISODE_SECONDS,
-    PERIOD,
-    copy_rows,
-    write_references,
-)
+from pam_envs.envs.core.step import CHOICE, EPISODE_SECONDS, PERIOD, copy_rows, write_references
 from pam_envs.envs.positioning import layout as L
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import LANES, kernel, routine

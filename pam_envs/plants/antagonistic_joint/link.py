@@ -71,7 +71,7 @@ class ArmFactors:
     """What all links and all joints of a chain have in common beside their own numbers.
 
     The masses of fluidic_muscles's arm are not published. A link weighs what
-    :class:`~pam_envs.mechanics.serial_chain.LinkForm` says, unless a chain is given.
+    :class:`~pam_envs.mechanics.serial_chain.chain.LinkForm` says, unless a chain is given.
     """
 
     mass_factor: float = parameter(

@@ -14,13 +14,7 @@ from pam_envs.kernels.history import N_HISTORY
 from pam_envs.mechanics.guide import bearing_step
 from pam_envs.plants.core.muscle_path import PATH_STATE, WARM, begin_path, path_air, path_muscle
 from pam_envs.plants.elbow_orthosis import rows as K
-from pam_envs.plants.elbow_orthosis.air import (
-    AIR,
-    GIVES_A,
-    NOW_A,
-    WAS_A,
-    count_used_air,
-)
+from pam_envs.plants.elbow_orthosis.air import AIR, GIVES_A, NOW_A, WAS_A, count_used_air
 from pam_envs.plants.elbow_orthosis.rows import EFFECT, STATE
 from pam_envs.sensing.sensor import begin_sensor, sense
 

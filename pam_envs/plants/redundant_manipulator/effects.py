@@ -10,7 +10,7 @@ from typing import Any
 
 from pam_envs.kernels.build import kernel
 from pam_envs.kernels.history import N_HISTORY
-from pam_envs.mechanics.serial_chain_kinematics import N_STAGES
+from pam_envs.mechanics.serial_chain.kinematics import N_STAGES
 from pam_envs.plants.core.muscle_path import PATH_STATE, begin_path, path_step
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.rows import EFFECT, STATE

@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.protocol import Usage
 from pam_envs.mechanics.antagonistic_lever import AntagonisticLever
-from pam_envs.mechanics.serial_chain import SerialChain
+from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.muscle.force_map import ForceMap, paper_stretch
 from pam_envs.plants.antagonistic_joint import statics as pair_statics
 from pam_envs.plants.antagonistic_joint.hysteresis import JointHysteresis, joint_hysteresis
@@ -80,7 +80,7 @@ class RedundantManipulator(Plant):
     Attributes
     ----------
     axes, lengths, masses, centres, across, along, gravity
-        The chain, as in :class:`~pam_envs.mechanics.serial_chain.SerialChain`, for an
+        The chain, as in :class:`~pam_envs.mechanics.serial_chain.chain.SerialChain`, for an
         ``arm.mass_factor`` of 1.
     joint_damping : tuple of float
         Of each joint [N m s/rad], beside ``link.damping`` and the muscles' viscosity, for an

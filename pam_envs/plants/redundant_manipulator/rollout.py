@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import COMPILED, build, kernel, scratch
-from pam_envs.mechanics.serial_chain_kinematics import N_STAGES
+from pam_envs.mechanics.serial_chain.kinematics import N_STAGES
 from pam_envs.plants.antagonistic_joint.pair import command
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator

@@ -19,9 +19,9 @@ from typing import Any
 
 from pam_envs.hysteresis import protocol
 from pam_envs.kernels.build import LANES, kernel, routine
-from pam_envs.mechanics.serial_chain_dynamics import chain_solve, chain_terms
-from pam_envs.mechanics.serial_chain_kinematics import N_STAGES
-from pam_envs.mechanics.serial_chain_rows import (
+from pam_envs.mechanics.serial_chain.dynamics import chain_solve, chain_terms
+from pam_envs.mechanics.serial_chain.kinematics import N_STAGES
+from pam_envs.mechanics.serial_chain.rows import (
     CENTRE,
     GRAVITY_ROWS,
     LENGTH,
@@ -30,7 +30,7 @@ from pam_envs.mechanics.serial_chain_rows import (
     TURN_X,
     mass_row,
 )
-from pam_envs.mechanics.serial_chain_rows import work_rows as chain_work_rows
+from pam_envs.mechanics.serial_chain.rows import work_rows as chain_work_rows
 from pam_envs.plants.antagonistic_joint.hysteresis_kernels import peek, remember
 from pam_envs.plants.antagonistic_joint.pair import (
     air_of,

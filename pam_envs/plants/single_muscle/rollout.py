@@ -16,11 +16,7 @@ from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.rows import N_COUNTS, N_PARAMETERS
-from pam_envs.plants.single_muscle.step import (
-    N_WORK,
-    advance,
-    rest_contraction,
-)
+from pam_envs.plants.single_muscle.step import N_WORK, advance, rest_contraction
 
 OUTPUTS = ("contraction", "velocity", "pressure", "drive")
 N_ROWS = 0

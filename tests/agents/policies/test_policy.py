@@ -29,13 +29,7 @@ from agents.__main__ import main
 from agents.export.export import export_policy
 from agents.policies import catalogue
 from agents.policies.policy import OnnxPolicy
-from agents.policies.policy_file import (
-    CARD,
-    MOST_BYTES,
-    PolicyFileError,
-    finished,
-    write_policy,
-)
+from agents.policies.policy_file import CARD, MOST_BYTES, PolicyFileError, finished, write_policy
 from agents.settings import presets as configs
 from agents.settings.schema import SettingsError
 from agents.training import checkpoint, sweep

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from baselines.manipulator.redundancy import POSE, InverseKinematics, compare
-from pam_envs.mechanics.redundancy import LIMIT, UnreachablePose, resolve
-from pam_envs.mechanics.serial_chain import SerialChain
+from pam_envs.mechanics.redundancy.resolution import LIMIT, UnreachablePose, resolve
+from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.parameters import Signal, Signals
 from pam_envs.references.path import PATHS
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.papers import manipulator as figures
-from pam_envs.mechanics.redundancy import LIMIT
+from pam_envs.mechanics.redundancy.resolution import LIMIT
 from pam_envs.references.path import PATHS, POINTS
 
 PUBLISHED = {"path_1": (34.2, 27.6), "path_2": (33.2, 26.2), "path_3": (37.1, 27.8)}

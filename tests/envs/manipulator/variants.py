@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pam_envs.mechanics.serial_chain import SerialChain
+from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 
 BENT = RedundantManipulator.paper().chain

@@ -19,8 +19,8 @@ from typing import Any
 
 from pam_envs.kernels.arithmetic import log_of_fraction
 from pam_envs.kernels.build import kernel, routine
-from pam_envs.mechanics.serial_chain_kinematics import N_STAGES, cross, place_chain
-from pam_envs.mechanics.serial_chain_rows import AXIS, DIRECTION, LEVER, POINT, block
+from pam_envs.mechanics.serial_chain.kinematics import N_STAGES, cross, place_chain
+from pam_envs.mechanics.serial_chain.rows import AXIS, DIRECTION, LEVER, POINT, block
 
 TASK = 5
 """Degrees of freedom of a pose."""

@@ -13,8 +13,8 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.kernels.build import LANES, kernel
-from pam_envs.mechanics.serial_chain_kinematics import N_STAGES, cross, place_chain
-from pam_envs.mechanics.serial_chain_rows import (
+from pam_envs.mechanics.serial_chain.kinematics import N_STAGES, cross, place_chain
+from pam_envs.mechanics.serial_chain.rows import (
     ACROSS,
     ALONG,
     AXIS,

@@ -12,15 +12,15 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.kernels.build import kernel, routine
-from pam_envs.mechanics.redundancy_equations import (
+from pam_envs.mechanics.redundancy.equations import (
     TASK,
     merit,
     set_curvature,
     set_equations,
     weight_of,
 )
-from pam_envs.mechanics.serial_chain_kinematics import N_STAGES
-from pam_envs.mechanics.serial_chain_rows import GRAVITY_ROWS, LINK_ROWS
+from pam_envs.mechanics.serial_chain.kinematics import N_STAGES
+from pam_envs.mechanics.serial_chain.rows import GRAVITY_ROWS, LINK_ROWS
 
 MOST_ITERATIONS = 150
 TOLERANCE = 1e-10

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.constants import GRAVITY
-from pam_envs.mechanics.serial_chain_rows import GRAVITY_ROWS, LINK_ROWS
+from pam_envs.mechanics.serial_chain.rows import GRAVITY_ROWS, LINK_ROWS
 from pam_envs.parameters import parameter
 
 Array = NDArray[np.float64]

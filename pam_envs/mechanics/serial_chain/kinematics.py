@@ -12,7 +12,7 @@ from typing import Any
 
 from pam_envs.kernels.build import LANES, kernel
 from pam_envs.mechanics.leg import sine_and_cosine
-from pam_envs.mechanics.serial_chain_rows import (
+from pam_envs.mechanics.serial_chain.rows import (
     AXIS,
     DIRECTION,
     FRAME,

@@ -1,0 +1,1 @@
+"""Redundancy resolution of a serial chain: joint angles for poses, away from their limits."""

@@ -1,0 +1,1 @@
+"""Serial chain of joints and links: kinematics, dynamics, numpy and kernels."""
