@@ -1,4 +1,4 @@
-"""The figures of a diagnosis, as pieces of SVG for its page."""
+"""Figures of a diagnosis, as SVG elements for its page."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ OF_REPORT = (structure, rivals, kinds, isolability)
 
 
 def draw(report: Mapping[str, Any], traces: Any) -> dict[str, Picture]:
-    """Draw whatever a diagnosis has.
+    """Draw the figures of a diagnosis.
 
     Parameters
     ----------
     report : mapping
         As in ``report.json``.
     traces : Traces or None
-        Without them only the figures of the report itself, and of settled readings in it.
+        Without them only figures of the report itself, and of its settled readings.
 
     Returns
     -------
     dict
-        Name to picture; one that has nothing to show is missing.
+        Name to picture, without empty ones.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""A figure in pixels, and its way onto a page: the only file here that imports matplotlib.
+"""Canvas in CSS pixels and its export to the page; the only module here that imports matplotlib.
 
-One unit of a figure is one CSS pixel on a page that is 900 wide. The SVG has neither fonts nor
-colours of its own; it takes both from the page, and is as dark or as light as the page is.
+The page is 900 pixels wide. The SVG takes fonts and colours from the page, in its light or dark
+theme.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ Array = NDArray[np.float64]
 
 WIDTH = 900.0
 LEFT, RIGHT = 62.0, 18.0
-"""Room beside axes for ticks and labels."""
+"""Margins beside axes for ticks and labels."""
 LEGEND = 36.0
-"""Height of the legend above everything."""
+"""Height of the legend at the top."""
 
 INK, MUTED, RULE, PAPER = "#1a1c20", "#646b75", "#dfe2e7", "#fefefe"
 MEASURED, BASE, EXTENDED, FLOOR = "#9aa1ab", "#d55e00", "#0072b2", "#009e73"
@@ -43,7 +43,7 @@ VARIABLES = {
     FALLING: "falling",
     GREY: "grey",
 }
-"""Colours that colour-blind readers tell apart (after Okabe and Ito), as the page names them."""
+"""Colours for colour-blind readers (after Okabe and Ito), with their names on the page."""
 
 STYLE = {
     "svg.fonttype": "none",
@@ -89,9 +89,9 @@ class Picture:
     svg : str
         An ``<svg>`` element without references to anything outside.
     alt : str
-        What it shows, for who does not see it.
+        Text alternative.
     caption : str
-        How to read it.
+        Reading instruction.
     """
 
     name: str
@@ -102,7 +102,7 @@ class Picture:
 
 @contextmanager
 def drawing() -> Iterator[None]:
-    """Set matplotlib up for the time of drawing.
+    """Configure matplotlib while drawing.
 
     Raises
     ------
@@ -112,13 +112,13 @@ def drawing() -> Iterator[None]:
     import matplotlib
 
     with matplotlib.rc_context(STYLE), warnings.catch_warnings():
-        # the page's own fonts show what the font that text is measured with lacks
+        # the page's own fonts have the glyphs that the measuring font lacks
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         yield
 
 
 class Canvas:
-    """A figure laid out in pixels from its upper left corner."""
+    """A figure with a layout in pixels from its upper left corner."""
 
     def __init__(self, height: float) -> None:
         import matplotlib.figure
@@ -182,9 +182,9 @@ class Canvas:
 
 
 def dots(ax: Any, x: Array, y: Array, colour: str) -> None:
-    """Draw a cloud as one path of strokes without length: a fifth of the size of markers.
+    """Draw points as one path of strokes without length: a fifth of the file size of markers.
 
-    The limits of the axes do not follow it.
+    The limits of the axes are unchanged.
     """
     import matplotlib.patches
     import matplotlib.path
@@ -209,7 +209,7 @@ def square(ax: Any, column: int, row: int, colour: str, alpha: float) -> None:
 
 
 def for_page(svg: str, name: str, alt: str, height: float) -> str:
-    """Return matplotlib's SVG as an element of a page: its own ids, the page's colours and type."""
+    """Return matplotlib's SVG as an element of the page: unique ids, the page's colours, fonts."""
     body = svg[svg.index("<svg") :]
     body = body[body.index(">") + 1 :]
     for tag in ("metadata", "style"):

@@ -1,4 +1,4 @@
-"""Figures over pressure: hysteresis loops, and the residual's cloud."""
+"""Figures over pressure: hysteresis loops and scatter of the residual."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from pam_envs.diagnosis.figures.quantities import Report, short
 from pam_envs.diagnosis.figures.traces import UNITS, View, limits
 
 PANELS = 3
-"""Loops side by side."""
+"""Number of loops side by side."""
 CLOUD = 1100
-"""Dots of each colour."""
+"""Largest number of points of each colour."""
 
 
 def scatter(report: Report, view: View) -> Picture | None:
@@ -74,8 +74,8 @@ def scatter(report: Report, view: View) -> Picture | None:
     return canvas.picture(
         "scatter",
         f"residual of {' and '.join(view.channels)} against pressure, by direction of motion",
-        "Two lines that part are a loop that the simulation draws too wide or too narrow; lines "
-        "that bend together are an error of the static curve; two flat lines at zero are neither.",
+        "Separate lines show a simulated loop that is too wide or too narrow, parallel bends an "
+        "error of the static curve; two flat lines at zero show neither.",
     )
 
 
@@ -115,8 +115,8 @@ def loops(report: Report, view: View) -> Picture | None:
     return canvas.picture(
         "loops",
         f"{output} over pressure in {', '.join(s.name for s in spans)}",
-        "Inflating runs along the lower side of a loop, deflating along the upper one; a model is "
-        "right where its line runs inside the grey one, in width and in corners.",
+        "Inflation is the lower side of a loop, deflation the upper one. A good model stays within "
+        "the grey line of the measurement, in width and at the corners.",
     )
 
 

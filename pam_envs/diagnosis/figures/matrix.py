@@ -1,4 +1,4 @@
-"""The figure of isolability: which causes look alike in a recording."""
+"""Figure of isolability: similarity of causes in a recording."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from pam_envs.diagnosis.figures.canvas import (
 from pam_envs.diagnosis.figures.quantities import Report
 
 NAMES, BARS = 190.0, 150.0
-"""Room for the name of the last cause, and for the bars beside it."""
+"""Width for the name of the last cause, and for the bars."""
 TOP = 30.0
 
 
 def isolability(report: Report) -> Picture | None:
-    """Draw the cosines between the effects, and how much of each the refit takes up."""
+    """Draw the cosines between effects, and the share of each that the refit absorbs."""
     found = report.get("isolability") or {}
     names = [str(n) for n in found.get("names") or []]
     if len(names) < 2:
@@ -44,10 +44,10 @@ def isolability(report: Report) -> Picture | None:
     shares(canvas.axes(left, TOP, BARS - 20.0, side), found.get("absorbed") or {}, names)
     return canvas.picture(
         "isolability",
-        f"how alike the effects of {len(names)} causes are in this recording",
-        "The fuller a cell, the less this recording can tell the two causes apart once the "
-        "ordinary parameters are refitted (1: not at all); the bars say how much of an effect "
-        "that refit takes up by itself.",
+        f"similarity of the effects of {len(names)} causes in this recording",
+        "Cosine between the effects of two causes after a refit of the base parameters (1: not "
+        "separable on this recording); the bars show the share of an effect that the refit "
+        "absorbs.",
     )
 
 
@@ -86,15 +86,15 @@ def shares(ax: Any, absorbed: Report, names: Sequence[str]) -> None:
 
 
 def alike(cosine: Array) -> list[int]:
-    """Return the order that puts causes that look alike side by side.
+    """Return the order that puts similar causes side by side.
 
-    It is the order along the second eigenvector of the graph's Laplacian (Fiedler), which keeps
-    strongly joined nodes close to one another.
+    Order along the second eigenvector of the graph Laplacian (Fiedler vector), which keeps
+    strongly connected nodes close together.
 
     Parameters
     ----------
     cosine : (n, n) array
-        From 0, nothing in common, to 1.
+        Similarity from 0 to 1.
     """
     weight = np.nan_to_num((cosine + cosine.T) / 2.0) ** 2
     np.fill_diagonal(weight, 0.0)

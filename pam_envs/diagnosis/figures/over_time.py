@@ -1,4 +1,4 @@
-"""Figures over time: the replay, what it leaves, what each cause does."""
+"""Figures over time: replay, residual, effect of each cause."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ from pam_envs.diagnosis.figures.quantities import MINUS, TIMES, Report, floor, s
 from pam_envs.diagnosis.figures.traces import CHANNELS, View, limits
 
 ROW = 14.0
-"""Height of a row of names of segments; gap between axes that share their time."""
+"""Height of a row of segment names; gap between axes with a common time axis."""
 BOTTOM = 40.0
 INSIDE = WIDTH - LEFT - RIGHT
 
 
 def line(ax: Any, x: Array, y: Array, **style: Any) -> None:
-    """Draw a line, thinned to what can be seen."""
+    """Draw a line, thinned to the visible resolution."""
     ax.plot(*tv.envelope(x, y), **({"linewidth": 1.1, "solid_joinstyle": "round"} | style))
 
 
 def models(ax: Any, view: View, channel: str, rows: slice, wide: float = 3.0) -> None:
-    """Draw an output as measured and as replayed."""
+    """Draw an output as measured and as simulated."""
     x = view.clock[rows]
     line(ax, x, view.measured[channel][rows], color=MEASURED, linewidth=wide)
     line(ax, x, view.base[channel][rows], color=BASE)
@@ -49,7 +49,7 @@ def models(ax: Any, view: View, channel: str, rows: slice, wide: float = 3.0) ->
 
 
 def model_legend(view: View) -> list[tuple[str, str, dict[str, Any]]]:
-    """Return the legend of measured and replayed lines."""
+    """Return the legend of measured and simulated lines."""
     entries = [
         ("line", "measured", {"color": MEASURED, "linewidth": 3.0}),
         (
@@ -71,9 +71,9 @@ def held_out_legend(view: View) -> list[tuple[str, str, dict[str, Any]]]:
 
 
 def places(view: View) -> list[tuple[float, int, str, bool]]:
-    """Return time, row, name and whether it was held out of each segment whose name has room.
+    """Return time, row, name and held-out flag of each segment whose name fits into two rows.
 
-    There are two rows, and those held out choose first.
+    Held-out segments have priority.
     """
     per_second = INSIDE / max(view.end - float(view.clock[0]), 1e-12)
     taken: list[list[tuple[float, float]]] = [[], []]
@@ -90,7 +90,7 @@ def places(view: View) -> list[tuple[float, int, str, bool]]:
 
 
 class Strips:
-    """Axes over the whole recording, one below the other."""
+    """Axes over the whole recording, stacked."""
 
     def __init__(self, view: View, heights: Sequence[float], gap: float = ROW) -> None:
         self.view, self.gap = view, gap
@@ -102,7 +102,7 @@ class Strips:
         self.axes: list[Any] = []
 
     def next(self, label: str) -> Any:
-        """Return the next axes, with the segments shaded and named on the first."""
+        """Return the next axes, with held-out segments shaded, and named on the first."""
         first = self.axes[0] if self.axes else None
         height = self.heights[len(self.axes)]
         ax = self.canvas.axes(LEFT, self.top, INSIDE, height, first)
@@ -141,7 +141,7 @@ class Strips:
 
 
 def replay(report: Report, view: View) -> Picture | None:
-    """Draw measured and replayed outputs over the whole recording."""
+    """Draw measured and simulated outputs over the whole recording."""
     below = []
     if view.load is not None and np.nanmax(view.load) > np.nanmin(view.load):
         below.append(("load\n[N]", view.load))
@@ -159,14 +159,14 @@ def replay(report: Report, view: View) -> Picture | None:
     return strips.canvas.picture(
         "replay",
         f"{' and '.join(view.channels)} over {len(view.spans)} segments, measured and simulated "
-        f"before{' and after' if view.extended else ''} the fix",
-        "A good simulation lies on the wide grey line of the measurement; shaded segments were "
+        f"before{' and after' if view.extended else ''} the extension",
+        "A good simulation follows the wide grey line of the measurement; shaded segments were "
         "held out of every fit.",
     )
 
 
 def zoom(report: Report, view: View) -> Picture | None:
-    """Draw the worst stretch of each held-out segment."""
+    """Draw the worst part of each held-out segment."""
     spans = tv.one_of_each(view.spans, 3)
     if not spans:
         return None
@@ -191,13 +191,13 @@ def zoom(report: Report, view: View) -> Picture | None:
     return canvas.picture(
         "zoom",
         f"close-up of the held-out segments {', '.join(s.name for s in spans)}",
-        "Up to 20 s of each kind of held-out segment, where the simulation was worst before the "
-        "fix.",
+        "Up to 20 s of each kind of held-out segment, at the largest error of the simulation "
+        "before the extension.",
     )
 
 
 def residual(report: Report, view: View) -> Picture | None:
-    """Draw what is left of each output over time, with the band of the noise."""
+    """Draw the residual of each output over time, with the noise band."""
     strips = Strips(view, [150.0] * len(view.channels))
     banded = False
     for channel in view.channels:
@@ -223,14 +223,14 @@ def residual(report: Report, view: View) -> Picture | None:
     strips.canvas.legend([*entries, *held_out_legend(view)])
     return strips.canvas.picture(
         "residual",
-        f"residual of {' and '.join(view.channels)} over time against the band of the noise",
-        "A residual of nothing but noise fills the space between the green lines evenly; whatever "
-        "leaves it or swings slowly is something that the simulation does not do.",
+        f"residual of {' and '.join(view.channels)} over time against the noise band",
+        "A residual of noise alone fills the band between the green lines evenly; larger or slow "
+        "variations are model error.",
     )
 
 
 def effects(report: Report, view: View) -> Picture | None:
-    """Draw what each named cause adds to the outputs."""
+    """Draw the contribution of each named cause to the outputs."""
     rows = [
         (short(cause.get("title") or cause["name"], 60), channel, traces[channel])
         for cause in report.get("causes") or []
@@ -251,8 +251,7 @@ def effects(report: Report, view: View) -> Picture | None:
     return strips.canvas.picture(
         "effects",
         "contribution over time of " + ", ".join(c["name"] for c in report["causes"]),
-        "The extended simulation less the same simulation with this one cause switched off: what "
-        "the cause does to the output, and when.",
+        "The extended simulation less the same simulation with this one cause switched off.",
     )
 
 
@@ -263,7 +262,7 @@ def _title_height(strips: Strips) -> float:
 
 
 def _seen(report: Report, effect: dict[str, Array]) -> list[str]:
-    """Return the channels on which an effect is at least a tenth of the noise, or the largest."""
+    """Return the channels on which an effect exceeds a tenth of the noise, or is largest."""
 
     def size(channel: str) -> float:
         noise = floor(report, channel)

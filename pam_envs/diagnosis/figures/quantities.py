@@ -1,4 +1,4 @@
-"""What figures read from a report."""
+"""Quantities of a report for its figures."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ def floor(report: Report, channel: str) -> float | None:
 
 
 def changed(report: Report) -> bool:
-    """Tell whether the report compares two simulations."""
+    """Return whether the report compares two simulations."""
     after = report.get("error_after")
     return bool(report.get("causes")) or bool(after and after != report.get("error_before"))
 
 
 def reported(quantities: Mapping[str, Any] | None) -> list[str]:
-    """Return the channels of which a report speaks."""
+    """Return the channels in a report."""
     return [c for c in CHANNELS if (quantities or {}).get(c)]
 
 
 def gain_to_floor(report: Report) -> float | None:
-    """Return the gain of a model that leaves only noise, None where it is not known."""
+    """Return the gain of a model that leaves only noise, or None if it is unknown."""
     errors = report.get("error_before") or {}
     ratios = [errors[c].get("times_floor") for c in reported(errors)]
     total = sum(2.0 * float(np.log(r)) for r in ratios if r)
@@ -44,10 +44,10 @@ def gain_to_floor(report: Report) -> float | None:
 
 
 def short(text: str, most: int) -> str:
-    """Return a text cut to so many characters."""
+    """Return a text of at most ``most`` characters."""
     return text if len(text) <= most else text[: most - 1] + "…"
 
 
 def written(number: float) -> str:
-    """Return a number with two decimals and a proper minus."""
+    """Return a number with two decimals and a typographic minus."""
     return f"{number:.2f}".replace("-", MINUS) if round(number, 2) else "0.00"

@@ -1,4 +1,4 @@
-"""Figures of a report's numbers: structure of the residual, rivals, errors by kind of segment."""
+"""Figures of a report's numbers: residual structure, rivals, errors by kind of segment."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ NOISE_FLOOR: tuple[str, str, dict[str, Any]] = (
 
 
 class Columns:
-    """Rows of names on the left, one panel for each channel."""
+    """Names of rows on the left, one panel for each channel."""
 
     def __init__(self, names: Sequence[str], channels: Sequence[str], step: float) -> None:
         self.left, gap, top = 205.0, 46.0, LEGEND + 20.0
@@ -107,8 +107,8 @@ def structure(report: Report) -> Picture | None:
     return panels.canvas.picture(
         "structure",
         f"share of the residual of {' and '.join(channels)} that each variable explains",
-        "The longer a bar, the more of the residual goes with that variable alone; the last row is "
-        "a flexible model of them all, the most that any cause could still explain.",
+        "Share of the residual explained by each variable alone; the last row is a flexible model "
+        "of all variables, an upper bound for any further cause.",
     )
 
 
@@ -157,14 +157,14 @@ def rivals(report: Report) -> Picture | None:
         "rivals",
         "gain of the candidates, in the order of the decision: "
         + ", ".join(r["name"] for r in entries[:5]),
-        "Each bar is a candidate fitted together with the ordinary parameters, the thin line the "
-        "interval of its gain, without what is held out; the order is that of the decision, on "
-        "blocks of the whole recording. At the dashed line nothing but noise would be left.",
+        "Gain of each candidate on held-out data, fitted together with the base parameters, with "
+        "its confidence interval; the order is that of the decision, on blocks of the whole "
+        "recording. The dashed line is the gain of a model that leaves only noise.",
     )
 
 
 def _rival_labels(entries: Sequence[Report]) -> list[str]:
-    """Return names, with the form where several forms of a cause compete."""
+    """Return names, or forms if several forms of a cause compete."""
     names = [r["name"] for r in entries]
     return [
         r["name"].replace("_", " ") if names.count(r["name"]) == 1 else r.get("form") or r["name"]
@@ -178,7 +178,7 @@ def _spread(gain: Any, middle: float) -> tuple[float, float]:
 
 
 def _comparable(rival: Report, best: Report, report: Report) -> tuple[float, tuple[float, float]]:
-    """Return a gain with its interval; judged elsewhere, from how far it is behind there."""
+    """Return a gain with its interval, converted if it is of other held-out data."""
     where = (report.get("held_out") or {}).get("by")
     if rival.get("held_out", where) == where or rival.get("behind") is None:
         gain = value(rival["gain"]) or 0.0
@@ -189,7 +189,7 @@ def _comparable(rival: Report, best: Report, report: Report) -> tuple[float, tup
 
 
 def _rival_colour(rival: Report, named: set[Any]) -> str:
-    """Tell the named cause, or causes joined by "+", from open and other rivals."""
+    """Return the colour of a rival: named, not excluded, or excluded."""
     forms = {n[1] for n in named if isinstance(n, tuple) and n[0] == rival["name"]}
     parts = set(re.split(r"\s*[+,]\s*", rival["name"]))
     if parts <= named and (not forms or rival.get("form") in forms):
@@ -200,7 +200,7 @@ def _rival_colour(rival: Report, named: set[Any]) -> str:
 def _rival_legend(
     entries: Sequence[Report], named: set[Any], most: float | None
 ) -> list[tuple[str, str, dict[str, Any]]]:
-    labels = {EXTENDED: "named", RISING: "not excluded", GREY: "left out: see the table"}
+    labels = {EXTENDED: "named", RISING: "not excluded", GREY: "excluded: see the table"}
     present = {_rival_colour(r, named) for r in entries}
     legend = [("area", labels[c], {"facecolor": c}) for c in labels if c in present]
     return legend if most is None else [*legend, NOISE_FLOOR]
@@ -235,11 +235,8 @@ def kinds(report: Report) -> Picture | None:
     return panels.canvas.picture(
         "kinds",
         f"held-out error by kind of segment: {', '.join(names)}",
-        "The further left the second dot, the more the fix helped on what was left out of the "
-        "fits; only chance gets left of the dashed line."
-        if both
-        else "Each dot is the error on what was left out of the fits; only chance gets left of the "
-        "dashed line.",
+        f"Errors on held-out data{' before and after the extension' if both else ''}; the dashed "
+        "line is the noise floor.",
     )
 
 

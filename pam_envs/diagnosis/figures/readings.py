@@ -1,4 +1,4 @@
-"""Figures of settled readings, which have no time: everything stands over pressure, by load."""
+"""Figures of settled readings over pressure, by load."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from pam_envs.diagnosis.figures.quantities import MINUS, TIMES, Report, changed,
 from pam_envs.diagnosis.figures.traces import limits
 
 PANELS = 4
-"""Loads side by side."""
+"""Largest number of loads side by side."""
 DASHED = (0, (3, 2))
 TOP = LEGEND + 18.0
 
 
 @dataclass(frozen=True)
 class Curves:
-    """The ``readings.curves`` of a report: cells in the order of the cycles, shape (C,)."""
+    """``readings.curves`` of a report: cells in the order of the cycles, shape (C,)."""
 
     load: Array
     pressure: Array
@@ -49,7 +49,7 @@ class Curves:
 
     @classmethod
     def of(cls, found: Report) -> Curves:
-        """Read what a report holds [kg, bar, mm]."""
+        """Read the curves of a report [kg, bar, mm]."""
         return cls(
             load=_array(found["load_kg"]),
             pressure=_array(found["pressure_bar"]),
@@ -64,12 +64,12 @@ class Curves:
 
     @property
     def loads(self) -> list[float]:
-        """The loads that get a panel [kg], the extremes among them."""
+        """Loads with a panel [kg], with the extremes."""
         loads = np.unique(self.load)
         return [float(v) for v in loads[tv.thin(np.arange(len(loads)), PANELS)]]
 
     def branches(self, load: float) -> list[NDArray[np.int64]]:
-        """Return the rows of each way of each cycle at a load, in order."""
+        """Return the rows of each branch of each cycle at a load, in order."""
         rows = np.flatnonzero(self.load == load)
         if not len(rows):
             return []
@@ -124,8 +124,8 @@ def cycles(report: Report, curves: Curves) -> Picture:
     return panels.canvas.picture(
         "replay",
         f"contraction over pressure at {len(curves.loads)} loads, readings and simulation",
-        "Inflating runs along the lower side of a loop, deflating along the upper one; a good "
-        "simulation runs through the dots.",
+        "Inflation is the lower side of a loop, deflation the upper one; a good simulation passes "
+        "through the dots.",
     )
 
 
@@ -155,8 +155,8 @@ def left_over(report: Report, curves: Curves) -> Picture:
     return panels.canvas.picture(
         "residual",
         "residual of the mean readings over pressure, by load and direction",
-        "A panel that lies high or low is an error of the load, a full line that leaves its dashed "
-        "one an error of the loop's width, a bend of both an error of the static curve.",
+        "An offset of a panel is an error of the load, a gap between full and dashed line an error "
+        "of the loop's width, a common bend an error of the static curve.",
     )
 
 
@@ -174,7 +174,7 @@ def _branches(ax: Any, curves: Curves, load: float, values: Array, colour: str) 
 
 
 def cell_effects(report: Report, curves: Curves) -> Picture | None:
-    """Draw what each named cause adds, over pressure, a line for each load."""
+    """Draw the contribution of each named cause over pressure, a line for each load."""
     causes = [c for c in report.get("causes") or [] if c["name"] in curves.effects][:3]
     if not causes:
         return None

@@ -1,4 +1,4 @@
-"""What of a diagnosis' traces is worth a picture: spans, windows, thinned lines."""
+"""Selection and thinning of time series for figures: spans, windows, envelopes."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ Array = NDArray[np.float64]
 
 CHANNELS = ("contraction", "pressure")
 UNITS = {"contraction": ("mm", 1e3), "pressure": ("bar", 1e-5)}
-"""Unit on the page of each output, and its factor from SI."""
+"""Display unit of each output, and its factor from SI."""
 
 
 @dataclass(frozen=True)
 class Span:
-    """Neighbouring rows of one segment, ``start`` to ``stop`` (not included)."""
+    """Consecutive rows of one segment, from ``start`` to ``stop`` (exclusive)."""
 
     name: str
     start: int
@@ -33,23 +33,20 @@ class Span:
 
 @dataclass(frozen=True)
 class View:
-    """Traces in the units of the page, all of shape (T,).
+    """Time series in display units, all of shape (T,).
 
     Attributes
     ----------
     clock : ndarray
-        Seconds since the start, rests between the parts of a recording left out; the number of the
-        row where there is no time.
-    timed : bool
-        Whether ``clock`` is time.
+        Time since the start without pauses between parts of a recording [s].
     spans : tuple of Span
-        The segments in the order in which they were run.
+        Segments in their order.
     measured, base, extended : dict
-        Channel to readings or replay [mm, bar]; ``extended`` is empty without an extended plant.
+        Channel to readings or simulation [mm, bar]; ``extended`` is empty without an extension.
     effects : dict
         Name of a cause to channel to its contribution [mm, bar].
-    load, command, temperature : ndarray or None
-        [N], [bar], [deg C].
+    command, load, temperature : ndarray or None
+        [bar], [N], [deg C].
     """
 
     clock: Array
@@ -65,12 +62,12 @@ class View:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """The measured outputs that were replayed, contraction first."""
+        """Measured and simulated outputs, contraction first."""
         return tuple(c for c in CHANNELS if c in self.measured and c in self.base)
 
     @property
     def end(self) -> float:
-        """Where the last row ends on the clock."""
+        """End of the last row [s]."""
         return float(2.0 * self.clock[-1] - self.clock[-2])
 
     @property
@@ -79,7 +76,7 @@ class View:
         return "time [s]" if self.timed else "reading"
 
     def residual(self, channel: str, extended: bool = False) -> Array:
-        """Return measured less replayed [mm or bar]."""
+        """Return measured less simulated [mm or bar]."""
         model = self.extended if extended else self.base
         return self.measured[channel] - model[channel]
 
@@ -122,12 +119,12 @@ def _shown(outputs: Mapping[str, Any] | None) -> dict[str, Array]:
 
 
 def elapsed(time: Array) -> Array:
-    """Return seconds since the start, without the jumps between parts of a recording.
+    """Return the time since the start [s] without jumps between parts of a recording.
 
     Parameters
     ----------
-    time : (T,) array [s]
-        May start anew at a segment.
+    time : ndarray, shape (T,)
+        Time [s], which may restart at a segment.
     """
     if len(time) < 2:
         return np.zeros(len(time))
@@ -153,14 +150,14 @@ def spans_of(
 
 
 def envelope(x: Array, y: Array, points: int = 2400) -> tuple[Array, Array]:
-    """Return a line that looks like ``y`` over ``x``: the extremes of every bin, in order.
+    """Return a thinned line that looks like ``y`` over ``x``: the extremes of every bin, in order.
 
     Parameters
     ----------
-    x, y : (T,) array
-        Rows in the order of x.
+    x, y : ndarray, shape (T,)
+        Points sorted by x.
     points : int
-        At most so many are returned.
+        Largest number of returned points.
     """
     width = -(-2 * len(y) // points)
     if width <= 2:
@@ -178,14 +175,14 @@ def envelope(x: Array, y: Array, points: int = 2400) -> tuple[Array, Array]:
 
 
 def thin(rows: NDArray[np.int64], most: int) -> NDArray[np.int64]:
-    """Return at most so many of the rows, evenly chosen."""
+    """Return at most ``most`` of the rows, evenly spaced."""
     if len(rows) <= most:
         return rows
     return rows[np.linspace(0, len(rows) - 1, most).round().astype(np.int64)]
 
 
 def along(x: Array, y: Array, span: Span, most: int) -> NDArray[np.int64]:
-    """Return at most so many rows of a span, closer where the curve y over x is fast."""
+    """Return at most ``most`` rows of a span, evenly spaced along the curve y over x."""
     rows = np.arange(span.start, span.stop)
     if len(rows) <= most:
         return rows
@@ -196,7 +193,7 @@ def along(x: Array, y: Array, span: Span, most: int) -> NDArray[np.int64]:
 
 
 def worst_window(clock: Array, error: Array, span: Span, seconds: float) -> slice:
-    """Return the part of a span, at most so long, in which the squared error is largest."""
+    """Return the part of a span, at most ``seconds`` long, with the largest squared error."""
     n = span.stop - span.start
     step = (clock[span.stop - 1] - clock[span.start]) / max(n - 1, 1)
     width = n if step <= 0 else min(n, round(seconds / step))
@@ -208,7 +205,7 @@ def worst_window(clock: Array, error: Array, span: Span, seconds: float) -> slic
 
 
 def one_of_each(spans: tuple[Span, ...], most: int) -> list[Span]:
-    """Return the first held-out span of each name, longest first where there are too many."""
+    """Return the first held-out span of each name, the longest ones if there are too many."""
     first: dict[str, Span] = {}
     for span in spans:
         if span.held_out and span.stop - span.start > 1:
@@ -218,7 +215,7 @@ def one_of_each(spans: tuple[Span, ...], most: int) -> list[Span]:
 
 
 def loop_spans(view: View, drive: Array, most: int = 3) -> list[Span]:
-    """Return the spans with the widest loops, one for each load while there are several."""
+    """Return the spans with the widest loops, of different loads first."""
     spans = [s for s in view.spans if s.stop - s.start > 20]
 
     turn = direction(drive)
@@ -228,7 +225,7 @@ def loop_spans(view: View, drive: Array, most: int = 3) -> list[Span]:
         if not np.isfinite(part).any():
             return 0.0
         low, high = np.nanpercentile(part, [2.0, 98.0])
-        moving = float(np.mean(turn[span.rows] != 0))  # steps show corners, not loops
+        moving = float(np.mean(turn[span.rows] != 0))  # few for steps, which are no loops
         return float(high - low) * np.sqrt(moving)
 
     def load(span: Span) -> float:
@@ -251,7 +248,7 @@ def unit_label(channel: str) -> str:
 
 
 def limits(values: Iterable[Array], margin: float = 0.06) -> tuple[float, float]:
-    """Return limits that hold all finite values."""
+    """Return axis limits for all finite values."""
     parts = [v[np.isfinite(v)] for v in values]
     whole = np.concatenate(parts) if parts else np.zeros(0)
     if not len(whole):
@@ -262,7 +259,7 @@ def limits(values: Iterable[Array], margin: float = 0.06) -> tuple[float, float]
 
 
 def direction(drive: Array, period_rows: int = 5) -> NDArray[np.int64]:
-    """Return 1 where a signal rises, -1 where it falls, 0 where it rests, shape (T,)."""
+    """Return 1 for a rising, -1 for a falling and 0 for a constant signal, shape (T,)."""
     if len(drive) < 3:
         return np.zeros(len(drive), dtype=np.int64)
     filled = np.nan_to_num(drive, nan=float(np.nanmean(drive)))
@@ -274,7 +271,7 @@ def direction(drive: Array, period_rows: int = 5) -> NDArray[np.int64]:
 
 
 def binned(x: Array, y: Array, bins: int = 14) -> tuple[Array, Array]:
-    """Return the mean of y in bins of x that hold enough, for a line through a cloud."""
+    """Return means of x and y in bins of x with enough points."""
     good = np.isfinite(x) & np.isfinite(y)
     x, y = x[good], y[good]
     if len(x) < 2 * bins or np.ptp(x) <= 0:

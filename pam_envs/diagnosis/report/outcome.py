@@ -1,4 +1,4 @@
-"""What a diagnosis gives."""
+"""Outcome of a diagnosis."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The outcome.
+    """Outcome of a diagnosis.
 
     Attributes
     ----------
     verdict : {"adequate", "named", "ambiguous", "unexplained", "insufficient"}
-        In a word.
+        Verdict in one word.
     text : str
-        In a few sentences.
+        Verdict in a few sentences.
     causes : tuple of str
         Names of the causes, in the order of evidence.
     report : dict
-        What ``report.json`` holds (``docs/diagnosis_report.md``), in plain types, rounded as there.
+        Content of ``report.json`` (``docs/diagnosis_report.md``), in plain types, rounded.
     base, plant : SingleMuscle
-        The refitted plant, and that with the causes in it; the same where there are none.
+        The refitted plant, and the plant extended by the causes; equal without a cause.
     traces : Traces
-        What the figures draw.
+        Time series of the figures.
     study : Study
-        Private: the fits that all this was made from. It may change in any version.
+        Private: the underlying fits. It may change in any version.
     """
 
     verdict: str

@@ -1,4 +1,4 @@
-"""The page of a diagnosis: one self-contained HTML file, figures first, no script."""
+"""Page of a diagnosis: one self-contained HTML file, figures first, no script."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from pam_envs.diagnosis.report.page_parts import DASH, TIMES, enumeration, inter
 
 CSS = Path(__file__).with_name("page.css")
 VERDICTS = {
-    "named": "the cause has a name",
+    "named": "the cause is named",
     "ambiguous": "more than one cause fits",
-    "adequate": "nothing is missing",
-    "unexplained": "something is missing, and no candidate carries it",
+    "adequate": "the plant is adequate",
+    "unexplained": "no candidate explains the model error",
     "insufficient": "the recording cannot decide",
 }
 NOTHING = {
     "replay": "There are no traces to show.",
     "residual": "There are no traces to show.",
-    "loops": "There is no loop to show: that takes an output and a pressure or its command.",
+    "loops": "There is no loop to show: it needs an output and a pressure or its command.",
     "rivals": "No rival was fitted.",
     "kinds": "No kind of segment was held out.",
     "effects": "No cause was named, so there is no effect to show.",
-    "isolability": "Fewer than two causes can act in this recording.",
+    "isolability": "Fewer than two causes are testable on this recording.",
 }
 Report = Mapping[str, Any]
 
@@ -44,9 +44,9 @@ def page(report: Report, traces: Any) -> str:
     Parameters
     ----------
     report : mapping
-        As in ``report.json``: display units, None for what is not known.
+        As in ``report.json``: display units, None for unknown values.
     traces : Traces or None
-        What the figures over time show (SI).
+        Time series of the figures [SI].
 
     Raises
     ------
@@ -88,7 +88,7 @@ def headline(report: Report) -> str:
 
 
 def _title(cause: Report) -> str:
-    """Return the title of a cause, its name where that is shorter to say."""
+    """Return the title of a cause, or its name if the title is long."""
     name, title = str(cause["name"]).replace("_", " "), str(cause.get("title") or "")
     return title if title and len(title) <= 40 else name
 
@@ -100,7 +100,7 @@ def _head(report: Report) -> str:
     kind = "lead" if len(text) < 320 else "lead long"
     next_step = ""
     if report.get("experiment"):
-        next_step = '<p><a href="#experiment">What to measure next</a></p>\n'
+        next_step = '<p><a href="#experiment">Next experiment</a></p>\n'
     return (
         f'<p class="over">Diagnosis of {escape(_name(source))}'
         f'<span class="verdict {escape(verdict)}">{escape(verdict)}</span></p>\n'
@@ -164,15 +164,15 @@ def _sections(report: Report, pictures: Mapping[str, Picture]) -> Iterable[tuple
 
     yield "replay", "Replay", shown("replay", "zoom")
     left = shown("residual", "structure", "scatter") + structure_table(report)
-    yield "residual", "What the simulation leaves", left
+    yield "residual", "Residual", left
     loops = shown("loops")
     if report.get("readings"):
-        loops = '<p class="none">Settled readings are loops: see the replay.</p>'
+        loops = '<p class="none">For settled readings see the replay.</p>'
     yield "loops", "Hysteresis loops", loops
     yield "rivals", "Rival causes", shown("rivals") + why(report)
     yield "kinds", "Held out", shown("kinds")
-    yield "effects", "What each cause does", shown("effects")
-    yield "isolability", "What this recording can tell apart", shown("isolability")
+    yield "effects", "Effect of each cause", shown("effects")
+    yield "isolability", "Isolability of causes in this recording", shown("isolability")
     yield "details", "Details", "\n".join(part(report) for part in DETAILS)
     yield "provenance", "Provenance", provenance(report)
 
@@ -187,6 +187,6 @@ def _figure(picture: Picture) -> str:
 def _foot(report: Report) -> str:
     package = words((report.get("provenance") or {}).get("package") or "pam-envs")
     return (
-        f"<footer>Made by {escape(package)}. Every number stands in report.json beside this page; "
-        "the refitted plant, with what was found in it, in plant.yaml.</footer>"
+        f"<footer>Made by {escape(package)}. All numbers are in report.json, the extended plant is "
+        "in plant.yaml.</footer>"
     )

@@ -1,4 +1,4 @@
-"""The tables of the page."""
+"""Tables of the page."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Report = Mapping[str, Any]
 
 
 def structure_table(report: Report) -> str:
-    """Return the table of what is left in the residuals."""
+    """Return the table of the structure of the residuals."""
     rows = []
     for side in ("before", "after") if changed(report) else ("before",):
         for channel, found in ((report.get("residual_structure") or {}).get(side) or {}).items():
@@ -43,19 +43,19 @@ def structure_table(report: Report) -> str:
 
 
 def held_out(report: Report) -> str:
-    """Return what errors and gains are of, in words."""
+    """Return the held-out data in words."""
     found = report.get("held_out")
     if not found:
-        return "on what was left out of the fits"
+        return "on held-out data"
     share = f"{100.0 * (found.get('share') or 0.0):.0f} % of the recording"
     if found["by"] == "blocks":
-        return f"on blocks of a few seconds left out of the fits, {share}"
+        return f"on held-out blocks of a few seconds, {share}"
     kinds = enumeration([str(k) for k in found["kinds"]])
-    return f"on kinds of experiment left out of the fits ({kinds}), {share}"
+    return f"on held-out kinds of experiment ({kinds}), {share}"
 
 
 def why(report: Report) -> str:
-    """Return the table of what became of each rival."""
+    """Return the table of rivals with the reason of each decision."""
     rows = [
         (
             r.get("title") or r["name"],
@@ -71,7 +71,7 @@ def why(report: Report) -> str:
 
 
 def _flags(entry: Report) -> str:
-    """Return what is to be said of a fitted parameter."""
+    """Return the flags of a fitted parameter in words."""
     return ", ".join(
         text
         for key, text in (
@@ -97,7 +97,7 @@ def parameters(report: Report) -> str:
         for c in report.get("causes") or []
         for p in c.get("parameters") or []
     ]
-    heads: tuple[str, ...] = ("cause", "parameter", "value", "95 % interval", "switched off at", "")
+    heads: tuple[str, ...] = ("cause", "parameter", "value", "95 % interval", "neutral", "")
     body = table(heads, rows, (2, 3, 4), (1,), flags=5)
     sizes = [
         (
@@ -112,7 +112,7 @@ def parameters(report: Report) -> str:
     ]
     heads = ("cause", "form", "gain", "on contraction", "on pressure", "over the noise")
     body += table(heads, sizes, (2, 3, 4, 5))
-    return f"<h3>What was found</h3>\n{body or paragraph('No cause was named.')}"
+    return f"<h3>Named causes</h3>\n{body or paragraph('No cause was named.')}"
 
 
 def _gain(gain: Report | None) -> str:
@@ -121,7 +121,7 @@ def _gain(gain: Report | None) -> str:
 
 
 def experiment(report: Report) -> str:
-    """Return the next experiment, nothing where none is proposed."""
+    """Return the proposed experiment, if any."""
     found = report.get("experiment")
     if not found:
         return ""
@@ -129,24 +129,24 @@ def experiment(report: Report) -> str:
     between = " and ".join(str(b) for b in found.get("between") or [])
     apart = number(found.get("separation"))
     if found.get("enough"):
-        lines.append(paragraph(f"It puts {between} {apart} noise variances apart."))
+        lines.append(paragraph(f"It separates {between} by {apart} noise variances."))
     else:
         lines.append(
             paragraph(
-                f"No experiment of the list will do: {between} would be only {apart} noise "
-                f"variances apart. A sensor would: {found.get('sensor') or 'none is known'}."
+                f"No experiment of the list is sufficient: it would separate {between} by only "
+                f"{apart} noise variances. Sensor: {found.get('sensor') or 'none is known'}."
             )
         )
     segments = found.get("segments") or []
     if segments:
         lines.append(bullets([words(s) for s in segments]))
     title = str(found.get("name") or "").replace("_", " ")
-    heading = f'<h3 id="experiment">The next experiment: {escape(title)}</h3>'
+    heading = f'<h3 id="experiment">Next experiment: {escape(title)}</h3>'
     return f'{heading}\n<div class="box">{"".join(lines)}</div>'
 
 
 def closed_loop(report: Report) -> str:
-    """Return the gain of a controller."""
+    """Return the closed-loop comparison."""
     found = report.get("closed_loop")
     if not found:
         reason = report.get("closed_loop_reason")
@@ -171,7 +171,7 @@ def closed_loop(report: Report) -> str:
         spread = interval(better.get("interval"))
         rows.append(("better by", quantity({**better, "unit": "%"}), spread))
     if found.get("recovered") is not None:
-        rows.append(("of the gap to the oracle", f"{number(100 * found['recovered'])} %", ""))
+        rows.append(("closed share of the gap", f"{number(100 * found['recovered'])} %", ""))
     heads = (f"{found.get('controller', 'controller')}, run on {found.get('where', 'the plant')}",)
     text = paragraph(str(found.get("text") or ""))
     return (
@@ -199,12 +199,12 @@ def calibration(report: Report) -> str:
 
 
 def not_testable(report: Report) -> str:
-    """Return what the recording cannot decide, and why."""
+    """Return the table of causes that are not testable, with the reason."""
     reasons: dict[str, list[str]] = {}
     for entry in report.get("not_testable") or []:
         reasons.setdefault(entry["reason"], []).append(entry["name"])
     rows = [(", ".join(names), reason) for reason, names in reasons.items()]
-    body = table(("causes", "why this recording cannot decide them"), rows, codes=(0,))
+    body = table(("causes", "reason"), rows, codes=(0,))
     return "<h3>Not testable</h3>\n" + (body or paragraph("Every cause could be tested."))
 
 
@@ -215,21 +215,18 @@ def warnings(report: Report) -> str:
 
 
 def readings(report: Report) -> str:
-    """Return the models and load laws that were tried on settled readings."""
+    """Return the models and load laws of settled readings."""
     found = report.get("readings")
     if not found:
         return ""
     rows = [
         (
-            ", ".join(rung["model"]) or "load-blind",
-            number(rung.get("parameters")),
-            number(rung.get("cells_mm")),
-            number(rung.get("left_out_mm")),
-            number(rung.get("load_left_out_mm")),
+            ", ".join(step["model"]) or "load-blind",
+            *(number(step.get(key)) for key in ERRORS),
         )
-        for rung in found.get("ladder") or []
+        for step in found.get("ladder") or []
     ]
-    heads = ("model", "parameters", "fitted [mm]", "left out [mm]", "load left out [mm]")
+    heads = ("model", "parameters", "fitted [mm]", "held out [mm]", "held-out load [mm]")
     laws = [
         (
             law["law"],
@@ -244,12 +241,15 @@ def readings(report: Report) -> str:
     body = table(heads, rows, (1, 2, 3, 4))
     if left.get("cut_percent"):
         body += paragraph(
-            f"A load left out is predicted to {quantity(left['after'])} instead of "
+            f"Error on a held-out load: {quantity(left['after'])} instead of "
             f"{quantity(left['before'])}, {number(left['cut_percent']['value'])} % less "
             f"{interval(left['cut_percent'].get('interval'))}."
         )
-    law_heads = ("load law", "value", "95 % interval", "load left out [mm]", "")
+    law_heads = ("load law", "value", "95 % interval", "held-out load [mm]", "")
     return f"<h3>Models in steps</h3>\n{body}{table(law_heads, laws, (1, 2, 3))}"
+
+
+ERRORS = ("parameters", "cells_mm", "left_out_mm", "load_left_out_mm")
 
 
 DETAILS: Sequence[Callable[[Report], str]] = (
@@ -264,7 +264,7 @@ DETAILS: Sequence[Callable[[Report], str]] = (
 
 
 def provenance(report: Report) -> str:
-    """Return the table of what went in."""
+    """Return the table of inputs and versions."""
     rows = [(k.replace("_", " "), words(v)) for k, v in (report.get("provenance") or {}).items()]
     rows.append(("decision rule", f"version {report.get('rule_version')}"))
     rows.append(("report", f"schema {report.get('schema')}"))

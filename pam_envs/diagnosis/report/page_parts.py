@@ -1,4 +1,4 @@
-"""Numbers, tables and lists as HTML; whatever comes from outside is escaped here."""
+"""Numbers, tables and lists as HTML, with all text escaped."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: Any) -> str:
-    """Return a number with three significant digits, a dash for none."""
+    """Return a number with three significant digits, or a dash for None."""
     if value is None:
         return DASH
     if not isinstance(value, float):
@@ -27,14 +27,14 @@ def number(value: Any) -> str:
 
 
 def interval(bounds: Sequence[float | None] | None) -> str:
-    """Return "[low, high]", or nothing."""
+    """Return "[low, high]", or an empty string."""
     if not bounds or all(b is None for b in bounds):
         return ""
     return f"[{', '.join(number(b) for b in bounds)}]"
 
 
 def quantity(value: Any) -> str:
-    """Return a value with its unit, a dash for none."""
+    """Return a value with its unit, or a dash."""
     if not value or value.get("value") is None:
         return DASH
     unit = value.get("unit") or ""
@@ -58,7 +58,7 @@ def enumeration(items: Sequence[str]) -> str:
 
 
 def paragraph(text: str) -> str:
-    """Return a paragraph, nothing for no text."""
+    """Return a paragraph, or an empty string for an empty text."""
     return f"<p>{escape(text)}</p>" if text else ""
 
 
@@ -74,18 +74,18 @@ def table(
     codes: Sequence[int] = (),
     flags: int | None = None,
 ) -> str:
-    """Return a table, nothing for no rows.
+    """Return a table, or an empty string without rows.
 
     Parameters
     ----------
     heads : sequence of str
         Titles of the columns; no head if all are empty.
     rows : sequence of sequences of str
-        Cells, as plain text.
+        Cells in plain text.
     numbers, codes : sequence of int
-        Columns to be set as numbers, as names of the code.
+        Columns of numbers, and of names of the code.
     flags : int, optional
-        A column of warnings.
+        Column of warnings.
     """
     if not rows:
         return ""

@@ -1,4 +1,4 @@
-"""The bar that shows how far a diagnosis is."""
+"""Progress bar of a diagnosis."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def steps(progress: bool) -> Iterator[Callable[[str], None]]:
-    """Give a function that shows what is being done."""
+    """Provide a function that shows the present stage."""
     if not progress:
         yield lambda text: None
         return

@@ -1,8 +1,8 @@
-"""A diagnosis as files: ``report.json``, ``report.html`` and ``plant.yaml``.
+"""Files of a diagnosis: ``report.json``, ``report.html`` and ``plant.yaml``.
 
 Every key of ``report.json`` is described in ``docs/diagnosis_report.md``. The same report gives the
-same bytes: keys in a fixed order, numbers with six significant digits, ``null`` for what is not
-finite. Each file is written whole or not at all.
+same bytes: keys in a fixed order, numbers with six significant digits, ``null`` for values that are
+not finite. Files are replaced atomically.
 """
 
 from __future__ import annotations
@@ -21,126 +21,51 @@ SCHEMA = 1
 DIGITS = 6
 """Significant digits of a number in ``report.json``."""
 WIDTH = 100
-"""A list or an object that fits into so many columns stands on one line."""
+"""Longest line for a list or an object."""
 
-QUANTITY = ("value", "unit", "from", "interval", "times_floor", "kinds")
-CHANNELS = ("contraction", "pressure")
-STRUCTURE = ("ljung_box_p", "r2", "flexible_r2", "peak")
-ORDER: dict[str, tuple[str, ...]] = {
-    "": (
-        "schema",
-        "verdict",
-        "text",
-        "causes",
-        "rivals",
-        "noise_floor",
-        "held_out",
-        "error_before",
-        "error_after",
-        "residual_structure",
-        "isolability",
-        "experiment",
-        "closed_loop",
-        "closed_loop_reason",
-        "calibration",
-        "not_testable",
-        "warnings",
-        "rule_version",
-        "provenance",
-        "runtime_s",
-    ),
-    "causes": ("name", "title", "form", "parameters", "gain", "effect", "size"),
-    "held_out": ("by", "kinds", "share"),
-    "parameters": (
-        "name",
-        "value",
-        "unit",
-        "interval",
-        "neutral",
-        "at_bound",
-        "not_identified",
-    ),
-    "rivals": (
-        "name",
-        "title",
-        "form",
-        "held_out",
-        "gain",
-        "behind",
-        "judged",
-        "why",
-        "excluded",
-    ),
-    "judged": ("gain", "better"),
-    "residual_structure": ("before", "after"),
-    "r2": (
-        "direction",
-        "rate",
-        "pressure",
-        "load",
-        "time_since_reversal",
-        "time",
-        "temperature",
-        "cycle",
-    ),
-    "peak": ("frequency_hz", "ratio"),
-    "isolability": ("names", "cosine", "absorbed"),
-    "experiment": (
-        "between",
-        "name",
-        "description",
-        "segments",
-        "separation",
-        "enough",
-        "sensor",
-    ),
-    "closed_loop": (
-        "controller",
-        "where",
-        "unit",
-        "before",
-        "after",
-        "oracle",
-        "better_percent",
-        "recovered",
-        "text",
-    ),
-    "calibration": (
-        "name",
-        "unit",
-        "before",
-        "after",
-        "interval",
-        "at_bound",
-        "not_identified",
-        "outside_tolerance",
-    ),
-    "not_testable": ("name", "reason"),
-    "provenance": ("recording", "rig", "plant_before", "plant_after", "package", "seed"),
+_KEYS = {
+    "": "schema verdict text causes rivals noise_floor held_out error_before error_after "
+    "residual_structure isolability experiment closed_loop closed_loop_reason calibration "
+    "not_testable warnings rule_version provenance runtime_s",
+    "causes": "name title form parameters gain effect size",
+    "held_out": "by kinds share",
+    "parameters": "name value unit interval neutral at_bound not_identified",
+    "rivals": "name title form held_out gain behind judged why excluded",
+    "judged": "gain better",
+    "residual_structure": "before after",
+    "r2": "direction rate pressure load time_since_reversal time temperature cycle",
+    "peak": "frequency_hz ratio",
+    "isolability": "names cosine absorbed",
+    "experiment": "between name description segments separation enough sensor",
+    "closed_loop": "controller where unit before after oracle better_percent recovered text",
+    "calibration": "name unit before after interval at_bound not_identified outside_tolerance",
+    "not_testable": "name reason",
+    "provenance": "recording rig plant_before plant_after package seed",
+    "*": "value unit from interval times_floor kinds contraction pressure "
+    "ljung_box_p r2 flexible_r2 peak",
 }
-"""The keys of an object in their order, by the key under which the object, or a list of it, stands.
-
-Keys that are not listed follow in the order in which they come."""
-COMMON = (*QUANTITY, *CHANNELS, *STRUCTURE)
+ORDER = {key: tuple(names.split()) for key, names in _KEYS.items()}
+"""Order of the keys of an object, by the key of the object or of the list that contains it (``*``:
+of all others); further keys follow in their given order."""
 
 
 def plain(value: Any, key: str = "") -> Any:
-    """Return a value as JSON has it: keys in order, rounded, nothing that is not finite.
+    """Return a value in plain JSON types: keys in order, numbers rounded, None if not finite.
 
     Parameters
     ----------
     value : Any
-        Mappings, sequences, arrays, numbers, strings, booleans and None, nested at will.
+        Nested mappings, sequences, arrays, numbers, strings, booleans and None.
     key : str
-        Under which the value stands; it chooses the order of the keys.
+        Key of the value, which selects the order of its own keys.
 
     Raises
     ------
     TypeError
-        For anything else.
+        For any other type.
     """
     if isinstance(value, Mapping):
-        first = ORDER.get(key, COMMON)
+        first = ORDER.get(key, ORDER["*"])
         names = [k for k in first if k in value]
         names += [str(k) for k in value if k not in first]
         return {k: plain(value[k], k) for k in names}
@@ -165,14 +90,14 @@ def plain(value: Any, key: str = "") -> Any:
 
 
 def rounded(value: float) -> float | None:
-    """Return a number with the digits of the report, or None if it is not finite."""
+    """Return a number rounded to the digits of the report, or None if it is not finite."""
     if not math.isfinite(value):
         return None
     return float(f"{value:.{DIGITS}g}") + 0.0  # no negative zero
 
 
 def dumps(value: Any, indent: int = 0) -> str:
-    """Return JSON in which what fits on a line stands on one."""
+    """Return JSON with lists and objects on one line where they fit."""
     short = json.dumps(value, allow_nan=False, ensure_ascii=False)
     if not isinstance(value, (dict, list)) or len(short) + indent <= WIDTH:
         return short
@@ -193,7 +118,7 @@ def report_json(report: Mapping[str, Any]) -> str:
 
 
 def write_file(path: Path, text: str) -> None:
-    """Write a text, whole or not at all."""
+    """Write a text file atomically."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         with open(temporary, "w", encoding="utf-8", newline="\n") as file:
@@ -208,17 +133,16 @@ def write_file(path: Path, text: str) -> None:
 def write(diagnosis: Any, folder: Path) -> None:
     """Write a diagnosis into a folder.
 
-    Everything is drawn before the first file is replaced, so that a folder holds one diagnosis,
-    never parts of two. A plant file or page left there by an earlier diagnosis goes if this one
-    has none: settled readings make no plant.
+    Everything is drawn before the first file is replaced, so that a folder contains one diagnosis,
+    never parts of two. A plant file or page of an earlier diagnosis is removed if this one has
+    none: settled readings give no plant.
 
     Parameters
     ----------
     diagnosis : Diagnosis
-        Its ``report`` (the mapping), ``traces`` (what the figures show, or None) and ``plant``
-        (the refitted plant with what was found, or None) are read.
+        With ``report``, ``traces`` (or None) and ``plant`` (the extended plant, or None).
     folder : Path
-        Made if it is missing.
+        Created if it is missing.
 
     Raises
     ------

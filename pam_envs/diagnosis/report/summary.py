@@ -1,4 +1,4 @@
-"""A diagnosis in numbers: the contents of ``report.json``."""
+"""Content of ``report.json``."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _floors(study: Any) -> dict[str, Any]:
 
 
 def _errors(study: Any, candidate: Candidate) -> dict[str, Any]:
-    """Return errors on what was held out, by channel."""
+    """Return the errors on the held-out data, by channel."""
     held: HeldOut = study.held
     rows = held.problem.rows(candidate.fit.residual)
     labels = np.array([kind_of(s) for s in study.recording.segments])[study.recording.segment]
@@ -104,17 +104,17 @@ def _errors(study: Any, candidate: Candidate) -> dict[str, Any]:
 
 
 def _against(rivals: list[dict[str, Any]]) -> list[str]:
-    """Return warnings of rivals that are left out but predict better what was held out."""
-    told = []
+    """Return warnings on excluded rivals that predict the held-out data better."""
+    found = []
     for rival in rivals:
         high = (rival["behind"]["interval"] or (0.0, 0.0))[1]
         if rival["why"] not in ("the best", "not excluded") and high < 0.0:
-            told.append(
-                f"on what was held out here {rival['name']} does better than the plant decided on, "
-                f"by {-rival['behind']['value']:.2g}; it is left out ({rival['why']}) because the "
-                "decision rests on blocks of the whole recording"
+            found.append(
+                f"on the held-out data {rival['name']} has a larger gain than the selected plant, "
+                f"by {-rival['behind']['value']:.2g}; it is excluded ({rival['why']}) because the "
+                "decision is based on blocks of the whole recording"
             )
-    return told
+    return found
 
 
 def _structure(study: Any, candidate: Candidate) -> dict[str, Any]:

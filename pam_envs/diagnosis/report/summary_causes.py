@@ -1,4 +1,4 @@
-"""What a report says of causes, rivals and fitted parameters."""
+"""Causes, rivals and fitted parameters in the report."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ BEST, OPEN, IMITATES = "the best", "not excluded", "imitates it"
 FEWER, MORE, SAME = "fewer causes", "more causes", "the same causes"
 LESS, WORSE, LITTLE = "gains less", "surely worse", "gains too little"
 EXCLUDED = (LESS, WORSE, LITTLE)
-"""Words for which a rival counts as excluded."""
+"""Reasons of excluded rivals."""
 
 
 def seen(study: Any) -> list[tuple[int, str]]:
-    """Return the channels that were measured, with their rows."""
+    """Return the measured channels with their indices."""
     return [
         (k, c)
         for k, c in enumerate(study.family.channels)
@@ -37,7 +37,7 @@ def seen(study: Any) -> list[tuple[int, str]]:
 
 
 def causes(study: Any) -> list[Json]:
-    """Return what was added to the plant, in the order of evidence."""
+    """Return the causes of the extended plant, in the order of evidence."""
     model, problem, family, held = study.model, study.problem, study.family, study.held
     if not model.causes:
         return []
@@ -78,7 +78,7 @@ def _parameter(family: Any, name: str, value: float, found: Json) -> Json:
 
 
 def calibration(study: Any) -> list[Json]:
-    """Return the refitted parameters, those of the final model."""
+    """Return the base parameters as refitted in the final model."""
     found = spans(study.problem, study.blocks, study.model.fit)
     after, made = study.model.fit.values(), []
     column = study.family.column
@@ -106,7 +106,7 @@ def calibration(study: Any) -> list[Json]:
 
 
 def judged(decision: Decision) -> list[tuple[Candidate, Mapping[str, Any]]]:
-    """Return the rivals that the rule looked at, each with what it saw."""
+    """Return the judged rivals, each with its evidence."""
     levels = decision.evidence.get("levels", [])
     if len(levels) < 2:
         return []
@@ -119,7 +119,7 @@ def judged(decision: Decision) -> list[tuple[Candidate, Mapping[str, Any]]]:
 
 
 def reasons(decision: Decision, rule: Rule) -> list[str]:
-    """Return in a few words, for each judged rival, why it stays or goes."""
+    """Return the reason for which each judged rival is kept or excluded."""
     found = judged(decision)
     rows = [row for _, row in found]
     if not decision.model.causes:
@@ -155,7 +155,7 @@ def _reason(
 
 
 def rivals(study: Any, rule: Rule) -> list[Json]:
-    """Return what was fitted beside the model, in the order of the decision."""
+    """Return the rivals of the model, in the order of the decision."""
     found, words = judged(study.decision), reasons(study.decision, rule)
     return [
         _rival(study, k, rival, row, word)

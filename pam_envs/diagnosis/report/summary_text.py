@@ -1,18 +1,19 @@
-"""The verdict in a few sentences."""
+"""Verdict of a diagnosis in a few sentences."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.decide.testable import SHORT
 from pam_envs.diagnosis.fit.blocks import BLOCK_SECONDS
+from pam_envs.diagnosis.report.page_parts import enumeration
 
 Report = Mapping[str, Any]
 
-GOES_WITH = 0.05
-"""Share of a residual that goes with one variable, from which on it is said."""
+VARIES_WITH = 0.05
+"""Share of a residual explained by one variable above which the variable is named."""
 
 
 def sentence(report: Report, rule: Rule) -> str:
@@ -23,11 +24,11 @@ def sentence(report: Report, rule: Rule) -> str:
     if verdict == "adequate":
         return (
             f"The plant is adequate: the held-out error is {_errors(report, 'error_before')}, "
-            f"{_where(report)}, and nothing is left that this recording could show."
+            f"{_where(report)}, and this recording shows no remaining error."
         )
     if verdict == "unexplained":
         return _unexplained(report, rule)
-    text = f"Your simulation misses {_listed(_titles(report))}: with it {_fell(report)}."
+    text = f"The simulation lacks {enumeration(_titles(report))}: with it {_fell(report)}."
     text += _doubts(report)
     if verdict == "ambiguous":
         text += _not_excluded(report)
@@ -40,25 +41,21 @@ def _insufficient(report: Report) -> str:
     short = [w for w in report["warnings"] if w.startswith(SHORT)]
     if short:
         return short[0]
-    text = "The recording does not excite what would have to be decided"
-    return f"{text}: {len(report['not_testable'])} causes cannot be tested on it."
+    text = "The recording does not excite the effects in question"
+    return f"{text}: {len(report['not_testable'])} causes cannot be tested."
 
 
 def _titles(report: Report) -> list[str]:
     return [c["title"] for c in report["causes"]]
 
 
-def _listed(items: Sequence[str]) -> str:
-    return " and ".join(part for part in (", ".join(items[:-1]), *items[-1:]) if part)
-
-
 def _where(report: Report) -> str:
-    """Return what the errors are of."""
+    """Return the held-out data in words."""
     held = report["held_out"]
     if held["by"] == "blocks":
-        return f"in blocks of {BLOCK_SECONDS:g} s left out of the fits"
+        return f"on held-out blocks of {BLOCK_SECONDS:g} s"
     word = "kind" if len(held["kinds"]) == 1 else "kinds"
-    return f"in experiments of the {word} {_listed(held['kinds'])}, left out of the fits"
+    return f"on held-out experiments of the {word} {enumeration(held['kinds'])}"
 
 
 def _errors(report: Report, key: str) -> str:
@@ -81,14 +78,14 @@ def _fell(report: Report) -> str:
 
 
 def _doubts(report: Report) -> str:
-    """Return which of several causes may gain nothing on what was held out."""
+    """Return the causes without a significant gain on the held-out data."""
     text = ""
     for cause in report["causes"]:
         low, high = cause["gain"]["interval"] or (None, None)
         if low is not None and low <= 0.0:
             text += (
-                f" Of {cause['title']} this is not sure: without it as much would be gained there, "
-                f"but for {cause['gain']['value']:.2g} (95 % interval {low:.2g} to {high:.2g})."
+                f" The gain of {cause['title']} is not significant on the held-out data: "
+                f"{cause['gain']['value']:.2g} (95 % interval {low:.2g} to {high:.2g})."
             )
     return text
 
@@ -100,31 +97,31 @@ def _not_excluded(report: Report) -> str:
     if plan is None:
         return text
     if plan["enough"]:
-        return f"{text} To tell them apart, {plan['description']}."
+        return f"{text} To separate them, {plan['description']}."
     return (
-        f"{text} No experiment of the list tells them apart; "
+        f"{text} No experiment of the list separates them; "
         f"{plan['sensor'] or 'another sensor'} would."
     )
 
 
 def _unexplained(report: Report, rule: Rule) -> str:
     text = (
-        "Something is missing that no candidate carries: the held-out error is "
+        "The model error is not explained by any candidate: the held-out error is "
         f"{_errors(report, 'error_before')}, {_where(report)}."
     )
     if report["causes"]:
         text += (
-            f" What {_listed(_titles(report))} can carry was added, which makes it "
-            f"{_errors(report, 'error_after')} and does not suffice: no name is given."
+            f" Adding {enumeration(_titles(report))} reduces it to "
+            f"{_errors(report, 'error_after')}, which is not sufficient for a name."
         )
     after = report["residual_structure"]["after"]
     flexible = max((s["flexible_r2"] for s in after.values()), default=0.0)
-    text += f" A flexible model could explain {100 * flexible:.0f} % of what is left"
+    text += f" A flexible model explains {100 * flexible:.0f} % of the residual"
     share, name = max(
         ((v or 0.0, n) for s in after.values() for n, v in s["r2"].items()), default=(0.0, "")
     )
-    text += f", which goes most with {name.replace('_', ' ')}." if share > GOES_WITH else "."
+    text += f", which varies most with {name.replace('_', ' ')}." if share > VARIES_WITH else "."
     peaks = [(s["peak"]["ratio"], s["peak"]["frequency_hz"]) for s in after.values()]
     if peaks and max(peaks)[0] > rule.peak:
-        text += f" Its spectrum has a line at {max(peaks)[1]:.3g} Hz."
+        text += f" Its spectrum has a peak at {max(peaks)[1]:.3g} Hz."
     return text

@@ -1,4 +1,4 @@
-"""What the figures of a diagnosis draw."""
+"""Time series of the figures of a diagnosis."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Traces:
-    """What a report draws; arrays of shape (T,) in SI.
+    """Time series of a report; arrays of shape (T,) in SI.
 
     Attributes
     ----------
     time, command, load : ndarray
-        [s], [Pa], [N].
+        Time [s], command [Pa] and load [N].
     segment : ndarray of int
         Index into ``segments``.
     segments : tuple of str
-        Labels.
+        Labels of the segments.
     held_out : ndarray of bool
-        Samples of the kinds of experiment that the reported errors are of.
+        Held-out samples, of which the errors are reported.
     temperature : ndarray or None
-        [deg C].
+        Temperature [deg C].
     measured, base, extended : dict of str to ndarray
-        By output.
+        Readings and simulations, by output.
     effects : dict of str to dict of str to ndarray
         Contribution of each named cause, by output.
     """
