@@ -124,7 +124,7 @@ class Strips:
         last = len(self.axes) == len(self.heights)
         ax.tick_params(labelbottom=last)
         if last:
-            ax.set_xlabel(self.view.time_label)
+            ax.set_xlabel("time [s]")
         return ax
 
     def _shade(self, ax: Any) -> None:
@@ -186,7 +186,7 @@ def zoom(report: Report, view: View) -> Picture | None:
             if i == 0:
                 ax.set_ylabel(tv.unit_label(channel))
             if channel == view.channels[-1]:
-                ax.set_xlabel(view.time_label)
+                ax.set_xlabel("time [s]")
     canvas.legend(model_legend(view))
     return canvas.picture(
         "zoom",

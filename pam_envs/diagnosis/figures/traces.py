@@ -50,7 +50,6 @@ class View:
     """
 
     clock: Array
-    timed: bool
     spans: tuple[Span, ...]
     measured: dict[str, Array]
     base: dict[str, Array]
@@ -70,11 +69,6 @@ class View:
         """End of the last row [s]."""
         return float(2.0 * self.clock[-1] - self.clock[-2])
 
-    @property
-    def time_label(self) -> str:
-        """What the clock counts."""
-        return "time [s]" if self.timed else "reading"
-
     def residual(self, channel: str, extended: bool = False) -> Array:
         """Return measured less simulated [mm or bar]."""
         model = self.extended if extended else self.base
@@ -82,27 +76,22 @@ class View:
 
     @classmethod
     def of(cls, traces: Any) -> View:
-        """Read the traces of a diagnosis (SI)."""
-        names = tuple(str(s) for s in traces.segments)
+        """Convert the time series of a diagnosis from SI to display units."""
         segment = np.asarray(traces.segment, dtype=np.int64)
-        time = getattr(traces, "time", None)
-        command = _optional(getattr(traces, "command", None))
-        effects = getattr(traces, "effects", None) or {}
-        base, extended = _shown(traces.base), _shown(getattr(traces, "extended", None))
-        same = [c in base and np.array_equal(extended[c], base[c], True) for c in extended]
-        if all(same):
-            extended = {}  # nothing was added
+        command = _optional(traces.command)
+        base, extended = _shown(traces.base), _shown(traces.extended)
+        if all(c in base and np.array_equal(extended[c], base[c], True) for c in extended):
+            extended = {}  # no extension
         return cls(
-            clock=np.arange(float(len(segment))) if time is None else elapsed(np.asarray(time)),
-            timed=time is not None,
-            spans=spans_of(segment, names, np.asarray(traces.held_out, dtype=bool)),
+            clock=elapsed(np.asarray(traces.time)),
+            spans=spans_of(segment, traces.segments, np.asarray(traces.held_out, dtype=bool)),
             measured=_shown(traces.measured),
             base=base,
             extended=extended,
-            effects={str(name): _shown(effect) for name, effect in effects.items()},
+            effects={name: _shown(effect) for name, effect in traces.effects.items()},
             command=None if command is None else command * UNITS["pressure"][1],
-            load=_optional(getattr(traces, "load", None)),
-            temperature=_optional(getattr(traces, "temperature", None)),
+            load=_optional(traces.load),
+            temperature=_optional(traces.temperature),
         )
 
 

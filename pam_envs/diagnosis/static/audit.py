@@ -1,7 +1,7 @@
-"""Faults of a table that its repeats cannot show, and published curves held against the readings.
+"""Faults of a table that repeats cannot show, and comparison of published curves with readings.
 
-A set-point that was missed is missed in every repeat. It shows as a cell that a model fitted to
-all other pressures gets wrong, by much more than its neighbours and at several loads alike.
+A missed setpoint is missed in every repeat. Its cells have a much larger prediction error than
+their neighbours for a model fitted to all other pressures, at several loads alike.
 """
 
 from __future__ import annotations
@@ -19,34 +19,34 @@ from pam_envs.diagnosis.static.fit import fit
 Array = NDArray[np.float64]
 
 OUTLYING = 3.5
-"""Robust standard deviations from which a left-out cell stands out."""
+"""Robust standard deviations above which a held-out cell is an outlier."""
 SIZABLE = 2.0
-"""A missed set-point is worth telling from so many standard deviations of a reading on,"""
+"""Least error of a reported setpoint in standard deviations of a reading,"""
 SIZABLE_SHARE = 0.01
-"""or, where that is not known, from such a share of the largest contraction."""
+"""or as a share of the largest contraction if that deviation is unknown."""
 FEWEST_STEPS = 10
-"""With fewer pressures than this the ordinary size of an error is not known."""
+"""Least number of pressures for an estimate of the usual error."""
 MOST_OUTLIERS = 3
 POOR_FIT = 1.3
-"""A curve that misses its readings by so much more than its own refit is of other readings."""
+"""Error of a curve over that of its refit above which it was fitted to other readings."""
 
 
 @dataclass(frozen=True)
 class SetPoint:
-    """A pressure at which several loads read wrong alike.
+    """A pressure with outlying readings at several loads.
 
     Attributes
     ----------
     pressure : float
-        [bar].
+        Pressure [bar].
     falling : bool
-        Whether the pressure had been lowered to it.
+        Whether it was reached by deflation.
     loads : tuple of float
-        Where it stands out [kg].
+        Loads with outliers [kg].
     missed : tuple of float
-        Reading less prediction from all other pressures there [mm].
+        Reading less prediction from all other pressures, at these loads [mm].
     others : tuple of float
-        The same at the loads where it does not stand out [mm].
+        The same at the other loads [mm].
     """
 
     pressure: float
@@ -57,15 +57,15 @@ class SetPoint:
 
     @property
     def sentence(self) -> str:
-        """What to make of it."""
+        """Warning on it."""
         way = "deflating" if self.falling else "inflating"
         where = " and ".join(f"{load:g}" for load in self.loads)
         size = " and ".join(f"{abs(miss):.2f}" for miss in self.missed)
         side = "low" if self.missed[0] < 0.0 else "high"
         rest = f", the other loads by {_listed(self.others)} mm" if self.others else ""
-        why = "a set-point that was missed, which repeats cannot show"
+        why = "a missed setpoint, which repeats cannot show"
         if not self.others:
-            why += ", or something that every model here lacks"
+            why += ", or an effect that all models lack"
         return (
             f"at {self.pressure:g} bar {way} the readings at {where} kg are {size} mm {side} of "
             f"what all other pressures predict{rest}: probably {why}; measure this pressure again"
@@ -77,10 +77,9 @@ def _listed(values: Sequence[float]) -> str:
 
 
 def missed_set_points(study: Study, model: Model) -> tuple[SetPoint, ...]:
-    """Return pressures that stand out when the model is fitted without them, the worst first.
+    """Return outlying pressures of models fitted without them, the worst first.
 
-    After each find its cells are left out for good, since a wrong cell bends its neighbours'
-    predictions.
+    The cells of each one are then excluded, since they distort the predictions of neighbours.
     """
     cells, found = study.cells, list[SetPoint]()
     kept = study.lanes.weight[0].copy()
@@ -100,7 +99,7 @@ def missed_set_points(study: Study, model: Model) -> tuple[SetPoint, ...]:
 
 
 def _left_out(study: Study, model: Model, kept: Array, here: NDArray[np.bool_]) -> Array:
-    """Return reading less prediction [mm] where a pressure is left out, (keys, C), else NaN."""
+    """Return reading less prediction [mm] of held-out pressures, shape (keys, C), else NaN."""
     cells = study.cells
     data = np.broadcast_to(cells.mean, here.shape)
     fitted = fit(cells, model.terms, data, kept * ~here, [model.fit.theta[0]])
@@ -111,7 +110,7 @@ def _left_out(study: Study, model: Model, kept: Array, here: NDArray[np.bool_]) 
 def _worst(
     study: Study, keys: Sequence[tuple[bool, float]], here: NDArray[np.bool_], missed: Array
 ) -> tuple[int, SetPoint] | None:
-    """Return the pressure that stands out most, at two loads or the only one, if any does."""
+    """Return the worst outlying pressure, at two loads or the only one, if any."""
     cells, size = study.cells, np.full(missed.shape, np.nan)
     for group in range(len(cells.loads)):
         of = (cells.group == group) & np.isfinite(missed)
@@ -160,26 +159,26 @@ class Curve:
 def audit_polynomials(
     table: ContractionTable, curves: Mapping[str, Curve | tuple[float, bool, Sequence[float]]]
 ) -> dict[str, object]:
-    """Hold published polynomials against the readings that they claim to describe.
+    """Compare published polynomials with the readings that they describe.
 
     Parameters
     ----------
     table : ContractionTable
-        The readings.
+        Readings.
     curves : mapping of str to Curve or (load [kg], inflating, coefficients)
-        Contraction [mm] over pressure [bar], highest power first, by the equation's name.
+        Contraction [mm] over pressure [bar], highest power first, by the name of the equation.
 
     Returns
     -------
     dict
-        ``equations``: for each its ``rms`` [mm] on the mean readings that it claims, that of its
-        ``refit``, the readings that it fits best (``best``), and of which other equation it is a
-        ``copy``; ``discrepancies``: sentences.
+        ``equations``: for each its ``rms`` [mm] on its mean readings, that of a ``refit``, the
+        readings that it fits best (``best``), and the equation of which it is a copy
+        (``copy_of``); ``discrepancies``: sentences.
 
     Raises
     ------
     ValueError
-        If a curve is of a load that the table lacks.
+        If the table lacks the load of a curve.
     """
     named = {name: _curve(curve) for name, curve in curves.items()}
     places = [(load, way) for load in table.loads for way in (True, False)]
@@ -188,7 +187,7 @@ def audit_polynomials(
         equation["copy_of"] = _copied(equation, equations)
     return {
         "equations": equations,
-        "discrepancies": [told for told in map(_discrepancy, equations) if told],
+        "discrepancies": [text for text in map(_discrepancy, equations) if text],
     }
 
 
@@ -252,6 +251,6 @@ def _discrepancy(equation: Mapping[str, object]) -> str | None:
     if _ratio(equation) > POOR_FIT:
         return (
             f"equation {equation['name']} {missed}, a refit by {equation['refit']:.2f} mm: it was "
-            "fitted to something else, or its coefficients lost digits"
+            "fitted to other readings, or its coefficients are truncated"
         )
     return None

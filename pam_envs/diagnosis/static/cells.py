@@ -1,4 +1,4 @@
-"""The cells of a table of readings, and the hysteresis of the pressures that led to each."""
+"""Cells of a table of readings, and the play operators along its pressure paths."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 THRESHOLDS = (1 / 24, 1 / 16, 1 / 12, 1 / 8, 3 / 16)
-"""Half dead widths of the plays, over the highest pressure."""
+"""Thresholds of the play operators over the highest pressure."""
 BLOCK = 4
-"""Neighbouring cells of one way that count as one draw of the model's error."""
+"""Number of neighbouring cells of one branch that form a block."""
 
 
 @dataclass(frozen=True)
 class Cells:
-    """The cells of a table: one load, step of a path and all its repeats each.
+    """Cells of a table: one load and one step of a path each, with all repeats.
 
     Attributes
     ----------
     load, pressure, mean : ndarray, shape (C,)
-        Fractions of the largest load, pressure and contraction.
+        Load, pressure and mean contraction over their largest values.
     falling : ndarray of bool, shape (C,)
-        Whether the pressure had been lowered to the cell.
+        Whether the pressure was reached by deflation.
     used : ndarray of bool, shape (C,)
-        False where a reading is zero by definition.
+        False for readings that are zero by definition.
     group : ndarray of int, shape (C,)
         Index into ``loads``.
     path : ndarray of int, shape (C,)
-        Cells of one number were gone through one after the other, from rest.
+        Number of the pressure path, which starts at rest.
     block : ndarray of int, shape (C,)
-        Stretch of neighbouring cells whose errors are taken as one draw; -1 where not used.
+        Block of neighbouring cells with dependent errors; -1 if not used.
     readings : ndarray, shape (R, C)
-        Repeats; NaN where there are fewer.
+        Repeats; NaN if there are fewer.
     loads : tuple of float
-        [kg].
+        Loads [kg].
     scale : tuple of float
         Largest load [kg], pressure [Pa] and contraction [m].
     """
@@ -60,29 +60,29 @@ class Cells:
 
     @cached_property
     def order(self) -> NDArray[np.int64]:
-        """Cells by step and path, shape (steps, paths); a path that has ended repeats its last."""
+        """Cells by step and path, shape (steps, paths); a shorter path repeats its last cell."""
         rows = [np.flatnonzero(self.path == k) for k in range(int(self.path[-1]) + 1)]
         longest = max(len(row) for row in rows)
         return np.array([np.pad(row, (0, longest - len(row)), "edge") for row in rows]).T
 
     @cached_property
     def lags(self) -> Array:
-        """How far the plays lag behind the pressure, shape (plays, 1, C)."""
+        """Lag of the play operators behind the pressure, shape (plays, 1, C)."""
         return stops(self.pressure[None], self.order)
 
     @property
     def counts(self) -> NDArray[np.int64]:
-        """Readings in each cell, shape (C,)."""
+        """Number of readings in each cell, shape (C,)."""
         return np.asarray(np.isfinite(self.readings).sum(axis=0))
 
     @property
     def millimetres(self) -> float:
-        """What a contraction of 1 is [mm]."""
+        """Scale of the contraction [mm]."""
         return self.scale[2] / MM
 
 
 def _paths(table: ContractionTable) -> dict[tuple[float, bytes], list[NDArray[np.int64]]]:
-    """Return the rows of every cycle, those of one load and the same pressures together."""
+    """Return the rows of every cycle, grouped by load and pressure path."""
     found: dict[tuple[float, bytes], list[NDArray[np.int64]]] = {}
     for load in table.loads:
         for repeat in table.repeats(load):
@@ -95,7 +95,7 @@ def _paths(table: ContractionTable) -> dict[tuple[float, bytes], list[NDArray[np
 
 
 def _blocks(path: NDArray[np.int64], falling: Mask, used: Mask) -> NDArray[np.int64]:
-    """Return the number of each stretch of at most ``BLOCK`` used cells of one way, or -1."""
+    """Return the block of each cell: at most ``BLOCK`` used cells of one branch; -1 if unused."""
     block, last, size = np.full(len(path), -1), -1, 0
     before: tuple[int, bool] | None = None
     for i in np.flatnonzero(used):
@@ -141,7 +141,7 @@ def cells_of(table: ContractionTable) -> Cells:
 
 
 def stops(pressure: Array, order: NDArray[np.int64]) -> Array:
-    """Return how far the plays lag behind the pressure, shape (plays, L, C), from rest.
+    """Return the lag of play operators behind the pressure from rest, shape (plays, L, C).
 
     ``order`` is :attr:`Cells.order`; the pressure has the shape (L, C).
     """

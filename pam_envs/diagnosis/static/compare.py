@@ -1,8 +1,7 @@
-"""Rival static models compared: on repeats and loads left out, and by a test that heeds blocks.
+"""Comparison of static models on held-out repeats and loads, with block-robust tests.
 
-A repeat left out shows what noise does to a fit, a load left out what a load law is worth. What a
-model gets wrong is alike in neighbouring cells, so neither tests nor intervals take the cells for
-independent: a block of neighbours is one draw.
+A held-out repeat tests a fit against noise, a held-out load tests the load law. Model errors of
+neighbouring cells are dependent, so that tests and intervals use blocks of cells.
 """
 
 from __future__ import annotations
@@ -23,29 +22,29 @@ Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
 PRESSURE_FOLDS = 6
-"""Every so many-th cell is left out together where there are no repeats to leave out."""
+"""Number of folds of cells without repeats."""
 DRAWS = 2000
-"""Resamplings of the blocks for an interval of an error."""
+"""Bootstrap samples of the blocks for an interval of an error."""
 REFITS = 200
 """Refits to resampled residuals for an interval of a parameter."""
 REFIT_GOOD = 1e-5
-"""When such a refit is done, as in :func:`improve`."""
+"""Tolerance of such a refit, see :func:`improve`."""
 
 
 @dataclass(frozen=True)
 class Lanes:
-    """The data sets that every model is fitted to, side by side: all, then one part left out.
+    """Data sets of every model, fitted side by side: all data, then each fold left out.
 
     Attributes
     ----------
     kind : str
-        What the first parts left out are: "repeats", or "pressures" if there is one repeat.
+        Kind of the first folds: "repeats", or "pressures" with one repeat.
     data, weight : ndarray, shape (1 + F + G, C)
-        Means of what stays, and the root of the number of readings behind each, 0 for none.
+        Means of the training data, and the root of the number of readings of each.
     target : ndarray, shape (F, C)
-        What was left out; NaN elsewhere.
+        Held-out readings; NaN elsewhere.
     loads : int
-        G, how many loads are left out in turn; 0 with fewer than three.
+        Number G of loads held out in turn; 0 with fewer than three loads.
     """
 
     kind: str
@@ -56,7 +55,7 @@ class Lanes:
 
 
 def lanes_of(cells: Cells) -> Lanes:
-    """Return the folds of a table."""
+    """Return the data sets of a table."""
     mean, root = cells.mean, np.sqrt(cells.counts) * cells.used
     kind, data, weight, target = _repeat_folds(cells)
     if not len(data):
@@ -95,18 +94,18 @@ def _pressure_folds(cells: Cells, root: Array) -> Folds:
 
 @dataclass(frozen=True)
 class Model:
-    """A fitted model and how well it predicts what it has not seen.
+    """A fitted model with its errors on held-out data.
 
     Attributes
     ----------
     fit : Fit
         Lanes as in :class:`Lanes`.
     residual : ndarray, shape (C,)
-        Reading mean minus model, fitted to everything [mm]; NaN where not used.
+        Mean reading minus model fitted to all data [mm]; NaN if not used.
     held : ndarray, shape (C,)
-        Mean squared error [mm2] on the parts left out, cell by cell.
+        Mean squared error of each cell on held-out data [mm2].
     load_errors : ndarray, shape (G, C)
-        Reading mean minus model on a load left out [mm]; NaN elsewhere.
+        Mean reading minus model on a held-out load [mm]; NaN elsewhere.
     """
 
     fit: Fit
@@ -116,7 +115,7 @@ class Model:
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """What the base is extended by."""
+        """Terms that extend the base."""
         return self.fit.terms
 
     @property
@@ -126,42 +125,42 @@ class Model:
 
     @property
     def held_out(self) -> float:
-        """Root mean square error on the parts left out [mm]."""
+        """Root mean square error on held-out data [mm]."""
         return float(np.sqrt(np.nanmean(self.held)))
 
     @property
     def by_load(self) -> Array:
-        """Root mean square error on each load when left out [mm], shape (G,)."""
+        """Root mean square error on each held-out load [mm], shape (G,)."""
         return np.asarray(np.sqrt(np.nanmean(np.square(self.load_errors), axis=1)))
 
     @property
     def left_load(self) -> float:
-        """The mean of :attr:`by_load`; NaN with fewer than three loads."""
+        """Mean of :attr:`by_load`; NaN with fewer than three loads."""
         return float(self.by_load.mean()) if len(self.load_errors) else float("nan")
 
 
 @dataclass(frozen=True)
 class Study:
-    """A table, its folds, and what is fitted to them."""
+    """A table with its folds and fitted models."""
 
     cells: Cells
     seed: int = 0
 
     @cached_property
     def lanes(self) -> Lanes:
-        """The folds."""
+        """Data sets with the folds."""
         return lanes_of(self.cells)
 
     @cached_property
     def base(self) -> Model:
-        """The load-blind model."""
+        """Load-blind model."""
         lanes = self.lanes
         return self.judged(fit(self.cells, (), lanes.data, lanes.weight, base_starts()))
 
     def extended(self, parents: Sequence[Model], terms: Sequence[Term], n: int = 0) -> Model:
-        """Return a model that contains all of ``parents``, fitted to the first ``n`` lanes.
+        """Return a model that contains all ``parents``, fitted to the first ``n`` lanes.
 
-        With ``n`` of 0 it is fitted to all lanes; with 1 it has no errors on what was left out.
+        ``n`` of 0 means all lanes; with 1 there are no errors on held-out data.
         """
         lanes, n = self.lanes, n or len(self.lanes.data)
         fits = [parent.fit.first(n) for parent in parents]
@@ -173,7 +172,7 @@ class Study:
         return self.judged(fit(self.cells, terms, lanes.data, lanes.weight, [start]))
 
     def judged(self, fitted: Fit) -> Model:
-        """Return the fit with its errors."""
+        """Return a fit with its errors."""
         cells, lanes, mm = self.cells, self.lanes, self.cells.millimetres
         made = fitted.predict(cells)
         inside = 1 + len(lanes.target)
@@ -189,7 +188,7 @@ class Study:
 
 
 def blocked(cells: Cells, values: Array) -> Array:
-    """Return sums over the blocks, shape (..., blocks), of values of the cells, (..., C)."""
+    """Return sums over blocks, shape (..., blocks), of values of cells, shape (..., C)."""
     n = int(cells.block.max()) + 1
     member = np.zeros((len(cells.block), n))
     used = np.flatnonzero(cells.used)
@@ -214,14 +213,14 @@ def _middle(draws: Array) -> Interval:
 
 
 def error_interval(study: Study, squares: Array) -> Interval:
-    """Return a 95 % interval of the root mean of squares (C,), its blocks resampled."""
+    """Return the 95 % block-bootstrap interval of the root mean of squares (C,)."""
     both = np.array([np.nan_to_num(squares), np.isfinite(squares)])
     sums = _resampled(study, both, "error")
     return _middle(np.sqrt(sums[:, 0] / np.maximum(sums[:, 1], 1e-12)))
 
 
 def gain(study: Study, before: Model, after: Model) -> tuple[float, Interval]:
-    """Return the log ratio of mean squared held-out errors, and its 95 % interval, paired."""
+    """Return the log ratio of mean squared held-out errors, and its paired 95 % interval."""
     both = np.array([before.held, after.held])
     sums = _resampled(study, both, "gain")
     value = float(np.log(np.nanmean(before.held) / np.nanmean(after.held)))
@@ -229,7 +228,7 @@ def gain(study: Study, before: Model, after: Model) -> tuple[float, Interval]:
 
 
 def load_cut(study: Study, before: Model, after: Model) -> tuple[float, Interval]:
-    """Return by which part the mean error on loads left out falls, and its 95 % interval."""
+    """Return the relative decrease of the mean error on held-out loads, and its 95 % interval."""
     errors = np.array([before.load_errors, after.load_errors])
     both = np.array([np.nan_to_num(np.square(errors)), np.isfinite(errors)])
     sums = _resampled(study, both, "loads")
@@ -238,7 +237,7 @@ def load_cut(study: Study, before: Model, after: Model) -> tuple[float, Interval
 
 
 def slopes(study: Study, model: Model) -> Array:
-    """Return the Jacobian [1] of the fit to everything, shape (C, n), rows weighted."""
+    """Return the weighted Jacobian of the fit to all data, shape (C, n)."""
     theta = model.fit.theta[:1]
     numbers = model.fit.numbers
     at = predict(study.cells, {n.name: theta[:, [i]] for i, n in enumerate(numbers)})
@@ -246,14 +245,14 @@ def slopes(study: Study, model: Model) -> Array:
 
 
 def beyond(base: Array, columns: Array) -> Array:
-    """Return what is left of columns after the span of ``base`` is taken out."""
+    """Return the projection of columns on the complement of the span of ``base``."""
     u, s, _ = np.linalg.svd(base, full_matrices=False)
     u = u[:, s > 1e-7 * s[0]]
     return np.asarray(columns - u @ (u.T @ columns))
 
 
 def spread(study: Study, model: Model) -> Array:
-    """Return weighted residuals (C,), enlarged for the parameters that were fitted."""
+    """Return weighted residuals (C,), corrected for the degrees of freedom of the fit."""
     used, n = study.cells.used, len(model.fit.numbers)
     free = max(1.0, float(used.sum()) - n)
     residual = np.nan_to_num(model.residual) * study.lanes.weight[0]
@@ -261,12 +260,11 @@ def spread(study: Study, model: Model) -> Array:
 
 
 def p_value(study: Study, parent: Model, child: Model) -> float:
-    """Return how likely a term that does nothing fits so much better.
+    """Return the p-value of the terms that a child adds to its parent.
 
-    The coefficients of the added directions, orthogonal to the parent's, over their scatter: as
-    the blocks of the child's residual give it (a cluster-robust test, for residuals that are alike
-    in neighbours), and as the cells give it (an F test, for blocks that agree by luck). The larger
-    of both p-values holds.
+    F statistic of the added directions, orthogonal to the parent's, with the scatter estimated
+    from blocks (cluster-robust, for dependent neighbours) and from cells (for blocks that agree by
+    chance); the larger of both p-values.
     """
     old = {n.name for n in parent.fit.numbers}
     names = [n.name for n in child.fit.numbers]
@@ -287,7 +285,7 @@ def p_value(study: Study, parent: Model, child: Model) -> float:
 
 
 def parameter_draws(study: Study, model: Model) -> Array:
-    """Return parameters refitted to residuals whose blocks changed sign at random, (REFITS, n)."""
+    """Return parameters of a wild block bootstrap with random signs, shape (REFITS, n)."""
     cells, weight = study.cells, study.lanes.weight[:1]
     random = np.random.default_rng([study.seed, 7])
     signs = random.choice([-1.0, 1.0], (REFITS, int(cells.block.max()) + 1))
@@ -306,10 +304,10 @@ def intervals(draws: Array) -> list[Interval]:
 
 
 def lack_of_fit(study: Study, model: Model) -> tuple[float, float, float]:
-    """Return F and p of the lack of fit against the repeats, and its size [mm].
+    """Return F, p-value and size [mm] of the lack of fit against the repeats.
 
-    The size is the part of the residual that the scatter of a cell's mean does not explain; all
-    are NaN without repeats.
+    The size is the part of the residual beyond the scatter of a cell's mean; all are NaN without
+    repeats.
     """
     cells, weight = study.cells, study.lanes.weight[0]
     pure, free = pure_error(cells)
@@ -324,9 +322,9 @@ def lack_of_fit(study: Study, model: Model) -> tuple[float, float, float]:
 
 
 def pure_error(cells: Cells) -> tuple[float, int]:
-    """Return the standard deviation of repeats about their cell's mean [mm], and its freedom.
+    """Return the standard deviation of repeats about their cell's mean [mm] and its freedom.
 
-    The deviation is NaN where there is one repeat, or copies of one.
+    The deviation is NaN with one repeat or copies of one.
     """
     apart = (cells.readings - cells.mean)[:, cells.used] * cells.millimetres
     free = int(np.maximum(cells.counts[cells.used] - 1, 0).sum())
@@ -337,7 +335,7 @@ def pure_error(cells: Cells) -> tuple[float, int]:
 def floor(study: Study) -> Array:
     """Return the mean squared difference [mm2] of a repeat from the mean of the others, (C,).
 
-    It is NaN where there is one repeat, or copies of one.
+    It is NaN with one repeat or copies of one.
     """
     cells, lanes = study.cells, study.lanes
     if lanes.kind != "repeats" or np.isnan(pure_error(cells)[0]):

@@ -1,9 +1,9 @@
-"""Diagnosis of settled readings: what a load-blind muscle gets wrong of a table, and why.
+"""Diagnosis of a table of settled readings: error of a load-blind muscle, causes, load law.
 
-A table (:class:`~pam_envs.data.tables.ContractionTable`) holds contractions over pressure cycles at
-one load or several, each repeated once or more. The stages: audit; a floor from the repeats; a
-load-blind model with hysteresis; rival causes added one at a time and in pairs, judged on repeats
-and loads left out; the law of the load; and pressures at which the readings themselves look wrong.
+A table (:class:`~pam_envs.data.tables.ContractionTable`) contains contractions over pressure cycles
+at one or more loads, each with one or more repeats. Stages: audit; noise floor from the repeats;
+load-blind model with hysteresis; rival causes one at a time and in pairs, judged on held-out
+repeats and loads; load law; pressures with implausible readings.
 """
 
 from __future__ import annotations
@@ -23,23 +23,22 @@ __all__ = ["Curve", "audit_polynomials", "diagnose_readings"]
 
 
 def diagnose_readings(table: ContractionTable, *, seed: int = 0) -> dict[str, Any]:
-    """Say what a load-blind muscle with hysteresis gets wrong of a table, and name the causes.
+    """Diagnose the error of a load-blind muscle with hysteresis on a table of settled readings.
 
     Parameters
     ----------
     table : ContractionTable
         Settled readings: any loads, pressures and number of repeats.
     seed : int
-        For resampling; the same table and seed give the same report but for ``runtime_s``.
+        Seed of the resampling; the same table and seed give the same report except ``runtime_s``.
 
     Returns
     -------
     dict
-        The report: ``verdict`` (``adequate``, ``named``, ``ambiguous``, ``unexplained`` or
-        ``insufficient``), ``text``, ``causes`` and so on; ``readings`` holds what only tables
-        have: the ``ladder`` of models tried, ``pairs``, ``load_laws``, ``set_points`` and the
-        ``curves`` to draw. Keys without meaning for a static table are null, and so is what is
-        not known.
+        Report: ``verdict`` (``adequate``, ``named``, ``ambiguous``, ``unexplained`` or
+        ``insufficient``), ``text``, ``causes`` and so on; ``readings`` has the ``ladder`` of
+        models, ``pairs``, ``load_laws``, ``set_points`` and the ``curves`` of the figures. Keys
+        without meaning for a static table, and unknown values, are null.
 
     Raises
     ------
@@ -58,7 +57,7 @@ def diagnose_readings(table: ContractionTable, *, seed: int = 0) -> dict[str, An
 
 
 def _finite(value: Any) -> Any:
-    """Return a report with None for every number that is not known."""
+    """Return a report with None for every number that is not finite."""
     if isinstance(value, dict):
         return {key: _finite(one) for key, one in value.items()}
     if isinstance(value, (list, tuple)):

@@ -1,4 +1,4 @@
-"""Everything that a diagnosis of readings finds, and the verdict on it."""
+"""Results of a diagnosis of settled readings, and the verdict."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ from pam_envs.diagnosis.static.structure import whiteness
 Array = NDArray[np.float64]
 
 FLOOR_REACHED = 1.1
-"""A model whose held-out error is at most so many floors leaves nothing to find."""
+"""Held-out error over the noise floor up to which a model is adequate."""
 WHITE = 0.01
-"""Without a floor: least p-value at which neighbouring residuals count as unrelated."""
+"""Without a noise floor: least p-value of white residuals."""
 
 
 @dataclass(frozen=True)
 class Findings:
-    """Everything that the report is made of."""
+    """Results of all stages."""
 
     table: ContractionTable
     study: Study
@@ -46,53 +46,43 @@ class Findings:
 
     @property
     def base(self) -> Model:
-        """The load-blind model."""
+        """Load-blind model."""
         return self.study.base
 
     @property
     def model(self) -> Model:
-        """The model with the named causes."""
+        """Model with the named causes."""
         return self.search.model
 
     @property
     def floor(self) -> float:
-        """Repeat against the mean of the others [mm]; NaN without repeats."""
+        """RMS difference of a repeat from the mean of the others [mm]; NaN without repeats."""
         squares = floor(self.study)
         seen = np.isfinite(squares)
         return float(np.sqrt(np.mean(squares[seen]))) if seen.any() else float("nan")
 
     def interval(self, name: str) -> Interval:
-        """Return the 95 % interval of a parameter of the model, relative."""
+        """Return the 95 % interval of a parameter of the model, in relative units."""
         names = [n.name for n in self.model.fit.numbers]
         return intervals(self.draws[:, [names.index(name)]])[0]
 
     def value(self, name: str) -> float:
-        """Return a parameter of the model, relative."""
+        """Return a parameter of the model, in relative units."""
         names = [n.name for n in self.model.fit.numbers]
         return float(self.model.fit.theta[0, names.index(name)])
 
     @property
     def bent(self) -> bool:
-        """Whether the readings ask for another law of the load than linear."""
+        """Whether the readings need a load law other than linear."""
         return bends(self.laws)
 
     @property
-    def reached(self) -> float:
-        """How many floors count as the floor."""
-        return FLOOR_REACHED
-
-    @property
     def ties(self) -> list[tuple[Trial, Trial]]:
-        """Accepted forms with one of another cause that does as well and was not accepted."""
+        """Accepted forms, each with an equally good form of a cause that was not accepted."""
         return ties(self.search)
 
-    @property
-    def tied(self) -> tuple[Trial, ...]:
-        """The first tie, if any."""
-        return self.ties[0] if self.ties else ()
-
     def shown_by(self, term: Term) -> str:
-        """Return the cause beside which alone a term shows, or nothing."""
+        """Return the cause that a term needs beside it to be significant, if any."""
         first = self.search.accepted[0].term.cause
         for pair in self.search.pairs:
             causes = [other.cause for other in pair.terms]
@@ -121,12 +111,12 @@ def find(table: ContractionTable, study: Study) -> Findings:
 
 
 def bends(laws: Sequence[Law]) -> bool:
-    """Return whether a law other than linear fits better by more than chance."""
+    """Return whether a load law other than linear fits significantly better."""
     return any(law.p * len(laws) <= rule.LEVEL for law in laws)
 
 
 def ties(found: Search) -> list[tuple[Trial, Trial]]:
-    """Return accepted forms with one of another cause that does as well and was not accepted."""
+    """Return accepted forms, each with an equally good form of a cause that was not accepted."""
     named = {trial.term.cause for trial in found.accepted}
     made = []
     for one in found.stages:
@@ -137,7 +127,7 @@ def ties(found: Search) -> list[tuple[Trial, Trial]]:
 
 
 def verdict(f: Findings) -> str:
-    """Return one of the five words."""
+    """Return the verdict in one word."""
     free = int(f.study.cells.used.sum()) - len(f.base.fit.numbers)
     if free < len(f.base.fit.numbers):
         return "insufficient"

@@ -1,8 +1,9 @@
-"""Least squares of the static models, many fits side by side.
+"""Levenberg-Marquardt fits of the static models, vectorised over hundreds of lanes.
 
-Every lane is a fit of its own: another start, another repeat or load left out, another resampled
-data set. A fit of a model with a term also starts from the optimum of the model without it, so it
-can never end worse; that is checked, since a stuck optimiser must not pass for evidence.
+Every lane is a fit of its own: another start, held-out part or bootstrap sample, so that the normal
+equations of all lanes are solved at once (:mod:`pam_envs.diagnosis.fit.least_squares` tries several
+dampings of few fits instead). A model with a term also starts from the optimum without it and must
+not fit worse; this is checked, since a failed optimiser must not count as evidence.
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ from pam_envs.diagnosis.static.models import Number, Term, Values, lags_of, numb
 Array = NDArray[np.float64]
 
 MOST_WEIGHT = 0.98
-"""The plays together carry at most so much of the slope: the muscle follows a turn a little."""
+"""Largest sum of the play weights: the muscle follows a reversal a little."""
 ROUNDS = 60
 STEP = 0.02
-"""Step of a difference, over the parameter's meaningful size."""
+"""Step of finite differences over the meaningful size of a parameter."""
 GOOD = 1e-7
-"""A lane is done when two steps lower its sum of squares by a smaller part."""
+"""Relative decrease of the sum of squares below which two steps end a lane."""
 
 
 @dataclass(frozen=True)
@@ -34,11 +35,11 @@ class Fit:
     Attributes
     ----------
     terms : tuple of Term
-        What the base was extended by.
+        Terms that extend the base.
     theta : ndarray, shape (L, n)
-        Parameters, relative.
+        Parameters in relative units.
     cost : ndarray, shape (L,)
-        Weighted sums of squares, relative.
+        Weighted sums of squares in relative units.
     """
 
     terms: tuple[Term, ...]
@@ -47,7 +48,7 @@ class Fit:
 
     @property
     def numbers(self) -> tuple[Number, ...]:
-        """The parameters, in the order of ``theta``."""
+        """Parameters in the order of ``theta``."""
         return numbers_of(self.terms)
 
     def first(self, n: int) -> Fit:
@@ -55,7 +56,7 @@ class Fit:
         return Fit(self.terms, self.theta[:n], self.cost[:n])
 
     def predict(self, cells: Cells) -> Array:
-        """Return the contractions, shape (L, C), relative."""
+        """Return the contractions in relative units, shape (L, C)."""
         return predict(cells, _named(self.numbers, self.theta))
 
 
@@ -64,7 +65,7 @@ def _named(numbers: Sequence[Number], theta: Array) -> Values:
 
 
 def _allowed(numbers: Sequence[Number], theta: Array) -> Array:
-    """Return parameters moved into their bounds, the plays' weights below their sum's."""
+    """Return parameters clipped to their bounds, and play weights to the bound of their sum."""
     held = np.clip(theta, [n.low for n in numbers], [n.high for n in numbers])
     plays = [i for i, n in enumerate(numbers) if n.name.startswith("weight")]
     total = held[:, plays].sum(axis=1, keepdims=True)
@@ -73,7 +74,7 @@ def _allowed(numbers: Sequence[Number], theta: Array) -> Array:
 
 
 def jacobian(cells: Cells, numbers: Sequence[Number], theta: Array, at: Array) -> Array:
-    """Return the derivatives of the predictions ``at`` by each parameter, (L, C, n), over sizes."""
+    """Return derivatives of the predictions ``at`` by each parameter over its size, (L, C, n)."""
     (lanes, n), size = theta.shape, np.array([number.size for number in numbers])
     inside = theta + STEP * size <= np.array([number.high for number in numbers])
     change = np.where(inside, STEP, -STEP)
@@ -85,7 +86,7 @@ def jacobian(cells: Cells, numbers: Sequence[Number], theta: Array, at: Array) -
 
 
 def _moved_lags(cells: Cells, numbers: Sequence[Number], theta: Array, moved: Array) -> Array:
-    """Return the plays' lags for parameters moved one by one: all but one move leave them alone."""
+    """Return the play lags of perturbed parameters, of which only "bend" changes them."""
     if "bend" not in [number.name for number in numbers]:
         return cells.lags
     lanes, n = theta.shape
@@ -96,7 +97,7 @@ def _moved_lags(cells: Cells, numbers: Sequence[Number], theta: Array, moved: Ar
 
 
 def _steps(slopes: Array, miss: Array, damping: Array, shut: NDArray[np.bool_]) -> Array:
-    """Return damped Gauss-Newton steps, parameters at a bound that they press on held."""
+    """Return damped Gauss-Newton steps with active bounds held."""
     slopes = np.where(shut[:, None, :], 0.0, slopes)
     normal = np.einsum("lci,lcj->lij", slopes, slopes)
     n = normal.shape[-1]
@@ -115,26 +116,27 @@ def improve(
     weight: Array,
     good: float = GOOD,
 ) -> tuple[Array, Array]:
-    """Lead every lane downhill to its nearest optimum.
+    """Fit every lane from its starting values by the Levenberg-Marquardt method.
 
     Parameters
     ----------
     cells : Cells
-        Where to predict.
+        Cells of the table.
     numbers : sequence of Number
-        The parameters.
+        Parameters.
     theta : ndarray, shape (L, n)
-        Where to start.
+        Starting values.
     data, weight : ndarray, shape (L, C)
-        What to fit, and the root of how much each cell counts.
+        Data, and the square root of the weight of each cell.
     good : float
-        See :data:`GOOD`.
+        Tolerance, see :data:`GOOD`.
 
     Returns
     -------
     theta : ndarray, shape (L, n)
+        Fitted parameters.
     cost : ndarray, shape (L,)
-        Never above that of the start.
+        Sums of squares, never above those of the start.
     """
     sizes = np.array([n.size for n in numbers])
     low, high = np.array([n.low for n in numbers]), np.array([n.high for n in numbers])
@@ -170,18 +172,18 @@ def fit(
     weight: Array,
     starts: Sequence[Array],
 ) -> Fit:
-    """Fit a model to each lane's data, keeping the best of several starts.
+    """Fit a model to the data of each lane, with the best of several starts.
 
     Parameters
     ----------
     cells : Cells
-        Where to predict.
+        Cells of the table.
     terms : sequence of Term
-        What the base is extended by.
+        Terms that extend the base.
     data, weight : ndarray, shape (L, C)
-        What to fit, and the root of how much each cell counts.
+        Data, and the square root of the weight of each cell.
     starts : sequence of ndarray, shape (n,) or (L, n)
-        Where to start each lane.
+        Starting values.
     """
     numbers, lanes = numbers_of(terms), len(data)
     begin = np.concatenate([np.broadcast_to(s, (lanes, len(numbers))) for s in starts])
@@ -195,7 +197,7 @@ def fit(
 
 
 def base_starts() -> list[Array]:
-    """Return starts of the base: soft and stiff beginnings, little and much friction."""
+    """Return starting values of the base: soft and stiff springs, little and much friction."""
     middle = np.array([n.neutral for n in numbers_of(())])
     made = [middle]
     for force, length, friction in ((0.05, 0.1, 0.5), (0.4, 0.3, 1.0), (0.2, 0.05, 0.3)):
@@ -206,7 +208,7 @@ def base_starts() -> list[Array]:
 
 
 def widened(parent: Fit, terms: Sequence[Term]) -> Array:
-    """Return the parent's parameters in the order of a model with more terms, the new neutral."""
+    """Return the parent's parameters for a model with more terms, whose parameters are neutral."""
     known = dict(zip([n.name for n in parent.numbers], parent.theta.T, strict=True))
     lanes = len(parent.theta)
     columns = [known.get(n.name, np.full(lanes, n.neutral)) for n in numbers_of(terms)]
@@ -216,12 +218,12 @@ def widened(parent: Fit, terms: Sequence[Term]) -> Array:
 def extend(
     cells: Cells, parents: Sequence[Fit], terms: Sequence[Term], data: Array, weight: Array
 ) -> Fit:
-    """Fit a model starting from all its parents' optima, with what is new at and off neutral.
+    """Fit a model from the optima of its parents, with new parameters at and off neutral.
 
     Raises
     ------
     RuntimeError
-        If the fit is worse than a parent's: the optimiser failed, and nothing may be concluded.
+        If the fit is worse than that of a parent: the optimiser failed.
     """
     starts = []
     for parent in parents:
@@ -240,7 +242,7 @@ def extend(
 
 
 def check_nested(parents: Sequence[Fit], child: Fit) -> None:
-    """Raise if a model fits worse than one that it contains."""
+    """Raise RuntimeError if a model fits worse than one that it contains."""
     for parent in parents:
         worse = child.cost > parent.cost * (1.0 + 1e-6) + 1e-15
         if worse.any():

@@ -1,8 +1,8 @@
-"""How the effects of a load grow with it, and which loads to hang next to find out.
+"""Load laws other than linear, and the loads that would separate them.
 
-The law is fixed beforehand as linear: that is what a load left out is predicted with. An exponent
-or a dead zone fitted afterwards has seen the load it is judged on, unless there are loads enough
-to fit it anew without each; with fewer it is labelled *post hoc*.
+A linear law, fixed beforehand, predicts held-out loads. An exponent or a dead zone fitted later has
+used the held-out load, unless there are enough loads to refit it without each; with fewer it is
+labelled *post hoc*.
 """
 
 from __future__ import annotations
@@ -29,29 +29,29 @@ from pam_envs.diagnosis.static.models import DEAD_LOAD, EXPONENT, Term, units
 Array = NDArray[np.float64]
 
 LOADS_FOR_A_LAW = 5
-"""From so many loads on a law is fitted without the load that it is judged on."""
+"""Least number of loads for a law that is fitted without the held-out load."""
 GRID = 24
-"""Loads at which rivals are compared, up to the heaviest measured."""
+"""Number of loads at which rivals are compared, up to the largest measured."""
 
 
 @dataclass(frozen=True)
 class Law:
-    """A load law other than linear, shared by all effects of the load.
+    """A load law other than linear, common to all effects of the load.
 
     Attributes
     ----------
     term : Term
-        Which.
+        Term of the law.
     model : Model
-        The named causes with it.
+        The named causes with the law.
     value, interval : float, tuple
         Its parameter in its own unit, and 95 % interval.
     p : float
-        Chance that it does nothing, against the linear law.
+        p-value against the linear law.
     left_load : float
-        Mean error on loads left out [mm].
+        Mean error on held-out loads [mm].
     post_hoc : bool
-        Whether its parameter had seen the load left out.
+        Whether its parameter was fitted to the held-out loads.
     """
 
     term: Term
@@ -64,7 +64,7 @@ class Law:
 
 
 def load_laws(study: Study, model: Model) -> tuple[Law, ...]:
-    """Return the laws that the table's loads allow to be fitted, if an effect needs one."""
+    """Return the load laws that can be fitted, if a named effect depends on the load."""
     acts = any(term.loads > 1 for term in model.terms)
     if not acts or len(study.cells.loads) < EXPONENT.loads:
         return ()
@@ -90,15 +90,15 @@ def _law(study: Study, model: Model, term: Term) -> Law:
 
 
 def _fixed(study: Study, model: Model, free: Model, term: Term, value: float) -> Model:
-    """Return the model with the law's parameter held, as it was chosen on everything."""
+    """Return the model with the law's parameter fixed at its fit to all data."""
     number = replace(term.numbers[0], neutral=value, low=value, high=value)
     start = free.fit.theta.copy()
     start[:, -1] = value
     return study.refitted((*model.terms, replace(term, numbers=(number,))), start)
 
 
-def told_apart(study: Study, laws: Sequence[Law]) -> bool:
-    """Return whether the readings prefer one of two laws."""
+def separated(study: Study, laws: Sequence[Law]) -> bool:
+    """Return whether one of two laws has a significantly larger gain."""
     if len(laws) < 2:
         return True
     _, (low, high) = gain(study, laws[0].model, laws[1].model)
@@ -107,19 +107,19 @@ def told_apart(study: Study, laws: Sequence[Law]) -> bool:
 
 @dataclass(frozen=True)
 class NextLoads:
-    """What other loads would tell two models apart.
+    """Separation of two models at other loads.
 
     Attributes
     ----------
     loads : ndarray, shape (GRID,)
-        [kg].
+        Loads [kg].
     separation : ndarray, shape (GRID,)
-        Mean square difference of the models over a cycle, in variances of a cell's mean with as
-        many repeats as the table has.
+        Mean square difference of the models over a cycle, in variances of a cell's mean with the
+        table's number of repeats.
     apart : ndarray, shape (GRID,)
         Root mean square difference [mm].
     best : tuple of float
-        Loads [kg] to hang next, the most telling first.
+        Loads [kg] to measure next, best first.
     """
 
     loads: Array
@@ -129,7 +129,7 @@ class NextLoads:
 
 
 def next_loads(study: Study, one: Model, other: Model) -> NextLoads:
-    """Return where two models that were fitted to the same readings differ most."""
+    """Return the separation of two models fitted to the same readings."""
     cells = study.cells
     heaviest = cells.scale[0]
     loads = heaviest * np.arange(1, GRID + 1) / GRID
@@ -147,7 +147,7 @@ def _apart(cells: Cells, one: Model, other: Model, load: float) -> float:
 
 
 def _peaks(measured: Sequence[float], loads: Array, apart: Array) -> tuple[float, ...]:
-    """Return the most telling load of each gap between measured ones, best first, two at most."""
+    """Return the load of largest difference in each gap between measured loads, two at most."""
     gap = np.searchsorted(measured, loads - 1e-9)
     gaps = [np.flatnonzero(gap == g) for g in np.unique(gap)]
     peaks = sorted((int(i[np.argmax(apart[i])]) for i in gaps), key=lambda i: -float(apart[i]))

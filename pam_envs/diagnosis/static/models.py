@@ -1,15 +1,15 @@
-"""Static models of a muscle led through pressure cycles: a load-blind base, and what may be added.
+"""Static models of a muscle on pressure cycles: a load-blind base, and terms that extend it.
 
-The base: the pressure passes play operators (its hysteresis), and a spring with a stiff start and a
-hardening end turns the effective pressure into contraction,
+Base: play operators on the pressure (hysteresis) and a spring with a stiff start and a hardening
+end, which converts the effective pressure to contraction,
 
     c (1 - exp(-x / x0)) + k1 x + k3 x^3 = p - sum(weights * stop_i(p)).
 
-It knows nothing of the load. A *term* adds one parameter or two, neutral at a stated value, so that
-every model with a term contains the one without. Inside, pressures, contractions and loads are
-fractions of the largest of the table; :func:`units` gives the way back.
+It is independent of the load. A *term* adds one or two parameters with a neutral value, so that
+every model with a term contains the model without it. Pressures, contractions and loads are
+relative to the largest of the table; :func:`units` gives the scales.
 
-All cells of a table are computed at once, for many parameter sets (lanes) side by side.
+All cells of a table are computed at once for many parameter sets (lanes).
 """
 
 from __future__ import annotations
@@ -29,25 +29,25 @@ Mask = NDArray[np.bool_]
 WEIGHTS = tuple(f"weight_{i}" for i in range(1, len(THRESHOLDS) + 1))
 SPRING = ("start_force", "start_length", "stiffness", "hardening")
 CREEP_READINGS = 4.0
-"""Time constant of residual creep, in readings; what creeps faster is over before a reading."""
+"""Time constant of residual creep [readings]; faster creep has settled before a reading."""
 
 
 @dataclass(frozen=True)
 class Number:
-    """A parameter of a model, in fractions of the table's largest values.
+    """A parameter of a model, relative to the largest values of the table.
 
     Attributes
     ----------
     name : str
-        Its name.
+        Name.
     neutral : float
-        The value at which it does nothing (a plausible one for the base's own).
+        Value without effect (a plausible one for parameters of the base).
     low, high : float
         Bounds.
     size : float
-        A meaningful change: the step of differences, and the offset of starts.
+        Size of a meaningful change, for finite differences and starting values.
     unit : str
-        Unit for people: ``bar``, ``mm``, ``1``, or one of these with ``/kg``, ``/mm``, ``/mm3``.
+        Display unit: ``bar``, ``mm``, ``1``, or one of these with ``/kg``, ``/mm``, ``/mm3``.
     """
 
     name: str
@@ -67,15 +67,15 @@ class Term:
     cause : str
         Name of the cause.
     form : str
-        Which form of it.
+        Name of the form.
     title : str
         A short sentence.
     numbers : tuple of Number
-        The parameters it adds.
+        Its parameters.
     loads : int
-        How many different loads it takes to fit it.
+        Number of different loads that its fit needs.
     both_ways : bool
-        Whether it takes readings at rising and at falling pressure.
+        Whether its fit needs readings at rising and falling pressure.
     """
 
     cause: str
@@ -93,33 +93,33 @@ BASE = (
     Number("hardening", 0.1, 0.0, 4.0, 0.1, "bar/mm3"),
     *(Number(name, 0.15, 0.0, 0.9, 0.1) for name in WEIGHTS),
 )
-"""The load-blind base."""
+"""Parameters of the load-blind base."""
 
 SHIFT = Term(
     "load_dependent_compliance",
     "pressure shift",
-    "The load takes a part of the pressure, as read from a zero common to all loads",
+    "The load acts as a pressure shift, with a zero common to all loads",
     (Number("shift", 0.0, -1.0, 1.0, 0.05, "bar/kg"),),
     2,
 )
 SHIFT_ZEROED = Term(
     "load_dependent_compliance",
     "pressure shift, zeroed at each load",
-    "The load takes a part of the pressure, and each load's rest length is its zero",
+    "The load acts as a pressure shift, with the rest length of each load as its zero",
     (Number("zeroed_shift", 0.0, -1.0, 1.0, 0.05, "bar/kg"),),
     2,
 )
 STRETCH = Term(
     "load_dependent_compliance",
     "stretch at rest",
-    "The load lengthens the muscle by the same at every pressure",
+    "The load lengthens the muscle equally at every pressure",
     (Number("stretch", 0.0, -2.0, 2.0, 0.05, "mm/kg"),),
     2,
 )
 STROKE = Term(
     "load_dependent_compliance",
     "smaller stroke",
-    "Contraction is divided by a factor that grows with the load",
+    "The contraction is divided by a factor that grows with the load",
     (Number("stroke", 0.0, -0.4, 2.0, 0.05, "1/kg"),),
     2,
 )
@@ -141,24 +141,24 @@ WIDTH = Term(
 FRICTION = Term(
     "pressure_dependent_friction",
     "bent pressure scale",
-    "Friction changes along the pressure range, uniform on a scale bent by this much",
+    "Friction changes along the pressure range, uniform on a bent pressure scale",
     (Number("bend", 0.0, -0.8, 0.8, 0.1),),
     both_ways=True,
 )
 CREEP = Term(
     "creep",
     "residual creep over readings",
-    "A part of each step arrives only in the next readings",
+    "A part of each step appears only in the next readings",
     (Number("creep", 0.0, -0.5, 0.5, 0.02),),
 )
 THRESHOLD = Term(
     "threshold_pressure",
     "soft threshold",
-    "The first part of the pressure does nothing",
+    "The first part of the pressure has no effect",
     (Number("threshold", 0.0, 0.0, 0.3, 0.03, "bar"),),
 )
 TERMS = (SHIFT, SHIFT_ZEROED, STRETCH, STROKE, STIFFENING, WIDTH, FRICTION, CREEP, THRESHOLD)
-"""All forms of all causes that a table of readings can show, best known first within a cause."""
+"""All forms of causes that a table of readings can show, the best established first."""
 
 EXPONENT = Term(
     "load law", "power", "Effects grow with a power", (Number("exponent", 1.0, 0.3, 6.0, 0.3),), 3
@@ -173,11 +173,11 @@ DEAD_LOAD = Term(
 
 
 Values = Mapping[str, Array]
-"""Parameters by name, each of shape (L, 1); those left out are neutral."""
+"""Parameters by name, each of shape (L, 1); missing ones are neutral."""
 
 
 def numbers_of(terms: Sequence[Term]) -> tuple[Number, ...]:
-    """Return the parameters of the base with some terms, the base's first."""
+    """Return the parameters of the base and of some terms."""
     return (*BASE, *(n for term in terms for n in term.numbers))
 
 
@@ -192,7 +192,7 @@ def _straight(value: Array, bend: Array) -> Array:
 
 
 def load_law(load: Array, values: Values) -> Array:
-    """Return how strongly each cell's load acts: 0 at no load, 1 at the largest."""
+    """Return the relative strength of load effects in each cell: 0 without load, at most 1."""
     dead, exponent = values.get("dead_load"), values.get("exponent")
     if dead is not None:
         load = np.maximum(load - dead, 0.0) / (1.0 - dead)
@@ -200,13 +200,13 @@ def load_law(load: Array, values: Values) -> Array:
 
 
 def lags_of(cells: Cells, values: Values) -> Array:
-    """Return how far the plays lag behind the bent pressure, shape (plays, L or 1, C)."""
+    """Return the lag of the play operators behind the bent pressure, shape (plays, L or 1, C)."""
     bend = values.get("bend")
     return cells.lags if bend is None else stops(_bent(cells.pressure, bend), cells.order)
 
 
 def effective_pressure(cells: Cells, values: Values, lags: Array) -> Array:
-    """Return the pressure after the hysteresis, shape (L, C), before any load acts."""
+    """Return the pressure after the hysteresis without effects of the load, shape (L, C)."""
     bend = values.get("bend")
     lost = sum(values[name] * lag for name, lag in zip(WEIGHTS, lags, strict=True))
     if "width" in values:
@@ -217,7 +217,7 @@ def effective_pressure(cells: Cells, values: Values, lags: Array) -> Array:
 
 
 def contraction(force: Array, values: Values, start: Array | None = None) -> Array:
-    """Return the contraction at which the spring balances ``force`` (both relative), by Newton."""
+    """Return the contraction at which the spring balances ``force``, by Newton's method."""
     c, x0, k1, k3 = (values[name] for name in SPRING)
     x = np.maximum(force, 0.0) if start is None else start
     for _ in range(60):
@@ -232,7 +232,7 @@ def contraction(force: Array, values: Values, start: Array | None = None) -> Arr
 
 
 def _above(force: Array, values: Values) -> Array:
-    """Return the force less a soft threshold, which takes nothing where there is no force."""
+    """Return the force less a soft threshold, zero without force."""
     if "threshold" not in values:
         return force
     level = np.maximum(values["threshold"], 1e-9)
@@ -240,7 +240,7 @@ def _above(force: Array, values: Values) -> Array:
 
 
 def crept(cells: Cells) -> Array:
-    """Return what turns contractions into the part that has crept by each reading, (C, C)."""
+    """Return the matrix (C, C) from contractions to their crept part at each reading."""
     behind = np.subtract.outer(np.arange(len(cells.load)), np.arange(len(cells.load)))
     keep = np.exp(-1.0 / CREEP_READINGS)
     seen = (behind >= 0) & (cells.group[:, None] == cells.group[None, :])
@@ -250,9 +250,9 @@ def crept(cells: Cells) -> Array:
 def predict(
     cells: Cells, values: Values, start: Array | None = None, lags: Array | None = None
 ) -> Array:
-    """Return the model's contractions of all cells, shape (L, C), relative.
+    """Return the contractions of all cells in relative units, shape (L, C).
 
-    ``start`` holds contractions near by, ``lags`` those of :func:`lags_of`: both save time.
+    ``start`` are nearby contractions, ``lags`` those of :func:`lags_of`: both save time.
     """
     acts = load_law(cells.load, values)
     force = effective_pressure(cells, values, lags_of(cells, values) if lags is None else lags)
@@ -274,7 +274,7 @@ def predict(
 
 
 def units(number: Number, scale: tuple[float, float, float]) -> float:
-    """Return what a value of 1 of a parameter is in its own unit (bar, mm, kg)."""
+    """Return the scale of a parameter from relative units to its display unit."""
     load, pressure, length = scale[0], scale[1] / BAR, scale[2] / MM
     return {
         "1": 1.0,

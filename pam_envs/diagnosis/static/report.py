@@ -1,4 +1,4 @@
-"""The diagnosis of a table of readings as a report: numbers with units and intervals."""
+"""Report of a diagnosis of settled readings."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from pam_envs.diagnosis.static.compare import (
     pure_error,
 )
 from pam_envs.diagnosis.static.findings import Findings, verdict
-from pam_envs.diagnosis.static.law import Law, told_apart
+from pam_envs.diagnosis.static.law import Law, separated
 from pam_envs.diagnosis.static.models import TERMS, Number, Term, predict, units
 from pam_envs.diagnosis.static.search import RULE, Pair, Stage, Trial
 from pam_envs.diagnosis.static.structure import isolability, structure
@@ -30,13 +30,13 @@ Array = NDArray[np.float64]
 Json = dict[str, Any]
 
 STATIC = (
-    "a table of settled readings has no time and no measured pressure: of the pressure channel, "
-    "delays, rates and the closed loop nothing is said"
+    "a table of settled readings has no time and no measured pressure: pressure channel, delays, "
+    "rates and closed loop are not diagnosed"
 )
 
 
 def report(f: Findings, seed: int) -> Json:
-    """Return the report, all keys but ``runtime_s``."""
+    """Return the report without ``runtime_s``."""
     cells = f.study.cells
     return {
         "schema": 1,
@@ -62,11 +62,11 @@ def report(f: Findings, seed: int) -> Json:
         "rule_version": RULE,
         "provenance": provenance(f.table, seed),
         "readings": {
-            "ladder": [rung(stage) for stage in f.search.stages],
-            "pairs": [paired(pair) for pair in f.search.pairs],
+            "ladder": [stage_of(stage) for stage in f.search.stages],
+            "pairs": [pair_of(pair) for pair in f.search.pairs],
             "loads_left_out": loads_left_out(f),
             "load_laws": [load_law(law) for law in f.laws],
-            "lack_of_fit": {"before": lacking(f, f.base), "after": lacking(f, f.model)},
+            "lack_of_fit": {"before": misfit(f, f.base), "after": misfit(f, f.model)},
             "set_points": [vars(point) for point in f.set_points],
             "curves": curves(f),
         },
@@ -90,12 +90,12 @@ def _number(f: Findings, number: Number) -> Json:
 
 
 def noise_floor(f: Findings) -> Json:
-    """Return the error of a repeat against the mean of the others, null if there is one repeat."""
+    """Return the difference of a repeat from the mean of the others; NaN with one repeat."""
     return _value(f.floor, "mm", **{"from": "repeats" if np.isfinite(f.floor) else None})
 
 
 def effect(f: Findings, term: Term) -> Array:
-    """Return what a cause adds to the contraction [mm], cell by cell."""
+    """Return the contribution of a cause to the contraction of each cell [mm]."""
     theta, cells = f.model.fit.theta[:1], f.study.cells
     values = {n.name: theta[:, [i]] for i, n in enumerate(f.model.fit.numbers)}
     without = {k: v for k, v in values.items() if k not in {n.name for n in term.numbers}}
@@ -127,7 +127,7 @@ def _gain(trial: Trial) -> Json:
 
 
 def rivals(f: Findings) -> list[Json]:
-    """Return the forms beside the named ones, each at the stage that decided on it."""
+    """Return the rival forms, each at the stage of its decision."""
     named = {trial.term.cause for trial in f.search.accepted}
     stages, made = f.search.stages, dict[str, Json]()
     for stage in stages:
@@ -152,7 +152,7 @@ def _rival(trial: Trial, chosen: bool) -> Json:
 
 
 def _why(trial: Trial, chosen: bool) -> str:
-    """Return why a form stays or goes, in the words of the report."""
+    """Return the reason for which a form is kept or excluded."""
     if chosen:
         return "the best"
     if not trial.passes:
@@ -161,13 +161,13 @@ def _why(trial: Trial, chosen: bool) -> str:
 
 
 def error(f: Findings, model: Model) -> Json:
-    """Return the error on readings and on loads left out."""
+    """Return the error on held-out readings and loads."""
     loads = f.study.cells.loads[: f.study.lanes.loads]
-    kinds = {f"{f.study.lanes.kind}, one left out": model.held_out, "cells, fitted": model.rms}
+    kinds = {f"{f.study.lanes.kind}, one held out": model.held_out, "cells, fitted": model.rms}
     for load, value in zip(loads, model.by_load.tolist(), strict=True):
-        kinds[f"{load:g} kg left out"] = value
+        kinds[f"{load:g} kg held out"] = value
     if loads:
-        kinds["loads, one left out (mean)"] = model.left_load
+        kinds["loads, one held out (mean)"] = model.left_load
     more = {
         "interval": list(error_interval(f.study, model.held)),
         "times_floor": model.held_out / f.floor,
@@ -177,10 +177,10 @@ def error(f: Findings, model: Model) -> Json:
 
 
 def experiment(f: Findings) -> Json | None:
-    """Return which loads to hang next, where two models are not told apart."""
+    """Return the loads to measure next if two models are not separated."""
     if f.next is None:
         return None
-    names = [law.term.form for law in f.laws] if f.bent else [t.term.cause for t in f.tied]
+    names = [law.term.form for law in f.laws] if f.bent else [t.term.cause for t in f.ties[0]]
     at = int(np.argmax(f.next.apart))
     loads = " and ".join(f"{load:.1f} kg" for load in f.next.best)
     separation = float(f.next.separation[at])
@@ -188,8 +188,8 @@ def experiment(f: Findings) -> Json | None:
         "between": names[:2],
         "name": "more loads",
         "description": (
-            f"hang {loads}, cycles and repeats as before: there the two differ most, by "
-            f"{f.next.apart[at]:.2f} mm RMS over a cycle at {f.next.loads[at]:.1f} kg (the "
+            f"measure {loads} with the same cycles and repeats: the largest difference of the two "
+            f"is {f.next.apart[at]:.2f} mm RMS over a cycle at {f.next.loads[at]:.1f} kg (the "
             "separation is in variances of a cell's mean)"
         ),
         "segments": [],
@@ -200,7 +200,7 @@ def experiment(f: Findings) -> Json | None:
 
 
 def calibrated(f: Findings, number: Number) -> Json:
-    """Return a parameter of the load-blind part as fitted; no earlier value exists."""
+    """Return a fitted parameter of the load-blind base, which has no earlier value."""
     made, scale = _number(f, number), units(number, f.study.cells.scale)
     value, span = made["value"], (number.high - number.low) * scale
     near = min(value - number.low * scale, number.high * scale - value)
@@ -216,7 +216,7 @@ def calibrated(f: Findings, number: Number) -> Json:
 
 
 def not_testable(f: Findings) -> list[Json]:
-    """Return the causes that no such table, or not this one, can show."""
+    """Return the causes that a table of readings, or this one, cannot show."""
     shown = {term.cause for term in TERMS}
     reasons = {c.name: c.settled for c in catalogue() if c.name not in shown}
     have = len(f.study.cells.loads)
@@ -229,28 +229,28 @@ def not_testable(f: Findings) -> list[Json]:
 
 
 def warnings(f: Findings) -> list[str]:
-    """Return what to bear in mind."""
-    told = [*audit_table(f.table), *(point.sentence for point in f.set_points), STATIC]
-    told += [_zeros(f)] if _zeros(f) else []
+    """Return the warnings."""
+    texts = [*audit_table(f.table), *(point.sentence for point in f.set_points), STATIC]
+    texts += [_zeros(f)] if _zeros(f) else []
     if not np.isfinite(f.floor):
-        told.append("without repeats that differ no floor is known to hold the errors against")
+        texts.append("without differing repeats the noise floor is unknown")
     if f.bent and f.laws[0].post_hoc:
-        told.append(
-            "an exponent of the load or a dead zone was chosen after seeing all loads: its error "
-            "on a load left out is post hoc, not held out"
+        texts.append(
+            "an exponent or a dead zone of the load was fitted to all loads: its error on a "
+            "held-out load is post hoc"
         )
-    if f.bent and not told_apart(f.study, f.laws):
+    if f.bent and not separated(f.study, f.laws):
         one, other = f.laws[:2]
-        told.append(
+        texts.append(
             f"a power {one.value:.2f} of the load and a dead zone of {other.value:.2f} kg fit "
-            f"alike ({one.model.rms:.3f} and {other.model.rms:.3f} mm on the cells): the readings "
-            "do not tell them apart"
+            f"equally well ({one.model.rms:.3f} and {other.model.rms:.3f} mm on the cells): the "
+            "readings do not separate them"
         )
-    return told
+    return texts
 
 
 def _zeros(f: Findings) -> str:
-    """Return the warning that the load's parameter depends on where contraction is zero."""
+    """Return the warning on a load parameter that depends on the zero of the contraction."""
     accepted = {trial.term.form for trial in f.search.accepted}
     for stage in f.search.stages:
         for trial in stage.trials:
@@ -259,14 +259,14 @@ def _zeros(f: Findings) -> str:
             if same and trial.passes and not trial.excluded and trial.term.form not in accepted:
                 value = float(trial.model.fit.theta[0, -1]) * units(other, f.study.cells.scale)
                 return (
-                    f"the form '{trial.term.form}' does as well, with {value:.3f} bar/kg: how far "
-                    "a load alone stretches the muscle was not measured"
+                    f"the form '{trial.term.form}' fits equally well, with {value:.3f} bar/kg: the "
+                    "stretch of the muscle by a load alone was not measured"
                 )
     return ""
 
 
 def provenance(table: ContractionTable, seed: int) -> Json:
-    """Return where the numbers come from."""
+    """Return the inputs and versions."""
     columns = (table.load_kg, table.inflating, table.pressure_pa, table.repeat, table.contraction_m)
     digest = hashlib.sha256(b"".join(column.tobytes() for column in columns)).hexdigest()
     return {
@@ -286,8 +286,8 @@ def _package() -> str:
         return "pam-envs, not installed"
 
 
-def rung(stage: Stage) -> Json:
-    """Return a stage of the search: the model so far, and every form tried on it."""
+def stage_of(stage: Stage) -> Json:
+    """Return a stage of the search: the present model, and every form tried on it."""
     return {
         "model": [term.form for term in stage.parent.terms],
         **_errors(stage.parent),
@@ -318,8 +318,8 @@ def _errors(model: Model) -> Json:
     }
 
 
-def paired(pair: Pair) -> Json:
-    """Return two causes fitted together, and which shows only beside the other."""
+def pair_of(pair: Pair) -> Json:
+    """Return two causes fitted together, and those that are significant only together."""
     return {
         "names": [term.cause for term in pair.terms],
         "p_alone": list(pair.alone),
@@ -329,7 +329,7 @@ def paired(pair: Pair) -> Json:
 
 
 def loads_left_out(f: Findings) -> Json | None:
-    """Return by how much effects linear in load cut the mean error on loads left out."""
+    """Return the decrease of the mean error on held-out loads by effects linear in load."""
     if not f.study.lanes.loads:
         return None
     cut, (low, high) = load_cut(f.study, f.base, f.model)
@@ -353,14 +353,14 @@ def load_law(law: Law) -> Json:
     }
 
 
-def lacking(f: Findings, model: Model) -> Json:
-    """Return the lack of fit: F and p against the repeats, and its size."""
+def misfit(f: Findings, model: Model) -> Json:
+    """Return the lack of fit: F and p-value against the repeats, and its size."""
     ratio, p, size = lack_of_fit(f.study, model)
     return {"F": ratio, "p": p, "size": _value(size, "mm")}
 
 
 def curves(f: Findings) -> Json:
-    """Return what the figures show, cell by cell: bar, kg and mm."""
+    """Return the curves of the figures, cell by cell [bar, kg, mm]."""
     cells, mm = f.study.cells, f.study.cells.millimetres
     return {
         "load_kg": [cells.loads[g] for g in cells.group],

@@ -1,9 +1,9 @@
-"""Which causes a table of readings shows: one at a time, and in pairs, since one may hide another.
+"""Search for causes in a table of readings: one at a time and in pairs, which may mask each other.
 
-The rule: causes are looked for while the residual is larger than repeats explain. A form is
-accepted if, counting all that were tried beside it, it fits better by more than chance (blocks of
-cells as draws), predicts readings left out better by a margin that matters, and does not predict
-loads left out worse. A cause accepted earlier is tested again.
+Rule: the search continues while the residual is larger than repeats explain. A form is accepted if
+its improvement is significant (block-robust, corrected for the number of forms), if it predicts
+held-out readings better by a relevant margin, and if it does not predict held-out loads worse.
+Accepted causes are tested again beside later ones.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from pam_envs.diagnosis.static.models import TERMS, Term
 RULE = "readings-1"
 """Version of the decision rule."""
 LEVEL = 0.05
-"""Chance of accepting a form that does nothing, over all tried at a stage."""
+"""Significance level over all forms of a stage."""
 LEAST_GAIN = 0.05
-"""Least log ratio of held-out mean squares that matters."""
+"""Least relevant log ratio of held-out mean squares."""
 RIGHT = 0.005
-"""Without repeats: a residual of so much of the largest contraction is right enough."""
+"""Without repeats: residual over the largest contraction that needs no explanation."""
 UNEXPLAINED = 0.01
-"""Causes are looked for while repeats explain the residual with a smaller chance than this."""
+"""p-value of the lack of fit below which the search continues."""
 WORSE_LOADS = 1.02
-"""A form may raise the error on loads left out by this factor at most."""
+"""Largest factor by which a form may increase the error on held-out loads."""
 MOST_CAUSES = 4
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A form tried on top of a model.
+    """A form added to a model.
 
     Attributes
     ----------
@@ -43,15 +43,15 @@ class Trial:
     model : Model
         The model with it.
     p : float
-        As :func:`p_value`, for this form alone.
+        See :func:`p_value`, for this form alone.
     tried : int
-        How many forms were tried at this stage.
+        Number of forms of the stage.
     gain, interval : float, tuple
         Log ratio of held-out mean squares to the model without it, and its 95 % interval.
-    behind, behind_interval : float, tuple
-        The same of the stage's best form to this one.
     loads_worse : bool
-        Whether it predicts loads left out worse.
+        Whether it predicts held-out loads worse.
+    behind, behind_interval : float, tuple
+        Gain of the stage's best form over this one, and its 95 % interval.
     """
 
     term: Term
@@ -66,7 +66,7 @@ class Trial:
 
     @property
     def adjusted(self) -> float:
-        """The p-value times the number of forms tried, at most 1."""
+        """Bonferroni-corrected p-value."""
         return min(1.0, self.p * self.tried)
 
     @property
@@ -76,13 +76,13 @@ class Trial:
 
     @property
     def excluded(self) -> bool:
-        """Whether it is behind the best by more than chance."""
+        """Whether the best form is significantly better."""
         return self.behind_interval[0] > 0.0
 
 
 @dataclass(frozen=True)
 class Stage:
-    """All forms tried on top of a model, best first, and the one taken."""
+    """All forms added to a model, best first, and the accepted one."""
 
     parent: Model
     trials: tuple[Trial, ...]
@@ -91,16 +91,16 @@ class Stage:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two causes fitted together, and what each is worth alone and beside the other.
+    """Two causes fitted together.
 
     Attributes
     ----------
     terms : tuple of Term
-        The two.
+        The two causes.
     model : Model
         The model with both.
     alone, beside : tuple of float
-        The p-value of each on top of the base, and on top of the other.
+        p-value of each added to the base, and added to the other.
     """
 
     terms: tuple[Term, Term]
@@ -110,27 +110,27 @@ class Pair:
 
     @property
     def masked(self) -> tuple[Term, ...]:
-        """Those that show only beside the other."""
+        """Causes that are significant only beside the other."""
         both = zip(self.terms, self.alone, self.beside, strict=True)
         return tuple(t for t, alone, beside in both if alone > LEVEL and beside <= LEVEL)
 
 
 @dataclass(frozen=True)
 class Search:
-    """What was tried, and the model that came out.
+    """Result of the search.
 
     Attributes
     ----------
     stages : tuple of Stage
-        The first on top of the base.
+        Stages, the first on the base.
     pairs : tuple of Pair
         Every two causes, each in its best form.
     model : Model
-        The accepted one.
+        The accepted model.
     accepted : tuple of Trial
-        In the order of evidence.
+        Accepted forms, in the order of evidence.
     dropped : tuple of Term
-        Accepted at first, then without worth beside the others.
+        Forms that are no longer significant beside later ones.
     """
 
     stages: tuple[Stage, ...]
@@ -141,14 +141,14 @@ class Search:
 
 
 def available(study: Study, terms: Sequence[Term] = TERMS) -> tuple[Term, ...]:
-    """Return the forms that the table's loads and ways allow to be fitted."""
+    """Return the forms that can be fitted to the loads and branches of a table."""
     cells = study.cells
     one_way = not cells.falling.any()
     return tuple(t for t in terms if t.loads <= len(cells.loads) and not (t.both_ways and one_way))
 
 
 def unexplained(study: Study, model: Model) -> bool:
-    """Return whether the residual is larger than repeats explain, or than a model can be right."""
+    """Return whether the residual is larger than repeats, or a good model, explain."""
     _, p, _ = lack_of_fit(study, model)
     if np.isnan(p):
         return model.rms > RIGHT * study.cells.millimetres
@@ -156,7 +156,7 @@ def unexplained(study: Study, model: Model) -> bool:
 
 
 def stage(study: Study, parent: Model, terms: Sequence[Term], singles: Sequence[Model]) -> Stage:
-    """Try forms on top of ``parent``; ``singles`` are models with one of them alone."""
+    """Add forms to ``parent``; ``singles`` are models with one of them alone."""
     trials = []
     for term in terms:
         known = [s for s in singles if s.terms == (term,) and parent.terms]
@@ -170,7 +170,7 @@ def stage(study: Study, parent: Model, terms: Sequence[Term], singles: Sequence[
 
 
 def _ranked(study: Study, trials: Sequence[Trial]) -> tuple[Trial, ...]:
-    """Return the trials, best first, each with how far it is behind the best."""
+    """Return the trials, best first, each with its distance from the best."""
     order = sorted(trials, key=lambda trial: (not trial.passes, -trial.gain))
     best = order[0].model if order else None
     made = []
@@ -182,7 +182,7 @@ def _ranked(study: Study, trials: Sequence[Trial]) -> tuple[Trial, ...]:
 
 
 def _choice(study: Study, ranked: Sequence[Trial], terms: Sequence[Term]) -> Trial | None:
-    """Return the best that passes; of its cause, the best known form that is not excluded."""
+    """Return the best accepted form; of its cause, the best established one not excluded."""
     passing = [trial for trial in ranked if trial.passes]
     if not passing:
         return None
@@ -191,7 +191,7 @@ def _choice(study: Study, ranked: Sequence[Trial], terms: Sequence[Term]) -> Tri
 
 
 def search(study: Study) -> Search:
-    """Look for causes until none pays."""
+    """Search for causes until none is accepted."""
     terms = available(study)
     stages = [stage(study, study.base, terms, ())] if terms else []
     singles = [trial.model for trial in stages[0].trials] if stages else []
@@ -229,7 +229,7 @@ def _pairs(study: Study, first: Stage) -> tuple[Pair, ...]:
 
 
 def _hidden(study: Study, pairs: Sequence[Pair]) -> list[Trial]:
-    """Return two causes that hide each other: neither shows alone, both do together."""
+    """Return two causes that mask each other: significant only together."""
     made = []
     for pair in pairs:
         p = max(pair.beside)
@@ -244,13 +244,13 @@ def _hidden(study: Study, pairs: Sequence[Pair]) -> list[Trial]:
 
 
 def _retested(study: Study, found: Search) -> Search:
-    """Drop what is without worth once the others are in."""
+    """Drop accepted causes that are not significant beside the later ones."""
     accepted, dropped = list(found.accepted), []
     while len(accepted) > 1:
         model = accepted[-1].model
         judged = [(_without(study, model, trial.term), trial) for trial in accepted[:-1]]
-        worth = [(p_value(study, less, model), less, trial) for less, trial in judged]
-        p, less, trial = max(worth, key=lambda one: one[0])
+        tested = [(p_value(study, less, model), less, trial) for less, trial in judged]
+        p, less, trial = max(tested, key=lambda one: one[0])
         if p <= LEVEL:
             break
         accepted.remove(trial)

@@ -1,4 +1,4 @@
-"""Against what the residual of a static model varies, and how alike its causes look."""
+"""Structure of the residual of a static model, and isolability of its causes."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ Array = NDArray[np.float64]
 Json = dict[str, Any]
 
 LAGS = 6
-"""Neighbours that the test of whiteness looks at."""
+"""Number of lags of the whiteness test."""
 DEGREE = 3
-"""Degree of the flexible model, one polynomial for each load and way."""
+"""Degree of the flexible model, one polynomial for each load and branch."""
 
 
 def whiteness(cells: Cells, model: Model) -> float:
-    """Return the p-value that neighbouring residuals of a path are unrelated (Ljung-Box)."""
+    """Return the p-value of uncorrelated residuals along the paths (Ljung-Box test)."""
     paths = [model.residual[(cells.path == k) & cells.used] for k in np.unique(cells.path)]
     paths = [path - path.mean() for path in paths if len(path) > LAGS]
     n = sum(len(path) for path in paths)
@@ -37,7 +37,7 @@ def whiteness(cells: Cells, model: Model) -> float:
 
 
 def explained(values: Array, labels: NDArray[Any]) -> float:
-    """Return the adjusted share of variance that means by label explain, at least 0."""
+    """Return the adjusted share of variance explained by means of each label, at least 0."""
     _, member = np.unique(labels, return_inverse=True)
     count = np.bincount(member)
     means = np.bincount(member, values) / count
@@ -52,7 +52,7 @@ def _adjusted(left: float, fitted: int, values: Array) -> float:
 
 
 def explained_by_polynomials(cells: Cells, residual: Array) -> float:
-    """Return the adjusted share of variance that polynomials by load and way explain."""
+    """Return the adjusted share of variance explained by polynomials of each load and branch."""
     left, fitted = 0.0, 0
     for group in range(len(cells.loads)):
         for falling in (False, True):
@@ -66,7 +66,7 @@ def explained_by_polynomials(cells: Cells, residual: Array) -> float:
 
 
 def since_reversal(cells: Cells) -> NDArray[np.int64]:
-    """Return how many readings ago the pressure turned, or the path began, shape (C,)."""
+    """Return the number of readings since the last reversal or start of the path, shape (C,)."""
     fresh = np.ones(len(cells.path), bool)
     fresh[1:] = (np.diff(cells.path) != 0) | (cells.falling[1:] != cells.falling[:-1])
     start = np.maximum.accumulate(np.where(fresh, np.arange(len(fresh)), 0))
@@ -99,10 +99,10 @@ def structure(cells: Cells, model: Model) -> Json:
 
 
 def isolability(study: Study) -> Json:
-    """Return how alike small causes look once the base has been refitted.
+    """Return the isolability of small causes after a refit of the base.
 
-    Each cause is added to the base at its meaningful size, in its best known form; what a refit of
-    the base would swallow is taken out.
+    Each cause is added to the base in its best established form at its meaningful size; the part
+    that a refit of the base absorbs is removed.
     """
     first = dict[str, Term]()
     for term in available(study):

@@ -1,11 +1,11 @@
-"""The diagnosis of a table of readings in a few sentences."""
+"""Verdict on a table of readings in a few sentences."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pam_envs.diagnosis.static.compare import lack_of_fit
-from pam_envs.diagnosis.static.findings import Findings, verdict
+from pam_envs.diagnosis.static.findings import FLOOR_REACHED, Findings, verdict
 from pam_envs.diagnosis.static.models import Term, units
 from pam_envs.diagnosis.static.search import Trial
 
@@ -16,8 +16,8 @@ def sentences(f: Findings) -> str:
     if word == "insufficient":
         cells, needed = int(f.study.cells.used.sum()), 2 * len(f.base.fit.numbers)
         return (
-            f"The table has {cells} cells; at least {needed} are needed to fit a static law with "
-            "hysteresis and to judge it. Measure more pressures, up and down."
+            f"The table has {cells} cells; a static law with hysteresis needs at least {needed} to "
+            "be fitted and judged. Measure more pressures, up and down."
         )
     if not f.search.accepted:
         return _nothing(f, word == "adequate")
@@ -25,31 +25,32 @@ def sentences(f: Findings) -> str:
 
 
 def _nothing(f: Findings, adequate: bool) -> str:
-    told = _missed(f)
+    text = _missed(f)
     if adequate:
-        return f"{told} No cause that the table can show is needed: the load-blind model will do."
+        return f"{text} The load-blind model is adequate: the table shows no cause."
     _, _, size = lack_of_fit(f.study, f.base)
-    much = f" ({size:.2f} mm of it more than repeats explain)" if np.isfinite(size) else ""
-    return f"{told} Something is left{much}, and no cause of the catalogue carries it."
+    much = f" of {size:.2f} mm" if np.isfinite(size) else ""
+    return f"{text} An error{much} beyond the repeats is left, which no known cause explains."
 
 
 def _missed(f: Findings) -> str:
     held, kind = f.base.held_out, f.study.lanes.kind
-    told = f"A load-blind muscle misses {kind} left out by {held:.2f} mm"
+    text = f"The error of a load-blind muscle on held-out {kind} is {held:.2f} mm"
     if np.isfinite(f.floor):
-        return f"{told}, {held / f.floor:.1f} times the floor of {f.floor:.3f} mm."
-    return f"{told}; without repeats no floor is known to hold it against."
+        return f"{text}, {held / f.floor:.1f} times the noise floor of {f.floor:.3f} mm."
+    return f"{text}; without repeats the noise floor is unknown."
 
 
 def _named(f: Findings) -> str:
     parts = [_cause(f, trial) for trial in f.search.accepted]
     rivals = sorted({rival.term.cause for _, rival in f.ties})
-    told = f"Named: {'; '.join(parts)}."
-    return f"{told} Not told apart from {' and '.join(rivals)}." if rivals else told
+    text = f"Named: {'; '.join(parts)}."
+    return f"{text} Not separated from {' and '.join(rivals)}." if rivals else text
 
 
 def _cause(f: Findings, trial: Trial) -> str:
-    hidden = f" (hidden until {f.shown_by(trial.term)} is in)" if f.shown_by(trial.term) else ""
+    masking = f.shown_by(trial.term)
+    hidden = f" (significant only beside {masking})" if masking else ""
     numbers = ", ".join(_number(f, trial.term, i) for i in range(len(trial.term.numbers)))
     return f"{trial.term.cause} as {trial.term.form}, {numbers}{hidden}"
 
@@ -70,13 +71,13 @@ def _loads(f: Findings) -> str:
     if not np.isfinite(before):
         return ""
     cut = 100.0 * (1.0 - after / before)
-    told = f"A load left out is predicted to {after:.2f} instead of {before:.2f} mm ({-cut:+.0f} %)"
+    text = f"The error on a held-out load is {after:.2f} instead of {before:.2f} mm ({-cut:+.0f} %)"
     if not f.bent:
-        return told + " by effects linear in load."
+        return text + " with effects linear in load."
     power = f.laws[0]
     label = "post hoc, not held out" if power.post_hoc else "held out"
     return (
-        f"{told} by effects linear in load, as fixed beforehand; to {power.left_load:.2f} mm with "
+        f"{text} with effects linear in load, as fixed beforehand; {power.left_load:.2f} mm with "
         f"the exponent {power.value:.1f} ({label})."
     )
 
@@ -85,11 +86,11 @@ def _left(f: Findings) -> str:
     ratio = f.model.held_out / f.floor
     if not np.isfinite(ratio):
         return ""
-    held = f"{f.model.held_out:.2f} mm on {f.study.lanes.kind} left out"
-    if ratio <= f.reached:
-        return f"The floor is reached: {held}."
+    held = f"{f.model.held_out:.2f} mm on held-out {f.study.lanes.kind}"
+    if ratio <= FLOOR_REACHED:
+        return f"The noise floor is reached: {held}."
     f_value, _, size = lack_of_fit(f.study, f.model)
     return (
-        f"The floor is not reached: {held} is {ratio:.1f} times it, {size:.2f} mm are left that "
-        f"repeats do not explain (lack of fit F = {f_value:.0f})."
+        f"The noise floor is not reached: {held} is {ratio:.1f} times it, {size:.2f} mm are not "
+        f"explained by repeats (lack of fit F = {f_value:.0f})."
     )

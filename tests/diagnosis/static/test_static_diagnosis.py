@@ -65,7 +65,7 @@ def test_the_load_blind_model_is_three_floors_off(measured):
 
 def test_effects_linear_in_load_cut_the_error_on_a_load_left_out_by_30_percent(measured):
     before, after = (
-        measured[key]["contraction"]["kinds"]["loads, one left out (mean)"]
+        measured[key]["contraction"]["kinds"]["loads, one held out (mean)"]
         for key in ("error_before", "error_after")
     )
     assert after <= 0.7 * before
@@ -103,7 +103,7 @@ def test_the_width_is_masked_until_the_shift_is_in(measured):
     assert beside["accepted"]
     pair = next(p for p in measured["readings"]["pairs"] if p["names"] == [COMPLIANCE, WIDTH])
     assert pair["masked"] == [WIDTH]
-    assert "hidden until load_dependent_compliance is in" in measured["text"]
+    assert "significant only beside load_dependent_compliance" in measured["text"]
 
 
 def test_residual_creep_and_a_threshold_are_not_needed(measured):
@@ -120,7 +120,7 @@ def test_an_exponent_is_post_hoc_and_cannot_be_told_from_a_dead_zone(measured):
     assert power["cells_mm"] == pytest.approx(dead["cells_mm"], abs=1e-4)
     told = " ".join(measured["warnings"])
     assert "measure at least five" in told
-    assert "the readings do not tell them apart" in told
+    assert "the readings do not separate them" in told
     assert measured["experiment"]["between"] == ["power", "dead zone"]
     assert "1.5 kg and 3.6 kg" in measured["experiment"]["description"]
 
@@ -128,13 +128,13 @@ def test_an_exponent_is_post_hoc_and_cannot_be_told_from_a_dead_zone(measured):
 def test_the_floor_is_not_reached_and_the_report_says_by_how_much(measured):
     assert measured["readings"]["lack_of_fit"]["after"]["F"] > 8.0
     assert measured["error_after"]["contraction"]["times_floor"] == pytest.approx(1.57, abs=0.05)
-    assert "The floor is not reached" in measured["text"]
+    assert "The noise floor is not reached" in measured["text"]
 
 
 def test_the_audit_finds_drift_unequal_scatter_and_the_missed_set_point(measured):
     told = " ".join(measured["warnings"])
     assert "drift by +0.033 mm a repeat" in told
-    assert "do not scatter alike" in told
+    assert "scatter differently" in told
     (point,) = measured["readings"]["set_points"]
     assert (point["pressure"], point["falling"]) == (5.5, False)
     assert point["loads"] == [0.0, 2.55]
@@ -161,7 +161,7 @@ def test_a_table_whose_loops_narrow_with_the_load_is_named_so():
     found = diagnose_readings(table(seed=2, width=lambda m: np.exp(-0.08 * m)))
     assert found["verdict"] == "named"
     assert [c["name"] for c in found["causes"]] == [WIDTH]
-    assert "The floor is reached" in found["text"]
+    assert "The noise floor is reached" in found["text"]
 
 
 def test_a_law_of_five_loads_is_judged_without_each():
@@ -171,7 +171,7 @@ def test_a_law_of_five_loads_is_judged_without_each():
     power = found["readings"]["load_laws"][0]
     assert power["status"] == "held out"
     assert power["value"] == pytest.approx(2.0, abs=0.25)
-    linear = found["error_after"]["contraction"]["kinds"]["loads, one left out (mean)"]
+    linear = found["error_after"]["contraction"]["kinds"]["loads, one held out (mean)"]
     assert power["load_left_out_mm"] < 0.7 * linear
 
 
@@ -187,7 +187,7 @@ def test_with_one_repeat_the_floor_is_unknown_and_the_shift_still_named():
     found = diagnose_readings(table(repeats=1, seed=5, shift=lambda m: 0.36 * (m / 4.55) ** 1.3))
     assert found["noise_floor"]["contraction"]["value"] is None
     assert found["causes"][0]["name"] == COMPLIANCE
-    assert "pressures, one left out" in found["error_after"]["contraction"]["kinds"]
+    assert "pressures, one held out" in found["error_after"]["contraction"]["kinds"]
     assert any("noise floor is not known" in told for told in found["warnings"])
 
 
