@@ -148,6 +148,12 @@ class Plant:
     def _model(self) -> HysteresisModel:
         return self._component.model
 
+    def linearise(self, **point: Any) -> Any:
+        """Return the ``control.StateSpace`` about a point of rest (``core.linearise``)."""
+        from pam_envs.plants.core.linearise import linearise
+
+        return linearise(self, **point)
+
     def to_yaml(self, path: str | Path) -> None:
         """Write the plant to a file that :meth:`from_yaml` and ``gym.make(plant=...)`` read."""
         plant_file.write(self, Path(path))

@@ -1,0 +1,131 @@
+"""Smooth equations of the antagonistic joint about a point of rest, for :meth:`Plant.linearise`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from pam_envs.plants.core.linearise import Array, Branch, Equilibrium, local_branch
+
+Inputs = Literal["pressure", "angle"]
+SIZE = 1e-5
+"""Contraction, or angle [rad], over which the slope of a branch is taken."""
+
+
+def at_rest(
+    plant: AntagonisticJoint,
+    angle: float = 0.0,
+    prestress: float | None = None,
+    payload: float = 0.0,
+    inputs: Inputs = "pressure",
+    branch: Branch = "loading",
+) -> Equilibrium:
+    """Return the equations about the rest at an angle and a co-contraction.
+
+    States: pressure_a, pressure_b [Pa], angle [rad], velocity [rad/s]; of the reduced plant angle
+    and velocity. Inputs: set_point_a, set_point_b [Pa], or command [rad] and co_contraction [N]
+    through the feed-forward (of the reduced plant: command). Output: angle.
+
+    Parameters
+    ----------
+    plant : AntagonisticJoint
+    angle : float
+        Angle at rest [rad], reached from the straight joint.
+    prestress : float, optional
+        Co-contraction [N]; default: the nominal one.
+    payload : float
+        Mass at the link's end [kg].
+    inputs : {"pressure", "angle"}
+        Set-points of the regulators, or of the feed-forward.
+    branch : {"loading", "turned"}
+        See :mod:`pam_envs.plants.core.linearise`.
+    """
+    link = plant.link
+    inertia = link.inertia + payload * link.length**2
+    if plant.dynamics == "reduced":
+        return _reduced(plant, angle, payload, branch)
+    stress = plant.prestress if prestress is None else prestress
+    weight = float(plant.weight_torque(angle, payload))
+    a, b, short = plant.pressures_for(angle, stress, weight)
+    if short:
+        raise ValueError(f"angle = {angle:g} rad is out of reach at {stress:g} N: choose a smaller")
+    pull = muscle_torque(plant, angle, branch)
+
+    def derivative(state: Array, command: Array) -> Array:
+        set_points, (phi, speed) = command, state[2:]
+        if inputs == "angle":
+            set_points = np.array(plant.pressures_for(command[0], command[1], weight)[:2])
+        torque = pull(phi, speed, state[:2]) - float(plant.weight_torque(phi, payload))
+        bend = (torque - link.damping * speed) / inertia
+        lag = (set_points - state[:2]) / plant.regulator.time_constant
+        return np.array([*lag, speed, bend])
+
+    by_angle = inputs == "angle"
+    return Equilibrium(
+        derivative,
+        lambda state: state[2:3],
+        np.array([a, b, angle, 0.0]),
+        np.array([angle, stress] if by_angle else [a, b]),
+        np.array([10.0, 10.0, 1e-6, 1e-6, *([1e-6, 1e-3] if by_angle else [10.0, 10.0])]),
+        (
+            ("pressure_a", "pressure_b", "angle", "velocity"),
+            ("command", "co_contraction") if by_angle else ("set_point_a", "set_point_b"),
+            ("angle",),
+        ),
+    )
+
+
+def muscle_torque(
+    plant: Any, angle: float, branch: Branch
+) -> Callable[[float, float, Array], float]:
+    """Return the torque [N m] of a pair by angle [rad], velocity [rad/s] and pressures [Pa].
+
+    The friction of both muscles is that of their branches at ``angle``.
+    """
+    muscle, lever, friction = plant.muscle, plant.lever, plant.hysteresis
+    straight = lever.contraction(0.0, muscle.rest_length)
+    at = lever.contraction(angle, muscle.rest_length) - straight
+    ways = np.sign(lever.contraction(angle + 1e-3, muscle.rest_length) - straight - at)
+    lines = [
+        local_branch(friction.operator, float(x), float(x - way * 1e-12 if x == 0.0 else 0.0),
+                     branch, SIZE)
+        for x, way in zip(at, ways, strict=True)
+    ]  # fmt: skip
+    gains = muscle.gain * (1.0 + np.array([1.0, -1.0]) * muscle.imbalance)
+
+    def torque(phi: float, speed: float, pressures: Array) -> float:
+        x, rate = lever.contraction(phi, muscle.rest_length), lever.rate(phi)
+        felt = np.array([line(v) for line, v in zip(lines, x - straight, strict=True)])
+        drag = friction.width * (friction.base + friction.rate * pressures) * (x - straight - felt)
+        slide = muscle.viscosity * pressures * -rate * speed / muscle.rest_length
+        forces = gains * muscle.law(pressures, x) - drag - slide
+        return float(-np.sum(np.maximum(0.0, forces) * rate))
+
+    return torque
+
+
+def _reduced(plant: AntagonisticJoint, angle: float, payload: float, branch: Branch) -> Equilibrium:
+    """Return the equations of the reduced plant: a branch of its hysteresis and a double pole."""
+    nominal, width = plant.nominal, plant.hysteresis.width
+    line = local_branch(plant.hysteresis.operator, angle, 0.0, branch, SIZE)
+    weight = float(plant.weight_torque(line(angle), payload))
+
+    def derivative(state: Array, command: Array) -> Array:
+        phi, speed = state
+        target = command[0] - width * (command[0] - float(line(command[0])))
+        torque = (weight - float(plant.weight_torque(phi, payload))) / nominal.stiffness
+        pole = nominal.pole
+        return np.array([speed, pole * pole * (target - phi + torque) - 2.0 * pole * speed])
+
+    rest = angle - width * (angle - float(line(angle)))
+    return Equilibrium(
+        derivative,
+        lambda state: state[:1],
+        np.array([rest, 0.0]),
+        np.array([angle]),
+        np.full(3, 1e-6),
+        (("angle", "velocity"), ("command",), ("angle",)),
+    )

@@ -1,0 +1,99 @@
+"""Smooth equations of the knee orthosis about a point of rest, for :meth:`Plant.linearise`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pam_envs.plants.core.linearise import Array, Branch, Equilibrium, local_branch
+from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
+from pam_envs.pneumatics.measured_dynamics import modes
+
+
+def at_rest(
+    plant: KneeOrthosis,
+    pressure: float = 2e5,
+    knee: float = 0.0,
+    branch: Branch = "loading",
+) -> Equilibrium:
+    """Return the equations about the rest at a set-point pressure.
+
+    States: pressure [Pa] (with the measured dynamics its modes instead), then angle [rad] and
+    velocity [rad/s] but in the rig. On the leg the angle is that of the wire about the wearer's
+    path, which the wearer holds with the stiffness of the swing. Input: set_point [Pa]. Outputs:
+    tension [N], torque [N m] (extension positive), pressure [Pa], and the angle.
+
+    Parameters
+    ----------
+    plant : KneeOrthosis
+    pressure : float
+        Set-point [Pa], reached by inflation from none.
+    knee : float
+        Flexion of the knee [rad], on the leg.
+    branch : {"loading", "turned"}
+        See :mod:`pam_envs.plants.core.linearise`.
+    """
+    full, muscle, lever = plant.regulator.max_pressure, plant.muscle, plant.lever
+    if not 0.0 < pressure < full:
+        raise ValueError(f"pressure = {pressure:g} Pa; give one between 0 and {full:g} Pa")
+    line = local_branch(plant.hysteresis.scaled, pressure, 0.0, branch, 1e-4 * full)
+    ratio = 1.0 if plant.hysteresis.operator else muscle.stiffness_ratio
+
+    def stiffness(p: Any) -> Array:
+        return np.asarray(muscle.gain * ratio * line(p))
+
+    matrix, settled, share = _regulator(plant)
+    air = len(settled)
+    rig, leg = plant.mounting == "rig", plant.mounting == "leg"
+    if rig:
+        angle = float(lever.angle(plant.fixture.length))
+    else:
+        angle = lever.mount_angle + knee if leg else float(plant.angle_at(stiffness(pressure)))
+    inertia = lever.inertia + (plant.leg.inertia if leg else 0.0)
+    damping = lever.damping + (plant.leg.hold_damping if leg else 0.0)
+    hold = plant.leg.hold_stiffness if leg else 0.0
+
+    def tension_torque(state: Array) -> tuple[float, float]:
+        theta = angle if rig else state[air]
+        pull = float(muscle.tension(stiffness(share @ state[:air]), lever.length(theta)))
+        return pull, float(lever.torque(pull, theta))
+
+    rest = np.concatenate([pressure * settled, [] if rig else [angle, 0.0]])
+    balance = tension_torque(rest)[1]
+
+    def derivative(state: Array, command: Array) -> Array:
+        rates = matrix @ (state[:air] - settled * command[0])
+        if rig:
+            return rates
+        theta, speed = state[air:]
+        torque = tension_torque(state)[1] - (balance if leg else 0.0)
+        pull = torque + hold * (theta - angle) + damping * speed
+        return np.array([*rates, speed, -pull / inertia])
+
+    def outputs(state: Array) -> Array:
+        shown = [*tension_torque(state), share @ state[:air]]
+        return np.array(shown if rig else [*shown, state[air]])
+
+    lags = ("pressure",) if air == 1 else tuple(f"mode_{k}" for k in range(air))
+    moving = () if rig else ("angle", "velocity")
+    return Equilibrium(
+        derivative,
+        outputs,
+        rest,
+        np.array([pressure]),
+        np.array([10.0] * air + ([] if rig else [1e-6, 1e-5]) + [10.0]),
+        ((*lags, *moving), ("set_point",), ("tension", "torque", "pressure", *moving[:1])),
+    )
+
+
+def _regulator(plant: KneeOrthosis) -> tuple[Array, Array, Array]:
+    """Return ``A``, ``settled`` and ``share`` of ``s' = A (s - settled u)``, ``p = share s``."""
+    if plant.dynamics == "lag":
+        return np.array([[-1.0 / plant.regulator.time_constant]]), np.ones(1), np.ones(1)
+    *real, (pole, gain) = modes()
+    n = len(real)
+    matrix = np.diag([*(p.real for p, _ in real), pole.real, pole.real])
+    matrix[n, n + 1], matrix[n + 1, n] = -pole.imag, pole.imag
+    share = [*(g.real for _, g in real), 2.0 * gain.real, -2.0 * gain.imag]
+    return matrix, np.array([*[1.0] * (n + 1), 0.0]), np.array(share)
