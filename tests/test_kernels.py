@@ -229,6 +229,21 @@ def test_code_on_disk_survives_other_words_and_not_another_value(tmp_path: Path)
     assert len(list(cache.iterdir())) == 4
 
 
+@pytest.mark.skipif(not kernels.COMPILED, reason="nothing is kept on disk")
+def test_code_on_disk_survives_a_move_of_its_module(tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    places = os.pathsep.join([str(ROOT), str(tmp_path)])
+    variables = {**os.environ, "PYTHONPATH": places, "PAM_ENVS_CACHE": str(cache)}
+    source = _KEPT.format(offset=3.0, docstring="Add.").replace("print(build", "made = (build")
+    for name in ("before_the_move", "after_the_move"):
+        (tmp_path / f"{name}.py").write_text(source)
+        command = [sys.executable, "-c", f"import {name}; print({name}.made)"]
+        done = subprocess.run(command, env=variables, check=True, capture_output=True, text=True)
+        assert float(done.stdout) == 8.0
+        (tmp_path / f"{name}.py").unlink()
+        assert sorted(p.suffix for p in cache.iterdir()) == [".nbc", ".nbi"]
+
+
 _BUILT_APART = """
 import sys
 import numpy as np

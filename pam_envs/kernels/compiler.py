@@ -182,6 +182,7 @@ def compiled(
         digest = build.graph_digest(original, names, digests)
         made.__name__ = f"{entry_name if entry else original.__name__}_{digest}"
         made.__qualname__ = made.__name__
+        made.__module__ = build.__name__  # code from the disk imports it: no kernel's own place
         if not entry:
             return njit(forceinline=original.__pam_kernel__, **_CALLEE)(made)  # type: ignore[no-any-return]
         dispatcher = njit(parallel=parallel, **_OPTIONS)(made)
