@@ -57,6 +57,11 @@ class _Locator(caching._CacheLocator):
 class _CacheImpl(caching.CompileResultCacheImpl):
     _locator_classes: ClassVar[list[Any]] = [_Locator]
 
+    def get_filename_base(self, fullname: str, abiflags: str) -> str:
+        """Return the file's name: the function's unique name, without that of its module."""
+        base: str = super().get_filename_base(fullname.partition(".")[2], abiflags)
+        return base
+
 
 class _Cache(caching.Cache):
     _impl_class = _CacheImpl
