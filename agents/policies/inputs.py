@@ -1,4 +1,4 @@
-"""Names of the numbers that a policy's network sees, in their order."""
+"""Names of a policy network's inputs, in order."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from pam_envs.wording import near
 
 
 def names(config: Config, signals: Signals, actions: Signals) -> tuple[str, ...]:
-    """Return the signals, the controller's action of a residual, and what is kept of the past."""
+    """Return the signals, a residual's controller's action, and the history."""
     seen = present(config, signals, actions)
     frames = config.history.frames
     return (*seen, *(f"{n}@{k + 1}" for k in range(frames) for n in config.history.signals))
 
 
 def present(config: Config, signals: Signals, actions: Signals) -> tuple[str, ...]:
-    """Return the inputs that are of the present."""
+    """Return the present inputs, without the history."""
     corrected = actions if config.residual.controller else ()
     return (*signals.names(), *(f"controller_{action.name}" for action in corrected))
 
 
 def index(known: tuple[str, ...], name: str, where: str) -> int:
-    """Return an input's place, or raise naming the nearest."""
+    """Return an input's index, or raise naming the nearest."""
     name = name.strip()
     if name not in known:
         raise SettingsError(f"{where}: no signal named {name!r}{near(name, known)}")
@@ -30,6 +30,6 @@ def index(known: tuple[str, ...], name: str, where: str) -> int:
 
 
 def kept(config: Config, signals: Signals, actions: Signals) -> tuple[int, ...]:
-    """Return the places of the inputs that ``history`` keeps."""
+    """Return the indices of the inputs in the history."""
     known = present(config, signals, actions)
     return tuple(index(known, name, "history.signals") for name in config.history.signals)

@@ -1,6 +1,6 @@
 """A trained policy as a controller: an ONNX file, run by onnxruntime on one thread.
 
-Needs neither torch nor stable-baselines3, and loading one cannot run code.
+It needs neither torch nor stable-baselines3, and loading a file cannot run code.
 """
 
 from __future__ import annotations
@@ -30,27 +30,27 @@ FIELDS = tuple(field.name for field in dataclasses.fields(Signal))
 
 
 def describe(signals: Signals) -> list[dict[str, Any]]:
-    """Return signals as plain values, as they stand on a policy's card."""
+    """Return signals as plain values, as on a policy's card."""
     return [dataclasses.asdict(signal) for signal in signals]
 
 
 class OnnxPolicy:
-    """A controller (``predict`` as in stable-baselines3) that is data.
+    """Policy file with the ``predict`` method of stable-baselines3.
 
-    The normaliser, the past and the limits of the action are inside the file. Each row of a batch
-    is computed as if it were alone, to the last bit. A policy that corrects a controller answers
-    with one: see :class:`agents.policies.residual.ResidualPolicy`.
+    The file includes the normaliser, the history and the limits of the action. A row's action does
+    not depend on the other rows of a batch, to the last bit. A policy that corrects a controller
+    acts together with it: see :class:`agents.policies.residual.ResidualPolicy`.
 
     Attributes
     ----------
     memory : int
-        Numbers a row that it remembers from call to call; 0 for none.
+        Width of the state, of a recurrent layer or a history; 0 for none.
     corrects : str
         Name of the controller that it corrects; empty for none.
     card : dict
         Environment, signals, algorithm, steps, seed, versions and command of the training.
     signals, action_signals : Signals
-        What it reads and what it writes.
+        Of its input and output.
     """
 
     def __init__(self, data: bytes, card: dict[str, Any], name: str = "the policy") -> None:
@@ -77,13 +77,13 @@ class OnnxPolicy:
         path : str or Path
             An ONNX file of :func:`agents.export.export.export_policy`.
         signals, action_signals : Signals, optional
-            The environment's (``env.unwrapped.signals``); given, they must be those of the
+            Of the environment (``env.unwrapped.signals``); if given, they must equal those of the
             training.
 
         Raises
         ------
         PolicyFileError
-            If the file may not be run (see :mod:`agents.policies.policy_file`) or the signals differ.
+            If the file is refused (see :mod:`agents.policies.policy_file`) or the signals differ.
         """
         file = read(path)
         made = cls(file.data, file.card, Path(path).name)
@@ -91,7 +91,7 @@ class OnnxPolicy:
         return made
 
     def check(self, signals: Signals | None, action_signals: Signals | None = None) -> None:
-        """Raise a clear error unless the signals are those of the training."""
+        """Raise unless the signals are those of the training."""
         for mine, theirs, kind in (
             (self.signals, signals, "observation"),
             (self.action_signals, action_signals, "action"),
@@ -112,12 +112,12 @@ class OnnxPolicy:
         ----------
         observation : array, shape (n_signals,) or (n_env, n_signals)
         state : array, shape (1 or n_env, memory), optional
-            As the last call returned it; None begins an episode in every row. A policy without
-            memory does not look at it.
+            Returned by the last call; None begins an episode in every row. Ignored by a policy
+            without memory.
         episode_start : bool or array, shape (n_env,), optional
-            Rows that begin an episode: their state is forgotten.
+            Rows that begin an episode, whose state is reset.
         deterministic : bool
-            The file holds the deterministic action; False gives the same.
+            Ignored: the file holds the deterministic action.
 
         Returns
         -------
@@ -142,14 +142,14 @@ class OnnxPolicy:
         episode_start: Any = None,
         controller: NDArray[np.float32] | None = None,
     ) -> tuple[NDArray[np.float32], Any]:
-        """Return the action, given a controller's action where the policy corrects one.
+        """Return the action, given the action of the controller that the policy corrects.
 
         Parameters
         ----------
         observation, state, episode_start
             See :meth:`predict`.
         controller : array of float32, shape of the action, optional
-            What the controller answers to the same observation.
+            The controller's action for the same observation.
         """
         made = np.asarray(observation, np.float32)
         rows = made if made.ndim == 2 else made[None]
@@ -162,14 +162,14 @@ class OnnxPolicy:
         if controller is not None:
             fed[CONTROLLER] = np.ascontiguousarray(controller).reshape(len(rows), -1)
         if self.memory:
-            fed |= self._remembered(state, episode_start, len(rows))
+            fed |= self._state_inputs(state, episode_start, len(rows))
             action, state = self._session.run([OUTPUT, AFTER], fed)
         else:
             action = self._session.run([OUTPUT], fed)[0]
         return (action if made.ndim == 2 else action[0]), state
 
-    def _remembered(self, state: Any, episode_start: Any, rows: int) -> dict[str, NDArray[Any]]:
-        """Return the state and where episodes begin, as the file wants them."""
+    def _state_inputs(self, state: Any, episode_start: Any, rows: int) -> dict[str, NDArray[Any]]:
+        """Return the inputs for the state and the beginnings of episodes."""
         starts = np.zeros((rows, 1), np.float32)
         if state is None:
             starts[:] = 1.0
@@ -178,8 +178,8 @@ class OnnxPolicy:
             starts[:, 0] = episode_start
         if np.shape(state) != (rows, self.memory):
             raise ValueError(
-                f"the state has shape {np.shape(state)}, expected ({rows}, {self.memory}); give "
-                "back what the last call returned, or None to begin"
+                f"the state has shape {np.shape(state)}, expected ({rows}, {self.memory}); "
+                "give the state that the last call returned, or None to begin"
             )
         return {STATE: state, START: starts}
 
@@ -188,7 +188,7 @@ class OnnxPolicy:
         return self._digest[:16]
 
     def _check_shapes(self) -> int:
-        """Raise unless inputs and outputs are a policy's; return the width of its memory."""
+        """Raise unless inputs and outputs are a policy's; return the width of its state."""
         actions = len(self.action_signals)
         memory = _width(self._session.get_inputs(), STATE)
         inputs = {INPUT: len(self.signals)}
@@ -198,21 +198,21 @@ class OnnxPolicy:
         if memory:
             inputs |= {STATE: memory, START: 1}
             outputs[AFTER] = memory
-        for wanted, found in (
+        for expected, found in (
             (inputs, self._session.get_inputs()),
             (outputs, self._session.get_outputs()),
         ):
             shapes = {node.name: (node.type, node.shape[1:]) for node in found}
-            if shapes != {name: ("tensor(float)", [width]) for name, width in wanted.items()}:
+            if shapes != {name: ("tensor(float)", [width]) for name, width in expected.items()}:
                 raise PolicyFileError(
                     f"{self.name} has {shapes}, but by its card it should have float32 numbers a "
-                    f"row as follows: {wanted}; export it with agents.export.export.export_policy"
+                    f"row as follows: {expected}; export it with agents.export.export.export_policy"
                 )
         return memory
 
 
 def _width(nodes: Any, name: str) -> int:
-    """Return the number of columns of an input, 0 if it is not there."""
+    """Return the number of columns of an input, 0 if it does not exist."""
     shapes = [node.shape for node in nodes if node.name == name]
     return shapes[0][1] if shapes and len(shapes[0]) == 2 and isinstance(shapes[0][1], int) else 0
 
@@ -234,7 +234,7 @@ def _session(data: bytes, name: str) -> onnxruntime.InferenceSession:
     try:
         return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
     except Exception as error:
-        raise PolicyFileError(f"{name} is no graph that can be run: {error}") from error
+        raise PolicyFileError(f"{name} is no executable graph: {error}") from error
 
 
 def _signals(described: Any, name: str) -> Signals:

@@ -1,7 +1,7 @@
-"""Policy files: what is checked before a runtime sees one, and the card that each carries.
+"""Policy files: checks before execution, the card inside, and the training record beside.
 
-An ONNX file is data: a graph of arithmetic and its numbers. Checked here are the ways in which one
-could still reach beyond itself: weights in other files, operators of other vendors, loops, size.
+An ONNX file is data, a graph of arithmetic and its numbers. The checks refuse the ways in which a
+graph could still do harm: weights in other files, operators of other vendors, loops, size.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ INPUT, OUTPUT = "observation", "action"
 CONTROLLER = "controller"
 """Input of a policy that corrects a controller: the controller's action."""
 STATE, START, AFTER = "state", "start", "state_after"
-"""Inputs and output of a policy that remembers: numbers a row, and 1 where an episode begins."""
+"""Inputs and output of a policy with a state; ``start`` is 1 where an episode begins."""
 OPERATORS = frozenset(
     (
         *("Abs", "Add", "Cast", "Clip", "Concat", "Constant", "Div", "Elu", "Exp", "Flatten"),
@@ -40,17 +40,16 @@ OPERATORS = frozenset(
         *("Transpose", "Unsqueeze"),
     )
 )
-"""Operators of policies: none loops, and none can make a tensor from a size. A policy that
-remembers does so from call to call, by what it is given back."""
+"""Operators of policies: none loops, and none makes a tensor from a size."""
 
 
 class PolicyFileError(ValueError):
-    """A file that is not a policy, or not one that may be run; the message says what to do."""
+    """A file that is no policy, or a refused one; the message contains the remedy."""
 
 
 @dataclass(frozen=True)
 class PolicyFile:
-    """Bytes of a checked policy and its card, see :func:`agents.export.export.export_policy`."""
+    """Bytes and card of a checked policy; see :func:`agents.export.export.export_policy`."""
 
     data: bytes
     card: dict[str, Any]
@@ -62,7 +61,7 @@ def read(path: str | Path) -> PolicyFile:
     Raises
     ------
     PolicyFileError
-        If it is anything but a small ONNX policy of plain arithmetic with its card.
+        If it is not a small ONNX graph of plain arithmetic with a card.
     """
     path = Path(path)
     try:
@@ -141,7 +140,7 @@ def write_atomically(path: Path, data: bytes) -> None:
 
 
 def _refuse_code(name: str, data: bytes) -> None:
-    """Refuse files that run code when they are opened, before anything looks inside."""
+    """Refuse files that run code when they are opened."""
     kinds = {b"PK": "a zip file (as of stable-baselines3 or torch)", b"\x80": "a pickle"}
     for mark, kind in kinds.items():
         if data.startswith(mark):
@@ -153,7 +152,7 @@ def _refuse_code(name: str, data: bytes) -> None:
 
 
 def check_graph(model: onnx.ModelProto) -> None:
-    """Raise unless the model is plain arithmetic within its own file."""
+    """Raise unless the model is plain arithmetic in one file."""
     domains = {entry.domain for entry in model.opset_import} | {n.domain for n in model.graph.node}
     foreign = sorted(domains - {"", "ai.onnx"})
     if foreign:
@@ -180,13 +179,13 @@ def _check_tensors(tensors: Any) -> None:
     for tensor in tensors:
         if tensor.data_location == onnx.TensorProto.EXTERNAL or tensor.external_data:
             raise PolicyFileError(
-                f"the weights {tensor.name!r} lie in another file, which is not opened; "
+                f"the weights {tensor.name!r} are in another file, which is not opened; "
                 "export with the weights inside"
             )
 
 
 def _check_sizes(model: onnx.ModelProto) -> None:
-    """Refuse values that could grow beyond memory: one batch axis, the rest known and small."""
+    """Refuse values of unknown or large size, apart from the batch axis."""
     try:
         inferred = onnx.shape_inference.infer_shapes(model, check_type=True, strict_mode=True)
     except Exception as error:
@@ -198,7 +197,7 @@ def _check_sizes(model: onnx.ModelProto) -> None:
             sizes = [d.dim_value for d in dims or () if d.HasField("dim_value")]
             if dims is None or len(dims) - len(sizes) > 1 or math.prod(sizes) > MOST_NUMBERS:
                 raise PolicyFileError(
-                    f"the size of {name!r} (operator {node.op_type}) is not known beforehand or "
+                    f"the size of {name!r} (operator {node.op_type}) is not known in advance or "
                     f"above {MOST_NUMBERS:,} numbers a row; export a plain feed-forward network"
                 )
 
@@ -207,7 +206,7 @@ def _card(model: onnx.ModelProto) -> dict[str, Any]:
     texts = {entry.key: entry.value for entry in model.metadata_props}
     if CARD not in texts:
         raise PolicyFileError(
-            "does not say which signals it reads; export it with agents.export.export.export_policy"
+            "has no card with its signals; export it with agents.export.export.export_policy"
         )
     try:
         card = json.loads(texts[CARD])
@@ -215,7 +214,9 @@ def _card(model: onnx.ModelProto) -> dict[str, Any]:
         raise PolicyFileError(f"its card is not JSON: {error}") from error
     if not isinstance(card, dict) or card.get("schema") != SCHEMA:
         raise PolicyFileError(f"its card is not of schema {SCHEMA}; export it with this version")
-    wanted = {"env", "env_kwargs", "signals", "action_signals", "algo", "steps", "seed"}
-    if wanted - set(card):
-        raise PolicyFileError(f"its card lacks {', '.join(sorted(wanted - set(card)))}")
+    lacking = {"env", "env_kwargs", "signals", "action_signals", "algo", "steps", "seed"} - set(
+        card
+    )
+    if lacking:
+        raise PolicyFileError(f"its card lacks {', '.join(sorted(lacking))}")
     return card

@@ -1,4 +1,4 @@
-"""A policy together with the controller that it corrects, as one controller."""
+"""A policy and the controller that it corrects, as one controller."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TOLERANCE = 1e-3
 
 
 class ResidualState(NamedTuple):
-    """What both remember.
+    """States of both.
 
     Attributes
     ----------
@@ -31,13 +31,13 @@ class ResidualState(NamedTuple):
 
 
 class ResidualPolicy:
-    """Acts as the file says: ``controller's action + scale * policy``, held within the range.
+    """Controller with the action ``controller's action + scale * policy``, clipped to its range.
 
     Attributes
     ----------
     policy : OnnxPolicy
     controller : Controller
-        Of :data:`baselines.core.catalogue.CONTROLLERS`, told the nominal plant.
+        Of :data:`baselines.core.catalogue.CONTROLLERS`, built from the nominal plant.
     """
 
     def __init__(self, policy: OnnxPolicy, controller: Any) -> None:
@@ -64,25 +64,24 @@ class ResidualPolicy:
 
     @property
     def model_output(self) -> Callable[[ResidualState], Any]:
-        """What the controller's model should do, from the state; there if the controller has it."""
-        told = self.controller.model_output
-        return lambda state: told(state.controller)
+        """Output of the controller's model by state; an attribute if the controller has it."""
+        output = self.controller.model_output
+        return lambda state: output(state.controller)
 
 
 def with_controller(policy: OnnxPolicy, plant: Any) -> OnnxPolicy | ResidualPolicy:
-    """Return the policy, with the controller that it corrects if it does.
+    """Return a policy together with the controller that it corrects, if any.
 
     Parameters
     ----------
     policy : OnnxPolicy
     plant : object
-        Nominal plant that the controller is told; policies alone are told nothing.
+        Nominal plant of the controller; not used by other policies.
 
     Raises
     ------
     PolicyFileError
-        If the controller has other numbers than in training, or answers otherwise, although it is
-        told the same plant.
+        If the controller, built from a plant of the training, does not give its recorded answers.
     """
     if not policy.corrects:
         return policy

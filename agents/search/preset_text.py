@@ -1,4 +1,4 @@
-"""Changes of a preset's file that leave its other lines and its comments as they are."""
+"""Edits of a preset's YAML text that keep its other lines and its comments."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def _in_section(text: str, section: str, entry: str, value: Any) -> str:
 
 
 def _flow(value: Any) -> str:
-    """Return a value on one line, numbers with a point so that YAML 1.1 reads them as such."""
+    """Return a value on one line; floats have a point, without which YAML 1.1 reads text."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{k}: {_flow(v)}" for k, v in value.items()) + "}"
     if isinstance(value, (list, tuple)):
@@ -62,4 +62,4 @@ def _flow(value: Any) -> str:
         digits = repr(value)
         return digits.replace("e", ".0e") if "e" in digits and "." not in digits else digits
     text: str = yaml.safe_dump([value], default_flow_style=True, width=10**6)
-    return text.strip()[1:-1]  # as it stands in a list, where a comma needs quotes
+    return text.strip()[1:-1]  # quoted as in a list, where a comma needs quotes

@@ -1,109 +1,97 @@
-"""What a search may choose: ranges and choices of settings, by algorithm."""
+"""Search spaces of the settings, by algorithm, as Optuna's distributions."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
+
+import yaml
+from optuna.distributions import (
+    BaseDistribution,
+    CategoricalDistribution,
+    FloatDistribution,
+    IntDistribution,
+)
 
 from agents.settings.presets import Config, from_mapping, put
 
-
-@dataclass(frozen=True)
-class Range:
-    """Numbers from ``low`` to ``high``; ``log``: evenly by their logarithm; ``whole`` numbers."""
-
-    low: float
-    high: float
-    log: bool = False
-    whole: bool = False
-
-    def suggest(self, trial: Any, name: str) -> float:
-        """Return a value that the search proposes."""
-        if self.whole:
-            return int(trial.suggest_int(name, int(self.low), int(self.high), log=self.log))
-        return float(trial.suggest_float(name, self.low, self.high, log=self.log))
-
-    @property
-    def common(self) -> float:
-        """Any value, the same for all: what is searched does not matter."""
-        return int(self.low) if self.whole else self.low
-
-    def nearest(self, value: Any) -> Any:
-        """Return the value, or the end of the range that is nearer."""
-        held = min(max(value, self.low), self.high)
-        return round(held) if self.whole else held
+Space = Mapping[str, BaseDistribution]
 
 
-@dataclass(frozen=True)
-class Choice:
-    """One of several values; a list is named by its text."""
-
-    values: tuple[Any, ...]
-
-    def suggest(self, trial: Any, name: str) -> Any:
-        """Return a value that the search proposes."""
-        texts = [str(value) for value in self.values]
-        return self.values[texts.index(trial.suggest_categorical(name, texts))]
-
-    @property
-    def common(self) -> Any:
-        """Any value, the same for all: what is searched does not matter."""
-        return self.values[0]
-
-    def nearest(self, value: Any) -> str:
-        """Return the text of the value, or of the first one."""
-        texts = [str(entry) for entry in self.values]
-        return str(value) if str(value) in texts else texts[0]
+def _choice(*values: Any) -> CategoricalDistribution:
+    """Return a choice among values, which Optuna stores as text."""
+    return CategoricalDistribution([str(value) for value in values])
 
 
-Space = Mapping[str, Range | Choice]
-
-_RATE = Range(3e-5, 3e-3, log=True)
-_HORIZON = Range(10.0, 200.0, log=True)
-_WIDTHS = Choice(([32, 32], [64, 64], [128, 128]))
-_WIDTH = Choice(([32], [64], [128]))
-"""Of the layer behind a memory."""
+_RATE = FloatDistribution(3e-5, 3e-3, log=True)
+_HORIZON = FloatDistribution(10.0, 200.0, log=True)
+_GAIN = FloatDistribution(5.0, 50.0, log=True)
+_WIDTHS = _choice([32, 32], [64, 64], [128, 128])
 _PPO: Space = {
     "learning_rate": _RATE,
     "horizon": _HORIZON,
-    "gae_lambda": Range(0.8, 0.99),
-    "clip_range": Range(0.1, 0.3),
-    "n_epochs": Range(2, 8, whole=True),
-    "network.log_std_init": Range(-4.5, -0.5),
-    "network.gain": Range(5.0, 50.0, log=True),
+    "gae_lambda": FloatDistribution(0.8, 0.99),
+    "clip_range": FloatDistribution(0.1, 0.3),
+    "n_epochs": IntDistribution(2, 8),
+    "network.log_std_init": FloatDistribution(-4.5, -0.5),
+    "network.gain": _GAIN,
 }
 _OFF_POLICY: Space = {
     "learning_rate": _RATE,
     "horizon": _HORIZON,
-    "tau": Range(0.002, 0.05, log=True),
-    "gradient_steps": Range(4, 16, whole=True),
+    "tau": FloatDistribution(0.002, 0.05, log=True),
+    "gradient_steps": IntDistribution(4, 16),
     "network.hidden": _WIDTHS,
-    "network.gain": Range(5.0, 50.0, log=True),
+    "network.gain": _GAIN,
 }
 SPACES: Mapping[str, Space] = {
     "ppo": {**_PPO, "network.hidden": _WIDTHS},
-    "recurrent_ppo": {**_PPO, "network.hidden": _WIDTH, "lstm_size": Choice((16, 32, 64))},
+    "recurrent_ppo": {
+        **_PPO,
+        "network.hidden": _choice([32], [64], [128]),
+        "lstm_size": _choice(16, 32, 64),
+    },
     "sac": _OFF_POLICY,
-    "tqc": {**_OFF_POLICY, "top_quantiles_to_drop_per_net": Range(0, 5, whole=True)},
+    "tqc": {**_OFF_POLICY, "top_quantiles_to_drop_per_net": IntDistribution(0, 5)},
 }
 """Names without a dot are of the algorithm's part. ``horizon`` is ``1 / (1 - gamma)``, in control
-periods; ``learning_rate`` is the first of the two, and the last stays the share of it that it is
-in the preset."""
+periods; ``learning_rate`` is the first of the two, whose ratio is the preset's."""
 
 
-def space_of(config: Config) -> dict[str, Range | Choice]:
-    """Return what a search chooses for a preset."""
+def space_of(config: Config) -> dict[str, BaseDistribution]:
+    """Return the search space of a preset."""
     space = dict(SPACES[config.algo])
     if config.residual.controller:
-        space["residual.scale"] = Range(0.003, 0.3, log=True)
+        space["residual.scale"] = FloatDistribution(0.003, 0.3, log=True)
     if config.history.frames:
-        space["history.frames"] = Range(2, 32, log=True, whole=True)
+        space["history.frames"] = IntDistribution(2, 32, log=True)
     return space
 
 
+def suggest(trial: Any, config: Config) -> dict[str, Any]:
+    """Return a trial's values in the search space of a preset."""
+    return {name: _suggest(trial, name, own) for name, own in space_of(config).items()}
+
+
+def _suggest(trial: Any, name: str, own: BaseDistribution) -> Any:
+    if isinstance(own, FloatDistribution):
+        return trial.suggest_float(name, own.low, own.high, log=own.log)
+    if isinstance(own, IntDistribution):
+        return trial.suggest_int(name, own.low, own.high, log=own.log)
+    assert isinstance(own, CategoricalDistribution)
+    return trial.suggest_categorical(name, own.choices)
+
+
+def common(config: Config) -> dict[str, Any]:
+    """Return one point of a search space, the same for all presets with that space."""
+    return {
+        name: own.choices[0] if isinstance(own, CategoricalDistribution) else own.low  # type: ignore[attr-defined]
+        for name, own in space_of(config).items()
+    }
+
+
 def as_settings(config: Config, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return settings by dotted name from what a search chose."""
+    """Return settings by dotted name from a point of the search space."""
     made: dict[str, Any] = {}
     for name, value in values.items():
         if name == "horizon":
@@ -114,16 +102,16 @@ def as_settings(config: Config, values: Mapping[str, Any]) -> dict[str, Any]:
             made[f"{config.algo}.learning_rate"] = [_short(value), _short(share * _short(value))]
         else:
             place = name if "." in name else f"{config.algo}.{name}"
-            made[place] = _short(value) if isinstance(value, float) else value
+            made[place] = yaml.safe_load(value) if isinstance(value, str) else _short(value)
     return made
 
 
 def from_settings(config: Config) -> dict[str, Any]:
-    """Return the preset's own values as a search would choose them, ends of ranges where beyond."""
+    """Return the nearest point of the search space to a preset's settings."""
     plain: dict[str, Any] = config.as_dict()
     own = plain[config.algo]
     made: dict[str, Any] = {}
-    for name, range_ in space_of(config).items():
+    for name, distribution in space_of(config).items():
         if name == "horizon":
             value: Any = 1.0 / max(1.0 - own["gamma"], 1e-9)
         elif name == "learning_rate":
@@ -131,8 +119,16 @@ def from_settings(config: Config) -> dict[str, Any]:
         else:
             part, _, entry = name.rpartition(".")
             value = (plain[part] if part else own)[entry]
-        made[name] = range_.nearest(value)
+        made[name] = _nearest(distribution, value)
     return made
+
+
+def _nearest(own: BaseDistribution, value: Any) -> Any:
+    if isinstance(own, CategoricalDistribution):
+        return str(value) if str(value) in own.choices else own.choices[0]
+    assert isinstance(own, (FloatDistribution, IntDistribution))
+    held = min(max(value, own.low), own.high)
+    return round(held) if isinstance(own, IntDistribution) else held
 
 
 def with_settings(config: Config, settings: Mapping[str, Any]) -> Config:
@@ -143,6 +139,6 @@ def with_settings(config: Config, settings: Mapping[str, Any]) -> Config:
     return from_mapping(plain)
 
 
-def _short(value: float) -> float:
-    """Return a number to three digits, as a person would write it."""
-    return float(f"{value:.3g}")
+def _short(value: Any) -> Any:
+    """Return a float rounded to three digits, and other numbers unchanged."""
+    return float(f"{value:.3g}") if isinstance(value, float) else value

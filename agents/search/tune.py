@@ -1,11 +1,10 @@
-"""Search for settings: Optuna on tuning seeds, resumable, its budget written into the preset.
+"""Hyper-parameter search with Optuna on tuning seeds, resumable.
 
-Each trial trains for a while with two seeds, which no policy that is reported has, and is scored
-as :mod:`agents.training.evaluation` does, by the best policy of each training, as it would be
-shipped; trials that lag behind the median of the others are stopped. The first trial is the preset
-as it stands, so that what comes out is not worse where it was looked at. What a trial proposes
-depends on the finished trials, its number and the seed alone: a search that was killed and resumed
-goes the same way, and searches side by side propose different settings.
+A trial trains with two seeds that no reported policy has. Its value is the mean over both of the
+best evaluation (:mod:`agents.training.evaluation`); trials behind the median are pruned. The first
+trial is the preset itself, so the result is not worse on the tuning seeds. A proposal depends on
+the finished trials, its number and the seed alone: a killed search resumes with the same
+proposals, and parallel searches propose different settings.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ import json
 import statistics
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import optuna
 from optuna.samplers import TPESampler
@@ -26,7 +24,7 @@ from rich.console import Console
 from stable_baselines3.common.logger import Logger
 
 from agents.search import preset_text
-from agents.search.spaces import as_settings, from_settings, space_of, with_settings
+from agents.search.spaces import as_settings, common, from_settings, suggest, with_settings
 from agents.settings import presets as configs
 from agents.settings.parts import Search
 from agents.settings.presets import Config
@@ -36,15 +34,15 @@ from agents.training.callbacks import PeriodicCallback, WarmUp, score_of
 from agents.training.evaluation import value_of
 
 HEARTBEAT = 60
-"""Seconds between the signs of life of a trial; after three without, it is given to another."""
+"""Seconds between heartbeats of a trial; without three of them it is repeated."""
 RETRIES = 2
 REPORTS = 5
-"""How often a training is looked at before its end."""
+"""Number of evaluations of a training before its end."""
 DONE = (TrialState.COMPLETE, TrialState.PRUNED)
 EARLIER = "earlier"
-"""What a study keeps the trials under that led to the preset it began from."""
+"""Study attribute: number of trials of earlier searches that led to its preset."""
 TRAINING_SEEDS = (10_000, 10_001)
-"""Far from those that are reported: settings that suit one seed's luck win nothing there."""
+"""Apart from those of reported policies."""
 
 
 @dataclass(frozen=True)
@@ -54,15 +52,15 @@ class Job:
     Attributes
     ----------
     config : Config
-        The preset that it starts from.
+        The initial preset.
     trials : int
-        Settings to try, those of earlier calls counted in.
+        Number of settings to try, including those of earlier calls.
     steps : int
         Control periods of each training.
     seed : int
         Of the sampler.
     storage : Path
-        SQLite file; several processes may work on one.
+        SQLite file, which several processes may share.
     """
 
     config: Config
@@ -73,16 +71,16 @@ class Job:
 
     @property
     def name(self) -> str:
-        """Name of the study: of everything that decides what a value means."""
+        """Name of the study, which identifies all that affects the meaning of a value."""
         config = self.config
         kind = f"{config.algo}-{config.residual.controller}" if config.residual.controller else ""
         what = f"{config.env} {kind or config.algo} {self.steps} steps, seed {self.seed}"
         return f"{what}, {self.fixed()}"
 
     def fixed(self) -> str:
-        """Return a digest of the settings that are not searched."""
-        common = {name: range_.common for name, range_ in space_of(self.config).items()}
-        plain = with_settings(self.config, as_settings(self.config, common)).as_dict()
+        """Return a digest of the settings outside the search space."""
+        point = as_settings(self.config, common(self.config))
+        plain = with_settings(self.config, point).as_dict()
         for name in ("steps", "checkpoint_steps", "search"):
             plain.pop(name, None)
         first, last = plain[self.config.algo].pop("learning_rate")
@@ -91,12 +89,12 @@ class Job:
 
 
 def search(job: Job, console: Console) -> optuna.Study:
-    """Try settings until ``job.trials`` are done; return the study.
+    """Run trials until ``job.trials`` are finished; return the study.
 
     Raises
     ------
     SettingsError
-        If the preset has no evaluation to search by.
+        If the preset has no evaluation.
     """
     if not job.config.evaluation.episodes:
         raise SettingsError(
@@ -115,7 +113,7 @@ def search(job: Job, console: Console) -> optuna.Study:
 
 
 def open_study(job: Job) -> optuna.Study:
-    """Return the study, made or found in the storage."""
+    """Return the study in the storage, created if missing."""
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     job.storage.parent.mkdir(parents=True, exist_ok=True)
     storage = RDBStorage(
@@ -139,7 +137,7 @@ def open_study(job: Job) -> optuna.Study:
 
 
 def finished(study: optuna.Study) -> int:
-    """Return how many trials are done."""
+    """Return the number of finished trials."""
     return len(study.get_trials(deepcopy=False, states=DONE))
 
 
@@ -149,31 +147,30 @@ def _best(study: optuna.Study) -> str:
 
 
 def objective(job: Job, trial: optuna.Trial) -> float:
-    """Return what a trial is worth: less is better."""
-    values = {name: range_.suggest(trial, name) for name, range_ in space_of(job.config).items()}
+    """Return the value of a trial: less is better."""
+    values = suggest(trial, job.config)
     config = dataclasses.replace(
         with_settings(job.config, as_settings(job.config, values)), steps=job.steps
     )
-    worth = []
-    for turn, seed in enumerate(TRAINING_SEEDS):
-        reports = Reports(config, trial, turn * job.steps)
-        worth.append(_trained(config, seed, reports))
-    return statistics.fmean(worth)
+    return statistics.fmean(
+        _trained(config, seed, Reports(config, trial, turn * job.steps))
+        for turn, seed in enumerate(TRAINING_SEEDS)
+    )
 
 
 def _trained(config: Config, seed: int, reports: Reports) -> float:
-    """Train and return what the best policy that was looked at is worth."""
+    """Train and return the value of the best evaluation."""
     env = make_env(config)
     model = make_model(config, seed, env)
     model.set_logger(Logger(None, []))
     model.learn(config.steps, callback=[WarmUp(config), reports])
-    reports.look()
+    reports.evaluate()
     env.close()
     return min(reports.values)
 
 
 class Reports(PeriodicCallback):
-    """Tells the search how a trial does, and stops it if it is told to.
+    """Report a trial's evaluations to Optuna, and stop a pruned trial.
 
     Parameters
     ----------
@@ -185,7 +182,7 @@ class Reports(PeriodicCallback):
     Attributes
     ----------
     values : list of float
-        What the policies were worth that were looked at.
+        Values of the evaluations.
     """
 
     def __init__(self, config: Config, trial: optuna.Trial, before: int) -> None:
@@ -201,14 +198,14 @@ class Reports(PeriodicCallback):
         if self.config.residual.controller:
             self.travel = score_of(self.model, self.config).travel
 
-    def look(self) -> None:
+    def evaluate(self) -> None:
         """Evaluate now."""
         score = score_of(self.model, self.config)
         self.values.append(value_of(score, self.config, self.travel))
 
     def act(self) -> None:
         """Evaluate and report now."""
-        self.look()
+        self.evaluate()
         self.trial.report(self.values[-1], self.before + self.model.num_timesteps)
         if self.trial.should_prune():
             raise optuna.TrialPruned
@@ -220,30 +217,23 @@ def write(job: Job, study: optuna.Study, path: Path) -> Config:
     Raises
     ------
     SettingsError
-        If the file would not say what it should; it is left as it was.
+        If the file cannot be edited; it is left unchanged.
     """
     search_part = Search(
         trials=finished(study),
         earlier=study.user_attrs.get(EARLIER, 0),
         steps=job.steps,
         seed=job.seed,
-        note=f"Optuna TPE, {len(TRAINING_SEEDS)} trainings a trial, each looked at in "
+        note=f"Optuna TPE, {len(TRAINING_SEEDS)} trainings a trial, each evaluated in "
         f"{job.config.evaluation.episodes} episodes on tuning seeds",
     )
-    best = as_settings(job.config, _chosen(job, study))
-    changes: dict[str, Any] = {**best}
+    changes = as_settings(job.config, study.best_params)
     changes |= {f"search.{name}": value for name, value in vars(search_part).items()}
-    wanted = with_settings(job.config, changes)
+    preset = with_settings(job.config, changes)
     text = preset_text.edited(path.read_text(encoding="utf-8"), changes)
-    if configs.from_text(text) != wanted:
+    if configs.from_text(text) != preset:
         raise SettingsError(
-            f"{path.name} is laid out otherwise than this can edit; put in by hand: {changes}"
+            f"{path.name} has a layout that this cannot edit; change it by hand: {changes}"
         )
     path.write_text(text, encoding="utf-8")
-    return wanted
-
-
-def _chosen(job: Job, study: optuna.Study) -> dict[str, Any]:
-    """Return the best trial's values, choices as values again."""
-    fixed = optuna.trial.FixedTrial(study.best_params)
-    return {name: range_.suggest(fixed, name) for name, range_ in space_of(job.config).items()}
+    return preset

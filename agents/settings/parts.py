@@ -1,4 +1,4 @@
-"""The parts of a training's settings, each with its bounds."""
+"""Parts of a training's settings, each with its bounds."""
 
 from __future__ import annotations
 
@@ -10,28 +10,27 @@ from agents.settings.schema import choice, number
 
 @dataclass(frozen=True)
 class Network:
-    """The policy's network.
+    """Network of the policy.
 
     Attributes
     ----------
     hidden : tuple of int
-        Width of each hidden layer, of the policy and of the critic alike.
+        Widths of the hidden layers, of policy and critic alike.
     activation : {"tanh", "relu", "elu"}
     log_std_init : float
-        PPO: logarithm of the first standard deviation of the action, in its range [-1, 1].
+        PPO: logarithm of the initial standard deviation of the action, in its range [-1, 1].
     differences : tuple of str
-        ``"a - b"`` with names of inputs: fixed extra inputs ``gain * (a - b)``. A millimetre is a
-        thirtieth of the range, so that errors are small numbers among the plain signals. Inputs
-        are the signals, a residual's ``controller_<action>``, and ``<signal>@1`` for what
-        ``history`` keeps of one period ago.
+        ``"a - b"`` with names of inputs: fixed extra inputs ``gain * (a - b)``, which scale up a
+        tracking error of a few hundredths of the range. Inputs are the signals, a residual's
+        ``controller_<action>``, and ``<signal>@1`` for ``history`` one period ago.
     gain : float
-        That factor.
+        Factor of the differences.
     linear : bool
         PPO: a linear path from the inputs to the action beside the layers, as in structured
         control nets (Srouji, Zhang, Salakhutdinov, ICML 2018).
     hold : tuple of str
         PPO with ``linear``: a signal for each action. The untrained policy returns its value, so
-        that learning starts from "keep the last set-point".
+        learning starts from "keep the last setpoint".
     """
 
     hidden: tuple[int, ...] = number((64, 64), 1, 4096)
@@ -54,17 +53,17 @@ class Normalize:
 
 
 @dataclass(frozen=True)
-class PPO:
-    """Proximal policy optimisation (Schulman et al. 2017), names as in stable-baselines3.
+class _OnPolicy:
+    """Settings of PPO and recurrent PPO, with the names of stable-baselines3.
 
     Attributes
     ----------
     learning_rate : tuple of float
-        Runs linearly from the first value to the second over the training.
+        First and last value, linear over the training.
     warm_up : int
-        Rollouts at the beginning in which the critic alone learns, so that a policy that starts
-        as a controller is not led away by an untrained critic (Silver et al., Residual policy
-        learning, arXiv:1812.06298, 2018). In as many rollouts after them the rate rises from 0.
+        Number of first rollouts in which the critic alone learns, so that an untrained critic does
+        not spoil a policy that starts as a controller (Silver et al., Residual policy learning,
+        arXiv:1812.06298, 2018). The rate rises from 0 in as many rollouts after them.
     """
 
     n_steps: int = number(32, 2, 100_000)
@@ -82,36 +81,30 @@ class PPO:
 
 
 @dataclass(frozen=True)
-class RecurrentPPO:
-    """PPO with a long short-term memory before the layers (sb3-contrib), otherwise as ``PPO``.
+class PPO(_OnPolicy):
+    """Proximal policy optimisation (Schulman et al. 2017)."""
+
+
+@dataclass(frozen=True)
+class RecurrentPPO(_OnPolicy):
+    """PPO with an LSTM before the layers (sb3-contrib).
 
     Attributes
     ----------
     lstm_size : int
-        Width of the memory.
+        Width of the LSTM.
     critic_lstm : bool
-        Whether the critic has a memory of its own; without, it sees the present inputs only.
+        Whether the critic has its own LSTM; otherwise it sees the present inputs only.
     """
 
+    n_steps: int = number(64, 2, 100_000)
     lstm_size: int = number(32, 1, 1024)
     critic_lstm: bool = True
-    n_steps: int = number(64, 2, 100_000)
-    batch_size: int = number(2048, 2, 1_000_000)
-    n_epochs: int = number(4, 1, 100)
-    learning_rate: tuple[float, float] = number((3e-4, 3e-4), 0.0, 1.0)
-    gamma: float = number(0.97, 0.0, 1.0)
-    gae_lambda: float = number(0.95, 0.0, 1.0)
-    clip_range: float = number(0.2, 1e-3, 10.0)
-    ent_coef: float = number(0.0, 0.0, 10.0)
-    vf_coef: float = number(0.5, 0.0, 100.0)
-    max_grad_norm: float = number(0.5, 1e-3, 1e3)
-    target_kl: float | None = number(None, 1e-6, 10.0)
-    warm_up: int = number(0, 0, 10_000)
 
 
 @dataclass(frozen=True)
-class SAC:
-    """Soft actor-critic (Haarnoja et al. 2018), names as in stable-baselines3."""
+class _OffPolicy:
+    """Settings of SAC and TQC, with the names of stable-baselines3."""
 
     buffer_size: int = number(200_000, 100, 100_000_000)
     learning_starts: int = number(5_000, 0, 100_000_000)
@@ -125,31 +118,27 @@ class SAC:
 
 
 @dataclass(frozen=True)
-class TQC:
-    """Truncated quantile critics (Kuznetsov et al. 2020), names as in sb3-contrib."""
+class SAC(_OffPolicy):
+    """Soft actor-critic (Haarnoja et al. 2018)."""
 
-    buffer_size: int = number(200_000, 100, 100_000_000)
-    learning_starts: int = number(5_000, 0, 100_000_000)
-    batch_size: int = number(256, 1, 1_000_000)
-    learning_rate: tuple[float, float] = number((1e-3, 1e-3), 0.0, 1.0)
-    gamma: float = number(0.97, 0.0, 1.0)
-    tau: float = number(0.005, 0.0, 1.0)
-    train_freq: int = number(1, 1, 100_000)
-    gradient_steps: int = number(8, 1, 100_000)
-    ent_coef: float | Literal["auto"] = number("auto", 0.0, 100.0)
+
+@dataclass(frozen=True)
+class TQC(_OffPolicy):
+    """Truncated quantile critics (Kuznetsov et al. 2020)."""
+
     top_quantiles_to_drop_per_net: int = number(2, 0, 24)
 
 
 @dataclass(frozen=True)
 class History:
-    """What the policy sees of the past: hysteresis hides a state that one observation lacks.
+    """Past signals among the inputs, since hysteresis hides a state that one observation lacks.
 
     Attributes
     ----------
     frames : int
-        Control periods that it looks back; 0 for none.
+        Number of past control periods; 0 for none.
     signals : tuple of str
-        Which signals it keeps, by name.
+        Names of the signals.
     """
 
     frames: int = number(0, 0, 256)
@@ -163,10 +152,10 @@ class Residual:
     Attributes
     ----------
     controller : str
-        Name in :data:`baselines.core.catalogue.CONTROLLERS`. It is told the nominal plant, and the
-        policy sees its action beside the observation.
+        Name in :data:`baselines.core.catalogue.CONTROLLERS`. It is built from the nominal plant,
+        and its action is an input of the policy.
     scale : float
-        Share of the half of the action's range that the policy can add or take.
+        Largest correction, as a share of half the action's range.
     """
 
     controller: str = ""
@@ -175,14 +164,14 @@ class Residual:
 
 @dataclass(frozen=True)
 class Plants:
-    """What plants are trained on.
+    """Plants of the training.
 
     Attributes
     ----------
     randomize : bool
         Whether every episode draws the assumed parameters within their declared ranges.
     hysteresis : tuple of str
-        Kinds of memory among which the rows are shared out; empty for the environment's default.
+        Hysteresis models among which the rows are divided; empty for the environment's default.
     """
 
     randomize: bool = False
@@ -196,17 +185,17 @@ class Evaluation:
     Attributes
     ----------
     interval : int
-        Control periods of training between evaluations; 0 for none but the first and the last.
+        Control periods of training between evaluations; 0 for the first and the last only.
     episodes : int
-        Episodes each time, as many for each kind of row and on the same seeds; 0 for no evaluation
-        at all: then the last policy is shipped, otherwise the best that was looked at.
+        Episodes per evaluation, divided among the kinds of rows, on the same seeds. 0 for no
+        evaluation: then the last policy is exported, otherwise the best.
     settle_seconds : float
-        Start [s] of each episode that is not counted.
+        Start [s] of each episode that is excluded.
     gate : tuple of str
-        Entries of ``info`` that are all 1 where the output is tracked; everywhere without.
+        Entries of ``info`` that are all 1 at evaluated instants; none for all instants.
     objective : {"rms", "geometric", "return"}
-        What policies and settings are chosen by: the error's RMS, the geometric mean of the kinds'
-        RMS (each counts by its ratio), or the return where a task is more than one error.
+        Criterion for policies and settings: the error's RMS, the geometric mean of the kinds' RMS
+        (which weights ratios), or the return, for tasks with more than one error.
     env_kwargs : dict
         Arguments of the environment that differ from the training's.
     """
@@ -221,20 +210,20 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Search:
-    """The search that chose the settings: its budget, as a comparison has to state it.
+    """Budget of the search that chose the settings, for fair comparisons.
 
     Attributes
     ----------
     trials : int or None
-        Settings that were tried; None where they were set by hand, and nobody counted.
+        Number of settings tried; None if they were set by hand and not counted.
     earlier : int
-        Settings that searches before it tried, from whose result it began.
+        Number tried by the searches whose result it started from.
     steps : int
         Control periods of each training of a trial.
     seed : int
         Of the sampler.
     note : str
-        What was searched, and on what.
+        Method of the search.
     """
 
     trials: int | None = number(None, 0, 10**6)

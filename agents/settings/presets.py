@@ -1,8 +1,8 @@
 """Training presets, one YAML file per environment and algorithm, with a checked schema.
 
-A file is named ``ENV.ALGO.yaml`` or ``ENV.ALGO-VARIANT.yaml``. With ``extends: ENV.ALGO`` it
-states only what differs from another preset; the other's search is left behind, and its algorithm
-where that differs.
+A file is named ``ENV.ALGO.yaml`` or ``ENV.ALGO-VARIANT.yaml``. With ``extends: ENV.ALGO`` it holds
+only the differences from another preset, without that preset's search, and without its algorithm's
+settings if the algorithm differs.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ FOLDER = Path(__file__).resolve().parents[1] / "configs"
 ALGORITHMS: tuple[str, ...] = ("ppo", "sac", "tqc", "recurrent_ppo")
 ON_POLICY = ("ppo", "recurrent_ppo")
 OPTIONAL = ("share", "per_reference", "history", "residual", "plants", "evaluation", "search")
-"""Parts that are left out of the plain form where they hold their defaults."""
+"""Parts that the plain form omits where they equal their defaults."""
 NAME = re.compile(r"[A-Za-z0-9]+-v[0-9]+\.[a-z_]+(-[a-z_]+)?")
 ENV = re.compile(r"PAM/[A-Za-z0-9]+-v[0-9]+")
-"""Ids of environments here. In ``module:id`` Gymnasium imports the module, which runs its code."""
+"""Valid ids. For ``module:id`` Gymnasium would import the module, which runs its code."""
 
 
 @dataclass(frozen=True)
 class Config:
-    """A training run: what is learnt, where, and how.
+    """Settings of a training.
 
     Attributes
     ----------
@@ -52,15 +52,15 @@ class Config:
     env_kwargs : dict
         Arguments of the environment.
     share : dict
-        Arguments of the environment that differ among the rows, each a list: every combination
-        gets as many rows.
+        Arguments of the environment that differ among the rows, each a list: the rows are divided
+        evenly among all combinations, the kinds of rows.
     per_reference : dict
-        Further arguments by the kind's reference, as in scenario files: a reward in which
-        references that are followed to a hundredth of a millimetre count as much as steps.
+        Further arguments by the kind's reference, for example reward weights that balance
+        references with small and with large errors.
     network, normalize, history, residual, plants, evaluation, search
-        The parts, see :mod:`agents.settings.parts`.
+        Parts; see :mod:`agents.settings.parts`.
     ppo, sac, tqc, recurrent_ppo
-        The algorithms' parts; the one that ``algo`` names is used.
+        Parts of the algorithms; only that of ``algo`` is used.
     schema : int
         Version of this schema.
     """
@@ -87,7 +87,7 @@ class Config:
     schema: int = number(1, 1, 1)
 
     def __post_init__(self) -> None:
-        """Refuse foreign environments and combinations that cannot train."""
+        """Refuse unknown environments and contradictory settings."""
         check_env(self.env)
         self._check_rollout()
         network = self.network
@@ -107,7 +107,7 @@ class Config:
         given = {"randomize", "hysteresis"} & {*self.env_kwargs, *self.share}
         if self.plants != Plants() and given:
             raise SettingsError(
-                f"env_kwargs or share and plants both say {', '.join(sorted(given))}; keep plants"
+                f"env_kwargs or share and plants both set {', '.join(sorted(given))}; keep plants"
             )
         for name, values in self.share.items():
             if not isinstance(values, list) or not values:
@@ -125,7 +125,7 @@ class Config:
             )
 
     def kinds(self) -> tuple[dict[str, Any], ...]:
-        """Return the environment's arguments of each kind that the rows are shared out among."""
+        """Return the environment's arguments of each kind of rows."""
         laws = {"hysteresis": list(self.plants.hysteresis)} if self.plants.hysteresis else {}
         shared = {**laws, **self.share}
         base = {**self.env_kwargs, **({"randomize": True} if self.plants.randomize else {})}
@@ -148,16 +148,16 @@ class Config:
 
     @property
     def chosen(self) -> Any:
-        """The part of the algorithm in use."""
+        """Part of the algorithm in use."""
         return getattr(self, self.algo)
 
     def decisive(self) -> Config:
-        """Return the settings that decide which policy is shipped: also how it is looked at."""
+        """Return the settings that affect the exported policy, the others at their defaults."""
         usual: Any = Config.checkpoint_steps
         return dataclasses.replace(self, search=Search(), checkpoint_steps=usual)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain values, without the other algorithms' parts and those left at rest."""
+        """Return plain values, without other algorithms' parts and optional default parts."""
         plain = _plain(dataclasses.asdict(self))
         idle = [a for a in ALGORITHMS if a != self.algo]
         idle += [name for name in OPTIONAL if getattr(self, name) == _fresh(name)]
@@ -168,7 +168,7 @@ class Config:
 
 
 def check_env(name: str) -> None:
-    """Raise unless a name is that of an environment of this package.
+    """Raise unless ``name`` is an environment of this package.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def _plain(value: Any) -> Any:
 
 
 def presets() -> dict[tuple[str, str, str], Path]:
-    """Return the presets' files by environment id, algorithm and variant ("" for the plain)."""
+    """Return the presets' files by environment id, algorithm and variant ("" for none)."""
     found = {}
     for path in sorted(FOLDER.glob("*.yaml")):
         name, _, kind = path.stem.rpartition(".")
@@ -210,7 +210,7 @@ def preset_path(env: str, algo: str, variant: str = "") -> Path:
         ids = [e for e, a, v in found if (a, v) == (algo, variant)]
         what = f"{algo}-{variant}" if variant else algo
         raise SettingsError(
-            f"no {what} preset for {env!r}{near(env, ids)} A file of your own: --config FILE"
+            f"no {what} preset for {env!r}{near(env, ids)} For your own file: --config FILE"
         )
     return found[env, algo, variant]
 
@@ -232,7 +232,7 @@ def read(path: str | Path) -> Config:
     Raises
     ------
     SettingsError
-        If the file is no YAML mapping or a setting is unknown or out of bounds.
+        If the file is no YAML mapping, or a setting is unknown or out of bounds.
     """
     path = Path(path)
     given = _mapping(path)
@@ -250,12 +250,12 @@ def _mapping(path: Path) -> Any:
 
 
 def from_text(text: str) -> Config:
-    """Return the configuration that a YAML text describes; see :func:`read`."""
+    """Return the configuration of a YAML text; see :func:`read`."""
     return from_mapping(yaml.safe_load(text))
 
 
 def from_mapping(given: Any) -> Config:
-    """Return the configuration that a mapping describes; see :func:`read`."""
+    """Return the configuration of a mapping; see :func:`read`."""
     if isinstance(given, Mapping) and "extends" in given:
         given = _extended(given)
     made: Config = build(Config, given)
@@ -263,14 +263,7 @@ def from_mapping(given: Any) -> Config:
 
 
 def _extended(given: Mapping[str, Any], above: tuple[str, ...] = ()) -> Any:
-    """Return a mapping laid over the preset that it extends, whose search is not its own.
-
-    Parameters
-    ----------
-    given : mapping
-    above : tuple of str
-        Presets that lead here, each extending the next.
-    """
+    """Return a mapping merged into the preset that it extends; ``above`` are those extending it."""
     name = given["extends"]
     under = _mapping(_extendable(name, above))
     own = {key: value for key, value in given.items() if key != "extends"}
@@ -280,16 +273,16 @@ def _extended(given: Mapping[str, Any], above: tuple[str, ...] = ()) -> Any:
     if own.get("algo", under.get("algo")) != under.get("algo"):
         foreign += ALGORITHMS
     under = {key: value for key, value in under.items() if key not in foreign}
-    return _laid_over(under, own)
+    return _merged(under, own)
 
 
 def _extendable(name: Any, above: tuple[str, ...]) -> Path:
-    """Return the file of a preset that another extends."""
+    """Return the file of a preset to extend."""
     if not isinstance(name, str) or not NAME.fullmatch(name):
         raise SettingsError(f"extends = {name!r} must name a preset, for example KneeWalk-v0.ppo")
     if name in above:
         circle = " -> ".join((*above[above.index(name) :], name))
-        raise SettingsError(f"extends = {name!r} goes in a circle ({circle}); take one out")
+        raise SettingsError(f"extends = {name!r} is a circle ({circle}); take one out")
     path = FOLDER / f"{name}.yaml"
     if not path.is_file():
         names = [p.stem for p in presets().values()]
@@ -297,14 +290,14 @@ def _extendable(name: Any, above: tuple[str, ...]) -> Path:
     return path
 
 
-def _laid_over(under: Any, over: Any) -> Any:
+def _merged(under: Any, over: Any) -> Any:
     if not (isinstance(under, Mapping) and isinstance(over, Mapping)):
         return over
-    return {**under, **{k: _laid_over(under.get(k), v) for k, v in over.items()}}
+    return {**under, **{k: _merged(under.get(k), v) for k, v in over.items()}}
 
 
 def changed(config: Config, assignments: Sequence[str]) -> Config:
-    """Return the configuration with ``"ppo.gamma=0.95"`` and the like applied.
+    """Return the configuration with assignments like ``"ppo.gamma=0.95"`` applied.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Checked settings: a mapping becomes a frozen dataclass, or a sentence says what is wrong."""
+"""Checked settings: frozen dataclasses from mappings, with errors that name the remedy."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pam_envs.wording import near
 
 
 class SettingsError(ValueError):
-    """A setting that cannot be used; the message says what to change."""
+    """An invalid setting; the message contains the remedy."""
 
 
 def number(default: Any, low: float, high: float) -> Any:
@@ -33,14 +33,14 @@ def build(cls: type, given: Any, where: str = "") -> Any:
     cls : type
         A frozen dataclass; nested ones are built from nested mappings.
     given : mapping
-        Values by field name; what is left out keeps its default.
+        Values by field name; other fields keep their defaults.
     where : str
-        Dotted place of the mapping, for messages.
+        Dotted name of the mapping, for messages.
 
     Raises
     ------
     SettingsError
-        Naming the entry, its value and the remedy; an unknown key with the nearest known one.
+        Naming the entry, its value and the remedy.
     """
     if not isinstance(given, Mapping):
         raise SettingsError(f"{where or 'the settings'} must be a mapping, got {given!r}")
@@ -61,7 +61,7 @@ def build(cls: type, given: Any, where: str = "") -> Any:
         and field.default_factory is dataclasses.MISSING
     ]
     if missing:
-        raise SettingsError(f"{where or 'the settings'} must say {', '.join(missing)}")
+        raise SettingsError(f"{where or 'the settings'} must set {', '.join(missing)}")
     return cls(**values)
 
 
@@ -120,12 +120,12 @@ def _plain(kind: Any, value: Any, place: str) -> Any:
         return float(value)
     if kind is str and isinstance(value, str):
         return value
-    wanted = {bool: "true or false", int: "a whole number", float: "a finite number", str: "text"}
-    raise SettingsError(f"{place} = {value!r} must be {wanted.get(kind, kind)}")
+    names = {bool: "true or false", int: "a whole number", float: "a finite number", str: "text"}
+    raise SettingsError(f"{place} = {value!r} must be {names.get(kind, kind)}")
 
 
 def _number_in(text: str) -> float | str:
-    """Return the number that a text holds: YAML 1.1 reads 1e-3 as text and 1.0e-3 as a number."""
+    """Return the number in a text, if any: YAML 1.1 reads 1e-3 as text."""
     try:
         return float(text)
     except ValueError:
@@ -141,6 +141,4 @@ def _check_field(field: dataclasses.Field[Any], value: Any, place: str) -> None:
     low, high = field.metadata["bounds"]
     for one in value if isinstance(value, tuple) else (value,):
         if not low <= one <= high:
-            raise SettingsError(
-                f"{place} = {one!r} must be from {low:g} to {high:g}; change it to lie within"
-            )
+            raise SettingsError(f"{place} = {one!r} must be from {low:g} to {high:g}")

@@ -1,9 +1,8 @@
-"""Which environment seeds are for training, which for tuning; those of benchmarks are neither.
+"""Disjoint environment seeds for training and for tuning, apart from those of benchmarks.
 
-Benchmarks use seeds below ``TUNING``, and for audits numbers that nobody can choose. What is
-trained here starts at ``TRAINING``; what is looked at while settings are chosen (networks, rates,
-how far a policy looks back or ahead) are the seeds from ``TUNING`` on, and no others. So no scored
-episode is ever trained on, and none decides a setting.
+Training uses seeds from ``TRAINING`` on; evaluations that choose settings and policies use the
+seeds from ``TUNING`` on. Scenarios use seeds below ``TUNING``, and audits draw theirs. So no scored
+episode is trained on or decides a setting.
 """
 
 from __future__ import annotations
@@ -24,11 +23,11 @@ def tuning(count: int) -> list[int]:
     Raises
     ------
     ValueError
-        If there are not so many.
+        If there are fewer.
     """
     if not 1 <= count <= MOST_TUNING:
         raise ValueError(
-            f"evaluation.episodes = {count} must be from 1 to {MOST_TUNING}: tuning has so many "
+            f"evaluation.episodes = {count} must be from 1 to {MOST_TUNING}, the number of tuning "
             "seeds; choose fewer"
         )
     return list(range(TUNING, TUNING + count))

@@ -327,8 +327,8 @@ def loop() -> Any:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda p: external(p / "weights.bin"), "lie in another file"),
-        (lambda p: external(Path("../weights.bin")), "lie in another file"),
+        (lambda p: external(p / "weights.bin"), "are in another file"),
+        (lambda p: external(Path("../weights.bin")), "are in another file"),
         (
             lambda _: graph(
                 [helper.make_node("PyOp", ["observation"], ["action"], domain="ai.evil")],
@@ -341,10 +341,10 @@ def loop() -> Any:
             lambda _: graph([helper.make_node("ConstantOfShape", ["observation"], ["action"])]),
             "operator ConstantOfShape",
         ),
-        (lambda _: outer(), "not known beforehand"),
+        (lambda _: outer(), "not known in advance"),
         (
             lambda _: graph([helper.make_node("Identity", ["observation"], ["action"])]),
-            "do not fit|not known beforehand",
+            "do not fit|not known in advance",
         ),
     ],
 )
@@ -380,5 +380,5 @@ def test_large_empty_and_unlabelled_files_are_refused(
         OnnxPolicy.load(file)
     del model.metadata_props[:]
     file.write_bytes(model.SerializeToString())
-    with pytest.raises(PolicyFileError, match="which signals it reads"):
+    with pytest.raises(PolicyFileError, match="has no card"):
         OnnxPolicy.load(file)

@@ -17,7 +17,7 @@ from optuna.trial import TrialState
 from short_runs import ID, KINDS, QUIET, kind, tiny
 
 from agents.search import preset_text, tune
-from agents.search.spaces import as_settings, from_settings, space_of, with_settings
+from agents.search.spaces import as_settings, from_settings, space_of, suggest, with_settings
 from agents.settings import presets as configs
 from agents.settings.parts import Plants, Search
 from agents.settings.presets import Config
@@ -47,8 +47,7 @@ def test_every_kind_has_a_space_that_holds_its_preset(name: str) -> None:
     config = kind(name)
     values = from_settings(config)
     assert set(values) == set(space_of(config))
-    fixed = optuna.trial.FixedTrial(values)
-    chosen = {n: range_.suggest(fixed, n) for n, range_ in space_of(config).items()}
+    chosen = suggest(optuna.trial.FixedTrial(values), config)
     again = with_settings(config, as_settings(config, chosen))
     assert again.algo == config.algo
     assert again.chosen.gamma == pytest.approx(config.chosen.gamma, abs=2e-5)
@@ -164,8 +163,7 @@ def test_every_preset_can_be_edited_in_place(names: tuple[str, str, str], note: 
 
 
 def _chosen(config: Config) -> dict[str, Any]:
-    fixed = optuna.trial.FixedTrial(from_settings(config))
-    return {name: range_.suggest(fixed, name) for name, range_ in space_of(config).items()}
+    return suggest(optuna.trial.FixedTrial(from_settings(config)), config)
 
 
 def test_a_failed_episode_makes_a_trial_worse() -> None:
@@ -216,8 +214,7 @@ def test_searches_side_by_side_propose_different_settings(
     proposed = {}
 
     def objective(made: tune.Job, trial: optuna.Trial) -> float:
-        space = space_of(made.config).items()
-        proposed[trial.number] = {name: range_.suggest(trial, name) for name, range_ in space}
+        proposed[trial.number] = suggest(trial, made.config)
         if trial.number == 1:  # while another process does the rest
             tune.search(job(tmp_path, 2), QUIET)
         return 1.0

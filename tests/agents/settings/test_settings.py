@@ -58,7 +58,7 @@ def test_every_environment_has_a_preset_of_every_kind() -> None:
         ({"env": ID, "ppo": {"batch_size": 3000}}, "choose a divisor"),
         ({"env": ID, "ppo": {"learning_rate": [1e-3]}}, "must have 2 entries"),
         ({"env": ID, "sac": {"ent_coef": "aut"}}, "sac.ent_coef = 'aut'"),
-        ({"algo": "ppo"}, "must say env"),
+        ({"algo": "ppo"}, "must set env"),
         ({"env": ID, "history": {"frames": 2}}, "both frames and signals"),
         ({"env": ID, "algo": "tqc", "network": {"linear": True}}, "leave it out for tqc"),
         ({"env": ID, "num_envs": 9, "ppo": {"batch_size": 9}, "plants": TWO}, "no multiple"),
