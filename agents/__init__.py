@@ -1,1 +1,1 @@
-"""Learning: the batched environment for stable-baselines3, training, and policies as data."""
+"""Reinforcement learning: presets, training, hyper-parameter search, policies as ONNX files."""

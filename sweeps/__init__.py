@@ -1,1 +1,1 @@
-"""Many tasks on many processes, of this machine or of a Dask cluster: for benchmarks and agents."""
+"""Execution of many tasks on processes of this machine or on a Dask cluster."""

@@ -1,1 +1,1 @@
-"""export."""
+"""Export of trained models as policy files."""

@@ -1,1 +1,1 @@
-"""policies."""
+"""Policies as files, and their networks."""

@@ -1,1 +1,1 @@
-"""settings."""
+"""Settings of a training: schema, presets and seeds."""

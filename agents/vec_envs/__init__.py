@@ -1,1 +1,1 @@
-"""vec_envs."""
+"""Environments for stable-baselines3: batch, mixture, history, residual."""
