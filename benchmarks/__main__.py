@@ -142,12 +142,31 @@ def cite(row: Positional[tuple[str, ...]]) -> int:
     return 0
 
 
+def show_row(row: Positional[tuple[str, ...]], json: bool = False) -> int:
+    """Print rows: origin, scores of both splits, every metric and setting.
+
+    Args:
+        row: Files or names of rows.
+        json: Print all that is stored instead, as JSON with every digit.
+    """
+    from json import dumps
+
+    from benchmarks.board.row_text import row_text
+
+    if not row:
+        raise ValueError("name a row, for example positioning_nominal--inverse")
+    for name in row:
+        held = rows.load(_row_path(name))
+        print(dumps(held, indent=1, sort_keys=True) if json else row_text(held))
+    return 0
+
+
 def board(results: Path = rows.RESULTS, out: Path | None = None) -> int:
-    """Write LEADERBOARD.md, a plot a track and TIMES.md from the rows.
+    """Write LEADERBOARD.md and a page with figures for each environment from the rows.
 
     Args:
         results: Folder of the rows.
-        out: The board's file.
+        out: The board's file; the pages are written beside it, into leaderboard.
     """
     from benchmarks.board import leaderboard
 
@@ -447,6 +466,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "verify": verify,
     "audit": audit,
     "cite": cite,
+    "show-row": show_row,
     "tune": tune,
     "papers": papers,
     "speed": speed,

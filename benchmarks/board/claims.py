@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from benchmarks.board import accessors as views
 from benchmarks.board import standings
 from benchmarks.runs import knowledge
+from benchmarks.runs.cells import AUDIT, PUBLIC
 from benchmarks.runs.rows import Row
 from benchmarks.scoring.metrics import COST_FLOOR, COST_RATIO, COSTS, of_track
 from benchmarks.scoring.statistics import NOTHING, Interval
@@ -161,7 +162,7 @@ def learned_claims(rows: Sequence[Row]) -> list[Claim]:
         (entry for entry in made if entry is not None),
         key=lambda entry: (
             order.index(entry.verdict),
-            entry.split != views.AUDIT,
+            entry.split != AUDIT,
             -entry.probability.value,
         ),
     )
@@ -171,7 +172,7 @@ def _doubts_of_track(rows: Sequence[Row], paper: Row) -> list[str]:
     """Return what keeps the best paper controller from being known to be the best."""
     listing = standings.listing(rows)
     doubts = [f"{name} is in the audit round and has no row" for name in listing.missing]
-    best, public = views.name_of(paper), views.mean_of(paper, split=views.PUBLIC)
+    best, public = views.name_of(paper), views.mean_of(paper, split=PUBLIC)
     for row in filter(is_paper, listing.outside):
         if row is not paper and views.mean_of(row) < public:
             doubts.append(f"{views.name_of(row)}, not audited, is below {best} on public episodes")

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from benchmarks.scoring.statistics import Interval
 
+WIDTH = 150
+"""Characters of a table's line at most; a wider table is split."""
 LEFT = {
     *("controller", "environment", "track", "knows", "verdict", "kind", "state", "episodes"),
-    *("best paper controller", "best learned", "first here", "largest fall", "largest rise"),
-    *("tuning", "hardware"),
+    *("best paper controller", "best learned", "first here", "tuning", "hardware"),
 }
-"""Columns of words."""
+"""Columns of words, aligned to the left."""
 
 
 def number(value: float | None) -> str:
@@ -82,6 +82,32 @@ def table(heading: Sequence[str], lines: Sequence[Sequence[str]]) -> list[str]:
     return [_line(heading), _line(rule), *(_line(line) for line in lines)]
 
 
+def tables(heading: Sequence[str], lines: Sequence[Sequence[str]]) -> list[str]:
+    """Return the lines of a table, split by columns into as many as fit :data:`WIDTH`.
+
+    Each part repeats the columns up to the controller's (at least the first).
+    """
+    fixed = heading.index("controller") + 1 if "controller" in heading else 1
+    widths = [max(map(_width, column)) + 3 for column in zip(heading, *lines, strict=True)]
+    parts: list[list[int]] = [[]]
+    for k in range(fixed, len(heading)):
+        used = sum(widths[:fixed]) + sum(widths[i] for i in parts[-1])
+        if parts[-1] and used + widths[k] >= WIDTH:
+            parts.append([])
+        parts[-1].append(k)
+    made: list[str] = []
+    for part in parts:
+        chosen = [*range(fixed), *part]
+        made += [""] * bool(made)
+        made += table([heading[k] for k in chosen], [[line[k] for k in chosen] for line in lines])
+    return made
+
+
+def _width(cell: str) -> int:
+    """Return the number of characters of the longest line of a cell."""
+    return max(map(len, cell.split("<br>")))
+
+
 def _line(cells: Sequence[str]) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
@@ -89,8 +115,3 @@ def _line(cells: Sequence[str]) -> str:
 def folded(title: str, lines: Sequence[str]) -> list[str]:
     """Return lines that a reader opens by a click."""
     return ["<details>", f"<summary>{title}</summary>", "", *lines, "", "</details>", ""]
-
-
-def linked(row: Mapping[str, Any], results: str = "results") -> str:
-    """Return a controller's name as a link to its row."""
-    return f"[`{row['controller']['name']}`]({results}/{row['row']}.json)"

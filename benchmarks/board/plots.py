@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -50,7 +51,14 @@ def track_figure(ordered: Sequence[Row]) -> str:
         figure.legend(*share.get_legend_handles_labels(), loc="outside right center", frameon=False)
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    return "\n".join(line.rstrip() for line in buffer.getvalue().splitlines()) + "\n"
+    paths = re.sub(r' d="[^"]*"', _rounded, buffer.getvalue())
+    return "\n".join(line.rstrip() for line in paths.splitlines()) + "\n"
+
+
+def _rounded(path: re.Match[str]) -> str:
+    """Return a path with its coordinates to a tenth of a pixel, on one line."""
+    words = (f"{float(w):.1f}".removesuffix(".0") if "." in w else w for w in path[0].split())
+    return " " + " ".join(words)
 
 
 def drawn_rows(ordered: Sequence[Row]) -> list[Row]:

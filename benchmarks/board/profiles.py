@@ -1,4 +1,4 @@
-"""Performance profiles: the share of episodes whose error is at most so large."""
+"""Performance profiles: share of episodes whose error is at most a threshold."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from benchmarks.scoring import statistics
 
 Array = NDArray[np.float64]
 
-POINTS = 120
+POINTS = 60
 
 
 def thresholds(rows: Sequence[Row], points: int = POINTS) -> Array:

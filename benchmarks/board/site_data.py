@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 
 from benchmarks.board import accessors as views
-from benchmarks.board import cite, claims, standings
+from benchmarks.board import cite, claims, standings, words
 from benchmarks.board import summary as board_summary
-from benchmarks.board import tables as board_tables
 from benchmarks.board.claims import Claim
+from benchmarks.board.columns import Column, columns_of, with_costs
 from benchmarks.board.format import percent
-from benchmarks.board.leaderboard import columns_of
 from benchmarks.board.standings import Changes, Listing, Track
-from benchmarks.board.tables import Column, with_costs
 from benchmarks.identity import audit
+from benchmarks.runs.cells import PUBLIC
 from benchmarks.runs.rows import Row, shown
 from benchmarks.runs.store import CHECKSUM
+from benchmarks.scoring.metrics import COSTS
 from benchmarks.scoring.statistics import Interval
 
 GROUPS = {
@@ -38,7 +38,7 @@ def board(rows: Sequence[Row]) -> dict[str, Any]:
         In any order.
     """
     tracks = standings.tracks(rows)
-    changes = standings.changes(board_summary.ranked_rows(tracks))
+    changes = standings.changes(standings.ranked(tracks))
     kinds = {views.name_of(row): row["controller"]["kind"] for row in rows}
     return {
         "groups": [{"name": name, "title": title} for name, title in GROUPS.items()],
@@ -69,8 +69,8 @@ def _track(name: str, ordered: Track) -> dict[str, Any]:
         "name": name,
         "title": str(content["title"]),
         "env": str(first["env"]["id"]),
-        "about": board_tables.about(first).replace("`", ""),
-        "round": board_tables.round_words(listing),
+        "about": words.about(first).replace("`", ""),
+        "round": words.round_words(listing),
         "split": listing.split,
         "digest": first["scenarios"]["digest"],
         "unit": unit,
@@ -78,7 +78,7 @@ def _track(name: str, ordered: Track) -> dict[str, Any]:
         "paper": "" if paper is None else views.name_of(paper),
         "figure": f"figures/{name}.svg",
         "columns": [title for _, title, _ in columns],
-        "costs": [k for k, (metric, _, _) in enumerate(columns) if metric in claims.COSTS],
+        "costs": [k for k, (metric, _, _) in enumerate(columns) if metric in COSTS],
         "settings": [f"{axis} {point}" for axis, point in views.by_setting(first)],
         "rows": _rows(listing, columns, claims.learned_claims(ordered)),
     }
@@ -122,12 +122,12 @@ def _row(row: Row, columns: Sequence[Column], against: Claim | None) -> dict[str
         "preview": rounded(controller["preview_seconds"]),
         "score": _numbers(views.interval(row), factor),
         "iqm": _numbers(views.middle(row), factor),
-        "public": _numbers(views.interval(row, split=views.PUBLIC), factor),
+        "public": _numbers(views.interval(row, split=PUBLIC), factor),
         "gap": _numbers(views.gap(row), factor),
         "worse": views.is_worse_unseen(row),
         "smooth": _numbers(views.smooth(row), factor),
         "chance": _numbers(against.probability) if against else None,
-        "claim": board_summary.plain_verdict(against) if against else "",
+        "claim": words.full_verdict(against) if against else "",
         "metrics": [rounded(f * views.mean_of(row, metric)) for metric, _, f in columns],
         "settings": [rounded(factor * value) for value in views.by_setting(row).values()],
         "trainings": {
@@ -193,13 +193,13 @@ def _winner(found: board_summary.Winner) -> dict[str, Any]:
         "track": found.track,
         "split": found.split,
         "paper": views.name_of(paper) if paper else "none",
-        "paper_score": board_summary.score_words(paper, found.split),
+        "paper_score": words.score_words(paper, found.split),
         "learned": views.name_of(entry.row) if entry else "none",
-        "learned_score": board_summary.score_words(entry.row if entry else None, found.split),
+        "learned_score": words.score_words(entry.row if entry else None, found.split),
         "chance": _numbers(entry.probability) if entry else None,
         "gain": percent(entry.gain) if entry else "-",
-        "cost": board_summary.largest_cost(entry) if entry else "-",
-        "verdict": board_summary.plain_verdict(entry) if entry else found.silence,
+        "cost": words.largest_cost(entry) if entry else "-",
+        "verdict": words.full_verdict(entry) if entry else found.silence,
         "better": entry is not None and entry.verdict == claims.BETTER,
     }
 
@@ -213,13 +213,12 @@ def _change(found: Changes, kinds: Mapping[str, str]) -> dict[str, Any]:
 
     return {
         "env": found.env,
-        "tracks": [board_summary.short_name(name, found.tracks) for name in found.tracks],
+        "tracks": [words.short_name(name, found.tracks) for name in found.tracks],
         "places": {n: [[p.first, p.shared] for p in places] for n, places in found.places.items()},
         "order": [order(k) for k in count],
         "agreement": [rounded(tau) for tau in found.agreement],
         "learned": [name for name in names if kinds[name] != "classical"],
         "lines": [
-            [cell.replace("`", "") for cell in board_summary.change_line(found, k)]
-            for k in count[1:]
+            [cell.replace("`", "") for cell in words.change_cells(found, k)] for k in count[1:]
         ],
     }

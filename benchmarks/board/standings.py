@@ -76,6 +76,19 @@ def tracks(rows: Sequence[Row]) -> dict[str, Track]:
     return {name: ordered(grouped[name]) for name in names}
 
 
+def ranked(by_track: Mapping[str, Track]) -> dict[str, Track]:
+    """Return the ranked rows of each track."""
+    return {name: listing(rows).ranked for name, rows in by_track.items()}
+
+
+def by_env(by_track: Mapping[str, Track]) -> dict[str, dict[str, Track]]:
+    """Return the tracks of each environment, by its id."""
+    grouped: dict[str, dict[str, Track]] = {}
+    for name, rows in by_track.items():
+        grouped.setdefault(str(rows[0]["env"]["id"]), {})[name] = rows
+    return grouped
+
+
 def _family(row: Row) -> str:
     """Return what tracks of one environment sort by: positioning first."""
     env = str(row["env"]["id"])

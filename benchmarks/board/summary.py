@@ -1,37 +1,42 @@
-"""What the board says first: who wins where, how ranks change, and what it all cost."""
+"""Summary of the board: learned against paper controllers, rank changes, pages, explanations."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from benchmarks.board import accessors as views
 from benchmarks.board import claims, standings
 from benchmarks.board.claims import Claim
-from benchmarks.board.format import (
-    bounded,
-    chance,
-    duration,
-    folded,
-    millions,
-    number,
-    percent,
-    table,
-)
-from benchmarks.board.standings import Changes, Track
-from benchmarks.runs.rows import Row, shown
+from benchmarks.board.format import chance, percent, tables
+from benchmarks.board.standings import Track
+from benchmarks.board.words import change_cells, full_verdict, largest_cost, score_words, short_env
+from benchmarks.runs.rows import Row
 
 Tracks = Mapping[str, Track]
+READING = Path(__file__).with_name("reading.md")
+"""Explanation of the tables."""
+NO_ROWS = "There are no rows yet: run `python -m benchmarks run`."
+INTRODUCTION = """\
+# Leaderboard
 
-
-def ranked_rows(tracks: Tracks) -> dict[str, Track]:
-    """Return the rows of each track that ranks are of."""
-    return {name: standings.listing(rows).ranked for name, rows in tracks.items()}
+Written by `python -m benchmarks board` from the rows in `benchmarks/results`; do not edit. Each
+environment has a page with its tracks and all its controllers. `python -m benchmarks show-row ROW`
+prints a row, `verify ROW` computes it again, `cite ROW` prints BibTeX, and `python -m benchmarks
+site` writes an interactive page with trajectories.
+"""
+NOMINAL = "*P* is the probability of improvement. With 95 % intervals, costs and reasons:"
+RANK_CHANGES = """\
+Each track against the nominal one of its environment, among the controllers that have run in all
+of them. *Nominal place*: place of the leaders in the nominal track. Kendall's tau is 1 for the same
+order.
+"""
 
 
 @dataclass(frozen=True)
 class Winner:
-    """The best paper controller of a track and the learned one that comes closest to a claim.
+    """The best paper controller of a track and the learned controller nearest to a claim.
 
     Attributes
     ----------
@@ -47,21 +52,21 @@ class Winner:
 
     @property
     def split(self) -> str:
-        """Which episodes the two are compared on."""
+        """Split of the episodes on which the two are compared."""
         if self.claim is not None:
             return self.claim.split
         return "" if self.paper is None else views.published_split(self.paper)
 
     @property
     def silence(self) -> str:
-        """What is said where nothing can be claimed."""
+        """Reason why there is no claim."""
         if self.paper is None:
             return "no paper controller to compare with"
         return "no learned controller has been run"
 
 
 def nominal(tracks: Tracks) -> dict[str, Winner]:
-    """Return who leads on the nominal track of each environment (on all where none is nominal)."""
+    """Return the leaders of each environment's nominal track (of all tracks if none is nominal)."""
     chosen = {name: rows for name, rows in tracks.items() if "nominal" in name} or dict(tracks)
     return {name: _winner(name, rows) for name, rows in chosen.items()}
 
@@ -72,166 +77,120 @@ def _winner(track: str, rows: Sequence[Row]) -> Winner:
     return Winner(env, track, claims.best_paper(rows), made[0] if made else None)
 
 
-def winners(tracks: Tracks) -> list[str]:
-    """Return the table of the nominal tracks: best paper controller, best learned one, verdict."""
-    heading = ["environment", "episodes", "best paper controller", "RMS [95 %]"]
-    heading += ["best learned", "RMS [95 %]", "lower by [95 %]", "P(improvement) [95 %]"]
-    heading += ["largest cost", "verdict"]
-    return table(heading, [_winner_line(found) for found in nominal(tracks).values()])
+def board_text(all_rows: Sequence[Row], pages: Mapping[str, str] | None = None) -> str:
+    """Return LEADERBOARD.md.
+
+    Parameters
+    ----------
+    all_rows : sequence of rows
+        In any order.
+    pages : mapping from environment to path, optional
+        Of its page, relative to the board.
+    """
+    tracks = standings.tracks(all_rows)
+    if not tracks:
+        return f"{INTRODUCTION}\n{NO_ROWS}\n"
+    lines = [*INTRODUCTION.splitlines(), "", verified_words(all_rows), ""]
+    lines += ["## Nominal tracks", "", *_winners(tracks), ""]
+    lines += ["## Rank changes between tracks", "", *_rank_changes(tracks), ""]
+    lines += ["## Environments", "", *_environments(tracks, pages or {}), ""]
+    if words := _budgets(all_rows):
+        lines += [words, ""]
+    return "\n".join([*lines, READING.read_text(encoding="utf-8")])
 
 
-def _winner_line(found: Winner) -> list[str]:
-    line = [f"`{found.env}`", found.split or "-", *_named(found.paper, found.split)]
-    if found.claim is None:
-        return [*line, *_named(None, ""), "-", "-", "-", found.silence]
-    best = found.claim
-    verdict = plain_verdict(best)
-    bold = f"**{verdict}**" if best.verdict == claims.BETTER else verdict
-    learned = _named(best.row, best.split)
-    against = [percent(best.gain), chance(best.probability), largest_cost(best)]
-    return [*line, *learned, *against, bold]
+def _winners(tracks: Tracks) -> list[str]:
+    """Return the table of the nominal tracks, and a line with intervals and reasons for each."""
+    heading = ["environment", "best paper controller", "best learned", "lower by", "P", "verdict"]
+    found = nominal(tracks).values()
+    return [*tables(heading, [_line(w) for w in found]), "", NOMINAL, "", *map(_detail, found)]
 
 
-def _named(row: Row | None, split: str) -> list[str]:
-    """Return a controller's name and its score."""
-    return ["none" if row is None else f"`{views.name_of(row)}`", score_words(row, split)]
+def _line(found: Winner) -> list[str]:
+    learned, entry = found.claim.row if found.claim else None, found.claim
+    cells = [f"`{short_env(found.env)}`"]
+    for row in (found.paper, learned):
+        name = "none" if row is None else f"`{views.name_of(row)}`"
+        cells.append(f"{name}<br>{_without_bounds(score_words(row, found.split))}")
+    if entry is None:
+        return [*cells, "-", "-", found.silence]
+    bold = f"**{entry.verdict}**" if entry.verdict == claims.BETTER else entry.verdict
+    return [*cells, f"{100.0 * entry.gain.value:+.2g} %", f"{entry.probability.value:.2f}", bold]
 
 
-def score_words(row: Row | None, split: str) -> str:
-    """Return the score of a row over the episodes of a split, with its interval and unit."""
-    if row is None:
-        return "-"
-    unit, factor = shown(views.content_of(row))
-    return f"{bounded(views.interval(row, split=split), factor)} {unit}"
+def _without_bounds(words: str) -> str:
+    """Return a score without its interval."""
+    before, bracket, rest = words.partition(" [")
+    return before + rest.partition("]")[2] if bracket else words
 
 
-def largest_cost(entry: Claim) -> str:
-    """Return the cost whose ratio to the paper controller's is the largest."""
-    name, ratio = max(entry.ratios.items(), key=lambda item: item[1])
-    return f"{number(ratio)}x {name}"
+def _detail(found: Winner) -> str:
+    """Return the intervals, the largest cost and the reasons of a nominal track's claim."""
+    paper, entry = found.paper, found.claim
+    words = f"- `{short_env(found.env)}`, {found.split or 'no'} episodes: "
+    if paper is not None:
+        words += f"`{views.name_of(paper)}` {score_words(paper, found.split)}"
+    if entry is None:
+        return f"{words}; {found.silence}"
+    return (
+        f"{words}, `{views.name_of(entry.row)}` {score_words(entry.row, entry.split)}; lower by "
+        f"{percent(entry.gain)}; P(improvement) {chance(entry.probability)}; largest cost "
+        f"{largest_cost(entry)}; {full_verdict(entry)}"
+    )
 
 
-def plain_verdict(entry: Claim) -> str:
-    """Return the verdict of a claim with what keeps it from being better, and what to know."""
-    words = "; ".join((*entry.reasons, *entry.remarks))
-    return f"{entry.verdict} ({words})" if words else entry.verdict
-
-
-def rank_changes(tracks: Tracks) -> list[str]:
-    """Return the table of every track against its environment's first, and all places, folded."""
-    found = standings.changes(ranked_rows(tracks))
+def _rank_changes(tracks: Tracks) -> list[str]:
+    """Return the table of every track against its environment's first."""
+    found = standings.changes(standings.ranked(tracks))
     if not found:
-        return ["No environment has been run on more than one track.", ""]
-    heading = ["environment", "track", "first here", "was", "largest fall", "largest rise"]
-    heading += ["same order (Kendall's tau)", "episodes"]
-    lines = [change_line(entry, k) for entry in found for k in range(1, len(entry.tracks))]
-    places = [part for entry in found for part in (f"`{entry.env}`", "", *_places(entry), "")]
-    return [*table(heading, lines), "", *folded("All places", places)]
-
-
-def change_line(found: Changes, k: int) -> list[str]:
-    """Return the line of the k-th track of an environment against its first."""
-    moves = {name: places[0].first - places[k].first for name, places in found.places.items()}
-    leaders = [name for name, places in found.places.items() if places[k].first == 1]
-    fall, rise = min(moves, key=lambda n: moves[n]), max(moves, key=lambda n: moves[n])
-    return [
-        f"`{found.env}`",
-        short_name(found.tracks[k], found.tracks),
-        ", ".join(f"`{name}`" for name in leaders),
-        ", ".join(str(found.places[name][0]) for name in leaders),
-        _step(found, fall, k) if moves[fall] < 0 else "-",
-        _step(found, rise, k) if moves[rise] > 0 else "-",
-        f"{found.agreement[k]:.2f}",
-        " / ".join(dict.fromkeys((found.splits[0], found.splits[k]))),
-    ]
-
-
-def _step(found: Changes, name: str, k: int) -> str:
-    places = found.places[name]
-    return f"`{name}` {places[0]} → {places[k]}"
-
-
-def short_name(track: str, tracks: Sequence[str]) -> str:
-    """Return a track's name without what the tracks of its environment have in common."""
-    words = [name.split("_") for name in tracks]
-    common = 0
-    while all(len(w) > common + 1 and w[common] == words[0][common] for w in words):
-        common += 1
-    return " ".join(track.split("_")[common:])
-
-
-def _places(found: Changes) -> list[str]:
-    heading = ["controller", *(short_name(name, found.tracks) for name in found.tracks)]
+        return ["No environment has been run on more than one track."]
+    heading = ["environment", "track", "first here", "nominal place", "Kendall's tau", "episodes"]
     lines = []
-    for name, (first, *others) in found.places.items():
-        cells = [_moved(place.first - first.first, str(place)) for place in others]
-        lines.append([f"`{name}`", str(first), *cells])
-    agreement = ["1", *(f"{tau:.2f}" for tau in found.agreement[1:])]
-    lines.append(["*order as in the first (Kendall's tau)*", *agreement])
-    return table(heading, lines)
+    for entry in found:
+        for k in range(1, len(entry.tracks)):
+            _, track, leaders, was, _, _, tau, split = change_cells(entry, k)
+            names = leaders.replace(", ", "<br>")
+            lines.append([f"`{short_env(entry.env)}`", track, names, was, tau, split])
+    return [*RANK_CHANGES.splitlines(), "", *tables(heading, lines)]
 
 
-def _moved(by: int, place: str) -> str:
-    return place if not by else f"{place} ({'▼' if by > 0 else '▲'}{abs(by)})"
+def _environments(tracks: Tracks, pages: Mapping[str, str]) -> list[str]:
+    """Return the table of the environments' pages."""
+    grouped = standings.by_env(tracks)
+    lines = []
+    for env, held in grouped.items():
+        name, names = short_env(env), {views.name_of(row) for rows in held.values() for row in rows}
+        link = f"[{name}]({pages[env]})" if env in pages else f"`{name}`"
+        count = sum(map(len, held.values()))
+        lines.append([link, str(len(held)), str(len(names)), str(count)])
+    return tables(["environment", "tracks", "controllers", "rows"], lines)
 
 
-COSTS = """\
-As stated by its maker, not verified: `verify` runs controllers, it does not train them again.
-"""
-
-
-def costs(rows: Sequence[Row]) -> list[str]:
-    """Return what each controller cost to make: a table, and how equal the tuning was."""
-    entries = {views.name_of(row): row for row in sorted(rows, key=lambda row: row["row"])}
-    return [COSTS.rstrip() + _budgets(list(entries.values())), "", *_cost_table(entries)]
+def verified_words(all_rows: Sequence[Row]) -> str:
+    """Return how many rows were reproduced, to the last bit or within tolerance, and when."""
+    found = [row[views.VERIFIED] for row in all_rows if views.is_verified(row)]
+    when = f", last on {max(entry['date'] for entry in found)}" if found else ""
+    elsewhere = sum(entry["mode"] == "elsewhere" for entry in found)
+    how = f", {elsewhere} of them within tolerance on another machine" if elsewhere else ""
+    return f"{len(found)} of {len(all_rows)} rows are verified{when}{how}."
 
 
 def _budgets(rows: Sequence[Row]) -> str:
     """Return sentences on the tuning trials of classical and learned controllers."""
+    entries = {views.name_of(row): row for row in sorted(rows, key=lambda row: row["row"])}
     trials: dict[bool, list[int | None]] = {}
-    for row in rows:
+    for row in entries.values():
         learned = row["controller"]["kind"] != "classical"
         trials.setdefault(learned, []).append(views.cost_of(row).trials)
     if len(trials) < 2:
         return ""
     most = {learned: max(count or 0 for count in counts) for learned, counts in trials.items()}
-    said = ""
+    words = []
     if most[True] != most[False]:
-        said += (
-            f" Tuning budgets are not equal: up to {most[True]} trials of a learned controller, "
+        words.append(
+            f"Tuning budgets are not equal: up to {most[True]} trials of a learned controller, "
             f"up to {most[False]} of a classical one."
         )
     if by_hand := trials[True].count(None):
-        said += f" Of {by_hand} learned controllers the settings were chosen by hand, uncounted."
-    return said
-
-
-def _cost_table(entries: Mapping[str, Row]) -> list[str]:
-    heading = ["controller", "kind", "tuning", "tuning trials", "training seeds", "steps a seed"]
-    heading += ["time a seed", "hardware"]
-    return table(heading, [_cost_line(entries[name]) for name in sorted(entries)])
-
-
-def _cost_line(row: Row) -> list[str]:
-    controller, cost = row["controller"], views.cost_of(row)
-    return [
-        f"`{views.name_of(row)}`",
-        controller["kind"],
-        cost.tuning or "-",
-        "-" if cost.trials is None else str(cost.trials),
-        str(views.training_seeds(row)) if controller["kind"] != "classical" else "-",
-        millions(cost.steps),
-        duration(cost.seconds),
-        cost.hardware or "-",
-    ]
-
-
-def legend(rows: Sequence[Row]) -> list[str]:
-    """Return a line for each controller: what it is and where it is from."""
-    entries = {views.name_of(row): row["controller"] for row in rows}
-    lines = []
-    for name in sorted(entries):
-        about = entries[name]
-        cited = f" *{about['citation']}*" if about["citation"] else ""
-        lines.append(f"- `{name}`: {about['summary']}{cited}")
-    return lines
+        words.append(f"Of {by_hand} learned controllers the settings were chosen by hand.")
+    return " ".join(words)

@@ -13,6 +13,8 @@ from benchmarks.identity import verified
 from benchmarks.runs.store import CHECKSUM, read_json
 from tests.benchmarks.row_helpers import commit, draw, place, run_row
 
+PAGE = "leaderboard/MusclePositioning.md"
+
 
 def test_a_round_its_entrants_and_who_is_outside_of_it(tmp_path: Path) -> None:
     with place(tmp_path):
@@ -30,9 +32,9 @@ def test_a_round_its_entrants_and_who_is_outside_of_it(tmp_path: Path) -> None:
         assert found.missing == ("integral",)
         assert len({views.pairs_of(row, "audit") for row in found.inside}) == 1
 
-        text = leaderboard.board_text(loaded)
+        text = leaderboard.files(loaded)[PAGE]
         assert "Audit round 1, drawn" in text
-        assert "30 episodes that nobody could tune to, 2 of 3 rows" in text
+        assert "30 episodes with seeds unknown before, 2 of 3 rows" in text
         assert "In the round and without a row: integral." in text
         day = verified.read(tmp_path / "out")["tiny--trained"]["date"]
         assert f"| verified {day} |" in text
@@ -53,7 +55,7 @@ def test_a_round_its_entrants_and_who_is_outside_of_it(tmp_path: Path) -> None:
         )
 
         bench_fakes.write_policies(tmp_path / "policies", 0.02, 0.06)
-        older = leaderboard.board_text(leaderboard.load(tmp_path / "out"))
+        older = leaderboard.files(leaderboard.load(tmp_path / "out"))[PAGE]
         assert f"| verified {day}, at an older code |" in older
         commit(tmp_path)
 

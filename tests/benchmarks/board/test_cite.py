@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from typing import Any
 
@@ -14,6 +15,7 @@ from baselines.core.entry import Entry
 from baselines.trivial import make_zero
 from benchmarks.__main__ import main
 from benchmarks.board import cite
+from benchmarks.runs import rows
 from benchmarks.runs.controllers import available
 from benchmarks.runs.provenance import ROOT
 from benchmarks.runs.store import write_record
@@ -93,8 +95,6 @@ def test_the_package_is_cited_as_it_says() -> None:
 def test_a_row_is_cited_with_what_runs_it_again(
     track: ScenarioSet, folder: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from benchmarks.runs import rows
-
     (path,) = score(track, folder, "integral").rows
     row = rows.load(path)
     row["controller"]["citation"] = f"{PPO}; {SIMC}"
@@ -144,3 +144,17 @@ def test_the_words_of_a_stranger_stay_in_their_field() -> None:
     entry = parsed(cite.bibtex(row))["short_nominal--pid-aaaaaaaa"]
     assert entry["author"] == "{A. B, note = won inputx}"
     assert entry["note"].startswith("RMS")
+
+
+def test_show_row_prints_scores_and_every_digit(
+    track: ScenarioSet, folder: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (path,) = score(track, folder, "integral").rows
+    assert main(["show-row", str(path)]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("short--integral\n")
+    assert "public RMS: " in text
+    assert "of 6 episodes failed" in text
+    assert main(["show-row", str(path), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == rows.load(path)
+    assert main(["show-row", "short--nobody"]) == 2

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.board import accessors as views
 from benchmarks.board import claims, standings
-from benchmarks.board import summary as board_summary
+from benchmarks.board.words import full_verdict
 from benchmarks.runs import knowledge
 
 TEN = np.linspace(0.4e-3, 0.6e-3, 10)
@@ -122,7 +122,7 @@ def test_unequal_budgets_stand_beside_the_verdict(trials: int | None, words: str
     found = claims.claim(row, PAPER)
     assert found is not None
     assert found.verdict == claims.BETTER
-    assert words in board_summary.plain_verdict(found)
+    assert words in full_verdict(found)
 
 
 # A maker can try public episodes until they suit him: nothing that he gains there may count.

@@ -1,4 +1,4 @@
-"""LEADERBOARD.md: a summary first, wide tables folded, the same bytes for the same rows."""
+"""LEADERBOARD.md and its pages: summary, narrow tables, equal bytes for equal rows."""
 
 from __future__ import annotations
 
@@ -6,60 +6,80 @@ import json
 import re
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import board_fakes as fakes
 import pytest
 
 from benchmarks.board import accessors as views
-from benchmarks.board import claims, leaderboard, plots, standings
+from benchmarks.board import claims, format, leaderboard, plots, standings, summary
+from benchmarks.board.columns import columns_of, with_costs
 from benchmarks.board.format import duration, number, table
-from benchmarks.board.tables import with_costs
 from benchmarks.identity import audit, verified
 from benchmarks.runs import cells, rows
 from benchmarks.runs.controllers import available, find
 from benchmarks.scoring.metrics import of_track
 
+BOARD, PAGE = leaderboard.BOARD.name, "leaderboard/MusclePositioning.md"
+
 
 @pytest.fixture(scope="module")
-def text() -> str:
-    return leaderboard.board_text(fakes.board())
+def files() -> dict[str, str]:
+    return leaderboard.files(fakes.board())
+
+
+def page(*rows: dict[str, Any]) -> str:
+    """Return the page of the rows' environment."""
+    return leaderboard.files(rows)[PAGE]
 
 
 def section(text: str, title: str) -> str:
     return re.split(r"^## ", text.partition(f"## {title}\n")[2], flags=re.MULTILINE)[0]
 
 
-def test_the_board_is_the_same_whatever_order_and_machine(text: str) -> None:
+def cells_of(text: str, name: str) -> list[list[str]]:
+    """Return the cells of every table line of a controller."""
+    lines = [line for line in text.splitlines() if f"| `{name}` |" in line]
+    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
+
+
+def test_files_do_not_depend_on_order_and_machine(files: dict[str, str]) -> None:
     turned = fakes.board()[::-1]
     for row in turned:
-        row["volatile"] = {"predict_us": {"median": 1e9, "p99": 1e9}, "host": "elsewhere"}
-    assert leaderboard.board_text(turned) == text
+        times = {"predict_us": {"median": 1e9, "p99": 1e9}, "machine": "x", "date": "y"}
+        row["volatile"] = times
+    made = leaderboard.files(turned)
+    assert {name for name in made if made[name] != files[name]} == {"leaderboard/times.md"}
+    assert made.keys() == files.keys()
 
 
-def test_the_verdict_stands_first_and_says_what_was_beaten(text: str) -> None:
-    (line,) = re.findall(r"^\| `PAM/Mus.*$", section(text, "Nominal tracks"), re.MULTILINE)
+def test_summary_shows_winner_and_verdict_of_each_nominal_track(files: dict[str, str]) -> None:
+    nominal = section(files[BOARD], "Nominal tracks")
+    (line,) = re.findall(r"^\| `Muscle.*$", nominal, re.MULTILINE)
     cells = [cell.strip() for cell in line.strip("|").split("|")]
-    assert cells[1:3] == ["audit", "`inverse`"]
-    assert cells[4] == "`ppo`"
-    assert cells[5].startswith("0.500 [")
-    assert cells[6] == "+50 % [+46, +54]"
-    assert cells[7] == "1.00 [1.00, 1.00]"
-    assert cells[9] == "**better (settings tried: 40, paper's 0)**"
+    assert cells[1:3] == ["`inverse`<br>1.00 mm", "`ppo`<br>0.500 mm"]
+    assert cells[3:] == ["+50 %", "1.00", "**better**"]
+    (detail,) = re.findall(r"^- `MusclePositioning`, audit episodes: .*$", nominal, re.MULTILINE)
+    assert "`ppo` 0.500 [" in detail
+    assert "; lower by +50 % [+46, +54]; P(improvement) 1.00 [1.00, 1.00]; largest" in detail
+    assert detail.endswith("; better (settings tried: 40, paper's 0)")
 
 
-def test_rank_changes_are_a_headline_table(text: str) -> None:
-    assert text.index("## Rank changes between tracks") < text.index("## Tracks")
-    changes = section(text, "Rank changes between tracks")
-    assert "| wrong model | `ppo` | 1 | `inverse` 2 → 3 | `pid` 3 → 2 | 0.67 | audit |" in changes
+def test_rank_changes_are_in_summary_and_page(files: dict[str, str]) -> None:
+    changes = section(files[BOARD], "Rank changes between tracks")
+    assert "| `MusclePositioning` | wrong model | `ppo` | 1 | 0.67 | audit |" in changes
+    changes = section(files[PAGE], "Rank changes between tracks")
+    line = "- *wrong model*: first `ppo` (nominal: 1); largest fall `inverse` 2 → 3; largest rise "
+    assert f"{line}`pid` 3 → 2; Kendall's tau 0.67; audit episodes" in changes
     assert "| `inverse` | 2 | 3 (▼1) |" in changes
 
 
-def test_rows_outside_of_the_round_and_young_ones_stand_apart(text: str) -> None:
-    track = section(text, "Tracks").split("### ")[1]
-    assert "Audit round 2, drawn 2026-01-02: 6 episodes that nobody could tune to, 5 of 6" in track
+def test_rows_outside_the_round_and_with_few_seeds_are_apart(files: dict[str, str]) -> None:
+    track = files[PAGE].split("\n## A short track\n")[1]
+    assert "Audit round 2, drawn 2026-01-02: 6 episodes with seeds unknown before, 5 of 6" in track
     ranked, _, rest = track.partition("Not ranked, fewer than 5 training seeds:")
-    young, _, outside = rest.partition("Not in the audit round, not ranked;")
-    names = [re.findall(r"^\| (\S+) \| \[`(\w+)`\]", part, re.MULTILINE)
+    young, _, outside = rest.partition("Not in the audit round, not ranked,")
+    names = [re.findall(r"^\| (\S+) \| `(\w+)`", part, re.MULTILINE)
              for part in (ranked, young, outside.partition("<details>")[0])]  # fmt: skip
     assert names == [
         [("1", "ppo"), ("2", "inverse"), ("3", "pid"), ("4", "zero")],
@@ -70,43 +90,61 @@ def test_rows_outside_of_the_round_and_young_ones_stand_apart(text: str) -> None
     assert "P(improvement), public episodes" in outside
 
 
-def test_a_row_that_does_worse_unseen_is_marked(text: str) -> None:
-    (line,) = re.findall(r"^\| 3 \| \[`pid`\]\(results/short_nominal--pid.*$", text, re.MULTILINE)
-    assert "**2.60**" in line
-    assert "| 2.00 |" in line
-    assert re.search(r"\*\*\+0\.600 \[\+0\.\d+, \+0\.\d+\]\*\*", line)
+def test_row_that_does_worse_unseen_is_marked(files: dict[str, str]) -> None:
+    track = files[PAGE].split("\n## A short track\n")[1]
+    line = cells_of(track, "pid")[0]
+    assert line[0] == "3"
+    assert line[2].startswith("**2.60** [")
+    assert re.fullmatch(r"\*\*\+0\.600 \[\+0\.\d+, \+0\.\d+\]\*\*", line[3])
+    public = track.partition("Public episodes, smooth")[2]
+    assert cells_of(public, "pid")[0][2] == "2.00"
 
 
-def test_a_second_artefact_of_a_name_shows() -> None:
+def test_no_table_is_wider_than_a_screen(files: dict[str, str]) -> None:
+    made = "\n".join(format.tables(["controller", *("x" * 20,) * 9], [["`a`", *"123456789"]] * 3))
+    assert made.count("| controller |") == 2
+    for text in (made, *(text for name, text in files.items() if name.endswith(".md"))):
+        for line in text.splitlines():
+            assert not line.startswith("|") or max(map(len, line.split("<br>"))) <= format.WIDTH
+
+
+def test_committed_summary_is_short() -> None:
+    assert leaderboard.BOARD.stat().st_size <= 60_000
+    pages = sorted((leaderboard.BOARD.parent / leaderboard.PAGES).glob("*.md"))
+    assert len(pages) > 9
+    links = re.findall(r"\]\((leaderboard/\w+\.md)\)", leaderboard.BOARD.read_text())
+    assert set(links) == {f"{leaderboard.PAGES}/{path.name}" for path in pages}
+
+
+def test_second_artefact_of_a_name_is_marked() -> None:
     row = fakes.row("pid", 1e-3, audit=1e-3)
-    assert "(artefact" not in leaderboard.board_text([row])
+    assert "(artefact" not in page(row)
     row["audit"]["entry"] = 3
-    assert "(artefact 3)" in leaderboard.board_text([row])
+    assert "(artefact 3)" in page(row)
 
 
-def test_an_entrant_of_the_round_that_has_no_row_is_named() -> None:
-    text = leaderboard.board_text([fakes.row("pid", 1e-3, audit=1e-3)])
+def test_entrant_of_the_round_without_row_is_named() -> None:
+    text = page(fakes.row("pid", 1e-3, audit=1e-3))
     assert "In the round and without a row: inverse, ppo, young, zero." in text
 
 
-def test_a_verified_row_says_when() -> None:
+def test_verified_row_shows_its_day() -> None:
     row = fakes.row("pid", 1e-3)
-    assert "not verified yet" in leaderboard.board_text([row])
-    assert "0 of 1 rows are verified with the code as it is.\n" in leaderboard.board_text([row])
+    assert "not verified yet" in page(row)
+    assert "0 of 1 rows are verified.\n" in summary.board_text([row])
     row["verified"] = {"date": "2026-01-03", "mode": "bits", "older": False}
-    assert "| verified 2026-01-03 |" in leaderboard.board_text([row])
-    said = leaderboard.board_text([row, fakes.row("zero", 2e-3)])
-    assert "1 of 2 rows are verified with the code as it is, last on 2026-01-03.\n" in said
+    assert "| verified 2026-01-03 |" in page(row)
+    board = summary.board_text([row, fakes.row("zero", 2e-3)])
+    assert "1 of 2 rows are verified, last on 2026-01-03.\n" in board
     row["verified"]["mode"] = "elsewhere"
-    assert "| verified 2026-01-03 elsewhere |" in leaderboard.board_text([row])
-    assert ", 1 of them elsewhere and nearly." in leaderboard.verified_of([row])
+    assert "| verified 2026-01-03 elsewhere |" in page(row)
+    assert ", 1 of them within tolerance on another machine." in summary.verified_words([row])
     row["verified"]["older"] = True
-    words = "| verified 2026-01-03 elsewhere, at an older code |"
-    assert words in leaderboard.board_text([row])
-    assert "0 of 1 rows are verified" in leaderboard.board_text([row])
+    assert "| verified 2026-01-03 elsewhere, at an older code |" in page(row)
+    assert "0 of 1 rows are verified" in summary.board_text([row])
 
 
-def test_a_row_of_an_older_round_is_self_reported(
+def test_row_of_an_older_round_is_self_reported(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     given = [fakes.row("pid", 1e-3, audit=1e-3), fakes.row("zero", 2e-3, audit=2e-3)]
@@ -120,7 +158,7 @@ def test_a_row_of_an_older_round_is_self_reported(
     assert [views.name_of(r) for r in standings.listing([pid, zero]).outside] == ["zero"]
 
 
-def test_a_verification_counts_for_the_row_that_it_was_of(
+def test_verification_counts_only_for_the_row_with_its_checksum(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     given = [fakes.row("pid", 1e-3), fakes.row("zero", 2e-3)]
@@ -150,36 +188,44 @@ def test_a_verification_is_of_the_code_that_it_ran(package: str) -> None:
     assert older(sources=now)
 
 
-def test_a_checkout_without_rows_has_a_board_that_says_so(tmp_path: Path) -> None:
+def test_board_without_rows_states_that(tmp_path: Path) -> None:
     written = leaderboard.write(tmp_path, tmp_path / "LEADERBOARD.md")
-    assert leaderboard.NO_ROWS in written[0].read_text()
+    assert summary.NO_ROWS in written[0].read_text()
     with pytest.raises(ValueError, match="no such folder of rows"):
         leaderboard.write(tmp_path / "nowhere", tmp_path / "LEADERBOARD.md")
 
 
-def test_costs_to_make_are_told(text: str) -> None:
-    costs = section(text, "What they cost to make")
-    assert "As stated by its maker, not verified" in costs
-    assert "not equal: up to 40 trials of a learned controller, up to 0 of a classical one" in costs
+def test_tuning_and_training_costs_are_shown(files: dict[str, str]) -> None:
+    costs = section(files[PAGE], "Tuning and training")
+    assert "As stated by the author of the row, not verified" in costs
     assert "| `ppo` | learned | search of 40 | 40 | 10 | 1 M | 5.00 min | 2 cores |" in costs
     assert "| `pid` | classical | by rule | 0 | - | - | - | - |" in costs
+    unequal = "not equal: up to 40 trials of a learned controller, up to 0 of a classical one"
+    assert unequal in files[BOARD]
 
 
-def test_wide_tables_are_folded(text: str) -> None:
+def test_secondary_tables_are_folded(files: dict[str, str]) -> None:
+    text = files[PAGE]
     opened = re.sub(r"<details>.*?</details>", "", text, flags=re.DOTALL)
     assert "| p95 [mm]" in text
     assert "| p95 [mm]" not in opened
     assert "interquartile" in text.lower()
-    assert text.count("<details>") == text.count("</details>") == 7
+    assert text.count("<details>") == text.count("</details>") == 11
 
 
-def test_rows_of_a_track_without_an_audit_say_so() -> None:
-    text = leaderboard.board_text([fakes.row("pid", 1e-3), fakes.row("zero", 2e-3)])
+def test_controllers_name_their_sources(files: dict[str, str]) -> None:
+    assert "- `pid`: what pid is (skogestad2003)\n" in section(files[PAGE], "Controllers")
+    assert "- skogestad2003: Skogestad, Sigurd, Simple" in section(files[PAGE], "Sources")
+
+
+def test_rows_of_a_track_without_audit_are_self_reported() -> None:
+    text = page(fakes.row("pid", 1e-3), fakes.row("zero", 2e-3))
     assert "Self-reported: no audit round yet" in text
-    assert "no learned controller has been run" in text
+    board = summary.board_text([fakes.row("pid", 1e-3), fakes.row("zero", 2e-3)])
+    assert "no learned controller has been run" in board
 
 
-def test_the_figure_has_the_same_bytes_each_time() -> None:
+def test_figure_is_deterministic() -> None:
     ordered = standings.tracks(fakes.board())["short_nominal"]
     first = plots.track_figure(ordered)
     assert plots.track_figure(ordered) == first
@@ -188,7 +234,7 @@ def test_the_figure_has_the_same_bytes_each_time() -> None:
     assert "told" not in first
 
 
-def test_only_the_best_classical_controllers_are_drawn_but_all_learned_ones() -> None:
+def test_all_learned_and_only_the_best_classical_controllers_are_drawn() -> None:
     many = [fakes.row(f"c{k:02}", 1e-3 * (k + 1)) for k in range(12)]
     worst = fakes.row("ppo", [0.1] * 5, kind="learned")
     drawn = plots.drawn_rows(standings.ordered([*many, worst]))
@@ -196,14 +242,14 @@ def test_only_the_best_classical_controllers_are_drawn_but_all_learned_ones() ->
     assert drawn[-1]["controller"]["name"] == "ppo"
 
 
-def test_every_cost_that_a_claim_rests_on_is_a_column() -> None:
+def test_every_cost_of_a_claim_is_a_column() -> None:
     for metrics in ([], ["range"], ["range", "gait"]):
-        columns = with_costs(leaderboard.columns_of({"metrics": metrics}))
+        columns = with_costs(columns_of({"metrics": metrics}))
         wanted = set(claims.COSTS) & set(of_track({"metrics": metrics}))
         assert wanted <= {metric for metric, _, _ in columns}
 
 
-def test_numbers_and_tables_as_printed() -> None:
+def test_numbers_and_tables_are_formatted() -> None:
     assert [number(x) for x in (0.0, 1.0, 0.012345, 123456.0, 2e-5, None)] == [
         "0", "1.00", "0.0123", "123456", "2e-05", "-",
     ]  # fmt: skip

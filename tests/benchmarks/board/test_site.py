@@ -300,7 +300,7 @@ def test_rows_of_a_run_make_a_board_and_a_page_with_their_trajectories(
     pairs = [(find(name), track) for name in ("low", "integral")]
     run(pairs, Options(jobs=1, out=out, cells=folder / "cells"))
     written = leaderboard.write(out, folder / "LEADERBOARD.md")
-    assert "`integral`" in written[0].read_text()
+    assert "`integral`" in written[1].read_text()
     assert main(["site", "--results", str(out), "--out", str(folder / "site")]) == 0
     assert main(["site", "--results", str(folder / "nowhere")]) == 2
     text = (folder / "site/data/traces/short--integral.js").read_text()

@@ -1,0 +1,102 @@
+"""Sentences and cells of the board that its pages and the site share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from benchmarks.board import accessors as views
+from benchmarks.board.claims import Claim
+from benchmarks.board.format import bounded, number
+from benchmarks.board.standings import Changes, Listing
+from benchmarks.runs.cells import AUDIT, PUBLIC
+from benchmarks.runs.rows import Row, shown
+from benchmarks.scoring.metrics import headline_of
+
+
+def short_env(env: str) -> str:
+    """Return the name of an environment without namespace and version."""
+    return env.removeprefix("PAM/").rpartition("-v")[0]
+
+
+def about(row: Row) -> str:
+    """Return a sentence on the track of a row: environment, scenarios, scoring."""
+    content, scenarios = views.content_of(row), len(row["plants"])
+    unit, factor = shown(content)
+    public = len(views.pairs_of(row, PUBLIC))
+    return (
+        f"`{row['env']['id']}`, scenarios `{views.track_of(row)}` version {content['version']} "
+        f"(`{row['scenarios']['digest'][:12]}`): {scenarios} scenarios, {public} public episodes, "
+        f"settling window {content['settle_seconds']:g} s, worst case "
+        f"{factor * content['worst_case'][headline_of(content)]:g} {unit}."
+    )
+
+
+def round_words(listing: Listing) -> str:
+    """Return the audit round of a track's scores and its entrants."""
+    first = listing.inside[0]
+    if not views.is_audited(first):
+        return "Self-reported: no audit round yet, all scores are of the public episodes."
+    found, total = views.round_of(first), len(listing.inside) + len(listing.outside)
+    episodes = len(views.pairs_of(first, AUDIT))
+    words = (
+        f"Audit round {found['round']}, drawn {found['drawn']}: {episodes} episodes with seeds "
+        f"unknown before, {len(listing.inside)} of {total} rows."
+    )
+    if listing.missing:
+        words += f" In the round and without a row: {', '.join(listing.missing)}."
+    return words
+
+
+def score_words(row: Row | None, split: str) -> str:
+    """Return the score of a row over the episodes of a split, with its interval and unit."""
+    if row is None:
+        return "-"
+    unit, factor = shown(views.content_of(row))
+    return f"{bounded(views.interval(row, split=split), factor)} {unit}"
+
+
+def largest_cost(entry: Claim) -> str:
+    """Return the cost whose ratio to the paper controller's is the largest."""
+    name, ratio = max(entry.ratios.items(), key=lambda item: item[1])
+    return f"{number(ratio)}x {name}"
+
+
+def full_verdict(entry: Claim) -> str:
+    """Return the verdict of a claim with its reasons and remarks."""
+    words = "; ".join((*entry.reasons, *entry.remarks))
+    return f"{entry.verdict} ({words})" if words else entry.verdict
+
+
+def change_cells(found: Changes, k: int) -> list[str]:
+    """Return the cells of the k-th track of an environment against its first.
+
+    Environment, track, leaders, their places in the first track, largest fall, largest rise,
+    Kendall's tau, episodes.
+    """
+    moves = {name: places[0].first - places[k].first for name, places in found.places.items()}
+    leaders = [name for name, places in found.places.items() if places[k].first == 1]
+    fall, rise = min(moves, key=lambda n: moves[n]), max(moves, key=lambda n: moves[n])
+    return [
+        f"`{found.env}`",
+        short_name(found.tracks[k], found.tracks),
+        ", ".join(f"`{name}`" for name in leaders),
+        ", ".join(str(found.places[name][0]) for name in leaders),
+        _move(found, fall, k) if moves[fall] < 0 else "-",
+        _move(found, rise, k) if moves[rise] > 0 else "-",
+        f"{found.agreement[k]:.2f}",
+        " / ".join(dict.fromkeys((found.splits[0], found.splits[k]))),
+    ]
+
+
+def _move(found: Changes, name: str, k: int) -> str:
+    places = found.places[name]
+    return f"`{name}` {places[0]} → {places[k]}"
+
+
+def short_name(track: str, tracks: Sequence[str]) -> str:
+    """Return a track's name without the first words that all tracks of its environment share."""
+    words = [name.split("_") for name in tracks]
+    common = 0
+    while all(len(w) > common + 1 and w[common] == words[0][common] for w in words):
+        common += 1
+    return " ".join(track.split("_")[common:])
