@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.board.leaderboard import columns_of
+from benchmarks.board.columns import columns_of
 from benchmarks.scenarios.scenario import available
 from benchmarks.scoring import metrics
 from benchmarks.scoring.elbow import ELBOW, NEAR

@@ -11,7 +11,7 @@ import pytest
 
 import pam_envs  # noqa: F401 (registers)
 from benchmarks.board import standings
-from benchmarks.board.leaderboard import columns_of
+from benchmarks.board.columns import columns_of
 from benchmarks.runs import rollout, rows
 from benchmarks.scenarios.scenario import ScenarioSet, available
 from benchmarks.scenarios.scenario_env import make_env
