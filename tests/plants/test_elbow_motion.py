@@ -10,13 +10,10 @@ from scipy.integrate import solve_ivp
 
 from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
 from pam_envs.hysteresis.protocol import kinds
-from pam_envs.kernels.build import COMPILED, interpreted
+from pam_envs.kernels.build import COMPILED
 from pam_envs.plants.elbow_orthosis.plant import MAKES, ElbowOrthosis
 from pam_envs.plants.elbow_orthosis.rollout import (
     OUTPUTS,
-    arrays_for,
-    kernel_names,
-    run_elbow,
     simulate_elbow,
 )
 from pam_envs.pneumatics.on_off_pair import OnOffValve, mass_flow
@@ -394,13 +391,11 @@ def test_plain_python_gives_the_same_bits(hysteresis: str, valves: str) -> None:
     plant = ElbowOrthosis.paper(hysteresis, valves)  # type: ignore[arg-type]
     commands, intent, start = commands_for(plant, 60), reach(60), (2e5, 3e5)
     compiled = simulate_elbow(plant, commands, intent=intent, disturbance=1.5, pressures=start)
-    drives = (commands[:, 0], commands[:, 1], *intent, 1.5)
-    arrays = [a.tolist() for a in arrays_for([plant], drives, start, 1)]
-    run = interpreted(run_elbow, kernel_names(hysteresis, valves, 1))
-    run(*arrays, plant.elements, plant.substeps, PERIOD)
-    plain = np.array(arrays[-1])[:, :, 0]
-    for k, name in enumerate(OUTPUTS):
-        assert np.array_equal(compiled[name], plain[k]), name
+    plain = simulate_elbow(
+        plant, commands, intent=intent, disturbance=1.5, pressures=start, compiled=False
+    )
+    for name in OUTPUTS:
+        assert np.array_equal(compiled[name], plain[name]), name
 
 
 @pytest.mark.parametrize("valves", MAKES)

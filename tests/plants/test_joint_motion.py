@@ -10,13 +10,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 from pam_envs.hysteresis.protocol import kinds
-from pam_envs.kernels.build import COMPILED, interpreted
+from pam_envs.kernels.build import COMPILED
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rollout import (
     OUTPUTS,
-    arrays_for,
-    kernel_names,
-    run_joint,
     simulate_joint,
 )
 
@@ -245,12 +242,9 @@ def test_compiled_bits_are_those_of_plain_python(make: str, kind) -> None:  # ty
     plant = getattr(AntagonisticJoint, make)(kind)
     commands, shoves = steps(60, 29.0 * DEGREE, 6), steps(60, 4.0, 9, 2)
     compiled = simulate_joint(plant, commands, disturbance=shoves, payload=0.3)
-    drives = [commands, plant.prestress, shoves, 0.3, 0.0, 0.0, 0.0]
-    arrays = [a.tolist() for a in arrays_for([plant], drives, 1)]
-    names = kernel_names(kind, plant.dynamics, 1)
-    interpreted(run_joint, names)(*arrays, plant.elements, plant.substeps, PERIOD, 0)
-    for k, name in enumerate(OUTPUTS):
-        assert np.array_equal(np.asarray(arrays[-1])[k, :, 0], compiled[name]), name
+    plain = simulate_joint(plant, commands, disturbance=shoves, payload=0.3, compiled=False)
+    for name in OUTPUTS:
+        assert np.array_equal(plain[name], compiled[name]), name
 
 
 def test_records_side_by_side_are_those_alone() -> None:

@@ -10,14 +10,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pam_envs.constants import GRAVITY
-from pam_envs.kernels.build import COMPILED, interpreted
+from pam_envs.kernels.build import COMPILED
 from pam_envs.muscle.emg import MuscleActivation, emg_proxy
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.plants.knee_orthosis.rollout import (
     OUTPUTS,
-    arrays_for,
-    kernel_names,
-    run_knee,
     simulate_knee,
 )
 from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE, gait_curves
@@ -317,13 +314,9 @@ def test_the_activations_are_those_of_the_proxy() -> None:
 def test_plain_python_gives_the_same_bits(plant: KneeOrthosis) -> None:
     u = steps(80)
     compiled = simulate_knee(plant, u, pressure=1e5, phase=0.4)
-    names = kernel_names(plant.hysteresis.kind, plant.mounting, plant.dynamics, 1)
-    arrays = [a.tolist() for a in arrays_for([plant], u, 1)]
-    run = interpreted(run_knee, names)
-    run(*arrays, plant.elements, plant.substeps, PERIOD, 0.4, 1e5)
-    plain = np.array(arrays[-1])[:, :, 0]
-    for k, name in enumerate(OUTPUTS):
-        assert np.array_equal(compiled[name], plain[k]), name
+    plain = simulate_knee(plant, u, pressure=1e5, phase=0.4, compiled=False)
+    for name in OUTPUTS:
+        assert np.array_equal(compiled[name], plain[name]), name
 
 
 def test_rows_of_a_batch_are_the_single_plants() -> None:

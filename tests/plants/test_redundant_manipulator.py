@@ -10,20 +10,14 @@ import numpy as np
 import pytest
 
 from pam_envs.hysteresis.protocol import kinds
-from pam_envs.kernels.build import COMPILED, interpreted
+from pam_envs.kernels.build import COMPILED
 from pam_envs.mechanics.redundancy.resolution import resolve
 from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rollout import simulate_joint
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
-from pam_envs.plants.redundant_manipulator.rollout import (
-    JOINT_OUTPUTS,
-    MUSCLE_OUTPUTS,
-    run_arm,
-    simulate_manipulator,
-)
-from pam_envs.plants.redundant_manipulator.step import hysteresis_rows, replacements, work_rows
+from pam_envs.plants.redundant_manipulator.rollout import simulate_manipulator
 from pam_envs.references.path import PATHS
 
 DEGREE = np.radians(1.0)
@@ -247,23 +241,8 @@ def test_bad_chains_are_refused() -> None:
 @pytest.mark.parametrize("kind", kinds())
 def test_compiled_bits_are_those_of_plain_python(kind) -> None:  # type: ignore[no-untyped-def]
     plant = RedundantManipulator.paper(kind)
-    commands, n = steps(20, 29.0 * DEGREE, 4), plant.stages
+    commands = steps(20, 29.0 * DEGREE, 4)
     compiled = simulate_manipulator(plant, commands, payload=0.1)
-    arrays = [
-        np.zeros((M.END + hysteresis_rows(kind, n), 1)),
-        plant.parameter_rows()[:, None],
-        np.zeros((M.N_COUNTS, 1), np.int64),
-        plant.hysteresis_tables()[:1],
-        commands,
-        np.zeros((20, n)),
-        np.full((20, 1), 0.1),
-        np.empty((len(JOINT_OUTPUTS), 20, n)),
-        np.empty((len(MUSCLE_OUTPUTS), 20, 2 * n)),
-    ]
-    lists = [a.tolist() for a in arrays]
-    names = replacements(kind, n) | {"ARM_WORK": work_rows(n), "LANES": 1}
-    interpreted(run_arm, names)(*lists, plant.prestress, plant.elements, plant.substeps, 0.01)
-    for s, name in enumerate(JOINT_OUTPUTS):
-        assert np.array_equal(np.asarray(lists[-2])[s], compiled[name]), name
-    for s, name in enumerate(MUSCLE_OUTPUTS):
-        assert np.array_equal(np.asarray(lists[-1])[s], compiled[name]), name
+    plain = simulate_manipulator(plant, commands, payload=0.1, compiled=False)
+    for name, values in plain.items():
+        assert np.array_equal(values, compiled[name]), name

@@ -1,19 +1,17 @@
-"""Whole records of the antagonistic joint, parameter sets side by side, and its rests."""
+"""Rollouts of the antagonistic joint, parameter sets side by side, and its rests."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import lru_cache
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.protocol import state_rows
-from pam_envs.kernels.build import COMPILED, LANES, build, kernel, prange, scratch, tile_view
+from pam_envs.kernels.build import COMPILED, LANES, kernel
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
-from pam_envs.plants.antagonistic_joint.rows import N_COUNTS, N_PARAMETERS
 from pam_envs.plants.antagonistic_joint.step import (
     N_WORK,
     advance,
@@ -22,7 +20,8 @@ from pam_envs.plants.antagonistic_joint.step import (
     replacements,
     start_hysteresis,
 )
-from pam_envs.plants.core.tiles import drives_of, first_of, in_tiles
+from pam_envs.plants.core.rollout import BEGIN, REST, Loop, run
+from pam_envs.plants.core.tiles import drives_of, first_of
 
 OUTPUTS = {
     "angle": K.ANGLE,
@@ -45,91 +44,74 @@ OUTPUTS = {
 """Every signal of a record (SI) and its row of state."""
 COMMANDED, STRESSED, DISTURBED, LOADED, FILLED_A, FILLED_B, DIRECT = range(7)
 """Channels of what drives a record; ``DIRECT`` above 0 says that pressures are given."""
-_ROWS = tuple(OUTPUTS.values())
-WIDTH = LANES if COMPILED else 1
-"""Plants that one tile holds; plain Python gains nothing from lanes."""
-N_ROWS = 0  # a placeholder, filled in for each hysteresis
 
 Array = NDArray[np.float64]
 
 
 @kernel
-def drive(rows: Any, fixed: Any, drives: Any, step: int, column: int, j: int) -> None:
+def drive(rows: Any, fixed: Any, drives: Any, t: int, column: int, j: int) -> None:
     """Write what drives one lane in one control period."""
-    rows[K.COMMAND][j] = drives[COMMANDED][step][column]
-    rows[K.PRESTRESS][j] = drives[STRESSED][step][column]
-    rows[K.DISTURBANCE][j] = drives[DISTURBED][step][column]
-    rows[K.PAYLOAD][j] = drives[LOADED][step][column]
+    rows[K.COMMAND][j] = drives[COMMANDED][t][column]
+    rows[K.PRESTRESS][j] = drives[STRESSED][t][column]
+    rows[K.DISTURBANCE][j] = drives[DISTURBED][t][column]
+    rows[K.PAYLOAD][j] = drives[LOADED][t][column]
     p_a, p_b, _ = feed_forward(fixed, j, rows[K.COMMAND][j], rows[K.PRESTRESS][j])
-    if drives[DIRECT][step][column] > 0.0:
-        p_a, p_b = drives[FILLED_A][step][column], drives[FILLED_B][step][column]
+    if drives[DIRECT][t][column] > 0.0:
+        p_a, p_b = drives[FILLED_A][t][column], drives[FILLED_B][t][column]
     rows[K.SET_POINT_A][j], rows[K.SET_POINT_B][j] = p_a, p_b
 
 
 @kernel
-def run_joint(
-    all_rows: Any, all_fixed: Any, all_counts: Any, table: Any, drives: Any, outputs: Any,
-    elements: int, substeps: int, period: float, quasi_static: int,
+def begin(
+    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, drives: Any, t: int, first: int,
+    elements: int, work: Any,
 ) -> None:  # fmt: skip
-    """Run tiles of joints from rest under the first command through all control periods.
-
-    With ``quasi_static`` each command is held until rest, and only rests are gone through.
-    """
-    for tile in prange(len(all_rows)):
-        rows = tile_view(all_rows, tile, N_ROWS, LANES)
-        fixed = tile_view(all_fixed, tile, N_PARAMETERS, LANES)
-        counts = tile_view(all_counts, tile, N_COUNTS, LANES)
-        work = scratch(N_WORK, LANES)
-        start = tile * LANES
-        lanes = min(LANES, len(outputs[0][0]) - start)
-        last = len(drives[0][0]) - 1
-        for j in range(LANES):
-            start_hysteresis(rows, counts, K.END, j)
-            drive(rows, fixed, drives, 0, min(start + j, last), j)
-            angle, stress = rows[K.COMMAND][j], rows[K.PRESTRESS][j]
-            begin_lane(rows, fixed, counts, table, K.END, elements, j, angle, stress)
-        for step in range(len(drives[0])):
-            for j in range(LANES):
-                drive(rows, fixed, drives, step, min(start + j, last), j)
-                counts[K.STEP][j] = step
-            if quasi_static > 0:
-                for j in range(LANES):
-                    angle, stress = rows[K.COMMAND][j], rows[K.PRESTRESS][j]
-                    begin_lane(rows, fixed, counts, table, K.END, elements, j, angle, stress)
-            else:
-                advance(rows, fixed, counts, table, K.END, elements, substeps, period, work)
-            for k in range(len(_ROWS)):
-                for j in range(lanes):
-                    outputs[k][step][start + j] = rows[_ROWS[k]][j]
+    """Bring a tile to rest under its command, from a straight virgin state."""
+    for j in range(LANES):
+        start_hysteresis(rows, counts, K.END, j)
+        angle, stress = rows[K.COMMAND][j], rows[K.PRESTRESS][j]
+        begin_lane(rows, fixed, counts, table, K.END, elements, j, angle, stress)
 
 
-@lru_cache(maxsize=18)
-def _runner(kind: str, dynamics: str) -> Callable[..., Any]:
-    return build(run_joint, f"run_joint_{kind}_{dynamics}", **kernel_names(kind, dynamics))
+@kernel
+def come_to_rest(
+    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, elements: int, work: Any
+) -> None:
+    """Bring a tile to rest under its command, from where it rests."""
+    for j in range(LANES):
+        angle, stress = rows[K.COMMAND][j], rows[K.PRESTRESS][j]
+        begin_lane(rows, fixed, counts, table, K.END, elements, j, angle, stress)
 
 
-def kernel_names(kind: str, dynamics: str, lanes: int = WIDTH) -> dict[str, Any]:
-    """Return what takes the place of the placeholders of :func:`run_joint`."""
-    sizes = {"N_ROWS": K.END + 2 * state_rows(kind), "LANES": lanes}
-    return replacements(kind, dynamics) | sizes
+@kernel
+def advance_joint(
+    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, elements: int, substeps: int,
+    period: float, work: Any,
+) -> None:  # fmt: skip
+    """Advance a tile by one control period."""
+    advance(rows, fixed, counts, table, K.END, elements, substeps, period, work)
 
 
-def arrays_for(
-    plants: Sequence[AntagonisticJoint], drives: Sequence[ArrayLike], lanes: int = WIDTH
-) -> list[Any]:
-    """Return the arrays that :func:`run_joint` takes, the outputs last, shape (signals, T, n)."""
-    filled = drives_of(drives)
-    _, periods, columns = filled.shape
-    n = len(plants) if len(plants) > 1 else columns
-    fixed = in_tiles([plant.parameter_rows() for plant in plants], n, lanes)
-    return [
-        np.zeros((len(fixed), K.END + 2 * state_rows(plants[0].hysteresis.kind), lanes)),
-        fixed,
-        np.zeros((len(fixed), N_COUNTS, lanes), np.int64),
-        plants[0].hysteresis_tables()[:1],
-        filled,
-        np.empty((len(OUTPUTS), periods, n)),
-    ]
+def loop_of(plant: AntagonisticJoint, extended: bool = False) -> Loop:
+    """Return the loop of a make of the joint."""
+    kind, dynamics = plant.hysteresis.kind, plant.dynamics
+    effects = K.END + 2 * state_rows(kind)
+    kernels = {
+        "plant_drive": drive,
+        "plant_begin": begin,
+        "plant_rest": come_to_rest,
+        "plant_advance": advance_joint,
+    }
+    return Loop(
+        f"joint_{kind}_{dynamics}" + ("_extended" if extended else ""),
+        kernels | replacements(kind, dynamics, effects if extended else None),
+        tuple(OUTPUTS.values()),
+        rows=effects + (K.STATE.end if extended else 0),
+        parameters=K.N_PARAMETERS,
+        counts=K.N_COUNTS,
+        work=N_WORK,
+        extra=np.zeros((1, 1)),
+    )
 
 
 def simulate_joint(
@@ -141,6 +123,7 @@ def simulate_joint(
     payload: ArrayLike = 0.0,
     pressures: tuple[ArrayLike, ArrayLike] | None = None,
     quasi_static: bool = False,
+    compiled: bool = COMPILED,
 ) -> dict[str, Array]:
     """Simulate one joint, or several of one make, from rest under the first command.
 
@@ -160,6 +143,8 @@ def simulate_joint(
     quasi_static : bool
         Whether each command is held until rest (from which the next one starts) instead of for a
         control period; commands only.
+    compiled : bool
+        Whether kernels run as machine code; plain Python gives the same bits.
 
     Returns
     -------
@@ -172,14 +157,15 @@ def simulate_joint(
     stress = first.prestress if prestress is None else prestress
     given = (0.0, 0.0) if pressures is None else pressures
     direct = 0.0 if pressures is None else 1.0
-    drives = [commands, stress, disturbance, payload, *given, direct]
-    arrays = arrays_for(several, drives)
-    if not COMPILED:
-        arrays = [a.tolist() for a in arrays]
-    run = _runner(first.hysteresis.kind, first.dynamics)
-    run(*arrays, first.elements, first.substeps, first.control_period, int(quasi_static))
-    made = np.asarray(arrays[-1])
-    single = isinstance(plants, AntagonisticJoint) and all(np.ndim(d) < 2 for d in drives)
+    channels = [commands, stress, disturbance, payload, *given, direct]
+    drives = drives_of(channels)
+    flags = np.full(drives.shape[1], REST if quasi_static else 0)
+    flags[0] |= BEGIN
+    loop = loop_of(first, any(plant.extended for plant in several))
+    columns = [plant.parameter_rows() for plant in several]
+    n = len(several) if len(several) > 1 else drives.shape[2]
+    made = run(loop, first, columns, drives, plants=n, flags=flags, compiled=compiled)
+    single = isinstance(plants, AntagonisticJoint) and all(np.ndim(d) < 2 for d in channels)
     return {name: made[k, :, 0] if single else made[k] for k, name in enumerate(OUTPUTS)}
 
 

@@ -1,121 +1,32 @@
 """Plants stepped set-point by set-point, with copies that look ahead.
 
-A controller is run against a plant one control period at a time, and a controller that carries a
-plant inside asks it what would come of many set-points. The step is that of
-:mod:`pam_envs.plants.single_muscle.replay`: the extended plant, one sub-step a period. Plants
-start at rest, without pressure and without a past.
+A controller runs against a plant one control period at a time, and a controller with an internal
+plant predicts the response to many set-points. The step is that of a replay: the extended plant,
+one sub-step a period. Plants start at rest, without pressure and in the virgin state.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import lru_cache
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.hysteresis.protocol import state_rows
-from pam_envs.kernels.build import COMPILED, LANES, build, kernel, prange, scratch, tile_view
-from pam_envs.kernels.motion import oscillator_wide
+from pam_envs.kernels.build import LANES
+from pam_envs.plants.core.rollout import BEGIN, call
+from pam_envs.plants.core.tiles import drives_of, in_tiles
 from pam_envs.plants.single_muscle import rows as R
-from pam_envs.plants.single_muscle.effects import advance_extended, replacements
 from pam_envs.plants.single_muscle.plant import SingleMuscle
-from pam_envs.plants.single_muscle.replay import begin
-from pam_envs.plants.single_muscle.rows import N_COUNTS, N_PARAMETERS
-from pam_envs.plants.single_muscle.step import N_WORK
+from pam_envs.plants.single_muscle.rollout import loop_of
 
 PERIOD = 0.01
 """Control period [s] unless another is given."""
 LONGEST_PERIOD = 0.0101
 """Longest one [s]: it is one sub-step, whose errors stay below the noise of a good sensor."""
 READING, PRESSURE, POSITION = range(3)
-N_ROWS = 0  # placeholders, filled in for each hysteresis
-EFFECTS_AT = 0
 
 Array = NDArray[np.float64]
-
-
-@kernel
-def begin_lanes(
-    all_rows: Any, all_fixed: Any, all_counts: Any, table: Any, loads: Any, elements: int
-) -> None:
-    """Bring tiles of plants to rest without pressure; ``loads[0]`` is the load [kg]."""
-    for tile in prange(len(all_rows)):
-        rows = tile_view(all_rows, tile, N_ROWS, LANES)
-        fixed = tile_view(all_fixed, tile, N_PARAMETERS, LANES)
-        counts = tile_view(all_counts, tile, N_COUNTS, LANES)
-        work = scratch(N_WORK, LANES)
-        for j in range(LANES):
-            rows[R.LOAD][j] = loads[0]
-        begin(rows, fixed, counts, table, 0.0, elements, work)
-
-
-@kernel
-def run_lanes(
-    all_rows: Any,
-    all_fixed: Any,
-    all_counts: Any,
-    table: Any,
-    set_points: Any,
-    outputs: Any,
-    elements: int,
-    period: float,
-) -> None:
-    """Advance tiles through ``set_points[t][lane]``; ``outputs[channel][t][lane]``."""
-    for tile in prange(len(all_rows)):
-        rows = tile_view(all_rows, tile, N_ROWS, LANES)
-        fixed = tile_view(all_fixed, tile, N_PARAMETERS, LANES)
-        counts = tile_view(all_counts, tile, N_COUNTS, LANES)
-        work = scratch(N_WORK, LANES)
-        start = tile * LANES
-        lanes = min(LANES, len(outputs[0][0]) - start)
-        seen_x, seen_p = (
-            rows[EFFECTS_AT + R.STATE.position_reading],
-            rows[EFFECTS_AT + R.STATE.pressure_reading],
-        )
-        true_x = rows[EFFECTS_AT + R.STATE.position]
-        for t in range(len(set_points)):
-            for j in range(LANES):
-                rows[R.SET_POINT][j] = set_points[t][start + min(j, lanes - 1)]
-            advance_extended(rows, fixed, counts, table, R.END, elements, 1, period, work)
-            for j in range(LANES):
-                counts[R.STEP][j] = counts[R.STEP][j] + 1
-            for j in range(lanes):
-                outputs[0][t][start + j] = seen_x[j] + fixed[R.POSITION_BIAS][j]
-                outputs[1][t][start + j] = seen_p[j] + fixed[R.PRESSURE_BIAS][j]
-                outputs[2][t][start + j] = true_x[j]
-
-
-@lru_cache(maxsize=8)
-def _built(function: Callable[..., Any], kind: str) -> Callable[..., Any]:
-    first = R.END + state_rows(kind)
-    return build(
-        function,
-        f"{function.__name__}_{kind}",
-        oscillator=oscillator_wide,
-        N_ROWS=first + R.N_EFFECTS,
-        **replacements(kind, first),
-    )
-
-
-def _call(function: Callable[..., Any], arrays: Sequence[Array], *rest: Any) -> None:
-    """Call a kernel that changes arrays in place."""
-    if COMPILED:
-        function(*arrays, *rest)
-        return
-    lists = [a.tolist() for a in arrays]
-    function(*lists, *rest)
-    for array, values in zip(arrays, lists, strict=True):
-        array[...] = values
-
-
-def _tiled(columns: Array) -> Array:
-    """Return parameter columns, shape (n, n_parameters), as tiles; the last one fills up."""
-    n = len(columns)
-    tiles = -(-n // LANES)
-    filled = columns[np.minimum(np.arange(tiles * LANES), n - 1)]
-    return np.ascontiguousarray(filled.T.reshape(-1, tiles, LANES).transpose(1, 0, 2))
 
 
 class PlantBatch:
@@ -155,17 +66,13 @@ class PlantBatch:
             raise ValueError(f"plants that are stepped together need one hysteresis, got {kinds}")
         self.plants = tuple(plants)
         self.period = period
-        self._kind, self._elements = kinds.pop()
         columns = np.array([plant.parameter_rows() for plant in plants])
         if kelvin is not None:
             columns[:, R.place("muscle.temperature")] = kelvin
-        self._fixed = _tiled(columns)
-        self._loads = np.array([load_kg])
-        self._table = plants[0].hysteresis_tables()[:1]
-        tiles = len(self._fixed)
-        self._rows = np.zeros((tiles, R.END + state_rows(self._kind) + R.N_EFFECTS, LANES))
-        self._counts = np.zeros((tiles, N_COUNTS, LANES), np.int64)
-        self.position = np.zeros(len(plants))
+        self._kelvin = columns[:, R.place("muscle.temperature")]
+        self._fixed = in_tiles(columns, len(plants), LANES)
+        self._load = load_kg
+        self._loop = loop_of(plants[0], True, readings=True)
         self.reset()
 
     def __len__(self) -> int:
@@ -174,14 +81,9 @@ class PlantBatch:
 
     def reset(self) -> None:
         """Bring every plant to rest without pressure."""
-        self._rows[:] = 0.0
-        self._counts[:] = 0
-        _call(_built(begin_lanes, self._kind), [*self._state, self._loads], self._elements)
+        self._state = self._loop.state(len(self._fixed), LANES)
+        self._periods = 0
         self.position = np.zeros(len(self))
-
-    @property
-    def _state(self) -> list[Any]:
-        return [self._rows, self._fixed, self._counts, self._table]
 
     def run(self, set_points: ArrayLike) -> Array:
         """Advance every plant through several control periods.
@@ -197,14 +99,16 @@ class PlantBatch:
             Contraction [m] and pressure [Pa] as the sensors show them, free of noise, and the
             true contraction [m], each at the end of its period.
         """
-        given = np.ascontiguousarray(set_points, dtype=np.float64)
+        given = np.asarray(set_points, np.float64)
         outputs = np.empty((3, *given.shape))
-        _call(
-            _built(run_lanes, self._kind),
-            [*self._state, given, outputs],
-            self._elements,
-            self.period,
-        )
+        drives = drives_of([given, self._load, self._kelvin[None], 0.0, 0.0])
+        flags = np.zeros(len(given), np.int64)
+        flags[0] = BEGIN if self._periods == 0 else 0
+        call(
+            self._loop, self.plants[0], self._state, self._fixed, drives, flags, outputs, 1,
+            self.period, begun=self._periods,
+        )  # fmt: skip
+        self._periods += len(given)
         self.position = outputs[POSITION, -1]
         return outputs
 
@@ -215,8 +119,9 @@ class PlantBatch:
 
     def take(self, other: PlantBatch) -> None:
         """Put every plant of this tile into the state of the first of another batch."""
-        self._rows[:] = other._rows[0, :, :1]
-        self._counts[:] = other._counts[0, :, :1]
+        for mine, its in zip(self._state, other._state, strict=True):
+            mine[:] = its[0, :, :1]
+        self._periods = other._periods
 
 
 class PlantStepper:

@@ -1,20 +1,19 @@
-"""Whole records of the elbow orthosis, parameter sets side by side."""
+"""Rollouts of the elbow orthosis, driven by given commands and motions of the wearer."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import lru_cache
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.protocol import state_rows
-from pam_envs.kernels.build import COMPILED, LANES, build, kernel, prange, scratch, tile_view
-from pam_envs.plants.core.tiles import drives_of, first_of, in_tiles
+from pam_envs.kernels.build import COMPILED, LANES, kernel
+from pam_envs.plants.core.rollout import Loop, run
+from pam_envs.plants.core.tiles import drives_of, first_of
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
-from pam_envs.plants.elbow_orthosis.rows import N_COUNTS, N_PARAMETERS
 from pam_envs.plants.elbow_orthosis.step import (
     N_WORK,
     advance,
@@ -46,78 +45,59 @@ OUTPUTS = {
 """Every signal of a record (SI) and its row of state."""
 DRIVEN = (K.COMMAND_A, K.COMMAND_B, K.INTENT, K.INTENT_RATE, K.INTENT_ACCELERATION, K.DISTURBANCE)
 """Rows that drive a record, in the order of its channels."""
-_ROWS = tuple(OUTPUTS.values())
-WIDTH = LANES if COMPILED else 1
-"""Plants that one tile holds; plain Python gains nothing from lanes."""
-N_ROWS = 0  # a placeholder, filled in for each hysteresis
+START = len(DRIVEN)
+"""First of the two channels with the pressures of the beginning."""
 
 Array = NDArray[np.float64]
 
 
 @kernel
-def run_elbow(
-    all_rows: Any, all_fixed: Any, all_counts: Any, table: Any, drives: Any, start: Any,
-    outputs: Any, elements: int, substeps: int, period: float,
+def drive(rows: Any, fixed: Any, drives: Any, t: int, column: int, j: int) -> None:
+    """Write what drives one lane."""
+    for k in range(len(DRIVEN)):
+        rows[DRIVEN[k]][j] = drives[k][t][column]
+
+
+@kernel
+def begin(
+    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, drives: Any, t: int, first: int,
+    elements: int, work: Any,
 ) -> None:  # fmt: skip
-    """Run tiles of plants from rest at the pressures ``start`` through all control periods."""
-    for tile in prange(len(all_rows)):
-        rows = tile_view(all_rows, tile, N_ROWS, LANES)
-        fixed = tile_view(all_fixed, tile, N_PARAMETERS, LANES)
-        counts = tile_view(all_counts, tile, N_COUNTS, LANES)
-        work = scratch(N_WORK, LANES)
-        first = tile * LANES
-        lanes = min(LANES, len(outputs[0][0]) - first)
-        last = len(drives[0][0]) - 1
-        for j in range(LANES):
-            column = min(first + j, last)
-            rows[K.INTENT][j] = drives[2][0][column]
-            rows[K.DISTURBANCE][j] = drives[5][0][column]
-            start_hysteresis(rows, counts, K.END, j)
-            begin_lane(
-                rows, fixed, counts, table, K.END, elements, j, start[0][column], start[1][column]
-            )
-        for step in range(len(drives[0])):
-            for j in range(LANES):
-                counts[K.STEP][j] = step
-                for k in range(len(DRIVEN)):
-                    rows[DRIVEN[k]][j] = drives[k][step][min(first + j, last)]
-            advance(rows, fixed, counts, table, K.END, elements, substeps, period, work)
-            for k in range(len(_ROWS)):
-                for j in range(lanes):
-                    outputs[k][step][first + j] = rows[_ROWS[k]][j]
+    """Bring a tile to rest at its pressures, held by wearers who intend an angle."""
+    last = len(drives[0][0]) - 1
+    for j in range(LANES):
+        column = min(first + j, last)
+        start_hysteresis(rows, counts, K.END, j)
+        begin_lane(
+            rows, fixed, counts, table, K.END, elements, j, drives[START][t][column],
+            drives[START + 1][t][column],
+        )  # fmt: skip
 
 
-@lru_cache(maxsize=12)
-def _runner(kind: str, valves: str) -> Callable[..., Any]:
-    return build(run_elbow, f"run_elbow_{kind}_{valves}", **kernel_names(kind, valves))
+@kernel
+def advance_elbow(
+    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, elements: int, substeps: int,
+    period: float, work: Any,
+) -> None:  # fmt: skip
+    """Advance a tile by one control period."""
+    advance(rows, fixed, counts, table, K.END, elements, substeps, period, work)
 
 
-def kernel_names(kind: str, valves: str, lanes: int = WIDTH) -> dict[str, Any]:
-    """Return what takes the place of the placeholders of :func:`run_elbow`."""
-    sizes = {"N_ROWS": K.END + state_rows(kind), "LANES": lanes}
-    return replacements(kind, valves) | sizes
-
-
-def arrays_for(
-    plants: Sequence[ElbowOrthosis],
-    drives: Sequence[ArrayLike],
-    start: Sequence[ArrayLike],
-    lanes: int = WIDTH,
-) -> list[Any]:
-    """Return the arrays that :func:`run_elbow` takes, the outputs last, shape (signals, T, n)."""
-    filled = drives_of(drives)
-    _, periods, columns = filled.shape
-    n = len(plants) if len(plants) > 1 else columns
-    fixed = in_tiles([plant.parameter_rows() for plant in plants], n, lanes)
-    return [
-        np.zeros((len(fixed), K.END + state_rows(plants[0].hysteresis.kind), lanes)),
-        fixed,
-        np.zeros((len(fixed), N_COUNTS, lanes), np.int64),
-        plants[0].hysteresis_tables()[:1],
-        filled,
-        np.array([np.broadcast_to(np.asarray(s, float), (columns,)) for s in start]),
-        np.empty((len(OUTPUTS), periods, n)),
-    ]
+def loop_of(plant: ElbowOrthosis, extended: bool = False) -> Loop:
+    """Return the loop of a make of the orthosis."""
+    kind, valves = plant.hysteresis.kind, plant.valves
+    effects = K.END + state_rows(kind)
+    kernels = {"plant_drive": drive, "plant_begin": begin, "plant_advance": advance_elbow}
+    return Loop(
+        f"elbow_{kind}_{valves}" + ("_extended" if extended else ""),
+        kernels | replacements(kind, valves, effects if extended else None),
+        tuple(OUTPUTS.values()),
+        rows=effects + (K.STATE.end if extended else 0),
+        parameters=K.N_PARAMETERS,
+        counts=K.N_COUNTS,
+        work=N_WORK,
+        extra=np.zeros((1, 1)),
+    )
 
 
 def _check_shapes(plants: Sequence[ElbowOrthosis], command: Array, motion: Sequence[Any]) -> None:
@@ -149,6 +129,7 @@ def simulate_elbow(
     intent: ArrayLike | tuple[ArrayLike, ArrayLike, ArrayLike] = 1.0,
     disturbance: ArrayLike = 0.0,
     pressures: tuple[ArrayLike, ArrayLike] | None = None,
+    compiled: bool = COMPILED,
 ) -> dict[str, Array]:
     """Simulate one orthosis, or several of one make, from rest.
 
@@ -168,6 +149,8 @@ def simulate_elbow(
     pressures : tuple of array_like, optional
         Pressures [Pa] of bundles a and b at the start. Default: the first set-points; of on/off
         valves 0.
+    compiled : bool
+        Whether kernels run as machine code; plain Python gives the same bits.
 
     Returns
     -------
@@ -188,12 +171,12 @@ def simulate_elbow(
     if pressures is None:
         pulsed = first.valves == "on_off"
         pressures = (0.0, 0.0) if pulsed else (command[0, ..., 0], command[0, ..., 1])
-    drives = (command[..., 0], command[..., 1], *motion, disturbance)
-    arrays = arrays_for(several, drives, pressures)
-    if not COMPILED:
-        arrays = [a.tolist() for a in arrays]
-    run = _runner(first.hysteresis.kind, first.valves)
-    run(*arrays, first.elements, first.substeps, first.control_period)
-    made = np.asarray(arrays[-1])
+    channels = (command[..., 0], command[..., 1], *motion, disturbance)
+    start = [np.broadcast_to(np.asarray(s, float), command.shape[:-1]) for s in pressures]
+    drives = drives_of([*channels, *start])
+    n = len(several) if len(several) > 1 else drives.shape[2]
+    loop = loop_of(first, any(plant.extended for plant in several))
+    columns = [plant.parameter_rows() for plant in several]
+    made = run(loop, first, columns, drives, plants=n, compiled=compiled)
     single = made.shape[2] == 1 and command.ndim == 2 and isinstance(plants, ElbowOrthosis)
     return {name: made[k, :, 0] if single else made[k] for k, name in enumerate(OUTPUTS)}

@@ -1,20 +1,19 @@
-"""Whole records of the knee orthosis, driven by given set-points, parameter sets side by side."""
+"""Rollouts of the knee orthosis, driven by given set-points, parameter sets side by side."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import lru_cache
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.protocol import state_rows
-from pam_envs.kernels.build import COMPILED, LANES, build, kernel, prange, scratch, tile_view
-from pam_envs.plants.core.tiles import first_of, in_tiles
+from pam_envs.kernels.build import COMPILED, LANES, kernel
+from pam_envs.plants.core.rollout import Loop, run
+from pam_envs.plants.core.tiles import drives_of, first_of
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
-from pam_envs.plants.knee_orthosis.rows import N_COUNTS, N_PARAMETERS
 from pam_envs.plants.knee_orthosis.step import (
     N_WORK,
     advance,
@@ -55,68 +54,53 @@ OUTPUTS = {
     "flexors_free": K.FLEXORS_FREE,
 }
 """Every signal of a record (SI) and its row of state."""
-_ROWS = tuple(OUTPUTS.values())
-WIDTH = LANES if COMPILED else 1
-"""Plants that one tile holds; plain Python gains nothing from lanes."""
-N_ROWS = 0  # a placeholder, filled in for each hysteresis
+MAKE = ("hysteresis.kind", "mounting", "dynamics", "activity")
 
 
 @kernel
-def run_knee(
-    all_rows: Any, all_fixed: Any, all_counts: Any, table: Any, gait: Any, set_points: Any,
-    outputs: Any, elements: int, substeps: int, period: float, phase: float, pressure: float,
+def drive(rows: Any, fixed: Any, drives: Any, t: int, column: int, j: int) -> None:
+    """Write the set-point [Pa] of one lane."""
+    rows[K.SET_POINT][j] = drives[0][t][column]
+
+
+@kernel
+def begin(
+    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, drives: Any, t: int, first: int,
+    elements: int, work: Any,
 ) -> None:  # fmt: skip
-    """Run tiles of plants from rest through ``len(set_points)`` control periods."""
-    for tile in prange(len(all_rows)):
-        rows = tile_view(all_rows, tile, N_ROWS, LANES)
-        fixed = tile_view(all_fixed, tile, N_PARAMETERS, LANES)
-        counts = tile_view(all_counts, tile, N_COUNTS, LANES)
-        work = scratch(N_WORK, LANES)
-        start = tile * LANES
-        lanes = min(LANES, len(outputs[0][0]) - start)
-        for j in range(LANES):
-            start_hysteresis(rows, counts, K.END, j)
-            begin_lane(rows, fixed, counts, table, gait, K.END, elements, j, phase, pressure)
-        for step in range(len(set_points)):
-            columns = len(set_points[step])
-            for j in range(LANES):
-                counts[K.STEP][j] = step
-                rows[K.SET_POINT][j] = set_points[step][min(start + j, columns - 1)]
-            advance(rows, fixed, counts, table, gait, K.END, elements, substeps, period, work)
-            for k in range(len(_ROWS)):
-                for j in range(lanes):
-                    outputs[k][step][start + j] = rows[_ROWS[k]][j]
+    """Bring a tile to rest; channels 1 and 2 are the phase [turns] and the pressure [Pa]."""
+    last = len(drives[0][0]) - 1
+    for j in range(LANES):
+        column = min(first + j, last)
+        phase, pressure = drives[1][t][column], drives[2][t][column]
+        start_hysteresis(rows, counts, K.END, j)
+        begin_lane(rows, fixed, counts, table, extra, K.END, elements, j, phase, pressure)
 
 
-@lru_cache(maxsize=18)
-def _runner(kind: str, mounting: str, dynamics: str) -> Callable[..., Any]:
-    name = f"run_knee_{kind}_{mounting}_{dynamics}"
-    return build(run_knee, name, **kernel_names(kind, mounting, dynamics))
+@kernel
+def advance_knee(
+    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, elements: int, substeps: int,
+    period: float, work: Any,
+) -> None:  # fmt: skip
+    """Advance a tile by one control period; ``extra`` is the table of the gait."""
+    advance(rows, fixed, counts, table, extra, K.END, elements, substeps, period, work)
 
 
-def kernel_names(kind: str, mounting: str, dynamics: str, lanes: int = WIDTH) -> dict[str, Any]:
-    """Return what takes the place of the placeholders of :func:`run_knee`."""
-    sizes = {"N_ROWS": K.END + state_rows(kind), "LANES": lanes}
-    return replacements(kind, mounting, dynamics) | sizes
-
-
-def arrays_for(
-    plants: Sequence[KneeOrthosis], set_points: ArrayLike, lanes: int = WIDTH
-) -> list[Any]:
-    """Return the arrays that :func:`run_knee` takes, the outputs last, shape (signals, T, n)."""
-    commands = np.asarray(set_points, np.float64)
-    commands = np.ascontiguousarray(commands.reshape(len(commands), -1))
-    n = len(plants) if len(plants) > 1 else commands.shape[1]
-    fixed = in_tiles([plant.parameter_rows() for plant in plants], n, lanes)
-    return [
-        np.zeros((len(fixed), K.END + state_rows(plants[0].hysteresis.kind), lanes)),
-        fixed,
-        np.zeros((len(fixed), N_COUNTS, lanes), np.int64),
-        plants[0].hysteresis_tables()[:1],
-        plants[0].gait_table(),
-        commands,
-        np.empty((len(OUTPUTS), len(commands), n)),
-    ]
+def loop_of(plant: KneeOrthosis, extended: bool = False) -> Loop:
+    """Return the loop of a make of the orthosis."""
+    kind, mounting, dynamics = plant.hysteresis.kind, plant.mounting, plant.dynamics
+    effects = K.END + state_rows(kind)
+    kernels = {"plant_drive": drive, "plant_begin": begin, "plant_advance": advance_knee}
+    return Loop(
+        f"knee_{kind}_{mounting}_{dynamics}" + ("_extended" if extended else ""),
+        kernels | replacements(kind, mounting, dynamics, effects if extended else None),
+        tuple(OUTPUTS.values()),
+        rows=effects + (K.STATE.end if extended else 0),
+        parameters=K.N_PARAMETERS,
+        counts=K.N_COUNTS,
+        work=N_WORK,
+        extra=plant.gait_table(),
+    )
 
 
 def simulate_knee(
@@ -125,6 +109,7 @@ def simulate_knee(
     *,
     phase: float = 0.0,
     pressure: float = 0.0,
+    compiled: bool = COMPILED,
 ) -> dict[str, NDArray[np.float64]]:
     """Simulate one plant, or several of one make, from rest.
 
@@ -139,6 +124,8 @@ def simulate_knee(
         Phase of the stride at the start, in turns.
     pressure : float
         Pressure [Pa] of the rest, reached by inflation from none.
+    compiled : bool
+        Whether kernels run as machine code; plain Python gives the same bits.
 
     Returns
     -------
@@ -147,14 +134,12 @@ def simulate_knee(
         one plant and (T, n) for several.
     """
     several = [plants] if isinstance(plants, KneeOrthosis) else list(plants)
-    words = ("hysteresis.kind", "mounting", "dynamics", "activity", "substeps")
-    first = first_of(several, *words)
-    arrays = arrays_for(several, set_points)
-    if not COMPILED:
-        arrays = [a.tolist() for a in arrays]
-    run = _runner(first.hysteresis.kind, first.mounting, first.dynamics)
-    numbers = (first.substeps, first.control_period, float(phase), float(pressure))
-    run(*arrays, first.elements, *numbers)
-    made = np.asarray(arrays[-1])
-    single = isinstance(plants, KneeOrthosis) and np.ndim(set_points) == 1
+    first = first_of(several, *MAKE, "substeps")
+    commands = np.asarray(set_points, np.float64)
+    n = len(several) if len(several) > 1 else commands.reshape(len(commands), -1).shape[1]
+    loop = loop_of(first, any(plant.extended for plant in several))
+    columns = [plant.parameter_rows() for plant in several]
+    drives = drives_of([commands, phase, pressure])
+    made = run(loop, first, columns, drives, plants=n, compiled=compiled)
+    single = isinstance(plants, KneeOrthosis) and commands.ndim == 1
     return {name: made[k, :, 0] if single else made[k] for k, name in enumerate(OUTPUTS)}

@@ -1,17 +1,18 @@
-"""Whole records of the redundant manipulator."""
+"""Rollouts of the redundant manipulator."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.kernels.build import COMPILED, build, kernel, scratch
+from pam_envs.kernels.build import COMPILED, LANES, kernel
 from pam_envs.mechanics.serial_chain.kinematics import N_STAGES
+from pam_envs.mechanics.serial_chain.rows import parameter_rows
 from pam_envs.plants.antagonistic_joint.pair import command
+from pam_envs.plants.core.rollout import Loop, run
+from pam_envs.plants.core.tiles import drives_of
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.plants.redundant_manipulator.step import (
@@ -37,51 +38,59 @@ MUSCLE_OUTPUTS = {
     "lag": M.LAG,
 }
 """Signals of a record (SI) and the first of their rows."""
-_JOINT_ROWS = tuple(JOINT_OUTPUTS.values())
-_MUSCLE_ROWS = tuple(MUSCLE_OUTPUTS.values())
-ARM_WORK = 0  # a placeholder, filled in for each length of the chain
 
 Array = NDArray[np.float64]
 
 
 @kernel
-def order(rows: Any, fixed: Any, commands: Any, stress: float, shove: Any, mass: Any) -> None:
-    """Write what drives the arm in one control period."""
-    rows[M.PAYLOAD][0] = mass[0]
+def drive(rows: Any, fixed: Any, drives: Any, t: int, column: int, j: int) -> None:
+    """Write what drives one lane: payload, prestress, commands, then disturbances."""
+    rows[M.PAYLOAD][j] = drives[0][t][column]
     for k in range(N_STAGES):
-        rows[M.DISTURBANCE + k][0] = shove[k]
+        rows[M.DISTURBANCE + k][j] = drives[2 + N_STAGES + k][t][column]
         command(
-            rows, fixed, 0, commands[k], stress, M.COMMAND + k, M.PRESTRESS + k,
-            M.SET_POINT + 2 * k,
+            rows, fixed, j, drives[2 + k][t][column], drives[1][t][column], M.COMMAND + k,
+            M.PRESTRESS + k, M.SET_POINT + 2 * k,
         )  # fmt: skip
 
 
 @kernel
-def run_arm(
-    rows: Any, fixed: Any, counts: Any, table: Any, commands: Any, shoves: Any, masses: Any,
-    joints: Any, muscles: Any, stress: float, elements: int, substeps: int, period: float,
+def begin(
+    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, drives: Any, t: int, first: int,
+    elements: int, work: Any,
 ) -> None:  # fmt: skip
-    """Run one arm from rest under the first commands through all control periods."""
-    work = scratch(ARM_WORK, 1)
-    start_hysteresis(rows, counts, M.END, 0)
-    order(rows, fixed, commands[0], stress, shoves[0], masses[0])
-    begin_lane(rows, fixed, counts, table, M.END, elements, 0, work)
-    for step in range(len(commands)):
-        order(rows, fixed, commands[step], stress, shoves[step], masses[step])
-        counts[M.STEP][0] = step
-        advance(rows, fixed, counts, table, M.END, elements, substeps, period, work)
-        for s in range(len(_JOINT_ROWS)):
-            for k in range(N_STAGES):
-                joints[s][step][k] = rows[_JOINT_ROWS[s] + k][0]
-        for s in range(len(_MUSCLE_ROWS)):
-            for m in range(2 * N_STAGES):
-                muscles[s][step][m] = rows[_MUSCLE_ROWS[s] + m][0]
+    """Bring a tile to rest under its commands, from a straight virgin state."""
+    for j in range(LANES):
+        start_hysteresis(rows, counts, M.END, j)
+        begin_lane(rows, fixed, counts, table, M.END, elements, j, work)
 
 
-@lru_cache(maxsize=12)
-def _runner(kind: str, stages: int) -> Callable[..., Any]:
-    names = replacements(kind, stages) | {"ARM_WORK": work_rows(stages), "LANES": 1}
-    return build(run_arm, f"run_arm_{kind}_{stages}", **names)
+@kernel
+def advance_arm(
+    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, elements: int, substeps: int,
+    period: float, work: Any,
+) -> None:  # fmt: skip
+    """Advance a tile by one control period."""
+    advance(rows, fixed, counts, table, M.END, elements, substeps, period, work)
+
+
+def loop_of(plant: RedundantManipulator, extended: bool = False) -> Loop:
+    """Return the loop of arms with a hysteresis and a number of joints."""
+    kind, stages = plant.hysteresis.kind, plant.stages
+    effects = M.END + hysteresis_rows(kind, stages)
+    kernels = {"plant_drive": drive, "plant_begin": begin, "plant_advance": advance_arm}
+    joints = [row + k for row in JOINT_OUTPUTS.values() for k in range(stages)]
+    muscles = [row + m for row in MUSCLE_OUTPUTS.values() for m in range(2 * stages)]
+    return Loop(
+        f"arm_{kind}_{stages}" + ("_extended" if extended else ""),
+        kernels | replacements(kind, stages, effects if extended else None),
+        (*joints, *muscles),
+        rows=effects + (M.STATE.end if extended else 0),
+        parameters=M.CHAIN + parameter_rows(stages),
+        counts=M.N_COUNTS,
+        work=work_rows(stages),
+        extra=np.zeros((1, 1)),
+    )
 
 
 def simulate_manipulator(
@@ -91,6 +100,7 @@ def simulate_manipulator(
     prestress: float | None = None,
     disturbance: ArrayLike = 0.0,
     payload: ArrayLike = 0.0,
+    compiled: bool = COMPILED,
 ) -> dict[str, Array]:
     """Simulate an arm from rest under the first commands.
 
@@ -106,6 +116,8 @@ def simulate_manipulator(
         Torques at the joints [N m].
     payload : array_like, shape () or (T,)
         Mass at the tip [kg].
+    compiled : bool
+        Whether kernels run as machine code; plain Python gives the same bits.
 
     Returns
     -------
@@ -113,26 +125,18 @@ def simulate_manipulator(
         Each signal of ``JOINT_OUTPUTS``, shape (T, n), and of ``MUSCLE_OUTPUTS``, shape (T, 2 n),
         at the end of each control period, free of noise.
     """
-    given = np.ascontiguousarray(np.atleast_2d(np.asarray(commands, np.float64)))
-    n, periods, kind = plant.stages, len(given), plant.hysteresis.kind
+    given, n = np.atleast_2d(np.asarray(commands, np.float64)), plant.stages
     if given.shape[1] != n:
         raise ValueError(f"commands have {given.shape[1]} columns for {n} joints; give one a joint")
-    masses = np.broadcast_to(np.asarray(payload, float), (periods,))[:, None]
-    arrays = [
-        np.zeros((M.END + hysteresis_rows(kind, n), 1)),
-        plant.parameter_rows()[:, None],
-        np.zeros((M.N_COUNTS, 1), np.int64),
-        plant.hysteresis_tables()[:1],
-        given,
-        np.array(np.broadcast_to(np.asarray(disturbance, float), (periods, n))),
-        np.array(masses),
-        np.empty((len(JOINT_OUTPUTS), periods, n)),
-        np.empty((len(MUSCLE_OUTPUTS), periods, 2 * n)),
-    ]
-    lists = arrays if COMPILED else [a.tolist() for a in arrays]
+    periods = len(given)
     stress = plant.prestress if prestress is None else prestress
-    numbers = (float(stress), plant.elements, plant.substeps, plant.control_period)
-    _runner(kind, n)(*lists, *numbers)
-    joints, muscles = np.asarray(lists[-2]), np.asarray(lists[-1])
-    made = {name: joints[s] for s, name in enumerate(JOINT_OUTPUTS)}
-    return made | {name: muscles[s] for s, name in enumerate(MUSCLE_OUTPUTS)}
+    shoves = np.broadcast_to(np.asarray(disturbance, float), (periods, n))
+    masses = np.broadcast_to(np.asarray(payload, float), (periods,))
+    drives = drives_of([masses, stress, *given.T, *shoves.T])
+    loop = loop_of(plant, plant.extended)
+    made = run(loop, plant, plant.parameter_rows()[None], drives, lanes=1, compiled=compiled)
+    split = len(JOINT_OUTPUTS) * n
+    joints = made[:split, :, 0].reshape(len(JOINT_OUTPUTS), n, periods).transpose(0, 2, 1)
+    muscles = made[split:, :, 0].reshape(len(MUSCLE_OUTPUTS), 2 * n, periods).transpose(0, 2, 1)
+    found = {name: joints[s] for s, name in enumerate(JOINT_OUTPUTS)}
+    return found | {name: muscles[s] for s, name in enumerate(MUSCLE_OUTPUTS)}

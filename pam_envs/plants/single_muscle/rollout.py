@@ -1,74 +1,162 @@
-"""Whole records: the plant driven by given set-points, many parameter sets side by side."""
+"""Rollouts of the single muscle, driven by given set-points, many parameter sets side by side."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import lru_cache
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.protocol import state_rows
-from pam_envs.kernels.build import COMPILED, LANES, build, kernel, prange, scratch, tile_view
-from pam_envs.plants.core.tiles import in_tiles
+from pam_envs.kernels.build import LANES, kernel
+from pam_envs.kernels.history import N_HISTORY
+from pam_envs.kernels.motion import oscillator_wide
+from pam_envs.plants.core.rollout import Loop, biased_output, run
+from pam_envs.plants.core.tiles import drives_of
 from pam_envs.plants.single_muscle import rows as R
+from pam_envs.plants.single_muscle.effects import (
+    EFFECTS_AT,
+    begin_effects,
+    replacements,
+    rest_extended,
+    settled,
+)
 from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.plant import SingleMuscle
-from pam_envs.plants.single_muscle.rows import N_COUNTS, N_PARAMETERS
-from pam_envs.plants.single_muscle.step import N_WORK, advance, rest_contraction
+from pam_envs.plants.single_muscle.step import N_WORK, advance, rest_contraction, true_position
 
 OUTPUTS = ("contraction", "velocity", "pressure", "drive")
-N_ROWS = 0
-remember: Any = None  # placeholders, filled in for each hysteresis
+COMMAND, LOAD, KELVIN, START_PRESSURE, HELD = range(5)
+"""Channels that drive a muscle: set-point [Pa], below zero with the valve shut; load [kg];
+temperature [K]; and, where it begins anew, its pressure and the set-point before [Pa]."""
+N_ROWS = 0  # a placeholder
 
 
 @kernel
-def run(
-    all_rows: Any,
-    all_fixed: Any,
-    all_counts: Any,
-    table: Any,
-    set_points: Any,
-    outputs: Any,
-    elements: int,
-    substeps: int,
-    period: float,
-) -> None:
-    """Run tiles of plants from rest at no pressure through ``len(set_points)`` control periods."""
-    for tile in prange(len(all_rows)):
-        rows = tile_view(all_rows, tile, N_ROWS, LANES)
-        fixed = tile_view(all_fixed, tile, N_PARAMETERS, LANES)
-        counts = tile_view(all_counts, tile, N_COUNTS, LANES)
-        work = scratch(N_WORK, LANES)
-        start = tile * LANES
-        lanes = min(LANES, len(outputs[0][0]) - start)
+def drive(rows: Any, fixed: Any, drives: Any, t: int, column: int, j: int) -> None:
+    """Write set-point and load of one lane."""
+    rows[R.SET_POINT][j] = drives[COMMAND][t][column]
+    rows[R.LOAD][j] = drives[LOAD][t][column]
+
+
+@kernel
+def drive_extended(rows: Any, fixed: Any, drives: Any, t: int, column: int, j: int) -> None:
+    """Write set-point, load and temperature of one lane."""
+    rows[R.SET_POINT][j] = drives[COMMAND][t][column]
+    rows[R.LOAD][j] = drives[LOAD][t][column]
+    rows[EFFECTS_AT + R.STATE.kelvin][j] = drives[KELVIN][t][column]
+
+
+@kernel
+def begin(
+    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, drives: Any, t: int, first: int,
+    elements: int, work: Any,
+) -> None:  # fmt: skip
+    """Begin a tile at rest at no pressure."""
+    for j in range(LANES):
+        rows[R.REST][j] = rest_contraction(fixed, j, 0.0, rows[R.LOAD][j])
+        rows[R.CONTRACTION][j] = rows[R.REST][j]
+        counts[R.STACK_COUNT][j] = 1
+
+
+@kernel
+def begin_extended(
+    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, drives: Any, t: int, first: int,
+    elements: int, work: Any,
+) -> None:  # fmt: skip
+    """Begin a tile at rest, at a pressure reached from none."""
+    last = len(drives[0][0]) - 1
+    for k in range(N_ROWS):
         for j in range(LANES):
-            rows[R.LOAD][j] = fixed[R.NOMINAL_LOAD][j]
-            rows[R.REST][j] = rest_contraction(fixed, j, 0.0, rows[R.LOAD][j])
-            rows[R.CONTRACTION][j] = rows[R.REST][j]
-            counts[R.STACK_COUNT][j] = 1
-        x, rest = rows[R.CONTRACTION], rows[R.REST]
-        for step in range(len(set_points)):
-            columns = len(set_points[step])
-            for j in range(LANES):
-                counts[R.STEP][j] = step
-                rows[R.SET_POINT][j] = set_points[step][min(start + j, columns - 1)]
-            advance(rows, fixed, counts, table, R.END, elements, substeps, period, work)
-            for j in range(lanes):
-                outputs[0][step][start + j] = x[j] - rest[j]
-                outputs[1][step][start + j] = rows[R.VELOCITY][j]
-                outputs[2][step][start + j] = rows[R.PRESSURE][j]
-                outputs[3][step][start + j] = rows[R.DRIVE][j]
+            keep = 0.0
+            if k == R.LOAD:
+                keep = rows[R.LOAD][j]
+            rows[k][j] = keep
+    for j in range(LANES):
+        counts[R.STACK_COUNT][j] = 1
+        rows[R.REST][j] = rest_extended(fixed, j, 0.0, rows[R.LOAD][j])
+    settled(rows, fixed, counts, table, R.END, 0, LANES, elements, work)
+    for j in range(LANES):
+        rows[R.PRESSURE][j] = drives[START_PRESSURE][t][min(first + j, last)]
+    settled(rows, fixed, counts, table, R.END, 0, LANES, elements, work)
+    for j in range(LANES):
+        rows[R.CONTRACTION][j] = rest_extended(fixed, j, rows[R.DRIVE][j], rows[R.LOAD][j])
+        begin_effects(rows, fixed, j)
+        for k in range(N_HISTORY):
+            rows[R.HISTORY + k][j] = drives[HELD][t][min(first + j, last)]
 
 
-@lru_cache(maxsize=8)
-def _runner(kind: str) -> Callable[..., Any]:
-    return build(
-        run,
-        f"rollout_{kind}",
-        **hysteresis_kernels(kind),
-        N_ROWS=R.END + state_rows(kind),
+@kernel
+def rezero(rows: Any, fixed: Any) -> None:
+    """Zero the position sensors of a tile at rest without pressure."""
+    for j in range(LANES):
+        rows[R.REST][j] = rest_extended(fixed, j, 0.0, rows[R.LOAD][j])
+
+
+@kernel
+def advance_muscle(
+    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, elements: int, substeps: int,
+    period: float, work: Any,
+) -> None:  # fmt: skip
+    """Advance a tile by one control period."""
+    advance(rows, fixed, counts, table, R.END, elements, substeps, period, work)
+
+
+@kernel
+def output(rows: Any, fixed: Any, k: int, j: int) -> float:
+    """Return an output of lane ``j``: the contraction, or a row of the state."""
+    return true_position(rows, j) if k == 0 else rows[OUTPUT_ROWS[k]][j]  # type: ignore[no-any-return]
+
+
+OUTPUT_ROWS: tuple[int, ...] = ()  # a placeholder
+
+
+def loop_of(plant: SingleMuscle, extended: bool, readings: bool = False) -> Loop:
+    """Return the loop of muscles with a hysteresis.
+
+    Parameters
+    ----------
+    plant : SingleMuscle
+    extended : bool
+        Whether its effects are needed.
+    readings : bool
+        Whether readings of both sensors and the true contraction [m] come out, in long steps.
+    """
+    kind = plant.hysteresis.kind
+    effects = R.END + state_rows(kind)
+    kernels = hysteresis_kernels(kind) | {
+        "plant_drive": drive,
+        "plant_begin": begin,
+        "plant_advance": advance_muscle,
+        "plant_output": output,
+    }
+    outputs: tuple[int, ...] = (R.CONTRACTION, R.VELOCITY, R.PRESSURE, R.DRIVE)
+    if extended:
+        kernels |= replacements(kind, effects) | {
+            "plant_drive": drive_extended,
+            "plant_begin": begin_extended,
+            "plant_rezero": rezero,
+        }
+    if readings:
+        kernels |= {
+            "oscillator": oscillator_wide,
+            "plant_output": biased_output,
+            "BIAS_ROWS": (R.POSITION_BIAS, R.PRESSURE_BIAS),
+        }
+        state = R.STATE
+        read = (state.position_reading, state.pressure_reading, state.position)
+        outputs = tuple(effects + row for row in read)
+    what = ("_extended" if extended else "") + ("_readings" if readings else "")
+    return Loop(
+        f"muscle_{kind}{what}",
+        kernels,
+        outputs,
+        rows=effects + (R.N_EFFECTS if extended else 0),
+        parameters=R.N_PARAMETERS,
+        counts=R.N_COUNTS,
+        work=N_WORK,
+        extra=np.zeros((1, 1)),
     )
 
 
@@ -92,18 +180,18 @@ def simulate_rows(
         Contraction [m], velocity [m/s], pressure [Pa] and effective pressure [Pa] at the end of
         each control period, free of noise.
     """
-    kind, n = plant.hysteresis.kind, len(parameters)
+    columns = np.asarray(parameters, np.float64)
+    loads, kelvin = columns[:, R.NOMINAL_LOAD], columns[:, R.place("muscle.temperature")]
     commands = np.asarray(set_points, np.float64)
-    commands = np.ascontiguousarray(commands.reshape(len(commands), -1))
-    fixed = in_tiles(parameters, n, LANES)
-    rows = np.zeros((len(fixed), R.END + state_rows(kind), LANES))
-    counts = np.zeros((len(fixed), N_COUNTS, LANES), np.int64)
-    outputs = np.empty((len(OUTPUTS), len(commands), n))
-    arrays: list[Any] = [rows, fixed, counts, plant.hysteresis_tables()[:1], commands, outputs]
-    if not COMPILED:
-        arrays = [a.tolist() for a in arrays]
-    _runner(kind)(*arrays, plant.elements, plant.substeps, plant.control_period)
-    return outputs if COMPILED else np.array(arrays[-1])
+    drives = drives_of([commands, loads[None], kelvin[None], 0.0, 0.0])
+    extended = plant.extended or bool(np.any(effects_on(columns)))
+    return run(loop_of(plant, extended), plant, columns, drives)
+
+
+def effects_on(columns: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which parameter sets, shape (n, n_parameters), have an effect on."""
+    places = [R.place(name) for name in SingleMuscle.neutral]
+    return np.asarray((columns[:, places] != list(SingleMuscle.neutral.values())).any(axis=1))
 
 
 def simulate(

@@ -1,0 +1,261 @@
+"""One loop over control periods for rollouts, replays and single steps of every plant.
+
+A family declares its loop once (:class:`Loop`): what drives a plant, how it begins, its step and
+what comes out. :func:`run` builds the machine code for it and lays out the arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pam_envs.kernels.build import (
+    COMPILED,
+    LANES,
+    build,
+    interpreted,
+    kernel,
+    prange,
+    scratch,
+    threads,
+    tile_view,
+)
+from pam_envs.plants.core.tiles import in_tiles
+
+BEGIN, REST, REZERO = 1, 2, 4
+"""Flags of a control period: begin anew; come to rest instead of advancing; zero the sensor."""
+STEP = 3
+"""Row of the control period among the whole numbers of every plant."""
+
+# placeholders, filled in for each plant
+N_ROWS = N_PARAMETERS = N_COUNTS = N_WORK = 0
+OUTPUT_ROWS: tuple[int, ...] = ()
+BIAS_ROWS: tuple[int, ...] = ()
+plant_drive: Any = None
+plant_begin: Any = None
+plant_advance: Any = None
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def plant_output(rows: Any, fixed: Any, k: int, j: int) -> float:
+    """Return output ``k`` of lane ``j``: a row of the state."""
+    return rows[OUTPUT_ROWS[k]][j]  # type: ignore[no-any-return]
+
+
+@kernel
+def biased_output(rows: Any, fixed: Any, k: int, j: int) -> float:
+    """Return output ``k`` of lane ``j``: an undisturbed reading with the sensor's bias."""
+    bias = fixed[BIAS_ROWS[k]][j] if k < len(BIAS_ROWS) else 0.0
+    return rows[OUTPUT_ROWS[k]][j] + bias  # type: ignore[no-any-return]
+
+
+@kernel
+def plant_rest(
+    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, elements: int, work: Any
+) -> None:
+    """Bring a tile to rest under what drives it: of plants that have no such kernel, do nothing."""
+
+
+@kernel
+def plant_rezero(rows: Any, fixed: Any) -> None:
+    """Zero the sensors of a tile: of plants that have no such kernel, do nothing."""
+
+
+@kernel
+def write_outputs(rows: Any, fixed: Any, outputs: Any, t: int, first: int, lanes: int) -> None:
+    """Write the outputs of a tile for sample ``t``."""
+    for k in range(len(OUTPUT_ROWS)):
+        for j in range(lanes):
+            outputs[k][t][first + j] = plant_output(rows, fixed, k, j)
+
+
+@kernel
+def run_plants(
+    all_rows: Any, all_fixed: Any, all_counts: Any, table: Any, extra: Any, drives: Any, flags: Any,
+    outputs: Any, elements: int, substeps: int, period: float, begun: int, before: int,
+) -> None:  # fmt: skip
+    """Run tiles of plants through the control periods of ``drives[channel][t][column]``.
+
+    Parameters
+    ----------
+    all_rows, all_fixed, all_counts : arrays, shape (tiles, rows, lanes)
+        State, parameters and whole numbers.
+    table, extra : arrays
+        Of the hysteresis, and of the plant (``Loop.extra``).
+    drives, flags, outputs : arrays
+        What drives each column, flags of the control periods, and ``outputs[k][t][plant]``.
+    elements, substeps, period : int, int, float
+        Of the hysteresis; sub-steps; duration of a control period [s].
+    begun : int
+        Number of the first control period.
+    before : int
+        Whether outputs are those at the beginning of each control period, not at its end.
+    """
+    for tile in prange(len(all_rows)):
+        rows = tile_view(all_rows, tile, N_ROWS, LANES)
+        fixed = tile_view(all_fixed, tile, N_PARAMETERS, LANES)
+        counts = tile_view(all_counts, tile, N_COUNTS, LANES)
+        work = scratch(N_WORK, LANES)
+        first = tile * LANES
+        lanes = min(LANES, len(outputs[0][0]) - first)
+        last = len(drives[0][0]) - 1
+        for t in range(len(drives[0])):
+            for j in range(LANES):
+                counts[STEP][j] = begun + t
+                plant_drive(rows, fixed, drives, t, min(first + j, last), j)
+            if flags[t] & BEGIN:
+                plant_begin(rows, fixed, counts, table, extra, drives, t, first, elements, work)
+                for j in range(LANES):
+                    plant_drive(rows, fixed, drives, t, min(first + j, last), j)
+            if flags[t] & REZERO:
+                plant_rezero(rows, fixed)
+            if before > 0:
+                write_outputs(rows, fixed, outputs, t, first, lanes)
+            if flags[t] & REST:
+                plant_rest(rows, fixed, counts, table, extra, elements, work)
+            else:
+                plant_advance(rows, fixed, counts, table, extra, elements, substeps, period, work)
+            if before == 0:
+                write_outputs(rows, fixed, outputs, t, first, lanes)
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Loop of a make of plants.
+
+    Attributes
+    ----------
+    name : str
+        Of the make and of what comes out: it names the code.
+    kernels : mapping
+        What takes the place of the placeholders: ``plant_drive(rows, fixed, drives, t, column, j)``
+        writes what drives lane ``j``, ``plant_begin(rows, fixed, counts, table, extra, drives, t,
+        first, elements, work)`` begins a tile, ``plant_advance(rows, fixed, counts, table, extra,
+        elements, substeps, period, work)`` advances it; and those of the plant's step.
+    outputs : sequence of int
+        Rows of the state that come out.
+    rows, parameters, counts, work : int
+        Rows of state, parameters, whole numbers and scratch.
+    extra : ndarray
+        What the step of the plant reads beside the table of its hysteresis, of two dimensions.
+    """
+
+    name: str
+    kernels: Mapping[str, Any]
+    outputs: Sequence[int]
+    rows: int
+    parameters: int
+    counts: int
+    work: int
+    extra: Array
+
+    def state(self, tiles: int, lanes: int) -> tuple[Array, NDArray[np.int64]]:
+        """Return zeroed state and whole numbers of some tiles."""
+        counts = np.zeros((tiles, self.counts, lanes), np.int64)
+        return np.zeros((tiles, self.rows, lanes)), counts
+
+    def function(self, lanes: int, parallel: bool, compiled: bool) -> Callable[..., Any]:
+        """Return the loop ready to call, built once for each make and number of lanes."""
+        key = (self.name, lanes, parallel, compiled)
+        if key not in _BUILT:
+            names = {
+                "N_ROWS": self.rows,
+                "N_PARAMETERS": self.parameters,
+                "N_COUNTS": self.counts,
+                "N_WORK": self.work,
+                "LANES": lanes,
+                "OUTPUT_ROWS": tuple(self.outputs),
+                **self.kernels,
+            }
+            if compiled:
+                _BUILT[key] = build(run_plants, f"run_{self.name}_{lanes}", parallel, **names)
+            else:
+                _BUILT[key] = interpreted(run_plants, names)
+        return _BUILT[key]
+
+
+_BUILT: dict[tuple[Any, ...], Callable[..., Any]] = {}
+
+
+def run(
+    loop: Loop, plant: Any, columns: ArrayLike, drives: Array, *, plants: int | None = None,
+    flags: ArrayLike | None = None, substeps: int | None = None, period: float | None = None,
+    before: bool = False, lanes: int | None = None, parallel: bool = False,
+    compiled: bool = COMPILED,
+) -> Array:  # fmt: skip
+    """Run parameter sets of one make of plants side by side, from their beginning.
+
+    Parameters
+    ----------
+    loop : Loop
+    plant : Plant
+        Gives the hysteresis, and sub-steps and control period [s] unless others are given.
+    columns : array_like, shape (n, n_parameters)
+        Parameter sets.
+    drives : ndarray, shape (channels, T, n or 1)
+        See :func:`pam_envs.plants.core.tiles.drives_of`.
+    plants : int, optional
+        Number of plants where the last parameter set serves several columns of ``drives``.
+    flags : array_like of int, shape (T,), optional
+        Default: begin with the first control period.
+    before : bool
+        Whether outputs are those at the beginning of each control period.
+    lanes : int, optional
+        Plants that a tile advances together.
+    parallel : bool
+        Whether tiles may be spread over the cores.
+    compiled : bool
+        Whether kernels run as machine code; plain Python gives the same bits.
+
+    Returns
+    -------
+    ndarray, shape (outputs, T, n)
+    """
+    n = len(np.asarray(columns)) if plants is None else plants
+    width = lanes or (LANES if compiled else 1)
+    fixed = in_tiles(columns, n, width)
+    given = np.zeros(drives.shape[1], np.int64)
+    given[:1] = BEGIN
+    outputs = np.empty((len(loop.outputs), drives.shape[1], n))
+    call(
+        loop, plant, [*loop.state(len(fixed), width)], fixed, drives,
+        given if flags is None else np.asarray(flags, np.int64), outputs, substeps, period,
+        before=before, parallel=parallel, compiled=compiled,
+    )  # fmt: skip
+    return outputs
+
+
+def call(
+    loop: Loop, plant: Any, state: Sequence[Any], fixed: Array, drives: Array,
+    flags: NDArray[np.int64], outputs: Array, substeps: int | None = None,
+    period: float | None = None, *, begun: int = 0, before: bool = False, parallel: bool = False,
+    compiled: bool = COMPILED,
+) -> None:  # fmt: skip
+    """Run tiles that exist already; their state and the outputs change in place (:func:`run`)."""
+    rows, counts = state
+    arrays = [
+        rows, fixed, counts, plant.hysteresis_tables()[:1], loop.extra,
+        np.ascontiguousarray(drives), flags, outputs,
+    ]  # fmt: skip
+    numbers = (
+        plant.elements,
+        plant.substeps if substeps is None else substeps,
+        plant.control_period if period is None else period,
+        begun,
+        int(before),
+    )
+    spread = compiled and parallel and len(rows) > 1 and threads() > 1
+    function = loop.function(rows.shape[2], spread, compiled)
+    if compiled:
+        function(*arrays, *numbers)
+        return
+    lists = [array.tolist() for array in arrays]
+    function(*lists, *numbers)
+    for array, values in zip((rows, counts, outputs), (lists[0], lists[2], lists[7]), strict=True):
+        array[...] = values
