@@ -301,7 +301,7 @@ def uncompiled(rounds: int) -> list[Measurement]:
 
 def jacobian(rounds: int) -> list[Measurement]:
     """Jacobian of a 60 s record over all free parameters."""
-    from pam_envs.identification import fit
+    from pam_envs.identification import record_jacobian as fit
     from pam_envs.plants.single_muscle.plant import SingleMuscle
 
     plant = SingleMuscle.mas10()

@@ -244,23 +244,16 @@ def preisach_inverse(
 
 
 @entry
-def simulate(
-    x: Array, stack: Any, sums: Any, count: Any, table: Any, low: float, inverse_cell: float,
-    y: Array,
-) -> None:  # fmt: skip
-    """Write into ``y`` the outputs of lane 0 for the inputs ``x`` in turn."""
-    for t in range(len(x)):
-        y[t] = preisach_step(x[t], stack, sums, count, 0, table, low, inverse_cell)
-
-
-@entry
 def advance_rows(
     x: Array, stack: Any, sums: Any, count: Any, table: Any, low: float, inverse_cell: float,
     y: Array,
 ) -> None:  # fmt: skip
-    """Write into ``y`` the output of every lane for one input each."""
-    for lane in range(len(x)):
-        y[lane] = preisach_step(x[lane], stack, sums, count, lane, table, low, inverse_cell)
+    """Write into ``y`` the outputs of every lane for its inputs in turn, ``x[t][lane]``."""
+    for t in range(len(x)):
+        for lane in range(len(x[t])):
+            y[t][lane] = preisach_step(
+                x[t][lane], stack, sums, count, lane, table, low, inverse_cell
+            )
 
 
 @entry

@@ -198,20 +198,6 @@ def slips_scaled(
 
 
 @kernel
-def slips_step(
-    x: Any, y: Any, rows: Any, fixed: Any, counts: Any, table: Any, elements: int, at: int,
-    model: int, count: int, member: int, first: int, last: int,
-) -> None:  # fmt: skip
-    """Advance a tile to its pressures with the width of the model."""
-    slips = rows[at : at + elements]
-    for j in range(first, last):
-        own = table[counts[member][j]]
-        y[j] = stiffness_step(
-            x[j], slips, j, own[BREAKS], own[STIFFNESSES], own[SPRING], own[SEGMENT][0], 1.0
-        )
-
-
-@kernel
 def slips_begin(
     rows: Any, fixed: Any, counts: Any, table: Any, elements: int, at: int, model: int, count: int,
     member: int, j: int,
@@ -224,36 +210,19 @@ def slips_begin(
 
 
 @entry
-def _advance(
-    values: Array, state: Array, breaks: Array, stiffnesses: Array, spring: Array, segment: float,
-    out: Array,
-) -> None:  # fmt: skip
-    """Advance every lane of ``state`` to its pressure."""
-    for j in range(len(values)):
-        out[j] = stiffness_step(values[j], state, j, breaks, stiffnesses, spring, segment, 1.0)
-
-
-@entry
-def _invert(
-    values: Array, state: Array, breaks: Array, stiffnesses: Array, spring: Array, segment: float,
-    out: Array,
-) -> None:  # fmt: skip
-    """Advance every lane of ``state`` to its stiffness."""
-    for j in range(len(values)):
-        out[j] = pressure_step(values[j], state, j, breaks, stiffnesses, spring, segment, 1.0)
-
-
-@entry
-def _follow(
+def _run(
     values: Array, state: Array, breaks: Array, stiffnesses: Array, spring: Array, segment: float,
     inverse: bool, out: Array,
 ) -> None:  # fmt: skip
-    """Run one lane over a record."""
+    """Advance the lanes of ``state`` through records, ``values[t][lane]``."""
     for t in range(len(values)):
-        if inverse:
-            out[t] = pressure_step(values[t], state, 0, breaks, stiffnesses, spring, segment, 1.0)
-        else:
-            out[t] = stiffness_step(values[t], state, 0, breaks, stiffnesses, spring, segment, 1.0)
+        for j in range(len(values[t])):
+            x = values[t][j]
+            if inverse:
+                y = pressure_step(x, state, j, breaks, stiffnesses, spring, segment, 1.0)
+            else:
+                y = stiffness_step(x, state, j, breaks, stiffnesses, spring, segment, 1.0)
+            out[t][j] = y
 
 
 @register
@@ -282,7 +251,7 @@ class ModifiedMaxwellSlip(HysteresisModel):
 
     kind: ClassVar[str] = "modified_maxwell_slip"
     choice: ClassVar[str] = "maxwell_slip"
-    kernels: ClassVar[Kernels] = Kernels(slips_step, scaled=slips_scaled, begin=slips_begin)
+    kernels: ClassVar[Kernels] = Kernels(scaled=slips_scaled, begin=slips_begin)
     state_rows: ClassVar[int] = MOST + 1
 
     stiffnesses: tuple[float, ...]
@@ -410,14 +379,14 @@ class ModifiedMaxwellSlip(HysteresisModel):
         state : ndarray, shape (..., n)
             Slip positions after.
         """
-        return self._rows(_advance, pressure, state)
+        return self._rows(pressure, state, False)
 
     def inverse_step(self, stiffness: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
         """Return the pressure [Pa] that gives a stiffness [N/m], and the state it leaves.
 
         The shapes are those of :meth:`step`, whose exact inverse this is.
         """
-        return self._rows(_invert, stiffness, state)
+        return self._rows(stiffness, state, True)
 
     def simulate(self, pressure: ArrayLike, state: ArrayLike | None = None) -> tuple[Array, Array]:
         """Return the stiffnesses, shape (T,), for pressures of shape (T,), and the last state."""
@@ -450,7 +419,7 @@ class ModifiedMaxwellSlip(HysteresisModel):
         stiffnesses = tuple(width * k for k in self.stiffnesses)
         return replace(self, stiffnesses=stiffnesses, spring=tuple(np.add(self.spring, tilt)))
 
-    def _rows(self, loop: Any, values: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
+    def _rows(self, values: ArrayLike, state: ArrayLike, inverse: bool) -> tuple[Array, Array]:
         shape, n = np.shape(state)[:-1], len(self.stiffnesses)
         if np.shape(state)[-1:] != (n,):
             raise ValueError(
@@ -458,9 +427,9 @@ class ModifiedMaxwellSlip(HysteresisModel):
                 " begin with initial_state(batch_shape)"
             )
         rows = np.array(np.asarray(state, float).reshape(-1, n).T, order="C")
-        taken = np.array(np.broadcast_to(np.asarray(values, float), shape)).reshape(-1)
+        taken = np.array(np.broadcast_to(np.asarray(values, float), shape)).reshape(1, -1)
         out = np.empty_like(taken)
-        loop(taken, rows, *self.arrays, out)
+        _run(taken, rows, *self.arrays, inverse, out)
         return out.reshape(shape), np.ascontiguousarray(rows.T).reshape(*shape, n)
 
     def _record(
@@ -469,7 +438,7 @@ class ModifiedMaxwellSlip(HysteresisModel):
         taken = series(values)
         rows = single_rows(self.initial_state() if state is None else state, len(self.stiffnesses))
         out = np.empty_like(taken)
-        _follow(taken, rows, *self.arrays, inverse, out)
+        _run(taken[:, None], rows, *self.arrays, inverse, out[:, None])
         return out, rows[:, 0]
 
 

@@ -35,7 +35,6 @@ from pam_envs.hysteresis.extrema import (
     relays_begin,
     relays_peek,
     relays_step,
-    simulate,
 )
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.protocol import (
@@ -336,7 +335,7 @@ class Preisach(HysteresisModel):
                 "simulate takes one: use step"
             )
         rows, y = self._rows(start), np.empty_like(values)
-        simulate(values, *rows, self.everett, self.low, self.inverse_cell, y)
+        advance_rows(values[:, None], *rows, self.everett, self.low, self.inverse_cell, y[:, None])
         return y, _shaped(rows, ())
 
     def step(self, x: ArrayLike, state: PreisachState) -> tuple[Array, PreisachState]:
@@ -359,7 +358,7 @@ class Preisach(HysteresisModel):
         shape = np.shape(state.counts)
         values = np.array(np.broadcast_to(np.asarray(x, float), shape)).reshape(-1)
         rows, y = self._rows(state), np.empty_like(values)
-        advance_rows(values, *rows, self.everett, self.low, self.inverse_cell, y)
+        advance_rows(values[None], *rows, self.everett, self.low, self.inverse_cell, y[None])
         return y.reshape(shape), _shaped(rows, shape)
 
     def inverse_step(self, y: ArrayLike, state: PreisachState) -> tuple[Array, PreisachState]:

@@ -120,10 +120,10 @@ class Kernels(NamedTuple):
 
     ``lag`` writes ``x - output`` in place of the output; ``peek`` also, from 0 (all slips) to 1
     (all sticks), the slope of the lag; ``scaled`` takes the factor on the hysteretic part, one a
-    lane, after ``y``; ``begin`` writes the state at the beginning of one lane ``j``, after zeros.
+    lane, after ``y`` (a model that plants only use so needs no ``step``); ``begin`` writes the state at the beginning of one lane ``j``, after zeros.
     """
 
-    step: Any
+    step: Any = None
     lag: Any = lag_by_step
     peek: Any = peek_by_step
     scaled: Any = scaled_by_step
