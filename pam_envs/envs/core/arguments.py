@@ -6,7 +6,7 @@ import dataclasses
 import difflib
 import functools
 import inspect
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,13 +17,33 @@ from numpy.typing import NDArray
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, check_whole
 from pam_envs.envs.core.step import MOST_PREVIEW
 from pam_envs.hysteresis.protocol import kinds, model_of
-from pam_envs.parameters import Signal, Signals, check, declarations
+from pam_envs.parameters import check, declarations
 
 T = TypeVar("T")
-Part = tuple[str, str, float, float]
-"""Name, unit and range of a signal."""
 
 RENDER_MODES = (None, "rgb_array", "human")
+
+
+@dataclass(frozen=True)
+class Randomisation:
+    """Parameters of a family that ``randomize`` may draw.
+
+    Attributes
+    ----------
+    parameters : sequence of str
+        Parameters of the plant in the order of the kernels' rows.
+    fixed : sequence of str
+        Those that cannot be drawn: they scale the action or enter derived numbers.
+    example : str
+        A valid mapping, for the error message.
+    corner : mapping of callable
+        ``min`` or ``max``: the end of a range at which the motion is fastest or a limit nearest.
+    """
+
+    parameters: Sequence[str]
+    fixed: Sequence[str]
+    example: str
+    corner: Mapping[str, Callable[..., float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -75,6 +95,161 @@ class Common:
         check_whole("preview_stride", self.preview_stride, 1, 1000)
         check_number("episode_seconds", self.episode_seconds, 0.02, 3600.0, "s")
 
+    def plant_of(self, kind: type[T], default: Callable[[Any], T]) -> T:
+        """Return the plant that ``plant`` and ``hysteresis`` name.
+
+        Parameters
+        ----------
+        kind : type
+            Class of the plants.
+        default : callable
+            Returns the default plant with a hysteresis model.
+        """
+        plant, hysteresis = self.plant, self.hysteresis
+        if hysteresis is not None:
+            check_choice("hysteresis", hysteresis, kinds())
+        if plant is None:
+            return default(hysteresis or "maxwell_slip")
+        made: Any = kind.from_yaml(plant) if isinstance(plant, (str, Path)) else plant  # type: ignore[attr-defined]
+        if not isinstance(made, kind):
+            raise ValueError(
+                f"plant = {str(plant)[:60]!r} must be a {kind.__name__}, the path of a plant file, "
+                "or None"
+            )
+        found: Any = made
+        if hysteresis is not None and model_of(hysteresis).identity:
+            return found.replace({"hysteresis.operator": None})  # type: ignore[no-any-return]
+        if hysteresis is not None and hysteresis != found.hysteresis.choice:
+            raise ValueError(
+                f"hysteresis = {hysteresis!r} but the plant's hysteresis is {found.hysteresis.choice!r}; "
+                "leave hysteresis out, or give a plant identified with that hysteresis"
+            )
+        return made
+
+    def reference_of(
+        self,
+        families: Sequence[str],
+        unit: str,
+        largest: float | Sequence[float],
+        channels: int = 1,
+    ) -> tuple[int, NDArray[np.float64]]:
+        """Return the number of the reference's family, and its samples if it is given as samples.
+
+        Parameters
+        ----------
+        families : sequence of str
+            Known families; ``len(families)`` is the number of given samples, shape (n,) or
+            (n, channels).
+        unit : str
+            Of the samples; of several channels, separated by commas.
+        largest : float or sequence of float
+            Largest magnitude of a sample, of each channel.
+        channels : int
+            References that are tracked at once.
+
+        Returns
+        -------
+        family : int
+        samples : ndarray, shape (channels, n)
+        """
+        reference = self.reference
+        if isinstance(reference, str):
+            check_choice("reference", reference, tuple(families))
+            return list(families).index(reference), np.zeros((channels, 1))
+        try:
+            samples = np.array(reference, np.float64)
+        except (TypeError, ValueError) as error:
+            raise ValueError(
+                f"reference = {str(reference)[:60]!r} must be one of {', '.join(families)} or samples"
+            ) from error
+        shaped = samples[:, None] if samples.ndim == channels == 1 else samples
+        if shaped.ndim != 2 or not len(shaped) or not np.isfinite(shaped).all():
+            raise ValueError(
+                f"reference has shape {samples.shape}; give a finite sample [{unit}] for each control "
+                "period"
+            )
+        if shaped.shape[1] != channels:
+            raise ValueError(
+                f"reference has shape {samples.shape}; give {channels} numbers for each control period"
+            )
+        sizes, bounds = np.abs(shaped).max(axis=0), np.broadcast_to(largest, channels)
+        for size, bound, own in zip(sizes, bounds, unit.split(", "), strict=True):
+            if size > bound:
+                raise ValueError(
+                    f"reference reaches {size:g} {own}; at most {bound:g} {own} is accepted"
+                )
+        return len(families), np.ascontiguousarray(shaped.T)
+
+    def task_of(self, kind: type[T]) -> T:
+        """Return a task with the changes of ``reward``."""
+        known, changes = tuple(declarations(kind)), self.reward
+        if changes is None:
+            return kind()
+        if not isinstance(changes, Mapping) or set(changes) - set(known):
+            raise ValueError(
+                f"reward = {changes!r} must be a mapping with keys among {', '.join(known)}"
+            )
+        task: Any = dataclasses.replace(kind(), **changes)  # type: ignore[type-var]
+        check(task, "reward")
+        return task  # type: ignore[no-any-return]
+
+    def spread_of(self, plant: Any, which: Randomisation) -> NDArray[np.float64]:
+        """Return (row, low, high) of each parameter that every episode draws.
+
+        Raises
+        ------
+        ValueError
+            If a parameter cannot be drawn, or a range is out of bounds or cannot be simulated.
+        """
+        names, corner = list(which.parameters), which.corner
+        ranges = self._ranges(plant, which)
+        allowed = tuple(name for name in names if name not in which.fixed)
+        table = []
+        for name, span in ranges.items():
+            if name not in allowed:
+                raise ValueError(
+                    f"randomize: {name!r} is not a parameter that can be drawn; there are: "
+                    + ", ".join(allowed)
+                )
+            if (
+                not isinstance(span, (Sequence, np.ndarray))
+                or len(span) != 2
+                or isinstance(span, str)
+            ):
+                raise ValueError(f"randomize: {name} needs (low, high), got {span!r}")
+            low, high = (check_number(f"randomize: {name}", v, -1e12, 1e12, "") for v in span)
+            if low > high:
+                raise ValueError(
+                    f"randomize: {name} has low = {low:g} above high = {high:g}; swap them"
+                )
+            for end in (low, high):
+                plant.replace({name: end})  # refuses what is out of bounds or cannot be simulated
+            table.append((names.index(name), low, high))
+        worst = {name: pick(ranges[name]) for name, pick in corner.items() if name in ranges}
+        for member in plant.members() if ranges else ():
+            member.replace(worst)  # refuses a corner that the sub-steps cannot follow
+        return np.array(table, float).reshape(-1, 3)
+
+    def _ranges(self, plant: Any, which: Randomisation) -> dict[str, Any]:
+        """Return the range of each parameter that ``randomize`` asks for."""
+        randomize = self.randomize
+        if randomize is False:
+            return {}
+        if isinstance(randomize, Mapping):
+            return dict(randomize)
+        if randomize is not True:
+            raise ValueError(
+                f"randomize = {randomize!r} must be True, False or a mapping from parameter to "
+                f"(low, high), for example {which.example}"
+            )
+        ranges = {}
+        for name in which.parameters:
+            component, _, attribute = name.partition(".")
+            declared = declarations(getattr(plant, component))[attribute]
+            if declared.spread is not None and name not in which.fixed:
+                ranges[name] = declared.spread
+        return ranges
+
 
 def environment_arguments(
     reference: Any, preview: int, preview_stride: int, episode_seconds: float
@@ -117,94 +292,6 @@ def environment_arguments(
     return decorate
 
 
-def plant_of(kind: type[T], given: Common, default: Callable[[Any], T]) -> T:
-    """Return the plant that ``given.plant`` and ``given.hysteresis`` name.
-
-    Parameters
-    ----------
-    kind : type
-        Class of the plants.
-    given : Common
-    default : callable
-        Returns the default plant with a hysteresis model.
-    """
-    plant, hysteresis = given.plant, given.hysteresis
-    if hysteresis is not None:
-        check_choice("hysteresis", hysteresis, kinds())
-    if plant is None:
-        return default(hysteresis or "maxwell_slip")
-    made: Any = kind.from_yaml(plant) if isinstance(plant, (str, Path)) else plant  # type: ignore[attr-defined]
-    if not isinstance(made, kind):
-        raise ValueError(
-            f"plant = {str(plant)[:60]!r} must be a {kind.__name__}, the path of a plant file, "
-            "or None"
-        )
-    found: Any = made
-    if hysteresis is not None and model_of(hysteresis).identity:
-        return found.replace({"hysteresis.operator": None})  # type: ignore[no-any-return]
-    if hysteresis is not None and hysteresis != found.hysteresis.choice:
-        raise ValueError(
-            f"hysteresis = {hysteresis!r} but the plant's hysteresis is {found.hysteresis.choice!r}; "
-            "leave hysteresis out, or give a plant identified with that hysteresis"
-        )
-    return made
-
-
-def reference_of(
-    reference: Any,
-    families: Sequence[str],
-    unit: str,
-    largest: float | Sequence[float],
-    channels: int = 1,
-) -> tuple[int, NDArray[np.float64]]:
-    """Return the number of the reference's family, and its samples if it is given as samples.
-
-    Parameters
-    ----------
-    reference : str or array_like, shape (n,) or (n, channels)
-        As given by the user.
-    families : sequence of str
-        Known families; ``len(families)`` is the number of given samples.
-    unit : str
-        Of the samples; of several channels, separated by commas.
-    largest : float or sequence of float
-        Largest magnitude of a sample, of each channel.
-    channels : int
-        References that are tracked at once.
-
-    Returns
-    -------
-    family : int
-    samples : ndarray, shape (channels, n)
-    """
-    if isinstance(reference, str):
-        check_choice("reference", reference, tuple(families))
-        return list(families).index(reference), np.zeros((channels, 1))
-    try:
-        samples = np.array(reference, np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(
-            f"reference = {str(reference)[:60]!r} must be one of {', '.join(families)} or samples"
-        ) from error
-    shaped = samples[:, None] if samples.ndim == channels == 1 else samples
-    if shaped.ndim != 2 or not len(shaped) or not np.isfinite(shaped).all():
-        raise ValueError(
-            f"reference has shape {samples.shape}; give a finite sample [{unit}] for each control "
-            "period"
-        )
-    if shaped.shape[1] != channels:
-        raise ValueError(
-            f"reference has shape {samples.shape}; give {channels} numbers for each control period"
-        )
-    sizes, bounds = np.abs(shaped).max(axis=0), np.broadcast_to(largest, channels)
-    for size, bound, own in zip(sizes, bounds, unit.split(", "), strict=True):
-        if size > bound:
-            raise ValueError(
-                f"reference reaches {size:g} {own}; at most {bound:g} {own} is accepted"
-            )
-    return len(families), np.ascontiguousarray(shaped.T)
-
-
 def payloads_of(payload: Any, most: float) -> NDArray[np.float64]:
     """Return the payloads [kg] from which episodes draw, shape (1, n).
 
@@ -223,121 +310,3 @@ def payloads_of(payload: Any, most: float) -> NDArray[np.float64]:
             f"payload = {payload!r} must be a mass [kg], several of them, or None for any"
         )
     return np.array([[check_number("payload", mass, 0.0, most, "kg") for mass in given]])
-
-
-def task_of(kind: type[T], changes: Any) -> T:
-    """Return a task with some of its weights, scales and limits changed."""
-    known = tuple(declarations(kind))
-    if changes is None:
-        return kind()
-    if not isinstance(changes, Mapping) or set(changes) - set(known):
-        raise ValueError(
-            f"reward = {changes!r} must be a mapping with keys among {', '.join(known)}"
-        )
-    task: Any = dataclasses.replace(kind(), **changes)  # type: ignore[type-var]
-    check(task, "reward")
-    return task  # type: ignore[no-any-return]
-
-
-@dataclass(frozen=True)
-class Randomisation:
-    """Parameters of a family that ``randomize`` may draw.
-
-    Attributes
-    ----------
-    parameters : sequence of str
-        Parameters of the plant in the order of the kernels' rows.
-    fixed : sequence of str
-        Those that cannot be drawn: they scale the action or enter derived numbers.
-    example : str
-        A valid mapping, for the error message.
-    corner : mapping of callable
-        ``min`` or ``max``: the end of a range at which the motion is fastest or a limit nearest.
-    """
-
-    parameters: Sequence[str]
-    fixed: Sequence[str]
-    example: str
-    corner: Mapping[str, Callable[..., float]] = field(default_factory=dict)
-
-
-def spread_of(plant: Any, which: Randomisation, randomize: Any) -> NDArray[np.float64]:
-    """Return (row, low, high) of each parameter that every episode draws.
-
-    Raises
-    ------
-    ValueError
-        If a parameter cannot be drawn, or a range is out of bounds or cannot be simulated.
-    """
-    names, corner = list(which.parameters), which.corner
-    ranges = _ranges(plant, which, randomize)
-    allowed = tuple(name for name in names if name not in which.fixed)
-    table = []
-    for name, span in ranges.items():
-        if name not in allowed:
-            raise ValueError(
-                f"randomize: {name!r} is not a parameter that can be drawn; there are: "
-                + ", ".join(allowed)
-            )
-        if not isinstance(span, (Sequence, np.ndarray)) or len(span) != 2 or isinstance(span, str):
-            raise ValueError(f"randomize: {name} needs (low, high), got {span!r}")
-        low, high = (check_number(f"randomize: {name}", v, -1e12, 1e12, "") for v in span)
-        if low > high:
-            raise ValueError(
-                f"randomize: {name} has low = {low:g} above high = {high:g}; swap them"
-            )
-        for end in (low, high):
-            plant.replace({name: end})  # refuses what is out of bounds or cannot be simulated
-        table.append((names.index(name), low, high))
-    worst = {name: pick(ranges[name]) for name, pick in corner.items() if name in ranges}
-    for member in plant.members() if ranges else ():
-        member.replace(worst)  # refuses a corner that the sub-steps cannot follow
-    return np.array(table, float).reshape(-1, 3)
-
-
-def _ranges(plant: Any, which: Randomisation, randomize: Any) -> dict[str, Any]:
-    """Return the range of each parameter that ``randomize`` asks for."""
-    if randomize is False:
-        return {}
-    if isinstance(randomize, Mapping):
-        return dict(randomize)
-    if randomize is not True:
-        raise ValueError(
-            f"randomize = {randomize!r} must be True, False or a mapping from parameter to "
-            f"(low, high), for example {which.example}"
-        )
-    ranges = {}
-    for name in which.parameters:
-        component, _, attribute = name.partition(".")
-        declared = declarations(getattr(plant, component))[attribute]
-        if declared.spread is not None and name not in which.fixed:
-            ranges[name] = declared.spread
-    return ranges
-
-
-def observed(
-    now: Iterable[Part], references: Iterable[Part], given: Common, period: float
-) -> Signals:
-    """Return the signals of an observation: present ones, then references with their previews.
-
-    Parameters
-    ----------
-    now, references : iterable of (name, unit, low, high)
-    given : Common
-    period : float
-        Control period [s].
-    """
-    parts = [(part, 0.0) for part in now]
-    for name, unit, low, high in references:
-        parts.append(((name, unit, low, high), 0.0))
-        for i in range(1, given.preview + 1):
-            ahead = i * given.preview_stride * period
-            parts.append(((f"{name}_{i}", unit, low, high), ahead))
-    return Signals(
-        Signal(*part, i, given.normalize, ahead) for i, (part, ahead) in enumerate(parts)
-    )
-
-
-def acted(parts: Iterable[Part], given: Common) -> Signals:
-    """Return the signals of an action."""
-    return Signals(Signal(*part, i, given.normalize) for i, part in enumerate(parts))

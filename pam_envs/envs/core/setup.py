@@ -7,7 +7,7 @@ the same setup and differ only in the number of lanes.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 
 from pam_envs.envs.core.step import CHOICE, EPISODE, N_SEED
 from pam_envs.kernels.build import COMPILED, LANES
-from pam_envs.parameters import Signals
+from pam_envs.parameters import Signal, Signals
 
+Part = tuple[str, str, float, float]
+"""Name, unit and range of a signal."""
 STEP, STEP_AND_RESTART, BEGIN = 0, 1, 2
 """Modes of the kernels: step; step and reset what has ended; reset what is flagged."""
 
@@ -34,16 +36,10 @@ class Setup:
         Signals of observation and action.
     kernels : object
         With ``single``, ``batch`` and ``parallel``, which take the arrays of a batch and a mode.
-    rows, fixed, counts : int
-        Rows of state, of parameters and of integer state of one environment.
     drawn : bool
         Whether environments differ in their parameters; otherwise all tiles share them.
     ring : int
         Length of the ring buffers of previewed references: a power of two for each channel.
-    seed_rows : tuple of int
-        Integer rows of the two key words and of the episode number.
-    info_keys : tuple of str
-        Keys of ``info``, in the order in which the kernels write them.
     shared : tuple of arrays
         Arrays that all environments share, in the order of the kernels' arguments.
     control_period, episode_seconds : float
@@ -58,25 +54,32 @@ class Setup:
     signals: Signals
     action_signals: Signals
     kernels: Any
-    rows: int
-    fixed: int
     drawn: bool
-    counts: int
     ring: int
-    seed_rows: tuple[int, int, int]
-    info_keys: tuple[str, ...]
     shared: tuple[Any, ...]
     control_period: float
     episode_seconds: float
     render_mode: str | None = None
     view: str = ""
 
+    @property
+    def info_keys(self) -> tuple[str, ...]:
+        """Keys of ``info``, in the order in which the kernels write them."""
+        keys: tuple[str, ...] = self.kernels.info
+        return keys
+
+    @property
+    def seed_rows(self) -> tuple[int, int, int]:
+        """Integer rows of the two key words and of the episode number."""
+        last = self.kernels.n_counts
+        return last - N_SEED, last - N_SEED + 1, EPISODE
+
     def state(self, tiles: int, lanes: int) -> tuple[NDArray[Any], ...]:
         """Return zeroed state, parameters, integers and previews for tiles of ``lanes`` lanes."""
         return (
-            np.zeros((tiles, self.rows, lanes)),
-            np.zeros((tiles if self.drawn else 1, self.fixed, lanes)),
-            np.zeros((tiles, self.counts, lanes), np.int64),
+            np.zeros((tiles, self.kernels.n_rows, lanes)),
+            np.zeros((tiles if self.drawn else 1, self.kernels.n_parameters, lanes)),
+            np.zeros((tiles, self.kernels.n_counts, lanes), np.int64),
             np.zeros((tiles, self.ring, lanes)),
         )
 
@@ -86,8 +89,9 @@ def compose(
     kernels: Any,
     given: Any,
     *,
-    signals: Signals,
-    actions: Signals,
+    observation: Iterable[Part],
+    references: Iterable[Part],
+    action: Iterable[Part],
     config: Mapping[str, float],
     choices: Mapping[str, int],
     spread: NDArray[np.float64],
@@ -109,8 +113,9 @@ def compose(
         Of :mod:`pam_envs.envs.core.families`.
     given : Common
         Of :mod:`pam_envs.envs.core.arguments`.
-    signals, actions : Signals
-        Of observation and action.
+    observation, references, action : iterable of (name, unit, low, high)
+        Signals of the observation without references; references, each of which its preview
+        follows; signals of the action.
     config, choices : mapping of numbers
         The family's own, by the names that ``kernels`` declares.
     spread : ndarray, shape (n, 3)
@@ -126,6 +131,8 @@ def compose(
     view : str
         Import name of the :class:`~pam_envs.envs.rendering.scene.View`, like ``my_family.view:VIEW``.
     """
+    signals = _observed(observation, references, given, plant.control_period)
+    actions = Signals(Signal(*part, i, given.normalize) for i, part in enumerate(action))
     drawn = given.randomize is not False
     members = plant.members() if drawn else (plant,)
     none = np.zeros((kernels.channels, 1))
@@ -163,13 +170,8 @@ def compose(
         signals=signals,
         action_signals=actions,
         kernels=kernels,
-        rows=kernels.n_rows,
-        fixed=kernels.n_parameters,
         drawn=drawn,
-        counts=kernels.n_counts,
         ring=kernels.channels * ring,
-        seed_rows=(kernels.n_counts - N_SEED, kernels.n_counts - N_SEED + 1, EPISODE),
-        info_keys=kernels.info,
         shared=(
             tables,
             none if samples is None else samples,
@@ -180,6 +182,21 @@ def compose(
         episode_seconds=float(given.episode_seconds),
         render_mode=given.render_mode,
         view=view,
+    )
+
+
+def _observed(
+    now: Iterable[Part], references: Iterable[Part], given: Any, period: float
+) -> Signals:
+    """Return the signals of an observation."""
+    parts = [(part, 0.0) for part in now]
+    for name, *span in references:
+        parts.append(((name, *span), 0.0))  # type: ignore[arg-type]
+        for i in range(1, given.preview + 1):
+            ahead = i * given.preview_stride * period
+            parts.append(((f"{name}_{i}", *span), ahead))  # type: ignore[arg-type]
+    return Signals(
+        Signal(*part, i, given.normalize, ahead) for i, (part, ahead) in enumerate(parts)
     )
 
 

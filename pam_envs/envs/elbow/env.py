@@ -52,25 +52,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.envs.core.arguments import (
-    Common,
-    Part,
-    Randomisation,
-    acted,
-    environment_arguments,
-    observed,
-    plant_of,
-    reference_of,
-    spread_of,
-    task_of,
-)
+from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments
 from pam_envs.envs.core.plant_env import PlantEnv
-from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose
+from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, compose
 from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.envs.elbow import layout as L
 from pam_envs.envs.elbow.kernels import kernels_for
 from pam_envs.envs.elbow.ranges import largest_errors, signal_ranges
-from pam_envs.parameters import Signals
 from pam_envs.plants.elbow_orthosis import rows as R
 from pam_envs.plants.elbow_orthosis.plant import MAKES, ElbowOrthosis, Valves
 from pam_envs.plants.single_muscle.hysteresis import Kind
@@ -109,7 +97,7 @@ def _plant(given: Common, valves: Any) -> ElbowOrthosis:
     """Return the orthosis that the arguments name."""
     if valves is not None:
         check_choice("valves", valves, MAKES)
-    made = plant_of(ElbowOrthosis, given, partial(_default, valves or MAKES[0]))
+    made = given.plant_of(ElbowOrthosis, partial(_default, valves or MAKES[0]))
     if valves is not None and made.valves != valves:
         raise ValueError(
             f"valves = {valves!r} but the plant's are {made.valves!r}; leave valves out, or give "
@@ -173,7 +161,8 @@ def _actions(plant: ElbowOrthosis, action: str) -> list[Part]:
     ]
 
 
-def _signals(plant: ElbowOrthosis, given: Common) -> Signals:
+def _observation(plant: ElbowOrthosis) -> list[Part]:
+    """Return the signals of the observation without references."""
     pressures, (torques, stiffnesses) = (0.0, plant.full_pressure), _spans(plant)
     word, unit, low, high = _commands(plant)
     parts: list[Part] = [
@@ -188,11 +177,7 @@ def _signals(plant: ElbowOrthosis, given: Common) -> Signals:
     ]
     if word == "pulse":
         parts.append(("to_pulse", "s", 0.0, plant.cycle))
-    references = [
-        ("reference", "N m", *torques),
-        ("stiffness_reference", "N m/rad", *stiffnesses),
-    ]
-    return observed(parts, references, given, plant.control_period)
+    return parts
 
 
 def _span(plant: ElbowOrthosis, span: Any) -> tuple[float, float]:
@@ -211,10 +196,10 @@ def _span(plant: ElbowOrthosis, span: Any) -> tuple[float, float]:
     return a, b
 
 
-def _reference(plant: ElbowOrthosis, reference: Any) -> tuple[int, NDArray[np.float64]]:
+def _reference(plant: ElbowOrthosis, given: Common) -> tuple[int, NDArray[np.float64]]:
     """Return the number of the object, and torque and stiffness if they are given as samples."""
     most = tuple(2.0 * largest for largest in signal_ranges(plant))
-    kind, samples = reference_of(reference, OBJECTS, "N m, N m/rad", most, channels=L.CHANNELS)
+    kind, samples = given.reference_of(OBJECTS, "N m, N m/rad", most, channels=L.CHANNELS)
     if samples.min(axis=1)[1] < 0.0:
         raise ValueError(
             f"reference has a stiffness of {samples.min(axis=1)[1]:g} N m/rad; give 0 or more"
@@ -282,7 +267,7 @@ def make_setup(
         Naming the argument, its value, the bounds and the remedy.
     """
     made = _plant(given, valves)
-    kind, samples = _reference(made, given.reference)
+    kind, samples = _reference(made, given)
     check_choice("action", action, L.ACTIONS)
     check_choice("motion", motion, MOTIONS)
     check_choice("start", start, ("ready", "random"))
@@ -293,9 +278,10 @@ def make_setup(
             "action = 'torque_stiffness' needs regulators, and on/off valves have none; take "
             "action = 'pressures', or valves = 'proportional'"
         )
-    task, full = task_of(TorqueStiffness, given.reward), made.full_pressure
+    task, full = given.task_of(TorqueStiffness), made.full_pressure
     lightest, heaviest = _weights(task, weight, kind)
     low, high = _span(made, span)
+    torques, stiffnesses = _spans(made)
     config = {
         **vars(task),
         "lightest": lightest,
@@ -318,13 +304,17 @@ def make_setup(
         "fixed_signals": L.COMMON_SIGNALS + (1 if pulsed else 0),
         "samples": samples.shape[1],
     }
-    spread = spread_of(made, RANDOMISATION, given.randomize)
+    spread = given.spread_of(made, RANDOMISATION)
     return compose(
         made,
         kernels_for(made.hysteresis.kind, made.valves, made.needs_effects(spread)),
         given,
-        signals=_signals(made, given),
-        actions=acted(_actions(made, action), given),
+        observation=_observation(made),
+        references=[
+            ("reference", "N m", *torques),
+            ("stiffness_reference", "N m/rad", *stiffnesses),
+        ],
+        action=_actions(made, action),
         config=config,
         choices=choices,
         reference=kind,

@@ -44,19 +44,12 @@ import numpy as np
 
 from pam_envs.envs.core.arguments import (
     Common,
-    Part,
     Randomisation,
-    acted,
     environment_arguments,
-    observed,
     payloads_of,
-    plant_of,
-    reference_of,
-    spread_of,
-    task_of,
 )
 from pam_envs.envs.core.plant_env import PlantEnv
-from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose
+from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, compose
 from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.envs.joint import layout as L
 from pam_envs.envs.joint.kernels import kernels_for
@@ -169,9 +162,9 @@ def make_setup(
     ValueError
         Naming the argument, its value, the bounds and the remedy.
     """
-    made = plant_of(AntagonisticJoint, given, _default)
+    made = given.plant_of(AntagonisticJoint, _default)
     most = made.angle_range[1]
-    place, samples = reference_of(given.reference, L.REFERENCES, "rad", most)
+    place, samples = given.reference_of(L.REFERENCES, "rad", most)
     family = NUMBERS.get(place, place)
     check_choice("action", action, L.MODES)
     check_choice("start", start, ("random", "straight"))
@@ -182,7 +175,7 @@ def make_setup(
         )
     usual = USUAL_SHARE * most
     reach = usual if amplitude is None else check_number("amplitude", amplitude, 0.0, most, "rad")
-    task, now = task_of(JointTracking, given.reward), _signals(made, action)
+    task, now = given.task_of(JointTracking), _signals(made, action)
     payloads = payloads_of(payload, MOST_PAYLOAD)
     change = check_number("payload_change", payload_change, 0.0, MOST_PAYLOAD, "kg")
     largest = np.abs(samples).max() if family == SAMPLES else reach
@@ -201,13 +194,14 @@ def make_setup(
         "worst_period": task.worst(made.largest_angle + most),
     }
     mode = L.MODES.index(action)
-    spread = spread_of(made, RANDOMISATION, given.randomize)
+    spread = given.spread_of(made, RANDOMISATION)
     return compose(
         made,
         kernels_for(made.hysteresis.kind, made.dynamics, made.needs_effects(spread)),
         given,
-        signals=observed(now, [("reference", "rad", *ANGLES)], given, made.control_period),
-        actions=acted(_actions(made, action), given),
+        observation=now,
+        references=[("reference", "rad", *ANGLES)],
+        action=_actions(made, action),
         config=config,
         choices={"mode": mode, "payloads": payloads.size, "fixed_signals": len(now)},
         reference=family,

@@ -33,17 +33,7 @@ from __future__ import annotations
 
 from functools import lru_cache, partial
 
-from pam_envs.envs.core.arguments import (
-    Common,
-    Randomisation,
-    acted,
-    environment_arguments,
-    observed,
-    plant_of,
-    reference_of,
-    spread_of,
-    task_of,
-)
+from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments
 from pam_envs.envs.core.plant_env import PlantEnv
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose
 from pam_envs.envs.core.vector_env import PlantVectorEnv
@@ -107,16 +97,16 @@ def make_setup(
     ValueError
         Naming the argument, its value, the bounds and the remedy.
     """
-    made = plant_of(KneeOrthosis, given, partial(_default, mounting))
+    made = given.plant_of(KneeOrthosis, partial(_default, mounting))
     if made.mounting == "leg":
         raise ValueError(
             "plant: this orthosis is on a leg; give KneeOrthosis.no_load() or KneeOrthosis.rig()"
         )
     unit, largest = UNITS[quantity], RANGES[quantity][1]
-    family, samples = reference_of(given.reference, REFERENCES, unit, largest)
+    family, samples = given.reference_of(REFERENCES, unit, largest)
     family = {len(REFERENCES): SAMPLES, len(FAMILIES): L.PAPER}.get(family, family)
     check_choice("start", start, ("random", "paper"))
-    task, full = task_of(BraceTracking, given.reward), made.regulator.max_pressure
+    task, full = given.task_of(BraceTracking), made.regulator.max_pressure
     low, high = REFERENCE_RANGES[L.QUANTITIES[quantity]][made.mounting]
     config = {
         **vars(task),
@@ -127,21 +117,20 @@ def make_setup(
         "start_low": PAPER_PRESSURE if start == "paper" else 0.0,
         "start_high": PAPER_PRESSURE if start == "paper" else 0.9 * full,
     }
-    now = [
-        ("tension", "N", *RANGES[L.TENSION]),
-        ("stiffness", "N/m", *RANGES[L.STIFFNESS]),
-        ("angle", "rad", 1.0, 3.1),
-        ("pressure", "Pa", 0.0, full),
-        ("set_point", "Pa", 0.0, full),
-    ]
-    references = [("reference", unit, *RANGES[quantity])]
-    spread = spread_of(made, RANDOMISATION, given.randomize)
+    spread = given.spread_of(made, RANDOMISATION)
     return compose(
         made,
         kernels_for(made.hysteresis.kind, made.mounting, made.dynamics, made.needs_effects(spread)),
         given,
-        signals=observed(now, references, given, made.control_period),
-        actions=acted([("pressure_set_point", "Pa", 0.0, full)], given),
+        observation=[
+            ("tension", "N", *RANGES[L.TENSION]),
+            ("stiffness", "N/m", *RANGES[L.STIFFNESS]),
+            ("angle", "rad", 1.0, 3.1),
+            ("pressure", "Pa", 0.0, full),
+            ("set_point", "Pa", 0.0, full),
+        ],
+        references=[("reference", unit, *RANGES[quantity])],
+        action=[("pressure_set_point", "Pa", 0.0, full)],
         config=config,
         choices={"quantity": quantity},
         reference=family,
@@ -154,27 +143,17 @@ def make_setup(
     )
 
 
-def tension(**arguments: object) -> Setup:
-    """Return the configuration of ``PAM/KneeTension-v0``."""
-    return make_setup(L.TENSION, "no_load", **arguments)
-
-
-def stiffness(**arguments: object) -> Setup:
-    """Return the configuration of ``PAM/KneeStiffness-v0``."""
-    return make_setup(L.STIFFNESS, "rig", **arguments)
-
-
-class KneeTensionEnv(PlantEnv, make_setup=tension):
+class KneeTensionEnv(PlantEnv, make_setup=partial(make_setup, L.TENSION, "no_load")):
     """Single environment of the tension (see the module's page)."""
 
 
-class KneeTensionVectorEnv(PlantVectorEnv, make_setup=tension):
+class KneeTensionVectorEnv(PlantVectorEnv, make_setup=partial(make_setup, L.TENSION, "no_load")):
     """Batch of environments of the tension (see the module's page)."""
 
 
-class KneeStiffnessEnv(PlantEnv, make_setup=stiffness):
+class KneeStiffnessEnv(PlantEnv, make_setup=partial(make_setup, L.STIFFNESS, "rig")):
     """Single environment of the stiffness (see the module's page)."""
 
 
-class KneeStiffnessVectorEnv(PlantVectorEnv, make_setup=stiffness):
+class KneeStiffnessVectorEnv(PlantVectorEnv, make_setup=partial(make_setup, L.STIFFNESS, "rig")):
     """Batch of environments of the stiffness (see the module's page)."""

@@ -45,24 +45,13 @@ from __future__ import annotations
 from functools import lru_cache, partial
 from typing import Any
 
-from pam_envs.envs.core.arguments import (
-    Common,
-    Randomisation,
-    acted,
-    environment_arguments,
-    observed,
-    plant_of,
-    reference_of,
-    spread_of,
-    task_of,
-)
+from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments
 from pam_envs.envs.core.plant_env import PlantEnv
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose
 from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.envs.knee.gait_kernels import kernels_for
 from pam_envs.envs.knee.gait_layout import SOURCES
 from pam_envs.muscle.emg import calibration
-from pam_envs.parameters import Signals
 from pam_envs.plants.knee_orthosis import rows as R
 from pam_envs.plants.knee_orthosis.plant import Activity, KneeOrthosis
 from pam_envs.plants.single_muscle.hysteresis import Kind
@@ -101,7 +90,7 @@ def _pace(pace: Any) -> float:
 def _plant(activity: Activity, given: Common, pace: Any) -> KneeOrthosis:
     """Return the orthosis on a leg that the arguments name."""
     seconds = PAPER_STRIDE if pace is None else _pace(pace)
-    made = plant_of(KneeOrthosis, given, partial(_default, activity, seconds))
+    made = given.plant_of(KneeOrthosis, partial(_default, activity, seconds))
     if made.mounting != "leg" or made.activity != activity:
         raise ValueError(
             f"plant: mounting {made.mounting!r} with activity {made.activity!r}; give "
@@ -110,20 +99,6 @@ def _plant(activity: Activity, given: Common, pace: Any) -> KneeOrthosis:
     if given.plant is not None and pace is not None:
         return made.replace({"stride.time": seconds})
     return made
-
-
-def _signals(given: Common, full: float, period: float) -> Signals:
-    now = [
-        ("tension", "N", *TENSIONS),
-        ("angle", "rad", *ANGLES),
-        ("pressure", "Pa", 0.0, full),
-        ("set_point", "Pa", 0.0, full),
-        ("stance", "1", 0.0, 1.0),
-        ("ground_force", "N", 0.0, 1500.0),
-        ("torque_reference", "N m", *TORQUES),
-    ]
-    references = [("reference", "N", *TENSIONS), ("angle_reference", "rad", *ANGLES)]
-    return observed(now, references, given, period)
 
 
 @environment_arguments(reference="estimate", preview=5, preview_stride=4, episode_seconds=10.0)
@@ -166,10 +141,10 @@ def make_setup(
         Naming the argument, its value, the bounds and the remedy.
     """
     made = _plant(activity, given, pace)
-    source, samples = reference_of(given.reference, SOURCES, "N m", 100.0)
+    source, samples = given.reference_of(SOURCES, "N m", 100.0)
     check_choice("assistance", assistance, tuple(ASSISTANCE))
     check_choice("start", start, STARTS)
-    task, full = task_of(GaitAssistance, given.reward), made.regulator.max_pressure
+    task, full = given.task_of(GaitAssistance), made.regulator.max_pressure
     config = {
         **vars(task),
         "ratio": check_number("ratio", ratio, 0.0, 0.5, ""),
@@ -184,13 +159,22 @@ def make_setup(
         "known_shank": made.leg.shank,
         "known_mass": made.leg.body_mass,
     }
-    spread = spread_of(made, RANDOMISATION, given.randomize)
+    spread = given.spread_of(made, RANDOMISATION)
     return compose(
         made,
         kernels_for(made.hysteresis.kind, made.dynamics, made.needs_effects(spread)),
         given,
-        signals=_signals(given, full, made.control_period),
-        actions=acted([("pressure_set_point", "Pa", 0.0, full)], given),
+        observation=[
+            ("tension", "N", *TENSIONS),
+            ("angle", "rad", *ANGLES),
+            ("pressure", "Pa", 0.0, full),
+            ("set_point", "Pa", 0.0, full),
+            ("stance", "1", 0.0, 1.0),
+            ("ground_force", "N", 0.0, 1500.0),
+            ("torque_reference", "N m", *TORQUES),
+        ],
+        references=[("reference", "N", *TENSIONS), ("angle_reference", "rad", *ANGLES)],
+        action=[("pressure_set_point", "Pa", 0.0, full)],
         config=config,
         choices={},
         reference=source,
@@ -202,40 +186,25 @@ def make_setup(
     )
 
 
-def walk(**arguments: object) -> Setup:
-    """Return the configuration of ``PAM/KneeWalk-v0``."""
-    return make_setup("walk", **arguments)
-
-
-def stairs_up(**arguments: object) -> Setup:
-    """Return the configuration of ``PAM/KneeStairsUp-v0``."""
-    return make_setup("stairs_up", **arguments)
-
-
-def stairs_down(**arguments: object) -> Setup:
-    """Return the configuration of ``PAM/KneeStairsDown-v0``."""
-    return make_setup("stairs_down", **arguments)
-
-
-class KneeWalkEnv(PlantEnv, make_setup=walk):
+class KneeWalkEnv(PlantEnv, make_setup=partial(make_setup, "walk")):
     """Single environment of level walking (see the module's page)."""
 
 
-class KneeWalkVectorEnv(PlantVectorEnv, make_setup=walk):
+class KneeWalkVectorEnv(PlantVectorEnv, make_setup=partial(make_setup, "walk")):
     """Batch of environments of level walking (see the module's page)."""
 
 
-class KneeStairsUpEnv(PlantEnv, make_setup=stairs_up):
+class KneeStairsUpEnv(PlantEnv, make_setup=partial(make_setup, "stairs_up")):
     """Single environment of stairs up (see the module's page)."""
 
 
-class KneeStairsUpVectorEnv(PlantVectorEnv, make_setup=stairs_up):
+class KneeStairsUpVectorEnv(PlantVectorEnv, make_setup=partial(make_setup, "stairs_up")):
     """Batch of environments of stairs up (see the module's page)."""
 
 
-class KneeStairsDownEnv(PlantEnv, make_setup=stairs_down):
+class KneeStairsDownEnv(PlantEnv, make_setup=partial(make_setup, "stairs_down")):
     """Single environment of stairs down (see the module's page)."""
 
 
-class KneeStairsDownVectorEnv(PlantVectorEnv, make_setup=stairs_down):
+class KneeStairsDownVectorEnv(PlantVectorEnv, make_setup=partial(make_setup, "stairs_down")):
     """Batch of environments of stairs down (see the module's page)."""

@@ -49,23 +49,16 @@ from numpy.typing import NDArray
 
 from pam_envs.envs.core.arguments import (
     Common,
-    Part,
     Randomisation,
-    acted,
     environment_arguments,
-    observed,
     payloads_of,
-    plant_of,
-    spread_of,
-    task_of,
 )
 from pam_envs.envs.core.plant_env import PlantEnv
-from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose
+from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, compose
 from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.envs.manipulator.kernels import kernels_for
 from pam_envs.envs.manipulator.layout import MODES, POSE, joint_names, muscle_names
 from pam_envs.envs.manipulator.paths import paths_for
-from pam_envs.parameters import Signals
 from pam_envs.plants.antagonistic_joint.bearing import bearable_payload, check_borne
 from pam_envs.plants.redundant_manipulator import rows as R
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
@@ -107,7 +100,8 @@ def _actions(plant: RedundantManipulator, action: str) -> list[Part]:
     return [(name, "rad", *plant.angle_range) for name in names]
 
 
-def _signals(plant: RedundantManipulator, action: str, plan: bool, given: Common) -> Signals:
+def _observation(plant: RedundantManipulator, action: str) -> list[Part]:
+    """Return the signals of the observation without references."""
     n, pressures = plant.stages, ("Pa", 0.0, plant.regulator.max_pressure)
     angles = ("rad", *ANGLES)
     parts: list[Part] = [(name, *angles) for name in joint_names("angle", n)]
@@ -118,10 +112,7 @@ def _signals(plant: RedundantManipulator, action: str, plan: bool, given: Common
         parts += [(name, "rad", *plant.angle_range) for name in joint_names("set_point", n)]
     else:
         parts += [(name, *pressures) for name in muscle_names("set_point", n)]
-    references = _pose(plant, "reference_")
-    if plan:
-        references += [(name, *angles) for name in joint_names("joint_reference", n)]
-    return observed(parts, references, given, plant.control_period)
+    return parts
 
 
 def _payloads(
@@ -186,16 +177,20 @@ def make_setup(
     ValueError
         Naming the argument, its value, the bounds and the remedy.
     """
-    made = plant_of(RedundantManipulator, given, _default)
+    made = given.plant_of(RedundantManipulator, _default)
     check_choice("action", action, MODES)
     check_choice("plan", plan, (True, False))
     check_choice("weighted", weighted, (True, False))
-    task = task_of(PathTracking, given.reward)
+    task = given.task_of(PathTracking)
     change = check_number("payload_change", payload_change, 0.0, MOST_PAYLOAD, "kg")
     paths = paths_for(made, given.reference, True)
     payloads = _payloads(made, payload, change, paths, action == "pressures")
     if not weighted:
         paths = paths_for(made, given.reference, weighted)
+    references = _pose(made, "reference_")
+    if plan:
+        names = joint_names("joint_reference", made.stages)
+        references += [(name, "rad", *ANGLES) for name in names]
     config = {
         **vars(task),
         "soft_angle": task.soft_share * made.angle_range[1],
@@ -206,13 +201,14 @@ def make_setup(
         "rest_seconds": check_number("rest_seconds", rest_seconds, 0.0, 600.0, "s"),
         "worst_period": task.worst(float(made.chain.reach)),
     }
-    spread = spread_of(made, RANDOMISATION, given.randomize)
+    spread = given.spread_of(made, RANDOMISATION)
     return compose(
         made,
         kernels_for(made.hysteresis.kind, made.stages, made.needs_effects(spread)),
         given,
-        signals=_signals(made, action, plan, given),
-        actions=acted(_actions(made, action), given),
+        observation=_observation(made, action),
+        references=references,
+        action=_actions(made, action),
         config=config,
         choices={
             "mode": MODES.index(action),

@@ -36,22 +36,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.envs.core.arguments import (
-    Common,
-    Randomisation,
-    acted,
-    environment_arguments,
-    observed,
-    plant_of,
-    reference_of,
-    spread_of,
-    task_of,
-)
+from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments
 from pam_envs.envs.core.plant_env import PlantEnv
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose
 from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.envs.positioning.kernels import kernels_for
-from pam_envs.parameters import Signals
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.hysteresis import Kind
 from pam_envs.plants.single_muscle.plant import SingleMuscle
@@ -97,18 +86,6 @@ def _loads(load: Any) -> NDArray[np.float64]:
     return np.array([check_number("load", v, 0.0, HIGHEST_LOAD, "kg") for v in values])
 
 
-def _signals(plant: SingleMuscle, task: Tracking, given: Common) -> Signals:
-    position = ("m", task.lowest_contraction, task.highest_contraction)
-    pressure = ("Pa", 0.0, plant.regulator.max_pressure)
-    now = [
-        ("contraction", *position),
-        ("pressure", *pressure),
-        ("set_point", *pressure),
-        ("load", "kg", 0.0, HIGHEST_LOAD),
-    ]
-    return observed(now, [("reference", *position)], given, plant.control_period)
-
-
 @environment_arguments(reference="steps", preview=5, preview_stride=4, episode_seconds=10.0)
 def make_setup(
     given: Common, load: Any = 2.55, load_disturbance: float = 0.0, start: str = "random"
@@ -134,11 +111,11 @@ def make_setup(
     ValueError
         Naming the argument, its value, the bounds and the remedy.
     """
-    made = plant_of(SingleMuscle, given, _default)
+    made = given.plant_of(SingleMuscle, _default)
     loads = _loads(load)
-    family, samples = reference_of(given.reference, FAMILIES, "m", 0.2)
+    family, samples = given.reference_of(FAMILIES, "m", 0.2)
     check_choice("start", start, ("random", "rest"))
-    task, full = task_of(Tracking, given.reward), made.regulator.max_pressure
+    task, full = given.task_of(Tracking), made.regulator.max_pressure
     config = {
         **vars(task),
         "reference_low": REFERENCE_RANGE[0],
@@ -146,13 +123,21 @@ def make_setup(
         "start_share": 0.9 if start == "random" else 0.0,
         "load_change": check_number("load_disturbance", load_disturbance, 0.0, HIGHEST_LOAD, "kg"),
     }
-    spread = spread_of(made, RANDOMISATION, given.randomize)
+    spread = given.spread_of(made, RANDOMISATION)
+    position = ("m", task.lowest_contraction, task.highest_contraction)
+    pressure = ("Pa", 0.0, full)
     return compose(
         made,
         kernels_for(made.hysteresis.kind, made.needs_effects(spread)),
         given,
-        signals=_signals(made, task, given),
-        actions=acted([("pressure_set_point", "Pa", 0.0, full)], given),
+        observation=[
+            ("contraction", *position),
+            ("pressure", *pressure),
+            ("set_point", *pressure),
+            ("load", "kg", 0.0, HIGHEST_LOAD),
+        ],
+        references=[("reference", *position)],
+        action=[("pressure_set_point", *pressure)],
         config=config,
         choices={"loads": len(loads)},
         reference=family,

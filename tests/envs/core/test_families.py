@@ -21,7 +21,6 @@ from pam_envs.envs.core.step import PERIOD, copy_rows, write_references
 from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import normal, uniform
-from pam_envs.parameters import Signal, Signals
 
 CARTS = 3
 PLACE, PUSH, OLD_PUSH, DRIFT = 0, CARTS, 2 * CARTS, 3 * CARTS
@@ -141,16 +140,13 @@ class Plant(SimpleNamespace):
 
 def setup(normalize: bool = True, seconds: float = 0.4) -> Setup:
     given = Common(None, 4, 3, seconds, normalize=normalize, randomize=True)
-    names = [f"place_{k}" for k in range(CARTS)]
-    names += [f"{n}_{k}" for n in ("first", "second") for k in range(5)]
     return compose(
         Plant(mass=2.0),
         carts(),
         given,
-        signals=Signals(Signal(n, "m", -5.0, 5.0, i, normalize) for i, n in enumerate(names)),
-        actions=Signals(
-            Signal(f"push_{k}", "N", -10.0, 10.0 * (k + 1), k, normalize) for k in range(CARTS)
-        ),
+        observation=[(f"place_{k}", "m", -5.0, 5.0) for k in range(CARTS)],
+        references=[(name, "m", -5.0, 5.0) for name in ("first", "second")],
+        action=[(f"push_{k}", "N", -10.0, 10.0 * (k + 1)) for k in range(CARTS)],
         config={},
         choices={},
         spread=np.array([[MASS, 1.0, 3.0]]),

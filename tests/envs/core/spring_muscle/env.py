@@ -14,16 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.envs.core.arguments import (
-    Common,
-    Randomisation,
-    acted,
-    environment_arguments,
-    observed,
-    reference_of,
-    spread_of,
-    task_of,
-)
+from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments
 from pam_envs.envs.core.families import Kernels
 from pam_envs.envs.core.kernels import trajectory_at
 from pam_envs.envs.core.layout import Report, computed, indices
@@ -178,23 +169,23 @@ def kernels() -> Kernels:
 def make_setup(given: Common) -> Setup:
     """Return the checked configuration."""
     plant = given.plant or Muscle()
-    family, samples = reference_of(given.reference, FAMILIES, "m", LONGEST)
+    family, samples = given.reference_of(FAMILIES, "m", LONGEST)
     span = ("m", 0.0, LONGEST)
     pressure = ("Pa", 0.0, FULL)
     drawn = Randomisation(("muscle.lag", "muscle.gain"), (), "{'muscle.lag': (0.05, 0.2)}")
-    now = [("contraction", *span), ("pressure", *pressure)]
     return compose(
         plant,
         kernels(),
         given,
-        signals=observed(now, [("reference", *span)], given, plant.control_period),
-        actions=acted([("pressure_set_point", *pressure)], given),
-        config=vars(task_of(Holding, given.reward)),
+        observation=[("contraction", *span), ("pressure", *pressure)],
+        references=[("reference", *span)],
+        action=[("pressure_set_point", *pressure)],
+        config=vars(given.task_of(Holding)),
         choices={},
         reference=family,
         sines=sines_needed(family),
         samples=samples,
-        spread=spread_of(plant, drawn, given.randomize),
+        spread=given.spread_of(plant, drawn),
         view=f"{__package__}.view:VIEW",
     )
 
