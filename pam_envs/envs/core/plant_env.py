@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import isfinite
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.envs.core.info import Info
-from pam_envs.envs.core.setup import BEGIN, STEP, Setup, check_seed, check_state, saved
+from pam_envs.envs.core.setup import BEGIN, STEP, Configured, Setup, check_seed, check_state, saved
 from pam_envs.kernels.build import COMPILED, address_book
 from pam_envs.kernels.random import seed_words
 from pam_envs.parameters import Signals
@@ -32,7 +31,7 @@ def fresh_seed() -> int:
     return int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 1)
 
 
-class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
+class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     """Environment around a plant: a batch of one, run by the kernels that run a batch.
 
     ``reset(seed=s)`` starts episode 0 of the seed; ``reset()`` starts the next one. All random
@@ -47,12 +46,6 @@ class PlantEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     """
 
     metadata = {"render_modes": ["rgb_array", "human"], "render_fps": 100}
-    make_setup: Callable[..., Setup]
-
-    def __init_subclass__(cls, make_setup: Callable[..., Setup] | None = None) -> None:
-        """Take the function that turns an environment's keyword arguments into its setup."""
-        if make_setup is not None:
-            cls.make_setup = staticmethod(make_setup)
 
     def __init__(self, setup: Setup | None = None, **arguments: Any) -> None:
         setup = self.make_setup(**arguments) if setup is None else setup

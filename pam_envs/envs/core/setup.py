@@ -7,7 +7,7 @@ the same setup and differ only in the number of lanes.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -304,3 +304,14 @@ def check_state(state: Any, like: tuple[NDArray[Any], ...]) -> list[NDArray[Any]
             )
         parts.append(part)
     return parts
+
+
+class Configured:
+    """Base of an environment whose keyword arguments ``make_setup`` turns into its setup."""
+
+    make_setup: Callable[..., Setup]
+
+    def __init_subclass__(cls, make_setup: Callable[..., Setup] | None = None) -> None:
+        """Take the function from the class statement."""
+        if make_setup is not None:
+            cls.make_setup = staticmethod(make_setup)

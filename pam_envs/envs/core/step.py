@@ -134,17 +134,9 @@ def copy_rows(rows: Any, work: Any) -> None:
 
 @routine
 def reset_lane(
-    rows: Any,
-    fixed: Any,
-    counts: Any,
-    ahead: Any,
-    tables: Any,
-    samples: Any,
-    settings: Any,
-    choices: Any,
-    work: Any,
-    j: int,
-) -> None:
+    rows: Any, fixed: Any, counts: Any, ahead: Any, tables: Any, samples: Any, settings: Any,
+    choices: Any, work: Any, j: int,
+) -> None:  # fmt: skip
     """Start the episode of lane ``j`` that its counter gives."""
     seed = N_COUNTS - N_SEED
     key_a = episode_key(counts[seed][j], counts[EPISODE][j])
@@ -195,15 +187,9 @@ def write_lane(
 
 @kernel
 def write_tile(
-    work: Any,
-    settings: Any,
-    choices: Any,
-    observation: Any,
-    info: Any,
-    flags: Any,
-    start: int,
+    work: Any, settings: Any, choices: Any, observation: Any, info: Any, flags: Any, start: int,
     lanes: int,
-) -> int:
+) -> int:  # fmt: skip
     """Copy a tile to the outputs; return how many of its episodes are over."""
     over = 0
     config, reward, time, ended = settings[0], info[0], work[FIRST_INFO], work[FIRST_INFO + N_INFO]
@@ -232,21 +218,10 @@ def write_tile(
 
 @kernel
 def step_tiles(
-    all_rows: Any,
-    all_fixed: Any,
-    all_counts: Any,
-    all_ahead: Any,
-    tables: Any,
-    samples: Any,
-    settings: Any,
-    choices: Any,
-    actions: Any,
-    observations: Any,
-    infos: Any,
-    flags: Any,
-    number: int,
-    mode: int,
-) -> None:
+    all_rows: Any, all_fixed: Any, all_counts: Any, all_ahead: Any, tables: Any, samples: Any,
+    settings: Any, choices: Any, actions: Any, observations: Any, infos: Any, flags: Any,
+    number: int, mode: int,
+) -> None:  # fmt: skip
     """Step or reset a batch, tile by tile.
 
     Parameters

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import gymnasium as gym
@@ -15,6 +14,7 @@ from pam_envs.envs.core.plant_env import fresh_seed, space_of
 from pam_envs.envs.core.setup import (
     BEGIN,
     STEP_AND_RESTART,
+    Configured,
     Setup,
     check_choice,
     check_seed,
@@ -31,7 +31,7 @@ PARALLEL_FROM = 4096
 """Rows from which on a batch is spread over the cores."""
 
 
-class PlantVectorEnv(VectorEnv[Any, Any, Any]):
+class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
     """``num_envs`` environments stepped by one kernel call.
 
     Row ``i`` of a batch reset with seed ``s`` is the single environment reset with ``s + i``, bit
@@ -58,13 +58,6 @@ class PlantVectorEnv(VectorEnv[Any, Any, Any]):
         "render_fps": 100,
         "autoreset_mode": AutoresetMode.SAME_STEP,
     }
-
-    make_setup: Callable[..., Setup]
-
-    def __init_subclass__(cls, make_setup: Callable[..., Setup] | None = None) -> None:
-        """Take the function that turns an environment's keyword arguments into its setup."""
-        if make_setup is not None:
-            cls.make_setup = staticmethod(make_setup)
 
     def __init__(
         self,
