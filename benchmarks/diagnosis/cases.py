@@ -1,9 +1,8 @@
-"""Cases of the diagnosis benchmark: a drawn rig, what is hidden in it and how large, its recording.
+"""Cases of the diagnosis benchmark: a drawn rig, its hidden effects and their sizes, its recording.
 
-The *size* of an effect is the RMS of what remains of it once the plant's base has been refitted
-to the noise-free clean rig, over the noise, on the output where that is largest. A case wants a
-size; the amplitude that gives it is solved for. Nothing of the rig but its recording and its
-owner's sheet reaches the diagnosis.
+The *size* of an effect is the RMS of its part that a refit of the plant's base to the noise-free
+clean rig does not absorb, over the noise, on the output where it is largest. A case gives a target
+size, for which the amplitude is solved. The diagnosis sees only recording and rig file.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from tests.diagnosis import hidden
 Array = NDArray[np.float64]
 
 NOISE = np.array([hidden.CONTRACTION_NOISE_MM * MM, hidden.PRESSURE_NOISE_BAR * BAR])
-"""RMS of the sensors' noise [m], [Pa]."""
+"""RMS noise of the sensors [m], [Pa]."""
 CAMPAIGNS = {
     "standard": hidden.campaign_standard,
     "short": hidden.campaign_short,
@@ -37,38 +36,38 @@ SETS = {"small": 0, "tune": 1, "final": 2}
 LARGE, WEAK = (1.0, 5.0), (0.1, 1.0)
 """Ranges of sizes."""
 LOUDER = 3.0
-"""Noise of the louder cases, over the usual."""
+"""Relative noise of the ``loud`` cases."""
 BRIEF = (30.0, 60.0, 120.0)
-"""Durations [s] of brief recordings."""
+"""Durations of the ``brief`` recordings [s]."""
 MOST_AMPLITUDE = 20.0
 NEAR = 0.03
-"""How near, in the logarithm, a size has to come to what is wanted."""
+"""Tolerance of a size, in the logarithm."""
 ROUNDS, DRAWS = 16, 12
-"""Trials of an amplitude, and of a rig whose effect cannot be made so large."""
+"""Largest numbers of trials of an amplitude, and of rigs."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """What is to be drawn; equal cases give equal recordings.
+    """Specification of a case; equal cases give equal recordings.
 
     Attributes
     ----------
     kind : {"single", "weak", "loud", "clean", "decoy", "pair", "unknown", "idle", "brief"}
-        ``loud`` is a single one under three times the noise, with the same absolute size; in an
-        ``idle`` one nothing is hidden and nothing moves, so that nothing can be decided; a
-        ``brief`` one is a clean rig of which there is little.
+        ``loud`` is a single effect under three times the noise with the same absolute size;
+        ``idle`` a clean rig without motion, which cannot be decided; ``brief`` a short recording
+        of a clean rig.
     seed : int
-        Of all draws.
+        Seed of all random draws.
     names : tuple of str
         Effects to hide.
     sizes : tuple of float
-        Wanted, over the usual noise.
+        Target sizes over the usual noise.
     campaign : str
         One of :data:`CAMPAIGNS`.
     noise : float
-        Over the usual noise.
+        Noise over the usual noise.
     seconds : float
-        Of the campaign that were recorded; 0: all.
+        Recorded duration of the campaign [s]; 0 for all of it.
     """
 
     kind: str
@@ -85,7 +84,7 @@ class Case:
 
     @property
     def title(self) -> str:
-        """A few words for messages."""
+        """Short description for messages."""
         parts = [f"{n} {s:.2g}" for n, s in zip(self.names, self.sizes, strict=True)]
         return f"{self.kind} {' + '.join(parts)} seed {self.seed}".replace("  ", " ")
 
@@ -97,13 +96,13 @@ class Truth:
     Attributes
     ----------
     effect : Effect
-        Its shape.
+        Effect with its shape.
     amplitude : float
-        What was solved for.
+        Solved amplitude.
     size, raw : float
-        What remains of it after the refit, and all of it, over the usual noise.
+        Size after and before the refit of the base, over the usual noise.
     trace : ndarray, shape (2, T)
-        What it adds to the outputs beside the case's other effects [m], [Pa].
+        Contribution to the outputs beside the other effects [m], [Pa].
     """
 
     effect: hidden.Effect
@@ -114,24 +113,24 @@ class Truth:
 
     @property
     def name(self) -> str:
-        """Its name in the catalogue."""
+        """Name in the catalogue."""
         return self.effect.name
 
 
 @dataclass(frozen=True)
 class Ground:
-    """A clean rig under a campaign, and what refitting the plant to it can change.
+    """A clean rig under a campaign, with the subspace that a refit of the plant spans.
 
     Attributes
     ----------
     base : hidden.Base
-        The rig's constants.
+        Constants of the rig.
     campaign : hidden.Campaign
-        What is done to it.
+        Inputs.
     clean : ndarray, shape (2, T)
-        Its outputs without effect and noise [m], [Pa].
+        Outputs without effect and noise [m], [Pa].
     basis : ndarray
-        Orthonormal, of what refitting can change.
+        Orthonormal basis of the changes that a refit can make.
     order : ndarray of int
         Order of a flattened trace in ``basis``.
     """
@@ -143,33 +142,35 @@ class Ground:
     order: NDArray[np.int64]
 
     def left(self, trace: Array) -> Array:
-        """Return what refitting leaves of a trace (2, T) [m], [Pa], over the noise; same shape."""
+        """Return the part of a trace (2, T) [m], [Pa] that a refit does not absorb, over noise."""
         flat = (trace / NOISE[:, None]).ravel()
         rows = np.empty_like(flat)
         rows[self.order] = projected(flat[self.order][None], self.basis)[0]
         return rows.reshape(trace.shape)
 
     def size(self, trace: Array) -> float:
-        """Return a trace's size."""
+        """Return the size of a trace."""
         return loudest(self.left(trace)) if np.isfinite(trace).all() else np.inf
 
 
 @dataclass(frozen=True)
 class Made:
-    """A case made: what the diagnosis is given, and what it is not.
+    """A generated case: input of the diagnosis, and the hidden truth.
 
     Attributes
     ----------
     recording : Recording
+        Recording of the rig.
     sheet : Rig
-        What the owner tells.
+        Rig file.
     ground : Ground
+        The clean rig.
     truths : tuple of Truth
-        In the order of the case.
+        Hidden effects in the order of the case.
     outputs : ndarray, shape (2, T)
         Outputs with the effects and without noise [m], [Pa].
     noise : ndarray, shape (2,)
-        RMS of the sensors' noise [m], [Pa].
+        RMS noise of the sensors [m], [Pa].
     """
 
     recording: Recording
@@ -188,32 +189,32 @@ def loudest(rows: Array) -> float:
 def outputs_of(
     base: hidden.Base, effects: Sequence[tuple[hidden.Effect, float]], campaign: hidden.Campaign
 ) -> Array:
-    """Return a rig's outputs without noise, shape (2, T) [m], [Pa]."""
+    """Return the outputs of a rig without noise, shape (2, T) [m], [Pa]."""
     run = hidden.simulate(base, list(effects), campaign)
     return np.stack([run["contraction_mm"] * MM, run["pressure_bar"] * BAR])
 
 
 def sheet_of(base: hidden.Base, campaign: hidden.Campaign, noise: float = 1.0) -> Rig:
-    """Return what an honest owner tells of a rig."""
-    told = hidden.rig_yaml(base, campaign, noise)
+    """Return the rig file of a rig, with correct declarations."""
+    file = hidden.rig_yaml(base, campaign, noise)
     return Rig(
-        plant=told["plant"],
-        rest_length=told["muscle"]["rest_length_mm"] * MM,
-        diameter=told["muscle"]["diameter_mm"] * MM,
-        max_pressure=told["regulator"]["max_pressure_bar"] * BAR,
-        load=told["load"],
-        contraction_noise=told["sensors"]["contraction_noise_mm"] * MM,
-        pressure_noise=told["sensors"]["pressure_noise_bar"] * BAR,
-        cycles_since_rest=told["history"]["cycles_since_rest"],
-        rezeroed=told["history"]["rezeroed"],
-        repeats=tuple(tuple(group) for group in told["repeats"]),
-        valve_closed=tuple(told["valve_closed"]),
-        tolerance=told["tolerance"],
+        plant=file["plant"],
+        rest_length=file["muscle"]["rest_length_mm"] * MM,
+        diameter=file["muscle"]["diameter_mm"] * MM,
+        max_pressure=file["regulator"]["max_pressure_bar"] * BAR,
+        load=file["load"],
+        contraction_noise=file["sensors"]["contraction_noise_mm"] * MM,
+        pressure_noise=file["sensors"]["pressure_noise_bar"] * BAR,
+        cycles_since_rest=file["history"]["cycles_since_rest"],
+        rezeroed=file["history"]["rezeroed"],
+        repeats=tuple(tuple(group) for group in file["repeats"]),
+        valve_closed=tuple(file["valve_closed"]),
+        tolerance=file["tolerance"],
     )
 
 
 def recording_of(columns: dict[str, Any], sheet: Rig, source: str) -> Recording:
-    """Return columns of a rig's recording as the library reads them."""
+    """Return the recording of a rig from its columns."""
     return Recording.from_arrays(
         columns["time_s"],
         columns["pressure_command_bar"] * BAR,
@@ -228,7 +229,7 @@ def recording_of(columns: dict[str, Any], sheet: Rig, source: str) -> Recording:
 
 
 def ground_of(base: hidden.Base, campaign: hidden.Campaign) -> Ground:
-    """Refit the plant's base to a clean rig without noise."""
+    """Fit the plant's base to a clean rig without noise."""
     sheet, clean = sheet_of(base, campaign), outputs_of(base, [], campaign)
     quiet = replace(base, grain_mm=0.0, grain_bar=0.0)
     columns = hidden.make_recording(quiet, [], campaign, 0, noise_factor=0.0)
@@ -239,32 +240,24 @@ def ground_of(base: hidden.Base, campaign: hidden.Campaign) -> Ground:
     return Ground(base, campaign, clean, base_subspace(fitted.fit), problem.order)
 
 
-def solve(ground: Ground, effect: hidden.Effect, wanted: float) -> tuple[float, Array] | None:
-    """Return the amplitude that gives a size, and the trace; None where there is none.
-
-    Parameters
-    ----------
-    ground : Ground
-    effect : hidden.Effect
-    wanted : float
-        Size, over the usual noise.
-    """
-    low, high, amplitude = 0.0, np.inf, min(1.0, wanted)
+def solve(ground: Ground, effect: hidden.Effect, target: float) -> tuple[float, Array] | None:
+    """Return the amplitude and trace of an effect of a target size, or None if out of reach."""
+    low, high, amplitude = 0.0, np.inf, min(1.0, target)
     for _ in range(ROUNDS):
         trace = outputs_of(ground.base, [(effect, amplitude)], ground.campaign) - ground.clean
         size = ground.size(trace)
-        if abs(np.log(max(size, 1e-9) / wanted)) < NEAR:
+        if abs(np.log(max(size, 1e-9) / target)) < NEAR:
             return amplitude, trace
-        low, high = (amplitude, high) if size < wanted else (low, amplitude)
+        low, high = (amplitude, high) if size < target else (low, amplitude)
         if low >= MOST_AMPLITUDE:
             return None
-        amplitude = _next(amplitude, size, wanted, low, high)
+        amplitude = _next(amplitude, size, target, low, high)
     return None
 
 
-def _next(amplitude: float, size: float, wanted: float, low: float, high: float) -> float:
-    """Return the amplitude to try next: in proportion, kept between what is known."""
-    guess = amplitude * wanted / max(size, 1e-6) if np.isfinite(size) else 0.5 * amplitude
+def _next(amplitude: float, size: float, target: float, low: float, high: float) -> float:
+    """Return the next amplitude: in proportion, within the known bounds."""
+    guess = amplitude * target / max(size, 1e-6) if np.isfinite(size) else 0.5 * amplitude
     if np.isinf(high):
         return float(min(guess, 6.0 * amplitude, MOST_AMPLITUDE))
     may_be_within = low + 0.02 * (high - low) < guess < high - 0.02 * (high - low)
@@ -274,7 +267,7 @@ def _next(amplitude: float, size: float, wanted: float, low: float, high: float)
 def _draw(
     case: Case, attempt: int
 ) -> tuple[Ground, list[tuple[hidden.Effect, float, Array]]] | None:
-    """Draw a rig and its effects; None where a size is out of reach."""
+    """Draw a rig and its effects; None if a size is out of reach."""
     rng = np.random.default_rng([case.seed, attempt])
     base = hidden.draw_base(rng, decoy=case.kind == "decoy")
     ground = ground_of(base, _campaign(case))
@@ -289,7 +282,7 @@ def _draw(
 
 
 def _campaign(case: Case) -> hidden.Campaign:
-    """Return a case's campaign, ended where its recording ends."""
+    """Return the campaign of a case, up to the end of its recording."""
     whole = CAMPAIGNS[case.campaign](case.seed)
     if not case.seconds:
         return whole
@@ -304,11 +297,11 @@ def make(case: Case) -> Made:
     Raises
     ------
     ValueError
-        If no rig could be drawn on which the effects have the wanted sizes.
+        If no drawn rig has effects of the target sizes.
     """
     drawn = next(filter(None, (_draw(case, k) for k in range(DRAWS))), None)
     if drawn is None:
-        raise ValueError(f"{case.title}: {DRAWS} rigs drawn, on none can the effect be so large")
+        raise ValueError(f"{case.title}: on none of {DRAWS} drawn rigs can the effect be so large")
     ground, found = drawn
     effects = [(effect, amplitude) for effect, amplitude, _ in found]
     outputs = outputs_of(ground.base, effects, ground.campaign)
@@ -329,7 +322,7 @@ def make(case: Case) -> Made:
 def _truths(
     ground: Ground, found: list[tuple[hidden.Effect, float, Array]], outputs: Array
 ) -> Iterator[Truth]:
-    """Return what was hidden; beside others an effect is what goes away without it."""
+    """Yield the hidden effects; the trace of one of several is the change without it."""
     for k, (effect, amplitude, alone) in enumerate(found):
         trace = alone
         if len(found) > 1:
@@ -341,7 +334,7 @@ def _truths(
 
 @dataclass(frozen=True)
 class Counts:
-    """How many cases of a kind a set has: by cause, or in all."""
+    """Number of cases of each kind of a set, for each cause or in total."""
 
     single: int
     weak: int
@@ -361,14 +354,14 @@ FULL = Counts(
 
 
 def first_seed(selected: str, offset: int = 0) -> int:
-    """Return the first seed of a set; no two sets, and no two offsets, share any."""
+    """Return the first seed of a set; sets and offsets have disjoint seeds."""
     if not 0 <= offset < 100:
         raise ValueError(f"seed offset {offset} is outside [0, 99]; choose another")
     return 10_000_000 * (SETS[selected] + 1) + 100_000 * offset
 
 
 def sizes_in(low: float, high: float, number: int, rng: np.random.Generator) -> Array:
-    """Draw sizes log-uniformly, one in each of as many equal parts of the range."""
+    """Draw stratified log-uniform sizes."""
     parts = (np.arange(number) + rng.random(number)) / max(number, 1)
     return np.asarray(rng.permutation(low * (high / low) ** parts))
 
@@ -379,14 +372,15 @@ def cases(selected: str = "small", offset: int = 0) -> list[Case]:
     Parameters
     ----------
     chosen : {"small", "tune", "final"}
+        Name of the set.
     offset : int
-        Another number gives other seeds: freshly drawn cases.
+        Another offset gives freshly drawn cases.
     """
     counts = SMALL if selected == "small" else FULL
     unknown = hidden.FINAL_UNKNOWN if selected == "final" else hidden.TUNING_UNKNOWN
     start = first_seed(selected, offset)
     rng = np.random.default_rng(start)
-    made = list(_wanted(counts, unknown, rng))
+    made = list(_specified(counts, unknown, rng))
     numbered = [replace(case, seed=start + i) for i, case in enumerate(made)]
     return numbered + [
         replace(case, kind="loud", noise=LOUDER)
@@ -399,8 +393,8 @@ def cases(selected: str = "small", offset: int = 0) -> list[Case]:
     ]
 
 
-def _wanted(counts: Counts, unknown: Sequence[str], rng: np.random.Generator) -> Iterator[Case]:
-    """Return the cases of a set, without their seeds."""
+def _specified(counts: Counts, unknown: Sequence[str], rng: np.random.Generator) -> Iterator[Case]:
+    """Yield the cases of a set without their seeds."""
     for name in hidden.EFFECTS:
         for size in sizes_in(*LARGE, counts.single, rng):
             yield Case("single", 0, (name,), (float(size),))

@@ -1,7 +1,7 @@
-"""What the records of the diagnosis benchmark say, counted: shares and bounds, confusions, curves.
+"""Statistics of the diagnosis benchmark: shares with bounds, confusion matrix, detection curve.
 
-All of it is a pure function of the records. Shares have exact (Clopper-Pearson) intervals of 95 %;
-an ``upper`` is the one-sided bound of 95 %. A failed run counts as wrong wherever it counts.
+Pure functions of the records. Shares have exact (Clopper-Pearson) 95 % confidence intervals;
+``upper`` is the one-sided 95 % bound. A failed run counts as wrong.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tests.diagnosis.hidden import EFFECTS
 
 VERDICTS = ("named", "ambiguous", "adequate", "unexplained", "insufficient", "failed")
 BINS = ((0.1, 0.3), (0.3, 1.0), (1.0, 2.0), (2.0, 5.0))
-"""Sizes of the tables."""
+"""Bins of sizes of the tables."""
 CURVE = (0.1, 0.2, 0.35, 0.6, 1.0, 1.5, 2.2, 3.3, 5.0)
 """Edges of the detection curve."""
 HELD_OUT = 1.1
@@ -32,8 +32,8 @@ Numbers = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Told:
-    """A record, in the words that are counted."""
+class Answer:
+    """A record in the categories of the statistics."""
 
     kind: str
     truth: tuple[str, ...]
@@ -44,7 +44,7 @@ class Told:
     record: Mapping[str, Any]
 
     @classmethod
-    def of(cls, record: Mapping[str, Any]) -> Told:
+    def of(cls, record: Mapping[str, Any]) -> Answer:
         """Read a record."""
         case, failed = record["case"], bool(record["failure"])
         return cls(
@@ -59,58 +59,58 @@ class Told:
 
     @property
     def size(self) -> float:
-        """Size of the first effect, over the usual noise."""
+        """Size of the first effect over the usual noise."""
         return self.wanted[0]
 
     @property
     def claims(self) -> bool:
-        """Whether it says what is missing, in doubt or not."""
+        """Whether it names a cause, ambiguous or not."""
         return self.verdict in ("named", "ambiguous") and bool(self.names)
 
     @property
     def first(self) -> str:
-        """The first cause, where one is claimed; else the verdict."""
+        """The first claimed cause, or the verdict without one."""
         return self.names[0] if self.claims else self.verdict
 
     @property
     def right_first(self) -> bool:
-        """Whether the first cause is there."""
+        """Whether the first cause is a hidden one."""
         return self.first in self.truth
 
     @property
     def exact(self) -> bool:
-        """Whether what is there is named without doubt, and nothing else."""
+        """Whether exactly the hidden causes are named, without ambiguity."""
         return self.verdict == "named" and set(self.names) == set(self.truth)
 
     @property
     def both(self) -> bool:
-        """Whether the causes are those that are there, in doubt or not."""
+        """Whether exactly the hidden causes are claimed, ambiguous or not."""
         return self.claims and set(self.names) == set(self.truth)
 
     @property
     def wrong(self) -> bool:
-        """Whether something that is not there is named without doubt."""
+        """Whether an absent cause is named without ambiguity."""
         return self.verdict == "failed" or (
             self.verdict == "named" and bool(set(self.names) - set(self.truth))
         )
 
     @property
     def extra(self) -> bool:
-        """Whether something that is not there is named beside what is."""
+        """Whether an absent cause is claimed beside the hidden ones."""
         return self.claims and set(self.names) > set(self.truth)
 
     @property
     def listed(self) -> bool:
-        """Whether what is there is among what is not excluded."""
+        """Whether the hidden causes are among the models that are not excluded."""
         return set(self.truth) in [set(self.names), *self.others]
 
     @property
     def alarm(self) -> bool:
-        """Whether something is said to be missing."""
+        """Whether a model error is reported."""
         return self.verdict not in ("adequate", "insufficient")
 
     def right_answer(self, verdict: str, names: Iterable[str]) -> bool:
-        """Return whether another verdict on the same rig is the right one."""
+        """Return whether another verdict on the same rig is correct."""
         if self.kind in ("clean", "decoy", "brief"):
             return verdict == "adequate"
         if self.kind == "idle":
@@ -121,17 +121,17 @@ class Told:
 
     @property
     def held_out(self) -> float | None:
-        """Error over the noise floor on held-out kinds, of the worse output."""
+        """Held-out error over the noise floor of the worse output."""
         return max(self.record.get("held_out", {}).get("error_after", {}).values(), default=None)
 
     @property
     def traces(self) -> Mapping[str, Any]:
-        """Errors of the traces of what is rightly named."""
+        """Errors of the traces of correctly named causes."""
         return self.record.get("traces") or {}
 
     @property
     def trace_error(self) -> float | None:
-        """RMS error of the first effect's trace, over its RMS."""
+        """RMS error of the first effect's trace over its RMS."""
         found = self.traces.get(self.truth[0])
         return found and found["error"]
 
@@ -150,7 +150,7 @@ def upper_bound(count: int, n: int, level: float = LEVEL) -> float:
 
 
 def share(marks: Iterable[bool]) -> Numbers:
-    """Return how many are true, of how many, with bounds; None for all where there are none."""
+    """Return count and share of true marks with bounds; None without marks."""
     listed = [bool(mark) for mark in marks]
     count, n = sum(listed), len(listed)
     if n == 0:
@@ -174,8 +174,8 @@ def spread(values: Iterable[float | None]) -> Numbers:
     return {"n": len(known), **dict(zip(names, found, strict=True))}
 
 
-def without_truth(by_kind: Mapping[str, list[Told]]) -> Numbers:
-    """Return the counts of rigs in which nothing of the catalogue is hidden."""
+def without_truth(by_kind: Mapping[str, list[Answer]]) -> Numbers:
+    """Return the statistics of rigs without an effect of the catalogue."""
     clean, decoy = by_kind.get("clean", []), by_kind.get("decoy", [])
     unknown, idle = by_kind.get("unknown", []), by_kind.get("idle", [])
     brief = by_kind.get("brief", [])
@@ -206,8 +206,8 @@ def without_truth(by_kind: Mapping[str, list[Told]]) -> Numbers:
     }
 
 
-def of_pairs(pairs: Sequence[Told]) -> Numbers:
-    """Return the counts of rigs that hide two effects."""
+def of_pairs(pairs: Sequence[Answer]) -> Numbers:
+    """Return the statistics of rigs with two hidden effects."""
     return {
         "pair": share(one.both for one in pairs),
         "pair_exact": share(one.exact for one in pairs),
@@ -222,8 +222,8 @@ def _bin(size: float) -> str:
     return f"{low:g}-{high:g}"
 
 
-def verdicts_by_size(alone: Sequence[Told]) -> Numbers:
-    """Return how often each verdict was given, by cause and size."""
+def verdicts_by_size(alone: Sequence[Answer]) -> Numbers:
+    """Return the counts of verdicts by cause and size."""
     counts = Counter((one.truth[0], _bin(one.size), one.verdict) for one in alone)
     return {
         name: {
@@ -234,16 +234,16 @@ def verdicts_by_size(alone: Sequence[Told]) -> Numbers:
     }
 
 
-def confusion(single: Sequence[Told]) -> Numbers:
-    """Return how often each first cause, or verdict, stood for each truth; zeros are left out."""
+def confusion(single: Sequence[Answer]) -> Numbers:
+    """Return the counts of first causes, or verdicts, for each hidden cause, without zeros."""
     counts: Numbers = {truth: Counter() for truth in EFFECTS}
     for one in single:
         counts[one.truth[0]][one.first] += 1
     return {truth: dict(sorted(row.items())) for truth, row in counts.items()}
 
 
-def confused(alone: Sequence[Told]) -> Numbers:
-    """Return what stands most often for what: as the first cause, and as a rival left open."""
+def confused(alone: Sequence[Answer]) -> Numbers:
+    """Return the most frequent confusions: as first cause, open rival, or extra cause."""
     first = Counter((o.truth[0], o.first) for o in alone if o.claims and not o.right_first)
     rivals = Counter(
         (one.truth[0], "+".join(sorted(names)))
@@ -261,7 +261,7 @@ def confused(alone: Sequence[Told]) -> Numbers:
     }
 
 
-def curve(alone: Sequence[Told]) -> list[Numbers]:
+def curve(alone: Sequence[Answer]) -> list[Numbers]:
     """Return shares against size."""
     made = []
     for low, high in pairwise(CURVE):
@@ -279,8 +279,8 @@ def curve(alone: Sequence[Told]) -> list[Numbers]:
     return made
 
 
-def of_cause(name: str, single: Sequence[Told], weak: Sequence[Told]) -> Numbers:
-    """Return the shares of one cause: at size 1 and above, and how often it is wrong at any."""
+def of_cause(name: str, single: Sequence[Answer], weak: Sequence[Answer]) -> Numbers:
+    """Return the statistics of one cause at sizes above 1, and of wrong names at any size."""
     ones = [one for one in single if one.truth == (name,)]
     small = [one for one in weak if one.truth == (name,)]
     return {
@@ -298,8 +298,8 @@ def of_cause(name: str, single: Sequence[Told], weak: Sequence[Told]) -> Numbers
     }
 
 
-def least_right(single: Sequence[Told]) -> Numbers:
-    """Return the cause whose first name is least often right."""
+def least_right(single: Sequence[Answer]) -> Numbers:
+    """Return the cause with the smallest share of correct first names."""
     made = []
     for name in EFFECTS:
         found = share(one.right_first for one in single if one.truth == (name,))
@@ -308,8 +308,8 @@ def least_right(single: Sequence[Told]) -> Numbers:
     return min(made, key=lambda found: found["value"], default={"name": None, **share(())})
 
 
-def recovery(alone: Sequence[Told]) -> Numbers:
-    """Return how well the size of what was rightly named is recovered."""
+def recovery(alone: Sequence[Answer]) -> Numbers:
+    """Return how well the sizes of correctly named causes are recovered."""
     pairs = [(t["found"], t["true"]) for one in alone for t in one.traces.values()]
     if not pairs:
         return {"n": 0, "rank_correlation": None, "median_ratio": None}
@@ -322,9 +322,9 @@ def recovery(alone: Sequence[Told]) -> Numbers:
     }
 
 
-def following(told: Sequence[Told]) -> Numbers:
-    """Return what the proposed experiments resolved, and when none was promised."""
-    ambiguous = [one for one in told if one.verdict == "ambiguous"]
+def following(answers: Sequence[Answer]) -> Numbers:
+    """Return the statistics of proposed experiments."""
+    ambiguous = [one for one in answers if one.verdict == "ambiguous"]
     plans = [one.record.get("experiment") or {} for one in ambiguous]
     done = [one for one in ambiguous if one.record.get("next")]
     resolved = [
@@ -346,9 +346,9 @@ def following(told: Sequence[Told]) -> Numbers:
     }
 
 
-def closed_loops(told: Sequence[Told]) -> Numbers:
-    """Return what the extended plants were worth in closed loop on the hidden rigs."""
-    ran = [one for one in told if one.record.get("loop")]
+def closed_loops(answers: Sequence[Answer]) -> Numbers:
+    """Return the closed-loop improvement by the extended plants on the hidden rigs."""
+    ran = [one for one in answers if one.record.get("loop")]
     failed = [one for one in ran if one.record["loop"].get("failure")]
     loops = [(one.truth[0], one.record["loop"]) for one in ran if one not in failed]
     wide = [(name, loop) for name, loop in loops if loop["gap"] >= GAP]
@@ -378,8 +378,8 @@ def _worse(loop: Mapping[str, Any]) -> bool:
     return bool(loop["after_mm"] > (1.0 + WORSE) * loop["before_mm"])
 
 
-def line(one: Told) -> str:
-    """Return a case and its outcome in a line."""
+def line(one: Answer) -> str:
+    """Return a case and its outcome in one line."""
     hidden = "+".join(f"{n}@{s:.2f}" for n, s in zip(one.truth, one.wanted, strict=True))
     said = " ".join([one.verdict, "+".join(one.names)]).strip()
     rivals = "".join(f" or {'+'.join(sorted(names))}" for names in one.others)

@@ -1,4 +1,4 @@
-"""The figure of the diagnosis benchmark: what is taken for what, and what is found against size."""
+"""Figure of the diagnosis benchmark: confusion matrix and detection curve."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ def _draw_confusion(axes: Any, found: Numbers) -> None:
 
 def _draw_curve(axes: Any, bins: Sequence[Numbers]) -> None:
     styles = {
-        "detected": ("#7f7f7f", "something is missing"),
-        "right_first": ("#0072b2", "right name first"),
-        "exact": ("#009e73", "named right without doubt"),
+        "detected": ("#7f7f7f", "model error detected"),
+        "right_first": ("#0072b2", "correct name first"),
+        "exact": ("#009e73", "correct and unambiguous"),
         "wrong": ("#d55e00", "wrong name"),
     }
     for k, (key, (colour, label)) in enumerate(styles.items()):

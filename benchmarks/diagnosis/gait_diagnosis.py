@@ -1,12 +1,11 @@
-"""What the orthosis' estimate of the knee torque misses, found by the diagnosis' own comparison.
+"""Diagnosis of the orthosis' estimate of the knee torque (yeh2010, Eq. 1).
 
-Eq. (1) of yeh2010 takes the knee torque from the vertical ground force, its point of attack and
-the lean of the shank. :func:`diagnose` sets it beside the knee torque that a gait laboratory
-measures, refits what one may have measured wrongly with a tape (the shank's length), and lets
-rival terms compete on strides that no fit has seen, by the search and the rule that muscles are
-judged by.
+Eq. 1 computes the knee torque from the vertical ground force, its centre of pressure and the lean
+of the shank. :func:`diagnose` compares it with the knee torque of a gait laboratory, refits the
+length of the shank, and compares rival terms on held-out strides, with the search and the rule of
+the muscle diagnosis.
 
-``python -m benchmarks.diagnosis.gait_diagnosis`` prints what is found at several paces.
+``python -m benchmarks.diagnosis.gait_diagnosis`` prints the results at several paces.
 """
 
 from __future__ import annotations
@@ -45,20 +44,20 @@ BOUNDS: dict[str, tuple[float, float, float, float]] = {
     "knee.damping": (0.0, -20.0, 20.0, 0.5),
     "torque.bias": (0.0, -50.0, 50.0, 1.0),
 }
-"""Every parameter: neutral value, lowest, highest, and the size of a meaningful change (SI)."""
+"""Neutral value, bounds and meaningful change of every parameter [SI]."""
 NAMES = tuple(BOUNDS)
 BASE = ("shank.length",)
-"""What is refitted before anything is called missing, to a tape's 1 cm."""
+"""Base parameters; the length is known to 1 cm."""
 
 
 @dataclass(frozen=True)
 class GaitEstimate:
-    """Eq. (1) and what may be added to it, as the diagnosis asks of a plant.
+    """Eq. 1 with optional terms, as a diagnosable plant.
 
     Attributes
     ----------
     recording : GaitRecording
-        What it is computed from.
+        Inputs.
     """
 
     recording: GaitRecording
@@ -68,18 +67,18 @@ class GaitEstimate:
 
     @property
     def column(self) -> Array:
-        """Return the parameters as a column."""
+        """Neutral parameters, shape (p,)."""
         return np.array([neutral for neutral, *_ in BOUNDS.values()])
 
     def free(self, name: str, **changes: Any) -> Free:
-        """Return how a fit moves a parameter."""
+        """Return the fit settings of a parameter."""
         start, low, high, scale = BOUNDS[name]
         made = dict(low=low, high=high, scale=scale, start=start)
         made["prior"] = 1.0 if name in BASE else np.inf
         return Free(name, NAMES.index(name), **{**made, **changes})
 
     def base(self) -> tuple[Free, ...]:
-        """Return what is refitted before anything is called missing."""
+        """Return the base parameters."""
         return tuple(self.free(name) for name in BASE)
 
     def simulate(self, columns: Array) -> Array:
@@ -105,16 +104,16 @@ class GaitEstimate:
         )
 
     def regressors(self) -> Regressors:
-        """Return what a residual may vary against: where the leg is and how it moves.
+        """Return position and motion of the leg as variables of the residual.
 
-        Of the markers, whose errors are not in the estimate: the shoe's noise is in its own
-        residual, and would explain it.
+        From the markers, whose errors are not in the estimate; the shoe's noise would explain its
+        own residual.
         """
         r = self.recording
         k, v, a = r.knee / 0.5, r.knee_rate / 3.0, r.ankle / 0.3
         rows = [np.ones_like(k), k, k**2, k**3, v, v**2, v**3, a, a**2, a**3]
         rows += [k * v, k * a, v * a, k**2 * a, k * a**2, v * a**2, np.abs(v)]
-        values = {"time": r.time, "pressure": r.vertical}  # the engine asks for the motion so
+        values = {"time": r.time, "pressure": r.vertical}  # the engine's name of the motion
         return Regressors(values, np.array(rows))
 
 
@@ -202,12 +201,12 @@ CAUSES = (
         experiment="A recording with nobody on the plate.",
     ),
 )
-"""What the estimate may lack, or the recording have wrong."""
+"""Causes of errors of the estimate or of the recording."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What was found in a recording."""
+    """Result of a gait diagnosis."""
 
     recording: GaitRecording
     problem: Problem
@@ -217,26 +216,26 @@ class Outcome:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Causes of the model that was decided on, the first found first."""
+        """Causes of the selected model, in the order of selection."""
         return self.decision.model.names
 
     @property
     def values(self) -> dict[str, float]:
-        """Parameters of that model by name (SI)."""
+        """Parameters of the selected model by name [SI]."""
         return self.decision.model.fit.values()
 
     @property
     def ladder(self) -> list[dict[str, Any]]:
-        """Of each level, what the rule looked at: see :func:`verdict.evidence_of`."""
+        """Evidence of each level: see :meth:`Ladder.evidence`."""
         return list(self.decision.evidence["levels"])
 
     def error(self, candidate: Candidate) -> float:
-        """Return the RMS error [N m] on strides that no fit has seen."""
+        """Return the RMS error on held-out strides [N m]."""
         mean = self.blocks.means(candidate.errors)[0]
         return float(np.sqrt(mean) * self.problem.noise[0])
 
     def gain_of(self, name: str) -> float:
-        """Return the log mean-square gain on held-out strides of a cause alone; NaN if untried."""
+        """Return the log mean-square gain of a cause alone on held-out strides; NaN if untried."""
         first = self.ladder[1]["rivals"] if len(self.ladder) > 1 else []
         return next((r["gain"] for r in first if r["names"] == [name]), float("nan"))
 
@@ -260,7 +259,7 @@ def blocks_of(recording: GaitRecording) -> Blocks:
     """Return the strides as blocks, every third one held out."""
     n = int(recording.stride.max()) + 1
     seen = np.isfinite(recording.torque).astype(float)
-    counts = np.bincount(recording.stride, seen, minlength=n)[None]
+    counts = np.bincount(recording.stride, seen, minlength=n)[None].astype(np.float64)
     return Blocks(recording.stride, np.arange(n) % EVERY == EVERY - 1, counts)
 
 
@@ -270,17 +269,18 @@ def diagnose(
     rule: Rule | None = None,
     seed: int = 0,
 ) -> Outcome:
-    """Compare Eq. (1) with the laboratory's knee torque and look for what it misses.
+    """Compare Eq. 1 with the laboratory's knee torque and search for missing terms.
 
     Parameters
     ----------
     recording : GaitRecording
+        Recorded strides.
     causes : sequence of Cause
         Rival terms.
     rule : Rule, optional
-        Numbers of the decision.
+        Thresholds of the decision.
     seed : int
-        Of the decision's draws.
+        Seed of the bootstrap.
     """
     family, measured = GaitEstimate(recording), recording.torque[None]
     blocks = blocks_of(recording)
@@ -294,7 +294,7 @@ def diagnose(
 
 
 def line(title: str, found: Outcome) -> str:
-    """Return what was found in a line."""
+    """Return a result in one line."""
     shares = {n: v for n, v in found.values.items() if n not in BASE}
     terms = ", ".join(f"{name} {value:.2f}" for name, value in shares.items()) or "nothing"
     before, after = (found.error(c) for c in (found.base, found.decision.model))
@@ -302,7 +302,7 @@ def line(title: str, found: Outcome) -> str:
 
 
 def main(strides: int = 24, seed: int = 1) -> None:
-    """Print what is found at several paces, and in a walk at two of them."""
+    """Print the results at several paces, and of walks at two paces."""
     walks = {f"{p:g} s a stride": record(p, strides, seed) for p in PACES}
     slow = record(PAPER_STRIDE, strides // 2, seed + 50)
     for title, walk in list(walks.items())[::2]:
@@ -311,12 +311,12 @@ def main(strides: int = 24, seed: int = 1) -> None:
         found = diagnose(walk)
         print(line(title, found))
         for k, level in enumerate(found.ladder[1:], 1):
-            told = [f"{'+'.join(r['names'])} {r['gain']:.2f}" for r in level["rivals"][:4]]
-            print(f"  {k}: {'; '.join(told)}")
+            gains = [f"{'+'.join(r['names'])} {r['gain']:.2f}" for r in level["rivals"][:4]]
+            print(f"  {k}: {'; '.join(gains)}")
 
 
 PACES = (NATURAL_STRIDE, 2.0, 3.0, PAPER_STRIDE)
-"""Duration of a stride [s]; a slow walk is added to every second one."""
+"""Durations of a stride [s]; a slow walk is added to every second one."""
 
 
 if __name__ == "__main__":

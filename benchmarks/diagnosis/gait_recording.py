@@ -72,7 +72,7 @@ class GaitRecording:
     @property
     def time(self) -> Array:
         """Time [s], strides put together."""
-        return np.arange(len(self.torque)) * PERIOD
+        return np.asarray(np.arange(len(self.torque)) * PERIOD, np.float64)
 
     def and_then(self, other: GaitRecording) -> GaitRecording:
         """Return this recording and another one of the same leg after it."""

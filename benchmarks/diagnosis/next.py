@@ -1,4 +1,4 @@
-"""What is done on a hidden rig after the diagnosis: the proposed experiment, and controllers."""
+"""Experiments and controllers on a hidden rig after its diagnosis."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 FULL = 6.0
 """Largest pressure [bar] of the rigs."""
 FRESH = ("cycles_after_rest",)
-"""Plans that begin with a muscle that has rested: the rig starts anew."""
+"""Plans with a rested muscle, for which the rig is reset."""
 
 
 def again(case: Case, made: Made, plan_name: str) -> tuple[Recording, Rig]:
@@ -74,8 +74,8 @@ def _campaign(plan: Plan, before: hidden.Campaign) -> hidden.Campaign:
 
 def _joined(first: hidden.Campaign, second: hidden.Campaign) -> hidden.Campaign:
     names = ("command_bar", "segment", "load_N", "temperature_C", "valve_closed")
-    both = [np.concatenate([getattr(first, n), getattr(second, n)]) for n in names]
-    return hidden.Campaign(*both, first.period)
+    both: Any = {n: np.concatenate([getattr(first, n), getattr(second, n)]) for n in names}
+    return replace(first, **both)
 
 
 def _sooner(effect: hidden.Effect, share: float) -> hidden.Effect:

@@ -1,23 +1,24 @@
-"""The page, the numbers and the figure of the diagnosis benchmark, from its records."""
+"""Page, statistics and figure of the diagnosis benchmark, from its records."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.diagnosis import counts as counting
-from benchmarks.diagnosis.counts import BINS, GAP, HELD_OUT, VERDICTS, Numbers, Told, share
+from benchmarks.diagnosis.counts import BINS, GAP, HELD_OUT, VERDICTS, Answer, Numbers, share
 from benchmarks.diagnosis.figure import picture
+from benchmarks.diagnosis.markdown import bullets, table
 from benchmarks.runs.store import write_bytes, write_record, write_text
 from tests.diagnosis.hidden import EFFECTS
 
 LETTERS = dict(zip(VERDICTS, "NAOUIF", strict=True))
 MOST_CONFUSED = 15
 CASES, CLEAN = 40, 300
-"""Cases wanted of every cause at size 1 and above, and of rigs without one."""
+"""Least numbers of cases of every cause at sizes above 1, and of rigs without a cause."""
 SECONDS, POST_HOC_MM = 10.0, 0.23
 
 PREFACE = """\
@@ -28,17 +29,17 @@ rule {rules}.
 
 Each case is a simulated rig that shares no code with the plants and hides effects in another
 mathematical form than the diagnosis fits. The diagnosis sees its recording (five minutes at 50 Hz)
-and what an honest owner tells of it.
+and a correct rig file.
 
-- The **size** of an effect is the RMS of what remains of it after the base has been refitted to the
-  rig without noise, over the noise, on the output where it is largest. Sizes are drawn
-  log-uniformly, alike for every cause: from 1 to 5 (*single*) and from 0.1 to 1 (*weak*).
-- A cause counts as **named** where the verdict is `named`, or `ambiguous` with it in the first
-  place. **Without doubt** is `named`, with all that is there and nothing else. A **wrong name** is
-  the verdict `named` with a cause that is not there, alone or beside the right one.
-- A trace found and the true one are compared after the same projection: without what refitting the
-  base takes up. In closed loop errors are those of the true position; the causes that a controller
-  can compensate are fixed beforehand.
+- The **size** of an effect is the RMS of its part that a refit of the base to the rig without noise
+  does not absorb, over the noise, on the output where it is largest. Sizes are drawn log-uniformly,
+  equally for every cause: from 1 to 5 (*single*) and from 0.1 to 1 (*weak*).
+- A cause counts as **named** if the verdict is `named`, or `ambiguous` with this cause first.
+  **Unambiguous** is `named` with exactly the hidden causes. A **wrong name** is the verdict `named`
+  with an absent cause, alone or beside the correct one.
+- The trace of a found effect and the true one are compared after the same projection: without the
+  part that a refit of the base absorbs. Closed-loop errors are those of the true position; the
+  causes that a controller can compensate are fixed beforehand.
 - A failed run counts as wrong. Intervals are exact (Clopper-Pearson) at 95 %, bounds one-sided.
 """
 
@@ -48,7 +49,7 @@ def figures(
     tables: Mapping[str, Any] | None = None,
     whole_report_s: Sequence[float] = (),
 ) -> Numbers:
-    """Return all numbers of the page.
+    """Return all statistics of the page.
 
     Parameters
     ----------
@@ -58,11 +59,11 @@ def figures(
         Report of :func:`pam_envs.diagnosis.static.diagnosis.diagnose_readings` on the measured
         tables.
     whole_report_s : sequence of float
-        Time [s] that whole reports of 10 minutes at 50 Hz took on 2 cores.
+        Durations of whole reports on 10 minutes at 50 Hz, on 2 cores [s].
     """
-    told = [Told.of(record) for record in records]
-    by_kind: dict[str, list[Told]] = {}
-    for one in told:
+    answers = [Answer.of(record) for record in records]
+    by_kind: dict[str, list[Answer]] = {}
+    for one in answers:
         by_kind.setdefault(one.kind, []).append(one)
     single, weak = by_kind.get("single", []), by_kind.get("weak", [])
     alone = single + weak
@@ -92,25 +93,27 @@ def figures(
             found["error"] for one in by_kind.get("pair", []) for found in one.traces.values()
         ),
         "held_out": share(
-            (one.held_out or np.inf) <= HELD_OUT for one in told if one.verdict == "named"
+            (one.held_out or np.inf) <= HELD_OUT for one in answers if one.verdict == "named"
         ),
-        "held_out_spread": counting.spread(one.held_out for one in told if one.verdict == "named"),
+        "held_out_spread": counting.spread(
+            one.held_out for one in answers if one.verdict == "named"
+        ),
         "recovery": counting.recovery(alone),
-        "next": counting.following(told),
-        "loop": counting.closed_loops(told),
+        "next": counting.following(answers),
+        "loop": counting.closed_loops(answers),
         "tables": _of_tables(tables),
         "whole_report_s": counting.spread(whole_report_s),
         "runtime_s": counting.spread(r.get("volatile", {}).get("runtime_s") for r in records),
         "failures": [
             f"{counting.line(one)}: {one.record['failure']}"
-            for one in told
+            for one in answers
             if one.verdict == "failed"
         ],
     }
 
 
 def _of_tables(report: Mapping[str, Any] | None) -> Numbers:
-    """Return by how much the error on a load left out is cut; None for all without a report."""
+    """Return the decrease of the error on a held-out load; None without a report."""
     names = ("value", "interval", "before_mm", "linear_mm", "post_hoc_mm", "floor_mm")
     if report is None:
         return {"n": 0, **dict.fromkeys(names)}
@@ -127,7 +130,7 @@ def _percent(found: Mapping[str, Any], key: str = "value") -> str:
     return "-" if found[key] is None else f"{100.0 * found[key]:.1f} %"
 
 
-def _told(found: Mapping[str, Any]) -> str:
+def _share_text(found: Mapping[str, Any]) -> str:
     """Return a share with its interval."""
     if not found["n"]:
         return "not run"
@@ -142,25 +145,20 @@ def _bound(found: Mapping[str, Any]) -> str:
 
 def _reached(found: Mapping[str, Any], key: str) -> str:
     """Return a share with its interval or bound, or a quantile."""
-    told = {"value": _told, "upper": _bound}.get(key)
-    return told(found) if told else _percent(found, key)
+    form = {"value": _share_text, "upper": _bound}.get(key)
+    return form(found) if form else _percent(found, key)
 
 
 def _number(value: float | None, form: str = ".2f") -> str:
     return "-" if value is None else format(value, form)
 
 
-def _table(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    lines = [head, [":--", *["--:"] * (len(head) - 1)], *rows]
-    return "".join(f"| {' | '.join(map(str, row))} |\n" for row in lines) + "\n"
-
-
 def targets(made: Numbers) -> list[tuple[str, str, str, int, bool | None]]:
-    """Return figure, target, what was reached, of how many, and whether it is met."""
+    """Return figure, target, reached value, number of cases, and whether the target is met."""
     rows: list[tuple[str, str, str, int, bool | None]] = []
 
-    def row(label: str, target: str, told: str, n: int, met: Any) -> None:
-        rows.append((label, target, told if n else "not run", n, bool(met) if n else None))
+    def row(label: str, target: str, value: str, n: int, met: Any) -> None:
+        rows.append((label, target, value if n else "not run", n, bool(met) if n else None))
 
     def at_least(
         label: str, found: Numbers, least: float, more: str = "", key: str = "value"
@@ -176,31 +174,31 @@ def targets(made: Numbers) -> list[tuple[str, str, str, int, bool | None]]:
 
     single, least, ahead = made["right_first"], made["least_right_first"], made["next"]
     few, name = min((c["right_first"]["n"], name) for name, c in made["by_cause"].items())
-    told = f"{few} (`{name}`)"
-    label = "cases of the rarest cause, size 1 and above"
-    row(label, f"at least {CASES}", told, single["n"], few >= CASES)
-    at_least("right name first, size 1 and above", single, 0.98)
+    value = f"{few} (`{name}`)"
+    label = "cases of the rarest cause, sizes above 1"
+    row(label, f"at least {CASES}", value, single["n"], few >= CASES)
+    at_least("correct name first, sizes above 1", single, 0.98)
     at_least("the same, for the worst cause", least, 0.85, f" (`{least['name']}`)")
-    at_least("named right without doubt", made["exact"], 0.95)
+    at_least("correct and unambiguous", made["exact"], 0.95)
     at_most("wrong name, any size", made["wrong"], 0.01)
     at_most("false alarm, clean rigs and decoys", made["false_alarms"], 0.01, of=CLEAN)
     at_least("outside the catalogue: `unexplained`", made["unknown"], 0.95)
     at_least("two effects: both", made["pair"], 0.85)
-    at_most("a wrong extra cause on single ones", made["extra"], 0.05, "value")
+    at_most("wrong extra cause on single effects", made["extra"], 0.05, "value")
     at_most("error of the effect's trace, median", made["trace"], 0.15, "median")
-    at_least(f"held-out error at most {HELD_OUT:g} times the floor", made["held_out"], 0.90)
-    at_least("next experiment resolves, where it promises to", ahead["resolved"], 0.80)
-    at_least("where none promises to, it says so", ahead["told_none"], 1.0)
-    at_least("three times the noise: right name first", made["loud"], 0.97)
+    at_least(f"held-out error at most {HELD_OUT:g} times the noise floor", made["held_out"], 0.90)
+    at_least("proposed experiment resolves the ambiguity", ahead["resolved"], 0.80)
+    at_least("no sufficient experiment: reported as such", ahead["told_none"], 1.0)
+    at_least("three times the noise: correct name first", made["loud"], 0.97)
     took, table, loop = made["whole_report_s"], made["tables"], made["loop"]
     n, most, label = took["n"], took["most"], "10 minutes at 50 Hz on 2 cores: whole report"
     row(label, f"at most {SECONDS:g} s", f"{_number(most, '.1f')} s", n, n and most <= SECONDS)
-    told = f", {_number(table['before_mm'])} to {_number(table['linear_mm'])} mm"
-    at_least("measured tables, a load left out, linear law: error cut", table, 0.30, told)
+    value = f", {_number(table['before_mm'])} to {_number(table['linear_mm'])} mm"
+    at_least("measured tables, held-out load, linear law: error decrease", table, 0.30, value)
     n, late = table["n"], table["post_hoc_mm"]
-    told = f"{_number(late)} mm; floor {_number(table['floor_mm'], '.3f')} mm"
+    value = f"{_number(late)} mm; noise floor {_number(table['floor_mm'], '.3f')} mm"
     met, label = n and round(late, 2) <= POST_HOC_MM, "the same, exponent post hoc, not held out"
-    row(label, f"about {POST_HOC_MM} mm", told, n, met)
+    row(label, f"about {POST_HOC_MM} mm", value, n, met)
     gap = f"closed loop, gap of at least {100 * GAP:g} %"
     at_least(f"{gap}: part recovered, median", loop["recovered"], 0.70, key="median")
     at_most(f"{gap}: over 5 % worse", loop["worse"], 0.05, "value")
@@ -227,28 +225,24 @@ def page(made: Numbers, arguments: str) -> str:
             rules=", ".join(made["rule_versions"]) or "-",
         ),
         "\n## Figures and targets\n\n",
-        _table(head, rows),
+        table(head, rows, True) + "\n",
         "The measured tables in full: `docs/diagnosis_tables.md`.\n\n",
         "Cases: " + ", ".join(f"{n} {kind}" for kind, n in made["cases"].items()) + ".\n\n",
         "![confusion matrix and detection curve](diagnosis.png)\n\n",
-        *["## By cause, size 1 and above\n\n", _causes_table(made)],
-        *["## What is taken for what\n\n", _confused_lists(made)],
+        *["## By cause, sizes above 1\n\n", _causes_table(made)],
+        *["## Confusions\n\n", _confused_lists(made)],
         *["## Verdicts by cause and size\n\n", _verdict_table(made)],
         *["## Detection against size\n\n", _curve_table(made)],
         *["## Rigs without a cause, unknown effects, pairs\n\n", _others(made)],
-        *["## After the diagnosis\n\n", _after(made)],
+        *["## Errors, experiments, closed loop\n\n", _after(made)],
     ]
     if made["failures"]:
-        parts += ["## Failed runs\n\n", _bullets(made["failures"])]
+        parts += ["## Failed runs\n\n", bullets(made["failures"]), "\n"]
     return "".join(parts).rstrip() + "\n"
 
 
-def _bullets(lines: Iterable[str]) -> str:
-    return "".join(f"- {text}\n" for text in lines) + "\n"
-
-
 def _causes_table(made: Numbers) -> str:
-    head = ["cause", "n", "right first", "without doubt", "in doubt, listed", "wrong, any size"]
+    head = ["cause", "n", "correct first", "unambiguous", "ambiguous, listed", "wrong, any size"]
     head += ["raw / size", "trace error", "held out", "found / true", "rank correlation"]
     rows = []
     for name, found in made["by_cause"].items():
@@ -256,30 +250,30 @@ def _causes_table(made: Numbers) -> str:
             continue
         doubt, wrong, back = found["ambiguous_with_truth"], found["wrong"], found["recovery"]
         right, raw, trace = found["right_first"], found["raw"], found["trace"]
-        cells = [f"`{name}`", right["n"], _told(right), _percent(found["exact"])]
+        cells = [f"`{name}`", right["n"], _share_text(right), _percent(found["exact"])]
         cells += [f"{some['count']} of {some['n']}" for some in (doubt, wrong)]
         cells += [_number(raw["median"]), _percent(trace, "median"), _percent(found["held_out"])]
         rows.append([*cells, _number(back["median_ratio"]), _number(back["rank_correlation"])])
     note = (
-        "*Raw / size*: the effect before the base is refitted over what remains, in the median. "
-        f"*Held out*: part of the named cases with at most {HELD_OUT:g} times the noise floor. "
-        "*Found / true*: RMS of the effect found over that hidden, in the median, and the rank "
-        "correlation of the two over all sizes.\n\n"
+        "*Raw / size*: the effect before the refit of the base over its size, median. "
+        f"*Held out*: share of the named cases with at most {HELD_OUT:g} times the noise floor. "
+        "*Found / true*: RMS of the found over the hidden effect, median, and their rank "
+        "correlation over all sizes.\n\n"
     )
-    return _table(head, rows) + note
+    return table(head, rows, True) + "\n" + note
 
 
 def _confused_lists(made: Numbers) -> str:
     titles = {
-        "first": "A wrong cause in the first place (any size, any noise)",
-        "extra": "A wrong cause beside the right one",
-        "open": "Not excluded beside the truth, or in its place",
+        "first": "A wrong first cause (any size, any noise)",
+        "extra": "A wrong cause beside the correct one",
+        "open": "Rivals that are not excluded",
     }
     text = ""
     for what, title in titles.items():
         listed = made["confused"][what][:MOST_CONFUSED]
         lines = [f"`{truth}` as `{said}`: {n}" for truth, said, n in listed] or ["none"]
-        text += f"{title}:\n\n{_bullets(lines)}"
+        text += f"{title}:\n\n{bullets(lines)}\n"
     return text
 
 
@@ -290,17 +284,17 @@ def _verdict_table(made: Numbers) -> str:
         [f"`{name}`", *[" ".join(f"{LETTERS[v]}{n}" for v, n in c.items()) for c in bins.values()]]
         for name, bins in made["verdicts"].items()
     ]
-    return f"{legend}.\n\n" + _table(head, rows)
+    return f"{legend}.\n\n" + table(head, rows, True) + "\n"
 
 
 def _curve_table(made: Numbers) -> str:
     keys = ("detected", "right_first", "exact", "wrong")
-    head = ["size", "n", "something is missing", "right first", "without doubt", "wrong name"]
+    head = ["size", "n", "model error detected", "correct first", "unambiguous", "wrong name"]
     rows = [
-        [f"{c['low']:g} to {c['high']:g}", c["exact"]["n"], *[_told(c[k]) for k in keys]]
+        [f"{c['low']:g} to {c['high']:g}", c["exact"]["n"], *[_share_text(c[k]) for k in keys]]
         for c in made["curve"]
     ]
-    return _table(head, rows)
+    return table(head, rows, True) + "\n"
 
 
 def _others(made: Numbers) -> str:
@@ -310,27 +304,29 @@ def _others(made: Numbers) -> str:
         f"false alarm, decoys (a wrong value of a base parameter): "
         f"{_bound(made['false_alarms_decoy'])}",
         f"a cause claimed on either: {_bound(made['false_names'])}",
-        f"what the alarms said: {alarms}",
-        f"recordings in which nothing moves: `insufficient` {_told(made['idle'])}",
+        f"answers of the false alarms: {alarms}",
+        f"recordings without motion: `insufficient` {_share_text(made['idle'])}",
         f"false alarm, clean rigs recorded for 30, 60 or 120 s: "
         f"{_bound(made['false_alarms_brief'])}; answers: "
         + (", ".join(f"`{name}` {n}" for name, n in made["brief"].items()) or "none"),
-        f"pairs: both named without doubt {_told(made['pair_exact'])}, only one of them "
-        f"{_told(made['pair_one'])}, a wrong name {_told(made['pair_wrong'])}, right name first "
-        f"{_told(made['pair_first'])}; trace error {_percent(made['trace_pairs'], 'median')}",
-        f"a wrong extra cause on weak ones: {_told(made['extra_weak'])}",
-        f"a wrong name in the first place, any size: {_bound(made['wrong_first'])}",
-        f"ambiguous, with the truth among what is not excluded: "
-        f"{_told(made['ambiguous_with_truth'])}",
-        f"three times the noise: without doubt {_told(made['loud_exact'])}, a wrong name "
-        f"{_told(made['loud_wrong'])}",
+        f"pairs: both named unambiguously {_share_text(made['pair_exact'])}, only one of them "
+        f"{_share_text(made['pair_one'])}, a wrong name {_share_text(made['pair_wrong'])}, "
+        f"correct name first {_share_text(made['pair_first'])}; trace error "
+        f"{_percent(made['trace_pairs'], 'median')}",
+        f"wrong extra cause on weak effects: {_share_text(made['extra_weak'])}",
+        f"wrong first name, any size: {_bound(made['wrong_first'])}",
+        "ambiguous, with the hidden cause not excluded: "
+        f"{_share_text(made['ambiguous_with_truth'])}",
+        f"three times the noise: unambiguous {_share_text(made['loud_exact'])}, a wrong name "
+        f"{_share_text(made['loud_wrong'])}",
     ]
     rows = []
     for name, found in made["unknown_by_kind"].items():
         others = ", ".join(f"{k} {n}" for k, n in found["others"].items())
-        rows.append([f"`{name}`", found["n"], _told(found), others])
-    unknown = _table(["outside the catalogue", "n", "`unexplained`", "else"], rows) if rows else ""
-    return _bullets(lines) + unknown
+        rows.append([f"`{name}`", found["n"], _share_text(found), others])
+    head = ["outside the catalogue", "n", "`unexplained`", "else"]
+    unknown = table(head, rows, True) + "\n" if rows else ""
+    return bullets(lines) + "\n" + unknown
 
 
 def _after(made: Numbers) -> str:
@@ -340,19 +336,19 @@ def _after(made: Numbers) -> str:
     lines = [
         f"held-out error over the noise floor, the worse output, of {held['n']} named cases: "
         f"median {_number(held['median'])}, 90 % quantile {_number(held['q90'])}",
-        f"RMS of the effect found over that hidden: median {_number(back['median_ratio'])}, rank "
+        f"RMS of the found over the hidden effect: median {_number(back['median_ratio'])}, rank "
         f"correlation {_number(back['rank_correlation'])} (n = {back['n']})",
-        f"{ahead['ambiguous']} ambiguous cases, {ahead['promised']} with an experiment that "
-        f"promises at least one noise variance; resolved {_told(ahead['resolved'])}",
+        f"{ahead['ambiguous']} ambiguous cases, {ahead['promised']} with a proposed experiment of "
+        f"at least one noise variance; resolved {_share_text(ahead['resolved'])}",
         f"closed loop on the hidden rig: {loop['n']} cases, {loop['gap']} with a gap of at least "
-        f"{100 * GAP:g} % between the old plant and the rig itself; over all, better by "
+        f"{100 * GAP:g} % between the plant before and the rig itself; error of all lower by "
         f"{_number(better['median'], '.1f')} % in the median ({_number(better['q10'], '.1f')} to "
-        f"{_number(better['q90'], '.1f')}); over 5 % worse {_told(loop['worse_of_all'])}",
+        f"{_number(better['q90'], '.1f')}); over 5 % worse {_share_text(loop['worse_of_all'])}",
         f"seconds a diagnosis: median {_number(took['median'], '.1f')}, 90 % quantile "
         f"{_number(took['q90'], '.1f')}, 99 % {_number(took['q99'], '.1f')}, most "
         f"{_number(took['most'], '.1f')}",
     ]
-    text = _bullets(lines)
+    text = bullets(lines) + "\n"
     if loop["n"]:
         rows = [
             [
@@ -362,10 +358,11 @@ def _after(made: Numbers) -> str:
             ]
             for name, found in loop["by_cause"].items()
         ]
-        text += _table(["closed loop", "n", "with a gap", "recovered", "better [%]"], rows)
+        head = ["closed loop", "n", "with a gap", "recovered", "better [%]"]
+        text += table(head, rows, True) + "\n"
     if ahead["unresolved"]:
-        text += "Experiments that did not resolve what they promised:\n\n"
-        text += _bullets(ahead["unresolved"])
+        text += "Experiments that did not resolve the ambiguity:\n\n"
+        text += bullets(ahead["unresolved"]) + "\n"
     return text
 
 
@@ -386,7 +383,7 @@ def write(
     made = figures(records, **beside)
     paths = [folder / f"diagnosis.{kind}" for kind in ("md", "json", "png")]
     write_text(paths[0], page(made, arguments))
-    lines = [counting.line(Told.of(record)) for record in records]
+    lines = [counting.line(Answer.of(record)) for record in records]
     write_record(paths[1], {"schema": 1, "arguments": arguments, "figures": made, "cases": lines})
     write_bytes(paths[2], picture(made))
     return paths

@@ -1,7 +1,7 @@
-"""Run the diagnosis on drawn cases; the records on disk are the checkpoint.
+"""Run of the diagnosis on drawn cases, with records on disk as checkpoints.
 
-A record belongs to a case, a stage and the sources that decide it: where the engine changes, it
-is made again. A case that fails has a record too, and counts as wrong.
+A record belongs to a case, a stage and the numbers of rule, causes and default plant: with another
+version of the rule it is made again. A failed case has a record too and counts as wrong.
 """
 
 from __future__ import annotations
@@ -9,66 +9,43 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
-from functools import lru_cache, partial
+from dataclasses import asdict, astuple, dataclass, field
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.diagnosis.cases import Case, cases
-from benchmarks.diagnosis.study import STAGES, loops, promised, study
-from benchmarks.identity.hashing import digest, sources_digest
+from benchmarks.diagnosis.study import loops, promised, study
+from benchmarks.identity.hashing import digest
 from benchmarks.runs import provenance
 from benchmarks.runs.store import Store, read_record
+from pam_envs.data.rig_file import Rig
+from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.decide.rule import Rule, judge
+from pam_envs.diagnosis.fit.single_muscle import start_plant
 from sweeps import engine
 
 HERE = Path(__file__).parents[1]
 FOLDER = HERE / ".cells" / "diagnosis"
 SHUFFLE = 20_260_101
 
-LOOP_FILES = ("gain.py", "gain_references.py", "plant_inverse.py")
-NOT_DECIDING = ("page", "readings", "report", "audit_tables", "outcome", "steps", "summary_text")
-"""Beginnings of the names of files that only tell what was decided, or read tables."""
-LIBRARY = (
-    *("compiler.py", "kernels.py", "parameters.py", "wording.py", "data/mas10_maxwell_slip.yaml"),
-    *("data/rig_file.py", "data/recording_segments.py"),
-    *(f"data/{name}.py" for name in ("recording", "recording_clock", "recording_columns")),
-    *(f"hysteresis/{name}.py" for name in ("elements", "everett", "maxwell_slip", "preisach")),
-    *("hysteresis/checks.py", "hysteresis/extrema.py", "mechanics/hanging_mass.py"),
-    *("muscle/effective_area.py", "pneumatics/regulator.py", "sensing/sensor.py"),
-    *(f"plants/{name}.py" for name in ("hysteresis", "plant", "replay", "stepping", "tiles")),
-    "plants/single_muscle.py",
-    *(f"plants/single_muscle_{name}.py" for name in ("effects", "kernels", "rows")),
-)
-"""What of the library besides the diagnosis decides: the one plant it knows, and its data."""
-OURS = ("diagnosis_cases.py", "diagnosis_study.py")
-
 Study = Callable[[Case, Collection[str]], dict[str, Any]]
 Advance = Callable[[], None]
 
 
-@lru_cache(maxsize=len(STAGES))
-def sources(stage: str) -> str:
-    """Return the digest of the code and data that a stage depends on."""
-    library = provenance.ROOT / "pam_envs"
-    engine = [p for p in sorted((library / "diagnosis").glob("*.py")) if _decides(p, stage)]
-    own = OURS if stage == "verdict" else (*OURS, "diagnosis_next.py")
-    paths = [
-        *engine,
-        library / "diagnosis" / "causes",
-        *(library / name for name in LIBRARY),
-        provenance.ROOT / "tests" / "diagnosis" / "hidden",
-        *(HERE / name for name in own),
+@cache
+def engine_digest() -> str:
+    """Return the digest of what decides a diagnosis: rule, causes, default plant.
+
+    The numbers of the rule and of the causes, with recorded decisions, belong to a version of the
+    rule (``tests/diagnosis/decide/test_rule_version.py``), so that sources need not be compared.
+    """
+    causes = [
+        (c.name, [[astuple(term) for term in form.terms] for form in c.forms]) for c in catalogue()
     ]
-    return sources_digest(paths)
-
-
-def _decides(path: Path, stage: str) -> bool:
-    if path.name in LOOP_FILES:
-        return stage == "loop"
-    return not path.name.startswith(NOT_DECIDING)
+    return digest([asdict(Rule()), causes, start_plant(Rig()).digest()])
 
 
 @dataclass(frozen=True)
@@ -81,7 +58,7 @@ class Task:
     @property
     def key(self) -> str:
         """Digest of all that the record depends on: the name under which it is kept."""
-        parts = [self.case.record(), self.stage, sources(self.stage), provenance.packages()]
+        parts = [self.case.record(), self.stage, engine_digest(), provenance.packages()]
         return digest(parts)[:32]
 
 

@@ -1,4 +1,4 @@
-"""One case of the diagnosis benchmark: what was found, beside what was hidden."""
+"""Study of one benchmark case: diagnosis, hidden truth, closed loop, next experiment."""
 
 from __future__ import annotations
 
@@ -15,40 +15,42 @@ from benchmarks.identity.hashing import plain
 from benchmarks.runs import provenance
 from pam_envs.constants import CELSIUS, GRAVITY
 from pam_envs.diagnosis.closed_loop.gain import COMPENSABLE, closed_loop
-from pam_envs.diagnosis.diagnosis import Diagnosis, diagnose
+from pam_envs.diagnosis.diagnosis import diagnose
+from pam_envs.diagnosis.report.outcome import Diagnosis
 
 Array = NDArray[np.float64]
 
 STAGES = ("verdict", "loop", "next")
-"""The diagnosis; controllers on the hidden rig; the proposed experiment, carried out."""
+"""Diagnosis; controllers on the hidden rig; execution of the proposed experiment."""
 OUTPUTS = ("contraction", "pressure")
 MOST_RIVALS = 6
 
 
 def study(case: Case, stages: Collection[str] = ("verdict",)) -> dict[str, Any]:
-    """Make a case, diagnose it, and return what came out beside the truth.
+    """Generate a case, diagnose it, and return the result with the truth.
 
     Parameters
     ----------
     case : Case
+        Specification.
     stages : collection of str
-        Of :data:`STAGES`; ``verdict`` is always made.
+        Some of :data:`STAGES`; ``verdict`` is always included.
 
     Returns
     -------
     dict
-        In plain types. Where anything raised, ``failure`` holds its text.
+        Record in plain types, with the text of an error as ``failure``.
     """
     unknown = sorted(set(stages) - set(STAGES))
     if unknown:
         raise ValueError(f"no stage is called {unknown[0]!r}; there are {', '.join(STAGES)}")
-    begun = clock.perf_counter()
+    started = clock.perf_counter()
     record: dict[str, Any] = {"schema": 1, "case": case.record(), "failure": None}
     spent = record["volatile"] = provenance.occasion() | {"make_s": 0.0, "runtime_s": None}
     try:
         made = make(case)
         record["truths"] = truths_of(case, made)
-        spent["make_s"] = clock.perf_counter() - begun
+        spent["make_s"] = clock.perf_counter() - started
         found = _timed(spent, lambda: diagnosed(made.recording, made.sheet))
         record |= outcome(found) | {"traces": trace_errors(made, found)}
         if "loop" in stages and loops(case):
@@ -61,30 +63,30 @@ def study(case: Case, stages: Collection[str] = ("verdict",)) -> dict[str, Any]:
 
 
 def _timed(spent: dict[str, Any], act: Callable[[], Diagnosis]) -> Diagnosis:
-    begun = clock.perf_counter()
+    started = clock.perf_counter()
     found = act()
-    spent["runtime_s"] = clock.perf_counter() - begun
+    spent["runtime_s"] = clock.perf_counter() - started
     return found
 
 
 def diagnosed(recording: Any, sheet: Any) -> Diagnosis:
-    """Return the diagnosis of what an owner hands in."""
+    """Return the diagnosis of a recording with its rig file."""
     return diagnose(recording, rig=sheet, closed_loop=False, progress=False)
 
 
 def loops(case: Case) -> bool:
-    """Return whether controllers are compared on a case: one hidden effect that they can meet."""
+    """Return whether controllers are compared on a case: one compensable hidden effect."""
     return case.kind == "single" and case.names[0] in COMPENSABLE
 
 
 def promised(record: dict[str, Any]) -> bool:
-    """Return whether a record proposes an experiment that shall tell its rivals apart."""
+    """Return whether a record proposes an experiment that separates its rivals."""
     plan = record.get("experiment")
     return record.get("verdict") == "ambiguous" and plan is not None and bool(plan["enough"])
 
 
 def truths_of(case: Case, made: Made) -> list[dict[str, Any]]:
-    """Return what was hidden."""
+    """Return the hidden effects."""
     return [
         {
             "name": truth.name,
@@ -98,7 +100,7 @@ def truths_of(case: Case, made: Made) -> list[dict[str, Any]]:
 
 
 def outcome(found: Diagnosis) -> dict[str, Any]:
-    """Return what a diagnosis says, in short."""
+    """Return the summary of a diagnosis."""
     report, decision = found.report, found.study.decision
     plan = report["experiment"]
     return {
@@ -125,10 +127,10 @@ def outcome(found: Diagnosis) -> dict[str, Any]:
 
 
 def trace_errors(made: Made, found: Diagnosis) -> dict[str, dict[str, Any]]:
-    """Return, for every cause rightly named, how far its trace is from the true one.
+    """Return the trace error of every correctly named cause.
 
-    RMS of the difference over that of the truth, both without what refitting the base takes up,
-    on the output where the truth is largest. Beside it the RMS of both, over the usual noise.
+    RMS of the difference over that of the truth, both without the part that a refit of the base
+    absorbs, on the output where the truth is largest; also the RMS of both over the usual noise.
     """
     errors = {}
     for truth in made.truths:
@@ -158,7 +160,7 @@ def _rms(values: Array) -> float:
 
 
 def next_of(case: Case, made: Made, plan: str) -> dict[str, Any]:
-    """Carry out an experiment and return what the diagnosis says then."""
+    """Run an experiment and return the summary of the diagnosis with it."""
     found = diagnosed(*again(case, made, plan))
     said = outcome(found)
     return {"plan": plan, **{key: said[key] for key in ("verdict", "names", "open", "rivals")}}
@@ -168,10 +170,9 @@ def next_of(case: Case, made: Made, plan: str) -> dict[str, Any]:
 
 
 def loop_of(made: Made, found: Diagnosis) -> dict[str, Any] | None:
-    """Return what the extended plant is worth on the hidden rig; errors are true ones, in mm.
+    """Return the closed-loop comparison on the hidden rig, with true position errors [mm].
 
-    Under the median load and at the last temperature of the recording. Where a wrong cause was
-    named, or none, this is what the owner would get.
+    Under the median load and at the last temperature of the recording, also after a wrong verdict.
     """
     load = float(np.median(made.recording.load))
     celsius = float(made.ground.campaign.temperature_C[-1])

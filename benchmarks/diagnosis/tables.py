@@ -1,7 +1,6 @@
-"""What a load-blind muscle gets wrong on the 375 measured readings, as a ladder of models.
+"""Diagnosis of the 375 measured readings (positioning2021): page of the documentation.
 
-``python -m benchmarks.diagnosis.tables`` prints the page; ``--write`` also puts it where the
-documentation keeps it.
+``python -m benchmarks.diagnosis.tables`` prints the page; ``--write`` also writes it to ``docs``.
 """
 
 from __future__ import annotations
@@ -12,56 +11,59 @@ from typing import Any
 
 import tyro
 
+from benchmarks.diagnosis.markdown import bullets, table
+
 PAGE = Path(__file__).parents[2] / "docs" / "diagnosis_tables.md"
 INTRODUCTION = """\
 # Diagnosis of the measured tables
 
 Made by `python -m benchmarks.diagnosis.tables --write`.
 
-The second input of the diagnosis is a table of settled readings: no time, only load, pressure, way,
-repeat and contraction. The shipped one holds 375 readings of a MAS-10-N-100 (three loads, 25
-pressures up and down, five repeats).
-`pam_envs.diagnosis.static.diagnosis.diagnose_readings(table)` takes any such table: other loads
-and pressures, one repeat or many, paths with several turns.
+Besides recordings the diagnosis accepts tables of settled readings: load, pressure, direction,
+repeat and contraction, without time. The shipped table contains 375 readings of a MAS-10-N-100
+(three loads, 25 pressures up and down, five repeats).
+`pam_envs.diagnosis.static.diagnosis.diagnose_readings(table)` accepts any such table: other loads
+and pressures, one or more repeats, paths with several reversals.
 
-The base knows nothing of the load: a spring with a stiff start and a hardening end behind play
-operators on the pressure (nine parameters). Causes are added to it one at a time and in pairs.
+The base is load-blind: a spring with a stiff start and a hardening end behind play operators on
+the pressure (nine parameters). Causes are added to it one at a time and in pairs.
 """
 METHOD = """\
 ## How to read this
 
-- **cells**: root mean square error on the mean readings that the model was fitted to (72 cells; a
-  reading that is zero by definition does not count). **repeat left out**: on single readings of a
-  repeat, fitted to the others; the floor is a repeat against the mean of the others. **load left
-  out**: fitted to the other loads, averaged over the loads.
-- **p**: the larger of a test that takes four neighbouring cells as one draw, since what a model
-  gets wrong is alike in neighbours, and the plain F test. It counts one form; the rule multiplies
-  it by the number of forms tried at that stage.
-- **The rule** (`readings-1`): causes are looked for while the residual is larger than repeats
-  explain. A form is accepted if its p, times the number tried, is at most 0.05, if it lowers the
-  mean squared error on repeats left out by at least 5 %, and if it does not raise the error on
-  loads left out by over 2 %. Of several forms of a cause that cannot be told apart the first in
-  the catalogue is named. What was accepted earlier is tested again beside the rest.
-- **Intervals** are of 95 %: of parameters from 200 refits to residuals whose blocks of four cells
-  changed sign at random, of errors and gains from resampled blocks. The interval of a gain is wide
-  because a few cells (5.5 bar) carry much of the error; acceptance rests on p and the margin.
-- **Load laws.** Linear in load was fixed beforehand. An exponent or a dead zone has seen the load
-  that it is judged on, unless the table has five loads or more: then it is fitted anew without
-  each, and held out.
-- With one load, causes of the load are not testable. With one repeat the floor is unknown, and
-  errors are judged on every sixth cell left out.
+- **cells**: root mean square error on the mean readings to which the model was fitted (72 cells,
+  without readings that are zero by definition). **held-out repeat**: error on the readings of a
+  repeat, fitted to the others; the noise floor is the difference of a repeat from the mean of the
+  others. **held-out load**: fitted to the other loads, averaged over the loads.
+- **p**: the larger p-value of a block test with four neighbouring cells as one block, since model
+  errors of neighbours are dependent, and of the F test. It is of one form; the rule multiplies it
+  by the number of forms of the stage.
+- **Rule** (`readings-1`): the search continues while the residual is larger than repeats explain.
+  A form is accepted if its p, times the number of forms, is at most 0.05, if it reduces the mean
+  squared error on held-out repeats by at least 5 %, and if it does not increase the error on
+  held-out loads by more than 2 %. Of several forms of a cause that cannot be separated the first
+  of the catalogue is named. Accepted causes are tested again beside later ones.
+- **Intervals** are 95 % confidence intervals: of parameters from 200 refits to residuals with
+  random signs of blocks of four cells, of errors and gains from resampled blocks. The interval of
+  a gain is wide because a few cells (5.5 bar) have much of the error; acceptance is based on p and
+  the margin.
+- **Load laws**: a linear law was fixed beforehand. An exponent or a dead zone is fitted to the load
+  on which it is judged, unless the table has five loads or more: then it is refitted without each
+  load, and held out.
+- With one load, causes of the load are not testable. With one repeat the noise floor is unknown,
+  and errors are of every sixth cell held out.
 """
 LIMITS = """\
-## What this does not settle
+## Limits
 
-- The shift as read and the shift with each load's rest length as zero fit alike, with different
-  values per kilogram: how far a load alone stretches the muscle was not measured.
-- The rule's margins (5 %, four cells) were set while this table was in view, on made-up tables
-  without effects; it has no second measured table to be judged on. The order of the causes and
-  the shift do not depend on them.
-- Pressure-dependent friction is the weakest of the three: its interval is wide, and a load left
-  out gains little from it.
-- Residual creep, where it is fitted last, comes near the margin but predicts loads left out worse.
+- The pressure shift as read and the shift with each load's rest length as zero fit equally well,
+  with different values per kilogram: the stretch of the muscle by a load alone was not measured.
+- The margins of the rule (5 %, four cells) were set with knowledge of this table, on synthetic
+  tables without effects; there is no second measured table to judge them. The order of the causes
+  and the shift do not depend on them.
+- Pressure-dependent friction is the weakest of the three causes: its interval is wide, and it
+  hardly improves a held-out load.
+- Residual creep, fitted last, is close to the margin but predicts held-out loads worse.
 """
 
 
@@ -76,8 +78,8 @@ def main(write: bool = False) -> str:
     from pam_envs.data.tables import load_contraction_table
     from pam_envs.diagnosis.static.diagnosis import audit_polynomials, diagnose_readings
 
-    table = load_contraction_table()
-    text = page(diagnose_readings(table), audit_polynomials(table, published()))
+    readings = load_contraction_table()
+    text = page(diagnose_readings(readings), audit_polynomials(readings, published()))
     print(text)
     if write:
         PAGE.write_text(text, encoding="utf-8")
@@ -98,25 +100,16 @@ def page(report: dict[str, Any], curves: dict[str, Any]) -> str:
     parts = [
         INTRODUCTION,
         f"**Verdict: {report['verdict']}.** {report['text']}\n",
-        *["## Ladder\n", ladder(report)],
+        *["## Models\n", ladder(report)],
         *["## Causes\n", causes(report)],
-        *["## One cause hides another\n", hidden(report)],
-        *["## How the load acts\n", laws(report)],
-        *["## Warnings\n", _bullets(report["warnings"])],
+        *["## Masked causes\n", hidden(report)],
+        *["## Load law\n", laws(report)],
+        *["## Warnings\n", bullets(report["warnings"])],
         *["## The published polynomials\n", polynomials(curves)],
         METHOD,
         LIMITS,
     ]
     return "\n".join(parts)
-
-
-def _bullets(lines: Sequence[str]) -> str:
-    return "".join(f"- {line}\n" for line in lines)
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
 def _errors(rung: dict[str, Any]) -> list[str]:
@@ -135,7 +128,7 @@ def _p(value: float) -> str:
 
 
 def ladder(report: dict[str, Any]) -> str:
-    """Return every model tried, stage by stage."""
+    """Return the table of models, stage by stage."""
     rows, first = [], report["readings"]["ladder"][0]
     rows.append(["**load-blind**", *_errors(first), "", ""])
     for rung in report["readings"]["ladder"]:
@@ -144,18 +137,18 @@ def ladder(report: dict[str, Any]) -> str:
             taken = tried["form"] == rung["chosen"]
             name = f"{tried['name'].replace('_', ' ')}: {tried['form']}"
             name = f"**{name}**" if taken else name
-            mark = "taken" if taken else ("as good" if not tried["excluded"] else "")
+            mark = "accepted" if taken else ("equally good" if not tried["excluded"] else "")
             rows.append([prefix + name, *_errors(tried), _p(tried["p"]), mark])
     for law in report["readings"]["load_laws"]:
-        name = f"all taken, {law['law']} {law['value']:.2f}{_unit(law['unit'])}"
+        name = f"all accepted, {law['law']} {law['value']:.2f}{_unit(law['unit'])}"
         rows.append([name, *_errors(law), _p(law["p"]), law["status"]])
-    head = ["model", "parameters", "cells", "repeat left out", "load left out"]
+    head = ["model", "parameters", "cells", "held-out repeat", "held-out load"]
     floor = report["noise_floor"]["contraction"]["value"]
     note = (
-        "\nErrors in mm; each `+` is a cause on top of those taken above. "
-        f"The floor of the repeats is {floor:.3f} mm.\n"
+        "\nErrors in mm; each `+` is a cause added to those accepted above. "
+        f"The noise floor from the repeats is {floor:.3f} mm.\n"
     )
-    return _table([*head, "each load", "p", ""], rows) + note
+    return table([*head, "each load", "p", ""], rows) + note
 
 
 def causes(report: dict[str, Any]) -> str:
@@ -175,7 +168,7 @@ def causes(report: dict[str, Any]) -> str:
                     f"{cause['gain']['value']:.2f} ({bottom:.2f} to {top:.2f})",
                 ]
             )
-    return _table(["cause", "form", "value", "interval", "effect (RMS)", "gain"], rows)
+    return table(["cause", "form", "value", "interval", "effect (RMS)", "gain"], rows)
 
 
 def _unit(unit: str) -> str:
@@ -183,28 +176,27 @@ def _unit(unit: str) -> str:
 
 
 def hidden(report: dict[str, Any]) -> str:
-    """Return, for pairs of causes, what each is worth alone and beside the other."""
+    """Return the p-values of each cause alone and beside another one."""
     rows = [
         [
             f"`{pair['names'][i]}`",
             f"`{pair['names'][1 - i]}`",
             _p(pair["p_alone"][i]),
             _p(pair["p_beside"][i]),
-            "hidden" if pair["names"][i] in pair["masked"] else "",
+            "masked" if pair["names"][i] in pair["masked"] else "",
         ]
         for pair in report["readings"]["pairs"]
         for i in (0, 1)
     ]
     rows.sort(key=lambda row: (row[4] == "", row[0], row[1]))
     note = (
-        "\nA search that drops what shows nothing on the load-blind model would lose the hidden "
-        "ones.\n"
+        "\nA search without pairs would lose the masked causes, which are not significant alone.\n"
     )
-    return _table(["cause", "beside", "p alone", "p beside it", ""], rows) + note
+    return table(["cause", "beside", "p alone", "p beside it", ""], rows) + note
 
 
 def laws(report: dict[str, Any]) -> str:
-    """Return what is said of the law of the load, and which loads to hang next."""
+    """Return the load laws, and the loads to measure next."""
     lines = [_law(law) for law in report["readings"]["load_laws"]]
     cut = report["readings"]["loads_left_out"]
     if cut:
@@ -212,27 +204,27 @@ def laws(report: dict[str, Any]) -> str:
         low, high = percent["interval"]
         lines.insert(
             0,
-            f"linear, fixed beforehand: {cut['after']['value']:.2f} mm on a load left out instead "
+            f"linear, fixed beforehand: {cut['after']['value']:.2f} mm on a held-out load instead "
             f"of {cut['before']['value']:.2f} mm, {percent['value']:.0f} % less "
             f"({low:.0f} to {high:.0f})",
         )
     experiment = report["experiment"]
     if experiment:
-        lines.append(f"to tell them apart, {experiment['description']}")
-    return _bullets(lines)
+        lines.append(f"to separate them, {experiment['description']}")
+    return bullets(lines)
 
 
 def _law(law: dict[str, Any]) -> str:
     low, high = law["interval"]
     return (
         f"{law['law']}: {law['value']:.2f}{_unit(law['unit'])} ({low:.2f} to {high:.2f}), "
-        f"{law['cells_mm']:.4f} mm on the cells, {law['load_left_out_mm']:.2f} mm on a load left "
-        f"out ({law['status']})"
+        f"{law['cells_mm']:.4f} mm on the cells, {law['load_left_out_mm']:.2f} mm on a held-out "
+        f"load ({law['status']})"
     )
 
 
 def polynomials(curves: dict[str, Any]) -> str:
-    """Return the published polynomials against the readings that they claim."""
+    """Return the comparison of published polynomials with their readings."""
     rows = [
         [
             equation["name"],
@@ -245,7 +237,7 @@ def polynomials(curves: dict[str, Any]) -> str:
         for equation in curves["equations"]
     ]
     head = ["equation", "claims", "RMS mm", "refit mm", "fits best", "copy of"]
-    return _table(head, rows) + "\n" + _bullets(curves["discrepancies"])
+    return table(head, rows) + "\n" + bullets(curves["discrepancies"])
 
 
 if __name__ == "__main__":

@@ -1,1 +1,1 @@
-"""head_to_head."""
+"""Comparison of the diagnosis with ``mujoco.sysid`` on a mass-spring-damper."""

@@ -1,8 +1,7 @@
-"""A second plant for the diagnosis: a mass on a spring and a damper, pushed by a known force.
+"""Mass-spring-damper with a known force, as a second diagnosable plant.
 
-:class:`MassSpringDamper` is all that the engine asks of a plant: a column of parameters, how many
-columns are simulated at once, which parameters the base refits, and how a fit moves each. With
-the causes below it is diagnosed as a muscle is, by one output instead of two.
+:class:`MassSpringDamper` implements :class:`pam_envs.diagnosis.fit.plant_protocol.PlantFamily`.
+With the causes below it is diagnosed as a muscle is, by one output instead of two.
 """
 
 from __future__ import annotations
@@ -22,19 +21,18 @@ from pam_envs.diagnosis.fit.starting_values import grid
 Array = NDArray[np.float64]
 
 SUBSTEPS = 4
-"""Steps of the simulation between two readings."""
+"""Simulation steps between two readings."""
 NEWTON = 12
 STRETCH = 0.05
-"""Displacement [m] at which bent springs are as much stiffer as their parameter says."""
+"""Reference displacement of nonlinear springs [m]."""
 STRONG = 5.0
-"""Force [N] at which a bent actuator is as much weaker as its parameter says."""
+"""Reference force of a nonlinear actuator [N]."""
 BROKEN_AWAY = 0.001
-"""Speed [m/s] at which friction has fallen from its value at rest (as in C. Canudas de Wit et al.,
-IEEE Transactions on Automatic Control 40 (1995) 419)."""
+"""Stribeck speed [m/s] (canudas1995)."""
 CREEPING = 2e-4
-"""Speed [m/s] up to which friction grows from nothing."""
+"""Speed over which friction is regularised [m/s]."""
 FORCES = (0.1, 0.16, 0.27, 0.43, 0.7, 1.14, 1.85, 3.0)
-"""Dry friction [N] from which fits may begin: the best few do."""
+"""Grid of starting values of the dry friction [N]."""
 NEUTRAL = {
     "mass": 1.0,
     "stiffness": 100.0,
@@ -53,7 +51,7 @@ NEUTRAL = {
     "relaxation.stiffness": 0.0,
     "relaxation.time": 1.0,
 }
-"""Every parameter, with its value in a plain plant (SI)."""
+"""Every parameter with its value in a plain plant [SI]."""
 NAMES = tuple(NEUTRAL)
 BASE = ("mass", "stiffness", "damping")
 BOUNDS = {
@@ -74,22 +72,22 @@ BOUNDS = {
     "relaxation.stiffness": (0.0, 1e3, 5.0),
     "relaxation.time": (0.02, 100.0, 0.1),
 }
-"""Lowest and highest value, and the size of a meaningful change (SI)."""
+"""Bounds and meaningful change of every parameter [SI]."""
 LOGARITHMIC = ("mass", "stiffness", "damping", "relaxation.time")
 
 
 @dataclass(frozen=True)
 class MassSpringDamper:
-    """What a fit of a mass-spring-damper starts from, and the force it feels.
+    """Mass-spring-damper with the force of a recording.
 
     Attributes
     ----------
     force : ndarray, shape (T,)
-        Held from each reading to the next [N].
+        Force, held from each reading to the next [N].
     period : float
-        Time between two readings [s].
+        Sampling period [s].
     start : dict of str to float
-        Parameters that differ from :data:`NEUTRAL`, by name.
+        Starting values that differ from :data:`NEUTRAL`, by name.
     """
 
     force: Array
@@ -101,16 +99,16 @@ class MassSpringDamper:
 
     @property
     def column(self) -> Array:
-        """Return the parameters as a column."""
+        """Parameters, shape (p,)."""
         return np.array([{**NEUTRAL, **self.start}[name] for name in NAMES])
 
     def simulate(self, columns: Array) -> Array:
-        """Return what the sensor would show [m], shape (1, T, n)."""
+        """Return sensor readings [m], shape (1, T, n)."""
         found = _positions(np.ascontiguousarray(columns), self.force, self.period)
         return np.ascontiguousarray(found.T)[None]
 
     def free(self, name: str, **changes: Any) -> Free:
-        """Return how a fit moves a parameter."""
+        """Return the fit settings of a parameter."""
         place = NAMES.index(name)
         low, high, scale = BOUNDS[name]
         made = dict(low=low, high=high, scale=scale, log=name in LOGARITHMIC)
@@ -118,18 +116,18 @@ class MassSpringDamper:
         return Free(name, place, **{**made, **changes})
 
     def base(self) -> tuple[Free, ...]:
-        """Return what is refitted before anything is called missing."""
+        """Return the base parameters."""
         return tuple(self.free(name) for name in BASE)
 
     def regressors(self, position: Array) -> Regressors:
-        """Return what a residual may vary against.
+        """Return the variables that may explain a residual.
 
         Parameters
         ----------
         position : ndarray, shape (T,)
-            As the refitted base has it [m].
+            Position simulated with the refitted base [m].
         """
-        time = np.arange(len(position)) * self.period
+        time: Array = np.asarray(np.arange(len(position)) * self.period, np.float64)
         speed = np.gradient(position, self.period)
         slow = [low_pass(self.force, tau, self.period) for tau in FILTERS]
         s = time / max(float(time[-1]), 1e-9)
@@ -137,14 +135,15 @@ class MassSpringDamper:
         rows = [np.ones_like(s), s, s**2, s**3]
         rows += [x, x**2, x**3, v, v * np.abs(v), np.tanh(v), np.tanh(5.0 * v), np.abs(v), x * v]
         rows += [f, f * np.abs(f), *(self.force - u for u in slow)]
-        # the engine asks for the motion under this name
-        values = {"time": time, "pressure": position, "rate": speed, "load": self.force}
+        # "pressure" is the engine's name of the motion
+        values: dict[str, Array] = {"time": time, "pressure": position, "rate": speed}
+        values["load"] = self.force
         return Regressors(values, np.array(rows))
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _positions(columns: Array, force: Array, period: float) -> Array:  # pragma: no cover
-    """Return positions, shape (n, T), by a midpoint rule that takes friction implicitly."""
+    """Return positions, shape (n, T), by a midpoint rule with implicit friction."""
     n, samples = len(columns), len(force)
     out = np.empty((n, samples))
     h = period / SUBSTEPS
@@ -311,4 +310,4 @@ CAUSES = (
         experiment="Long holds.",
     ),
 )
-"""What a mass-spring-damper may lack."""
+"""Effects that a mass-spring-damper may lack."""

@@ -1,4 +1,4 @@
-"""The page of the head-to-head benchmark, from its rows."""
+"""Page of the head-to-head benchmark, from its rows."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
+from benchmarks.diagnosis.markdown import table
+
 Row = dict[str, Any]
 
 LOSS = "friction.force"
@@ -18,39 +20,39 @@ INTRODUCTION = """\
 
 Made by `python -m benchmarks.head_to_head.run --write` (MuJoCo from the extra `mujoco`).
 
-A mass on a spring and a damper is pushed by a known force for 60 s, its position read at 100 Hz
-with 1 mm of noise. The rig may hide what neither tool was told of: dry friction of 0.5, 1 or 2 N,
-under forces of up to 9 N. The same recordings go to both tools.
+A known force acts on a mass-spring-damper for 60 s; the position is read at 100 Hz with 1 mm of
+noise. The rig may have an undeclared dry friction of 0.5, 1 or 2 N, under forces of up to 9 N. Both
+tools use the same recordings.
 
-- **ours**: mass, stiffness and damping are refitted; eleven rival causes are tried; the verdict is
-  that of `pam_envs.diagnosis`, with the rule and the numbers that muscles are judged by.
+- **ours**: mass, stiffness and damping are refitted; eleven rival causes are compared; the verdict
+  is that of `pam_envs.diagnosis`, with the rule and thresholds of the muscle diagnosis.
 - **mujoco.sysid**: `optimize` fits mass, stiffness and damping, from the same start within the same
   bounds. *Issues* are the warnings of its own report (`AutomatedInsights`).
-- **mujoco.sysid, told**: the same with MuJoCo's `frictionloss` among the parameters, which is what
-  its user would do who already suspects friction; on fewer rigs, since it takes longest.
+- **mujoco.sysid, told**: the same with MuJoCo's `frictionloss` as a further parameter, as a user
+  would do who suspects friction; on fewer rigs, since it takes longest.
 
-`mujoco.sysid` estimates parameters of a given model. It does not claim to say what a model lacks,
-and its report has no test for that; this page measures what follows if it is read as if it did.
+`mujoco.sysid` estimates the parameters of a given model. It does not test for missing effects; this
+page measures what its report shows if a model lacks one.
 """
 RIG = """\
 ## The rigs
 
 Mass, stiffness and damping are drawn within a factor of 1.25 of 1 kg, 100 N/m and 2 N s/m. Friction
-is a set-valued Coulomb law with a breakaway force 1 to 1.3 times the sliding one (drawn); between
+is a set-valued Coulomb law with a breakaway force 1 to 1.3 times the sliding force (drawn); between
 two events the motion is computed in closed form, and events are found by bisection
-(`benchmarks/head_to_head/rig.py`). The candidate is a smooth tanh law, with or without a
-breakaway that fades with speed, in a midpoint rule of 2.5 ms
-(`benchmarks/head_to_head/mass_spring_damper.py`); MuJoCo runs RK4 at 5 ms. *Another experiment* is
-a rising tone and small steps that no fit has seen; errors on it are against the noise-free rig.
-Causes and starts were set up on rigs of other seeds.
+(`benchmarks/head_to_head/rig.py`). The candidate is a smooth tanh law, with or without a breakaway
+force that decays with speed, in a midpoint rule of 2.5 ms
+(`benchmarks/head_to_head/mass_spring_damper.py`); MuJoCo uses RK4 at 5 ms. *Another experiment* is
+a chirp and small steps that are not used in any fit; errors on it are relative to the noise-free
+rig. Causes and starting values were set on rigs of other seeds.
 """
 ENGINE = """\
 ## A second plant
 
-`MassSpringDamper` joins the engine without a change to it. It gives `column`, `simulate`, `free`,
-`base`, a `Regressors`, and a tuple of `Cause`; calibration is `search.fit_base`, the decision
-`verdict.decide`. Nothing in `pam_envs` knows of it. What is still the muscle's own: the command
-line, reading recordings, the noise floor and the report; here noise is the sensor's declared 1 mm.
+`MassSpringDamper` uses the engine without a change to it. It provides `column`, `simulate`, `free`,
+`base`, a `Regressors`, and a tuple of `Cause`; calibration is `fit.candidate.fit_base`, the
+decision `decide.verdict.decide`. Specific to the muscle are the command line, the reading of recordings, the
+noise floor and the report; here the noise is the sensor's declared 1 mm.
 """
 
 
@@ -60,7 +62,7 @@ def page(result: Row) -> str:
     Parameters
     ----------
     result : dict
-        As ``benchmarks.head_to_head.run.main`` makes it.
+        From :func:`benchmarks.head_to_head.run.main`.
     """
     rows = result["rows"]
     against = any("sysid" in row for row in rows)
@@ -68,8 +70,8 @@ def page(result: Row) -> str:
     parts = [
         INTRODUCTION,
         "" if against else "**`mujoco.sysid` was not installed: its side was not run.**\n",
-        *["## Who notices\n", noticed(rows, against)],
-        *["## What becomes of the parameters\n", parameters(rows, against)],
+        *["## Detection\n", noticed(rows, against)],
+        *["## Parameters\n", parameters(rows, against)],
         *["## Another experiment\n", transfer(rows, against)],
         *["## Other hidden effects\n", others(rows, against)],
         RIG,
@@ -77,15 +79,6 @@ def page(result: Row) -> str:
         f"Rule {result['rule']}; {packages}.\n",
     ]
     return "\n".join(part for part in parts if part)
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table in Markdown."""
-    for row in rows:
-        if len(row) != len(head):
-            raise ValueError(f"a row of {len(row)} cells is not as long as the head, {len(head)}")
-    lines = [head, ["---"] * len(head), *rows]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
 def rate(hits: Sequence[bool]) -> str:
@@ -102,12 +95,12 @@ def middle(values: Sequence[float], digits: int = 2) -> str:
 
 
 def flagged(row: Row) -> bool:
-    """Return whether ours says that something is missing."""
+    """Return whether ours reports a model error."""
     return row["ours"]["verdict"] in ("named", "ambiguous", "unexplained")
 
 
 def named(row: Row) -> bool:
-    """Return whether ours names the hidden cause without doubt, and no other."""
+    """Return whether ours names exactly the hidden cause."""
     right = [row["effect"]] if row["effect"] else []
     verdict = "named" if right else "adequate"
     return bool(row["ours"]["verdict"] == verdict and row["ours"]["causes"] == right)
@@ -120,8 +113,8 @@ def by_friction(rows: Sequence[Row]) -> dict[float, list[Row]]:
 
 
 def noticed(rows: Sequence[Row], against: bool) -> str:
-    """Return what is reported, by friction."""
-    head = ["friction N", "ours: flagged", "ours: right name alone", "verdicts"]
+    """Return the table of detections by friction."""
+    head = ["friction N", "ours: flagged", "ours: correct name only", "verdicts"]
     head += ["ours: residual before", "after"]
     if against:
         head += ["sysid: issues", "sysid: residual", "told: issues", "told: residual"]
@@ -136,17 +129,17 @@ def noticed(rows: Sequence[Row], against: bool) -> str:
             line += [rate([bool(r["issues"]) for r in its]), middle([r["residual"] for r in its])]
         made.append(line)
     return table(head, made) + (
-        "\nCounts with exact 95 % intervals. At 0 N the right answer is *adequate*, no cause. "
-        "Residuals are RMS over the noise, median and range: ours on blocks that no fit has seen, "
-        "sysid's on all that it was fitted to. What a told sysid reports at 0 N is that its "
-        "friction is at the lower bound, which is right. Where ours is left well above 1, the "
-        "candidate's law breaks away a moment early or late and stands elsewhere until the next "
-        "motion: with the rig's own constants it was 0.2 to 2.3 mm off on six rigs at 2 N.\n"
+        "\nCounts with exact 95 % intervals. At 0 N the correct answer is *adequate*, no cause. "
+        "Residuals are RMS over the noise, median and range: ours on held-out blocks, sysid's on "
+        "its training data. The issue of a told sysid at 0 N is that its friction is at the lower "
+        "bound, which is correct. A residual of ours well above 1 is due to a candidate that "
+        "breaks away slightly early or late and rests elsewhere until the next motion: with the "
+        "rig's own constants it was 0.2 to 2.3 mm off on six rigs at 2 N.\n"
     )
 
 
 def parameters(rows: Sequence[Row], against: bool) -> str:
-    """Return how far the fitted parameters are off, by friction."""
+    """Return the errors of the fitted parameters by friction."""
     tools = {"sysid": ("sysid", "values"), "sysid, told": ("sysid_told", "values")}
     tools = tools if against else {}
     tools |= {"ours, refitted": ("ours", "base_values"), "ours, extended": ("ours", "values")}
@@ -170,14 +163,14 @@ def parameters(rows: Sequence[Row], against: bool) -> str:
 
 
 def _inside(row: Row, tool: str) -> bool:
-    """Return whether the truth is inside all of a tool's intervals."""
+    """Return whether all intervals of a tool contain the truth."""
     truth = row["rig"] | {"friction.force": row["rig"]["friction"]}
     found = row[tool]
     return all(abs(found["values"][n] - truth[n]) <= found["intervals"][n] for n in found["values"])
 
 
 def transfer(rows: Sequence[Row], against: bool) -> str:
-    """Return the errors on another experiment, by friction."""
+    """Return the errors on another experiment by friction."""
     head = ["friction N", "ours, refitted", "ours, extended"]
     head += ["sysid", "sysid, told"] if against else []
     made = []
@@ -191,11 +184,11 @@ def transfer(rows: Sequence[Row], against: bool) -> str:
 
 
 def others(rows: Sequence[Row], against: bool) -> str:
-    """Return what is said of other hidden effects."""
+    """Return the verdicts on other hidden effects."""
     effects = list(dict.fromkeys(r["effect"] for r in rows if "friction" not in r["hidden"]))
     if not effects:
         return "None were run.\n"
-    head = ["hidden", "ours: right name alone", "ours: said", "ours: residual before", "after"]
+    head = ["hidden", "ours: correct name only", "ours: answers", "ours: residual before", "after"]
     head += ["sysid: issues", "sysid: residual"] if against else []
     made = []
     for effect in effects:

@@ -1,8 +1,7 @@
-"""A rig to be diagnosed: a mass on a spring and a damper, with hidden dry friction.
+"""Simulated rig: mass-spring-damper with hidden dry friction.
 
-Between two events everything acts linearly under a constant force, so that the motion is known in
-closed form; the friction is a set-valued Coulomb law with a higher breakaway force. Nothing here is
-shared with the model that is fitted to it.
+Between two events the motion under a constant force is linear and computed in closed form; friction
+is a set-valued Coulomb law with a higher breakaway force. No code is shared with the fitted model.
 """
 
 from __future__ import annotations
@@ -16,25 +15,25 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 PERIOD = 0.01
-"""Time between two readings [s]."""
+"""Sampling period [s]."""
 NOISE = 1e-3
 """Standard deviation of the position sensor's noise [m]."""
 NOMINAL = {"mass": 1.0, "stiffness": 100.0, "damping": 2.0}
-"""Middle of what rigs are drawn from [kg], [N/m], [N s/m]."""
+"""Median constants of rigs [kg], [N/m], [N s/m]."""
 SPREAD = 1.25
-"""Rigs differ from it by at most this factor."""
+"""Largest factor between constants of a rig and the median."""
 BREAKAWAY = (1.0, 1.3)
 """Range of the breakaway force over the sliding force."""
 LOOK = 1e-3
-"""A change of the velocity's sign is looked for this often [s]."""
+"""Interval of the checks for a change of the velocity's sign [s]."""
 HALVINGS = 50
 SETTLED = 2.0
-"""Seconds without force at the start of an experiment."""
+"""Time without force at the start of an experiment [s]."""
 
 
 @dataclass(frozen=True)
 class Oscillator:
-    """What a rig consists of.
+    """Constants of a rig.
 
     Attributes
     ----------
@@ -43,13 +42,13 @@ class Oscillator:
     friction : float
         Dry friction while sliding [N].
     breakaway : float
-        Friction at rest, over that while sliding.
+        Friction at rest over that while sliding.
     delay : int
-        Samples by which the force comes late.
+        Delay of the force [samples].
     bias : float
-        Of the sensor [m].
+        Bias of the sensor [m].
     drift : float
-        Of the sensor over an experiment [m].
+        Drift of the sensor over an experiment [m].
     """
 
     mass: float = NOMINAL["mass"]
@@ -85,7 +84,7 @@ class Oscillator:
         return found
 
     def readings(self, force: Array, seed: int) -> Array:
-        """Return what the sensor shows [m], shape (T,)."""
+        """Return sensor readings [m], shape (T,)."""
         noise = np.random.default_rng([seed, 2]).normal(0.0, NOISE, len(force))
         ramp = np.linspace(0.0, self.drift, len(force))
         return np.asarray(self.positions(force) + self.bias + ramp + noise)
@@ -108,7 +107,7 @@ class Oscillator:
     def _slide(
         self, x: float, v: float, force: float, way: float, step: float
     ) -> tuple[float, float, float]:
-        """Return position, velocity and time at the end of a step, or where the mass halts."""
+        """Return position, velocity and time at the end of a step or at standstill."""
         x1, v1 = self._free(x, v, force, step)
         if v1 * way > 0.0:
             return x1, v1, step
@@ -135,14 +134,14 @@ class Oscillator:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What is done to a rig.
+    """Inputs of an experiment.
 
     Attributes
     ----------
     force : ndarray, shape (T,)
-        Held from each sample to the next [N].
+        Force, held from each sample to the next [N].
     time : ndarray, shape (T,)
-        [s].
+        Time [s].
     """
 
     force: Array
@@ -150,13 +149,13 @@ class Experiment:
 
     @classmethod
     def of(cls, *parts: Array) -> Experiment:
-        """Return parts one after another, after a rest."""
+        """Return a sequence of parts after a rest."""
         force = np.concatenate([np.zeros(round(SETTLED / PERIOD)), *parts])
-        return cls(force, np.arange(len(force)) * PERIOD)
+        return cls(force, np.asarray(np.arange(len(force)) * PERIOD, np.float64))
 
 
 def campaign(seed: int) -> Experiment:
-    """Return 60 s of random steps, a swelling sine, many sines at once and slow ramps."""
+    """Return 60 s of random steps, a growing sine, a multisine and slow ramps."""
     rng = np.random.default_rng([seed, 3])
     return Experiment.of(
         steps(rng, 8, 2.0, 8.0),
@@ -167,7 +166,7 @@ def campaign(seed: int) -> Experiment:
 
 
 def another(seed: int) -> Experiment:
-    """Return 40 s of a kind that no model was fitted to: a rising tone, and small steps."""
+    """Return 40 s of another kind of motion: a chirp and small steps."""
     rng = np.random.default_rng([seed, 4])
     time = np.arange(round(26.0 / PERIOD)) * PERIOD
     tone = 4.0 * np.sin(2.0 * np.pi * (0.1 + 0.5 * 2.9 * time / time[-1]) * time)
@@ -175,7 +174,7 @@ def another(seed: int) -> Experiment:
 
 
 def steps(rng: np.random.Generator, number: int, seconds: float, most: float) -> Array:
-    """Return forces up to ``most`` [N], each held so long."""
+    """Return random forces up to ``most`` [N], each held for ``seconds``."""
     return np.repeat(rng.uniform(-most, most, number), round(seconds / PERIOD))
 
 
@@ -186,7 +185,7 @@ def swelling_sine(seconds: float, frequency: float, most: float) -> Array:
 
 
 def many_sines(rng: np.random.Generator, seconds: float, spread: float) -> Array:
-    """Return sines of random phase, 0.2 to 4 Hz, of a given RMS [N]."""
+    """Return a multisine of random phases, 0.2 to 4 Hz, of a given RMS [N]."""
     time = np.arange(round(seconds / PERIOD)) * PERIOD
     tones = np.geomspace(0.2, 4.0, 12)[:, None]
     phases = rng.uniform(0.0, 2.0 * np.pi, (12, 1))
@@ -195,7 +194,7 @@ def many_sines(rng: np.random.Generator, seconds: float, spread: float) -> Array
 
 
 def ramps(corners: tuple[float, ...], seconds: float) -> Array:
-    """Return straight lines from 0 through the corners [N], at one pace."""
+    """Return ramps of equal rate from 0 through the corners [N]."""
     lengths = np.abs(np.diff((0.0, *corners)))
     at = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum() * seconds
     return np.interp(np.arange(round(seconds / PERIOD)) * PERIOD, at, (0.0, *corners))

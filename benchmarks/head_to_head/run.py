@@ -1,8 +1,8 @@
-"""Head to head: a mass-spring-damper with hidden dry friction, by ours and by ``mujoco.sysid``.
+"""Comparison with ``mujoco.sysid`` on a mass-spring-damper with hidden dry friction.
 
-``python -m benchmarks.head_to_head.run`` runs both on the same recordings and prints the tables;
-``--write`` also puts them into ``docs/head_to_head.md`` and ``results/head_to_head.json``.
-Without the extra ``mujoco`` it says so and runs ours alone.
+``python -m benchmarks.head_to_head.run`` runs both tools on the same recordings and prints the
+tables; ``--write`` also writes ``docs/head_to_head.md`` and ``results/head_to_head.json``. Without
+the extra ``mujoco`` only ours is run.
 """
 
 from __future__ import annotations
@@ -41,25 +41,25 @@ OTHERS: dict[str, dict[str, float]] = {
     "sensor_bias": {"bias": 0.003},
     "sensor_drift": {"drift": 0.006},
 }
-"""Effects hidden instead, so that not everything is called friction."""
+"""Other hidden effects, to test against a bias towards friction."""
 FIRST = 1000
-"""Seed of the first rig; the causes and their starts were set up on seeds below."""
+"""Seed of the first rig; causes and starting values were set on smaller seeds."""
 START = {"mass": 1.5, "stiffness": 70.0, "damping": 3.0}
-"""Where every fit begins."""
+"""Starting values of every fit."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A drawn rig with something hidden in it, or nothing.
+    """A drawn rig, with or without a hidden effect.
 
     Attributes
     ----------
     seed : int
-        Of all draws.
+        Seed of all random draws.
     effect : str
-        Name of the cause that is right; empty where there is none.
+        Name of the correct cause; empty without one.
     hidden : dict of str to float
-        What :meth:`Oscillator.drawn` adds to the rig.
+        Hidden constants of :meth:`Oscillator.drawn`.
     """
 
     seed: int
@@ -68,7 +68,7 @@ class Case:
 
     @property
     def rig(self) -> Oscillator:
-        """The rig."""
+        """Drawn rig."""
         return Oscillator.drawn(self.seed, **self.hidden)
 
 
@@ -83,17 +83,17 @@ class Outcome:
     decision: Decision
 
     def error(self, candidate: Candidate) -> float:
-        """Return the RMS residual over the noise on blocks that no fit has seen."""
+        """Return the RMS residual over the noise on held-out blocks."""
         return float(np.sqrt(self.blocks.means(candidate.errors)[0]))
 
     def predict(self, candidate: Candidate, force: Array) -> Array:
-        """Return a candidate's positions [m] under another force, shape (T,)."""
+        """Return the positions of a candidate under another force [m], shape (T,)."""
         family = dataclasses.replace(self.family, force=force)
         return family.simulate(column_of(candidate.fit, candidate.fit.z)[None])[0, :, 0]
 
 
 def cases(rigs: int, others: int, first: int = FIRST) -> Iterator[Case]:
-    """Yield the cases, so many rigs for every friction and for every other effect."""
+    """Yield the cases: ``rigs`` for every friction, ``others`` for every other effect."""
     for seed in range(first, first + rigs):
         for friction in FRICTIONS:
             yield Case(seed, "dry_friction" if friction else "", {"friction": friction})
@@ -103,21 +103,21 @@ def cases(rigs: int, others: int, first: int = FIRST) -> Iterator[Case]:
 
 
 def diagnose(force: Array, reading: Array, rule: Rule | None = None, seed: int = 0) -> Outcome:
-    """Refit a mass-spring-damper to a recording and look for what it misses.
+    """Diagnose the error of a mass-spring-damper on a recording.
 
     Parameters
     ----------
     force : ndarray, shape (T,)
-        Held from each reading to the next [N].
+        Force, held from each reading to the next [N].
     reading : ndarray, shape (T,)
-        Of the position [m].
+        Position readings [m].
     rule : Rule, optional
-        Numbers of the decision.
+        Thresholds of the decision.
     seed : int
-        Of the decision's draws.
+        Seed of the bootstrap.
     """
     family = MassSpringDamper(force, PERIOD, START)
-    time = np.arange(len(force)) * PERIOD
+    time: Array = np.asarray(np.arange(len(force)) * PERIOD, np.float64)
     measured = reading[None]
     blocks = Blocks.make(time, measured)
     problem = Problem(family.simulate, measured, np.array([NOISE]), blocks.train, time)
@@ -129,15 +129,16 @@ def diagnose(force: Array, reading: Array, rule: Rule | None = None, seed: int =
 
 
 def run(case: Case, against: bool, told: bool = False) -> dict[str, Any]:
-    """Return what both tools make of a case, in plain types.
+    """Return the results of both tools on a case, in plain types.
 
     Parameters
     ----------
     case : Case
+        Rig and experiment.
     against : bool
         Whether MuJoCo is run.
     told : bool
-        Whether it is also run with friction among its parameters.
+        Whether MuJoCo is also run with friction as a parameter.
     """
     rig, force, fresh = case.rig, campaign(case.seed).force, another(case.seed).force
     reading, truth = rig.readings(force, case.seed), rig.positions(fresh)
@@ -151,7 +152,7 @@ def run(case: Case, against: bool, told: bool = False) -> dict[str, Any]:
 
 
 def _rms(values: Array) -> float:
-    """Return the RMS over the noise, of what is there."""
+    """Return the RMS of finite values over the noise."""
     return float(np.sqrt(np.nanmean(values**2))) / NOISE
 
 
@@ -189,7 +190,7 @@ def _theirs(
 
 
 def kept(row: dict[str, Any]) -> dict[str, Any]:
-    """Return a row with what MuJoCo made of the same case when the results were written."""
+    """Return a row with MuJoCo's stored result of the same case."""
     alike = ("seed", "effect", "hidden")
     for old in json.loads(RESULTS.read_text(encoding="utf-8"))["rows"]:
         if all(old[key] == row[key] for key in alike):
@@ -209,12 +210,11 @@ def main(
     others : int
         Drawn rigs for every other hidden effect.
     told : int
-        Rigs on which MuJoCo is also told of friction: most of its time goes into that.
+        Rigs on which MuJoCo also fits friction, which takes most of its time.
     write : bool
         Also write ``results/head_to_head.json`` and ``docs/head_to_head.md``.
     keep : bool
-        Take MuJoCo's side from ``results/head_to_head.json`` and run ours anew: minutes instead of
-        half an hour.
+        Use MuJoCo's stored results and run only ours: minutes instead of half an hour.
     """
     from rich.progress import track
 

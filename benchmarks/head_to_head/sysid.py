@@ -1,7 +1,7 @@
-"""What ``mujoco.sysid`` makes of a recording of a mass-spring-damper (extra ``mujoco``).
+"""Identification of a mass-spring-damper by ``mujoco.sysid`` (extra ``mujoco``).
 
-It is given all that it needs: the mechanism, the force as it was held, free bounds as wide as ours,
-the starting values that ours begins from. Issues are what its own report lists as warnings.
+It has the mechanism, the force, and our bounds and starting values. Issues are the warnings of its
+own report.
 """
 
 from __future__ import annotations
@@ -37,23 +37,23 @@ MECHANISM = """
 </mujoco>
 """
 LOSS = ("friction.force", 0.5)
-"""The parameter of MuJoCo's own dry friction, under our name, and where its fit begins [N]."""
+"""Our name of MuJoCo's dry friction, and its starting value [N]."""
 
 
 @dataclass(frozen=True)
 class Identified:
-    """What came out.
+    """Result of an identification.
 
     Attributes
     ----------
     values : dict of str to float
-        Parameters by our names (SI).
+        Parameters by our names [SI].
     intervals : dict of str to float
-        Half widths of their 95 % intervals, as ``calculate_intervals`` gives them.
+        Half-widths of their 95 % intervals from ``calculate_intervals``.
     issues : list of str
         Warnings of its report.
     position : ndarray, shape (T,)
-        Of the fitted model, under the force of the recording [m]; NaN where it is not compared.
+        Position of the fitted model [m]; NaN where it is not compared.
     """
 
     values: dict[str, float]
@@ -63,11 +63,11 @@ class Identified:
 
 
 def version() -> str | None:
-    """Return MuJoCo's version if its identification can be used, else None."""
+    """Return MuJoCo's version if its identification is available, else None."""
     try:
         from mujoco import sysid
 
-        assert sysid.optimize
+        assert hasattr(sysid, "optimize")
         return importlib.metadata.version("mujoco")
     except (ImportError, AttributeError):
         return None
@@ -76,20 +76,20 @@ def version() -> str | None:
 def identify(
     force: Array, reading: Array, period: float, start: dict[str, float], friction: bool
 ) -> Identified:
-    """Fit mass, stiffness and damping, and MuJoCo's dry friction if it is asked for.
+    """Fit mass, stiffness and damping, and optionally MuJoCo's dry friction.
 
     Parameters
     ----------
     force : ndarray, shape (T,)
-        Held from each reading to the next [N].
+        Force, held from each reading to the next [N].
     reading : ndarray, shape (T,)
-        [m].
+        Position readings [m].
     period : float
-        [s].
+        Sampling period [s].
     start : dict of str to float
-        Where the fit begins.
+        Starting values.
     friction : bool
-        Whether its user has thought of dry friction.
+        Whether dry friction is a parameter.
     """
     import mujoco
     from mujoco import sysid
@@ -99,7 +99,7 @@ def identify(
     parameters = _parameters(start | ({LOSS[0]: LOSS[1]} if friction else {}))
     sequence = _sequence(spec, force, reading, period)
     residual = sysid.build_residual_fn(models_sequences=[sequence], n_threads=1)
-    with redirect_stdout(StringIO()):  # it prints its iterations whatever it is told
+    with redirect_stdout(StringIO()):  # it prints iterations in spite of verbose=False
         found, result = sysid.optimize(parameters, residual, optimizer="mujoco", verbose=False)
     left, (predicted,), _ = residual(found.as_vector(), found, return_pred_all=True)
     _, widths = sysid.calculate_intervals(left, result.jac)
@@ -114,7 +114,7 @@ def identify(
 
 
 def _parameters(start: dict[str, float]) -> Any:
-    """Return what is fitted, with what each changes in the mechanism."""
+    """Return the fitted parameters with their changes of the mechanism."""
     from mujoco import sysid
 
     def modifier(name: str) -> Any:
@@ -138,7 +138,7 @@ def _parameters(start: dict[str, float]) -> Any:
 
 
 def _sequence(spec: Any, force: Array, reading: Array, period: float) -> Any:
-    """Return the recording as ``mujoco.sysid`` reads it: the force anew at each of its steps."""
+    """Return the recording for ``mujoco.sysid``, with the force at each simulation step."""
     from mujoco import sysid
 
     model = spec.compile()

@@ -7,7 +7,7 @@ import pytest
 from diagnosis_fakes import counted, failed, loop, record, sample
 from scipy import stats
 
-from benchmarks.diagnosis.counts import Told, exact_interval, share, upper_bound
+from benchmarks.diagnosis.counts import Answer, exact_interval, share, upper_bound
 from benchmarks.diagnosis.report import figures, page
 
 # --- shares --------------------------------------------------------------------------------------
@@ -55,17 +55,17 @@ WORDS = ("right_first", "exact", "both", "wrong", "extra", "listed", "alarm")
 def test_words_for_a_single_effect(
     verdict: str, names: list[str], others: list[str], holds: set[str]
 ) -> None:
-    told = Told.of(record(verdict=verdict, names=names, others=others))
+    told = Answer.of(record(verdict=verdict, names=names, others=others))
     assert {word for word in WORDS if getattr(told, word)} == holds
 
 
 def test_words_for_two_effects() -> None:
     truth = {"creep": 2.0, "leak": 1.0}
-    one = Told.of(record("pair", truth, "named", ["leak"]))
+    one = Answer.of(record("pair", truth, "named", ["leak"]))
     assert one.right_first and not (one.exact or one.both or one.wrong or one.extra)
-    both = Told.of(record("pair", truth, "ambiguous", ["leak", "creep"], ["creep+slip_step"]))
+    both = Answer.of(record("pair", truth, "ambiguous", ["leak", "creep"], ["creep+slip_step"]))
     assert both.both and both.listed and not both.exact
-    third = Told.of(record("pair", truth, "named", ["leak", "creep", "slip_step"]))
+    third = Answer.of(record("pair", truth, "named", ["leak", "creep", "slip_step"]))
     assert third.wrong and third.extra and not third.both
 
 

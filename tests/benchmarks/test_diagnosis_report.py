@@ -15,13 +15,13 @@ from tests.diagnosis.hidden import EFFECTS
 def test_targets_are_met_or_missed_on_their_own_figures() -> None:
     good = [record(names=["creep"], traces={"creep": trace(0.1)}, seed=k) for k in range(3)]
     rows = {row[0]: row for row in targets(figures(good))}
-    assert rows["right name first, size 1 and above"][2:] == ("100.0 % [29.2, 100.0]", 3, True)
+    assert rows["correct name first, sizes above 1"][2:] == ("100.0 % [29.2, 100.0]", 3, True)
     assert rows["wrong name, any size"][4] is False  # three cases bound nothing
     assert rows["error of the effect's trace, median"][4] is True
     assert rows["two effects: both"][2:] == ("not run", 0, None)
     bad = [*good, record(names=["leak"])]
     rows = {row[0]: row for row in targets(figures(bad))}
-    assert rows["right name first, size 1 and above"][3:] == (4, False)
+    assert rows["correct name first, sizes above 1"][3:] == (4, False)
     assert rows["the same, for the worst cause"][2].endswith("(`creep`)")
     many = [record("clean", {}, "adequate", seed=k) for k in range(300)]
     rows = {row[0]: row for row in targets(figures(many))}
@@ -33,9 +33,7 @@ def test_targets_are_met_or_missed_on_their_own_figures() -> None:
 def test_the_page_says_figure_target_and_number() -> None:
     text = page(figures(sample()), "--chosen tune")
     assert "`python -m benchmarks diagnosis --chosen tune`" in text
-    assert (
-        "| right name first, size 1 and above | at least 98 % | 60.0 % [14.7, 94.7] | 5 |" in text
-    )
+    assert "| correct name first, sizes above 1 | at least 98 % | 60.0 % [14.7, 94.7] | 5 |" in text
     assert "`leak` as `creep`: 2" in text
     assert "| `stick_slip` |  |  |  | A1 |" in text
     assert "`temperature` 1" in text
@@ -70,12 +68,12 @@ def tables(cut_percent: float, post_hoc: float) -> dict[str, Any]:
 
 
 def test_the_measured_tables_and_the_whole_report_have_their_targets() -> None:
-    linear = "measured tables, a load left out, linear law: error cut"
+    linear = "measured tables, held-out load, linear law: error decrease"
     late = "the same, exponent post hoc, not held out"
     whole = "10 minutes at 50 Hz on 2 cores: whole report"
     rows = {row[0]: row[1:] for row in targets(figures([], tables(40.0, 0.22), [4.0, 9.5, 7.0]))}
     assert rows[linear] == ("at least 30 %", "40.0 % [32.0, 48.0], 0.63 to 0.38 mm", 375, True)
-    assert rows[late] == ("about 0.23 mm", "0.22 mm; floor 0.168 mm", 375, True)
+    assert rows[late] == ("about 0.23 mm", "0.22 mm; noise floor 0.168 mm", 375, True)
     assert rows[whole] == ("at most 10 s", "9.5 s", 3, True)
     rows = {row[0]: row[1:] for row in targets(figures([], tables(25.0, 0.26), [4.0, 10.5]))}
     assert [rows[label][3] for label in (linear, late, whole)] == [False, False, False]
@@ -84,7 +82,7 @@ def test_the_measured_tables_and_the_whole_report_have_their_targets() -> None:
 
 
 def test_enough_cases_are_wanted_of_every_cause_and_of_clean_rigs() -> None:
-    label = "cases of the rarest cause, size 1 and above"
+    label = "cases of the rarest cause, sizes above 1"
     of_all = [
         record(truth={name: 2.0}, names=[name], seed=k) for name in EFFECTS for k in range(40)
     ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import os
 from collections.abc import Collection
@@ -22,7 +21,9 @@ from benchmarks.diagnosis.next import DrivenRig, OracleRig
 from benchmarks.diagnosis.report import figures
 from benchmarks.diagnosis.run import Options, retold, run, select
 from benchmarks.diagnosis.study import study, trace_errors
+from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.closed_loop.gain import COMPENSABLE
+from pam_envs.diagnosis.decide.rule import Rule
 from tests.diagnosis import hidden
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -136,50 +137,25 @@ def test_a_corrupt_record_is_made_again(tmp_path: Path) -> None:
     assert report.records == before
 
 
-def test_changed_sources_are_computed_again(
+def test_records_belong_to_the_numbers_of_rule_and_causes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     options = Options(kinds=("pair",), folder=tmp_path)
     run(options, act=answer)
-    monkeypatch.setattr(diagnosis, "sources", lambda stage: f"other {stage}")
-    assert run(options, act=answer).computed == 2
-
-
-def test_a_stage_depends_on_what_decides_it() -> None:
-    engine = ROOT / "pam_envs" / "diagnosis"
-    files = {stage: set() for stage in diagnosis.STAGES}
-    for stage, deciding in files.items():
-        deciding |= {p.name for p in engine.glob("*.py") if diagnosis._decides(p, stage)}
-    assert {"verdict.py", "search.py", "fitting.py", "experiment.py"} <= files["verdict"]
-    assert not {"gain.py", "page.py", "readings.py", "report.py"} & files["verdict"]
-    assert "plant_inverse.py" in files["loop"]
-    assert len({diagnosis.sources(stage) for stage in diagnosis.STAGES}) == 3
-
-
-def imported(path: Path) -> set[Path]:
-    """Return the library's files that a file imports, wherever in it."""
-    named: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and node.module:
-            named |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-    files = {ROOT.joinpath(*name.split(".")).with_suffix(".py") for name in named}
-    return {file for file in files if file.is_file() and "pam_envs" in file.parts}
-
-
-def test_what_the_diagnosis_imports_is_in_the_digest() -> None:
-    library = ROOT / "pam_envs"
-    apart = {library / "plants" / "plant_file.py", library / "data" / "tables.py"}  # only files
-    known = {library / name for name in diagnosis.LIBRARY}
-    assert all(path.is_file() for path in known)
-    left, seen = [library / "diagnosis" / "diagnosis.py"], set()
-    while left:
-        path = left.pop()
-        if path not in seen | apart and not path.name.startswith(diagnosis.NOT_DECIDING):
-            seen.add(path)
-            left += imported(path)
-    outside = {path for path in seen if "diagnosis" not in path.parts}
-    assert len(outside) > 15
-    assert outside <= known
+    known = diagnosis.engine_digest()
+    diagnosis.engine_digest.cache_clear()
+    assert diagnosis.engine_digest() == known
+    for name, value in (
+        ("Rule", lambda: Rule(doubt=0.06)),
+        ("catalogue", lambda: catalogue()[1:]),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(diagnosis, name, value)
+            diagnosis.engine_digest.cache_clear()
+            assert diagnosis.engine_digest() != known
+            assert run(options, act=answer).computed == 2
+    diagnosis.engine_digest.cache_clear()
+    assert run(options, act=answer).computed == 0
 
 
 def test_loops_and_experiments_are_run_where_they_count(tmp_path: Path) -> None:
@@ -216,7 +192,6 @@ def deadly(case: Case, stages: Collection[str]) -> dict[str, Any]:
 def test_a_case_that_kills_its_worker_is_a_failed_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    diagnosis.sources.cache_clear()  # the workers look at the files anew
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(Path(__file__).parent)]))
     get_reusable_executor().shutdown(wait=True)
     options = Options(kinds=("single",), names=("creep", "leak"), folder=tmp_path, jobs=2)

@@ -137,7 +137,7 @@ def written() -> dict:
 
 
 def test_every_line_of_a_table_has_all_its_columns():
-    with pytest.raises(ValueError, match="not as long as the head"):
+    with pytest.raises(ValueError, match="a row of 1 cells in a table of 2 columns"):
         head_to_head_page.table(["a", "b"], [["1"]])
 
 
