@@ -42,7 +42,7 @@ class Render:
     env: tyro.conf.Positional[str]
     """Its id, with or without PAM/ and -v0."""
     video: Path = Path("out.mp4")
-    """Where to write."""
+    """Output file."""
     seconds: float = 10.0
     """Length of the episode [s]."""
     hysteresis: Kind = "maxwell_slip"

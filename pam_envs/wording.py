@@ -1,4 +1,4 @@
-"""What messages about unknown names end with."""
+"""Suggestions at the end of messages about unknown names."""
 
 from __future__ import annotations
 

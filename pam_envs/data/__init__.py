@@ -1,1 +1,1 @@
-"""Measured tables and identified plants that the library ships, see ``PROVENANCE.md``."""
+"""Shipped tables of measurements and identified plants (see ``PROVENANCE.md``)."""

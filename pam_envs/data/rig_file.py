@@ -1,4 +1,4 @@
-"""What the owner of a rig tells about it: ``RIG.yaml``.
+"""Declared facts of a rig: ``RIG.yaml``.
 
     plant: single_muscle
     muscle: {rest_length_mm: 200, diameter_mm: 10}
@@ -37,7 +37,7 @@ MM = 1e-3
 
 @dataclasses.dataclass(frozen=True)
 class Bounds:
-    """A number of the file: where it stands, its unit in SI, and what is possible."""
+    """Number of the file: its key, its unit in SI and its bounds."""
 
     key: str
     unit: str
@@ -77,7 +77,7 @@ _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 @dataclasses.dataclass(frozen=True)
 class Rig:
-    """What is known of the rig that a recording was taken on.
+    """Declared facts of the rig that a recording was taken on.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ class Rig:
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
 
     def __post_init__(self) -> None:
-        """Check every value; a message speaks in the file's units."""
+        """Check every value; messages use the file's units."""
         for field, bounds in NUMBERS.items():
             value = getattr(self, field)
             if value is not None:

@@ -1,4 +1,4 @@
-"""The measured contraction of one muscle over pressure cycles, checked as it is read.
+"""Measured contraction of one muscle over pressure cycles, checked while reading.
 
 375 readings of a Festo MAS-10-N-100 (positioning2021, Tables 3 to 5): three hanging loads, five
 cycles each, one cycle 0 to 6 bar and back in steps of 0.5 bar, a minute of rest before each
@@ -208,8 +208,8 @@ def one_of(*choices: str) -> Parser:
 
     def parse(cell: str) -> str:
         if cell not in choices:
-            wanted = " or ".join(map(repr, choices))
-            raise ValueError(f"{cell!r} is not {wanted}; correct the cell")
+            allowed = " or ".join(map(repr, choices))
+            raise ValueError(f"{cell!r} is not {allowed}; correct the cell")
         return cell
 
     return parse
@@ -303,11 +303,11 @@ def _values(cells: list[str], columns: Mapping[str, Parser], where: str) -> dict
     return values
 
 
-def _converted(cell: str, kind: Callable[[str], N], wanted: str) -> N:
+def _converted(cell: str, kind: Callable[[str], N], allowed: str) -> N:
     try:
         return kind(cell)
     except ValueError:
-        raise ValueError(f"{cell!r} is not {wanted}; correct the cell") from None
+        raise ValueError(f"{cell!r} is not {allowed}; correct the cell") from None
 
 
 def _within(value: N, low: float, high: float) -> N:

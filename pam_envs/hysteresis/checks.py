@@ -1,4 +1,4 @@
-"""Checks of what a user hands to a hysteresis: every message names value, bound and remedy."""
+"""Checks of a hysteresis model's arguments: every message names value, bound and remedy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The Everett map: what a Preisach operator's output changes by between two inputs.
+"""The Everett map: change of a Preisach operator's output between two inputs.
 
 ``E(alpha, beta)`` is the change of the output when the input rises from ``beta`` to ``alpha``
 (and has been below ``beta`` before): the weight of all relays that switch up at or below

@@ -1,9 +1,9 @@
-"""The stack of dominant extrema: a Preisach operator's hysteresis, and its recursive inverse.
+"""The stack of dominant extrema, the state of a Preisach operator, and the recursive inverse.
 
-Of all that an input did, the operator keeps the alternating extrema that no later, larger
-excursion has wiped out, each with the output reached there. In the rows of a lane
+Of an input's history, the operator keeps the alternating extrema that no later, larger excursion
+has wiped out, each with the output reached there. In the rows of a lane
 
-- ``stack[0]`` is where the history starts: ``low``, where every relay is down; or, in a virgin
+- ``stack[0]`` is the start of the history: ``low``, where every relay is down; or, in a virgin
   history, the largest excursion so far of either sign (0 at the start, in a range ``-h..h``);
 - ``stack[count - 2]`` is the last turn and ``stack[count - 1]`` the present input;
 - ``sums[k]`` is the output at ``stack[k]``, so that one term of the Everett map gives the next.
@@ -46,13 +46,13 @@ def _held(x: float, low: float, high: float) -> float:
 
 @kernel
 def _rises(x: float, last: float, goes_up: bool) -> bool:
-    """Return which way ``x`` goes; without motion, the way of the present branch."""
+    """Return the direction of ``x``; without motion, that of the present branch."""
     return goes_up if x == last else x > last
 
 
 @kernel
 def _branch(n: int, rising: bool, goes_up: bool) -> int:
-    """Return the count of turns, less the present input where the same branch goes on."""
+    """Return the count of turns, less the present input if the same branch continues."""
     if n > 1 and rising == goes_up:
         return n - 1
     return n
@@ -65,7 +65,7 @@ def _passes(x: float, bound: float, rising: bool) -> bool:
 
 @kernel
 def _base(n: int, value: float, start_value: float, start: float, low: float) -> int:
-    """Return 0 where the history begins anew: at ``low``, or beyond a virgin one's largest."""
+    """Return 0 if the history begins anew: at ``low``, or beyond the largest virgin excursion."""
     if n == 1 and (value == start_value or (start != low and abs(value) >= abs(start_value))):
         return 0
     return n
@@ -139,7 +139,7 @@ def preisach_step(
     Notes
     -----
     When the stack is full, a further turn is not stored: the smallest loop, that between the last
-    turn and the present input, is forgotten, and the input moves back and forth on the branch
+    turn and the present input, is dropped, and the input moves back and forth on the branch
     that led to that turn. The output has no jump, and all larger loops are kept exactly.
     """
     x = _held(x, low, low + (len(table) - 1) / inverse_cell)
@@ -157,7 +157,7 @@ def preisach_peek(
     x: float, stack: Any, sums: Any, count: Any, lane: int, table: Any, low: float,
     inverse_cell: float,
 ) -> float:  # fmt: skip
-    """Return the output that :func:`preisach_step` would give, and leave the hysteresis alone."""
+    """Return the output that :func:`preisach_step` would give, without changing the state."""
     x = _held(x, low, low + (len(table) - 1) / inverse_cell)
     _, turn, output, part = _find_turn(x, stack, sums, count, lane, low)
     change = everett((x - low) * inverse_cell, (turn - low) * inverse_cell, table)
@@ -221,9 +221,9 @@ def preisach_inverse(
     y: float, stack: Any, sums: Any, count: Any, lane: int, table: Any, low: float,
     inverse_cell: float,
 ) -> float:  # fmt: skip
-    """Return the input that takes the output of one lane to ``y``; the hysteresis is left alone.
+    """Return the input that takes the output of one lane to ``y``; the state is not changed.
 
-    The recursion ``E(u_next, u_turn) = y - y_turn`` from the turn that ``y`` leaves standing:
+    The recursion ``E(u_next, u_turn) = y - y_turn`` from the last turn that ``y`` does not wipe out:
     exact, other than a series over an inverted Everett map, which holds only for relay densities
     of ``alpha - beta`` alone. An output out of reach gives the end of the range. Parameters are
     those of :func:`preisach_step`.
@@ -261,14 +261,14 @@ def invert_rows(
     y: Array, stack: Any, sums: Any, count: Any, table: Any, low: float, inverse_cell: float,
     x: Array,
 ) -> None:  # fmt: skip
-    """Write into ``x`` the input of every lane that gives ``y``, and advance the hysteresis models."""
+    """Write into ``x`` the input of every lane that gives ``y``, and advance the states."""
     for lane in range(len(y)):
         x[lane] = preisach_inverse(y[lane], stack, sums, count, lane, table, low, inverse_cell)
         preisach_step(x[lane], stack, sums, count, lane, table, low, inverse_cell)
 
 
 # --- tiles of lanes -----------------------------------------------------------------------------
-# Most inputs go on along the present branch. So its end points are kept in rows of their own, the
+# Most inputs continue along the present branch. So its end points are kept in rows of their own, the
 # stack is read only where an input leaves the branch, and the outputs of all lanes are evaluated
 # in one loop without branches. The bits are those of preisach_step.
 
@@ -282,7 +282,7 @@ EVERYTHING = 1e300
 
 @kernel
 def _continues(x: float, present: float, turn: float, bound: float) -> float:
-    """Return 1 if an input goes on along the branch from a turn, 0 if it leaves it."""
+    """Return 1 if an input continues along the branch from a turn, 0 if it leaves it."""
     if present > turn:
         return 1.0 if x >= present and x < bound else 0.0
     return 1.0 if x <= present and x > bound else 0.0

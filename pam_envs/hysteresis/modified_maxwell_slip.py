@@ -7,7 +7,7 @@ stiffness ``s = tension / (length - shortest length)``:
 
     P = g(s) + sum_i k_i (s - w_i),    w_i = play(s, r_i)
 
-with ``g`` piecewise linear on evenly spaced knots. The pressure of a wanted stiffness is a plain
+with ``g`` piecewise linear on evenly spaced knots. The pressure of a desired stiffness is a plain
 sum. The stiffness under a pressure is found by marching along the branch from kink to kink, where
 an element begins to slip or the spring has a knot: exact, with no tolerance.
 
@@ -148,8 +148,8 @@ def stiffness_step(
 
     Notes
     -----
-    In every state that the model can reach, the softest-breaking element's slip position lies
-    where no element slips, and from there on the elements slip in the order of their thresholds.
+    In every state that the model can reach, no element slips at the slip position of the
+    element that breaks first, and from there on the elements slip in the order of their thresholds.
     """
     n, cells = len(breaks), len(spring) - 1
     x = state[0][lane]
@@ -163,7 +163,7 @@ def stiffness_step(
     reached = _spring(x, spring, segment) + held + tilt * x - friction
     rising = pressure > reached
     cell, k = _cell(x, segment, cells), 0
-    for _ in range(n + cells):  # no more kinks than that lie on the way
+    for _ in range(n + cells):  # the most kinks on the way
         slope = tilt + (spring[cell + 1] - spring[cell]) / segment + holding
         next_one = min(k, n - 1)
         slip = _next_slip(k < n, state[next_one][lane], breaks[next_one], rising)
@@ -228,7 +228,7 @@ def _run(
 @register
 @dataclass(frozen=True)
 class ModifiedMaxwellSlip(HysteresisModel):
-    """From pressure [Pa] to stiffness [N/m], with the pressure of a wanted stiffness as inverse.
+    """Stiffness [N/m] as a hysteresis of pressure [Pa], with an exact inverse.
 
     Parameters
     ----------
@@ -245,8 +245,8 @@ class ModifiedMaxwellSlip(HysteresisModel):
 
     Notes
     -----
-    The state holds the slip positions, shape (..., n). Beyond its knots the spring goes on with
-    its end slopes.
+    The state holds the slip positions, shape (..., n). Beyond its knots the spring has its
+    end slopes.
     """
 
     kind: ClassVar[str] = "modified_maxwell_slip"
@@ -332,7 +332,7 @@ class ModifiedMaxwellSlip(HysteresisModel):
         """Return the Everett map of the first-order reversal curves, and the output at the start.
 
         An operator with this map agrees on every loop where the model's minor loops are congruent,
-        as they are with a straight spring; a spring with bends may ask for relays of negative
+        as they are with a straight spring; a spring with bends may need relays of negative
         weight, which are left out.
         """
         grid = np.linspace(low, high, levels)
@@ -348,7 +348,7 @@ class ModifiedMaxwellSlip(HysteresisModel):
 
     @cached_property
     def arrays(self) -> tuple[Array, Array, Array, float]:
-        """What the kernels take: breaks, stiffnesses, spring, segment."""
+        """Arguments of the kernels: breaks, stiffnesses, spring, segment."""
         lists = (self.break_stiffnesses, self.stiffnesses, self.spring)
         breaks, stiffnesses, spring = (np.array(values) for values in lists)
         return breaks, stiffnesses, spring, self.segment
@@ -410,7 +410,7 @@ class ModifiedMaxwellSlip(HysteresisModel):
     def scaled(self, width: float, slope: float | None = None) -> ModifiedMaxwellSlip:
         """Return this model with its hysteresis ``width`` times as wide, 0 for none.
 
-        The spring takes over what the elements held at the tips of the major loop, so that the
+        The spring takes over the pressure of the elements at the tips of the major loop, so that the
         tips stay where they are, whatever ``slope``.
         """
         (width,) = floats("width", (width,))

@@ -46,7 +46,7 @@ def identity_peek(
 @register
 @dataclass(frozen=True)
 class NoHysteresis(HysteresisModel):
-    """The output is the input; ``operator=None`` of a plant stands for it."""
+    """The identity; ``operator=None`` of a plant means the same."""
 
     kind: ClassVar[str] = "none"
     identity: ClassVar[bool] = True

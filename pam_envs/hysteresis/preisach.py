@@ -77,7 +77,7 @@ class Preisach(HysteresisModel):
         Everett map at ``n >= 2`` evenly spaced inputs, antisymmetric, of relay weights that are
         nowhere negative; kept as a tuple of tuples. Interpolated bilinearly in between.
     depth : int
-        Extrema that are kept, at least 3. A turn too many forgets the smallest loop.
+        Extrema that are kept, at least 3. A turn too many drops the smallest loop.
     start : {"low", "virgin"}
         State at the beginning: every relay down, at ``low``; or demagnetised, at 0 in a range
         with ``low = -high`` and a map with ``mu(a, b) = mu(-b, -a)``. For a muscle, the first is
@@ -208,7 +208,7 @@ class Preisach(HysteresisModel):
         output = width * self.start_output + slope * start
         return replace(self, table=table, start_output=output)  # type: ignore[arg-type]
 
-    # --- what the map says ----------------------------------------------------------------------
+    # --- properties of the map ----------------------------------------------------------------------
 
     @cached_property
     def everett(self) -> Array:
@@ -268,15 +268,15 @@ class Preisach(HysteresisModel):
     def check(self, usage: Usage) -> None:
         """Refuse another start, range or depth than the plant simulates."""
         span, full = (self.low, self.high), usage.full
-        asked = None
+        needed = None
         if full is not None:
-            asked = (-full, full) if usage.start == "virgin" else (0.0, full)
-        wrong = asked is not None and not np.allclose(span, asked, rtol=1e-9)
+            needed = (-full, full) if usage.start == "virgin" else (0.0, full)
+        wrong = needed is not None and not np.allclose(span, needed, rtol=1e-9)
         if wrong or self.start != usage.start or self.depth != DEPTH:
-            needs = "" if asked is None else f" from {asked[0]:g} to {asked[1]:g} (its range)"
+            text = "" if needed is None else f" from {needed[0]:g} to {needed[1]:g} (its range)"
             raise ValueError(
                 f"hysteresis: the Everett map spans {span} with start {self.start!r} and depth "
-                f"{self.depth}; {usage.plant} needs a map{needs} with start {usage.start!r} and "
+                f"{self.depth}; {usage.plant} needs a map{text} with start {usage.start!r} and "
                 f"depth {DEPTH}"
             )
 
@@ -367,14 +367,14 @@ class Preisach(HysteresisModel):
         Parameters
         ----------
         y : array_like, shape batch_shape
-            Wanted outputs. One out of reach gives the nearest end of the input's range.
+            Desired outputs. One out of reach gives the nearest end of the input's range.
         state : PreisachState
             HysteresisModel before; it is not changed.
 
         Raises
         ------
         ValueError
-            If the output can stand still while the input moves (a cell of the diagonal has no
+            If the output can rest while the input moves (a cell of the diagonal has no
             weight), so that there is no unique input.
         """
         self._check_invertible()
@@ -393,7 +393,7 @@ class Preisach(HysteresisModel):
         if self.weights[k, k] <= 0.0:
             raise ValueError(
                 f"the relay weight of the diagonal cell {k} is {self.weights[k, k]}; it must be"
-                " above 0 for an inverse, or the output stands still after a turn: add a line"
+                " above 0 for an inverse, or the output does not move after a turn: add a line"
                 " with plus_linear(slope)"
             )
 

@@ -1,4 +1,4 @@
-"""The hysteresis protocol: what every model offers to plants, files and controllers; registry.
+"""The hysteresis protocol, between models and plants, files and controllers, and its registry.
 
 A model is one class in one file of this folder, marked :func:`register`. It offers
 
@@ -132,7 +132,7 @@ class Kernels(NamedTuple):
 
 @dataclass(frozen=True)
 class Usage:
-    """What a plant demands of its operator, for :meth:`HysteresisModel.check`.
+    """Demands of a plant on its operator, for :meth:`HysteresisModel.check`.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ class Usage:
     reach : float
         Smallest range on either side of 0 that the operator needs to span.
     unit_slope : bool
-        Whether input and output are the same quantity, so that the total slope is 1.
+        True if input and output are the same quantity: the total slope is 1.
     """
 
     plant: str
@@ -167,7 +167,7 @@ class HysteresisModel:
     choice: ClassVar[str | None] = None
     """Value of ``hysteresis=`` that selects the model; ``kind`` unless given."""
     identity: ClassVar[bool] = False
-    """Whether the output is the input, so that a plant may leave the operator out."""
+    """True for the model whose output is its input."""
     kernels: ClassVar[Kernels]
     state_rows: ClassVar[int]
     """Rows of state of one operator."""
@@ -268,14 +268,14 @@ class Rows:
         """Return the states of so many rows at the beginning."""
         return (self.operator.initial_state((rows,)),)
 
-    def forward(self, felt: Array, state: RowsState) -> tuple[Array, RowsState]:
+    def forward(self, x: Array, state: RowsState) -> tuple[Array, RowsState]:
         """Return the outputs for inputs, shape (rows,), and the states they leave."""
-        output, after = self.operator.step(felt, state[0])
+        output, after = self.operator.step(x, state[0])
         return output, (after,)
 
-    def inverse(self, wanted: Array, state: RowsState) -> Array:
+    def inverse(self, y: Array, state: RowsState) -> Array:
         """Return the inputs that give outputs, shape (rows,); the states stay."""
-        return self.operator.inverse_step(wanted, state[0])[0]  # type: ignore[no-any-return]
+        return self.operator.inverse_step(y, state[0])[0]  # type: ignore[no-any-return]
 
 
 def padded(values: Sequence[float]) -> list[float]:

@@ -1,1 +1,1 @@
-"""From recordings to models: fits that say how much of them the data decide."""
+"""Identification of models from measurements, with their identifiability."""

@@ -1,4 +1,4 @@
-"""The measured muscle, identified from quasi-static cycles: contraction against pressure.
+"""Identification of a muscle from quasi-static cycles of contraction against pressure.
 
 The tables of positioning2021 hold one inflation and deflation at each of three loads, five times
 over. They fix the static law and the shape of the major loop. They do not fix what a small reversal
@@ -317,12 +317,12 @@ def repeatability_floor(table: ContractionTable) -> float:
 
 @dataclass(frozen=True)
 class Identifiability:
-    """What the cycles fix of a plant's parameters.
+    """Identifiability of a plant's parameters from the cycles.
 
     Attributes
     ----------
     names : tuple of str
-        The parameters asked about.
+        Names of the parameters.
     rank : int
         Independent combinations of them that the means fix to better than a fifth (one standard
         deviation).

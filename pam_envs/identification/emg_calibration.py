@@ -1,4 +1,4 @@
-"""The constants of the two calibrated EMG readings, fitted to yeh2010's three reductions.
+"""Calibration of the two EMG readings to the three reductions of yeh2010.
 
 Run ``python -m pam_envs.identification.emg_calibration`` to write them anew. They are *fitted*, one
 a published figure, and predict nothing: what is assumed is an orthosis that delivers 20 % of

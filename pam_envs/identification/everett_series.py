@@ -3,7 +3,7 @@
     u = u_min + sum_i G(F_(i+1), F_i) + G(f, F_k),   G(f_alpha, f_alphabeta) = u_alpha - u_beta
 
 with ``F_i`` the past extrema of the output. ``G`` is read from first-order curves, so that the sum
-is exact up to the first turn. After two turns the output at the last one stands no longer on a
+is exact up to the first turn. After two turns the output at the last one is no longer on a
 first-order curve, and the sum is off, unless the map depends on ``alpha - beta`` alone. The exact
 inverse is the recursion ``E(u_next, u_turn) = f_next - f_turn`` of
 :meth:`~pam_envs.hysteresis.preisach.Preisach.inverse_step`; this one is here to be compared.

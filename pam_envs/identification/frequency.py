@@ -120,7 +120,7 @@ def _check(w: Array, values: Complex, order: int, relative_degree: int) -> None:
     if order < 1 or len(w) < order:
         raise ValueError(
             f"order is {order} with {len(w)} frequencies; it must be from 1 to their number:"
-            " measure more frequencies or ask for fewer poles"
+            " measure more frequencies or choose fewer poles"
         )
     if not 1 <= relative_degree <= order:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""From measured and synthetic strides to the tables of :mod:`pam_envs.references.gait`.
+"""Tables of :mod:`pam_envs.references.gait` from measured and synthetic strides.
 
 Run ``python -m pam_envs.identification.gait_tables`` to write them anew.
 
@@ -28,7 +28,7 @@ SHANK = 0.43
 """Length of the shank [m] of the subject, knee to ankle."""
 HARMONICS = 8
 SHIFT = {"low": -0.06, "high": 0.2}
-"""Where on the sole [m ahead of the ankle] the ground can push."""
+"""Range of the centre of pressure on the sole [m ahead of the ankle]."""
 
 KNOTS = (0.0, 0.15, 0.3, 0.5, 0.65, 0.8, 1.0)
 STAIRS: dict[str, dict[str, tuple[float, ...]]] = {

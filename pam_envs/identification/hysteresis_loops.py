@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LoopFit:
-    """What was found, and how much of it the record fixes.
+    """Identified model, and how much of it the record fixes.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class LoopFit:
 
     @property
     def determined(self) -> bool:
-        """Whether the record fixes every unknown."""
+        """True if the record fixes every unknown."""
         return self.rank == self.unknowns
 
 

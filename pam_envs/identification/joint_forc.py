@@ -1,11 +1,11 @@
-"""The hysteresis of a joint, measured on a rig: Everett map, symmetry and congruency with a verdict.
+"""Hysteresis of a joint from a rig: Everett map, symmetry and congruency, with a verdict.
 
 fluidic_muscles (section 3.2) drives the joint along the ascending branch, turns at chosen
 set-points and lets it fall to negative saturation: first-order descending curves, which give the
 Everett map ``E(alpha, beta) = f_alpha - f_alphabeta`` (3.2). The printed rule for the other half,
 ``f_alphabeta = -f_betaalpha``, is wrong; it is ``E(beta, alpha) = -E(alpha, beta)``.
 
-Whether a Preisach operator may be read off at all is measured in the same test:
+The same test measures if a Preisach operator may be identified at all:
 
 - *symmetry*, ``mu(a, b) = mu(-b, -a)``: the descending branches are the ascending ones turned by
   half a turn. Two equal muscles against each other have it, a single muscle has not.
@@ -47,7 +47,7 @@ INSIDE = 0.7
 
 @dataclass(frozen=True)
 class JointHysteresis:
-    """What the test gives.
+    """Result of the test.
 
     Attributes
     ----------
@@ -72,12 +72,12 @@ class JointHysteresis:
 
     @property
     def symmetric(self) -> bool:
-        """Whether the map counts as symmetric."""
+        """True if the map counts as symmetric."""
         return self.symmetry <= SYMMETRY
 
     @property
     def preisach(self) -> bool:
-        """Whether congruency and wiping out allow a Preisach operator."""
+        """True if congruency and wiping out allow a Preisach operator."""
         return self.congruency <= CONGRUENCY and self.wiping_out <= WIPING_OUT
 
     @property

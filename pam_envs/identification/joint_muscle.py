@@ -1,4 +1,4 @@
-"""One muscle of a joint alone, under a constant load: what the symmetry test has to refuse.
+"""One muscle of a joint under a constant load, the counterexample of the symmetry test.
 
 Against its twin a muscle's hysteresis is symmetric, since each muscle does on the way back what the
 other one did on the way there. Alone it is not: its friction grows with its pressure, and its
@@ -42,7 +42,7 @@ class HangingMuscle:
         if self.plant.dynamics != "muscles" or self.plant.hysteresis.operator is None:
             raise ValueError(
                 f"dynamics = {self.plant.dynamics!r} with hysteresis {self.plant.hysteresis.kind!r} has no"
-                " muscle that remembers; take AntagonisticJoint.paper() or .measured()"
+                " muscle with hysteresis; take AntagonisticJoint.paper() or .measured()"
             )
 
     def rest_contractions(self, pressures: ArrayLike) -> Array:

@@ -1,4 +1,4 @@
-"""What the antagonistic joint's presets were identified from, and how.
+"""Identification of the antagonistic joint's presets.
 
 :func:`fit_force_map` fits the static law of :mod:`pam_envs.muscle.force_map` on the measured map,
 :func:`fit_angle_plays` the reduced plant's hysteresis on loops of the plant with muscles. The

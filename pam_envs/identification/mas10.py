@@ -1,4 +1,4 @@
-"""The shipped MAS-10-N-100 plants, made from the shipped readings, and the report on them."""
+"""Identification of the shipped MAS-10-N-100 plants from the shipped readings, and its report."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ MISSED = (
     "the flat step of the inflating curve from 5 to 5.5 bar at 0 and 2.55 kg",
     "the steep drop of the deflating curve from 3.5 to 3 bar",
     "the drift of +0.03 mm a repeat at 0 kg",
-    "a width that depends on load other than linearly (three loads cannot tell)",
+    "a width that depends on load other than linearly (three loads do not show it)",
 )
-"""What the residuals show and the model has no part for."""
+"""Structure of the residuals that the model does not represent."""
 
 STOCK = (PlayOperator.kind, Preisach.kind, NoHysteresis.kind)
 """Kinds of hysteresis that are identified on the tables."""
@@ -128,13 +128,13 @@ def identify_all(
                 "Preisach's congruency error (minor loops between 2 and 3 bar after 3 and after 6 "
                 f"bar): {inner:.1e} in effective pressure, {outer:.1%} in contraction. For a "
                 "single muscle a Preisach map from pressure straight to contraction is an "
-                "approximation; here the static law stands between."
+                "approximation; here the static law comes between."
             )
     lines += ["", congruency, "", "## What the readings fix", ""]
     found = cycles.identifiability(fits[PlayOperator.kind])
     lines += [
         "Share of each parameter that lies in the combinations that the means fix to better than "
-        "a fifth. What is near 0 is assumed (its range stands in the plant file) or comes from the "
+        "a fifth. What is near 0 is assumed (its range is in the plant file) or comes from the "
         "prior: equal weight on every threshold, which is what fills the minor loops.",
         "",
         "| parameter | fixed |",

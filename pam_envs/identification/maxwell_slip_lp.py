@@ -51,7 +51,7 @@ LEAST_SLOPE = 1e-3
 """Least slope of the spring over that of the line between the tips of the major loop."""
 WEAKEST = 1.2e-3
 """Least singular value of the equations, over the largest, that counts as fixing something. What
-lies below would pass the noise of a record on nearly a thousandfold."""
+is smaller would amplify the noise of a record almost a thousandfold."""
 OPEN = 0.05
 """Part of an element in a combination that is not fixed, from which on the element is open."""
 AT_ZERO = 0.02
@@ -64,7 +64,7 @@ class OpenParameters(UserWarning):
 
 @dataclass(frozen=True)
 class SlipFit:
-    """What was found, and how much of it the loops fix.
+    """Identified model, and how much of it the loops fix.
 
     Parameters
     ----------
@@ -92,12 +92,12 @@ class SlipFit:
 
     @property
     def determined(self) -> bool:
-        """Whether all is fixed but the split between ``k_N`` and the spring."""
+        """True if all is fixed but the split between ``k_N`` and the spring."""
         return self.unknowns - self.rank <= 1
 
     @property
     def note(self) -> str:
-        """What the loops leave open, in a sentence."""
+        """Unknowns that the loops leave open, in a sentence."""
         fixed = f"the loops fix {self.rank} of {self.unknowns} unknowns"
         if self.determined:
             return f"{fixed}; the last element acts as a part of the spring"
@@ -195,7 +195,7 @@ class _Grid:
 
 @dataclass(frozen=True)
 class _Solution:
-    """What a programme found; ``full`` is the largest pressure [Pa]."""
+    """Solution of a linear programme; ``full`` is the largest pressure [Pa]."""
 
     grid: _Grid
     rows: Array

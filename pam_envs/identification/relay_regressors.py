@@ -1,4 +1,4 @@
-"""How much of every relay cell is up, along a record: the regressors of a Preisach fit."""
+"""Regressors of a Preisach fit: the share of every relay cell that is up, along a record."""
 
 from __future__ import annotations
 

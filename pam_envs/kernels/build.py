@@ -1,4 +1,4 @@
-"""The one place that knows the compiler, and the arithmetic that every kernel may use.
+"""Kernels: pure functions, compiled with numba or run as plain Python.
 
 A *kernel* is a plain Python function of scalars (or of rows of scalars) marked :func:`kernel`.
 :func:`build` turns one and all that it calls into machine code with numba, or, with
@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 
 F = TypeVar("F", bound=Callable[..., Any])
 Bound = frozenset[tuple[str, Any]]
-"""Global names of a call graph and what stands for them."""
+"""Global names of a call graph and their values."""
 
 COMPILED: bool = os.environ.get("PAM_ENVS_COMPILE", "1").lower() not in {"0", "false", "no", "off"}
-"""Whether kernels are compiled (``PAM_ENVS_COMPILE=0`` runs them as plain Python)."""
+"""True if kernels are compiled (``PAM_ENVS_COMPILE=0`` runs them as plain Python)."""
 
 LANES = 32 if COMPILED else 4
 """Environments that one tile of a batch advances together. Plain Python computes them one by one,
@@ -77,7 +77,7 @@ def scratch(rows: int, lanes: int) -> Any:
 def tile_view(tiles: Any, tile: int, rows: int, lanes: int) -> Any:
     """Return one tile of ``rows`` by ``lanes`` numbers.
 
-    Compiled, the sizes are constants, so that the compiler knows how far apart the rows lie.
+    Compiled, the sizes are constants, so that the compiler knows the strides of the rows.
     """
     return tiles[tile]
 
@@ -109,9 +109,9 @@ def threads() -> int:
         return 1
     from pam_envs.kernels.compiler import get_num_threads
 
-    wanted = os.environ.get("OMP_NUM_THREADS", "")
+    given = os.environ.get("OMP_NUM_THREADS", "")
     most = int(get_num_threads())
-    return max(1, min(most, int(wanted))) if wanted.isdigit() else most
+    return max(1, min(most, int(given))) if given.isdigit() else most
 
 
 def build(
@@ -127,7 +127,7 @@ def build(
     function : callable
         A kernel.
     name : str
-        What to call it (and its file in the cache).
+        Its name, also of its file in the cache.
     parallel : bool
         Spread ``prange`` loops over the cores.
     **names : object

@@ -22,7 +22,7 @@ _CALLEE: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wra
 
 
 class _Locator(caching._CacheLocator):
-    """Keeps compiled code by the digest of its call graph, which stands in the function's name.
+    """Keeps compiled code by the digest of its call graph, which is part of the function's name.
 
     Numba's own locator looks only at the file of the function itself, so that an edit of a
     function that it calls, in another file, would go unnoticed, and an edited comment would not.
@@ -40,7 +40,7 @@ class _Locator(caching._CacheLocator):
         return _COMPILER
 
     def get_disambiguator(self) -> str:
-        """Tell functions of one name apart: names are unique here."""
+        """Return nothing: names are unique here."""
         return ""
 
     @classmethod
@@ -68,7 +68,7 @@ class _Cache(caching.Cache):
 
 
 def _constant_view(context: Any, builder: Any, view: Any, data: Any, shape: tuple[int, int]) -> Any:
-    """Return an array value of constant shape over memory that it does not own."""
+    """Return an array value of constant shape over an address that it does not own."""
     width = context.get_abi_sizeof(context.get_data_type(view.dtype))
     made = make_array(view)(context, builder)
     populate_array(
@@ -122,7 +122,7 @@ _DTYPES = (types.float64, types.int64, types.float32, types.int8)
 
 @intrinsic(prefer_literal=True)
 def _array_at(typing: Any, book: Any, index: Any, dimensions: Any, kind: Any) -> Any:
-    """Return the array whose address and shape stand in ``book`` (see ``build.address_book``)."""
+    """Return the array with an address and a shape of ``book`` (see ``build.address_book``)."""
     if not isinstance(dimensions, types.IntegerLiteral) or not isinstance(
         kind, types.IntegerLiteral
     ):
@@ -191,7 +191,7 @@ def compiled(
         if not entry:
             return njit(forceinline=original.__pam_kernel__, **_CALLEE)(made)  # type: ignore[no-any-return]
         dispatcher = njit(parallel=parallel, **_OPTIONS)(made)
-        with contextlib.suppress(RuntimeError):  # without a place to write: compile in memory
+        with contextlib.suppress(RuntimeError):  # without a place to write nothing is kept
             dispatcher._cache = _Cache(made)
         return dispatcher  # type: ignore[no-any-return]
 

@@ -1,1 +1,1 @@
-"""Loads and joints, with steps that stay exact where the motion is stiff."""
+"""Mechanics of loads, levers, joints and chains."""

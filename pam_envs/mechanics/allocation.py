@@ -1,4 +1,4 @@
-"""From torque and stiffness of a joint to the two bundles that pull it, exactly, and what is left.
+"""Allocation of torque and stiffness of a joint to its two bundles, exactly, with the residual.
 
 A bundle's force is ``P = X phi(C)`` and its slope over the contraction ``dP/dC = X psi(C)``, with
 ``phi = (L_n - C)(C_max - C)``, ``psi = 2 C - L_n - C_max`` and the *factor* ``X = k_0 + k_1 p``

@@ -1,4 +1,4 @@
-"""The lever between two antagonistic muscles: lengths and lever arms of fluidic_muscles, Eq. (1.1).
+"""Lever between two antagonistic muscles: lengths and lever arms (fluidic_muscles, Eq. 1.1).
 
     L_A = | (r_u, l_u) + R(phi) (-r_o, l_o) |,    L_B = | (-r_u, l_u) + R(phi) (r_o, l_o) |
 
@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class AntagonisticLever:
-    """Where the muscles of one stage are fixed; ``u`` is the lower plate, ``o`` the upper one."""
+    """Fixing points of the muscles of one stage; ``u`` is the lower plate, ``o`` the upper one."""
 
     r_u: float = parameter(0.0362, "m", 0.005, 0.5, "derived", _SIZE)
     r_o: float = parameter(0.0362, "m", 0.005, 0.5, "derived", _SIZE)

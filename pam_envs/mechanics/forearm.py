@@ -1,4 +1,4 @@
-"""The wearer's forearm with the orthosis on it, below an upper arm that hangs.
+"""The wearer's forearm with the orthosis on it, below a hanging upper arm.
 
     J_w q'' = J_w q_w'' + K (q_w - q) + D (q_w' - q') + w_w (sin q_w - sin q) + felt + pushed
     J_o q'' = Q - w_o sin q - d q' - felt

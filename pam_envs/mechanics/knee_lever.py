@@ -1,4 +1,4 @@
-"""The zig-zag wire of the orthosis as a torsion spring, and the lever by which the muscle pulls.
+"""The zig-zag wire of the orthosis as a torsion spring, and the lever arm of the muscle.
 
 The wire's two arms of length ``L_b`` include the angle ``theta``; the muscle, with fittings of
 length ``L_a``, spans their ends (yeh2010, Fig. 4). Bending the knee opens the angle, the muscle

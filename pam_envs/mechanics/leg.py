@@ -1,4 +1,4 @@
-"""Shank and foot about the knee: what the knee has to bear, and how the wearer holds his path.
+"""Shank and foot about the knee: torque at the knee, and the wearer's hold of the path.
 
 The shank leans forward by ``psi`` (knee ahead of the ankle), the thigh by ``beta = q - psi`` with
 the knee flexion ``q``. The hip moves evenly, so that the knee's acceleration is the thigh's. The
@@ -59,7 +59,7 @@ class Leg:
         0.0,
         2.0,
         "assumed",
-        "height that the ground's force goes on pointing at while it brakes, at another pace; "
+        "height that the ground's force keeps pointing at while it brakes, at another pace; "
         "least squares on the measured stride give 1.13 m; 0: the centre of pressure as measured",
         neutral=0.0,
         spread=(0.9, 1.15),
@@ -107,8 +107,8 @@ def centre_of_pressure(
     """Return the centre of pressure [m ahead of the ankle] at another pace than the natural one.
 
     Horizontal forces grow with the square of the pace. The body would tip over if the ground's
-    force did not go on pointing at about its centre of mass, so a wearer who walks slowly, with a
-    force that is nearly upright, stays at the heel for longer. While the force drives the body
+    force did not keep pointing at about its centre of mass, so a wearer who walks slowly, with a
+    force that is almost upright, stays at the heel for longer. While the force drives the body
     ahead nothing moves: the centre of pressure is at the ball of the foot already, and further
     ahead the heel would be free under the whole body weight.
 

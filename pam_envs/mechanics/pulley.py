@@ -1,9 +1,9 @@
-"""A pulley that two antagonistic bundles turn: chakarov2018, Eqs. (8) to (10).
+"""Pulley between two antagonistic bundles (chakarov2018, Eqs. 8 to 10).
 
     C_a = r (q_max - q),    C_b = r (q - q_min),    Q = r (P_b - P_a)
 
 Bundle b raises the angle, bundle a lowers it. Each has its nominal length at one end of the
-range, where it is longest; beyond, stiff springs stand for the mechanical stops.
+range, where it is longest; beyond, stiff springs represent the mechanical stops.
 """
 
 from __future__ import annotations

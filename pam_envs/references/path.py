@@ -1,6 +1,6 @@
-"""Paths of a tool: where it has to be and point, pose after pose, and when.
+"""Paths of a tool: position and direction over time.
 
-A path is told by the joint angles of its two ends, between which each joint goes in a straight
+A path is given by the joint angles of its two ends, between which each joint goes in a straight
 line; its poses are those of the arm on this line. So every path is within reach, and there are
 joint angles to compare a plan with. That the ends of fluidic_muscles's example are meant so, and
 not as ends of a straight line of the tool, follows from its figures: the smallest angles then peak
@@ -103,7 +103,7 @@ def draw_ends(seed: int, number: int, stages: int, limit: float) -> tuple[Array,
     """Return the ends of paths that are drawn at random: joint angles [rad], shapes (number, n).
 
     Path ``i`` of a seed is the same however many are drawn. An end uses up to 0.9 of the limit,
-    the joints turn by 0.8 of it or more on the way, all together, and the arm is nowhere nearly
+    the joints turn by 0.8 of it or more on the way, all together, and the arm is nowhere almost
     straight: there it could go either way.
 
     Parameters
@@ -127,7 +127,7 @@ def draw_ends(seed: int, number: int, stages: int, limit: float) -> tuple[Array,
 
 
 def _usable(line: Array, limit: float) -> bool:
-    """Return whether a path is long enough and nowhere nearly straight."""
+    """Return whether a path is long enough and nowhere almost straight."""
     bent, way = np.sum(line**2, axis=1), np.sum((line[-1] - line[0]) ** 2)
     return bool(way > (0.8 * limit) ** 2 and np.min(bent) > (0.6 * limit) ** 2)
 

@@ -1,4 +1,4 @@
-"""Where a wearer means to move: minimum-jerk reaches, sines, or nowhere.
+"""Intended motion of a wearer: minimum-jerk reaches, sines, or rest.
 
 Everything is a function of time and of a few constants that are drawn when an episode begins, so
 that a preview is an evaluation at a later time. Reaches run from one drawn place to the next, one

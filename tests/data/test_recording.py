@@ -1,4 +1,4 @@
-"""Recordings, tables of readings and rig files: what is read, mended and refused."""
+"""Recordings, tables of readings and rig files: reading, repair and refusal."""
 
 from __future__ import annotations
 

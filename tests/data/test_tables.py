@@ -1,4 +1,4 @@
-"""The measured table: what it holds, what its cells scatter by, and what its reader refuses."""
+"""The measured table: contents, scatter, and the cells that its reader refuses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Asking a Preisach hysteresis what it would do leaves it alone and tells the truth."""
+"""The peek of a Preisach operator equals its step and leaves the state unchanged."""
 
 from __future__ import annotations
 

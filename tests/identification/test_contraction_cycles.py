@@ -1,4 +1,4 @@
-"""The shipped plants come from the shipped readings, and say what these do not fix."""
+"""The shipped plants are identified from the shipped readings, with their identifiability."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hysteresis models found again from their records, and how much a record can say."""
+"""Identification of hysteresis models from their own records, and its rank."""
 
 from __future__ import annotations
 

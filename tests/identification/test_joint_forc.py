@@ -1,4 +1,4 @@
-"""First-order curves of a joint: what passes as a symmetric Preisach operator, and what fails."""
+"""First-order curves of a joint: the test for a symmetric Preisach operator."""
 
 from __future__ import annotations
 

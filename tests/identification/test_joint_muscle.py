@@ -1,4 +1,4 @@
-"""One muscle of a joint under a load: its hysteresis is no symmetric one, its joint's is."""
+"""One muscle of a joint under a load has asymmetric hysteresis, its joint symmetric."""
 
 from __future__ import annotations
 

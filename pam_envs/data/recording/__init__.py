@@ -1,1 +1,1 @@
-"""recording."""
+"""Recordings of rigs: columns, clock, segments."""

@@ -1,4 +1,4 @@
-"""The time of a recording: is it whole, and the even steps that it is put on."""
+"""Clock of a recording: gaps and jitter, and resampling to even steps."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ON_GRID = 0.1
 
 @dataclasses.dataclass(frozen=True)
 class Clock:
-    """What the column of time says.
+    """Timing that the column of time declares.
 
     Attributes
     ----------
@@ -266,7 +266,7 @@ def block_size(period: float) -> int:
 
 
 def block_means(values: Array, starts: Indices, size: int) -> Array:
-    """Return means over blocks that lie evenly around every ``size``-th sample of each run.
+    """Return means over blocks centred on every ``size``-th sample of each run.
 
     Parameters
     ----------
@@ -286,7 +286,7 @@ def block_means(values: Array, starts: Indices, size: int) -> Array:
 
 
 def block_places(n: int, starts: Indices, size: int, offset: int = 0) -> Indices:
-    """Return the samples at (or ``offset`` after) which the blocks of :func:`block_means` stand."""
+    """Return the samples of the blocks of :func:`block_means`, or those ``offset`` after them."""
     ends = np.r_[starts[1:], n]
     return np.concatenate(
         [

@@ -1,4 +1,4 @@
-"""Columns of a file of measurements: its header, its cells and what is wrong with them."""
+"""Columns of a file of measurements: header, cells and their faults."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pam_envs.wording import near
 
 Array = NDArray[np.float64]
 SHOWN = 5
-"""How many rows a message names."""
+"""Most rows that a message names."""
 
 CONVERSIONS = {
     "s": {"ms": "divide by 1000", "us": "divide by 1e6", "min": "multiply by 60"},
@@ -37,7 +37,7 @@ CONVERSIONS = {
     "C": {"k": "subtract 273.15", "f": "subtract 32 and divide by 1.8"},
     "kg": {"n": "divide by 9.80665", "g": "divide by 1000"},
 }
-"""What makes the wanted unit of another one, by wanted unit and other unit in lower case."""
+"""Conversion to a unit of SI from another unit (lower case), in words."""
 
 
 class RecordingError(ValueError):
@@ -190,7 +190,7 @@ def read_sheet(path: str | Path, known: Sequence[str], required: Sequence[str], 
         for name in header
         if name not in known
     ]
-    problems += [f"row 1: the column {n} stands twice" for n in known if header.count(n) > 1]
+    problems += [f"row 1: the column {n} appears twice" for n in known if header.count(n) > 1]
     if not problems:  # a missing column is most often a misspelt one
         problems = [f"row 1: {what} needs the column {n}" for n in required if n not in header]
     if problems:
@@ -223,13 +223,13 @@ def column_hint(name: str, known: Iterable[str]) -> str:
         return f"; name it or take it out, known: {', '.join(columns)}"
     stem, _, unit = name.rpartition("_")
     for column in columns:
-        base, _, wanted = column.rpartition("_")
-        if wanted not in CONVERSIONS:
+        base, _, expected = column.rpartition("_")
+        if expected not in CONVERSIONS:
             continue
         if name.lower() == base.lower():
             return f"; give {column}, with the unit in the name"
-        if stem.lower() == base.lower() and unit != wanted:
-            recipe = CONVERSIONS[wanted].get(unit.lower())
+        if stem.lower() == base.lower() and unit != expected:
+            recipe = CONVERSIONS[expected].get(unit.lower())
             return f"; give {column} instead" + (f": {recipe}" if recipe else "")
     return near(name, columns)
 

@@ -1,4 +1,4 @@
-"""A recording of a rig: what was commanded, and what the sensors read, on even steps of time.
+"""A recording of a rig: commands and sensor readings on even steps of time.
 
     time_s,segment,pressure_command_bar,pressure_bar,contraction_mm,load_N
     0.00,staircase,0.0,0.004,0.01,25.0
@@ -181,7 +181,7 @@ class Recording:
         valve_closed : sequence of str
             Segments with the valve shut.
         source : str
-            A name for messages. They count rows as if the arrays stood in a file with a header.
+            A name for messages, which count rows as in a file with a header.
 
         Raises
         ------

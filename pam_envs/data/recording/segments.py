@@ -1,4 +1,4 @@
-"""Segments of a recording: what is said of them, and which repeat one another."""
+"""Segments of a recording: their declared properties and repetitions."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def check_rig(recording: Recording, rig: Rig) -> list[str]:
     for group in rig.repeats:
         lengths = {label: len(recording.rows_of(label)) for label in group}
         if max(lengths.values()) - min(lengths.values()) >= 3:
-            told = ", ".join(f"{label!r} has {n}" for label, n in lengths.items())
+            listed = ", ".join(f"{label!r} has {n}" for label, n in lengths.items())
             problems.append(
-                f"segments that repeat one another must be equally long: {told} samples; cut "
+                f"segments that repeat one another must be equally long: {listed} samples; cut "
                 "them alike, or take them out of repeats"
             )
     return problems
@@ -59,7 +59,7 @@ def repeat_rows(recording: Recording, rig: Rig) -> list[list[Indices]]:
 
 
 def returns(segment: Indices, segments: Sequence[str], rows: Indices) -> list[str]:
-    """Return which segments stand in several places, as sentences."""
+    """Return the segments that appear in several places, as sentences."""
     first = np.flatnonzero(np.r_[True, np.diff(segment) != 0])
     again = [i for i in first if np.any(segment[:i] == segment[i])]
     labels = list(dict.fromkeys(segments[segment[i]] for i in again))

@@ -1,4 +1,4 @@
-"""What an optimum of a redundant chain has to fulfil: the equations of one Newton iteration.
+"""Optimality conditions of a redundant chain: the equations of one Newton iteration.
 
 fluidic_muscles, (2.2) to (2.12), with two corrections: the second derivative of the Lagrangian
 holds the curvature of the constraint, ``sum_i lambda_i d2 g_i / dq2``, which the text leaves to
@@ -87,7 +87,7 @@ def column(work: Any, k: int) -> tuple[float, float, float, float, float, float]
 
 @kernel
 def multipliers_of_direction(multipliers: Any, pose: Any) -> tuple[float, float, float]:
-    """Return the multipliers of the direction as a vector across the wanted one."""
+    """Return the multipliers of the direction as a vector across the desired one."""
     sx, sy, sz = across(pose[3], pose[4], pose[5])
     tx, ty, tz = cross(pose[3], pose[4], pose[5], sx, sy, sz)
     s, t = multipliers[3], multipliers[4]
@@ -96,7 +96,7 @@ def multipliers_of_direction(multipliers: Any, pose: Any) -> tuple[float, float,
 
 @kernel
 def errors_of(work: Any, pose: Any) -> tuple[float, float, float, float, float]:
-    """Return the errors of position [m] and of direction, across the wanted one."""
+    """Return the errors of position [m] and of direction, across the desired one."""
     end = block(0, N_STAGES, N_STAGES)
     dx, dy, dz = (
         work[end + DIRECTION][0],

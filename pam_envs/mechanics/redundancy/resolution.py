@@ -4,7 +4,7 @@
 
 fluidic_muscles, section 2. The weight grows without bound towards the limits, so that an optimum
 within them is found wherever there is one nearby; the unweighted variant minimises ``q'q`` and
-knows no limits. The iteration is in ``redundancy_newton``.
+has no limits. The iteration is in ``redundancy_newton``.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ LIMIT = float(np.deg2rad(30.0))
 """Largest angle of a joint [rad] (fluidic_muscles, section 2)."""
 UNIT_TOLERANCE = 1e-6
 REACHED = 1e-5
-"""Distance [m] and turn [rad] from which the nearest pose is the one that is wanted."""
+"""Distance [m] and turn [rad] below which the nearest pose counts as reached."""
 
 
 class UnreachablePose(ValueError):

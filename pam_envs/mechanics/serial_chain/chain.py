@@ -38,7 +38,7 @@ BOUNDS = {
 
 
 HEAVY = ("masses", "across", "along")
-"""What grows with the mass of the links."""
+"""Properties that are proportional to the mass of the links."""
 
 
 @dataclass(frozen=True)

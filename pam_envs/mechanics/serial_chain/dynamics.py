@@ -1,4 +1,4 @@
-"""How a serial chain moves: mass matrix and bias torques, and the solution of ``M x = b``.
+"""Dynamics of a serial chain: mass matrix, bias torques, and the solution of ``M x = b``.
 
     M(q) qdd + bias(q, qd) = joint torques
 

@@ -1,6 +1,6 @@
-"""Where the links of a serial chain are: frames, joint axes, tip, for lanes side by side.
+"""Kinematics of a serial chain: frames, joint axes and tip, for lanes side by side.
 
-Each joint turns about a fixed axis of the frame before it; its link lies along the z of the frame
+Each joint turns about a fixed axis of the frame before it; its link is along the z of the frame
 behind it. Everything is told in the base's frame, and motions as screws about the base's origin:
 a turn about joint ``k`` moves the point of a body in the origin with ``point_k x axis_k``. So no
 vector has to be turned from frame to frame.

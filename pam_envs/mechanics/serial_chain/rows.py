@@ -1,4 +1,4 @@
-"""Where the numbers of a serial chain stand in rows of parameters and of scratch.
+"""Row indices of a serial chain in parameters and scratch.
 
 Parameters, from the row ``chain`` of ``fixed``: the gravity vector, then one block of
 ``LINK_ROWS`` for each joint with its link. Scratch, from the row ``base`` of ``work``, for a chain

@@ -1,1 +1,1 @@
-"""core."""
+"""Parts of every plant: files, rollout, replay, stepper, linear model."""

@@ -1,20 +1,20 @@
-"""The hysteresis of the elbow's bundles: friction driven by their contraction.
+"""Hysteresis of the elbow's bundles: friction driven by their contraction.
 
 The threads of the braid slide as the length changes, and press on each other in proportion to the
 force. An operator of slope 1 follows the travel of the pulley (the contraction of bundle b; that
-of bundle a is its mirror image, so that one operator serves both). What it lags behind makes the
-force of each bundle
+of bundle a is its mirror image, so that one operator serves both). Its lag gives the force of
+each bundle
 
     P = X [(L_n - C) (C_max - C) - s],    s = loop L_n C_max lag / (2 largest lag)
 
 with the lag of that bundle's own contraction. ``loop`` is the largest difference of the forces
 while the bundle is stretched and let go, over its force at nominal length, at any one pressure:
-so is the paper's 7.5 % read. It was reported of loops that overload the muscles beyond their
+so the paper's 7.5 % is read. It was reported of loops that overload the muscles beyond their
 nominal length; shorter ones are said to have less.
 
 The two presets are two hysteresis models and not one in two forms. Plays are alike wherever the
-elbow is, and their thresholds are spread evenly on a logarithmic scale. The Preisach preset has
-thresholds spread evenly up to its largest, so that less slides in small motions, and less friction
+elbow is; their thresholds are spread evenly on a logarithmic scale. The Preisach preset has
+thresholds spread evenly up to its largest, so that small motions have less slip, and less friction
 mid-stroke than towards either end, where one of the bundles is as long as it gets. No plays can do
 that. Both are assumed; the paper gives no more than the largest difference, which is the same.
 """

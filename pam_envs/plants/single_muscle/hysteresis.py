@@ -100,15 +100,15 @@ class HysteresisInverse:
         """
         if self.operator is None:
             return np.clip(np.asarray(drive, float), 0.0, self.full), state
-        felt, _ = self.operator.inverse_step(self.hysteresis.stretched(drive, self.full), state)
-        felt = np.clip(felt, 0.0, self.full)
-        _, after = self.operator.step(felt, state)
-        return self.hysteresis.unstretched(felt, self.full), after
+        x, _ = self.operator.inverse_step(self.hysteresis.stretched(drive, self.full), state)
+        x = np.clip(x, 0.0, self.full)
+        _, after = self.operator.step(x, state)
+        return self.hysteresis.unstretched(x, self.full), after
 
     def drive(self, pressure: ArrayLike, state: Any) -> tuple[NDArray[np.float64], Any]:
         """Return the effective pressure [Pa] at a pressure [Pa], and the state it leaves."""
         if self.operator is None:
             return np.asarray(pressure, float), state
-        felt = self.hysteresis.stretched(np.clip(pressure, 0.0, self.full), self.full)
-        value, after = self.operator.step(felt, state)
+        x = self.hysteresis.stretched(np.clip(pressure, 0.0, self.full), self.full)
+        value, after = self.operator.step(x, state)
         return self.hysteresis.unstretched(value, self.full), after

@@ -69,17 +69,17 @@ def effective_pressure(
         fixed[MAX_PRESSURE],
     )
     load, per_load = rows[LOAD], fixed[WIDTH_PER_LOAD]
-    felt, output, per_full = work[0], work[1], work[2]
+    inputs, output, per_full = work[0], work[1], work[2]
     for j in range(first, last):
         per_full[j] = 1.0 / full[j]
-        felt[j] = stretched(pressure[j], stretch[j], per_full[j])
+        inputs[j] = stretched(pressure[j], stretch[j], per_full[j])
     hysteresis_step(
-        felt, output, rows, fixed, counts, table, elements, hysteresis, MODEL, STACK_COUNT, MEMBER,
+        inputs, output, rows, fixed, counts, table, elements, hysteresis, MODEL, STACK_COUNT, MEMBER,
         first, last,
     )  # fmt: skip
     for j in range(first, last):
-        friction = felt[j] - output[j]
-        value = felt[j] - loop_width(per_load[j], load[j]) * friction
+        friction = inputs[j] - output[j]
+        value = inputs[j] - loop_width(per_load[j], load[j]) * friction
         drive[j] = unstretched(value, stretch[j], per_full[j])
 
 
