@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,12 +33,9 @@ from baselines.core.controller import Array, Prediction, reset_rows
 from baselines.core.entry import Entry
 from baselines.core.environments import JOINT
 from baselines.core.knobs import AS_DESIGNED, Knobs
-from baselines.joint.bank import Bank
 from baselines.joint.gravity import Gravity
 from baselines.joint.loop import (
     SLOW,
-    JointLoop,
-    LoopState,
     PiGains,
     make_loop,
     pi_system,
@@ -49,11 +46,15 @@ from baselines.joint.model import POLE, JointModel, joint_model
 from baselines.joint.poles import joint_poles
 from baselines.joint.preview import KNOBS, Lookahead, double_lags, lookahead_for
 from baselines.joint.view import JointSignalMap, JointView, make_joint_signal_map
+from baselines.linear.bumpless import Bumpless, BumplessState
 from baselines.linear.simc import PID_KNOBS, WAIT, Simc, simc_rule
-from baselines.linear.systems import LinearSystem
+from baselines.linear.systems import DiscreteSystem, discrete, from_polynomials
 from pam_envs.parameters import Signals
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
+
+if TYPE_CHECKING:
+    from control import StateSpace
 
 FILTER = 8.0
 """Derivative time over the time constant of its filter."""
@@ -97,18 +98,16 @@ def simc_joint(
     return simc_rule(gain, lag, lag, wait, pace, knobs)
 
 
-def pid_system(law: Simc) -> LinearSystem:
+def pid_system(law: Simc) -> StateSpace:
     """Return ``K_c (1 + 1 / (tau_I s)) (1 + tau_D s) / (1 + tau_D s / FILTER)``."""
     top = np.polymul([law.integral_time, 1.0], [law.derivative_time, 1.0])
     low = np.polymul([law.integral_time, 0.0], [law.derivative_time / FILTER, 1.0])
-    return LinearSystem.from_polynomials(law.gain * top, low)
+    return from_polynomials(law.gain * top, low)
 
 
-def reference_filter(law: Simc) -> LinearSystem:
+def reference_filter(law: Simc) -> StateSpace:
     """Return what takes the derivative off the reference."""
-    return LinearSystem.from_polynomials(
-        [law.derivative_time / FILTER, 1.0], [law.derivative_time, 1.0]
-    )
+    return from_polynomials([law.derivative_time / FILTER, 1.0], [law.derivative_time, 1.0])
 
 
 def pid_delay(law: Simc, gain: float) -> float:
@@ -123,7 +122,7 @@ def pid_delay(law: Simc, gain: float) -> float:
 class FeedbackState(NamedTuple):
     """Hysteresis models of the loops and of the reference's filters."""
 
-    loop: LoopState
+    loop: BumplessState
     reference: Array
 
 
@@ -134,20 +133,20 @@ class JointFeedback:
     Attributes
     ----------
     model : JointModel
-    loop : JointLoop
+    loop : Bumpless
     signals : JointSignalMap
     gravity : Gravity
     lookahead : Lookahead
-    prefilter : Bank or None
+    prefilter : DiscreteSystem or None
         On the reference.
     """
 
     model: JointModel
-    loop: JointLoop
+    loop: Bumpless
     signals: JointSignalMap
     gravity: Gravity
     lookahead: Lookahead
-    prefilter: Bank | None = None
+    prefilter: DiscreteSystem | None = None
 
     def predict(
         self,
@@ -169,10 +168,10 @@ class JointFeedback:
 
     def _start(self, view: JointView) -> FeedbackState:
         held = view.set_point - self.gravity.shift(view.angle, view.payload)
-        return FeedbackState(self.loop.start(held), self._rest(view.angle))
+        return FeedbackState(self.loop.holding_state(held), self._rest(view.angle))
 
     def _rest(self, angle: Array) -> Array:
-        return self.prefilter.rest(angle) if self.prefilter else np.zeros((*angle.shape, 0))
+        return self.prefilter.rest_state(angle) if self.prefilter else np.zeros((*angle.shape, 0))
 
     def _filtered(self, reference: Array, state: Array) -> tuple[Array, Array]:
         if self.prefilter is None:
@@ -218,16 +217,16 @@ class Loops(NamedTuple):
 
     Attributes
     ----------
-    loop : JointLoop
+    loop : Bumpless
     delays : sequence of float
         Of the closed loops [s], for slow references.
-    prefilter : Bank or None
+    prefilter : DiscreteSystem or None
         On the references.
     """
 
-    loop: JointLoop
+    loop: Bumpless
     delays: Sequence[float]
-    prefilter: Bank | None = None
+    prefilter: DiscreteSystem | None = None
 
 
 def _loops(model: JointModel, kind: Kind, in_arm: bool, knobs: Knobs) -> Loops:
@@ -240,12 +239,14 @@ def _loops(model: JointModel, kind: Kind, in_arm: bool, knobs: Knobs) -> Loops:
         return simc_joint(model.gain, pole, model.period, in_arm, kind == "pid_smooth", knobs)
 
     laws = [rule(pole) for pole in model.poles]
-    filters = [reference_filter(law).discrete(model.period) for law in laws]
+    filters = [discrete(reference_filter(law), model.period) for law in laws]
     loop = make_loop(model, lambda pole: pid_system(rule(pole)))
-    return Loops(loop, [pid_delay(law, model.gain) for law in laws], Bank.of(filters))
+    return Loops(
+        loop, [pid_delay(law, model.gain) for law in laws], DiscreteSystem.stacked(filters)
+    )
 
 
-def _pi(model: JointModel, gains: Callable[[float, float], PiGains]) -> JointLoop:
+def _pi(model: JointModel, gains: Callable[[float, float], PiGains]) -> Bumpless:
     return make_loop(model, lambda pole: pi_system(gains(model.gain, pole)))
 
 

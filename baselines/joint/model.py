@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from baselines.core.controller import Array
-from baselines.joint.bank import Bank
-from baselines.linear.systems import LinearSystem
+from baselines.linear.systems import DiscreteSystem, discrete, double_lag
 from baselines.positioning.nominal import HysteresisState
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.hysteresis.protocol import Rows
@@ -29,12 +28,6 @@ LEVELS = 21
 """Levels of the identified map."""
 
 _HYSTERESIS_MODELS: dict[str, Preisach] = {}
-
-
-def nominal_motion(pole: float = POLE) -> LinearSystem:
-    """Return ``pole^2 / (s + pole)^2``, from the hysteresis's output to the angle."""
-    a = np.array([[-pole, pole], [0.0, -pole]])
-    return LinearSystem(a, np.array([0.0, pole]), np.array([1.0, 0.0]))
 
 
 @dataclass(frozen=True)
@@ -82,9 +75,10 @@ class JointModel:
     slope: float = 1.0
 
     @cached_property
-    def motion(self) -> Bank:
-        """The motion at the control period, exact for an input that is held."""
-        return Bank.of([nominal_motion(pole).discrete(self.period, "zoh") for pole in self.poles])
+    def motion(self) -> DiscreteSystem:
+        """The motion of each joint at the control period, exact for an input that is held."""
+        motions = [discrete(double_lag(pole), self.period, "zoh") for pole in self.poles]
+        return DiscreteSystem.stacked(motions)
 
     @cached_property
     def gain(self) -> float:

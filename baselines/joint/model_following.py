@@ -31,13 +31,15 @@ from baselines.core.environments import JOINT
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.joint.gravity import Gravity
 from baselines.joint.hysteresis_rows import JointHysteresisModels
-from baselines.joint.loop import DAMPING, JointLoop, LoopState, make_loop
+from baselines.joint.loop import DAMPING, make_loop
 from baselines.joint.model import JointModel, joint_model
 from baselines.joint.poles import joint_poles
 from baselines.joint.preview import KNOBS as PREVIEW_KNOBS
 from baselines.joint.preview import Lookahead, double_lags, lookahead_for
-from baselines.joint.tracking import ModelLoop, make_model_loop
+from baselines.joint.tracking import make_model_loop
 from baselines.joint.view import JointSignalMap, JointView, make_joint_signal_map
+from baselines.linear.bumpless import Bumpless, BumplessState
+from baselines.linear.systems import DiscreteSystem
 from baselines.positioning.nominal import HysteresisState
 from baselines.robust.loops import Kind, robust_controller
 from pam_envs.parameters import Signals
@@ -57,14 +59,14 @@ class FollowingState(NamedTuple):
         States of the model of the motion.
     tracking : ndarray
         States of the model loop.
-    disturbance : LoopState
+    disturbance : BumplessState
     hysteresis : tuple of ndarray
         Of the inverse.
     """
 
     model: Array
     tracking: Array
-    disturbance: LoopState
+    disturbance: BumplessState
     hysteresis: HysteresisState
 
 
@@ -76,8 +78,9 @@ class ModelFollowing:
     ----------
     model : JointModel
         Whose hysteresis is inverted.
-    tracking : ModelLoop
-    disturbance : JointLoop
+    tracking : DiscreteSystem
+        Model loop, from reference to mean command.
+    disturbance : Bumpless
     signals : JointSignalMap
     gravity : Gravity
     lookahead : Lookahead
@@ -85,8 +88,8 @@ class ModelFollowing:
     """
 
     model: JointModel
-    tracking: ModelLoop
-    disturbance: JointLoop
+    tracking: DiscreteSystem
+    disturbance: Bumpless
     signals: JointSignalMap
     gravity: Gravity
     lookahead: Lookahead
@@ -102,11 +105,11 @@ class ModelFollowing:
         view = self.signals.read(observation)
         state = reset_rows(state, episode_start, len(view.angle), lambda: self._start(view))
         shift = self.gravity.shift(view.reference, view.payload)
-        wanted = self._wanted(view, state)
-        set_point = self._inverse(sum(wanted), state.hysteresis) + shift
+        tracking, correction = self._commands(view, state)
+        set_point = self._inverse(tracking + correction, state.hysteresis) + shift
         set_point = np.minimum(np.maximum(set_point, self.model.low), self.model.high)
         return self.signals.write(set_point, observation), self._after(
-            view, state, wanted[0], set_point - shift
+            view, state, tracking, set_point - shift
         )
 
     def model_output(self, state: FollowingState) -> Array:
@@ -119,18 +122,18 @@ class ModelFollowing:
         held, hysteresis = JointHysteresisModels(self.model).start(view.set_point - shift)
         angle = view.angle
         return FollowingState(
-            self.model.motion.rest(angle),
-            self.tracking.start(angle),
-            self.disturbance.start(held - angle),
+            self.model.motion.rest_state(angle),
+            self.tracking.rest_state(angle),
+            self.disturbance.holding_state(held - angle),
             hysteresis,
         )
 
-    def _wanted(self, view: JointView, state: FollowingState) -> tuple[Array, Array]:
-        """Return what both loops want: angles at rest [rad]."""
+    def _commands(self, view: JointView, state: FollowingState) -> tuple[Array, Array]:
+        """Return the commands of model and disturbance loop: angles at rest [rad]."""
         low, high = self.model.reach
         angle = self.model_output(state)
         aim = self.lookahead.wanted(view.samples)
-        tracking = self.tracking.output(aim, state.tracking, low, high)
+        tracking = np.clip(self.tracking.output(aim, state.tracking), low, high)
         more = self.disturbance.output(
             angle, view.angle, state.disturbance, low - tracking, high - tracking
         )

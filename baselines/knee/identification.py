@@ -50,8 +50,8 @@ def tested(plant: KneeOrthosis, output: Output) -> KneeOrthosis:
     """Return the orthosis as it is mounted in the test of an output; see the module."""
     quiet = plant.without_noise()
     if output == "tension":
-        mounting = "no_load" if plant.mounting == "no_load" else "rig"
-        return dataclasses.replace(quiet, mounting=mounting)
+        free = plant.mounting == "no_load"
+        return dataclasses.replace(quiet, mounting="no_load" if free else "rig")
     if plant.mounting != "leg":
         return dataclasses.replace(quiet, mounting="no_load")
     leg, lever = plant.leg, plant.lever
@@ -95,7 +95,7 @@ def frequency_response(
         Of the first harmonic; the hold of the control period is divided out.
     """
     h = plant.control_period
-    time = np.arange(round((SETTLING + MEASURED) / h)) * h
+    time = h * np.arange(round((SETTLING + MEASURED) / h), dtype=float)
     swing = amplitude * np.sin(np.multiply.outer(time, frequencies))
     record = simulate_knee(plant, CENTRE + swing, pressure=CENTRE)[output]
     found = [

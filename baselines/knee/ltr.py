@@ -25,13 +25,13 @@ from baselines.core.controller import Array, Prediction, encode_action, reset_ro
 from baselines.core.entry import Entry
 from baselines.core.environments import GAIT, KNEE
 from baselines.core.knobs import AS_DESIGNED, Knobs
-from baselines.knee.design import KNOBS, Loop, make_loop, printed_loop
+from baselines.knee.design import KNOBS, make_loop, printed_loop
 from baselines.knee.feedforward import Forward, Kind
 from baselines.knee.nominal import KneeNominal
 from baselines.knee.preview import KNOBS as PREVIEW_KNOBS
 from baselines.knee.preview import Ahead, free_tension, make_ahead, tension
 from baselines.knee.view import Eyes, View, make_eyes
-from baselines.linear.bumpless import BumplessState
+from baselines.linear.bumpless import Bumpless, BumplessState
 from baselines.positioning.nominal import HysteresisState
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
@@ -59,8 +59,8 @@ class KneeLtr:
 
     Attributes
     ----------
-    tension : Loop
-    angle : Loop, optional
+    tension : Bumpless
+    angle : Bumpless, optional
         None without a gait.
     forward : Forward
     eyes : Eyes
@@ -69,8 +69,8 @@ class KneeLtr:
         Has the feed-forward look one lag ahead.
     """
 
-    tension: Loop
-    angle: Loop | None
+    tension: Bumpless
+    angle: Bumpless | None
     forward: Forward
     eyes: Eyes
     action_signal: Signal
@@ -118,11 +118,11 @@ class KneeLtr:
         held = np.zeros_like(view.set_point)
         if self.forward.kind == "nominal":
             held = view.set_point - self.forward.pressure(view.wanted, view.stretch, ())
-        angle = () if self.angle is None else self.angle.start(held)
-        return LtrState(self.tension.start(held), angle, self.forward.start(view.set_point))
+        angle = () if self.angle is None else self.angle.holding_state(held)
+        return LtrState(self.tension.holding_state(held), angle, self.forward.start(view.set_point))
 
     def _share(
-        self, loop: Loop, wanted: Array, measured: Array, forward: Array, state: BumplessState
+        self, loop: Bumpless, wanted: Array, measured: Array, forward: Array, state: BumplessState
     ) -> Array:
         """Return a loop's share of the set-point [Pa], within what the feed-forward leaves."""
         low, high = self.action_signal.low - forward, self.action_signal.high - forward

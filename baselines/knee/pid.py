@@ -50,7 +50,7 @@ def simc_tension(plant: KneeOrthosis, knobs: Knobs = AS_DESIGNED) -> Gains:
 def _sum_of_lags() -> float:
     """Return the lag [s] of the published dynamics at low frequencies."""
     plant = printed_plant()
-    return float((sum(1.0 / -p for p in plant.poles) - sum(1.0 / -z for z in plant.zeros)).real)
+    return float((sum(1.0 / -p for p in plant.poles()) - sum(1.0 / -z for z in plant.zeros())).real)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ coefficients that are left (:func:`refit_controller`).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -21,7 +22,10 @@ from scipy.optimize import least_squares
 from baselines.core.controller import Array
 from baselines.linear.bumpless import BumplessGains
 from baselines.linear.ltr import LtrDesign, design_ltr
-from baselines.linear.systems import LinearSystem
+from baselines.linear.systems import from_polynomials, from_roots, state_space
+
+if TYPE_CHECKING:
+    from control import StateSpace
 
 NOMINAL_PRESSURE = 2e5
 """Pressure [Pa] that deviations are counted from (section 4.1)."""
@@ -50,27 +54,27 @@ def printed_plant_polynomials() -> tuple[Array, Array]:
     low = np.array([1.0, 12.33])
     for factor in ([1.0, 17.97, 78.51], [1.0, 13.78, 47.43], [1.0, 8.11, 17.12]):
         low = np.polymul(low, factor)
-    return top, low
+    return np.asarray(top, float), np.asarray(low, float)
 
 
-def printed_plant() -> LinearSystem:
+def printed_plant() -> StateSpace:
     """Return (10): from pressure [kPa] to tension [N]."""
-    return LinearSystem.from_polynomials(*printed_plant_polynomials())
+    return from_polynomials(*printed_plant_polynomials())
 
 
-def printed_controller() -> LinearSystem:
+def printed_controller() -> StateSpace:
     """Return (11): from reference less tension [N] to pressure [kPa]."""
-    return LinearSystem.from_polynomials(CONTROLLER_NUMERATOR, CONTROLLER_DENOMINATOR)
+    return from_polynomials(CONTROLLER_NUMERATOR, CONTROLLER_DENOMINATOR)
 
 
-def printed_bumpless() -> tuple[LinearSystem, BumplessGains]:
+def printed_bumpless() -> tuple[StateSpace, BumplessGains]:
     """Return (10) in companion form, and the printed compensator's gains in its coordinates."""
     top, low = printed_plant_polynomials()
     n = len(low) - 1
     a = np.vstack([-low[1:], np.eye(n - 1, n)])
     c = np.concatenate([np.zeros(n - len(top)), top])
     gains = BumplessGains(np.array(BUMPLESS_STATE_GAIN), BUMPLESS_DIRECT_GAIN)
-    return LinearSystem(a, np.eye(n)[0], c), gains
+    return state_space(a, np.eye(n)[0], c), gains
 
 
 @dataclass(frozen=True)
@@ -101,10 +105,11 @@ def refit_controller(bandwidth: float | None = None) -> Refit:
         ``1/sqrt(mu)`` [rad/s], held at this value; free if not given.
     """
     start = [0.0, 0.0, 0.0] if bandwidth else [0.0, 0.0, 0.0, 0.0]
-    found = least_squares(
-        lambda q: np.log(_coefficients(_design(q, bandwidth)) / _printed_coefficients()),
-        start, xtol=1e-14, ftol=1e-14, gtol=1e-14,
-    )  # fmt: skip
+
+    def residual(q: Array) -> Array:
+        return np.log(_coefficients(_design(q, bandwidth)) / _printed_coefficients())
+
+    found = least_squares(residual, start, xtol=1e-14, ftol=1e-14, gtol=1e-14)
     return Refit(
         _design(found.x, bandwidth),
         _fourth_zero(found.x),
@@ -122,16 +127,17 @@ def _design(unknowns: Array, bandwidth: float | None) -> LtrDesign:
     zeros = [*CANCELLED_POLES, _fourth_zero(unknowns)]
     gain = 0.79 * float(np.exp(unknowns[0]))
     wide = bandwidth or 62.0 * float(np.exp(unknowns[3]))
-    plant = LinearSystem.from_roots(zeros, poles, gain)
+    plant = from_roots(zeros, poles, gain)
     return design_ltr(plant, wide, 1e-6 * float(np.exp(unknowns[2])))
 
 
 def _coefficients(design: LtrDesign) -> Array:
     """Return the leading coefficient of the numerator and eight of the denominator."""
     controller = design.controller
-    lead = controller.c @ controller.a @ controller.b  # relative degree 2: c b = 0
-    poles = controller.poles[1:]
-    return np.concatenate([[lead], np.poly(poles).real[1:]])
+    lead = (controller.C @ controller.A @ controller.B)[0]  # relative degree 2: C B = 0
+    poles = controller.poles()
+    moving = poles[np.argsort(np.abs(poles))][1:]
+    return np.concatenate([lead, np.poly(moving).real[1:]])
 
 
 def _printed_coefficients() -> Array:

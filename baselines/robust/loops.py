@@ -18,12 +18,15 @@ from __future__ import annotations
 import json
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from baselines.linear.systems import DiscreteSystem, LinearSystem
+from baselines.linear.systems import DiscreteSystem, state_space
 from baselines.robust.requirements import RobustDesign
+
+if TYPE_CHECKING:
+    from control import StateSpace
 
 Kind = Literal["hinf", "mu"]
 Stage = Literal["full", "reduced"]
@@ -38,7 +41,7 @@ def frozen() -> dict[str, Any]:
 
 def robust_controller(
     kind: Kind, stage: Stage = "reduced", pole: float | None = None
-) -> LinearSystem:
+) -> StateSpace:
     """Return a controller in continuous time, from error [rad] to command [rad].
 
     Parameters
@@ -52,11 +55,11 @@ def robust_controller(
     numbers = frozen()[kind][stage]
     a, b, c = (np.array(numbers[name]) for name in "abc")
     pace = 1.0 if pole is None else pole / RobustDesign().pole
-    return LinearSystem(pace * a, pace * b, c, numbers["d"])
+    return state_space(pace * a, pace * b, c, numbers["d"])
 
 
 def frozen_loop(kind: Kind) -> DiscreteSystem:
     """Return a controller at the control period for which it was frozen."""
     numbers = frozen()[kind]["discrete"]
     a, b, c = (np.array(numbers[name]) for name in "abc")
-    return DiscreteSystem(a, b, c, numbers["d"], float(frozen()["period"]))
+    return DiscreteSystem(a, b, c, np.asarray(numbers["d"]), float(frozen()["period"]))

@@ -25,12 +25,17 @@ S. Skogestad, I. Postlethwaite, "Multivariable Feedback Control", Wiley 2005, ch
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from baselines.core.controller import Array
-from baselines.linear.systems import Complex, LinearSystem
+from baselines.linear.systems import Complex, double_lag, from_polynomials, response
+
+if TYPE_CHECKING:
+    from control import StateSpace
 
 FREQUENCIES = np.geomspace(1e-2, 1e3, 401)
 """[rad/s], at which loops are looked at."""
@@ -71,28 +76,27 @@ class RobustDesign:
     neglected_corner: float = 40.0
     effort: float = 0.1
 
-    @property
-    def plant(self) -> LinearSystem:
+    @cached_property
+    def plant(self) -> StateSpace:
         """The nominal plant."""
-        a = np.array([[-self.pole, self.pole], [0.0, -self.pole]])
-        return LinearSystem(a, np.array([0.0, self.pole]), np.array([1.0, 0.0]))
+        return double_lag(self.pole)
 
-    @property
-    def performance(self) -> LinearSystem:
+    @cached_property
+    def performance(self) -> StateSpace:
         """``W_p = (s / M + w_b) / (s + w_b e)``."""
         top = [1.0 / self.peak, self.bandwidth]
-        return LinearSystem.from_polynomials(top, [1.0, self.bandwidth * self.at_rest])
+        return from_polynomials(top, [1.0, self.bandwidth * self.at_rest])
 
-    @property
-    def neglected(self) -> LinearSystem:
+    @cached_property
+    def neglected(self) -> StateSpace:
         """``W_m = (s + w_m l) / (s / h + w_m)``."""
         low = [1.0 / self.neglected_high, self.neglected_corner]
-        return LinearSystem.from_polynomials([1.0, self.neglected_corner * self.neglected_low], low)
+        return from_polynomials([1.0, self.neglected_corner * self.neglected_low], low)
 
     def structured_value(self, loop: Complex, frequency: Array = FREQUENCIES) -> Array:
         """Return ``mu`` at each frequency [rad/s], with the gain real; loop of shape (n,)."""
-        margin = np.abs(self.performance.response(frequency))
-        margin = margin + np.abs(self.neglected.response(frequency) * loop)
+        margin = np.abs(response(self.performance, frequency))
+        margin = margin + np.abs(response(self.neglected, frequency) * loop)
         low, high = np.zeros(len(loop)), np.full(len(loop), 1.0 / 1e-6)
         for _ in range(DOUBLINGS):
             size = np.sqrt(np.maximum(low, 1e-12) * high)
@@ -103,8 +107,8 @@ class RobustDesign:
     def complex_value(self, loop: Complex, frequency: Array = FREQUENCIES) -> Array:
         """Return ``mu`` with the gain's uncertainty taken as complex: never below the real one."""
         tracking = np.abs(loop / (1.0 + loop))
-        spread = self.gain_spread + np.abs(self.neglected.response(frequency))
-        asked = np.abs(self.performance.response(frequency) / (1.0 + loop))
+        spread = self.gain_spread + np.abs(response(self.neglected, frequency))
+        asked = np.abs(response(self.performance, frequency) / (1.0 + loop))
         return np.asarray(spread * tracking + asked)
 
     def _nearest(self, loop: Complex, size: Array) -> Array:

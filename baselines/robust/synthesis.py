@@ -9,176 +9,149 @@ extra. The steps:
    three uncertainties taken as one full block: the loop ``hinf``.
 2. D-K iteration for ``mu``: each block is scaled by the magnitude that minimises the norm (for the
    rank-one matrix at hand ``d_i^2 = 1 / |a_i|``), fitted by a stable system with a stable
-   inverse, and the synthesis repeated; of all rounds that with the smallest ``mu``.
-3. Poles beyond ``FAST`` are taken as settled, the slowest, which stands in for an integrator,
-   becomes one, and the rest is reduced by balanced residualisation to ``ORDER`` states; the whole
-   is made discrete by the bilinear rule at 10 ms.
+   inverse, and the synthesis is repeated; the controller of the round with the smallest ``mu``.
+3. Modes beyond ``FAST`` are replaced by their static gain, the slowest, which approximates an
+   integrator, becomes one, and the rest is reduced by balanced residualisation to ``ORDER`` states;
+   the whole is made discrete by the bilinear rule at 10 ms.
 
-The real gain is scaled as if it were complex (D and not D, G); ``mu`` of the outcome is that with a
+The real gain is scaled as if it were complex (D and not D, G); ``mu`` of the result is that with a
 real gain, exact, and its bound by SLICOT's AB13MD beside it.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from baselines.core.controller import Array
-from baselines.linear.reduction import residualised, split, with_integrator, without_fast
-from baselines.linear.systems import Complex, LinearSystem
+from baselines.linear.ltr import integrator
+from baselines.linear.reduction import residualised, split, without_fast
+from baselines.linear.systems import Complex, DiscreteSystem, discrete, from_polynomials, response
 from baselines.robust.requirements import FREQUENCIES, RobustDesign, sensitivity
 
+if TYPE_CHECKING:
+    from control import StateSpace
+
+    Scales = tuple[StateSpace, StateSpace] | None
+
 FILE = Path(__file__).with_name("joint_robust.json")
-SOURCES = ("joint_synthesis.py", "robust_design.py", "reduction.py")
-"""Files whose digest stands beside the numbers."""
-Scales = tuple[LinearSystem, LinearSystem] | None
 PERIOD = 0.01
 FAST, INTEGRATOR = 1e3, 0.1
-"""Poles [rad/s] beyond which a controller is settled, and within which it integrates."""
+"""Frequencies [rad/s] beyond which modes count as settled, and within which one integrates."""
 ROUNDS = 6
 SCALE_ORDER = 2
 ORDER = 2
 """States beside the integrator: more change no figure in its third digit."""
 FITTED = FREQUENCIES <= 300.0
-"""Where the scales are fitted: above, no block matters."""
+"""Frequencies at which the scales are fitted: above, no block matters."""
 PROBES = (0.1, 1.0, 4.0)
-"""Frequencies [rad/s] at which the sensitivity is written down."""
+"""Frequencies [rad/s] at which the sensitivity is reported."""
 
 
-def digest() -> str:
-    """Return the SHA-256 of this script and of what it computes with."""
-    made = hashlib.sha256()
-    for name in SOURCES:
-        made.update(Path(__file__).with_name(name).read_bytes())
-    return made.hexdigest()
+def generalised_plant(design: RobustDesign, scales: Scales) -> StateSpace:
+    """Return the plant of the synthesis.
 
-
-def generalised_plant(design: RobustDesign, scales: Scales) -> Any:
-    """Return the plant of the synthesis as ``control.StateSpace``.
-
-    Inputs: what the gain's and the neglected dynamics' uncertainty add to the output, a disturbance
-    of the output, and the command. Outputs: what feeds the two uncertainties, the weighted output,
-    the weighted command, and what the controller sees.
+    Inputs: the outputs of the gain's and of the neglected dynamics' uncertainty and a disturbance,
+    all added to the plant's output, and the command. Outputs: the inputs of the two uncertainties,
+    the weighted output, the weighted command, and the controller's input.
     """
-    import control as ct
+    import control
 
     g, performance, neglected = design.plant, design.performance, design.neglected
-    a = np.zeros((4, 4))
-    a[:2, :2] = g.a
-    a[2, 2], a[3, 3] = performance.a[0, 0], neglected.a[0, 0]
-    a[2, :2], a[3, :2] = performance.b[0] * g.c, neglected.b[0] * g.c
-    b = np.zeros((4, 4))
-    b[2, :3], b[:2, 3] = performance.b[0], g.b
+    a, b = np.zeros((4, 4)), np.zeros((4, 4))
+    a[:2, :2], a[2, 2], a[3, 3] = g.A, performance.A[0, 0], neglected.A[0, 0]
+    a[2, :2], a[3, :2] = performance.B @ g.C, neglected.B @ g.C
+    b[:2, 3], b[2, :3] = g.B[:, 0], performance.B[0, 0]
     c, d = np.zeros((5, 4)), np.zeros((5, 4))
-    c[0, :2] = design.gain_spread * g.c
-    c[1, :2], c[1, 3] = neglected.d * g.c, neglected.c[0]
-    c[2, :2], c[2, 2], d[2, :3] = performance.d * g.c, performance.c[0], performance.d
+    c[0, :2] = design.gain_spread * g.C
+    c[1, :2], c[1, 3] = neglected.D @ g.C, neglected.C[0, 0]
+    c[2, :2], c[2, 2], d[2, :3] = performance.D @ g.C, performance.C[0, 0], performance.D[0, 0]
     d[3, 3] = design.effort
-    c[4, :2], d[4, :3] = -g.c, -1.0
-    plant = ct.ss(a, b, c, d)
+    c[4, :2], d[4, :3] = -g.C, -1.0
+    plant = control.ss(a, b, c, d)
     if scales is None:
         return plant
-    one = [ct.ss([], [], [], np.eye(n)) for n in (3, 2)]
-    left = ct.append(*(_state_space(s) for s in scales), one[0])
-    right = ct.append(*(_state_space(_inverse(s)) for s in scales), one[1])
+    identity = [control.ss([], [], [], np.eye(n)) for n in (3, 2)]
+    left = control.append(*scales, identity[0])
+    right = control.append(*(scale**-1 for scale in scales), identity[1])
     return left * plant * right
 
 
-def _state_space(system: LinearSystem) -> Any:
-    import control as ct
-
-    return ct.ss(system.a, system.b[:, None], system.c[None, :], [[system.d]])
-
-
-def _inverse(system: LinearSystem) -> LinearSystem:
-    back = 1.0 / system.d
-    a = system.a - np.outer(system.b, system.c) * back
-    return LinearSystem(a, system.b * back, -system.c * back, back)
-
-
-def synthesise(design: RobustDesign, scales: Scales) -> LinearSystem:
+def synthesise(design: RobustDesign, scales: Scales) -> StateSpace:
     """Return the H-infinity controller for scaled blocks."""
-    import control as ct
+    import control
 
-    controller = ct.hinfsyn(generalised_plant(design, scales), 1, 1)[0]
-    return LinearSystem(
-        controller.A, controller.B[:, 0], controller.C[0], float(controller.D[0, 0])
-    )
+    return control.hinfsyn(generalised_plant(design, scales), 1, 1)[0]
 
 
-def loop_of(design: RobustDesign, controller: LinearSystem) -> Complex:
+def loop_of(design: RobustDesign, controller: StateSpace) -> Complex:
     """Return the loop's response at ``FREQUENCIES``."""
-    return np.asarray(
-        design.plant.response(FREQUENCIES) * controller.response(FREQUENCIES), complex
-    )
+    return response(design.plant, FREQUENCIES) * response(controller, FREQUENCIES)
 
 
-def scales_for(design: RobustDesign, loop: Complex) -> tuple[LinearSystem, LinearSystem]:
+def scales_for(design: RobustDesign, loop: Complex) -> tuple[StateSpace, StateSpace]:
     """Return the scales of the two uncertainties, that of the performance being 1."""
-    asked = np.abs(design.performance.response(FREQUENCIES) / (1.0 + loop))
+    performance = np.abs(response(design.performance, FREQUENCIES) / (1.0 + loop))
     tracking = np.abs(loop / (1.0 + loop))
-    feeds = (
-        design.gain_spread * tracking,
-        np.abs(design.neglected.response(FREQUENCIES)) * tracking,
-    )
-    first, second = (fit_scale(np.sqrt(asked / feed)) for feed in feeds)
+    spreads = (design.gain_spread, np.abs(response(design.neglected, FREQUENCIES)))
+    first, second = (fit_scale(np.sqrt(performance / (s * tracking))) for s in spreads)
     return first, second
 
 
-def fit_scale(magnitude: Array, order: int = SCALE_ORDER) -> LinearSystem:
+def fit_scale(magnitude: Array, order: int = SCALE_ORDER) -> StateSpace:
     """Return a stable system with a stable inverse, of real roots, with this magnitude."""
-    w, wanted = FREQUENCIES[FITTED], np.log(magnitude[FITTED])
+    w, target = FREQUENCIES[FITTED], np.log(magnitude[FITTED])
 
-    def found(q: Array) -> Array:
+    def residual(q: Array) -> Array:
         zeros, poles = np.exp(q[1 : 1 + order]), np.exp(q[1 + order :])
         terms = np.log((w[:, None] ** 2 + zeros**2) / (w[:, None] ** 2 + poles**2))
-        return np.asarray(q[0] + 0.5 * terms.sum(axis=1))
+        return np.asarray(q[0] + 0.5 * terms.sum(axis=1) - target)
 
     start = np.log(np.geomspace(2.0, 60.0, order))
-    guess = np.concatenate([[wanted[-1]], start + 0.1, start - 0.1])
-    q = least_squares(lambda q: found(q) - wanted, guess, bounds=(-12.0, 12.0)).x
+    guess = np.concatenate([[target[-1]], start + 0.1, start - 0.1])
+    q = least_squares(residual, guess, bounds=(-12.0, 12.0)).x
     top = np.exp(q[0]) * np.poly(-np.exp(q[1 : 1 + order]))
-    return LinearSystem.from_polynomials(top, np.poly(-np.exp(q[1 + order :])))
+    return from_polynomials(top, np.poly(-np.exp(q[1 + order :])))
 
 
-def d_k_iteration(design: RobustDesign) -> tuple[LinearSystem, LinearSystem, list[float]]:
+def d_k_iteration(design: RobustDesign) -> tuple[StateSpace, StateSpace, list[float]]:
     """Return the H-infinity controller, that with the smallest ``mu``, and ``mu`` by round."""
-    rounds: list[tuple[float, LinearSystem]] = []
+    controllers, values = [], []
     scales: Scales = None
     for _ in range(ROUNDS):
-        controller = synthesise(design, scales)
-        loop = loop_of(design, controller)
-        rounds.append((float(design.structured_value(loop).max()), controller))
+        controllers.append(synthesise(design, scales))
+        loop = loop_of(design, controllers[-1])
+        values.append(float(design.structured_value(loop).max()))
         scales = scales_for(design, loop)
-    best = min(rounds, key=lambda made: made[0])
-    return rounds[0][1], best[1], [value for value, _ in rounds]
+    return controllers[0], controllers[int(np.argmin(values))], values
 
 
-def frozen(design: RobustDesign, controller: LinearSystem, order: int = ORDER) -> dict[str, Any]:
-    """Return the numbers of a controller: full, reduced, discrete, and what they reach."""
+def reduced_controller(controller: StateSpace, order: int = ORDER) -> tuple[StateSpace, Array]:
+    """Return a synthesised controller with an integrator and few states, and Hankel values."""
     slowest, rest = split(without_fast(controller, FAST), INTEGRATOR)
-    residue = float(slowest.c @ slowest.b)
     small, sizes = residualised(rest, order)
-    reduced = with_integrator(residue, small)
-    discrete = reduced.discrete(PERIOD)
+    return integrator(float((slowest.C @ slowest.B)[0, 0])) + small, sizes
+
+
+def frozen(design: RobustDesign, controller: StateSpace) -> dict[str, Any]:
+    """Return the numbers of a controller: full, reduced, discrete, and its figures."""
+    reduced, sizes = reduced_controller(controller)
     full_loop, loop = (loop_of(design, c) for c in (controller, reduced))
+    at_probes = np.interp(PROBES, FREQUENCIES, sensitivity(loop))
     return {
         "full": _numbers(controller),
         "reduced": _numbers(reduced),
-        "discrete": _numbers(discrete),
+        "discrete": _discrete_numbers(discrete(reduced, PERIOD)),
         "hankel": sizes.tolist(),
         "mu_full": float(design.structured_value(full_loop).max()),
         "mu_reduced": float(design.structured_value(loop).max()),
         "mu_bound_ab13md": _bound(design, loop),
-        "sensitivity": dict(
-            zip(map(str, PROBES), np.interp(PROBES, FREQUENCIES, sensitivity(loop)), strict=True)
-        ),
+        "sensitivity": dict(zip(map(str, PROBES), at_probes, strict=True)),
         "peak_sensitivity": float(sensitivity(loop).max()),
     }
 
@@ -187,42 +160,42 @@ def _bound(design: RobustDesign, loop: Complex) -> float:
     """Return SLICOT's upper bound of ``mu`` with a real gain."""
     from slycot import ab13md
 
-    feeds = np.array(
-        [np.full(len(loop), design.gain_spread), design.neglected.response(FREQUENCIES)]
-    )
+    spreads = [np.full(len(loop), design.gain_spread), response(design.neglected, FREQUENCIES)]
     rows = np.vstack(
-        [-feeds * loop / (1.0 + loop), design.performance.response(FREQUENCIES) / (1.0 + loop)]
+        [
+            -np.array(spreads) * loop / (1.0 + loop),
+            response(design.performance, FREQUENCIES) / (1.0 + loop),
+        ]
     )
     kinds, sizes = np.array([1, 2, 2]), np.ones(3, int)
     return max(float(ab13md(np.outer(row, np.ones(3)), sizes, kinds)[0]) for row in rows.T)
 
 
-def _numbers(system: Any) -> dict[str, Any]:
-    return {
-        "a": system.a.tolist(),
-        "b": system.b.tolist(),
-        "c": system.c.tolist(),
-        "d": float(system.d),
-    }
+def _numbers(system: StateSpace) -> dict[str, Any]:
+    a, b, c = system.A.tolist(), system.B[:, 0].tolist(), system.C[0].tolist()
+    return {"a": a, "b": b, "c": c, "d": float(system.D[0, 0])}
+
+
+def _discrete_numbers(system: DiscreteSystem) -> dict[str, Any]:
+    return {name: getattr(system, name).tolist() for name in "abcd"}
 
 
 def main() -> None:
-    """Synthesise, freeze, and say what came out."""
+    """Synthesise, write the numbers, and print the figures."""
     design = RobustDesign()
     hinf, mu, rounds = d_k_iteration(design)
+    loops = {"hinf": frozen(design, hinf), "mu": frozen(design, mu)}
     made = {
         "made_by": "python -m baselines.robust.synthesis",
-        "digest": digest(),
         "versions": {name: version(name) for name in ("control", "slycot", "numpy", "scipy")},
         "period": PERIOD,
         "mu_by_round": rounds,
-        "hinf": frozen(design, hinf),
-        "mu": frozen(design, mu),
+        **loops,
     }
     FILE.write_text(json.dumps(made, indent=1) + "\n", encoding="utf-8")
-    for kind in ("hinf", "mu"):
-        shown = {k: v for k, v in made[kind].items() if k not in ("full", "reduced", "discrete")}
-        print(kind, json.dumps(shown))
+    for kind, numbers in loops.items():
+        hidden = ("full", "reduced", "discrete")
+        print(kind, json.dumps({k: v for k, v in numbers.items() if k not in hidden}))
     print("mu by round", rounds)
 
 

@@ -228,11 +228,12 @@ def linear_switch(mismatch: float, compensated: bool) -> tuple[float, float]:
     """
     from baselines.knee.published import printed_bumpless, printed_controller
     from baselines.linear.bumpless import make_bumpless
+    from baselines.linear.systems import discrete
 
     plant, gains = printed_bumpless()
     loop = make_bumpless(plant, printed_controller(), PERIOD, -200.0, 250.0, gains)
     loop = loop if compensated else loop.without()
-    rig, before = plant.discrete(PERIOD, "zoh"), round(SWING / PERIOD)
+    rig, before = discrete(plant, PERIOD, "zoh"), round(SWING / PERIOD)
     inside, state = rig.initial_state(), loop.initial_state()
     measured, commands = list[float](), list[float]()
     for k in range(before + round(AFTER / PERIOD)):

@@ -43,12 +43,11 @@ GRID = 0.6006743720854 / 99
 def nominal_step() -> tuple[Array, Array]:
     """Return times [s] and the step response of the nominal plant with the PI."""
     from baselines.joint.loop import pi_system, pole_cancelling
-    from baselines.joint.model import nominal_motion
-    from baselines.linear.systems import LinearSystem
+    from baselines.joint.model import POLE
+    from baselines.linear.systems import discrete, double_lag
 
-    loop = pi_system(pole_cancelling()).series(nominal_motion())
-    closed = LinearSystem(loop.a - np.outer(loop.b, loop.c), loop.b, loop.c)
-    fine = closed.discrete(1e-4, "zoh")
+    loop = double_lag(POLE) * pi_system(pole_cancelling())
+    fine = discrete(loop.feedback(), 1e-4, "zoh")
     state, outputs = fine.initial_state(), []
     for _ in range(20000):
         state = fine.advance(1.0, state)
@@ -59,8 +58,9 @@ def nominal_step() -> tuple[Array, Array]:
 def pi_figures() -> list[Figure]:
     """PI with pole cancellation on the nominal plant."""
     from baselines.joint.loop import pi_system, pole_cancelling
-    from baselines.joint.model import nominal_motion
+    from baselines.joint.model import POLE
     from baselines.linear.ltr import loop_figures
+    from baselines.linear.systems import double_lag
     from benchmarks.papers.joint_studies import step_figures
 
     time, output = nominal_step()
@@ -69,7 +69,8 @@ def pi_figures() -> list[Figure]:
     read = np.interp(grid, time, output)
     rise = GRID * float(np.argmax(read >= 0.9) - np.argmax(read >= 0.1))
     gains = pole_cancelling()
-    margin = loop_figures(pi_system(gains).series(nominal_motion()).response).phase_margin
+    loop = double_lag(POLE) * pi_system(gains)
+    margin = loop_figures(lambda w: loop(1j * w)).phase_margin
     coarse = f"samples of {1e3 * GRID:.2f} ms"
     why = f"0.1274 s was read on {coarse}, on which ours reads {rise:.4f} s; this is exact"
     lines = [
@@ -90,6 +91,7 @@ def pi_figures() -> list[Figure]:
 
 def robust_figures() -> list[Figure]:
     """Structured singular value and sensitivity of the disturbance loops as frozen."""
+    from baselines.linear.systems import response
     from baselines.robust.loops import robust_controller
     from baselines.robust.requirements import FREQUENCIES, RobustDesign, sensitivity
 
@@ -97,7 +99,7 @@ def robust_figures() -> list[Figure]:
     figures = []
     for stage in ("full", "reduced"):
         controller = robust_controller("mu", stage)  # type: ignore[arg-type]
-        loop = design.plant.response(FREQUENCIES) * controller.response(FREQUENCIES)
+        loop = response(design.plant, FREQUENCIES) * response(controller, FREQUENCIES)
         value = float(design.structured_value(loop).max())
         name = f"mu, gain +-35 % and 4 rad/s, {stage}"
         figures.append(Figure(name, CONTROL, "1", UNKNOWN, value, None, at_most=1.0))

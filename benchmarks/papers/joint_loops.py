@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baselines.linear.systems import response
 from baselines.robust.requirements import FREQUENCIES, RobustDesign, sensitivity
 from benchmarks.papers.joint_studies import STEPPED, ReducedRig, StepFigures, controller, step
 
@@ -73,7 +74,7 @@ def law_response(made: Any, frequency: Array) -> Complex:
 def loop_figures(name: str) -> LoopFigures:
     """Return the figures of a controller of the catalogue."""
     design, made = RobustDesign(), controller(name, ReducedRig())
-    loop = design.plant.response(FREQUENCIES) * law_response(made, FREQUENCIES)
+    loop = response(design.plant, FREQUENCIES) * law_response(made, FREQUENCIES)
     size = sensitivity(loop)
     low = tuple(float(np.interp(f, FREQUENCIES, size)) for f in LOW)
     value = float(design.structured_value(loop).max())

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.core.catalogue import CONTROLLERS
-from baselines.joint.model import POLE, nominal_motion
+from baselines.joint.model import POLE
+from baselines.linear.systems import discrete, double_lag
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.parameters import Signal, Signals
@@ -123,7 +124,7 @@ def run(
     disturbance : callable, optional
         Of the angle [rad], from times [s].
     """
-    motion, hysteresis = nominal_motion(POLE).discrete(FINE, "zoh"), rig.hysteresis
+    motion, hysteresis = discrete(double_lag(POLE), FINE, "zoh"), rig.hysteresis
     fine = round(rig.control_period / FINE)
     x, held, state = motion.initial_state(), hysteresis.initial_state(), None
     time = np.arange(1.0, fine * len(reference) + 1.0) * FINE

@@ -104,12 +104,13 @@ def tension_tracking(friction: float) -> Tracking:
 
 def _tracked(friction: float, feed_forward: str) -> float:
     from baselines.knee.published import NOMINAL_PRESSURE, printed_controller, printed_plant
+    from baselines.linear.systems import discrete
     from pam_envs.hysteresis.modified_maxwell_slip import even_model
 
     hysteresis = even_model(FULL_PRESSURE, FULL_STIFFNESS, friction)
     plant = printed_plant()
-    rig = plant.discrete(PERIOD, "zoh")
-    controller = printed_controller().discrete(PERIOD)
+    rig = discrete(plant, PERIOD, "zoh")
+    controller = discrete(printed_controller(), PERIOD)
     time = np.arange(round((DROPPED + 2.0 / FREQUENCY) / PERIOD)) * PERIOD
     wanted = 205.0 - 125.0 * np.cos(2.0 * np.pi * FREQUENCY * time)
     ahead = {
@@ -119,14 +120,14 @@ def _tracked(friction: float, feed_forward: str) -> float:
     }[feed_forward]
     state = controller.initial_state()
     _, slips = hysteresis.inverse_step(START_TENSION / DELTA_LENGTH, hysteresis.initial_state())
-    inside = rig.rest_state(START_TENSION / plant.static_gain)
+    inside = rig.rest_state(START_TENSION / plant.dcgain())
     measured = np.empty_like(time)
     for k, reference in enumerate(wanted):
         measured[k] = float(inside @ rig.c)
         command, state = controller.step(reference - measured[k], state)
         pressure = min(max(float(ahead[k]) + 1e3 * float(command), 0.0), FULL_PRESSURE)
         stiffness, slips = hysteresis.step(pressure, slips)
-        inside = rig.advance(stiffness * DELTA_LENGTH / plant.static_gain, inside)
+        inside = rig.advance(stiffness * DELTA_LENGTH / plant.dcgain(), inside)
     return half_range_error(measured, wanted, PERIOD)
 
 
@@ -140,13 +141,13 @@ def loop_shape() -> list[Figure]:
     from baselines.linear.ltr import closed_loop_poles, design_ltr, loop_figures
 
     plant, controller = seed.printed_plant(), seed.printed_controller()
-    printed = loop_figures(lambda w: plant.response(w) * controller.response(w))
+    printed = loop_figures(lambda w: plant(1j * w) * controller(1j * w))
     refit = seed.refit_controller()
     inferred = refit.design.plant
-    wide = loop_figures(lambda w: inferred.response(w) * controller.response(w))
+    wide = loop_figures(lambda w: inferred(1j * w) * controller(1j * w))
     at_100_hz = np.array([200.0 * np.pi])
-    needed = design_ltr(plant, 2.0 * np.pi * 26.2, 1e-14).controller.response(at_100_hz)
-    has = controller.response(at_100_hz)
+    needed = design_ltr(plant, 2.0 * np.pi * 26.2, 1e-14).controller(1j * at_100_hz)
+    has = controller(1j * at_100_hz)
     hertz = (
         f"printed as Hz: 26.2 Hz would need a gain of {abs(needed[0]):.0f} kPa/N at 100 Hz, the"
         f" printed controller has {abs(has[0]):.2f}"
@@ -156,9 +157,9 @@ def loop_shape() -> list[Figure]:
     as_printed = ("predicted", "preset as printed", "continuous loop")
     behind = ("calibrated", "preset plant behind (11)", "continuous loop")
     lines = [
-        ("static gain of (10)", "N/kPa", 0.7398, plant.static_gain, 1e-4,
+        ("static gain of (10)", "N/kPa", 0.7398, plant.dcgain(), 1e-4,
          note(*as_printed, "the nominal point, 158 N / 200 kPa, has 0.79", BEFORE)),
-        ("static gain of the inferred plant", "N/kPa", 0.79, inferred.static_gain, 0.005,
+        ("static gain of the inferred plant", "N/kPa", 0.79, inferred.dcgain(), 0.005,
          note(*behind)),
         ("crossover of (11) on (10)", "rad/s", 9.02, printed.crossover, 0.005,
          note(*as_printed, BEFORE)),

@@ -14,9 +14,9 @@ import pytest
 
 from baselines.joint.feedback import pid_system, simc_joint
 from baselines.joint.loop import pi_system, pole_cancelling
-from baselines.joint.model import nominal_motion
 from baselines.joint.poles import joint_delays, joint_poles, mean_time
 from baselines.linear.simc import WAIT
+from baselines.linear.systems import discrete, double_lag
 from baselines.robust.loops import robust_controller
 from baselines.robust.requirements import FREQUENCIES, RobustDesign
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
@@ -58,15 +58,8 @@ def arm(payload: float) -> np.ndarray:
 @cache
 def laws(name: str) -> np.ndarray:
     """Return the sampled responses of the joints' controllers, (frequency, joint)."""
-    made = [LAWS[name](pole).discrete(PERIOD) for pole in joint_poles(PLANT)]
-    z = np.exp(1j * PERIOD * W)
-    return np.array([_response(system, z) for system in made]).T
-
-
-def _response(system, z):
-    gap = z[:, None, None] * np.eye(len(system.b)) - system.a
-    states = np.linalg.solve(gap, np.broadcast_to(system.b[:, None], (len(z), len(system.b), 1)))
-    return states[..., 0] @ system.c + system.d
+    made = [discrete(LAWS[name](pole), PERIOD) for pole in joint_poles(PLANT)]
+    return np.array([system.response(W) for system in made]).T
 
 
 def loops(name: str, gain: float = 1.0, payload: float = 0.0) -> np.ndarray:
@@ -148,21 +141,21 @@ def test_design_of_a_slower_joint_is_no_harder_than_the_one_synthesised():
 
 def _loop(design):
     controller = robust_controller("mu", pole=design.pole)
-    return design.plant.response(FREQUENCIES) * controller.response(FREQUENCIES)
+    return design.plant(1j * FREQUENCIES) * controller(1j * FREQUENCIES)
 
 
 def test_neglected_dynamics_cover_hold_and_computing():
     late = np.abs(np.exp(-1j * FREQUENCIES * WAIT * PERIOD) - 1.0)
-    assert np.all(late < np.abs(RobustDesign().neglected.response(FREQUENCIES)))
+    assert np.all(late < np.abs(RobustDesign().neglected(1j * FREQUENCIES)))
 
 
 def test_double_pole_is_not_the_base_joint_as_it_is():
     """The base swings: beyond what the design allows for, which is why it is measured here."""
     hold = np.exp(-0.5j * W * PERIOD)
-    nominal = [nominal_motion(pole).response(W) * hold for pole in joint_poles(PLANT)]
+    nominal = [double_lag(pole)(1j * W) * hold for pole in joint_poles(PLANT)]
     gap = np.abs(np.diagonal(arm(0.0), axis1=1, axis2=2) / np.array(nominal).T - 1.0)
     design = RobustDesign()
-    covered = design.gain_spread + np.abs(design.neglected.response(W))
+    covered = design.gain_spread + np.abs(design.neglected(1j * W))
     within = np.max(gap / covered[:, None], axis=0)
     assert within[0] == pytest.approx(1.21, abs=0.05) and within[-1] < 1.0
 

@@ -13,9 +13,10 @@ from baselines.joint.feedback import (
     simc_joint,
 )
 from baselines.joint.loop import pi_system, pole_cancelling
-from baselines.joint.model import POLE, nominal_motion
+from baselines.joint.model import POLE
 from baselines.joint.model_following import make_model_following
 from baselines.joint.preview import MOST, ahead_by, double_lags, present
+from baselines.linear.systems import discrete, double_lag
 from benchmarks.papers.joint_studies import ACTIONS, RANGE, ReducedRig
 from pam_envs.parameters import Signal, Signals
 
@@ -53,11 +54,11 @@ def test_without_previews_the_present_is_read():
 
 @pytest.mark.parametrize("pole", [5.5, POLE])
 def test_loop_of_the_pi_is_its_delay_up_to_the_third_order(pole):
-    loop = pi_system(pole_cancelling(pole=pole)).series(nominal_motion(pole))
+    loop = double_lag(pole) * pi_system(pole_cancelling(pole=pole))
     delay = double_lags([pole])[0]
 
     def gap(w):
-        closed = loop.response(w) / (1.0 + loop.response(w))
+        closed = loop(1j * w) / (1.0 + loop(1j * w))
         return np.abs(closed * np.exp(1j * w * delay) - 1.0)
 
     small = 0.02 * pole
@@ -67,16 +68,16 @@ def test_loop_of_the_pi_is_its_delay_up_to_the_third_order(pole):
 
 def test_delay_of_the_pid_is_that_of_its_closed_loop():
     law = simc_joint(0.9, POLE, PERIOD)
-    loop = pid_system(law).series(nominal_motion(POLE))
+    loop = double_lag(POLE) * pid_system(law)
     w = 0.01 * POLE
-    back = 0.9 * loop.response(w)
-    found = reference_filter(law).response(w) * back / (1.0 + back)
+    back = 0.9 * loop(1j * w)
+    found = reference_filter(law)(1j * w) * back / (1.0 + back)
     assert -np.angle(found) / w == pytest.approx(pid_delay(law, 0.9), rel=0.01)
 
 
 def _error(made) -> float:
     """Return the RMS error of a sine of 20 degrees and 0.5 Hz over its amplitude, no hysteresis."""
-    motion = nominal_motion().discrete(PERIOD, "zoh")
+    motion = discrete(double_lag(POLE), PERIOD, "zoh")
 
     def wanted(t):
         return np.sin(np.pi * t)

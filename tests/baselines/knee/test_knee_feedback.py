@@ -10,7 +10,6 @@ from baselines.knee.design import BANDWIDTHS, design, make_loop
 from baselines.knee.identification import FREQUENCIES, frequency_response, identify
 from baselines.linear.bumpless import BumplessGains, certificate
 from baselines.linear.ltr import plant_system
-from baselines.linear.systems import LinearSystem
 from benchmarks.scoring.knee import landings
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from tests.baselines.conftest import built
@@ -60,14 +59,14 @@ def test_hysteresis_lets_less_through_and_later():
 def test_gains_of_zero_satisfy_the_compensators_inequality():
     pytest.importorskip("cvxpy")
     for mounting, output in (("rig", "tension"), ("on_leg", "angle")):
-        plant: LinearSystem = plant_system(identify(getattr(KneeOrthosis, mounting)(), output))
-        assert certificate(plant, BumplessGains(np.zeros(plant.order))) > 0.0
+        plant = plant_system(identify(getattr(KneeOrthosis, mounting)(), output))
+        assert certificate(plant, BumplessGains(np.zeros(plant.nstates))) > 0.0
 
 
 def test_a_loop_that_begins_with_a_command_holds_it():
     loop = make_loop(KneeOrthosis.rig(), "tension")
     command, full = np.array([-5e4, 2e4]), np.full(2, 4.5e5)
-    state = loop.start(command)
+    state = loop.holding_state(command)
     for _ in range(50):
         given = loop.output(np.full(2, 158.0), np.full(2, 158.0), state, -full, full)
         np.testing.assert_allclose(given, command, rtol=1e-6)

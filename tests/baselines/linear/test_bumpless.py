@@ -14,7 +14,7 @@ from baselines.linear.bumpless import (
     design_bumpless,
 )
 from baselines.linear.bumpless import make_bumpless as make
-from baselines.linear.systems import LinearSystem
+from baselines.linear.systems import discrete, from_polynomials
 
 PLANT, GAINS = printed_bumpless()
 PERIOD = 0.01
@@ -30,7 +30,7 @@ def switched(loop: Bumpless, offset: float, seconds: float = 2.0) -> tuple[float
 
     Returns the largest tension error [N] and jump of the pressure [kPa] after the switch.
     """
-    rig = PLANT.discrete(PERIOD, "zoh")
+    rig = discrete(PLANT, PERIOD, "zoh")
     inside, state, last = rig.initial_state(), loop.initial_state(), 0.0
     errors, jumps = [], []
     for k in range(600):
@@ -60,7 +60,7 @@ def test_without_mismatch_there_is_nothing_to_do():
 
 
 def test_in_charge_and_unlimited_it_is_the_plain_controller():
-    loop, rig = compensated(-1e9, 1e9, NONE), PLANT.discrete(PERIOD, "zoh")
+    loop, rig = compensated(-1e9, 1e9, NONE), discrete(PLANT, PERIOD, "zoh")
     plain = loop.without()
     states = [one.initial_state() for one in (loop, plain)]
     inside = [rig.initial_state(), rig.initial_state()]
@@ -79,7 +79,7 @@ def test_in_charge_and_unlimited_it_is_the_plain_controller():
 
 def test_idle_controller_sees_the_loop_it_would_have_closed():
     """On its own model the fictitious loop is the real one, whatever another controller does."""
-    loop, rig = compensated(gains=NONE), PLANT.discrete(PERIOD, "zoh")
+    loop, rig = compensated(gains=NONE), discrete(PLANT, PERIOD, "zoh")
     idle, real = loop.initial_state(), loop.initial_state()
     foreign, own = rig.initial_state(), rig.initial_state()
     pressures = np.random.default_rng(0).uniform(-100.0, 100.0, 300)
@@ -94,7 +94,7 @@ def test_idle_controller_sees_the_loop_it_would_have_closed():
 
 
 def test_limits_do_not_wind_the_controller_up():
-    rig = PLANT.discrete(PERIOD, "zoh")
+    rig = discrete(PLANT, PERIOD, "zoh")
 
     def time_back(loop: Bumpless) -> int:
         inside, state, back = rig.initial_state(), loop.initial_state(), 0
@@ -139,7 +139,7 @@ def test_direct_gain_acts_only_as_a_factor_of_the_state_gain():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"model": PLANT.discrete(0.02, "zoh")}, "periods? is|period is 0.01"),
+        ({"model": discrete(PLANT, 0.02, "zoh")}, "periods? is|period is 0.01"),
         ({"low": 300.0}, "low is 300.0"),
     ],
 )
@@ -174,8 +174,8 @@ def test_nothing_satisfies_it_beyond_the_slowest_pole():
 def test_destabilising_gains_do_not_satisfy_it():
     pytest.importorskip("cvxpy")
     plant = printed_plant()
-    gains = BumplessGains(5.0 * plant.c / plant.static_gain)
-    assert np.max(np.linalg.eigvals(plant.a + np.outer(plant.b, gains.feedback)).real) > 0.0
+    gains = BumplessGains(5.0 * plant.C[0] / plant.dcgain())
+    assert np.max(np.linalg.eigvals(plant.A + plant.B * gains.feedback).real) > 0.0
     assert certificate(plant, gains) < SMALLEST
 
 
@@ -185,7 +185,7 @@ def test_design_satisfies_its_own_inequality(decay):
     plant = printed_plant()
     gains = design_bumpless(plant, decay)
     assert certificate(plant, gains, decay) > SMALLEST
-    poles = np.linalg.eigvals(plant.a + np.outer(plant.b, gains.feedback))
+    poles = np.linalg.eigvals(plant.A + plant.B * gains.feedback)
     assert np.max(poles.real) < -decay
 
 
@@ -199,4 +199,4 @@ def test_designed_gains_act_as_the_printed_ones():
 def test_unstable_plants_are_refused():
     pytest.importorskip("cvxpy")
     with pytest.raises(ValueError, match="must be stable"):
-        design_bumpless(LinearSystem.from_polynomials([1.0], [1.0, -1.0]))
+        design_bumpless(from_polynomials([1.0], [1.0, -1.0]))

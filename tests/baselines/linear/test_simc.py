@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from baselines.joint.feedback import closed_loop_time, pid_system, simc_joint
-from baselines.joint.model import nominal_motion
 from baselines.linear.ltr import loop_figures
 from baselines.linear.simc import WAIT, simc_rule
+from baselines.linear.systems import double_lag
 
 PERIOD, POLE = 0.01, 23.0
 
@@ -35,8 +35,8 @@ def test_one_stage_takes_the_recommendation_and_an_arm_is_held_back():
 def test_loop_of_one_stage_bears_its_dead_time(smooth, margin, peak):
     """With a whole period of computing, as on a rig; without the filter of D the peak were 1.59."""
     law = simc_joint(1.0, POLE, PERIOD, smooth=smooth)
-    loop = pid_system(law).series(nominal_motion(POLE))
-    late = loop_figures(lambda w: loop.response(w) * np.exp(-1j * w * WAIT * PERIOD))
+    loop = double_lag(POLE) * pid_system(law)
+    late = loop_figures(lambda w: loop(1j * w) * np.exp(-1j * w * WAIT * PERIOD))
     assert np.degrees(late.phase_margin) == pytest.approx(margin, abs=0.2)
     assert late.peak_sensitivity == pytest.approx(peak, abs=0.01)
 
