@@ -257,7 +257,8 @@ def environment_arguments(
     """Give a function the arguments of :class:`Common`, with these defaults, beside its own.
 
     The function gets a :class:`Common` as its first argument. Without keyword arguments of an
-    unknown name: a ``TypeError`` lists the known ones.
+    unknown name: a ``TypeError`` lists the known ones. Every check raises a ``ValueError`` that names
+    the argument, its value, the bounds and the remedy.
     """
     defaults = Common(reference, preview, preview_stride, episode_seconds)
 

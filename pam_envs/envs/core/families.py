@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from pam_envs.envs.core.layout import Report
+from pam_envs.envs.core.layout import Report, indices
 from pam_envs.envs.core.step import MOST_PREVIEW, N_SEED, do_nothing, step_by_address, step_tiles
 from pam_envs.kernels.build import LANES, build, interpreted
 
+Kernel = Callable[..., Any]
+NONE = indices(())
 
+
+@dataclass(frozen=True, eq=False)
 class Kernels:
     """Kernels of one family, built on first use.
 
-    Parameters
+    Attributes
     ----------
     name : str
         Name of the machine code on disk: the family and what its kernels depend on.
@@ -46,56 +51,58 @@ class Kernels:
         References that are tracked at once.
     """
 
-    def __init__(
-        self,
-        name: str,
-        maker: Callable[..., Any],
-        key: tuple[Any, ...],
-        report: Report,
-        *,
-        advance: Callable[..., Any],
-        reference: Callable[..., Any],
-        evaluate: Callable[..., Any],
-        begin: Callable[..., Any],
-        rows: int,
-        parameters: int,
-        counts: int,
-        signals: int,
-        set_points: int,
-        old_set_points: int,
-        channels: int = 1,
-        config: Any = (),
-        choices: Any = (),
-        apply: Callable[..., Any] = do_nothing,
-        placeholders: Mapping[str, Any] | None = None,
-    ) -> None:
-        self.name, self._made_by = name, (maker, key)
-        self.info, self.channels = report.keys, channels
-        self.config, self.choices = getattr(config, "_fields", ()), getattr(choices, "_fields", ())
-        self.n_rows, self.n_parameters, self.n_counts = rows, parameters, counts + N_SEED
-        self.names = {
-            **(placeholders or {}),
-            "env_apply": apply,
-            "env_advance": advance,
-            "env_reference": reference,
-            "env_evaluate": evaluate,
-            "env_begin": begin,
-            "N_ROWS": rows,
-            "N_PARAMETERS": parameters,
+    name: str
+    maker: Callable[..., Any]
+    key: tuple[Any, ...]
+    report: Report
+    advance: Kernel
+    reference: Kernel
+    evaluate: Kernel
+    begin: Kernel
+    rows: int
+    parameters: int
+    counts: int
+    signals: int
+    set_points: int
+    old_set_points: int
+    channels: int = 1
+    config: Any = NONE
+    choices: Any = NONE
+    apply: Kernel = do_nothing
+    placeholders: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def n_counts(self) -> int:
+        """Integer rows with those of the seed."""
+        return self.counts + N_SEED
+
+    @cached_property
+    def names(self) -> dict[str, Any]:
+        """Values of global names in the call graph of the step."""
+        keys, channels = self.report.keys, self.channels
+        return {
+            **self.placeholders,
+            "env_apply": self.apply,
+            "env_advance": self.advance,
+            "env_reference": self.reference,
+            "env_evaluate": self.evaluate,
+            "env_begin": self.begin,
+            "N_ROWS": self.rows,
+            "N_PARAMETERS": self.parameters,
             "N_COUNTS": self.n_counts,
-            "N_WORK_ROWS": report.signals + signals + channels * (1 + MOST_PREVIEW),
-            "FIRST_INFO": report.scratch,
-            "N_INFO": len(report.keys),
-            "N_REWARDS": sum(name.startswith("reward/") for name in report.keys),
-            "COPIED": report.copied,
+            "N_WORK_ROWS": self.report.signals + self.signals + channels * (1 + MOST_PREVIEW),
+            "FIRST_INFO": self.report.scratch,
+            "N_INFO": len(keys),
+            "N_REWARDS": sum(key.startswith("reward/") for key in keys),
+            "COPIED": self.report.copied,
             "CHANNELS": channels,
-            "FIRST_SET_POINT": set_points,
-            "FIRST_OLD_SET_POINT": old_set_points,
+            "FIRST_SET_POINT": self.set_points,
+            "FIRST_OLD_SET_POINT": self.old_set_points,
         }
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the key instead of machine code."""
-        return self._made_by
+        return self.maker, self.key
 
     def _build(self, name: str, lanes: int, parallel: bool = False) -> Callable[..., Any]:
         names = {**self.names, "LANES": lanes}

@@ -9,26 +9,14 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.envs.core.configured import Configured, fresh_seed, space_of
 from pam_envs.envs.core.info import Info
-from pam_envs.envs.core.setup import BEGIN, STEP, Configured, Setup, check_seed, check_state, saved
+from pam_envs.envs.core.setup import BEGIN, STEP, Setup, check_seed, check_state, saved
 from pam_envs.kernels.build import COMPILED, address_book
 from pam_envs.kernels.random import seed_words
-from pam_envs.parameters import Signals
 
 INTERPRETED_CALLS = 50
 """Steps in plain Python before an environment changes to machine code."""
-
-
-def space_of(signals: Signals) -> gym.spaces.Box[np.float32]:
-    """Return the Box of a vector of signals."""
-    low = [-1.0 if s.normalized else s.low for s in signals]
-    high = [1.0 if s.normalized else s.high for s in signals]
-    return gym.spaces.Box(np.array(low, np.float32), np.array(high, np.float32), dtype=np.float32)
-
-
-def fresh_seed() -> int:
-    """Return a seed from the operating system's entropy."""
-    return int(np.random.SeedSequence().generate_state(1, np.uint64)[0] >> 1)
 
 
 class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -48,15 +36,9 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     metadata = {"render_modes": ["rgb_array", "human"], "render_fps": 100}
 
     def __init__(self, setup: Setup | None = None, **arguments: Any) -> None:
-        setup = self.make_setup(**arguments) if setup is None else setup
-        self.setup = setup
-        self.plant = setup.plant
-        self.signals = setup.signals
-        self.action_signals = setup.action_signals
-        self.render_mode = setup.render_mode
+        setup = self._configure(setup, arguments)
         self.observation_space: gym.spaces.Box[np.float32] = space_of(setup.signals)
         self.action_space: gym.spaces.Box[np.float32] = space_of(setup.action_signals)
-        self.control_period = setup.control_period
         self._seed: int | None = None
         self._steps = -1
         self._renderer: Any = None
@@ -153,7 +135,7 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         except (AttributeError, TypeError, IndexError):
             i = -1
         if i != self._n_actions:
-            for i, value in enumerate(self._as_action(action)):
+            for i, value in enumerate(self._numbers(action, (self._n_actions,), "action").tolist()):
                 cells[i] = value
 
     def _warm(self) -> None:
@@ -161,32 +143,6 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._warming -= 1
         if not self._warming:
             self._use(self.setup.kernels.single, compiled=True)
-
-    def _as_action(self, action: Any) -> list[float]:
-        """Return an action as a list of numbers, or raise saying what is wrong with it."""
-        shape = (self._n_actions,)
-        try:
-            if np.iscomplexobj(action):
-                raise TypeError("complex numbers")
-            made = np.asarray(action, np.float64)
-        except (TypeError, ValueError, OverflowError) as error:
-            raise ValueError(
-                f"the action {str(action)[:60]!r} is not an array of {shape[0]} numbers: {error}"
-            ) from error
-        if made.shape != shape:
-            raise ValueError(
-                f"the action has shape {made.shape}, expected {shape}: one number for each of "
-                + ", ".join(self.action_signals.names())
-            )
-        for i, value in enumerate(made.tolist()):
-            if not isfinite(value):
-                low, high = self.action_space.low[i], self.action_space.high[i]
-                raise ValueError(
-                    f"action[{i}] ({self.action_signals[i].name}) is {value}; "
-                    f"give a finite number between {low:g} and {high:g}"
-                )
-        values: list[float] = made.tolist()
-        return values
 
     def _read(self) -> tuple[NDArray[np.float32], Info, float, bool, bool]:
         """Return observation, info, reward and flags of the last call."""

@@ -7,7 +7,7 @@ the same setup and differ only in the number of lanes.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,7 +65,7 @@ class Setup:
     @property
     def info_keys(self) -> tuple[str, ...]:
         """Keys of ``info``, in the order in which the kernels write them."""
-        keys: tuple[str, ...] = self.kernels.info
+        keys: tuple[str, ...] = self.kernels.report.keys
         return keys
 
     @property
@@ -77,8 +77,8 @@ class Setup:
     def state(self, tiles: int, lanes: int) -> tuple[NDArray[Any], ...]:
         """Return zeroed state, parameters, integers and previews for tiles of ``lanes`` lanes."""
         return (
-            np.zeros((tiles, self.kernels.n_rows, lanes)),
-            np.zeros((tiles if self.drawn else 1, self.kernels.n_parameters, lanes)),
+            np.zeros((tiles, self.kernels.rows, lanes)),
+            np.zeros((tiles if self.drawn else 1, self.kernels.parameters, lanes)),
             np.zeros((tiles, self.kernels.n_counts, lanes), np.int64),
             np.zeros((tiles, self.ring, lanes)),
         )
@@ -137,7 +137,7 @@ def compose(
     members = plant.members() if drawn else (plant,)
     none = np.zeros((kernels.channels, 1))
     tables = np.zeros((len(members), 1, 1)) if tables is None else tables[: len(members)]
-    own_numbers = [config[name] for name in kernels.config]
+    own_numbers = [config[name] for name in kernels.config._fields]
     blocks = [
         np.array([(plant.control_period, given.episode_seconds, *own_numbers)], np.float64),
         np.array([_action_scale(signal) for signal in actions]),
@@ -163,7 +163,10 @@ def compose(
         "sines": sines,
         **dict(zip(CHOICE._fields[-5:], first[1:6], strict=True)),
     }
-    numbers = *(whole[name] for name in CHOICE._fields), *(choices[n] for n in kernels.choices)
+    numbers = (
+        *(whole[name] for name in CHOICE._fields),
+        *(choices[n] for n in kernels.choices._fields),
+    )
     ring = 1 << (whole["preview"] * whole["stride"]).bit_length()
     return Setup(
         plant=plant,
@@ -304,14 +307,3 @@ def check_state(state: Any, like: tuple[NDArray[Any], ...]) -> list[NDArray[Any]
             )
         parts.append(part)
     return parts
-
-
-class Configured:
-    """Base of an environment whose keyword arguments ``make_setup`` turns into its setup."""
-
-    make_setup: Callable[..., Setup]
-
-    def __init_subclass__(cls, make_setup: Callable[..., Setup] | None = None) -> None:
-        """Take the function from the class statement."""
-        if make_setup is not None:
-            cls.make_setup = staticmethod(make_setup)

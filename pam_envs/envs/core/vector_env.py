@@ -10,11 +10,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from pam_envs.envs.core.plant_env import fresh_seed, space_of
+from pam_envs.envs.core.configured import Configured, fresh_seed, space_of
 from pam_envs.envs.core.setup import (
     BEGIN,
     STEP_AND_RESTART,
-    Configured,
     Setup,
     check_choice,
     check_seed,
@@ -67,17 +66,11 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         setup: Setup | None = None,
         **arguments: Any,
     ) -> None:
-        setup = self.make_setup(**arguments) if setup is None else setup
+        setup = self._configure(setup, arguments)
         self.num_envs = check_whole("num_envs", num_envs, 1, 2**24)
         check_choice("a batch's render_mode", setup.render_mode, (None, "rgb_array"))
         if setup.render_mode is not None and not info:
             raise ValueError("render_mode = 'rgb_array' needs info; leave info=True")
-        self.setup = setup
-        self.plant = setup.plant
-        self.signals = setup.signals
-        self.action_signals = setup.action_signals
-        self.render_mode = setup.render_mode
-        self.control_period = setup.control_period
         self.with_info = bool(info)
         self._renderers: list[Any] = []
         self.single_observation_space = space_of(setup.signals)
@@ -186,7 +179,7 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         """
         if not self._seeded:
             raise gym.error.ResetNeeded("call reset() before step()")
-        actions = self._checked(actions)
+        actions = self._numbers(actions, (self.num_envs, len(self.action_signals)), "actions")
         outputs = self._outputs()
         observations, reports, flags = outputs
         self._call(actions, outputs, STEP_AND_RESTART)
@@ -198,24 +191,6 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
         if ended.any():
             self._add_final(infos, ended, observations[1], reports[1])
         return observations[0], reports[0, 0], flags[0], flags[1], infos
-
-    def _checked(self, actions: Any) -> NDArray[np.float64]:
-        shape = (self.num_envs, len(self.action_signals))
-        try:
-            if np.iscomplexobj(actions):
-                raise TypeError("complex numbers")
-            made = np.asarray(actions, np.float64)
-        except (TypeError, ValueError, OverflowError) as error:
-            raise ValueError(f"the actions are not an array of shape {shape}: {error}") from error
-        if made.shape != shape:
-            raise ValueError(f"the actions have shape {made.shape}, expected {shape}")
-        if not np.isfinite(made).all():
-            row, column = np.argwhere(~np.isfinite(made))[0]
-            raise ValueError(
-                f"actions[{row}, {column}] ({self.action_signals[int(column)].name}) is "
-                f"{made[row, column]}; give finite numbers"
-            )
-        return made
 
     def _infos(self, info: NDArray[np.float64]) -> dict[str, Any]:
         return dict(zip(self.setup.info_keys, info[1:], strict=True)) if self.with_info else {}

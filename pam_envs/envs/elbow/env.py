@@ -260,11 +260,6 @@ def make_setup(
         Whether the orthosis compensates its own weight.
     start : {"ready", "random"}
         Under the pressures for the references, or under random ones.
-
-    Raises
-    ------
-    ValueError
-        Naming the argument, its value, the bounds and the remedy.
     """
     made = _plant(given, valves)
     kind, samples = _reference(made, given)

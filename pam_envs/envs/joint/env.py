@@ -159,8 +159,6 @@ def make_setup(
     ------
     UnbearableLoad
         If the muscles cannot hold the largest angle with the heaviest payload.
-    ValueError
-        Naming the argument, its value, the bounds and the remedy.
     """
     made = given.plant_of(AntagonisticJoint, _default)
     most = made.angle_range[1]

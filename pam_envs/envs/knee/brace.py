@@ -91,11 +91,6 @@ def make_setup(
         Frequency of the reference "sine" [Hz].
     start : {"random", "paper"}
         At rest under a random pressure, or at about 55 N.
-
-    Raises
-    ------
-    ValueError
-        Naming the argument, its value, the bounds and the remedy.
     """
     made = given.plant_of(KneeOrthosis, partial(_default, mounting))
     if made.mounting == "leg":

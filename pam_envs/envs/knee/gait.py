@@ -134,11 +134,6 @@ def make_setup(
         Offset [N] of the tension's reference in swing, where the tension is not tracked.
     start : {"random", "heel_contact"}
         Phase of the stride at the start.
-
-    Raises
-    ------
-    ValueError
-        Naming the argument, its value, the bounds and the remedy.
     """
     made = _plant(activity, given, pace)
     source, samples = given.reference_of(SOURCES, "N m", 100.0)

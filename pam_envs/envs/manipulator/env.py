@@ -174,8 +174,6 @@ def make_setup(
         If the arm cannot take a pose of the path.
     UnbearableLoad
         If its muscles cannot hold it there with the heaviest payload.
-    ValueError
-        Naming the argument, its value, the bounds and the remedy.
     """
     made = given.plant_of(RedundantManipulator, _default)
     check_choice("action", action, MODES)

@@ -105,11 +105,6 @@ def make_setup(
         Step of the load [kg], up or down, at an unannounced time.
     start : {"random", "rest"}
         Random pressure history, or never inflated.
-
-    Raises
-    ------
-    ValueError
-        Naming the argument, its value, the bounds and the remedy.
     """
     made = given.plant_of(SingleMuscle, _default)
     loads = _loads(load)
