@@ -143,11 +143,9 @@ def plants_of(env: Any) -> list[str]:
 
 def _kinds(env: Any) -> Iterator[tuple[dict[str, Any], Any]]:
     """Yield the environment's arguments and the nominal plant of each kind of row."""
-    base = env.unwrapped
-    for batch in getattr(base, "batches", (base,)):
-        given = batch.get_attr("spec")[0].kwargs
-        kind = {name: value for name, value in given.items() if name not in OWN}
-        yield kind, batch.get_attr("plant")[0]
+    for batch in env.unwrapped.batches:
+        kind = {name: value for name, value in batch.spec.kwargs.items() if name not in OWN}
+        yield kind, batch.unwrapped.plant
 
 
 def _in_common(kinds: list[dict[str, Any]]) -> dict[str, Any]:

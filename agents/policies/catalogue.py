@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from agents.policies.policy import OnnxPolicy
 from agents.policies.policy_file import PolicyFileError, read, record_of
@@ -112,16 +112,8 @@ LSTM = "Hochreiter, Schmidhuber, Long short-term memory, Neural Computation 9 (1
 RESIDUAL = "Johannink et al., Residual reinforcement learning for robot control, ICRA 2019"
 
 
-@dataclass(frozen=True)
-class Kind:
-    """Algorithm and variant of a preset.
-
-    Attributes
-    ----------
-    name : str
-        Prefix of controllers' names.
-    summary, citation : str
-    """
+class Kind(NamedTuple):
+    """Prefix of controllers' names, summary and citation of an algorithm and variant."""
 
     name: str
     summary: str

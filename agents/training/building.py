@@ -19,7 +19,6 @@ from agents.settings.presets import ON_POLICY, Config
 from agents.settings.schema import SettingsError
 from agents.vec_envs.batch import make_batch_vec_env
 from agents.vec_envs.history import HistoryVecEnv
-from agents.vec_envs.mixed import MixedVecEnv
 from agents.vec_envs.residual import ResidualVecEnv
 
 OWN = ("learning_rate", "lstm_size", "critic_lstm", "warm_up")
@@ -30,8 +29,7 @@ def make_env(config: Config) -> VecEnv:
     """Return the environment of a run: batch, monitor, controller, history, normaliser."""
     kinds = config.kinds()
     rows = config.num_envs // len(kinds)
-    batches = [make_batch_vec_env(config.env, rows, **kind) for kind in kinds]
-    env: VecEnv = VecMonitor(batches[0] if len(batches) == 1 else MixedVecEnv(batches))
+    env: VecEnv = VecMonitor(make_batch_vec_env(config.env, rows, *kinds))
     signals, actions = signals_of(env)
     corrected, scale = config.residual.controller, config.residual.scale
     if corrected:

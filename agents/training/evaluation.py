@@ -21,7 +21,6 @@ from agents.policies.residual import with_controller
 from agents.settings import seeds
 from agents.settings.presets import Config
 
-Array = NDArray[np.float64]
 TRAVEL = "effort/pressure_travel"
 MORE_TRAVEL = 1.05
 """Ratio of a policy's travel to its controller's up to which the travel costs nothing."""
@@ -111,8 +110,6 @@ def evaluate(policy: OnnxPolicy | str, config: Config, episodes: int | None = No
     parts = [
         _Part(policy, config, {**kind, **config.evaluation.env_kwargs}, chosen) for kind in kinds
     ]
-    for part in parts:
-        part.run()
     counted = sum(part.counted for part in parts)
     squares = sum(part.squares for part in parts)
     return Score(
@@ -125,44 +122,49 @@ def evaluate(policy: OnnxPolicy | str, config: Config, episodes: int | None = No
 
 
 class _Part:
-    """The episodes on one kind of plant, as one batch."""
+    """The episodes of one kind of rows, as one batch.
+
+    Attributes
+    ----------
+    returns : array, shape (n_episodes,)
+    squares, travel : float
+        Sums over the evaluated instants.
+    counted, failures : int
+        Numbers of evaluated instants and of failed episodes.
+    """
 
     def __init__(
         self, policy: OnnxPolicy | str, config: Config, kwargs: dict[str, Any], chosen: list[int]
     ) -> None:
-        self.env: Any = gym.make_vec(
+        env: Any = gym.make_vec(
             config.env, len(chosen), vectorization_mode="vector_entry_point", **kwargs
         )
-        base: Any = self.env.unwrapped
-        self.policy: Any = (
+        base: Any = env.unwrapped
+        controller: Any = (
             controllers.make(policy, base.plant, base.signals, base.action_signals)
             if isinstance(policy, str)
             else with_controller(policy, base.plant)
         )
         self.evaluation = config.evaluation
-        self.seeds = chosen
         self.returns = np.zeros(len(chosen))
         self.squares = self.travel = 0.0
         self.counted = self.failures = 0
-
-    @property
-    def rms(self) -> float:
-        """RMS of the error in these episodes."""
-        return math.sqrt(self.squares / self.counted) if self.counted else math.nan
-
-    def run(self) -> None:
-        """Run every episode to its end."""
-        observation, infos = self.env.reset(seed=self.seeds)
-        running, state, start = np.ones(len(self.seeds), bool), None, np.ones(len(self.seeds), bool)
+        observation, infos = env.reset(seed=chosen)
+        running, state, start = np.ones(len(chosen), bool), None, np.ones(len(chosen), bool)
         while running.any():
-            action, state = self.policy.predict(observation, state, start)
-            observation, reward, terminated, truncated, infos = self.env.step(action)
+            action, state = controller.predict(observation, state, start)
+            observation, reward, terminated, truncated, infos = env.step(action)
             self.returns += np.where(running, reward, 0.0)
             self.failures += int((running & terminated).sum())
             start = terminated | truncated
             running &= ~start
             self._count(infos, running)
-        self.env.close()
+        env.close()
+
+    @property
+    def rms(self) -> float:
+        """RMS of the error in these episodes."""
+        return math.sqrt(self.squares / self.counted) if self.counted else math.nan
 
     def _count(self, infos: Any, running: NDArray[np.bool_]) -> None:
         """Add the present errors of the rows whose first episode is still running."""
@@ -171,7 +173,7 @@ class _Part:
         rows = running & (np.asarray(infos["time"]) > self.evaluation.settle_seconds)
         for name in self.evaluation.gate:
             rows &= np.asarray(infos[name]) > 0.5
-        errors: Array = np.asarray(infos["output"]) - np.asarray(infos["reference"])
+        errors = np.asarray(infos["output"]) - np.asarray(infos["reference"])
         self.squares += float(np.sum(np.square(errors[rows])))
         self.travel += float(np.sum(np.asarray(infos[TRAVEL])[rows]))
         self.counted += int(rows.sum())

@@ -17,7 +17,6 @@ import numpy as np
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
-from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
 from agents.vec_envs.history import HistoryVecEnv
@@ -25,6 +24,12 @@ from agents.vec_envs.residual import ResidualVecEnv
 
 COUNTERS = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_remaining")
 LAST = ("_last_obs", "_last_episode_starts", "_last_original_obs")
+ARRAYS: dict[type[VecEnv], tuple[str, ...]] = {
+    VecMonitor: ("episode_returns", "episode_lengths"),
+    VecNormalize: ("returns", "old_obs", "old_reward"),
+    HistoryVecEnv: ("past", "last"),
+}
+"""Arrays of the wrappers' states."""
 BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
@@ -88,57 +93,41 @@ def _lstm(model: BaseAlgorithm) -> tuple[Any, ...]:
 def _layers(env: VecEnv) -> Iterator[VecEnv]:
     """Yield the wrappers with a state."""
     while hasattr(env, "venv"):
-        if isinstance(env, (VecMonitor, VecNormalize, HistoryVecEnv, ResidualVecEnv)):
+        if isinstance(env, (ResidualVecEnv, *ARRAYS)):
             yield env
         env = env.venv
 
 
 def _layer(layer: VecEnv) -> dict[str, Any]:
-    if isinstance(layer, (HistoryVecEnv, ResidualVecEnv)):
+    if isinstance(layer, ResidualVecEnv):
         return layer.snapshot()
+    made: dict[str, Any] = {n: np.array(getattr(layer, n)) for n in ARRAYS[type(layer)]}
+    for name, moments in _moments(layer):
+        made[name] = [np.array(moments.mean), np.array(moments.var), moments.count]
     if isinstance(layer, VecMonitor):
-        return {
-            "returns": layer.episode_returns.copy(),
-            "lengths": layer.episode_lengths.copy(),
-            "count": layer.episode_count,
-        }
-    assert isinstance(layer, VecNormalize)
-    made: dict[str, Any] = {
-        "returns": layer.returns.copy(),
-        "old_obs": np.asarray(layer.old_obs).copy(),
-        "old_reward": layer.old_reward.copy(),
-        "ret_rms": _moments(layer.ret_rms),
-    }
-    if layer.norm_obs:
-        made["obs_rms"] = _moments(layer.obs_rms)  # type: ignore[arg-type]
+        made["count"] = layer.episode_count
     return made
 
 
 def _restore_layer(layer: VecEnv, saved: dict[str, Any]) -> None:
-    if isinstance(layer, (HistoryVecEnv, ResidualVecEnv)):
+    if isinstance(layer, ResidualVecEnv):
         layer.restore(saved)
         return
+    for name in ARRAYS[type(layer)]:
+        setattr(layer, name, saved[name].numpy().copy())
+    for name, moments in _moments(layer):
+        mean, var, moments.count = saved[name]
+        moments.mean, moments.var = mean.numpy().copy(), var.numpy().copy()
     if isinstance(layer, VecMonitor):
-        layer.episode_returns = saved["returns"].numpy().copy()
-        layer.episode_lengths = saved["lengths"].numpy().copy()
         layer.episode_count = saved["count"]
-        return
-    assert isinstance(layer, VecNormalize)
-    layer.returns = saved["returns"].numpy().copy()
-    layer.old_obs = saved["old_obs"].numpy().copy()
-    layer.old_reward = saved["old_reward"].numpy().copy()
-    _restore_moments(layer.ret_rms, saved["ret_rms"])
-    if layer.norm_obs:
-        _restore_moments(layer.obs_rms, saved["obs_rms"])  # type: ignore[arg-type]
 
 
-def _moments(moments: RunningMeanStd) -> dict[str, Any]:
-    return {"mean": np.array(moments.mean), "var": np.array(moments.var), "count": moments.count}
-
-
-def _restore_moments(moments: RunningMeanStd, saved: dict[str, Any]) -> None:
-    moments.mean, moments.var = saved["mean"].numpy().copy(), saved["var"].numpy().copy()
-    moments.count = float(saved["count"])
+def _moments(layer: VecEnv) -> Iterator[tuple[str, Any]]:
+    """Yield the running moments of a normaliser."""
+    if isinstance(layer, VecNormalize):
+        yield "ret_rms", layer.ret_rms
+        if layer.norm_obs:
+            yield "obs_rms", layer.obs_rms
 
 
 def _replay(model: BaseAlgorithm) -> dict[str, Any] | None:

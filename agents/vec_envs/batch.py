@@ -1,4 +1,4 @@
-"""Adapter of the batched environment to stable-baselines3: one kernel call a step.
+"""Adapter of batched environments to stable-baselines3: one kernel call a step and batch.
 
 There are no processes and no loop over environments. stable-baselines3 expects a list of ``info``
 dictionaries; here all rows whose episode continues share one empty dictionary.
@@ -6,7 +6,8 @@ dictionaries; here all rows whose episode continues share one empty dictionary.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NoReturn
 
 import gymnasium as gym
@@ -33,7 +34,7 @@ class NoInfo(dict[str, Any]):
 NO_INFO = NoInfo()
 
 
-def make_batch_vec_env(env_id: str, num_envs: int, **kwargs: Any) -> BatchVecEnv:
+def make_batch_vec_env(env_id: str, num_envs: int, *kinds: Mapping[str, Any], **kwargs: Any) -> Any:
     """Return ``num_envs`` environments for stable-baselines3.
 
     Parameters
@@ -41,22 +42,28 @@ def make_batch_vec_env(env_id: str, num_envs: int, **kwargs: Any) -> BatchVecEnv
     env_id : str
         A registered environment, for example ``"PAM/MusclePositioning-v0"``.
     num_envs : int
-        Number of rows.
+        Number of rows of each kind.
+    *kinds : mapping
+        Arguments of each kind of rows; none for one kind.
     **kwargs
-        Arguments of the environment. ``info=True`` makes each step report ``info``, which is
-        slower and which learning does not need.
+        Arguments of all rows. ``info=True`` makes each step report ``info``, which is slower and
+        which learning does not need.
     """
-    made = gym.make_vec(
-        env_id,
-        num_envs=num_envs,
-        vectorization_mode="vector_entry_point",
-        **{"info": False, **kwargs},
+    return BatchVecEnv(
+        *(
+            gym.make_vec(
+                env_id,
+                num_envs=num_envs,
+                vectorization_mode="vector_entry_point",
+                **{"info": False, **kwargs, **kind},
+            )
+            for kind in kinds or ({},)
+        )
     )
-    return BatchVecEnv(made)
 
 
 class BatchVecEnv(VecEnv):
-    """``VecEnv`` over a batched Gymnasium environment that resets in the same step.
+    """``VecEnv`` over the rows of batched Gymnasium environments, one batch after the other.
 
     Row ``i`` after ``seed(s)`` is the single environment reset with ``s + i``, bit for bit.
     ``infos[i]`` is empty unless an episode ended in row ``i``; then it holds
@@ -64,44 +71,60 @@ class BatchVecEnv(VecEnv):
 
     Parameters
     ----------
-    env : gymnasium.vector.VectorEnv
-        With ``AutoresetMode.SAME_STEP``.
+    *batches : gymnasium.vector.VectorEnv
+        With the same spaces and ``AutoresetMode.SAME_STEP``.
 
     Raises
     ------
     ValueError
-        If the environment has another reset mode.
+        If a batch has another reset mode.
     """
 
-    def __init__(self, env: VectorEnv[Any, Any, Any]) -> None:
-        mode = env.metadata.get("autoreset_mode")
-        if mode != AutoresetMode.SAME_STEP:
-            raise ValueError(
-                f"the batched environment has autoreset_mode = {mode}, but stable-baselines3 needs "
-                "AutoresetMode.SAME_STEP; make it with vectorization_mode='vector_entry_point'"
-            )
-        self.env = env
-        self.spec = env.spec
+    def __init__(self, *batches: VectorEnv[Any, Any, Any]) -> None:
+        for batch in batches:
+            mode = batch.metadata.get("autoreset_mode")
+            if mode != AutoresetMode.SAME_STEP:
+                raise ValueError(
+                    f"the batched environment has autoreset_mode = {mode}, but stable-baselines3 "
+                    "needs AutoresetMode.SAME_STEP; make it with "
+                    "vectorization_mode='vector_entry_point'"
+                )
+        self.batches = batches
+        ends = np.cumsum([batch.num_envs for batch in batches]).tolist()
+        self.slices = tuple(slice(a, b) for a, b in zip([0, *ends[:-1]], ends, strict=True))
+        self.spec = batches[0].spec
         self._actions: NDArray[Any] | None = None
-        super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
+        super().__init__(
+            ends[-1], batches[0].single_observation_space, batches[0].single_action_space
+        )
+
+    def parts(self) -> Iterator[tuple[slice, Any]]:
+        """Yield the rows of each plant; adjacent batches of equal plants are one entry."""
+        plants = [(rows, self._base(i).plant) for i, rows in enumerate(self.slices)]
+        for _, group in itertools.groupby(plants, key=lambda pair: pair[1].digest()):
+            pairs = list(group)
+            yield slice(pairs[0][0].start, pairs[-1][0].stop), pairs[0][1]
+
+    def _base(self, batch: int) -> Any:
+        return self.batches[batch].unwrapped
 
     def reset(self) -> NDArray[np.float32]:
         """Start all episodes, with the seeds and options set before; see stable-baselines3."""
-        seeds = None if all(s is None for s in self._seeds) else list(self._seeds)
-        observation, infos = self.env.reset(
-            seed=seeds,  # type: ignore[arg-type]
-            options=self._common_options(),
-        )
-        self.reset_infos = self._rows_of(infos)
+        made = [
+            self._reset(batch, rows) for batch, rows in zip(self.batches, self.slices, strict=True)
+        ]
+        self.reset_infos = [info for _, infos in made for info in infos]
         self._reset_seeds()
         self._reset_options()
-        return np.asarray(observation)
+        return _joined([observation for observation, _ in made])
 
-    def _common_options(self) -> dict[str, Any] | None:
-        first = self._options[0]
-        if any(options != first for options in self._options):
+    def _reset(self, batch: Any, rows: slice) -> tuple[Any, list[dict[str, Any]]]:
+        seeds, options = self._seeds[rows], self._options[rows]
+        if any(own != options[0] for own in options):
             raise ValueError("the rows are reset by one call; give the same options for all rows")
-        return first or None
+        seeded = any(seed is not None for seed in seeds)
+        observation, infos = batch.reset(seed=seeds if seeded else None, options=options[0] or None)
+        return observation, _rows_of(infos, batch.num_envs)
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Keep the actions for :meth:`step_wait`."""
@@ -112,66 +135,54 @@ class BatchVecEnv(VecEnv):
         if self._actions is None:
             raise RuntimeError("call step_async(actions) before step_wait()")
         actions, self._actions = self._actions, None
-        observation, reward, terminated, truncated, infos = self.env.step(actions)
-        done = terminated | truncated
-        rows = self._rows_of(infos)
-        if done.any():
-            for i in np.flatnonzero(done).tolist():
-                rows[i] = self._last_info(infos, i, bool(truncated[i] and not terminated[i]))
-        return observation, reward.astype(np.float32), done, rows
-
-    def _rows_of(self, infos: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Return the infos by row; rows without any share one."""
-        keys = [k for k in infos if not k.startswith("_") and k not in FINAL_KEYS]
-        if not keys:
-            return [NO_INFO] * self.num_envs
-        columns = [np.asarray(infos[k]).tolist() for k in keys]
-        return [dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)]
-
-    @staticmethod
-    def _last_info(infos: Mapping[str, Any], row: int, truncated: bool) -> dict[str, Any]:
-        last = infos.get("final_info", {})
-        made = {k: v[row].item() for k, v in last.items() if not k.startswith("_")}
-        made["terminal_observation"] = infos["final_obs"][row]
-        made["TimeLimit.truncated"] = truncated
-        return made
+        made = [
+            _stepped(batch, actions[rows])
+            for batch, rows in zip(self.batches, self.slices, strict=True)
+        ]
+        observations, rewards, done, infos = zip(*made, strict=True)
+        rows = [info for batch in infos for info in batch]
+        return _joined(observations), _joined(rewards), _joined(done), rows
 
     def close(self) -> None:
-        """Close the batched environment."""
-        self.env.close()
+        """Close all batches."""
+        for batch in self.batches:
+            batch.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """Return an attribute of the batched environment, which the rows share, for each row."""
-        return [getattr(self.env.unwrapped, attr_name)] * len(self._indices(indices))
+        """Return an attribute of each row's batch, which its rows share."""
+        whole = [
+            getattr(batch.unwrapped, attr_name)
+            for batch in self.batches
+            for _ in range(batch.num_envs)
+        ]
+        return [whole[row] for row in self._indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Set an attribute of the batched environment.
+        """Set an attribute of all batches.
 
         Raises
         ------
         ValueError
-            If ``indices`` are only some rows: the rows share their attributes.
+            If ``indices`` are only some rows: rows share their attributes.
         """
-        self._all_rows(f"set_attr({attr_name!r})", indices)
-        setattr(self.env.unwrapped, attr_name, value)
+        self._check_all_rows(f"set_attr({attr_name!r})", indices)
+        for batch in self.batches:
+            setattr(batch.unwrapped, attr_name, value)
 
     def env_method(
-        self,
-        method_name: str,
-        *method_args: Any,
-        indices: VecEnvIndices = None,
-        **method_kwargs: Any,
+        self, method_name: str, *args: Any, indices: VecEnvIndices = None, **kwargs: Any
     ) -> list[Any]:
-        """Call a method of the batched environment once; every row gets the result.
+        """Call a method of all batches once; every row gets its batch's result.
 
         Raises
         ------
         ValueError
             If ``indices`` are only some rows: a method acts on all.
         """
-        self._all_rows(f"env_method({method_name!r})", indices)
-        result = getattr(self.env.unwrapped, method_name)(*method_args, **method_kwargs)
-        return [result] * self.num_envs
+        self._check_all_rows(f"env_method({method_name!r})", indices)
+        made = [getattr(batch.unwrapped, method_name)(*args, **kwargs) for batch in self.batches]
+        rows = zip(made, self.batches, strict=True)
+        return [value for value, batch in rows for _ in range(batch.num_envs)]
 
     def env_is_wrapped(
         self, wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]], indices: VecEnvIndices = None
@@ -180,9 +191,9 @@ class BatchVecEnv(VecEnv):
         return [False] * len(self._indices(indices))
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
-        """Return an image of each row that the batched environment renders."""
-        drawn: Any = self.env.render()
-        return list(drawn) if drawn is not None else [None] * self.num_envs
+        """Return an image of each row that the batches render."""
+        drawn: list[Any] = [(batch.render(), batch.num_envs) for batch in self.batches]
+        return [image for made, rows in drawn for image in (made or [None] * rows)]
 
     def _indices(self, indices: VecEnvIndices) -> list[int]:
         rows = list(self._get_indices(indices))
@@ -191,21 +202,53 @@ class BatchVecEnv(VecEnv):
                 raise IndexError(f"row {row} is not among the {self.num_envs} environments")
         return rows
 
-    def _all_rows(self, what: str, indices: VecEnvIndices) -> None:
+    def _check_all_rows(self, call: str, indices: VecEnvIndices) -> None:
         rows = self._indices(indices)
         if sorted(r % self.num_envs for r in rows) != list(range(self.num_envs)):
             raise ValueError(
-                f"{what} for rows {rows}: the {self.num_envs} rows are one batch and share it; "
-                "leave indices out, or use single environments (gym.make) for differing rows"
+                f"{call} for rows {rows}: the rows of one batch share it; leave indices out, or "
+                "use single environments (gym.make) for differing rows"
             )
 
     def get_state(self) -> dict[str, NDArray[Any]]:
         """Return all that the future depends on; see the batched environment."""
-        base: Any = self.env.unwrapped
-        state: dict[str, NDArray[Any]] = base.get_state()
-        return state
+        states = [self._base(i).get_state() for i in range(len(self.batches))]
+        return {f"{i}/{name}": v for i, state in enumerate(states) for name, v in state.items()}
 
-    def set_state(self, state: dict[str, NDArray[Any]]) -> None:
+    def set_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Return to a state of :meth:`get_state`, bit for bit."""
-        base: Any = self.env.unwrapped
-        base.set_state(state)
+        for i in range(len(self.batches)):
+            own = {k.removeprefix(f"{i}/"): v for k, v in state.items() if k.startswith(f"{i}/")}
+            self._base(i).set_state(own)
+
+
+def _joined(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """Return the rows of all batches; the array itself for one batch."""
+    return np.asarray(arrays[0]) if len(arrays) == 1 else np.concatenate(arrays)
+
+
+def _stepped(batch: Any, actions: NDArray[Any]) -> tuple[Any, Any, Any, list[dict[str, Any]]]:
+    """Return observations, rewards, ends and infos of the rows of a batch after a step."""
+    observation, reward, terminated, truncated, infos = batch.step(actions)
+    done = terminated | truncated
+    rows = _rows_of(infos, batch.num_envs)
+    for i in np.flatnonzero(done).tolist():
+        rows[i] = _last_info(infos, i, bool(truncated[i] and not terminated[i]))
+    return observation, reward.astype(np.float32), done, rows
+
+
+def _rows_of(infos: Mapping[str, Any], rows: int) -> list[dict[str, Any]]:
+    """Return the infos by row; rows without any share one."""
+    keys = [k for k in infos if not k.startswith("_") and k not in FINAL_KEYS]
+    if not keys:
+        return [NO_INFO] * rows
+    columns = [np.asarray(infos[k]).tolist() for k in keys]
+    return [dict(zip(keys, row, strict=True)) for row in zip(*columns, strict=True)]
+
+
+def _last_info(infos: Mapping[str, Any], row: int, truncated: bool) -> dict[str, Any]:
+    last = infos.get("final_info", {})
+    made = {k: v[row].item() for k, v in last.items() if not k.startswith("_")}
+    made["terminal_observation"] = infos["final_obs"][row]
+    made["TimeLimit.truncated"] = truncated
+    return made

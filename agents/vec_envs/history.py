@@ -54,11 +54,3 @@ class HistoryVecEnv(VecEnvWrapper):
             infos[row]["terminal_observation"] = np.concatenate([ended, self.past[row]])
             self.past[row] = np.tile(self.last[row], self.frames)
         return np.concatenate([observation, self.past], 1), reward, done, infos
-
-    def snapshot(self) -> dict[str, Any]:
-        """Return all that the future depends on."""
-        return {"past": self.past.copy(), "last": self.last.copy()}
-
-    def restore(self, saved: dict[str, Any]) -> None:
-        """Return to a snapshot."""
-        self.past, self.last = saved["past"].numpy().copy(), saved["last"].numpy().copy()

@@ -125,9 +125,7 @@ class ResidualVecEnv(VecEnvWrapper):
 def parts_of(venv: VecEnv) -> list[tuple[slice, Any]]:
     """Return the rows of each nominal plant."""
     base: Any = venv.unwrapped
-    if hasattr(base, "parts"):
-        return list(base.parts())
-    return [(slice(0, venv.num_envs), base.get_attr("plant")[0])]
+    return list(base.parts())
 
 
 # A controller's state is a tuple, perhaps named, of arrays, None and such tuples.

@@ -105,19 +105,19 @@ def batches_of(env: Any) -> Iterator[Any]:
     if hasattr(env, "venv"):
         yield from batches_of(env.venv)
     else:
-        yield from getattr(env, "batches", (env,))
+        yield from env.batches
 
 
 def _timed(batch: Any) -> Callable[[], float]:
     """Make a batch count the CPU seconds of its steps; return a function that reads the count."""
-    plain, total = batch.step_wait, [0.0]
+    plain, total = batch.step, [0.0]
 
-    def step_wait() -> Any:
+    def step(actions: Any) -> Any:
         began = time.process_time()
         try:
-            return plain()
+            return plain(actions)
         finally:
             total[0] += time.process_time() - began
 
-    batch.step_wait = step_wait
+    batch.step = step
     return lambda: total[0]

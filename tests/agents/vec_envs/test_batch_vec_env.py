@@ -167,7 +167,7 @@ def test_normalisation_reaches_the_terminal_observation() -> None:
 
 def test_attributes_and_methods_are_those_of_the_batch() -> None:
     env = make_batch_vec_env(ID, N, **SHORT)
-    assert env.get_attr("plant", indices=[0, 3]) == [env.env.plant] * 2
+    assert env.get_attr("plant", indices=[0, 3]) == [env.batches[0].unwrapped.plant] * 2
     assert len(env.get_attr("signals")) == N
     assert env.has_attr("plant")
     assert not env.has_attr("nonsense")
@@ -189,7 +189,7 @@ def test_state_goes_back_to_the_last_bit() -> None:
     moves = actions(40)
     for action in moves[:20]:
         env.step(action)
-    state = env.env_method("get_state")[0]
+    state = env.get_state()
     first = [env.step(action)[0] for action in moves[20:]]
     env.set_state(state)
     again = [env.step(action)[0] for action in moves[20:]]

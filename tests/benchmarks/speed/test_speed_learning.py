@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import pytest
+from gymnasium.vector import VectorEnv
 
 from benchmarks.speed import learning as speed_learning
 
@@ -19,7 +20,7 @@ def test_a_share_is_of_the_whole_rollout(
     monkeypatch.setattr(speed_learning, "time", SimpleNamespace(process_time=lambda: now[0]))
 
     class Batch:
-        def step_wait(self) -> None:
+        def step(self, actions: None) -> None:
             now[0] += 1.0
 
     batches = (Batch(), Batch())
@@ -27,7 +28,7 @@ def test_a_share_is_of_the_whole_rollout(
 
     def chunk() -> int:
         for batch in batches:
-            batch.step_wait()
+            batch.step(None)
         now[0] += rest
         return 2
 
@@ -43,12 +44,11 @@ def test_all_batches_of_a_preset_are_found(variant: str) -> None:
         "agents.training.building", reason="the extra 'agents' is not there"
     )
     from agents.settings.presets import preset
-    from agents.vec_envs.batch import BatchVecEnv
 
     wanted = preset("PAM/KneeTension-v0", "ppo", variant)
     env = building.make_env(wanted)
     found = list(speed_learning.batches_of(env))
     env.close()
     assert len(found) == len(wanted.kinds()) > 1
-    assert all(isinstance(batch, BatchVecEnv) for batch in found)
+    assert all(isinstance(batch, VectorEnv) for batch in found)
     assert sum(batch.num_envs for batch in found) == wanted.num_envs
