@@ -83,19 +83,31 @@ def stick_slip_step(
     return 0.0 if rests else dx, 0.0 if stops else after, 1.0 if stops else 0.0
 
 
-@kernel
-def bearing_step(
-    rows: Any, fixed: Any, j: int, state: int, effects: int, velocity: float, acceleration: float,
-    jerk: float, stiffness: float, damping: float, per_inertia: float, h: float,
-) -> tuple[float, float]:  # fmt: skip
-    """Return what ``damped_motion`` returns, with the dry friction of the bearing of lane ``j``.
+# placeholders of a plant whose bearing sticks: the row that says whether it holds, and the first of
+# its effects (``GUIDE``)
+STUCK = BEARING = 0
 
-    ``state`` is the row that says whether the bearing holds, ``effects`` the first of ``GUIDE``.
-    """
+
+@kernel
+def turn(
+    rows: Any, fixed: Any, j: int, velocity: float, acceleration: float, jerk: float,
+    stiffness: float, damping: float, per_inertia: float, h: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the turn [rad] of a joint in ``h`` seconds and its velocity [rad/s] after it."""
+    damped = decay(0.5 * damping * h)
+    return damped_motion(velocity, acceleration, jerk, stiffness, damping, damped, h)
+
+
+@kernel
+def turn_on_bearing(
+    rows: Any, fixed: Any, j: int, velocity: float, acceleration: float, jerk: float,
+    stiffness: float, damping: float, per_inertia: float, h: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the same as :func:`turn` on a bearing that sticks and slips."""
     push = acceleration - 0.5 * stiffness * h * velocity
-    most = fixed[effects + GUIDE.stick][j] * per_inertia
-    kinetic, pace = fixed[effects + GUIDE.stick_kinetic][j], fixed[effects + GUIDE.stick_speed][j]
-    dx, after, rows[state][j] = stick_slip_step(
-        velocity, rows[state][j], push, jerk, stiffness, damping, most, kinetic, pace, h
+    most = fixed[BEARING + GUIDE.stick][j] * per_inertia
+    kinetic, pace = fixed[BEARING + GUIDE.stick_kinetic][j], fixed[BEARING + GUIDE.stick_speed][j]
+    dx, after, rows[STUCK][j] = stick_slip_step(
+        velocity, rows[STUCK][j], push, jerk, stiffness, damping, most, kinetic, pace, h
     )
     return dx, after

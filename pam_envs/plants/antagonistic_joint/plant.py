@@ -7,6 +7,11 @@
 Without hysteresis, gravity and load the feed-forward makes the angle at rest the commanded one; the
 regulators' lag and the damped stiffness of the muscles are then two real poles near 23 rad/s. The
 paper's reduced plant, a Preisach operator and two poles, is the make ``dynamics="reduced"``.
+
+Effects (off unless set): of both regulators, static gain, dead time, dead band, spool overlap,
+rounded slew limit, slow and choked exhaust, leak, limited and drooping supply, resonance of the line;
+of both muscles, creep, first cycles and temperature; stick-slip of the bearing; delay, drift, ramp,
+bow and slip of both kinds of sensor. In the reduced plant only pressures and sensors have them.
 """
 
 from __future__ import annotations

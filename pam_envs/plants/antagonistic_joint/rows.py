@@ -8,10 +8,10 @@ which all tiles of a batch share unless they are drawn. Of pairs, the first is m
 from __future__ import annotations
 
 from pam_envs.hysteresis.protocol import NUMBERS
-from pam_envs.kernels.history import N_HISTORY
 from pam_envs.mechanics.guide import GUIDE
 from pam_envs.parameters import row_blocks
 from pam_envs.plants.core.muscle_path import PATH, PATH_NAMES, PATH_STATE, WARM
+from pam_envs.plants.core.sensors import sensor_rows
 from pam_envs.sensing.sensor import SENSOR
 
 (
@@ -152,18 +152,15 @@ EFFECT = row_blocks(
     path=len(PATH),
     warm=len(WARM),
     bearing=len(GUIDE),
-    angle_sensor=len(SENSOR),
-    pressure_sensor=len(SENSOR),
+    angle=len(SENSOR),
+    pressure=len(SENSOR),
 )
 """First rows of the parameters of effects."""
 STATE = row_blocks(
     effective=2,
     paths=2 * PATH_STATE.end,
     stuck=1,
-    angle=1,
-    angle_ring=N_HISTORY,
-    pressures=2,
-    pressure_rings=2 * N_HISTORY,
+    sensors=sensor_rows(3),
 )
 """State of the effects, counted from the first row after the hysteresis's."""
 

@@ -20,6 +20,7 @@ from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.motion import damped_motion
 from pam_envs.mechanics.antagonistic_lever import sine_and_cosine_of
+from pam_envs.mechanics.guide import turn
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.effects import effect_kernels
 from pam_envs.plants.antagonistic_joint.hysteresis_kernels import peek, remember
@@ -65,6 +66,7 @@ from pam_envs.plants.antagonistic_joint.rows import (
     STRAIGHT,
     VELOCITY,
 )
+from pam_envs.plants.core.sensors import read_sensors
 
 __all__ = [
     "N_WORK",
@@ -97,28 +99,8 @@ def regulate(
 
 
 @kernel
-def turn(
-    rows: Any, fixed: Any, j: int, velocity: float, acceleration: float, jerk: float,
-    stiffness: float, damping: float, per_inertia: float, h: float,
-) -> tuple[float, float]:  # fmt: skip
-    """Return the turn [rad] of a joint in a sub-step and its velocity [rad/s] after it."""
-    damped = decay(0.5 * damping * h)
-    return damped_motion(velocity, acceleration, jerk, stiffness, damping, damped, h)
-
-
-@kernel
 def begin_muscles(rows: Any, fixed: Any, j: int) -> None:
     """Begin the effects of the muscles: a plain plant has none."""
-
-
-@kernel
-def begin_sensors(rows: Any, fixed: Any, j: int) -> None:
-    """Begin the effects of the sensors: a plain plant has none."""
-
-
-@kernel
-def read_sensors(rows: Any, fixed: Any, j: int, step: int, period: float) -> None:
-    """Write readings with the effects of the sensors: a plain plant has none."""
 
 
 @kernel
@@ -311,7 +293,7 @@ def begin_lane(
     rest(rows, fixed, counts, table, hysteresis, elements, j)
     rows[VELOCITY][j] = 0.0
     report(rows, fixed, j)
-    begin_sensors(rows, fixed, j)
+    read_sensors(rows, fixed, j, 0, 0.0)
 
 
 @kernel

@@ -10,15 +10,16 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.kernels.build import LANES, kernel
-from pam_envs.kernels.history import N_HISTORY
-from pam_envs.mechanics.guide import bearing_step
+from pam_envs.mechanics.guide import turn_on_bearing
 from pam_envs.plants.core.muscle_path import PATH_STATE, WARM, begin_path, path_air, path_muscle
+from pam_envs.plants.core.sensors import sensor_kernels
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.air import AIR, GIVES_A, NOW_A, WAS_A, count_used_air
 from pam_envs.plants.elbow_orthosis.rows import EFFECT, STATE
-from pam_envs.sensing.sensor import begin_sensor, sense
 
 EFFECTS_AT = 0  # placeholder: the row after the hysteresis's state
+FULL_SCALES = (2.1, 6e5, 6e5)
+"""Full scales of the sensors: rad, Pa, Pa."""
 plain_breathe: Any = None  # placeholders: air of the plain plant
 plain_settle: Any = None
 
@@ -117,63 +118,23 @@ def begin_muscles(rows: Any, fixed: Any, j: int) -> None:
     rows[EFFECTS_AT + STATE.stuck][j] = 1.0
 
 
-@kernel
-def turn(
-    rows: Any, fixed: Any, j: int, velocity: float, acceleration: float, jerk: float,
-    stiffness: float, damping: float, per_inertia: float, h: float,
-) -> tuple[float, float]:  # fmt: skip
-    """Return the turn [rad] of a joint on a bearing that sticks and slips, and its velocity."""
-    return bearing_step(
-        rows, fixed, j, EFFECTS_AT + STATE.stuck, EFFECT.bearing, velocity, acceleration, jerk,
-        stiffness, damping, per_inertia, h,
-    )  # fmt: skip
-
-
-@kernel
-def begin_sensors(rows: Any, fixed: Any, j: int) -> None:
-    """Begin the sensors of lane ``j`` at rest."""
-    begin_sensor(
-        rows, fixed, j, EFFECTS_AT + STATE.angle, EFFECTS_AT + STATE.angle_ring, EFFECT.angle_sensor,
-        rows[K.ANGLE][j], fixed[K.HIGHEST][j],
-    )  # fmt: skip
-    for side in range(2):
-        begin_sensor(
-            rows, fixed, j, EFFECTS_AT + STATE.pressures + side,
-            EFFECTS_AT + STATE.pressure_rings + side * N_HISTORY, EFFECT.pressure_sensor,
-            rows[K.PRESSURE_A + side][j], fixed[K.MAX_PRESSURE][j],
-        )  # fmt: skip
-
-
-@kernel
-def read_sensors(rows: Any, fixed: Any, j: int, step: int, period: float) -> None:
-    """Write the undisturbed readings of lane ``j`` at the end of a control period."""
-    time = step * period
-    sense(
-        rows, fixed, j, EFFECTS_AT + STATE.angle, EFFECTS_AT + STATE.angle_ring, EFFECT.angle_sensor,
-        rows[K.ANGLE][j], fixed[K.HIGHEST][j], step, time, period,
-    )  # fmt: skip
-    for side in range(2):
-        sense(
-            rows, fixed, j, EFFECTS_AT + STATE.pressures + side,
-            EFFECTS_AT + STATE.pressure_rings + side * N_HISTORY, EFFECT.pressure_sensor,
-            rows[K.PRESSURE_A + side][j], fixed[K.MAX_PRESSURE][j], step, time, period,
-        )  # fmt: skip
-
-
 def effect_kernels(valves: str, first: int) -> dict[str, Any]:
     """Return the kernels of the effects, whose state begins at row ``first``."""
     regulated = valves == "proportional"
-    return {
+    sensors = first + STATE.sensors
+    measured = (K.ANGLE, K.PRESSURE_A, K.PRESSURE_A + 1)
+    effects = (EFFECT.angle, EFFECT.pressure, EFFECT.pressure)
+    return sensor_kernels(sensors, measured, effects, FULL_SCALES) | {
         "EFFECTS_AT": first,
         "EFFECTIVE_A": first + STATE.effective,
-        "SENSED_ANGLE": first + STATE.angle,
-        "SENSED_PRESSURE": first + STATE.pressures,
+        "SENSED_ANGLE": sensors,
+        "SENSED_PRESSURE": sensors + 1,
         "plain_breathe": AIR[valves]["breathe"],
         "plain_settle": AIR[valves]["settle"],
         "breathe": breathe_regulated if regulated else breathe_pulsed,
         "settle": settle_regulated if regulated else settle_pulsed,
         "begin_muscles": begin_muscles,
-        "begin_sensors": begin_sensors,
-        "read_sensors": read_sensors,
-        "turn": turn,
+        "STUCK": first + STATE.stuck,
+        "BEARING": EFFECT.bearing,
+        "turn": turn_on_bearing,
     }

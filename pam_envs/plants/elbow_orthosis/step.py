@@ -13,12 +13,12 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.hysteresis import protocol
-from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
-from pam_envs.kernels.motion import damped_motion
+from pam_envs.mechanics.guide import turn
 from pam_envs.mechanics.leg import sine_and_cosine
 from pam_envs.mechanics.pulley import stop_torque
 from pam_envs.plants.antagonistic_joint.hysteresis_kernels import remember
+from pam_envs.plants.core.sensors import read_sensors
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.air import (
     AIR,
@@ -94,28 +94,8 @@ EFFECTIVE_A, SENSED_ANGLE, SENSED_PRESSURE = PRESSURE_A, ANGLE, PRESSURE_A
 
 
 @kernel
-def turn(
-    rows: Any, fixed: Any, j: int, velocity: float, acceleration: float, jerk: float,
-    stiffness: float, damping: float, per_inertia: float, h: float,
-) -> tuple[float, float]:  # fmt: skip
-    """Return the turn [rad] of the elbow in a sub-step and its velocity [rad/s] after it."""
-    damped = decay(0.5 * damping * h)
-    return damped_motion(velocity, acceleration, jerk, stiffness, damping, damped, h)
-
-
-@kernel
 def begin_muscles(rows: Any, fixed: Any, j: int) -> None:
     """Begin the effects of the bundles: a plain plant has none."""
-
-
-@kernel
-def begin_sensors(rows: Any, fixed: Any, j: int) -> None:
-    """Begin the effects of the sensors: a plain plant has none."""
-
-
-@kernel
-def read_sensors(rows: Any, fixed: Any, j: int, step: int, period: float) -> None:
-    """Write readings with the effects of the sensors: a plain plant has none."""
 
 
 @kernel
@@ -333,7 +313,7 @@ def begin_lane(
     for side in range(2):
         rows[AIR_A + side][j] = air_at(rows, fixed, j, side)
     report(rows, fixed, j)
-    begin_sensors(rows, fixed, j)
+    read_sensors(rows, fixed, j, 0, 0.0)
 
 
 @kernel

@@ -11,12 +11,12 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.kernels.build import LANES, kernel, scratch
-from pam_envs.kernels.history import N_HISTORY
-from pam_envs.mechanics.guide import bearing_step
+from pam_envs.mechanics.guide import turn_on_bearing
 from pam_envs.plants.core.muscle_path import PATH_STATE, begin_path, path_air, path_muscle
+from pam_envs.plants.core.sensors import sensor_kernels
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.rows import EFFECT, STATE
-from pam_envs.sensing.sensor import SENSOR, begin_sensor, sense
+from pam_envs.sensing.sensor import SENSOR
 
 EFFECTS_AT = 0  # placeholder: the row after the hysteresis's state
 plain_regulate: Any = None  # placeholder: the dynamics of the pressure of the plain plant
@@ -84,52 +84,21 @@ def begin_muscle(rows: Any, fixed: Any, j: int) -> None:
     rows[EFFECTS_AT + STATE.stuck][j] = 1.0
 
 
-@kernel
-def turn(
-    rows: Any, fixed: Any, j: int, velocity: float, acceleration: float, jerk: float,
-    stiffness: float, damping: float, per_inertia: float, h: float,
-) -> tuple[float, float]:  # fmt: skip
-    """Return the turn [rad] of a brace on a bearing that sticks and slips, and its velocity."""
-    return bearing_step(
-        rows, fixed, j, EFFECTS_AT + STATE.stuck, EFFECT.bearing, velocity, acceleration, jerk,
-        stiffness, damping, per_inertia, h,
-    )  # fmt: skip
-
-
-@kernel
-def begin_sensors(rows: Any, fixed: Any, j: int) -> None:
-    """Begin the sensors of lane ``j`` at rest."""
-    for k in range(len(MEASURED)):
-        begin_sensor(
-            rows, fixed, j, EFFECTS_AT + STATE.readings + k, EFFECTS_AT + STATE.rings + k * N_HISTORY,
-            EFFECT.sensors + k * len(SENSOR), rows[MEASURED[k]][j], FULL_SCALES[k],
-        )  # fmt: skip
-
-
-@kernel
-def read_sensors(rows: Any, fixed: Any, j: int, step: int, period: float) -> None:
-    """Write the undisturbed readings of lane ``j`` at the end of a control period."""
-    for k in range(len(MEASURED)):
-        sense(
-            rows, fixed, j, EFFECTS_AT + STATE.readings + k, EFFECTS_AT + STATE.rings + k * N_HISTORY,
-            EFFECT.sensors + k * len(SENSOR), rows[MEASURED[k]][j], FULL_SCALES[k], step,
-            step * period, period,
-        )  # fmt: skip
-
-
 def effect_kernels(dynamics: str, plain: Any, first: int) -> dict[str, Any]:
     """Return the kernels of the effects, whose state begins at row ``first``.
 
     ``plain`` is the dynamics of the pressure of the plain plant.
     """
-    return {
+    sensors = first + STATE.sensors
+    effects = [EFFECT.sensors + k * len(SENSOR) for k in range(len(MEASURED))]
+    return sensor_kernels(sensors, MEASURED, effects, FULL_SCALES) | {
         "EFFECTS_AT": first,
         "EFFECTIVE": first + STATE.effective,
-        "SENSED": tuple(first + STATE.readings + k for k in range(len(MEASURED))),
+        "SENSED": tuple(sensors + k for k in range(len(MEASURED))),
         "plain_regulate": plain,
         "regulate": regulate_with_lag if dynamics == "lag" else regulate_as_measured,
         "begin_muscle": begin_muscle,
-        "begin_sensors": begin_sensors,
-        "read_sensors": read_sensors,
-        "turn": turn,
+        "STUCK": first + STATE.stuck,
+        "BEARING": EFFECT.bearing,
+        "turn": turn_on_bearing,
     }

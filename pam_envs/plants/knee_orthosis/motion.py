@@ -17,6 +17,7 @@ from pam_envs.constants import ATMOSPHERE, DENSITY_PER_PRESSURE
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.motion import damped_motion
+from pam_envs.mechanics.guide import turn
 from pam_envs.mechanics.knee_lever import assistive_torque, half_angle, muscle_length
 from pam_envs.muscle.gas_spring import gas_volume, spring_tension, stretch_of
 from pam_envs.plants.knee_orthosis import rows as K
@@ -52,16 +53,6 @@ from pam_envs.references.gait import curve_and_rates, fraction_of_turn
 WAS, HELD, HELD_RATE, KNEE_WAS, RATE_WAS, FORCE_WAS = range(6)
 """Rows of scratch: stiffness before the sub-step, then the wearer's hold and path."""
 N_WORK = 6
-
-
-@kernel
-def turn(
-    rows: Any, fixed: Any, j: int, velocity: float, acceleration: float, jerk: float,
-    stiffness: float, damping: float, per_inertia: float, h: float,
-) -> tuple[float, float]:  # fmt: skip
-    """Return the turn [rad] of the brace in a sub-step and its velocity [rad/s] after it."""
-    damped = decay(0.5 * damping * h)
-    return damped_motion(velocity, acceleration, jerk, stiffness, damping, damped, h)
 
 
 @kernel

@@ -9,6 +9,12 @@ It is mounted in one of three ways. In the *rig* the muscle is held at its nomin
 the *leg* it opens with the knee, ``theta = mount angle + knee flexion``; the wearer walks or takes
 stairs on a path that he holds with a stiffness of his own, and the knee bears the full balance of
 ground force, weight and acceleration, of which the paper's Eq. (1) sees the vertical force alone.
+
+Effects (off unless set): of the regulator, static gain, dead time, dead band, spool overlap, rounded
+slew limit, slow and choked exhaust, leak, limited and drooping supply, resonance of the line (the
+measured dynamics take the place of all these); of the muscle, creep, first cycles and temperature,
+before its hysteresis; stick-slip of the brace's bearing where it is alone; delay, drift, ramp, bow
+and slip of all sensors.
 """
 
 from __future__ import annotations

@@ -8,10 +8,10 @@ which all tiles of a batch share unless they are drawn.
 from __future__ import annotations
 
 from pam_envs.hysteresis.protocol import NUMBERS
-from pam_envs.kernels.history import N_HISTORY
 from pam_envs.mechanics.guide import GUIDE
 from pam_envs.parameters import row_blocks
 from pam_envs.plants.core.muscle_path import PATH, PATH_NAMES, PATH_STATE, WARM
+from pam_envs.plants.core.sensors import sensor_rows
 from pam_envs.pneumatics.measured_dynamics import MODE_ROWS, MODES
 from pam_envs.sensing.sensor import SENSOR
 
@@ -205,8 +205,7 @@ STATE = row_blocks(
     effective=1,
     path=PATH_STATE.end,
     stuck=1,
-    readings=len(SENSORS),
-    rings=len(SENSORS) * N_HISTORY,
+    sensors=sensor_rows(len(SENSORS)),
 )
 """State of the effects, counted from the first row after the hysteresis's."""
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
+from pam_envs.plants.core.sensors import read_sensors
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.effects import effect_kernels
 from pam_envs.plants.knee_orthosis.hysteresis_kernels import hysteresis_kernels
@@ -50,16 +51,6 @@ SENSED = (K.TENSION, K.ANGLE, K.PRESSURE, K.HEEL, K.GROUND_Z, K.COP, K.ANKLE)
 @kernel
 def begin_muscle(rows: Any, fixed: Any, j: int) -> None:
     """Begin the effects of the muscle: a plain plant has none."""
-
-
-@kernel
-def begin_sensors(rows: Any, fixed: Any, j: int) -> None:
-    """Begin the effects of the sensors: a plain plant has none."""
-
-
-@kernel
-def read_sensors(rows: Any, fixed: Any, j: int, step: int, period: float) -> None:
-    """Write readings with the effects of the sensors: a plain plant has none."""
 
 
 @kernel
@@ -172,7 +163,7 @@ def begin_lane(
     rows[K.START_PHASE][j] = start_phase
     rest(rows, fixed, gait, j)
     report(rows, fixed, j, 0.0)
-    begin_sensors(rows, fixed, j)
+    read_sensors(rows, fixed, j, 0, 0.0)
     rows[K.OLD_AIR][j] = rows[K.AIR][j]
 
 

@@ -9,14 +9,15 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.kernels.build import kernel
-from pam_envs.kernels.history import N_HISTORY
 from pam_envs.mechanics.serial_chain.kinematics import N_STAGES
 from pam_envs.plants.core.muscle_path import PATH_STATE, begin_path, path_step
+from pam_envs.plants.core.sensors import sensor_kernels
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.rows import EFFECT, STATE
-from pam_envs.sensing.sensor import begin_sensor, sense
 
 EFFECTS_AT = 0  # placeholder: the row after the hysteresis's state
+FULL_ANGLE, FULL_PRESSURE = 0.5236, 6.5e5
+"""Full scales of the sensors [rad, Pa]."""
 WAS = 0
 """First row of scratch: effective pressures before a sub-step."""
 
@@ -43,48 +44,17 @@ def begin_muscles(rows: Any, fixed: Any, j: int) -> None:
         )
 
 
-@kernel
-def begin_sensors(rows: Any, fixed: Any, j: int) -> None:
-    """Begin the sensors of lane ``j`` at rest."""
-    for k in range(N_STAGES):
-        begin_sensor(
-            rows, fixed, j, EFFECTS_AT + STATE.angles + k, EFFECTS_AT + STATE.angle_rings + k * N_HISTORY,
-            EFFECT.angle_sensor, rows[M.ANGLE + k][j], fixed[M.LIMIT][j],
-        )  # fmt: skip
-    for m in range(2 * N_STAGES):
-        begin_sensor(
-            rows, fixed, j, EFFECTS_AT + STATE.pressures + m,
-            EFFECTS_AT + STATE.pressure_rings + m * N_HISTORY, EFFECT.pressure_sensor,
-            rows[M.PRESSURE + m][j], fixed[M.MAX_PRESSURE][j],
-        )  # fmt: skip
-
-
-@kernel
-def read_sensors(rows: Any, fixed: Any, j: int, step: int, period: float) -> None:
-    """Write the undisturbed readings of lane ``j`` at the end of a control period."""
-    time = step * period
-    for k in range(N_STAGES):
-        sense(
-            rows, fixed, j, EFFECTS_AT + STATE.angles + k, EFFECTS_AT + STATE.angle_rings + k * N_HISTORY,
-            EFFECT.angle_sensor, rows[M.ANGLE + k][j], fixed[M.LIMIT][j], step, time, period,
-        )  # fmt: skip
-    for m in range(2 * N_STAGES):
-        sense(
-            rows, fixed, j, EFFECTS_AT + STATE.pressures + m,
-            EFFECTS_AT + STATE.pressure_rings + m * N_HISTORY, EFFECT.pressure_sensor,
-            rows[M.PRESSURE + m][j], fixed[M.MAX_PRESSURE][j], step, time, period,
-        )  # fmt: skip
-
-
-def effect_kernels(first: int) -> dict[str, Any]:
+def effect_kernels(stages: int, first: int) -> dict[str, Any]:
     """Return the kernels of the effects, whose state begins at row ``first``."""
-    return {
+    sensors, muscles = first + STATE.sensors, 2 * stages
+    measured = [M.ANGLE + k for k in range(stages)] + [M.PRESSURE + m for m in range(muscles)]
+    effects = [EFFECT.angle] * stages + [EFFECT.pressure] * muscles
+    full_scales = [FULL_ANGLE] * stages + [FULL_PRESSURE] * muscles
+    return sensor_kernels(sensors, measured, effects, full_scales) | {
         "EFFECTS_AT": first,
         "EFFECTIVE": first + STATE.effective,
-        "SENSED_ANGLE": first + STATE.angles,
-        "SENSED_PRESSURE": first + STATE.pressures,
+        "SENSED_ANGLE": sensors,
+        "SENSED_PRESSURE": sensors + stages,
         "regulate": regulate_extended,
         "begin_muscles": begin_muscles,
-        "begin_sensors": begin_sensors,
-        "read_sensors": read_sensors,
     }

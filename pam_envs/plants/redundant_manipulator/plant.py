@@ -12,6 +12,11 @@ bear where the paper's paths bend the arm most, and lighter than two muscles wit
 the arm is as if its muscles weighed nothing. Each joint has, beside the viscosity of its muscles,
 the damping that gives it a ratio of one half with the rest of the straight arm held rigid. Both
 have a common factor (``arm.mass_factor``, ``arm.damping_factor``) that can be drawn.
+
+Effects (off unless set), the same for all joints: of the regulators, static gain, dead time, dead band,
+spool overlap, rounded slew limit, slow and choked exhaust, leak, limited and drooping supply,
+resonance of the line; of the muscles, creep, first cycles and temperature; delay, drift, ramp, bow
+and slip of all sensors. The bearings have viscous friction only.
 """
 
 from __future__ import annotations

@@ -9,7 +9,6 @@ kernels of the pair serve both.
 from __future__ import annotations
 
 from pam_envs.hysteresis.protocol import NUMBERS
-from pam_envs.kernels.history import N_HISTORY
 from pam_envs.parameters import row_blocks
 from pam_envs.plants.antagonistic_joint.rows import (
     ANGLE_BIAS,
@@ -29,6 +28,7 @@ from pam_envs.plants.antagonistic_joint.rows import (
     TIME_CONSTANT,
 )
 from pam_envs.plants.core.muscle_path import PATH, PATH_NAMES, PATH_STATE, WARM
+from pam_envs.plants.core.sensors import sensor_rows
 from pam_envs.sensing.sensor import SENSOR
 
 __all__ = [
@@ -86,17 +86,14 @@ EFFECT = row_blocks(
     len(PARAMETERS),
     path=len(PATH),
     warm=len(WARM),
-    angle_sensor=len(SENSOR),
-    pressure_sensor=len(SENSOR),
+    angle=len(SENSOR),
+    pressure=len(SENSOR),
 )
 """First rows of the parameters of effects."""
 STATE = row_blocks(
     effective=2 * MOST_STAGES,
     paths=2 * MOST_STAGES * PATH_STATE.end,
-    angles=MOST_STAGES,
-    angle_rings=MOST_STAGES * N_HISTORY,
-    pressures=2 * MOST_STAGES,
-    pressure_rings=2 * MOST_STAGES * N_HISTORY,
+    sensors=sensor_rows(3 * MOST_STAGES),
 )
 """State of the effects, counted from the first row after the hysteresis's."""
 

@@ -45,6 +45,7 @@ from pam_envs.plants.antagonistic_joint.pair import (
     stop_torque,
     turning,
 )
+from pam_envs.plants.core.sensors import read_sensors
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.effects import effect_kernels
 from pam_envs.plants.redundant_manipulator.rows import (
@@ -111,16 +112,6 @@ def regulate(
 @kernel
 def begin_muscles(rows: Any, fixed: Any, j: int) -> None:
     """Begin the effects of the muscles: a plain plant has none."""
-
-
-@kernel
-def begin_sensors(rows: Any, fixed: Any, j: int) -> None:
-    """Begin the effects of the sensors: a plain plant has none."""
-
-
-@kernel
-def read_sensors(rows: Any, fixed: Any, j: int, step: int, period: float) -> None:
-    """Write readings with the effects of the sensors: a plain plant has none."""
 
 
 @kernel
@@ -317,7 +308,7 @@ def begin_lane(
         MEMBER, j, j + 1,
     )  # fmt: skip
     report(rows, fixed, j)
-    begin_sensors(rows, fixed, j)
+    read_sensors(rows, fixed, j, 0, 0.0)
 
 
 @kernel
@@ -389,5 +380,5 @@ def replacements(kind: str, stages: int, effects: int | None = None) -> dict[str
 
     ``effects`` is the first row of the state of the effects; None for a plain plant.
     """
-    extended = {} if effects is None else effect_kernels(effects)
+    extended = {} if effects is None else effect_kernels(stages, effects)
     return protocol.kernels(kind) | {"N_STAGES": stages} | extended
