@@ -9,7 +9,9 @@ import pytest
 from pam_envs.__main__ import Mistake, env_id, env_ids, main
 
 
-def test_list(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_list_shows_every_environment(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("COLUMNS", "200")
     assert main(["list"]) == 0
     out = capsys.readouterr().out
@@ -24,7 +26,7 @@ def test_ids_may_be_short(given: str) -> None:
     assert env_id(given) == "PAM/MusclePositioning-v0"
 
 
-def test_a_mistyped_id_names_the_nearest() -> None:
+def test_mistyped_id_names_the_nearest() -> None:
     with pytest.raises(Mistake, match=r"did you mean PAM/MusclePositioning-v0\?"):
         env_id("MusclePositionin")
     with pytest.raises(Mistake, match="There are: PAM/"):
@@ -42,7 +44,7 @@ def test_every_environment_can_be_filmed(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".gif"])
-def test_a_film(tmp_path: Path, suffix: str) -> None:
+def test_render_writes_a_film(tmp_path: Path, suffix: str) -> None:
     pytest.importorskip("pygame")
     imageio = pytest.importorskip("imageio.v2")
     film = tmp_path / f"film{suffix}"
@@ -56,7 +58,7 @@ def test_a_film(tmp_path: Path, suffix: str) -> None:
     assert (pictures[0] != pictures[-1]).any()
 
 
-def test_a_film_lasts_as_long_as_the_episode(tmp_path: Path) -> None:
+def test_film_lasts_as_long_as_the_episode(tmp_path: Path) -> None:
     pytest.importorskip("pygame")
     imageio = pytest.importorskip("imageio.v2")
     film = tmp_path / "film.gif"

@@ -77,7 +77,7 @@ def test_columns_become_si_arrays(tmp_path):
     assert got.raw is None
 
 
-def test_columns_may_stand_in_any_order_and_blank_rows_count(tmp_path):
+def test_columns_may_be_in_any_order_and_blank_rows_count(tmp_path):
     columns = sheet()
     path = write(tmp_path, dict(reversed(columns.items())))
     lines = path.read_text().splitlines()
@@ -197,7 +197,7 @@ def test_empty_cells_are_named_and_counted(tmp_path):
 
 
 @pytest.mark.parametrize("bad", ["nan", "inf", "-inf", "n/a", "1.2.3"])
-def test_what_is_no_number_is_named(tmp_path, bad):
+def test_cell_that_is_no_number_is_named(tmp_path, bad):
     columns = sheet()
     columns["pressure_bar"][7] = columns["pressure_bar"][20] = bad
     columns["time_s"][50] = "later"
@@ -289,7 +289,7 @@ def test_segments_need_one_rate(tmp_path):
     assert "record all segments at one rate" in text
 
 
-def test_rounded_times_leave_the_values_alone(tmp_path):
+def test_rounded_times_leave_the_values_unchanged(tmp_path):
     """60 Hz in whole milliseconds: 17, 16, 17 ms; each sample stays what it was."""
     time = np.round(np.arange(600) / 60.0, 3)
     columns = sheet(600, time_s=time.tolist())
@@ -371,7 +371,7 @@ def test_runs_are_averaged_apart():
 # segments and load
 
 
-def test_a_label_stands_for_one_stretch(tmp_path):
+def test_label_names_one_continuous_segment(tmp_path):
     columns = sheet()
     columns["segment"][80:] = ["a"] * 20
     text = refusal(write(tmp_path, columns))
@@ -379,7 +379,7 @@ def test_a_label_stands_for_one_stretch(tmp_path):
     assert "'a_2'" in text
 
 
-def test_a_load_that_changes_inside_a_segment_is_told(tmp_path):
+def test_load_change_inside_a_segment_is_reported(tmp_path):
     columns = sheet(load_N=[25.0] * 20 + [30.0] * 30 + [40.0] * 50)
     got = load_recording(write(tmp_path, columns))
     assert len(got.notes) == 1
@@ -475,7 +475,7 @@ def test_every_key_but_the_plant_is_optional(tmp_path):
         ("tolerance: {mass.load: high}", "tolerance of mass.load must be a number"),
     ],
 )
-def test_a_wrong_rig_file_is_explained(tmp_path, line, told):
+def test_wrong_rig_file_is_refused_with_a_remedy(tmp_path, line, told):
     path = rig_file(tmp_path, f"plant: single_muscle\n{line}\n")
     with pytest.raises(ValueError) as caught:
         Rig.from_yaml(path)
@@ -518,7 +518,7 @@ def test_the_published_table_is_read_as_any_other(tmp_path):
     assert one_path(table)
 
 
-def test_other_peoples_tables(tmp_path):
+def test_tables_of_other_rigs_are_read(tmp_path):
     """Minor loops, other pressures in the second repeat, no column of repeats."""
     rows = ["2.5,up,3,1,5", "2.5,down,2,1,4", "2.5,inflating,6,1,14", "2.5,up,0,2,0.1"]
     table = load_readings(table_file(tmp_path, *READINGS, *rows, "2.5,up,4,2,8"))
@@ -547,7 +547,7 @@ def test_wrong_readings_are_named(tmp_path, row, told):
     assert told in str(caught.value)
 
 
-def test_the_columns_decide_what_a_file_is(tmp_path):
+def test_columns_determine_the_kind_of_file(tmp_path):
     assert isinstance(read_input(write(tmp_path, sheet())), Recording)
     with pytest.raises(RecordingError, match="unknown column 'time_ms'"):
         read_input(table_file(tmp_path, "time_ms,pressure_command_bar,pressure_bar", "0,1,1"))

@@ -26,7 +26,7 @@ def _file(folder: Path, *rows: str, header: str = HEADER) -> Path:
     return path
 
 
-def test_there_are_375_readings_of_three_loads_and_five_cycles(table):
+def test_table_has_375_readings_of_three_loads_and_five_cycles(table):
     assert table.loads == (0.0, 2.55, 4.55)
     assert all(table.repeats(load) == (1, 2, 3, 4, 5) for load in table.loads)
     assert all(len(getattr(table, field.name)) == 375 for field in dataclasses.fields(table))
@@ -101,7 +101,7 @@ def test_readings_cannot_be_changed(table):
         table.contraction_m[0] = 1.0
 
 
-def test_what_is_not_there_is_named_with_what_is(table):
+def test_unknown_load_or_cycle_is_refused_with_the_known_ones(table):
     with pytest.raises(ValueError, match=r"no readings at 3\.0 kg.* 0, 2\.55, 4\.55 kg"):
         table.branch(3.0, True)
     with pytest.raises(ValueError, match="no repeat 6 at 0 kg"):
@@ -115,7 +115,7 @@ def test_a_file_of_ones_own_is_read_in_any_order_of_its_cycles(tmp_path):
     np.testing.assert_allclose(table.cycles(0.0)[1].T, [[0, 0.9e-3, 0.2e-3], [0, 1.1e-3, 0.4e-3]])
 
 
-def test_a_byte_order_mark_and_blank_lines_do_no_harm(tmp_path):
+def test_byte_order_mark_and_blank_lines_are_accepted(tmp_path):
     path = _file(tmp_path, CYCLE[0], "", *CYCLE[1:], header="\ufeff" + HEADER)
     assert load_contraction_table(path).pressure_pa.tolist() == [0.0, 1e5, 0.0]
 
@@ -151,7 +151,7 @@ def test_a_bad_cell_is_refused_with_its_place(tmp_path, row, column, value, faul
         ((*CYCLE, "0,inflation,0,2,0", "0,inflation,2,2,3"), "repeat 2: its pressures differ"),
     ],
 )
-def test_a_table_that_is_no_set_of_cycles_is_refused(tmp_path, rows, fault):
+def test_table_without_full_cycles_is_refused(tmp_path, rows, fault):
     with pytest.raises(ValueError, match=fault):
         load_contraction_table(_file(tmp_path, *rows))
 

@@ -128,7 +128,7 @@ def test_batch_gives_the_bits_of_single_histories():
         np.testing.assert_array_equal(end, last)
 
 
-def test_not_a_number_leaves_the_hysteresis_alone():
+def test_not_a_number_leaves_the_state_unchanged():
     state = RIG.simulate([3e5])[1]
     stiffness, after = RIG.step(np.nan, state)
     assert np.isnan(stiffness)

@@ -264,7 +264,7 @@ def test_full_loop_dissipates():
 SHRINKING = [0.9 * (-0.8) ** k for k in range(8)]
 
 
-def test_a_full_stack_forgets_the_smallest_loop_only():
+def test_full_stack_drops_the_smallest_loop_only():
     weights = np.tril(np.ones((CELLS, CELLS)))
     deep = Preisach.from_weights(weights, LOW, HIGH, 40)
     shallow = Preisach.from_weights(weights, LOW, HIGH, 6)
@@ -280,7 +280,7 @@ def test_a_full_stack_forgets_the_smallest_loop_only():
 
 @few
 @given(relay_weights(), st.lists(inputs, min_size=2, max_size=20))
-def test_a_full_stack_gives_no_jump(weights, history):
+def test_full_stack_gives_no_jump(weights, history):
     operator = Preisach.from_weights(weights, LOW, HIGH, 4)
     steepest = np.max(np.diff(operator.everett, axis=0)) * operator.inverse_cell
     path = np.concatenate([np.linspace(a, b, 30) for a, b in pairwise([LOW, *history])])
@@ -352,7 +352,7 @@ def test_inverse_with_a_full_stack(weights, numbers):
 
 @few
 @given(operators(), histories)
-def test_inverse_leaves_the_hysteresis_of_the_operator(operator, history):
+def test_inverse_step_leaves_the_state_of_a_step(operator, history):
     y, hysteresis = operator.simulate(history)
     state = operator.initial_state()
     for value in y:
@@ -512,7 +512,7 @@ def test_density_is_integrated():
     assert scale(operator) == pytest.approx(2.0 * 2.0 + 8.0 / 6.0, rel=1e-4)
 
 
-def test_symmetry_error_is_a_number():
+def test_symmetry_error_has_the_expected_size():
     even = Preisach.from_density(lambda a, b: 1.0 + (a + b) ** 2, LOW, HIGH)
     odd = Preisach.from_density(lambda a, b: 3.0 + a + b, LOW, HIGH)
     assert symmetry_error(even.table) < 1e-12
@@ -537,7 +537,7 @@ def test_rows_of_steps_have_the_bits_of_a_simulation(operator, rows):
         assert [v.hex() for v in y] == [float(v[i]).hex() for v in stepped]
 
 
-def test_a_step_leaves_the_given_state_alone():
+def test_step_leaves_the_given_state_unchanged():
     operator = Preisach.from_weights(np.tril(np.ones((CELLS, CELLS))), LOW, HIGH)
     state = operator.initial_state((3,))
     operator.step([0.1, 0.2, 0.3], state)

@@ -11,7 +11,7 @@ from pam_envs.hysteresis.preisach import Preisach
 PLAYS = PlayOperator((0.05, 0.1, 0.3), (0.2, 0.3, 0.2), 0.3)
 
 
-def test_a_peek_is_the_step_that_is_not_taken() -> None:
+def test_peek_equals_step_and_leaves_the_state_unchanged() -> None:
     rng = np.random.default_rng(0)
     for start in ("low", "virgin"):
         operator = Preisach.from_play(PLAYS, -1.0, 1.0, 41, depth=6, start=start)  # type: ignore[arg-type]

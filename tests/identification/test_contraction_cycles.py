@@ -28,7 +28,9 @@ def fits() -> dict[str, cc.CyclesFit]:
 
 
 @pytest.mark.parametrize("kind", kinds())
-def test_the_shipped_plant_is_the_identified_one(kind: str, fits: dict[str, cc.CyclesFit]) -> None:
+def test_shipped_plant_equals_the_identified_plant(
+    kind: str, fits: dict[str, cc.CyclesFit]
+) -> None:
     shipped, fitted = residual(SingleMuscle.mas10(kind)), fits[kind].residual
     assert np.abs(shipped - fitted).max() < 2e-5  # 0.02 mm: the optimum is flat in places
     assert np.sqrt(np.mean(shipped**2)) == pytest.approx(np.sqrt(np.mean(fitted**2)), rel=1e-3)
@@ -44,7 +46,9 @@ def test_loop_widths_come_out_within_a_third_of_a_millimetre(
     assert np.abs(model - measured).max() < 0.3e-3
 
 
-def test_residuals_against_the_floor(fits: dict[str, cc.CyclesFit]) -> None:
+def test_residuals_are_near_the_repeatability_of_the_readings(
+    fits: dict[str, cc.CyclesFit],
+) -> None:
     floor = cc.repeatability_floor(TABLE)
     assert floor == pytest.approx(0.168e-3, abs=1e-6)
     assert fits["maxwell_slip"].rms() < 0.25e-3
@@ -64,7 +68,7 @@ def test_every_member_of_the_ensemble_fits_about_as_well() -> None:
         assert len(drives) == len(members)  # equally good, and different
 
 
-def test_rank_names_what_the_tables_cannot_fix(fits: dict[str, cc.CyclesFit]) -> None:
+def test_rank_names_parameters_that_the_tables_leave_open(fits: dict[str, cc.CyclesFit]) -> None:
     found = cc.identifiability(fits["maxwell_slip"])
     fixed = dict(zip(found.names, found.fixed, strict=True))
     assert found.rank < len(found.names)
@@ -75,7 +79,7 @@ def test_rank_names_what_the_tables_cannot_fix(fits: dict[str, cc.CyclesFit]) ->
     assert fixed["hysteresis.width_per_load"] > 0.9
 
 
-def test_a_known_muscle_is_recovered_from_its_own_cycles() -> None:
+def test_known_muscle_is_recovered_from_its_own_cycles() -> None:
     true = SingleMuscle.mas10().replace({"muscle.area": 9.5e-4, "hysteresis.width_per_load": -0.03})
     made = [cc.quasi_static(true, CYCLES.pressures, m) for m in CYCLES.loads.tolist()]
     fit = cc.fit_cycles(dataclasses.replace(CYCLES, contractions=np.array(made)))

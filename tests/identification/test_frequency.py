@@ -18,7 +18,7 @@ def response(w: np.ndarray, zeros: np.ndarray, poles: np.ndarray, gain: float = 
     return scale * np.prod(s - zeros, axis=-1) / np.prod(s - poles, axis=-1)
 
 
-def test_a_known_plant_comes_back():
+def test_known_transfer_function_is_recovered():
     fit = fit_rational(W, response(W, ZEROS, POLES), 7, relative_degree=3)
     assert fit.relative_error < 1e-9
     assert fit.static_gain == pytest.approx(0.74, rel=1e-8)
@@ -28,7 +28,7 @@ def test_a_known_plant_comes_back():
 
 
 @pytest.mark.parametrize("order", [2, 3, 4, 5])
-def test_lower_orders_have_the_relative_degree_asked_for(order):
+def test_lower_orders_have_the_given_relative_degree(order):
     fit = fit_rational(W, response(W, ZEROS, POLES), order, relative_degree=2)
     fast = 1e6 * np.array([1.0, 10.0])
     drop = np.abs(fit.response(fast))
@@ -72,6 +72,6 @@ def test_an_unstable_response_is_fitted_by_a_stable_system():
         ((W, np.ones(W.size), 2, 3), "relative_degree is 3"),
     ],
 )
-def test_bad_input_is_named(arguments, message):
+def test_bad_input_is_refused_by_name(arguments, message):
     with pytest.raises(ValueError, match=message):
         fit_rational(*arguments)

@@ -40,7 +40,7 @@ def shrinking_loops(amplitude: float = 2.0, turns: int = 24, points: int = 25) -
 
 @few
 @given(weights_, st.floats(0.0, 2.0), st.floats(-1.0, 1.0))
-def test_play_weights_come_back(weights, linear, constant):
+def test_play_weights_are_recovered(weights, linear, constant):
     x = shrinking_loops()
     y, _ = PlayOperator(LADDER, tuple(weights), linear).simulate(x)
     fit = fit_play(x, y + constant, LADDER)
@@ -54,7 +54,7 @@ def test_play_weights_come_back(weights, linear, constant):
 
 @few
 @given(weights_, st.floats(0.05, 2.0), st.floats(-1.0, 1.0))
-def test_stiffnesses_come_back(stiffnesses, spring, constant):
+def test_stiffnesses_are_recovered(stiffnesses, spring, constant):
     x = shrinking_loops()
     force, _ = MaxwellSlip(spring, tuple(stiffnesses), LADDER).simulate(x)
     fit = fit_maxwell_slip(x, force + constant, LADDER)
@@ -81,7 +81,7 @@ def standard_errors(x: Array, sigma: float) -> Array:
     return sigma * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
 
 
-def test_noise_costs_what_least_squares_promises():
+def test_noise_gives_the_errors_predicted_by_least_squares():
     model, x, sigma = PlayOperator(LADDER, (0.3, 0.1, 0.5, 0.2), 0.4), shrinking_loops(), 0.01
     y, _ = model.simulate(x)
     truth = np.array([model.linear, *model.weights])
@@ -104,7 +104,7 @@ def test_weights_are_never_negative():
         assert min(sizes) >= 0.0
 
 
-def test_rank_tells_what_a_small_loop_cannot():
+def test_rank_falls_for_a_small_loop():
     model = PlayOperator(LADDER, (0.3, 0.1, 0.5, 0.2), 0.4)
     x = shrinking_loops(amplitude=0.7)
     fit = fit_play(x, model.simulate(x)[0], LADDER)
@@ -136,7 +136,7 @@ def random_operator(seed: int, levels: int = LEVELS, output: float = 0.0) -> Pre
 
 @few
 @given(st.integers(0, 10**6), st.integers(1, 4), st.floats(-1.0, 1.0))
-def test_map_comes_back_from_first_order_curves(seed, points, output):
+def test_map_is_recovered_from_first_order_curves(seed, points, output):
     truth = random_operator(seed, output=output)
     x = curve_inputs(-1.0, 1.0, LEVELS, points)
     curves = descending_curves(x, truth.simulate(x)[0])
@@ -175,7 +175,7 @@ def test_regressors_times_weights_are_the_output(seed, virgin):
 
 
 @pytest.mark.parametrize("start", ["low", "virgin"])
-def test_fit_finds_a_model_that_the_record_decides(start):
+def test_fit_recovers_an_identifiable_model(start):
     truth = random_operator(1, output=0.3)
     if start == "virgin":
         even = truth.weights + truth.weights[::-1, ::-1].T
@@ -237,7 +237,7 @@ def minor_loops(output) -> list[tuple[Array, Array]]:
     return records
 
 
-def test_congruency_error_is_a_number():
+def test_congruency_error_has_the_expected_size():
     operator = random_operator(7)
     assert congruency_error(minor_loops(lambda x: operator.simulate(x)[0])) < 1e-12
     # a nonlinear output map keeps the hysteresis but not the congruency

@@ -18,7 +18,7 @@ def _rig(model):
     return lambda inputs: model.simulate(inputs)[0]
 
 
-def test_symmetric_operator_passes_and_is_given_back():
+def test_symmetric_operator_passes_and_is_recovered():
     model = assumed_hysteresis()
     found = measure_joint(_rig(model), RANGE, levels=len(model.table))
     assert found.verdict.startswith("passes")
@@ -72,7 +72,7 @@ def test_output_that_creeps_does_not_wipe_out():
 
 
 @pytest.mark.parametrize("answer", [np.zeros(3), None])
-def test_rig_that_gives_something_else_is_refused(answer):
+def test_rig_with_wrong_output_is_refused(answer):
     with pytest.raises(ValueError, match="one finite number"):
         measure_joint(lambda u: np.full_like(u, np.nan) if answer is None else answer, RANGE)
 

@@ -12,7 +12,7 @@ from pam_envs.identification.joint_muscle import HangingMuscle
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
 
-def test_the_joints_pass_and_one_of_their_muscles_fails_the_symmetry() -> None:
+def test_joint_passes_the_symmetry_test_and_one_muscle_fails_it() -> None:
     found = verdicts()
     for name in ("paper joint", "measured joint"):
         assert found[name].verdict.startswith("passes as a symmetric Preisach operator")
@@ -34,7 +34,7 @@ def test_joints_pass_with_either_hysteresis_and_unequal_muscles_do_not() -> None
     assert not measure_joint(uneven.rest_angles, uneven.angle_range[1]).symmetric
 
 
-def test_at_rest_the_muscle_carries_its_load() -> None:
+def test_muscle_at_rest_carries_its_load() -> None:
     """Force of the law less friction, worked out anew with plays of its own."""
     joint = AntagonisticJoint.paper()
     operator, hysteresis = joint.hysteresis.operator, joint.hysteresis
@@ -56,6 +56,6 @@ def test_at_rest_the_muscle_carries_its_load() -> None:
 @pytest.mark.parametrize(
     "joint", [AntagonisticJoint.reduced(), AntagonisticJoint.paper("none")], ids=["reduced", "none"]
 )
-def test_a_plant_without_muscles_that_remember_is_refused(joint: AntagonisticJoint) -> None:
+def test_plant_without_hysteresis_of_its_muscles_is_refused(joint: AntagonisticJoint) -> None:
     with pytest.raises(ValueError, match="has no muscle that remembers"):
         HangingMuscle(joint)

@@ -64,7 +64,7 @@ def test_rank_of_the_loop_sets(segments, rank):
     assert found.relative_objective < 1e-5
 
 
-def test_enough_loops_give_the_known_model_back():
+def test_enough_loops_recover_the_known_model():
     found = fit(10, 9)
     assert found.open == ("k_10",)
     np.testing.assert_allclose(found.model.stiffnesses[:9], KNOWN.stiffnesses[:9], rtol=2e-3)
@@ -74,7 +74,7 @@ def test_enough_loops_give_the_known_model_back():
     np.testing.assert_allclose(ours, truth, rtol=0.0, atol=1e-3 * FULL)
 
 
-def test_the_major_loop_alone_fits_itself_and_predicts_others_wrongly():
+def test_major_loop_alone_fits_itself_and_mispredicts_other_loops():
     found = fit(10)
     errors = []
     for segments in (10, 7):
@@ -84,7 +84,7 @@ def test_the_major_loop_alone_fits_itself_and_predicts_others_wrongly():
     assert errors[1] > 0.01
 
 
-def test_too_few_loops_are_told_with_names():
+def test_too_few_loops_warn_with_the_open_unknowns():
     with pytest.warns(OpenParameters, match=r"16 of 21 unknowns; .*k_9, k_10 stay open") as caught:
         fit_slip_programme([loop(10)])
     assert "minor loop" in str(caught[0].message)
@@ -93,7 +93,7 @@ def test_too_few_loops_are_told_with_names():
 
 @pytest.mark.parametrize(("segments", "rank"), [((10, 5), 18), ((10, 4.83), 18), ((10, 9), 20)])
 @pytest.mark.parametrize("noise", [0.0, 1e-3, 3e-3])
-def test_neither_noise_nor_a_turn_between_breaks_passes_for_knowledge(segments, rank, noise):
+def test_noise_or_a_turn_between_breaks_adds_no_rank(segments, rank, noise):
     rng, loops = np.random.default_rng(1), []
     for n in segments:
         up = np.linspace(0.0, n * EVEN.segment, round(40 * n) + 1)
@@ -129,7 +129,7 @@ def test_printed_objective_of_even_elements():
     assert 4.5 * objective == pytest.approx(0.99, abs=0.01)  # [bar]
 
 
-def test_pressure_cycles_with_free_peaks_are_taken():
+def test_pressure_cycles_with_free_peaks_are_accepted():
     phase = np.linspace(0.0, 2.0 * np.pi, 2001)
     loops = []
     for peak in (4.5e5, 1.5e5, 3.8e5):

@@ -58,14 +58,14 @@ def wishes(number: int) -> list[tuple[float, float, float]]:
     return [tuple(row) for row in drawn.tolist()]
 
 
-def test_the_stiffness_is_the_slope_of_the_torque() -> None:
+def test_stiffness_is_the_slope_of_the_torque() -> None:
     h = 1e-6
     for angle, (a, b) in itertools.product(ANGLES, itertools.product(BOX[:2], BOX[2:])):
         slope = (given(a, b, angle + h)[0] - given(a, b, angle - h)[0]) / (2.0 * h)
         assert given(a, b, angle)[1] == pytest.approx(-slope, abs=1e-6)
 
 
-def test_the_determinant_is_positive_over_the_whole_range() -> None:
+def test_determinant_is_positive_over_the_whole_range() -> None:
     fine = np.linspace(0.0, STROKE, 2401)
     values = np.array([determinant(*shapes(angle)) for angle in fine])
     assert values.min() > 0.015
@@ -74,7 +74,7 @@ def test_the_determinant_is_positive_over_the_whole_range() -> None:
 
 
 @pytest.mark.parametrize("muscles", [(1, 1), (2, 5), (3, 7), (7, 3)])
-def test_round_trip_to_1e_9(muscles: tuple[int, int]) -> None:
+def test_allocation_inverts_torque_and_stiffness_to_1e_9(muscles: tuple[int, int]) -> None:
     low_a, high_a = (factor(muscles[0], p) for p in (0.0, 6e5))
     low_b, high_b = (factor(muscles[1], p) for p in (0.0, 6e5))
     for angle, share_a, share_b in itertools.product(ANGLES, *2 * [np.linspace(0.0, 1.0, 9)]):
@@ -87,7 +87,7 @@ def test_round_trip_to_1e_9(muscles: tuple[int, int]) -> None:
         assert given(*held, angle) == pytest.approx((torque, stiffness), abs=1e-9)
 
 
-def test_what_is_within_reach_is_given_and_nothing_leaves_the_limits() -> None:
+def test_reachable_targets_are_met_and_pressures_stay_within_limits() -> None:
     within = 0
     for torque, stiffness, angle in wishes(1500):
         a, b = allocated(torque, stiffness, angle)
@@ -99,7 +99,7 @@ def test_what_is_within_reach_is_given_and_nothing_leaves_the_limits() -> None:
     assert 100 < within < 750
 
 
-def test_a_torque_within_its_range_is_given_whatever_stiffness_is_asked_for() -> None:
+def test_reachable_torque_is_met_for_any_target_stiffness() -> None:
     for torque, stiffness, angle in wishes(1500):
         phi_a, phi_b, _, _ = shapes(angle)
         lowest = torque_of(BOX[1], BOX[2], RADIUS, phi_a, phi_b)
@@ -108,7 +108,7 @@ def test_a_torque_within_its_range_is_given_whatever_stiffness_is_asked_for() ->
         assert found == pytest.approx(min(max(torque, lowest), highest), abs=1e-9)
 
 
-def test_no_pressures_give_the_torque_and_come_nearer_to_the_stiffness() -> None:
+def test_no_other_pressures_with_the_torque_are_closer_to_the_stiffness() -> None:
     """Against a search along the line of equal torque."""
     for torque, stiffness, angle in wishes(100):
         a, b = allocated(torque, stiffness, angle)
@@ -122,7 +122,7 @@ def test_no_pressures_give_the_torque_and_come_nearer_to_the_stiffness() -> None
             assert abs(found - stiffness) <= np.abs(offered - stiffness).min() + 1e-9
 
 
-def test_it_is_the_box_least_squares_with_all_weight_on_the_torque() -> None:
+def test_allocation_equals_bounded_least_squares_with_all_weight_on_the_torque() -> None:
     for torque, stiffness, angle in wishes(200):
         phi_a, phi_b, psi_a, psi_b = shapes(angle)
         weights = np.array([1e4, 1.0])
@@ -141,13 +141,13 @@ def test_it_is_the_box_least_squares_with_all_weight_on_the_torque() -> None:
         assert given(*allocated(torque, stiffness, angle), angle) == pytest.approx(best, abs=1e-4)
 
 
-def test_corners_are_answered_by_corners() -> None:
+def test_corners_of_the_reachable_set_map_to_corners() -> None:
     for angle, (a, b) in itertools.product(ANGLES, itertools.product(BOX[:2], BOX[2:])):
         assert allocated(*given(a, b, angle), angle) == pytest.approx((a, b), rel=1e-9)
 
 
 @pytest.mark.parametrize(("share", "areas"), [(0.28, (104.0, 105.9)), (0.33, (137.0, 139.0))])
-def test_the_area_of_what_can_be_given(share: float, areas: tuple[float, float]) -> None:
+def test_area_of_the_reachable_set(share: float, areas: tuple[float, float]) -> None:
     """At 20 and 60 degrees, with the largest contraction of 28 % and of the printed 33 %."""
     spans = (BOX[1] - BOX[0]) * (BOX[3] - BOX[2])
     for degrees, area in zip((20, 60), areas, strict=True):

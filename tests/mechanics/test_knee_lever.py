@@ -18,13 +18,13 @@ from pam_envs.mechanics.knee_lever import (
 ANGLES = np.radians(np.linspace(82.0, 178.0, 49))
 
 
-def test_the_lever_arm_is_what_virtual_work_says() -> None:
+def test_lever_arm_satisfies_virtual_work() -> None:
     lever, h = KneeLever(), 1e-5
     slope = (lever.length(ANGLES + h) - lever.length(ANGLES - h)) / (2.0 * h)
     assert np.allclose(slope, lever.lever_arm(ANGLES), atol=1e-10)
 
 
-def test_the_torque_is_minus_the_gradient_of_the_energy() -> None:
+def test_torque_is_minus_the_gradient_of_the_energy() -> None:
     """A constant tension and the spring: work over angle, with no formula of the torque."""
     lever, tension, h = KneeLever(), 158.0, 1e-5
 
@@ -36,7 +36,7 @@ def test_the_torque_is_minus_the_gradient_of_the_energy() -> None:
     assert np.allclose(slope, lever.torque(tension, ANGLES), atol=1e-8)
 
 
-def test_the_wanted_tension_gives_the_wanted_torque_and_grows_with_it() -> None:
+def test_tension_for_a_torque_gives_it_and_increases_with_it() -> None:
     lever = KneeLever()
     for torque in (-8.0, 0.0, 12.0):
         tension = lever.tension(torque, ANGLES)
@@ -50,7 +50,7 @@ def test_length_and_angle_are_inverses() -> None:
     assert lever.length(math.radians(110.0)) == pytest.approx(0.22, abs=1e-4)
 
 
-def test_the_kernels_are_the_methods() -> None:
+def test_knee_kernels_equal_numpy() -> None:
     lever = KneeLever()
     numbers = (lever.arm, lever.stiffness, lever.relaxed_angle)
     for angle in ANGLES:
@@ -64,6 +64,6 @@ def test_the_kernels_are_the_methods() -> None:
         assert wanted == pytest.approx(held, rel=1e-9, abs=1e-12)
 
 
-def test_no_tension_pushes() -> None:
+def test_tension_is_never_negative() -> None:
     lever = KneeLever()
     assert wanted_tension(math.radians(150.0), -9.0, lever.arm, 30.0, lever.relaxed_angle) == 0.0

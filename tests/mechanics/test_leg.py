@@ -41,7 +41,7 @@ def centre_at(t: float, leg: Leg) -> np.ndarray:
 
 
 @pytest.mark.parametrize("t", [0.0, 0.4, 1.1, 2.3])
-def test_the_full_balance_is_newton_and_euler(t: float) -> None:
+def test_full_balance_satisfies_newton_and_euler(t: float) -> None:
     """Knee torque from forces and moments about the shank's centre of mass, all differenced."""
     leg = Leg()
     force = np.array([-80.0, 650.0])
@@ -68,7 +68,7 @@ def test_the_full_balance_is_newton_and_euler(t: float) -> None:
     assert made == pytest.approx(wanted, abs=1e-4)
 
 
-def test_gravity_stiffness_is_the_slope_of_the_shanks_torque() -> None:
+def test_gravity_stiffness_is_the_slope_of_the_shank_torque() -> None:
     """Flexing by e leans the shank by e more; the torque the shank asks for falls by K e."""
     leg, ahead, up = Leg(), 2.0, -1.5
 
@@ -83,7 +83,7 @@ def test_gravity_stiffness_is_the_slope_of_the_shanks_torque() -> None:
         assert made == pytest.approx(-slope, abs=1e-6)
 
 
-def test_at_every_pace_the_ground_pushes_towards_one_place() -> None:
+def test_ground_force_points_at_one_place_at_every_pace() -> None:
     aim, x, z, natural = 1.0, -0.06, 1.0, 0.03
     for quick in (0.25, 0.6, 1.0, 1.2):
         cop = centre_of_pressure(natural, x, z, quick, aim, -0.2, 0.4)
@@ -91,7 +91,7 @@ def test_at_every_pace_the_ground_pushes_towards_one_place() -> None:
         assert cop + leaning * aim == pytest.approx(natural + x / z * aim, abs=1e-12)
 
 
-def test_the_ground_pushes_within_the_sole() -> None:
+def test_centre_of_pressure_stays_within_the_sole() -> None:
     assert centre_of_pressure(0.0, -0.2, 1.0, 0.1, 1.0, -0.05, 0.22) == -0.05
     assert centre_of_pressure(0.2, 0.2, 1.0, 0.1, 1.0, -0.05, 0.22) == 0.2  # driven ahead: as it is
     assert centre_of_pressure(0.3, 0.2, 1.0, 0.1, 1.0, -0.05, 0.22) == 0.22

@@ -65,7 +65,7 @@ def back_on_pose(angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("weighted", [True, False])
-def test_what_is_found_is_a_minimum_on_the_pose(weighted: bool) -> None:
+def test_solution_is_a_minimum_on_the_pose(weighted: bool) -> None:
     """No slope along the joint motion that leaves the pose, and more weight to either side."""
     poses = ARM.pose(joint_line(START, END, 9))
     found = resolve(ARM, poses, weighted=weighted, start=START)
@@ -88,7 +88,7 @@ def test_what_is_found_is_a_minimum_on_the_pose(weighted: bool) -> None:
         (0.298, -0.376, 0.003, 0.014, 0.204, -0.382),
     ],
 )
-def test_a_saddle_nearby_is_left(start: tuple[float, ...]) -> None:
+def test_iteration_leaves_a_nearby_saddle(start: tuple[float, ...]) -> None:
     """Where Newton's plain method ends with more weight than it began with, or at a saddle."""
     pose = ARM.pose(start)
     found = resolve(ARM, pose[None], start=start).angles[0]
@@ -110,7 +110,7 @@ def test_multipliers_are_those_of_the_lagrangian() -> None:
 
 
 @pytest.mark.parametrize("weighted", [True, False])
-def test_slope_and_curvature_are_the_weight_s(weighted: bool) -> None:
+def test_slope_and_curvature_are_derivatives_of_the_weight(weighted: bool) -> None:
     for angle in np.linspace(-0.5, 0.5, 11).tolist():
         slope, curvature = slope_and_curvature(angle, LIMIT, weighted)
         sides = [slope_and_curvature(angle + h, LIMIT, weighted)[0] for h in (H, -H)]
@@ -124,7 +124,7 @@ def test_slope_and_curvature_are_the_weight_s(weighted: bool) -> None:
     assert value == pytest.approx(weight(angles, weighted), abs=1e-9)
 
 
-def test_the_equations_hold_the_second_derivative_of_the_lagrangian() -> None:
+def test_equations_contain_the_second_derivative_of_the_lagrangian() -> None:
     """Of weight and constraint, both differenced; the multipliers' block is the Jacobian."""
     pose, multipliers = ARM.pose(END), np.array([3.0, -2.0, 1.5, 0.7, -1.1])
     work, system = np.zeros((work_rows(6), 1)).tolist(), np.zeros((11, 12)).tolist()
@@ -161,7 +161,7 @@ def test_equations_are_solved_with_row_exchange() -> None:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_saddle_is_told_from_a_minimum(sign: float) -> None:
+def test_saddle_is_distinguished_from_a_minimum(sign: float) -> None:
     """Of a form that is negative where the constraint holds it, and ``sign`` where it does not."""
     rng = np.random.default_rng(1)
     basis = np.linalg.qr(rng.normal(size=(6, 6)))[0]
@@ -183,7 +183,7 @@ def test_without_a_start_bent_poses_are_tried() -> None:
         assert weight(found.angles[0], True) <= weight(drawn, True) + 1e-9
 
 
-def test_a_straight_start_is_bent_first() -> None:
+def test_straight_start_is_bent_first() -> None:
     """The Jacobian has lost rank there: rows of position and direction along the arm are 0."""
     straight = np.zeros(6)
     assert np.linalg.matrix_rank(ARM.jacobian(straight)) == 4
@@ -192,12 +192,12 @@ def test_a_straight_start_is_bent_first() -> None:
     np.testing.assert_allclose(ARM.pose(found.angles[0]), pose, atol=1e-12)
 
 
-def test_a_nearly_straight_pose_is_reached() -> None:
+def test_almost_straight_pose_is_reached() -> None:
     found = resolve(ARM, [[0.0, 0.0, 1.4999, 0.0, 0.0, 1.0]])
     np.testing.assert_allclose(ARM.pose(found.angles[0])[:3], [0.0, 0.0, 1.4999], atol=1e-9)
 
 
-def test_one_branch_is_followed() -> None:
+def test_path_follows_one_branch() -> None:
     found = resolve(ARM, ARM.pose(joint_line(START, END)), start=START)
     assert found.longest_step < np.deg2rad(1.0)
     assert found.angles.shape == (41, 6) and found.multipliers.shape == (41, 5)
@@ -212,14 +212,14 @@ def test_unweighted_angles_may_pass_a_limit_that_weighted_ones_keep() -> None:
     assert np.sum(free.angles**2) < np.sum(kept.angles**2)
 
 
-def test_a_narrower_limit_is_kept_too() -> None:
+def test_narrower_limit_is_kept() -> None:
     limit = np.deg2rad(27.6)
     found = resolve(ARM, ARM.pose(END)[None], limit=limit, start=0.9 * END)
     assert found.peak < limit
     assert found.peak > np.deg2rad(26.0)
 
 
-def test_another_chain_with_more_joints_to_spare(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_chain_with_more_redundant_joints_is_solved(monkeypatch: pytest.MonkeyPatch) -> None:
     uncompiled(monkeypatch)
     chain = SerialChain.uniform("zxyxyxyz", length=0.2)
     angles = np.array([0.2, -0.3, 0.25, 0.1, -0.2, 0.3, 0.15, -0.1])
@@ -240,7 +240,7 @@ def test_another_chain_with_more_joints_to_spare(monkeypatch: pytest.MonkeyPatch
 @pytest.mark.parametrize(
     ("pose", "distance"), [([0, 0, 1.6, 0, 0, 1], 0.1), ([0, 0, 2.5, 0, 0, 1], 1.0)]
 )
-def test_an_unreachable_pose_is_named(pose: list[float], distance: float) -> None:
+def test_unreachable_pose_is_refused_by_name(pose: list[float], distance: float) -> None:
     poses = np.array([ARM.pose(START), pose, ARM.pose(START)])
     with pytest.raises(UnreachablePose, match="bring the path") as caught:
         resolve(ARM, poses, start=START)
@@ -250,7 +250,7 @@ def test_an_unreachable_pose_is_named(pose: list[float], distance: float) -> Non
     assert f"{1e3 * distance:g} mm" in str(caught.value)
 
 
-def test_within_the_arm_s_length_a_pose_may_be_beyond_the_limits() -> None:
+def test_pose_within_the_length_of_the_arm_may_exceed_joint_limits() -> None:
     bent = np.deg2rad([40.0, 0.0, 40.0, 0.0, 40.0, 0.0])
     pose = ARM.pose(bent)
     with pytest.raises(UnreachablePose) as caught:
@@ -259,13 +259,13 @@ def test_within_the_arm_s_length_a_pose_may_be_beyond_the_limits() -> None:
     assert resolve(ARM, pose[None], limit=np.deg2rad(45.0)).peak < np.deg2rad(45.0)
 
 
-def test_a_pose_that_is_missed_though_within_reach_asks_for_a_start() -> None:
+def test_missed_reachable_pose_requests_a_starting_point() -> None:
     far, near = (UnreachablePose(0, ARM.pose(START), d, 0.0, LIMIT) for d in (1e-3, 1e-9))
     assert "out of reach" in str(far) and "1 mm" in str(far)
     assert "give start angles" in str(near)
 
 
-def test_the_nearest_pose_of_a_reachable_one_is_itself() -> None:
+def test_nearest_pose_of_a_reachable_pose_is_itself() -> None:
     distance, turn = nearest(ARM, ARM.pose(START))
     assert distance < 1e-6 and turn < 1e-5
 
@@ -281,13 +281,13 @@ def test_the_nearest_pose_of_a_reachable_one_is_itself() -> None:
         ({"start": np.full(6, 0.6)}, "begin between the limits"),
     ],
 )
-def test_arguments_that_make_no_sense(arguments: dict[str, Any], words: str) -> None:
+def test_invalid_arguments_are_refused(arguments: dict[str, Any], words: str) -> None:
     given = {"poses": ARM.pose(START)[None], **arguments}
     with pytest.raises(ValueError, match=words):
         resolve(ARM, **given)
 
 
-def test_a_chain_without_a_joint_to_spare() -> None:
+def test_chain_without_redundancy_is_refused() -> None:
     with pytest.raises(ValueError, match="4 joints"):
         resolve(SerialChain.uniform("xyxy"), np.zeros((1, 6)))
 

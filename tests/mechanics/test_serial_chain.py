@@ -51,7 +51,7 @@ def slope(function: Any, at: np.ndarray) -> np.ndarray:
 # --- numpy --------------------------------------------------------------------------------------
 
 
-def test_the_straight_arm_and_one_bent_joint() -> None:
+def test_pose_of_the_straight_arm_and_of_one_bent_joint() -> None:
     np.testing.assert_allclose(PAPER.pose(np.zeros(6)), [0, 0, 1.5, 0, 0, 1], atol=1e-15)
     bent = np.array([0.3, 0, 0, 0, 0, 0])  # about x: towards -y
     expected = [0, -1.5 * np.sin(0.3), 1.5 * np.cos(0.3), 0, -np.sin(0.3), np.cos(0.3)]
@@ -62,7 +62,7 @@ def test_the_straight_arm_and_one_bent_joint() -> None:
 
 
 @CHAINS
-def test_poses_of_many_are_those_of_each(chain: SerialChain) -> None:
+def test_batched_poses_equal_single_poses(chain: SerialChain) -> None:
     angles = np.stack([drawn(chain, seed)[0] for seed in range(4)]).reshape(2, 2, -1)
     assert chain.pose(angles).shape == (2, 2, 6)
     assert chain.joints(angles).shape == (2, 2, chain.stages + 1, 3)
@@ -81,7 +81,7 @@ def test_jacobian_and_curvature_are_derivatives_of_the_pose(chain: SerialChain) 
 
 
 @CHAINS
-def test_kinetic_energy_is_that_of_the_moving_bodies(chain: SerialChain) -> None:
+def test_kinetic_energy_equals_that_of_the_bodies(chain: SerialChain) -> None:
     """Of two mass points and a spin for each link, all differenced."""
     angles, rates = drawn(chain)
     payload, total = 0.7, 0.0
@@ -105,7 +105,7 @@ def test_kinetic_energy_is_that_of_the_moving_bodies(chain: SerialChain) -> None
 
 
 @CHAINS
-def test_equations_of_motion_are_lagrange_s(chain: SerialChain) -> None:
+def test_equations_of_motion_satisfy_lagrange(chain: SerialChain) -> None:
     """``d/dt (M v) - d(T - V)/dq`` without acceleration is the bias."""
     angles, rates = drawn(chain)
     payload = 0.4
@@ -120,7 +120,7 @@ def test_equations_of_motion_are_lagrange_s(chain: SerialChain) -> None:
 
 
 @CHAINS
-def test_weights_of_many_poses_are_those_of_each(chain: SerialChain) -> None:
+def test_batched_weights_equal_single_weights(chain: SerialChain) -> None:
     poses = np.stack([drawn(chain, seed)[0] for seed in range(6)]).reshape(2, 3, -1)
     masses = np.array([[0.0, 0.1, 0.5], [1.0, 0.2, 0.3]])
     together = chain.gravity_torque(poses, masses)
@@ -136,7 +136,7 @@ def test_weights_of_many_poses_are_those_of_each(chain: SerialChain) -> None:
     )
 
 
-def test_a_hanging_arm_comes_back_and_a_lying_one_sags() -> None:
+def test_hanging_arm_returns_and_horizontal_arm_sags() -> None:
     bent = np.array([0.2, 0, 0, 0, 0, 0])
     torque = PAPER.gravity_torque(bent)[0]
     weight = 6 * FORM.mass * GRAVITY
@@ -178,7 +178,7 @@ def plain(function: Any, chain: SerialChain, *arrays: np.ndarray, lanes: int = L
 
 
 @CHAINS
-def test_kernels_find_the_same_place(chain: SerialChain) -> None:
+def test_chain_kernels_equal_numpy_kinematics(chain: SerialChain) -> None:
     rows, fixed, work = states(chain)
 
     def placed(*arrays: Any) -> None:
@@ -193,7 +193,7 @@ def test_kernels_find_the_same_place(chain: SerialChain) -> None:
 
 
 @CHAINS
-def test_kernels_find_the_same_equations_of_motion(chain: SerialChain) -> None:
+def test_chain_kernels_equal_numpy_dynamics(chain: SerialChain) -> None:
     rows, fixed, work = states(chain)
     n = chain.stages
 
@@ -216,7 +216,7 @@ def test_kernels_find_the_same_equations_of_motion(chain: SerialChain) -> None:
 
 
 @CHAINS
-def test_energy_stays_in_free_motion(chain: SerialChain) -> None:
+def test_energy_is_conserved_in_free_motion(chain: SerialChain) -> None:
     """Of the kernels' accelerations, integrated by Runge and Kutta's fourth-order method."""
     rows, fixed, work = states(chain, 1)
     n, h, steps = chain.stages, 1e-3, 100
@@ -251,7 +251,7 @@ def test_compiled_kernels_give_the_same_bits() -> None:
         np.testing.assert_array_equal(work, expected)
 
 
-def test_lanes_do_not_touch_each_other() -> None:
+def test_lanes_are_independent() -> None:
     rows, fixed, work = states(PAPER, 5)
     together = plain(accelerate, PAPER, rows, fixed, work, lanes=5)
     for j in range(5):
@@ -259,7 +259,7 @@ def test_lanes_do_not_touch_each_other() -> None:
         np.testing.assert_array_equal(plain(accelerate, PAPER, *one, lanes=1)[:, 0], together[:, j])
 
 
-def test_rows_have_the_lengths_that_are_said() -> None:
+def test_row_counts_match_their_declarations() -> None:
     for chain in (PAPER, ODD):
         assert len(chain.rows()) == parameter_rows(chain.stages)
     assert work_rows(6) > max(tip_row(6) + 3, pointing_row(6) + 3)
@@ -279,11 +279,11 @@ def test_rows_have_the_lengths_that_are_said() -> None:
         ({"gravity": (0.0, 0.0, 98.0)}, r"gravity\[2\] = 98.0 m/s2"),
     ],
 )
-def test_a_chain_that_makes_no_sense(changes: dict[str, Any], words: str) -> None:
+def test_invalid_chain_is_refused(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         dataclasses.replace(PAPER, **changes)
 
 
-def test_angles_that_do_not_fit() -> None:
+def test_angles_of_wrong_shape_are_refused() -> None:
     with pytest.raises(ValueError, match="6 joints"):
         PAPER.pose(np.zeros(5))

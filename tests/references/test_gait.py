@@ -52,7 +52,7 @@ def test_rates_are_derivatives(activity: str) -> None:
 
 
 @pytest.mark.parametrize("activity", ACTIVITIES)
-def test_the_kernels_are_the_curves(activity: str) -> None:
+def test_gait_kernels_equal_numpy(activity: str) -> None:
     table = gait_table(activity)
     for phase in (0.0, 0.004, 0.37, 0.62, 0.9999999):
         for signal, name in enumerate(SIGNALS):
@@ -63,20 +63,20 @@ def test_the_kernels_are_the_curves(activity: str) -> None:
                 assert three[derivative] == pytest.approx(float(wanted), rel=1e-9, abs=1e-9)
 
 
-def test_a_phase_counts_by_its_fraction() -> None:
+def test_phase_is_taken_modulo_one() -> None:
     assert fraction_of_turn(3.25) == 0.25
     assert fraction_of_turn(0.0) == 0.0
 
 
 @pytest.mark.parametrize("activity", ACTIVITIES)
-def test_the_foot_pushes_and_never_pulls_and_lifts_off(activity: str) -> None:
+def test_ground_force_is_never_negative_and_zero_in_swing(activity: str) -> None:
     vertical = gait_curves(activity, np.linspace(0, 1, 1001))["ground_z"]
     assert vertical.min() >= 0.0
     assert 0.25 < np.mean(vertical == 0.0) < 0.45
     assert 1.0 < vertical.max() < 1.5
 
 
-def test_the_tables_are_what_their_script_makes() -> None:
+def test_gait_tables_equal_their_script() -> None:
     for activity, curves in tables().items():
         stored = gait_table(activity)[1:-2]
         made = np.array([curves[name] for name in SIGNALS]).T
@@ -94,7 +94,7 @@ def measured() -> np.ndarray:
     return np.genfromtxt(FOLDER / "gait_walk_stride.csv", delimiter=",", names=True)[:100]
 
 
-def test_the_knee_is_the_measured_one() -> None:
+def test_knee_angle_equals_the_measured_one() -> None:
     knee = np.degrees(gait_curves("walk", PHASES)["knee"])
     assert np.sqrt(np.mean((knee - measured()["knee_flexion_deg"]) ** 2)) < 0.15
 
@@ -122,7 +122,7 @@ def rms(error: np.ndarray) -> float:
     return float(np.sqrt(np.mean(error**2)))
 
 
-def test_the_full_balance_meets_inverse_dynamics_and_equation_1_does_not() -> None:
+def test_full_balance_matches_inverse_dynamics_and_equation_1_does_not() -> None:
     full, vertical, truth = walking_balance()
     stance = PHASES < 0.64
     assert rms((full - truth)[stance]) < 7.0
@@ -132,11 +132,11 @@ def test_the_full_balance_meets_inverse_dynamics_and_equation_1_does_not() -> No
     assert np.corrcoef(vertical[stance], truth[stance])[0, 1] < 0.2
 
 
-def test_an_unknown_activity_is_named() -> None:
+def test_unknown_activity_is_refused_by_name() -> None:
     with pytest.raises(ValueError, match=r"activity = 'hop'.*walk, stairs_up, stairs_down"):
         gait_table("hop")
 
 
-def test_a_table_is_the_callers_own() -> None:
+def test_table_is_a_copy() -> None:
     gait_table("walk")[:] = 0.0
     assert gait_table("walk")[:, KNEE].max() > 1.0

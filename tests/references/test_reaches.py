@@ -49,7 +49,7 @@ def test_motions_stay_in_their_range_and_begin_at_rest(kind: int) -> None:
 
 
 @pytest.mark.parametrize("kind", [REACHES, SINES])
-def test_rate_and_acceleration_are_the_slopes(kind: int) -> None:
+def test_rate_and_acceleration_are_derivatives(kind: int) -> None:
     h, times = 1e-5, np.arange(0.1, 12.0, 0.013)
     rows = drawn(3, kind)
     slopes = (course(rows, times + h) - course(rows, times - h)) / (2.0 * h)
@@ -64,7 +64,7 @@ def test_reaches_join_and_rest_between() -> None:
         assert before[1] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_the_course_is_the_one_of_least_jerk() -> None:
+def test_reach_has_minimum_jerk() -> None:
     """Fifth order, symmetric, with neither speed nor acceleration at its ends."""
     u = np.linspace(0.0, 1.0, 41)
     s = np.array([least_jerk(float(x)) for x in u])
@@ -80,7 +80,7 @@ def test_the_course_is_the_one_of_least_jerk() -> None:
     assert np.allclose(bend[1:-1], (v[2:] - v[:-2]) * 20.0, atol=0.05)
 
 
-def test_mixed_draws_each_and_keys_tell_motions_apart() -> None:
+def test_mixed_motions_draw_each_kind_and_differ_by_key() -> None:
     kinds = {int(drawn(seed, MIXED)[KIND, 0]) for seed in range(40)}
     assert kinds == set(range(len(MOTIONS) - 1))
     times = np.arange(0.0, 8.0, 0.1)

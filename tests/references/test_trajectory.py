@@ -22,7 +22,7 @@ def record(seed: int, seconds: float = 12.0, **arguments: object) -> np.ndarray:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_family_is_seeded_and_stays_in_range(family: str) -> None:
+def test_family_is_seeded_and_stays_in_range(family: str) -> None:
     several = [record(seed, reference=family) for seed in range(4)]
     assert np.array_equal(several[0], record(0, reference=family))
     assert len({r.tobytes() for r in several}) == 4
@@ -32,7 +32,7 @@ def test_a_family_is_seeded_and_stays_in_range(family: str) -> None:
         assert np.ptp(r) > 0.001
 
 
-def test_what_makes_a_family() -> None:
+def test_each_family_has_its_characteristic_shape() -> None:
     steps, ramps = record(0, reference="steps"), record(0, reference="ramps")
     assert np.mean(np.diff(steps) == 0.0) > 0.98
     assert np.abs(np.diff(ramps)).max() < 0.012 * 0.01 + 1e-9  # at most the range in a second
@@ -53,7 +53,7 @@ def test_what_makes_a_family() -> None:
 
 
 @pytest.mark.parametrize(("preview", "stride"), [(5, 4), (1, 1), (20, 3), (3, 50)])
-def test_the_preview_is_what_comes(preview: int, stride: int) -> None:
+def test_preview_equals_the_future_reference(preview: int, stride: int) -> None:
     env = gym.make(NAME, preview=preview, preview_stride=stride, reference="mixed", normalize=False)
     observation, info = env.reset(seed=5)
     seen, promised = [info["reference"]], [observation[4:]]
@@ -67,7 +67,7 @@ def test_the_preview_is_what_comes(preview: int, stride: int) -> None:
                 assert value == np.float32(seen[k + i * stride])
 
 
-def test_samples_are_followed_and_the_last_one_holds() -> None:
+def test_given_samples_are_followed_and_the_last_is_held() -> None:
     samples = 0.005 + 0.002 * np.sin(0.05 * np.arange(200))
     env = gym.make(NAME, reference=samples, preview=2, preview_stride=10, normalize=False)
     observation, info = env.reset(seed=0)

@@ -21,7 +21,7 @@ from pam_envs.kernels.motion import damped_motion, oscillator
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def test_decay_is_the_exponential() -> None:
+def test_decay_equals_the_exponential() -> None:
     x = np.linspace(-3.0, 5.0, 801)
     assert max(abs(arithmetic.decay(v) / math.exp(-v) - 1.0) for v in x.tolist()) < 2e-13
     x = np.linspace(5.0, 20.0, 301)
@@ -30,13 +30,13 @@ def test_decay_is_the_exponential() -> None:
     assert arithmetic.decay(1e9) == arithmetic.decay(40.0) > 0.0
 
 
-def test_sine_is_the_sine() -> None:
+def test_sine_of_turns_equals_the_sine() -> None:
     x = np.linspace(-30.0, 30.0, 4001).tolist()
     assert max(abs(arithmetic.sine_of_turns(v) - math.sin(2 * math.pi * v)) for v in x) < 1e-13
     assert arithmetic.sine_of_turns(0.0) == 0.0
 
 
-def test_logarithm_and_normal_quantile() -> None:
+def test_logarithm_and_normal_quantile_equal_references() -> None:
     u = np.concatenate([np.logspace(-9.9, -0.31, 800), 1.0 - np.logspace(-9.0, -0.31, 800)])
     assert max(abs(arithmetic.log_of_fraction(v) - math.log(v)) for v in u.tolist()) < 1e-11
     got = np.array([random.normal_quantile(v) for v in u.tolist()])
@@ -46,7 +46,7 @@ def test_logarithm_and_normal_quantile() -> None:
 @pytest.mark.parametrize(
     ("value", "step", "expected"), [(0.26, 0.1, 0.3), (-0.26, 0.1, -0.3), (1.7, 0.0, 1.7)]
 )
-def test_quantise(value: float, step: float, expected: float) -> None:
+def test_quantise_rounds_to_the_nearest_step(value: float, step: float, expected: float) -> None:
     assert arithmetic.quantise(value, step) == pytest.approx(expected, abs=1e-15)
 
 
@@ -158,7 +158,7 @@ def _both(x: float) -> float:
     return _inner(x) + _doubled(x)
 
 
-def test_callees_are_made_once_for_what_is_bound_in_them() -> None:
+def test_callees_are_built_once_for_each_binding() -> None:
     made: list[tuple[str, set[tuple[str, object]]]] = []
 
     def finish(copy: Any, original: Any, bound: kernels.Bound) -> Any:
