@@ -11,10 +11,10 @@ NEEDS = {
     "contraction": "`contraction_mm`",
     "pressure": "`pressure_bar`",
     "loads": "`load_N` with two loads or more",
-    "weighed": "loads declared to a tolerance (`tolerance: {mass.load}` in RIG.yaml)",
-    "temperature": "`temperature_C` that varies",
-    "valve_closed": "a segment with the valve shut (`valve_closed` in RIG.yaml)",
-    "rest": "a muscle that had rested (`cycles_since_rest` in RIG.yaml)",
+    "weighed": "loads with a declared tolerance (`tolerance: {mass.load}` in RIG.yaml)",
+    "temperature": "varying `temperature_C`",
+    "valve_closed": "a segment with the valve closed (`valve_closed` in RIG.yaml)",
+    "rest": "a rested muscle at the start (`cycles_since_rest` in RIG.yaml)",
     "exhaust": "a command that falls by more than 0.5 bar",
 }
 """Requirements of a cause on a recording, in words."""

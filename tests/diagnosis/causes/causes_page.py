@@ -1,7 +1,7 @@
-"""What ``docs/diagnosis_causes.md`` has to say, made of the declarations.
+"""Generated parts of ``docs/diagnosis_causes.md``, from the declarations of the causes.
 
-The page holds three parts between marks; the rest of it is written by hand. After a change of the
-catalogue ``python -m tests.diagnosis.causes.causes_page`` brings the parts up to date.
+The page has three parts between marks; the rest is written by hand. After a change of the catalogue
+``python -m tests.diagnosis.causes.causes_page`` updates the parts.
 """
 
 from __future__ import annotations
@@ -26,26 +26,29 @@ WEIGHT = "hysteresis.weight"
 GIVEN = {
     "regulator.max_pressure": "RIG.yaml, `regulator: {max_pressure_bar}`",
     "muscle.rest_length": "RIG.yaml, `muscle: {rest_length_mm}`",
-    "muscle.diameter": "RIG.yaml, `muscle: {diameter_mm}`; only the air used depends on it",
-    "muscle.braid_angle": "the plant; only the air used depends on it",
-    "muscle.braid_strain": "the plant; `braid_force` and `stiffness` go with it and are refitted",
-    "muscle.temperature": "the recording, `temperature_C`; 20 °C if there is none",
+    "muscle.diameter": "RIG.yaml, `muscle: {diameter_mm}`; only the air consumption depends on it",
+    "muscle.braid_angle": "the plant; only the air consumption depends on it",
+    "muscle.braid_strain": "the plant; `braid_force` and `stiffness` are refitted with it",
+    "muscle.temperature": "the recording, `temperature_C`; 20 °C without it",
     "hysteresis.creep_time_1": "the plant; four fixed times cover 0.1 to 300 s",
     "hysteresis.creep_time_2": "the plant",
     "hysteresis.creep_time_3": "the plant",
     "hysteresis.creep_time_4": "the plant",
     "mass.load": "the recording, `load_N`; its error is `payload_error`",
     "mass.carried": "RIG.yaml, `load`: 1 for `hanging_mass`, 0 for `constant_force`",
-    "position.noise": "RIG.yaml, `sensors: {contraction_noise_mm}`; measured if it is not given",
-    "position.resolution": "the recording; replays are free of steps",
-    "pressure.noise": "RIG.yaml, `sensors: {pressure_noise_bar}`; measured if it is not given",
-    "pressure.resolution": "the recording; replays are free of steps",
+    "position.noise": "RIG.yaml, `sensors: {contraction_noise_mm}`; estimated if it is not given",
+    "position.resolution": "the recording; replays are not quantised",
+    "pressure.delay": "the plant; no cause uses it",
+    "pressure.slip": "the plant; no cause uses it",
+    "pressure.slip_at": "the plant; no cause uses it",
+    "pressure.noise": "RIG.yaml, `sensors: {pressure_noise_bar}`; estimated if it is not given",
+    "pressure.resolution": "the recording; replays are not quantised",
 }
-"""Declared parameters, and where they are given."""
+"""Declared parameters and their source."""
 
 
 def named_by() -> dict[str, list[str]]:
-    """Return the causes whose forms move a parameter, by its name."""
+    """Return the causes that use each parameter."""
     found: dict[str, list[str]] = {}
     for cause in catalogue():
         for name in dict.fromkeys(t.name for form in cause.forms for t in form.terms):
@@ -54,7 +57,7 @@ def named_by() -> dict[str, list[str]]:
 
 
 def classes_of(name: str) -> list[tuple[str, str]]:
-    """Return the classes of a parameter, one if all is well, with a word on each."""
+    """Return the classes of a parameter with a remark on each; there must be one."""
     causes = named_by().get(name, [])
     return [
         *([("base", "refitted")] if name in (*BASE, WEIGHT) else []),
@@ -95,11 +98,11 @@ def table() -> str:
 
 
 def row_of(form: Form, term: Term) -> str:
-    """Return what is fitted, within which bounds."""
+    """Return the row of a fitted parameter with its bounds."""
     unit, low, high, neutral = limits(term.name)
     low = low if term.low is None else term.low
     high = high if term.high is None else term.high
-    role = "the effect goes with it" if term.amount else "shapes it"
+    role = "size of the effect" if term.amount else "shape"
     cells = (form.name, f"`{term.name}`", unit, f"{low:g} to {high:g}")
     return f"| {' | '.join(cells)} | {number(neutral) if term.amount else ''} | {role} |"
 
@@ -116,10 +119,10 @@ def section(cause: Cause) -> str:
     rows = [row_of(form, term) for form in cause.forms for term in form.terms]
     points = {
         "Residual": cause.signature + ".",
-        "Easily taken for": ", ".join(f"[{n}](#{n})" for n in cause.neighbours) + ".",
-        "What tells": cause.experiment,
-        "Measured directly by": cause.sensor + ".",
-        "Needs": ", ".join(NEEDS[n] for n in cause.needs) + "." if cause.needs else "",
+        "Similar causes": ", ".join(f"[{n}](#{n})" for n in cause.neighbours) + ".",
+        "Separating experiment": cause.experiment,
+        "Direct measurement": cause.sensor + ".",
+        "Requirements": ", ".join(NEEDS[n] for n in cause.needs) + "." if cause.needs else "",
         "Source": cause.source,
     }
     return "\n".join(
@@ -155,7 +158,7 @@ def _between(name: str) -> re.Pattern[str]:
 
 
 def part(name: str) -> str:
-    """Return a part of the page as it stands."""
+    """Return a part of the present page."""
     found = _between(name).search(PAGE.read_text(encoding="utf-8"))
     assert found is not None, f"{PAGE.name} has lost its marks of {name!r}"
     return found.group()

@@ -1,6 +1,6 @@
-"""Resonance: something rings after steps.
+"""Resonance of line or mount: decaying oscillations after steps.
 
-A column of air in a long feed line swings against the muscle's volume, or the target of the
+The air column of a long feed line oscillates against the muscle's volume, or the target of the
 position sensor stands on a soft bracket. A share of the pressure, or of the position, then follows
 through a lightly damped second-order system of a few hertz.
 """
@@ -35,14 +35,14 @@ CAUSE = Cause(
     ),
     signature=(
         "a decaying oscillation of one frequency after every step, whatever its size; a peak in "
-        "the spectrum that is not there in holds"
+        "the spectrum that is absent in holds"
     ),
     contains=("sensor_delay", "dead_time"),
     neighbours=("dead_time", "viscous_loss"),
     experiment=(
         "Sharp steps sampled at 50 Hz or more, under two loads: ringing keeps its frequency, the "
-        "bounce of load and muscle falls with the load's mass; in the pressure it is the line, in "
-        "the contraction alone the mount. Between steps it dies out, which a vibration does not."
+        "oscillation of load and muscle slows with the load's mass; in the pressure it is the "
+        "line, in the contraction alone the mount. Between steps it decays, unlike a vibration."
     ),
     source=(
         "The acoustics of tubes (a quarter of a wave: 340 m/s over four times the length); sizes "

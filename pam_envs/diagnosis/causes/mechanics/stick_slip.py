@@ -1,8 +1,8 @@
 """Stick-slip: the guide sticks, breaks away and sticks again.
 
-Dry friction of a guide is larger at rest than in motion, so that slow motion goes in jumps. The
-load stays where it is until the force on it exceeds the breakaway force, then jumps to where the
-friction of motion holds it. Weak sticking looks like a loss that depends on direction.
+The dry friction of a guide is larger at rest than in motion, so that slow motion proceeds in jumps.
+The load is at rest until the force exceeds the breakaway force and then jumps to an equilibrium
+with the kinetic friction. Weak sticking resembles a loss that depends on direction.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ CAUSE = Cause(
         ),
     ),
     signature=(
-        "in slow motion the contraction stands still and jumps; the error is a saw-tooth with the "
+        "in slow motion the contraction stops and jumps; the error is a saw-tooth with the "
         "sign of the direction, whatever the speed"
     ),
     neighbours=("viscous_loss", "hysteresis_drive", "hysteresis_shape", "valve_dead_band"),
     experiment=(
-        "A very slow triangle, 10 s or more for each way: stick-slip draws stairs where everything "
-        "else draws a line; the pressure stays smooth, which a valve's dead band does not."
+        "A very slow triangle, 10 s or more for each way: stick-slip gives stairs, other "
+        "causes a line; the pressure is smooth, unlike with a dead band of the valve."
     ),
     source=(
         "Armstrong-Hélouvry, Dupont and Canudas de Wit 1994, Automatica 30(7); sizes are assumed, "

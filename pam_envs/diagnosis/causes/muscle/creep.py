@@ -1,9 +1,9 @@
-"""Creep: the muscle goes on moving after the pressure has settled.
+"""Creep: the muscle continues to move after the pressure has settled.
 
 Rubber and braid are viscoelastic, so that part of the response follows over seconds and minutes,
-nearly along the logarithm of time, and is given back as slowly. Four Kelvin-Voigt elements with
-fixed time constants, spread from 0.4 to 90 s, stand for any such law. Either the effective pressure
-creeps, and with it the force, or the length does, as in a fitting or a coating.
+nearly along the logarithm of time, and is recovered as slowly. Four Kelvin-Voigt elements with
+fixed time constants from 0.4 to 90 s approximate any such law. Either the effective pressure
+creeps, and with it the force, or the length, as in a fitting or a coating.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ CAUSE = Cause(
         ),
     ),
     signature=(
-        "in holds the contraction goes on along the logarithm of the time since the step, with the "
-        "sign of the step, while the pressure stands still"
+        "in holds the contraction continues along the logarithm of the time since the step, with "
+        "the sign of the step, while the pressure is constant"
     ),
     neighbours=(
         "leak",
@@ -41,8 +41,8 @@ CAUSE = Cause(
     ),
     experiment=(
         "Hold one pressure for a minute, reached from below and from above: creep changes its sign "
-        "with the direction and starts anew with every step, a leak, a drift and heat do neither, "
-        "and friction keeps the gap open."
+        "with the direction and restarts with every step, a leak, a drift and heat do neither, and "
+        "friction leaves a constant gap."
     ),
     source=(
         "A public record of a DMSP-10-250 on a pressure regulator: 20 % of the stroke within 4 s "

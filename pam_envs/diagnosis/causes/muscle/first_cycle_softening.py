@@ -1,8 +1,8 @@
-"""Softening over the first cycles: a rested muscle is stiffer and rubs more.
+"""First-cycle softening: a rested muscle is stiffer and has more friction.
 
-Filled rubber loses part of its stiffness when it is first stretched (Mullins) and gets it back in a
-long rest; strands that have stuck together come loose. The first travel of the pressure is
-therefore made with wider loops and less effective pressure, and both fade with the travel.
+Filled rubber loses part of its stiffness at the first stretch (Mullins effect) and recovers it in a
+long rest; strands that adhere to one another come loose. The first travel of the pressure therefore
+has wider loops and less effective pressure, and both decay with the travel.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ CAUSE = Cause(
         ),
     ),
     signature=(
-        "the first cycles contract less and lie further open than later ones; the error fades with "
-        "the travel made, not with time"
+        "the first cycles contract less and have wider loops than later ones; the error decays "
+        "with the travel, not with time"
     ),
     neighbours=("creep", "sensor_drift", "temperature"),
     experiment=(
         "Rest overnight, then cycle; rest for an hour without cycling, then cycle again: softening "
-        "waits for the travel, creep and a drift do not, heat follows the duty."
+        "depends on the travel, creep and drift on time, heat on the duty."
     ),
     source=(
         "Mullins 1969, Rubber Chemistry and Technology 42; an open wrist-robot project: loops of "

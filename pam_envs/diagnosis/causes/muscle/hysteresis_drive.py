@@ -1,8 +1,8 @@
-"""What drives the hysteresis: strands rub when the length changes, not when the pressure does.
+"""Length-driven friction: strands slide when the length changes, not the pressure.
 
-Threads of the braid slide on one another as the muscle shortens. A hysteresis of the pressure has
-them slide in a blocked muscle too, where they stand still. In the plant four Maxwell elements in
-the length, breaking loose one after the other, pull against the motion.
+Threads of the braid slide on one another as the muscle contracts. A hysteresis of the pressure lets
+them slide in a blocked muscle too, where they are at rest. The plant has four Maxwell elements in
+the length, which break away one after the other and act against the motion.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ CAUSE = Cause(
     ),
     signature=(
         "the error has the sign of the direction and depends on how far the length, not the "
-        "pressure, has gone since the reversal; it differs between loads and is there when a load "
-        "is changed at constant pressure"
+        "pressure, has moved since the reversal; it differs between loads and is present when a "
+        "load changes at constant pressure"
     ),
     neighbours=(
         "hysteresis_shape",

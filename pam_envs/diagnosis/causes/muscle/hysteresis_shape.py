@@ -1,9 +1,9 @@
-"""Shape of the hysteresis: minor loops rub otherwise than the major one.
+"""Shape of minor loops: friction in minor loops differs from that of the major loop.
 
-A hysteresis made of plays ties inner loops to the outer one (congruence), and a spread of
-thresholds that fits the outer loop may be wrong for small reversals, since strands that have slid
-far have settled otherwise than those that just turned. In the plant friction below its largest
-value is weakened or strengthened by the part that is missing to it.
+A hysteresis of play operators relates minor loops to the major one (congruence), and thresholds
+that fit the major loop may be wrong for small reversals, since strands that have slid far settle
+differently from those that have just reversed. The plant weakens or strengthens friction below its
+largest value by the difference to that value.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ CAUSE = Cause(
     title="the shape of minor loops",
     forms=(Form("inner loops", (Term("hysteresis.shape", (2.0, 0.5), log=True),)),),
     signature=(
-        "the error begins at reversals and has gone when the loop is fully slipped: large loops "
-        "fit, small reversals are off"
+        "the error starts at reversals and vanishes when the loop is fully slipped: large loops "
+        "fit, small reversals do not"
     ),
     neighbours=("hysteresis_drive", "pressure_dependent_friction", "stick_slip"),
     experiment=(

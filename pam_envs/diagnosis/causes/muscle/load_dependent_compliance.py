@@ -1,9 +1,8 @@
-"""Compliance that changes with load: the static curve moves or turns with what hangs on the muscle.
+"""Load-dependent compliance: the static curve shifts or rotates with the load.
 
-The law of the base gives a load its share of the pull, in proportion. A real muscle is necked at
-its ends and its fittings give way, so that the load costs more pressure than that (a shift with its
-square) or meets another stiffness (passive force times a polynomial in the
-root of the load).
+In the law of the base a load takes a proportional share of the force. A real muscle has necked ends
+and compliant fittings, so that a load costs more pressure (a shift with its square) or acts on
+another stiffness (passive force times a polynomial in the root of the load).
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ CAUSE = Cause(
     experiment=(
         "The same slow triangle under five loads, one of them none: a wrong load shifts all loads "
         "by one amount, slack ends at a contraction, compliance bends with the load. Three loads "
-        "cannot tell a square law from a dead zone."
+        "cannot separate a square law from a dead zone."
     ),
     source=(
         "Readings of a MAS-10-N-100 (Applied Sciences 2021, 11(21), 9855, Tables 3 to 5): the load "

@@ -1,7 +1,7 @@
-"""Hysteresis that changes with load: the loop's width depends on what hangs on the muscle.
+"""Load-dependent hysteresis: the width of the loop depends on the load.
 
-A load stretches the braid, changes its angle and the force between its strands, and with them the
-friction. In the plant the hysteretic part of the hysteresis is scaled in proportion to the load.
+A load stretches the braid, changes its angle and the force between its strands, and thus the
+friction. The plant scales the hysteretic part in proportion to the load.
 """
 
 from __future__ import annotations
@@ -13,13 +13,12 @@ CAUSE = Cause(
     title="hysteresis that changes with load",
     forms=(Form("linear", (Term("hysteresis.width_per_load", (-0.01, 0.02), scale=0.01),)),),
     signature=(
-        "the error has the sign of the direction, one way round at small loads and the other way "
-        "round at large ones"
+        "the error has the sign of the direction at small loads and the opposite one at large loads"
     ),
     neighbours=("load_dependent_compliance", "pressure_dependent_friction", "hysteresis_drive"),
     experiment=(
         "The same slow triangle under five loads: a changing width opens or closes the loop about "
-        "its middle line, a changing compliance moves the middle line. The second hides the first "
+        "its middle line, a changing compliance moves the middle line. The second masks the first "
         "until it is in the model."
     ),
     source=(

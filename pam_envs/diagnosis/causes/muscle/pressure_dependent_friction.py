@@ -1,8 +1,8 @@
-"""Friction that changes with pressure: the loop is wider at one end of the range than at the other.
+"""Pressure-dependent friction: the loop is wider at one end of the pressure range.
 
 The pressure presses the threads of the braid on one another, so that their friction grows with it,
-less what the load takes off. In the plant the hysteresis acts on a stretched scale of the
-pressure, on which friction is uniform: the loop's width changes along the range.
+less the effect of the load. In the plant the hysteresis acts on a stretched pressure scale with
+uniform friction, so that the width of the loop changes along the range.
 """
 
 from __future__ import annotations

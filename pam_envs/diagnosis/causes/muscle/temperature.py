@@ -1,8 +1,8 @@
-"""Temperature: a warm muscle pulls otherwise.
+"""Temperature: the force of the muscle depends on its temperature.
 
-Rubber's stiffness goes with the absolute temperature, its losses and the braid's friction fall as
-it warms, and cycling heats the muscle by itself. The effective pressure gains a fixed share with
-each kelvin away from 20 degrees Celsius.
+The stiffness of rubber is proportional to absolute temperature, its losses and the braid's friction
+decrease with it, and cycling heats the muscle. The effective pressure changes by a fixed share per
+kelvin away from 20 degrees Celsius.
 """
 
 from __future__ import annotations
@@ -13,17 +13,15 @@ CAUSE = Cause(
     name="temperature",
     title="the effect of temperature",
     forms=(Form("gain", (Term("muscle.temperature_gain", (0.002, -0.002), scale=0.001),)),),
-    signature=(
-        "the error of the contraction goes with temperature times pressure and is nothing at rest"
-    ),
+    signature=("the error of the contraction is proportional to temperature times pressure"),
     neighbours=("creep", "sensor_drift", "first_cycle_softening", "load_dependent_compliance"),
     experiment=(
-        "Repeat a staircase while the muscle is warmed, and again when it has cooled: only heat "
-        "comes back to the same curve; without warming, rest instead of cycling for as long."
+        "Repeat a staircase while the muscle is warmed, and again when it has cooled: only "
+        "heat returns to the same curve; without warming, rest as long instead of cycling."
     ),
     source=(
-        "Treloar, The Physics of Rubber Elasticity: a rubber's modulus goes with absolute "
-        "temperature; no figure for a pneumatic muscle was found, the size is assumed."
+        "Treloar, The Physics of Rubber Elasticity: the modulus of rubber is "
+        "proportional to absolute temperature; the size for a muscle is assumed."
     ),
     needs=("contraction", "temperature"),
     settled="no temperature was recorded",

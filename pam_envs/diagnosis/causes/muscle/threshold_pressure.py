@@ -1,8 +1,8 @@
-"""Threshold pressure: the first part of the pressure does nothing.
+"""Threshold pressure: the first part of the pressure has no effect.
 
-The bladder has to be blown up until it meets the braid before any pull passes on, and a slack or
-kinked muscle straightens first. In the plant pressures below the threshold are not felt, and the
-rest counts from there.
+The bladder must expand to the braid before it transmits force, and a slack or kinked muscle
+straightens first. In the plant pressures below the threshold have no effect, and the threshold is
+subtracted above it.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ CAUSE = Cause(
     ),
     neighbours=("sensor_bias", "wire_slack", "valve_dead_band"),
     experiment=(
-        "Slow ramps from rest, against the measured pressure and under several loads: slack moves "
-        "with the load, a valve's dead band is not there in the measured pressure, a threshold "
-        "stays."
+        "Slow ramps from rest, against the measured pressure and under several loads: slack "
+        "changes with the load, a dead band is absent in the measured pressure, a threshold is "
+        "constant."
     ),
     source=(
         "Public isometric pulse tests of 10 mm Festo muscles: about 50 kPa at full length; Martens "

@@ -1,8 +1,8 @@
-"""Viscous loss: a drag that grows with speed, less than in proportion.
+"""Viscous loss: a drag that grows less than in proportion to speed.
 
-Rubber under shear and grease between strands resist the more the faster they are sheared, along a
-power of the speed below one. In the plant a further damping falls off with speed from its value at
-rest, so that it holds back slow motion and leaves fast motion to the damping of the base.
+Rubber under shear and grease between strands resist motion with a power of the speed below one. The
+plant has a further damping that decreases with speed from its value at rest, so that it acts on
+slow motion and leaves fast motion to the damping of the base.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ CAUSE = Cause(
         ),
     ),
     signature=(
-        "the error of the contraction has the sign of the velocity, grows with speed and is gone "
-        "in a hold"
+        "the error of the contraction has the sign of the velocity, grows with speed and "
+        "vanishes in a hold"
     ),
     neighbours=("stick_slip", "hysteresis_drive", "sensor_delay", "creep", "resonance"),
     experiment=(
-        "One swing at 0.2, 0.5, 1 and 2 Hz, and ramps at two rates: what viscous loss adds to the "
+        "A sine at 0.2, 0.5, 1 and 2 Hz, and ramps at two rates: what viscous loss adds to the "
         "loop shrinks with the rate, what friction adds does not; in a hold only friction is left."
     ),
     source=(

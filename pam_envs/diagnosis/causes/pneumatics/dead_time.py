@@ -1,8 +1,8 @@
-"""Dead time: the regulator answers late.
+"""Dead time: the regulator responds late.
 
 The command passes a bus, a converter and a pilot stage before the valve moves, and sound needs time
-along the tube. Everything happens as it would, only later, in pressure and contraction alike. A lag
-rounds the corner of a step instead, so that the two can be told where the record is fast enough.
+along the tube. The whole response is delayed, in pressure and contraction alike. A lag rounds the
+corner of a step instead, so that the two are separable at a sufficient sampling rate.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ CAUSE = Cause(
         "resonance",
     ),
     experiment=(
-        "Steps of three sizes, up and down: dead time is the same for all of them, the time that a "
-        "limited rate takes grows with the size, a slow exhaust is late on the way down only. A "
-        "delayed position reading leaves the pressure alone."
+        "Steps of three sizes, up and down: dead time is the same for all of them, the time of a "
+        "limited rate grows with the size, a slow exhaust is late only downwards. A delayed "
+        "position reading does not affect the pressure."
     ),
     source=(
         "A public record of a DMSP-10-250 on a pressure regulator: 44 ms inflating, 96 ms "

@@ -1,8 +1,8 @@
-"""Exhausting unlike filling: the way down has a pace of its own.
+"""Exhaust asymmetry: the muscle exhausts at another rate than it fills.
 
 Filling is driven by the supply, exhausting by the muscle's own pressure, through another edge of
-the valve and a silencer. The lag may be another, or the flow be choked, so that the absolute
-pressure falls by at most a fixed share a second.
+the valve and a silencer. The lag may differ, or the flow may be choked, so that the absolute
+pressure falls by at most a fixed share per second.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ CAUSE = Cause(
         ),
     ),
     signature=(
-        "steps down are late or early in the pressure, steps up fit; with one lag for both, errors "
-        "of opposite signs"
+        "downward steps are late or early in the pressure, upward steps fit; with one lag for "
+        "both, errors of opposite signs"
     ),
     neighbours=("dead_time", "slew_limit", "supply_droop", "creep"),
     experiment=(
         "Steps of several sizes up and down between the same levels, against the measured "
-        "pressure: dead time and a limited rate act both ways, a drooping supply on the way up, "
-        "creep not in the pressure at all."
+        "pressure: dead time and a limited rate act in both directions, a drooping supply "
+        "upwards, creep not in the pressure."
     ),
     source=(
         "A public record of a DMSP-10-250 on a pressure regulator: lags of 50 ms up and 84 ms "

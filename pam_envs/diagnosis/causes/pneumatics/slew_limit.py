@@ -1,7 +1,7 @@
-"""Slew limit: the pressure cannot rise or fall faster than the valve lets air through.
+"""Slew limit: the flow of the valve limits the rate of the pressure.
 
-A full-open valve passes a limited flow, so that large steps run along a straight ramp before they
-round off. Small steps do not meet the limit and follow the lag alone.
+A fully open valve passes a limited flow, so that large steps follow a straight ramp before they
+round off. Small steps do not reach the limit and follow the lag alone.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ CAUSE = Cause(
     neighbours=("dead_time", "supply_droop", "exhaust_asymmetry"),
     experiment=(
         "Steps of three sizes, up and down: a limited rate delays by the size of the step and is "
-        "the same every time, a drooping supply is slower near the top and after a busy spell, a "
-        "slow exhaust acts on the way down only."
+        "the same every time, a drooping supply is slower near the top and after heavy use, a slow "
+        "exhaust acts only downwards."
     ),
     source=(
         "A public record of a DMSP-10-250 on a pressure regulator: 6.8 bar/s in a raw step, not an "

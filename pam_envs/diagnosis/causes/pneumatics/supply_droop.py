@@ -1,9 +1,9 @@
-"""Droop of the supply: the reservoir empties faster than it is filled.
+"""Supply droop: the reservoir empties faster than it is filled.
 
-A small reservoir or a long feed loses pressure as air is taken and recovers slowly. High commands
-are then missed or reached late, the more the busier the rig has been; below the supply's pressure
-nothing is felt. In the plant filling runs through a throat from a supply that falls with what is
-filled and comes back through an orifice.
+The pressure of a small reservoir or a long feed falls as air is used and recovers slowly. High
+commands are then missed or reached late, increasingly so after heavy use; below the supply pressure
+there is no effect. In the plant filling passes a throat from a supply that falls with the filled
+amount and recovers through an orifice.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ CAUSE = Cause(
         ),
     ),
     signature=(
-        "peaks of the pressure are clipped or late near the top, worse after a busy spell; "
-        "deflating fits"
+        "peaks of the pressure are clipped or late near the top, more so after heavy "
+        "use; deflation fits"
     ),
     neighbours=("slew_limit", "exhaust_asymmetry"),
     experiment=(
         "Fill to the top again and again, then once after a rest: a droop grows with the number of "
-        "fillings and is gone after the rest, a limited rate is the same every time and at every "
+        "fillings and vanishes after the rest, a limited rate is the same every time and at every "
         "level."
     ),
     source=(

@@ -1,10 +1,10 @@
-"""Dead band: the valve does not answer small errors.
+"""Dead band: the valve does not respond to small errors.
 
-Overlap of a spool, or the gap between the switching points of a comparator, leaves the pressure
-where it is until the error is large enough. Small commands vanish, and after each step the pressure
-stops short on the side it came from. A spool lets through what the error exceeds the overlap by,
-and leaks within it. A switching valve may go on, once open, until the error is smaller still: then
-the second number is the error at which it closes, over that at which it opens.
+Overlap of a spool, or the gap between the switching points of a comparator, keeps the pressure
+constant until the error is large enough. Small commands have no effect, and after each step the
+pressure stops short on the side that it came from. A spool passes the part of the error above the
+overlap, and leaks within it. A switching valve may stay open until the error is smaller: the second
+parameter is the error at which it closes over that at which it opens.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ CAUSE = Cause(
     ),
     signature=(
         "the settled pressure misses the command by the same amount, with the sign of the last "
-        "step; commands smaller than that do nothing"
+        "step; smaller commands have no effect"
     ),
     neighbours=("leak", "dead_time", "stick_slip", "threshold_pressure"),
     experiment=(
-        "Swing the command at 1 Hz with ever smaller amplitudes and approach one level from both "
+        "Sines of the command at 1 Hz with decreasing amplitudes and approach one level from both "
         "sides: the dead band shows in the measured pressure, stick-slip and a threshold only in "
         "the contraction, dead time at any amplitude alike."
     ),

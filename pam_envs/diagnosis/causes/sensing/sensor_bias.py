@@ -1,9 +1,8 @@
-"""Bias: a reading is off by a constant.
+"""Sensor bias: a reading is off by a constant.
 
-The zero of an amplifier, or a muscle that had not come to rest when the sensor was zeroed, shifts
-every reading by the same amount, at all pressures and loads. An amplifier that was just switched on
-needs some seconds to get there. The bias acts on the reading alone, so that nothing else in the rig
-feels it.
+The zero of an amplifier, or a muscle that was not at rest when the sensor was zeroed, shifts every
+reading by the same amount at all pressures and loads. An amplifier that was just switched on needs
+some seconds to reach its bias. Only the reading is affected.
 """
 
 from __future__ import annotations
@@ -46,8 +45,8 @@ CAUSE = Cause(
         "pressure_dependent_friction",
     ),
     experiment=(
-        "Rest without pressure at the start and at the end: a bias is there both times and equal, "
-        "a drift and a slip only later, a threshold and a bowed sensor only under pressure."
+        "Rest without pressure at the start and at the end: a bias is equal both times, a drift "
+        "and a slip appear later, a threshold and a nonlinear sensor only under pressure."
     ),
     source=(
         "A public record of a DMSP-10-250 on a pressure regulator: the pressure reads 0.3 bar off "

@@ -1,7 +1,7 @@
-"""Delay of the reading: the position is shown late.
+"""Sensor delay: the position reading is late.
 
-Filters of an amplifier, averaging over samples and a bus make the reading late, not the motion. The
-pressure reading shows when things really happened.
+Filters of an amplifier, averaging over samples and a bus delay the reading, not the motion. The
+pressure reading shows the true time.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ CAUSE = Cause(
     ),
     neighbours=("dead_time", "viscous_loss"),
     experiment=(
-        "One swing at 0.2, 0.5, 1 and 2 Hz: a delay shifts all of them by the same time without "
-        "taking from the swing, a loss takes from it and shifts the slow ones more; dead time is "
-        "in the pressure as well."
+        "A sine at 0.2, 0.5, 1 and 2 Hz: a delay shifts all by the same time without "
+        "attenuation, a loss attenuates them and shifts the slow ones more; dead time is also in "
+        "the pressure."
     ),
     source=(
         "An open wrist-robot project: readings 15 to 25 ms behind a simulation driven by the "

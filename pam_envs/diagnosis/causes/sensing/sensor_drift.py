@@ -1,8 +1,8 @@
-"""Drift: a reading walks away.
+"""Sensor drift: a reading changes slowly with time.
 
-Electronics warm up, a clamp or a coating settles, a bridge amplifier follows the room. The error
-has nothing to do with what the muscle does, only with time: it settles along an exponential, or
-happens between two moments and then stays.
+Electronics warm up, a clamp or a coating settles, a bridge amplifier follows the room temperature.
+The error depends on time alone, not on the muscle: it settles exponentially, or changes between two
+moments and then is constant.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ CAUSE = Cause(
         "first_cycle_softening",
     ),
     experiment=(
-        "Return to rest without pressure at the end: a drift has moved the zero, heat and "
-        "softening leave it; after a rest creep and softening begin anew, a drift goes on."
+        "Return to rest without pressure at the end: a drift has moved the zero, heat "
+        "and softening have not; after a rest creep and softening restart, a drift continues."
     ),
     source=(
         "Assumed; the published readings of a MAS-10-N-100 (Applied Sciences 2021, 11(21), 9855, "

@@ -1,8 +1,8 @@
-"""Nonlinear sensor: the reading bows between its ends.
+"""Sensor nonlinearity: the reading deviates between the ends of its range.
 
-Potentiometers, strings on drums and bridges follow their calibration line at the ends and leave it
-in between. The reading is a parabola that is right at zero and at full scale. It cannot be told
-from a static law that bends the same way, unless that law acts at several loads.
+Potentiometers, draw-wire sensors and bridges follow their calibration line at the ends and deviate
+between them. The error is a parabola that vanishes at zero and at full scale. It is not separable
+from a static law of the same bend, unless that law acts at several loads.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ CAUSE = Cause(
         Form("pressure", (Term("pressure.bow", (0.01, -0.01), scale=0.01),)),
     ),
     signature=(
-        "a smooth function of the reading alone, whatever load, direction, rate or time; for the "
-        "pressure, settled readings that miss the command by a bow"
+        "a smooth function of the reading alone, independent of load, direction, rate and time; "
+        "for the pressure, a curved error of settled readings"
     ),
     neighbours=("sensor_bias", "sensor_drift"),
     experiment=(
-        "Measure the same staircase against a second sensor or gauge blocks: only that tells a "
-        "bowed position reading from the muscle's own curve. A bowed pressure reading shows "
-        "against the command."
+        "Measure the same staircase against a second sensor or gauge blocks: only this "
+        "separates a nonlinear position reading from the muscle's own curve. A nonlinear pressure "
+        "reading is visible against the command."
     ),
     source=(
         "Data sheets of proportional regulators with sensors of their own: linearity within 1 % of "

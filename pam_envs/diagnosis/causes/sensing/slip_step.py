@@ -1,7 +1,7 @@
-"""Slip: a clamp gave way once.
+"""Slip: a clamp slips once.
 
 A sleeve, a knot or a sensor's clamp moves under load by a fraction of a millimetre and holds again.
-From then on the position reads off by a constant; before, nothing is wrong.
+From then on the position reading is off by a constant; before, it is correct.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ CAUSE = Cause(
         ),
     ),
     signature=(
-        "one step of the contraction within a second, which the pressure does not show; a constant "
-        "error after it"
+        "one step of the contraction within a second, absent in the pressure; a constant error "
+        "after it"
     ),
     neighbours=("sensor_bias", "sensor_drift", "creep"),
     experiment=(
-        "Look at the zero before and after, and repeat the segment in which it happened: a step "
-        "that has happened stays and does not come back, a drift goes on."
+        "Compare the zero before and after, and repeat the segment of the step: a step stays and "
+        "does not recur, a drift continues."
     ),
-    source="Assumed: what clamps and sleeves of rigs do; no figure was found.",
+    source="Assumed: usual behaviour of clamps and sleeves; no published value.",
     needs=("contraction",),
     once=True,
     sensor="a second position sensor on the other side of the clamp",
