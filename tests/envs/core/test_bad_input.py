@@ -1,4 +1,4 @@
-"""Bad input: a clear error, and an environment that goes on as if nothing had been said."""
+"""Bad input raises a clear error and leaves the environment unchanged."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def test_bad_batches_change_nothing(name: str) -> None:
         ({"plant": 7}, "plant = '7' must be a "),
     ],
 )
-def test_bad_arguments_that_all_take(name: str, arguments: dict[str, Any], said: str) -> None:
+def test_bad_common_arguments(name: str, arguments: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         gym.make(name, **arguments)
 
@@ -181,7 +181,7 @@ def test_bad_arguments_of_muscle_positioning(arguments: dict[str, Any], said: st
 
 
 @EVERY
-def test_an_unknown_argument_names_the_known_ones(name: str) -> None:
+def test_unknown_argument_lists_the_known_ones(name: str) -> None:
     said = "no argument 'previev', but 'preview'; the arguments are .*episode_seconds"
     with pytest.raises(TypeError, match=said):
         gym.make(name, previev=3)
@@ -189,7 +189,7 @@ def test_an_unknown_argument_names_the_known_ones(name: str) -> None:
         gym.make_vec(name, 2, vectorization_mode="vector_entry_point", previev=3)
 
 
-def test_a_plant_with_another_hysteresis_is_refused() -> None:
+def test_plant_with_another_hysteresis_is_refused() -> None:
     plant = SingleMuscle.mas10("preisach")
     with pytest.raises(ValueError, match="the plant's hysteresis is 'preisach'"):
         gym.make("PAM/MusclePositioning-v0", plant=plant, hysteresis="maxwell_slip")
@@ -255,7 +255,7 @@ def test_bad_plant_files(tmp_path: Path, text: str, said: str) -> None:
     assert re.search("rig.yaml", str(error.value))
 
 
-def test_what_cannot_be_simulated_names_the_remedy() -> None:
+def test_unstable_parameters_name_the_remedy() -> None:
     with pytest.raises(UnstableParameters, match=r"use at least \d sub-steps") as error:
         SingleMuscle.mas10(mass__moving_mass=0.06)
     enough = int(re.findall(r"at least (\d+) sub-steps", str(error.value))[0])

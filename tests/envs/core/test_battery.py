@@ -1,4 +1,4 @@
-"""What must hold of every registered environment."""
+"""Properties of every registered environment."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EVERY_CASE = pytest.mark.parametrize(("name", "variant"), CASES)
 
 
 @EVERY
-def test_gymnasium_and_sb3_checkers_have_nothing_to_say(name: str) -> None:
+def test_gymnasium_and_sb3_checkers_accept_it(name: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(gym.make(name).unwrapped, skip_render_check=True)
@@ -39,7 +39,7 @@ def test_same_seed_same_bits_and_other_seed_other_bits(name: str, variant: str) 
 
 
 @EVERY
-def test_the_reset_without_a_seed_goes_on_to_another_episode(name: str) -> None:
+def test_reset_without_seed_starts_the_next_episode(name: str) -> None:
     env, other = gym.make(name), gym.make(name)
     env.reset(seed=1)
     other.reset(seed=1)
@@ -63,7 +63,7 @@ def test_global_random_numbers_are_neither_used_nor_disturbed(name: str) -> None
 
 
 @EVERY_CASE
-def test_observations_lie_in_their_space_and_every_entry_moves(name: str, variant: str) -> None:
+def test_observations_are_in_their_space_and_every_signal_varies(name: str, variant: str) -> None:
     env = gym.make(name, **{**LIVELY.get(name, {}), **VARIANTS[name][variant]})
     seen = []
     for seed in range(4):
@@ -107,7 +107,7 @@ def test_info_has_the_documented_schema(name: str) -> None:
 
 
 @EVERY
-def test_signals_decode_what_the_sensors_gave(name: str) -> None:
+def test_signals_decode_the_readings(name: str) -> None:
     env, raw = gym.make(name), gym.make(name, normalize=False)
     scaled, info = env.reset(seed=4)
     plain, _ = raw.reset(seed=4)
@@ -124,7 +124,7 @@ def test_signals_decode_what_the_sensors_gave(name: str) -> None:
 
 
 @EVERY_CASE
-def test_a_saved_state_loses_no_bit(name: str, variant: str) -> None:
+def test_restored_state_continues_with_equal_bits(name: str, variant: str) -> None:
     env = gym.make(name, episode_seconds=1.0, **VARIANTS[name][variant]).unwrapped
     drive = actions_for(env.action_space, 240, 1)
 
@@ -152,7 +152,7 @@ def test_a_saved_state_loses_no_bit(name: str, variant: str) -> None:
 
 
 @EVERY
-def test_a_state_of_other_arguments_is_refused(name: str) -> None:
+def test_state_of_other_arguments_is_refused(name: str) -> None:
     env, other = gym.make(name, preview=0).unwrapped, gym.make(name, preview=9).unwrapped
     env.reset(seed=0)
     other.reset(seed=0)
@@ -174,7 +174,7 @@ def test_a_state_of_other_arguments_is_refused(name: str) -> None:
 
 
 @EVERY
-def test_the_spec_survives_json(name: str) -> None:
+def test_spec_survives_json(name: str) -> None:
     env = gym.make(name, preview=2)
     again = gym.make(gym.spec(name))
     assert again.spec is not None
@@ -183,14 +183,14 @@ def test_the_spec_survives_json(name: str) -> None:
 
 
 @EVERY
-def test_stepping_before_the_reset_says_so(name: str) -> None:
+def test_step_before_reset_raises(name: str) -> None:
     env = gym.make(name)
     with pytest.raises(gym.error.ResetNeeded, match="reset"):
         env.step(env.action_space.sample())
 
 
 @EVERY
-def test_the_episode_ends_by_its_clock(name: str) -> None:
+def test_episode_is_truncated_after_its_duration(name: str) -> None:
     env = gym.make(name, episode_seconds=0.5)
     env.reset(seed=0)
     flags = [env.step(a)[2:4] for a in np.zeros((50, *env.action_space.shape), np.float32)]

@@ -1,4 +1,4 @@
-"""One environment, rows of any batch, compiled and uncompiled: the same bits."""
+"""Equal bits of one environment, rows of any batch, compiled and uncompiled."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_rows_of_a_batch_are_single_environments(name: str, variant: str, number
 
 @pytest.mark.parametrize("name", TILED)
 @pytest.mark.skipif(not COMPILED, reason="compares with the compiled kernels")
-def test_both_cores_give_the_bits_of_one(name: str) -> None:
+def test_two_cores_give_the_bits_of_one(name: str) -> None:
     number = 4096
     one = batch(name, number, threads=1, episode_seconds=0.2)
     two = batch(name, number, episode_seconds=0.2)
@@ -75,7 +75,7 @@ def test_both_cores_give_the_bits_of_one(name: str) -> None:
 
 
 @EVERY
-def test_a_saved_batch_loses_no_bit(name: str) -> None:
+def test_restored_batch_continues_with_equal_bits(name: str) -> None:
     number, seconds, at = (40, 0.2, 25) if COMPILED else (6, 0.05, 6)
     envs = batch(name, number, episode_seconds=seconds)
     drive = actions_for(envs.action_space, 60 if COMPILED else 14, 5)
@@ -93,7 +93,7 @@ def test_a_saved_batch_loses_no_bit(name: str) -> None:
 
 
 @EVERY
-def test_a_masked_reset_leaves_the_other_rows_alone(name: str) -> None:
+def test_masked_reset_changes_no_other_row(name: str) -> None:
     envs, kept = batch(name, 5), batch(name, 5)
     envs.reset(seed=9)
     kept.reset(seed=9)

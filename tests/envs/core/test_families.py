@@ -190,7 +190,7 @@ def test_channels_have_previews_of_their_own() -> None:
         assert np.allclose(observation[CARTS + 5 :], 0.02 * steps, atol=1e-6)
 
 
-def test_a_wrong_number_of_actions_names_them() -> None:
+def test_wrong_number_of_actions_lists_their_names() -> None:
     env = PlantEnv(setup())
     env.reset(seed=0)
     for wrong in (np.zeros(2), np.zeros(4), np.zeros((3, 1)), np.float32(0.0)):
@@ -223,7 +223,7 @@ def test_rows_of_a_batch_are_single_environments_through_ends_and_restarts() -> 
     assert ends >= 3 * len(singles)
 
 
-def test_a_limit_ends_the_episode() -> None:
+def test_limit_ends_the_episode() -> None:
     env = PlantEnv(setup(seconds=60.0))
     env.reset(seed=0)
     steps = 0
@@ -236,7 +236,7 @@ def test_a_limit_ends_the_episode() -> None:
     assert steps < 200
 
 
-def test_copies_go_on_alike() -> None:
+def test_copies_continue_with_equal_bits() -> None:
     env = PlantEnv(setup())
     env.reset(seed=4)
     for _ in range(60):

@@ -1,4 +1,4 @@
-"""The lazily filled info is a dict in every way that somebody may use."""
+"""The lazily filled info behaves like a dict."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_two_untouched_infos_compare() -> None:
     assert isinstance(fresh(), dict)
 
 
-def test_wrappers_that_write_into_the_info() -> None:
+def test_wrappers_can_write_into_info() -> None:
     env = gym.wrappers.RecordEpisodeStatistics(
         gym.make("PAM/MusclePositioning-v0", episode_seconds=0.1)
     )

@@ -40,7 +40,7 @@ def driven(env: Any, action: Any, steps: int, seed: int = 0) -> dict[str, np.nda
     return record | {"seen": np.array(seen)}
 
 
-def test_the_program_knows_the_nominal_bundles() -> None:
+def test_estimate_equals_the_law_of_the_nominal_bundles() -> None:
     random = np.random.default_rng(1)
     for angle, a, b in random.uniform((0.0, 0.0, 0.0), (2.09, 6e5, 6e5), (50, 3)).tolist():
         torque, stiffness = estimate(MODEL, angle, a, b)
@@ -49,14 +49,14 @@ def test_the_program_knows_the_nominal_bundles() -> None:
         assert pressures_for(MODEL, angle, torque, stiffness) == pytest.approx((a, b), abs=1e-3)
 
 
-def test_other_bundles_are_known_as_well() -> None:
+def test_estimate_uses_the_bundles_of_the_plant() -> None:
     plant = ElbowOrthosis.paper(bundle_a__muscles=5.0, pulley__highest=1.8)
     torque, stiffness = estimate(model_row(plant).tolist(), 0.9, 1e5, 2e5)
     assert torque == pytest.approx(float(plant.torque(0.9, 1e5, 2e5)), abs=1e-9)
     assert stiffness == pytest.approx(float(plant.stiffness(0.9, 1e5, 2e5)), abs=1e-9)
 
 
-def test_what_can_be_had_is_the_parallelogram_of_the_corners() -> None:
+def test_reachable_values_are_the_parallelogram_of_the_corners() -> None:
     for angle in np.linspace(0.0, 2.09, 8).tolist():
         torques, stiffnesses = PLANT.corners(angle)
         assert within_reach(MODEL, angle, 99.0, 5.0)[0] == pytest.approx(torques.max())
@@ -68,7 +68,7 @@ def test_what_can_be_had_is_the_parallelogram_of_the_corners() -> None:
 
 
 @pytest.mark.parametrize("bear", [True, False])
-def test_a_weight_is_asked_for_at_the_hand(bear: bool) -> None:
+def test_weight_reference_is_its_torque_at_the_hand(bear: bool) -> None:
     env = made(reference="weight", weight=0.8, bear=bear)
     info = driven(env, [0.0, -0.5], 250)
     assert np.ptp(info["state/angle"]) > 0.1
@@ -79,7 +79,7 @@ def test_a_weight_is_asked_for_at_the_hand(bear: bool) -> None:
     assert np.allclose(asked, pulled + borne, atol=1e-9)
 
 
-def test_a_wall_is_a_spring_beyond_its_place_and_nothing_before() -> None:
+def test_wall_reference_is_a_spring_beyond_its_angle() -> None:
     env = made(reference="wall", bear=False, motion="sines", pace=1.0)
     info = driven(env, [-0.3, -0.5], 900)
     torque, angle = info["state/object_torque"], info["state/angle"]
@@ -95,7 +95,7 @@ def test_a_wall_is_a_spring_beyond_its_place_and_nothing_before() -> None:
     assert np.ptp(asked[~inside]) < 1e-12
 
 
-def test_more_than_there_is_is_clipped_torque_first_and_said() -> None:
+def test_unreachable_references_are_clipped_torque_first_and_reported() -> None:
     samples = [[40.0, 14.0]] * 20 + [[-30.0, 1.0]] * 20
     env = made(reference=samples, motion="still")
     info = driven(env, [0.0, 0.0], 39)
@@ -110,7 +110,7 @@ def test_more_than_there_is_is_clipped_torque_first_and_said() -> None:
     assert (info["saturated"] == 0.0).all()  # nobody was told to do it
 
 
-def test_signals_reach_as_far_as_the_bundles_do() -> None:
+def test_signal_ranges_cover_the_bundles() -> None:
     assert signal_ranges(PLANT) == (30.0, 15.0)
     assert signal_ranges(ElbowOrthosis.paper(bundle_a__muscles=1.0)) == (30.0, 15.0)
     strong = ElbowOrthosis.paper("none", bundle_a__muscles=12.0, bundle_b__muscles=20.0)
@@ -125,7 +125,7 @@ def test_signals_reach_as_far_as_the_bundles_do() -> None:
     assert by_torque["stiffness_set_point"].high == signal_ranges(strong)[1]
 
 
-def test_an_episode_starts_at_no_more_than_the_drawn_supply() -> None:
+def test_start_pressures_do_not_exceed_the_drawn_supply() -> None:
     env = made(valves="on_off", randomize={"valve.supply_pressure": (2e5, 2.1e5)}, start="random",
                reference=[[20.0, 10.0]])  # fmt: skip
     found = [env.reset(seed=s)[1] for s in range(12)]
@@ -134,7 +134,7 @@ def test_an_episode_starts_at_no_more_than_the_drawn_supply() -> None:
     assert max(most) > 1.9e5
 
 
-def test_error_of_torque_and_stiffness_weigh_as_in_the_headline() -> None:
+def test_reward_weighs_torque_and_stiffness_as_the_headline() -> None:
     task = TorqueStiffness()
     torque = task.torque_weight / task.torque_scale
     assert task.stiffness_weight / task.stiffness_scale == pytest.approx(NEAR * torque)
@@ -154,7 +154,7 @@ def test_torque_and_stiffness_as_actions() -> None:
     assert max(info["state/command_a"], info["state/command_b"]) == pytest.approx(full)
 
 
-def test_the_references_observed_are_those_at_the_angle_as_sensed() -> None:
+def test_observed_references_are_those_at_the_sensed_angle() -> None:
     env = made(reference="weight", weight=1.0, bear=False)
     info = driven(env, [0.0, -0.5], 100)
     seen = env.signals.decode(info["seen"], "reference")
@@ -166,7 +166,7 @@ def test_the_references_observed_are_those_at_the_angle_as_sensed() -> None:
     assert not np.allclose(seen, info["reference"], atol=1e-5)
 
 
-def test_previews_are_along_the_intended_motion() -> None:
+def test_previews_follow_the_intended_motion() -> None:
     env = made(reference="weight", weight=1.0, bear=False, preview=2, preview_stride=5)
     info = driven(env, [0.0, -0.5], 120)
     ahead = env.signals.decode(info["seen"], "reference_2")[:-10]
@@ -176,7 +176,7 @@ def test_previews_are_along_the_intended_motion() -> None:
     assert np.allclose(ahead, np.maximum(wanted, lowest), atol=1e-5)
 
 
-def test_pulses_are_taken_once_in_a_cycle() -> None:
+def test_one_pulse_is_taken_per_cycle() -> None:
     def pressures(actions: list[list[float]]) -> list[float]:
         env = made(valves="on_off", motion="still")
         observation, _ = env.reset(seed=0)
@@ -196,7 +196,7 @@ def test_pulses_are_taken_once_in_a_cycle() -> None:
     assert pressures([rest, pulse, pulse, *[rest] * 7]) == never
 
 
-def test_pulses_are_shown_and_paid_for_until_the_next_ones() -> None:
+def test_pulses_are_observed_and_penalised_until_the_next_ones() -> None:
     env = made(valves="on_off", motion="still")
     env.reset(seed=0)
     seen, paid = [], []
@@ -232,7 +232,7 @@ def rewards(policy: Any, seed: int) -> tuple[np.ndarray, dict[str, Any]]:
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_to_break_a_stop_never_pays(seed: int) -> None:
+def test_ending_an_episode_at_a_stop_never_pays(seed: int) -> None:
     crash, info = rewards([-1.0, 1.0], seed)
     assert info["terminated"]
     assert len(crash) < 100
@@ -246,7 +246,7 @@ def test_to_break_a_stop_never_pays(seed: int) -> None:
     assert per_period > -2.0 * min(held.min(), crash[:-1].min())  # no period costs as much
 
 
-def test_no_period_costs_as_much_as_one_that_is_left() -> None:
+def test_no_period_costs_as_much_as_a_remaining_one() -> None:
     torque, stiffness = largest_errors(PLANT)
     env = made(randomize=True, motion="sines", span=(0.1, 2.0), pace=1.0, start="random")
     worst = TorqueStiffness().worst(torque, stiffness)
@@ -290,6 +290,6 @@ def test_no_period_costs_as_much_as_one_that_is_left() -> None:
         ),
     ],
 )
-def test_wrong_arguments_are_named(arguments: dict[str, Any], message: str) -> None:
+def test_bad_arguments_are_named(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         made(**arguments)

@@ -36,7 +36,7 @@ def run(env: Any, action: list[float], seconds: float) -> dict[str, np.ndarray]:
     return {k: np.array([i[k] for i in infos]) for k in infos[0]}
 
 
-def test_a_set_point_is_the_angle_at_rest_without_hysteresis_weight_and_load() -> None:
+def test_angle_at_rest_equals_set_point_without_hysteresis_and_weight() -> None:
     for angle in (-0.45, -0.1, 0.3):
         info = run(make(plant=IDEAL), [angle], 2.0)
         assert info["output"][-1] == pytest.approx(angle, abs=1e-4)
@@ -46,7 +46,7 @@ def test_a_set_point_is_the_angle_at_rest_without_hysteresis_weight_and_load() -
         )
 
 
-def test_hysteresis_makes_the_angle_depend_on_the_way() -> None:
+def test_hysteresis_makes_the_angle_depend_on_its_history() -> None:
     env = make()
     env.reset(seed=0)
     rests = []
@@ -59,7 +59,7 @@ def test_hysteresis_makes_the_angle_depend_on_the_way() -> None:
     assert rests[3] == pytest.approx(-rests[1], abs=2e-3)  # the joint's loop is symmetric
 
 
-def test_stiffness_is_an_action() -> None:
+def test_prestress_as_action_changes_the_stiffness() -> None:
     stiff = {}
     for prestress in (20.0, 120.0):
         info = run(make(plant=IDEAL, action="angle_stiffness"), [0.1, prestress], 2.0)
@@ -70,7 +70,7 @@ def test_stiffness_is_an_action() -> None:
     assert stiff[20.0] / stiff[120.0] > 1.2  # the lever buckles under co-contraction
 
 
-def test_pressures_are_actions() -> None:
+def test_pressures_as_actions() -> None:
     info = run(make(plant=IDEAL, action="pressures"), [4e5, 2e5], 2.0)
     assert info["state/pressure_a"][-1] == pytest.approx(4e5, rel=1e-6)
     assert info["state/pressure_b"][-1] == pytest.approx(2e5, rel=1e-6)
@@ -79,12 +79,12 @@ def test_pressures_are_actions() -> None:
     assert float(IDEAL.torque(angle, 4e5, 2e5)) == pytest.approx(0.0, abs=1e-3)
 
 
-def test_the_reduced_plant_has_no_pressures_to_set() -> None:
+def test_reduced_plant_refuses_pressures_as_actions() -> None:
     with pytest.raises(ValueError, match="needs the muscles"):
         make(plant=AntagonisticJoint.reduced(), action="pressures")
 
 
-def test_the_measured_plant_reaches_less() -> None:
+def test_measured_plant_has_a_smaller_range() -> None:
     paper, measured = make(), make(plant=AntagonisticJoint.measured())
     spans = [env.action_signals["angle_set_point"].high for env in (paper, measured)]
     assert spans[0] == pytest.approx(math.radians(30.0))
@@ -93,7 +93,7 @@ def test_the_measured_plant_reaches_less() -> None:
         make(plant=AntagonisticJoint.measured(), reference=[0.5])
 
 
-def test_a_prestress_that_takes_too_much_pressure_gives_way_to_the_angle() -> None:
+def test_prestress_is_reduced_where_pressure_is_not_sufficient() -> None:
     info = run(make(plant=IDEAL, action="angle_stiffness"), [0.49, 120.0], 2.0)
     assert info["output"][-1] == pytest.approx(0.49, abs=2e-3)
     assert info["saturated"][-1] == 0.0
@@ -101,7 +101,7 @@ def test_a_prestress_that_takes_too_much_pressure_gives_way_to_the_angle() -> No
     assert mean < 80.0
 
 
-def test_a_set_point_out_of_reach_is_reported() -> None:
+def test_unreachable_set_point_is_reported() -> None:
     far = make(plant=AntagonisticJoint.paper(link__limit=0.58))
     held, short = run(far, [0.4], 0.1), run(far, [0.575], 0.1)
     assert not held["saturated"].any()
@@ -109,7 +109,7 @@ def test_a_set_point_out_of_reach_is_reported() -> None:
     assert not short["saturated"][0]
 
 
-def test_pulses_push_the_joint_once_in_five_seconds() -> None:
+def test_one_disturbance_pulse_in_five_seconds() -> None:
     env = make(plant=IDEAL, disturbance=1.0)
     info = run(env, [0.0], 20.0)
     pushed = info["state/disturbance"][1:].reshape(4, 500)
@@ -124,7 +124,7 @@ def test_pulses_push_the_joint_once_in_five_seconds() -> None:
         assert info["output"][last] == pytest.approx(torque / stiffness, rel=0.05)
 
 
-def test_a_payload_is_told_and_its_change_is_not() -> None:
+def test_payload_is_observed_and_its_change_is_not() -> None:
     env = make(payload=0.5, payload_change=0.25, episode_seconds=4.0)
     observation, first = env.reset(seed=3)
     told, true = [float(env.signals.decode(observation, "payload"))], [first["state/payload"]]
@@ -142,7 +142,7 @@ def test_a_payload_is_told_and_its_change_is_not() -> None:
 
 
 @pytest.mark.parametrize(("payload", "ends"), [(0.0, {0.25}), (0.1, {0.35}), (0.5, {0.25, 0.75})])
-def test_less_than_the_change_can_only_become_more(payload: float, ends: set[float]) -> None:
+def test_payload_smaller_than_its_change_only_increases(payload: float, ends: set[float]) -> None:
     env = make(payload=payload, payload_change=0.25, episode_seconds=1.0)
     found = set()
     for seed in range(12):
@@ -153,12 +153,12 @@ def test_less_than_the_change_can_only_become_more(payload: float, ends: set[flo
     assert found == ends
 
 
-def test_a_payload_hangs_down() -> None:
+def test_payload_reduces_the_angle() -> None:
     bare, loaded = (run(make(payload=p), [0.3], 2.0)["output"][-1] for p in (0.0, 1.0))
     assert 0.0 < loaded < bare - 0.01
 
 
-def test_the_mechanical_stop_ends_the_episode() -> None:
+def test_mechanical_stop_ends_the_episode() -> None:
     env = make(disturbance=80.0)
     env.reset(seed=0)
     for _ in range(600):
@@ -170,7 +170,7 @@ def test_the_mechanical_stop_ends_the_episode() -> None:
     assert ended
 
 
-def test_angles_that_the_weight_does_not_allow_are_refused_when_it_is_made() -> None:
+def test_angles_beyond_the_capacity_are_refused_at_construction() -> None:
     with pytest.raises(UnbearableLoad, match=r"needs 0.184 N m at -30.0 degrees .* exert 0 N m"):
         make(reference="sine", amplitude=math.radians(30.0))
     make(reference="sine", amplitude=math.radians(29.0))
@@ -179,7 +179,7 @@ def test_angles_that_the_weight_does_not_allow_are_refused_when_it_is_made() -> 
     make(reference=[math.radians(28.0)], payload=0.5)
 
 
-def test_references_that_are_the_joints_own() -> None:
+def test_sine_and_step_references() -> None:
     sine = run(make(reference="sine", amplitude=0.2, frequency=0.5), [0.0], 2.0)
     wanted = 0.2 * np.sin(np.pi * sine["time"])
     assert np.allclose(sine["reference"], wanted, atol=1e-12)
@@ -188,7 +188,7 @@ def test_references_that_are_the_joints_own() -> None:
     assert run(make(reference="steps"), [0.0], 6.0)["reference"].max() <= math.radians(20.0)
 
 
-def test_the_scored_error_is_of_the_true_angle() -> None:
+def test_output_is_the_true_angle() -> None:
     info = run(make(reference="sine"), [0.1], 3.0)
     assert np.array_equal(info["output"], info["state/angle"])
     assert not np.array_equal(info["output"], info["sensor/angle"])
@@ -197,7 +197,7 @@ def test_the_scored_error_is_of_the_true_angle() -> None:
     assert np.std(info["sensor/angle"] - info["output"]) < 2e-3
 
 
-def test_set_points_stand_for_the_command() -> None:
+def test_command_gives_the_set_points_of_pressure() -> None:
     info = run(make(), [0.2], 0.5)
     a, b, short = AntagonisticJoint.paper().pressures_for(np.float32(0.2))
     assert not short

@@ -1,4 +1,4 @@
-"""An episode that a limit ends is worth less than any that goes on."""
+"""Ending an episode at a limit has a lower return than continuing it."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def worth(given: np.ndarray, discount: float) -> float:
 
 @EVERY
 @pytest.mark.parametrize("discount", [1.0, 0.97])
-def test_a_crash_is_worse_than_doing_nothing_and_control_is_better(
+def test_return_of_a_crash_is_below_that_of_no_action_and_of_control(
     name: str, discount: float
 ) -> None:
     env, plant = make(name), CASES[name][0]
@@ -74,7 +74,7 @@ def test_a_crash_is_worse_than_doing_nothing_and_control_is_better(
 
 
 @EVERY
-def test_the_end_costs_the_worst_period_for_each_that_is_left(name: str) -> None:
+def test_end_at_a_limit_costs_the_worst_reward_of_each_remaining_period(name: str) -> None:
     env = make(name)
     _, infos = rewards(env, None)
     *before, last = infos
@@ -93,7 +93,7 @@ def test_the_end_costs_the_worst_period_for_each_that_is_left(name: str) -> None
 
 
 @EVERY
-def test_the_clock_costs_nothing(name: str) -> None:
+def test_truncation_costs_nothing(name: str) -> None:
     _, infos = rewards(make(name), 0.0)
     assert len(infos) == PERIODS
     assert infos[-1]["reward/ended"] == 0.0

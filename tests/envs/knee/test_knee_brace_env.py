@@ -1,4 +1,4 @@
-"""The brace alone: what is tracked, where it starts, what it reaches."""
+"""Brace alone: tracked quantity, start, range of references."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def series(name: str, seconds: float, pressure: float, **arguments: Any) -> dict
     ("name", "low", "high"),
     [("PAM/KneeTension-v0", 80.0, 205.0), ("PAM/KneeStiffness-v0", 100.0, 7100.0)],
 )
-def test_the_papers_reference_is_a_sine_of_a_tenth_hertz_from_its_lowest_value(
+def test_default_reference_is_a_sine_of_a_tenth_hertz_from_its_lowest_value(
     name: str, low: float, high: float
 ) -> None:
     info = series(name, 10.0, 1e5)
@@ -34,7 +34,7 @@ def test_the_papers_reference_is_a_sine_of_a_tenth_hertz_from_its_lowest_value(
     assert np.allclose(info["reference"], wanted, rtol=1e-9)
 
 
-def test_the_papers_run_begins_at_about_55_newtons() -> None:
+def test_paper_start_has_a_tension_of_55_newtons() -> None:
     info = series("PAM/KneeTension-v0", 0.0, 0.5e5, start="paper")
     assert info["output"][0] == pytest.approx(55.0, abs=2.0)
     assert info["reference"][0] == pytest.approx(80.0)
@@ -49,7 +49,7 @@ def test_every_reference_is_within_reach_of_the_capacity() -> None:
             assert info["output"][-1] > info["reference"].max()
 
 
-def test_what_is_tracked_is_tension_or_stiffness() -> None:
+def test_output_is_tension_or_stiffness() -> None:
     for name, key in (("PAM/KneeTension-v0", "tension"), ("PAM/KneeStiffness-v0", "stiffness")):
         info = series(name, 1.0, 2e5)
         assert np.array_equal(info["output"], info[f"state/{key}"])
@@ -57,7 +57,7 @@ def test_what_is_tracked_is_tension_or_stiffness() -> None:
         assert np.allclose(info["state/tension"], info["state/stiffness"] * stretch)
 
 
-def test_the_sensed_stiffness_is_of_the_sensed_tension_and_angle() -> None:
+def test_sensed_stiffness_follows_from_sensed_tension_and_angle() -> None:
     info = series("PAM/KneeTension-v0", 1.0, 2e5)
     plant = KneeOrthosis.no_load()
     wanted = plant.stiffness_for(info["sensor/tension"], info["sensor/angle"])
@@ -65,6 +65,6 @@ def test_the_sensed_stiffness_is_of_the_sensed_tension_and_angle() -> None:
     assert not np.array_equal(info["sensor/stiffness"], info["state/stiffness"])
 
 
-def test_an_orthosis_on_a_leg_is_refused() -> None:
+def test_orthosis_on_a_leg_is_refused() -> None:
     with pytest.raises(ValueError, match=r"give KneeOrthosis.no_load\(\) or KneeOrthosis.rig\(\)"):
         gym.make("PAM/KneeTension-v0", plant=KneeOrthosis.on_leg("walk"))

@@ -42,7 +42,7 @@ def record(
 
 @EACH_GAIT
 @pytest.mark.parametrize("mismatch", [0.0, 10.0, -20.0])
-def test_the_tension_gives_the_wanted_torque_in_stance_and_is_off_by_the_mismatch_in_swing(
+def test_tension_reference_gives_the_desired_torque_in_stance_and_the_mismatch_in_swing(
     name: str, mismatch: float
 ) -> None:
     env, info, _ = record(name, mismatch=mismatch)
@@ -55,7 +55,7 @@ def test_the_tension_gives_the_wanted_torque_in_stance_and_is_off_by_the_mismatc
 
 
 @EACH_GAIT
-def test_in_swing_the_angle_should_be_that_of_the_path_and_in_stance_it_is_what_it_is(
+def test_angle_reference_is_the_path_in_swing_and_the_sensed_angle_in_stance(
     name: str,
 ) -> None:
     env, info, _ = record(name)
@@ -69,7 +69,7 @@ def test_in_swing_the_angle_should_be_that_of_the_path_and_in_stance_it_is_what_
 @EACH_GAIT
 @pytest.mark.parametrize(("assistance", "lowest"), [("signed", -np.inf), ("clipped", 0.0)])
 @pytest.mark.parametrize(("source", "key"), [("estimate", "estimate"), ("demand", "demand")])
-def test_the_wanted_torque_is_a_share_after_the_low_pass(
+def test_desired_torque_is_a_low_passed_share_of_the_estimate(
     name: str, assistance: str, lowest: float, source: str, key: str
 ) -> None:
     arguments = {"assistance": assistance, "reference": source, "ratio": 0.3}
@@ -80,7 +80,7 @@ def test_the_wanted_torque_is_a_share_after_the_low_pass(
     assert np.allclose(info["state/torque_reference"][settled], filtered(share)[settled], atol=2e-3)
 
 
-def test_samples_are_the_wanted_torque_themselves() -> None:
+def test_samples_are_the_desired_torque_without_low_pass() -> None:
     samples = 3.0 * np.sin(0.05 * np.arange(100))
     _, info, _ = record("PAM/KneeWalk-v0", 150, reference=samples)
     later = samples[np.minimum(np.arange(151), 99)]
@@ -88,7 +88,7 @@ def test_samples_are_the_wanted_torque_themselves() -> None:
 
 
 @EACH_GAIT
-def test_the_preview_is_what_comes_when_nothing_disturbs(name: str) -> None:
+def test_preview_equals_later_references_without_disturbance(name: str) -> None:
     plant = quiet(name).replace({"leg.hold_stiffness": 500.0, "leg.stance_stiffness": 2e3})
     env, info, seen = record(name, plant=plant, preview=3, preview_stride=5)
     signals = env.signals
@@ -105,7 +105,7 @@ def test_the_preview_is_what_comes_when_nothing_disturbs(name: str) -> None:
 
 
 @EACH_GAIT
-def test_the_emg_proxies_are_those_of_the_recorded_torques(name: str) -> None:
+def test_emg_proxies_follow_from_recorded_torques(name: str) -> None:
     env, info, _ = record(name)
     period, muscle = env.control_period, env.plant.activation
     helped = info["state/torque"]
@@ -133,7 +133,7 @@ def test_over_assistance_is_torque_beyond_the_demand_or_against_it() -> None:
 
 
 @EACH_GAIT
-def test_references_are_of_the_orthosis_as_it_is_known_and_not_as_it_was_drawn(name: str) -> None:
+def test_references_use_nominal_and_not_drawn_parameters(name: str) -> None:
     drawn = {"lever.stiffness": (33.0, 34.0), "lever.relaxed_angle": (2.2, 2.25)}
     env, info, _ = record(name, randomize=drawn)
     stance = info["sensor/stance"] > 0.5
@@ -143,7 +143,7 @@ def test_references_are_of_the_orthosis_as_it_is_known_and_not_as_it_was_drawn(n
 
 
 @EACH_GAIT
-def test_the_plan_does_not_know_the_wearers_mass(name: str) -> None:
+def test_planned_references_use_the_nominal_body_mass(name: str) -> None:
     seen, plant = [], quiet(name)
     for mass in (60.0, 85.0):
         heavy = {"leg.body_mass": (mass, mass + 1e-6)}
@@ -154,7 +154,7 @@ def test_the_plan_does_not_know_the_wearers_mass(name: str) -> None:
     assert np.abs(seen[0][:, 1] - seen[1][:, 1]).max() < 1.0
 
 
-def test_ambient_air_costs_nothing() -> None:
+def test_ambient_air_is_not_counted_as_effort() -> None:
     env = gym.make("PAM/KneeWalk-v0", normalize=False).unwrapped
     env.reset(seed=0)
     infos = [env.step(np.zeros(1, np.float32))[4] for _ in range(800)][300:]
@@ -162,7 +162,7 @@ def test_ambient_air_costs_nothing() -> None:
     assert max(i["effort/air"] for i in infos) == 0.0
 
 
-def test_rewards_are_gated_by_the_stance_that_sensor_and_truth_agree_on() -> None:
+def test_rewards_are_gated_where_sensed_and_true_phase_agree() -> None:
     noisy = KneeOrthosis.on_leg("walk", stride=2.0).replace({"heel.noise": 2.0})
     _, info, _ = record("PAM/KneeWalk-v0", plant=noisy)
     true, seen = info["state/stance"] > 0.5, info["sensor/stance"] > 0.5
@@ -175,7 +175,7 @@ def test_rewards_are_gated_by_the_stance_that_sensor_and_truth_agree_on() -> Non
 
 
 @EACH_GAIT
-def test_paces_have_their_stride(name: str) -> None:
+def test_pace_sets_the_stride_time(name: str) -> None:
     for pace, seconds in (("slow", 5.0), ("normal", 1.224), (2.5, 2.5)):
         _, info, _ = record(name, 20, pace=pace, start="heel_contact")
         assert info["state/phase"][0] == 0.0

@@ -49,7 +49,7 @@ def follow(env: Any, seconds: float, seed: int = 0) -> list[dict[str, float]]:
     return infos
 
 
-def test_the_tool_rests_runs_along_the_path_rests_and_comes_back() -> None:
+def test_reference_rests_follows_the_path_rests_and_returns() -> None:
     env = make(path_seconds=1.0, rest_seconds=0.25, reference="path_3")
     infos = follow(env, 2.5)
     wanted = np.array([pose(info, "reference_") for info in infos])
@@ -62,7 +62,7 @@ def test_the_tool_rests_runs_along_the_path_rests_and_comes_back() -> None:
     assert 70 < np.argmax(fastest) < 80  # in the middle of the way, as least jerk has it
 
 
-def test_the_planned_angles_take_the_tool_along_the_path_within_the_limits() -> None:
+def test_planned_angles_follow_the_path_within_joint_limits() -> None:
     quick = {"path_seconds": 0.5, "rest_seconds": 0.02}
     for number, path in enumerate(PATHS):
         infos = follow(make(reference=path.name, **quick), 0.54)
@@ -82,12 +82,12 @@ def test_without_hysteresis_and_weight_the_arm_rests_on_its_plan() -> None:
     assert first["state/pointing_error"] < 1e-5
 
 
-def test_weight_pulls_the_arm_off_its_path_and_a_payload_more_so() -> None:
+def test_weight_and_payload_increase_the_position_error() -> None:
     bare, loaded = (follow(make(payload=p), 0.5)[-1]["output"] for p in (0.0, 0.1))
     assert 0.01 < bare < loaded < 0.5
 
 
-def test_output_and_pointing_are_those_of_the_true_angles() -> None:
+def test_output_and_pointing_error_follow_from_true_angles() -> None:
     for info in follow(make(), 1.5)[::30]:
         true, wanted = PLANT.chain.pose(vector(info, "state/angle")), pose(info, "reference_")
         assert np.allclose(pose(info), true, atol=1e-12)
@@ -100,7 +100,7 @@ def test_output_and_pointing_are_those_of_the_true_angles() -> None:
         assert info["reference"] == 0.0
 
 
-def test_the_observed_pose_is_that_of_the_sensed_angles() -> None:
+def test_observed_pose_follows_from_sensed_angles() -> None:
     env = make()
     observation, info = env.reset(seed=0)
     for _ in range(20):
@@ -114,7 +114,7 @@ def test_the_observed_pose_is_that_of_the_sensed_angles() -> None:
         assert not np.allclose(sensed, pose(info), atol=1e-9)
 
 
-def test_previews_are_the_references_to_come() -> None:
+def test_previews_equal_later_references() -> None:
     env = make(preview=3, preview_stride=7, path_seconds=0.5, rest_seconds=0.1)
     observation, _ = env.reset(seed=0)
     seen = []
@@ -135,7 +135,7 @@ def test_episodes_draw_among_the_paths() -> None:
     assert drawn == {0.0, 1.0, 2.0}
 
 
-def test_the_reference_may_be_poses() -> None:
+def test_reference_accepts_poses() -> None:
     line = np.linspace(0.1, 0.2, 5)[:, None] * np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0])
     poses = PLANT.chain.pose(line)
     infos = follow(make(reference=poses, path_seconds=0.5, rest_seconds=0.1), 0.6)
@@ -143,13 +143,13 @@ def test_the_reference_may_be_poses() -> None:
     assert np.allclose(pose(infos[-1], "reference_"), poses[-1])
 
 
-def test_a_pose_out_of_reach_is_refused_when_the_environment_is_made() -> None:
+def test_unreachable_pose_is_refused_at_construction() -> None:
     far = np.array([[0.0, 0.0, 1.5, 0.0, 0.0, 1.0], [1.4, 0.0, 0.0, 0.0, 0.0, 1.0]])
     with pytest.raises(UnreachablePose, match="is out of reach with joints"):
         make(reference=far)
 
 
-def test_other_arms_follow_paths_of_their_own() -> None:
+def test_other_arms_follow_drawn_paths() -> None:
     arm = RedundantManipulator.paper(chain=SerialChain.uniform("xyxyxyx", 0.2, 0.08))
     line = np.linspace(0.1, 0.2, 5)[:, None] * np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
     env = make(plant=arm, reference=arm.chain.pose(line))
@@ -160,7 +160,7 @@ def test_other_arms_follow_paths_of_their_own() -> None:
         make(plant=arm, reference="path_1")
 
 
-def test_twelve_pressures_are_actions() -> None:
+def test_twelve_pressures_as_actions() -> None:
     env = make(action="pressures", plan=False)
     assert env.action_space.shape == (12,)
     assert "joint_reference_0" not in list(env.signals.names())
@@ -172,7 +172,7 @@ def test_twelve_pressures_are_actions() -> None:
     assert np.allclose(found, pressures.astype(np.float32), rtol=1e-6)
 
 
-def test_a_joint_at_its_stop_ends_the_episode() -> None:
+def test_joint_at_its_stop_ends_the_episode() -> None:
     env = make(action="pressures", payload=0.1)
     env.reset(seed=0)
     ended = False
@@ -211,7 +211,7 @@ def test_bad_arguments(arguments: dict[str, Any], said: str) -> None:
 
 
 @pytest.mark.parametrize("make_arm", [RedundantManipulator.paper, RedundantManipulator.measured])
-def test_drawn_plans_do_not_leap_and_are_borne(make_arm: Any) -> None:
+def test_drawn_plans_are_continuous_and_can_be_held(make_arm: Any) -> None:
     arm = make_arm("none")
     paths = paths_for(arm, "drawn", weighted=True)
     assert len(paths) == DRAWN
@@ -225,7 +225,7 @@ def test_drawn_plans_do_not_leap_and_are_borne(make_arm: Any) -> None:
     assert len(ends) == DRAWN  # no path twice
 
 
-def test_the_measured_arm_says_which_paths_it_takes() -> None:
+def test_measured_arm_names_the_paths_it_can_follow() -> None:
     arm = RedundantManipulator.measured()
     with pytest.raises(
         UnreachablePose, match=r"of \+-20\.\d+ degrees.* not for this arm: take 'drawn'"
@@ -234,7 +234,7 @@ def test_the_measured_arm_says_which_paths_it_takes() -> None:
     gym.make(NAME, plant=arm, reference="drawn").reset(seed=0)
 
 
-def test_a_payload_that_is_not_borne_names_pose_joint_and_torques() -> None:
+def test_unbearable_payload_names_pose_joint_and_torques() -> None:
     said = (
         r"path_3, pose 40: with 0.05 kg of payload joint 2 needs 1.58 N m at -27.8 degrees and "
         r"its muscles exert 1.49 N m there at most; give it a payload of 0.0367 kg or less"
@@ -250,7 +250,7 @@ def test_a_payload_that_is_not_borne_names_pose_joint_and_torques() -> None:
         make(plant=RedundantManipulator.paper(chain=SerialChain.uniform(mass=0.3)))
 
 
-def test_any_payload_means_any_that_the_paths_bear() -> None:
+def test_payload_none_draws_up_to_the_largest_bearable_one() -> None:
     env = make(reference="path_3", payload=None, payload_change=0.01)
     drawn = {env.reset(seed=seed)[1]["state/payload"] for seed in range(40)}
     plan = paths_for(PLANT, "path_3", weighted=True)["path_3"][6:].T
@@ -258,7 +258,7 @@ def test_any_payload_means_any_that_the_paths_bear() -> None:
     assert max(drawn) == pytest.approx(bearable_payload(PLANT, plan) - 0.01, abs=1e-12)
 
 
-def test_rates_are_of_the_sensed_angles() -> None:
+def test_rates_are_filtered_differences_of_sensed_angles() -> None:
     env, twin = make(plant=PLANT.without_noise()), make()
     observation, _ = env.reset(seed=0)
     twin.reset(seed=0)
@@ -280,7 +280,7 @@ def test_rates_are_of_the_sensed_angles() -> None:
     assert 0.1 * single < np.std(noise[10:]) < 0.3 * single
 
 
-def test_resting_says_when_the_path_rests() -> None:
+def test_resting_flag_marks_rests_of_the_path() -> None:
     env = make(path_seconds=0.3, rest_seconds=0.2)
     infos = follow(env, 1.2)
     places = np.array([pose(info, "reference_") for info in infos])

@@ -1,4 +1,4 @@
-"""Pictures: of the right size, of the right thing, and without any effect on the simulation."""
+"""Pictures have the right size and content, and do not affect the simulation."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ EVERY = pytest.mark.parametrize("name", IDS)
 
 
 @EVERY
-def test_a_picture_shows_the_state(name: str) -> None:
+def test_picture_shows_the_state(name: str) -> None:
     env = gym.make(name, render_mode="rgb_array")
     env.reset(seed=0)
     first = env.render()
@@ -38,7 +38,7 @@ def test_a_picture_shows_the_state(name: str) -> None:
 
 
 @EVERY
-def test_drawing_leaves_every_bit_alone(name: str) -> None:
+def test_drawing_changes_no_bit(name: str) -> None:
     plain, drawn = gym.make(name), gym.make(name, render_mode="rgb_array")
     plain.reset(seed=3)
     drawn.reset(seed=3)
@@ -52,7 +52,7 @@ def test_drawing_leaves_every_bit_alone(name: str) -> None:
 
 
 @EVERY
-def test_the_window(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_human_mode_opens_a_window(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     env = gym.make(name, render_mode="human")
     env.reset(seed=0)
@@ -63,7 +63,9 @@ def test_the_window(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @EVERY
-def test_the_close_button_closes_for_good(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_close_button_closes_the_window_for_good(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     import pygame
 
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
@@ -84,31 +86,31 @@ import gymnasium as gym
 import pam_envs
 assert "pygame" not in sys.modules
 before = dict(os.environ)
-env = gym.make(sys.argv[1], render_mode="rgb_array")
-env.reset(seed=0)
-assert env.render().shape == (600, 800, 3)
+for name in sys.argv[1:]:
+    env = gym.make(name, render_mode="rgb_array")
+    env.reset(seed=0)
+    assert env.render().shape == (600, 800, 3)
 import pygame
 assert not pygame.display.get_init()
 assert dict(os.environ) == before
 """
 
 
-@EVERY
-def test_pictures_need_no_display_and_leave_the_environment_variables_alone(name: str) -> None:
+def test_pictures_need_no_display_and_change_no_environment_variable() -> None:
     variables = {k: v for k, v in os.environ.items() if not k.startswith("SDL_")}
     variables["DISPLAY"] = ":none"  # a display that cannot be opened
-    subprocess.run([sys.executable, "-c", HEADLESS, name], env=variables, check=True)
+    subprocess.run([sys.executable, "-c", HEADLESS, *IDS], env=variables, check=True)
 
 
 @EVERY
-def test_the_checker_with_rendering(name: str) -> None:
+def test_checker_accepts_rendering(name: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(gym.make(name, render_mode="rgb_array").unwrapped)
 
 
 @EVERY
-def test_rendering_without_a_mode_warns_and_before_the_reset_says_so(name: str) -> None:
+def test_rendering_warns_without_a_mode_and_raises_before_reset(name: str) -> None:
     env = gym.make(name).unwrapped
     env.reset(seed=0)
     with pytest.warns(UserWarning, match="render_mode"):
@@ -119,7 +121,7 @@ def test_rendering_without_a_mode_warns_and_before_the_reset_says_so(name: str) 
 
 
 @EVERY
-def test_a_copy_and_a_closed_environment_draw_the_present(name: str) -> None:
+def test_copy_and_closed_environment_draw_the_present(name: str) -> None:
     env = gym.make(name, render_mode="rgb_array").unwrapped
     env.reset(seed=0)
     for action in actions_for(env.action_space, 80):
@@ -151,7 +153,7 @@ def test_rows_of_a_batch_are_drawn_as_single_environments(name: str) -> None:
     batch.close()
 
 
-def test_a_batch_has_no_window_and_needs_info_for_its_pictures() -> None:
+def test_batch_has_no_window_and_needs_info_for_pictures() -> None:
     name = "PAM/MusclePositioning-v0"
     with pytest.raises(ValueError, match="'human' is not known"):
         gym.make_vec(name, 2, vectorization_mode="vector_entry_point", render_mode="human")
