@@ -1,4 +1,4 @@
-"""The elbow: what is asked for, what of it can be had, what the program knows, when pulses act."""
+"""Elbow orthosis: references, reachable values, estimates, pulses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One antagonistic joint: what its actions do, what pushes it, where it ends."""
+"""Antagonistic joint: actions, disturbances, references, end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The knee orthosis on a leg: references, assistance and effort follow from what is recorded."""
+"""Knee orthosis on a leg: references, assistance and effort follow from recorded signals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A redundant manipulator: its path, its plan, what is seen and what counts."""
+"""Redundant manipulator: path, plan, observation, output."""
 
 from __future__ import annotations
 
