@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from benchmarks.board import accessors as views
 from benchmarks.board.columns import columns_of, with_costs
 from benchmarks.board.environment_page import kind_of
 from benchmarks.board.format import bounded, number
 from benchmarks.board.words import about
 from benchmarks.runs.cells import AUDIT, PUBLIC
-from benchmarks.runs.rows import shown
+from benchmarks.runs.rows import Row, shown
 
 
-def row_text(row: Mapping[str, Any]) -> str:
+def row_text(row: Row) -> str:
     """Return a row in words: origin, headline of each split, every metric, every setting.
 
     Parameters
     ----------
-    row : mapping
+    row : Row
         Of :func:`benchmarks.runs.rows.load`.
     """
     controller, content = row["controller"], views.content_of(row)
@@ -29,7 +26,7 @@ def row_text(row: Mapping[str, Any]) -> str:
         str(row["row"]),
         f"  {controller['summary']}",
         f"  {kind_of(row)}; knows: {controller['knowledge']}; commit {row['made_with']['commit']}",
-        f"  {about(dict(row)).replace('`', '')}",
+        f"  {about(row).replace('`', '')}",
     ]
     for split in splits:
         failed, total = views.failures_of(row, split)
