@@ -1,1 +1,1 @@
-"""board."""
+"""Leaderboard, its pages and the interactive site, computed from the rows."""

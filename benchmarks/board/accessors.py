@@ -1,4 +1,4 @@
-"""What tables, claims and the page read of a row: the one place that knows a row's keys."""
+"""Accessors of a row for tables, claims and the site; only this module knows the keys of a row."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def track_of(row: Mapping[str, Any]) -> str:
 
 
 def factor_of(row: Mapping[str, Any]) -> float:
-    """Return the factor from SI in which the row's headline is shown."""
+    """Return the factor from SI with which the row's headline is shown."""
     return shown(content_of(row))[1]
 
 
@@ -70,12 +70,12 @@ def is_audited(row: Mapping[str, Any]) -> bool:
 
 
 def round_of(row: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the audit round that a row is in: number, salt, day, and its entrants' names."""
+    """Return the audit round of a row: number, salt, day and its entrants' names."""
     return dict(row["audit"])
 
 
 def published_split(row: Mapping[str, Any]) -> str:
-    """Return which episodes the row's score is of: the audit's if it is in the round."""
+    """Return the split of the row's score: the audit episodes if it is in the round."""
     return AUDIT if is_audited(row) else PUBLIC
 
 
@@ -87,7 +87,7 @@ def training_seeds(row: Mapping[str, Any]) -> int:
 
 
 def is_listed(row: Mapping[str, Any]) -> bool:
-    """Return whether the row has as many training seeds as a rank needs."""
+    """Return whether the row has enough training seeds for a rank."""
     return row["controller"]["kind"] == "classical" or training_seeds(row) >= LISTED_SEEDS
 
 
@@ -145,18 +145,18 @@ def gap(row: Mapping[str, Any]) -> Interval | None:
 
 
 def artefacts_audited(row: Mapping[str, Any]) -> int:
-    """Return how many artefacts of this name the rounds of the track have had, 0 without one."""
+    """Return the number of artefacts of this name in the rounds of the track, 0 without a round."""
     return int(row["audit"]["entry"]) if is_audited(row) else 0
 
 
 def is_worse_unseen(row: Mapping[str, Any]) -> bool:
-    """Return whether the audit mean lies above the public one by more than its interval."""
+    """Return whether the audit mean exceeds the public one by more than its interval."""
     found = gap(row)
     return found is not None and found.low > 0.0
 
 
 def failures_of(row: Mapping[str, Any], split: str = "") -> tuple[int, int]:
-    """Return how many of the published episodes failed, and their number."""
+    """Return the number of failed episodes among the published ones, and the number of all."""
     episodes = episodes_of(row, split or published_split(row))
     return sum(bool(episode["failed"]) for episode in episodes), len(episodes)
 
@@ -177,7 +177,7 @@ def verified_words(row: Mapping[str, Any]) -> str:
 
 
 JUMPING = ("steps", "staircase")
-"""References that jump: the mean over a track may be mostly the error of their edges."""
+"""References with jumps, whose edges may dominate the mean error of a track."""
 
 
 def references_of(row: Mapping[str, Any]) -> dict[str, str]:
@@ -210,7 +210,7 @@ def pairs_of(row: Mapping[str, Any], split: str) -> frozenset[tuple[str, int]]:
 
 
 def common_split(first: Row, second: Row) -> str | None:
-    """Return which episodes two rows are compared on, ``None`` if they have not run the same.
+    """Return the split on which two rows are compared, ``None`` if their episodes differ.
 
     The audit's if both are in the round, the public ones otherwise.
     """
@@ -221,19 +221,19 @@ def common_split(first: Row, second: Row) -> str | None:
 
 @dataclass(frozen=True)
 class Cost:
-    """What a controller cost to make.
+    """Cost of tuning and training a controller.
 
     Attributes
     ----------
     tuning : str
-        How it was tuned.
+        Method of tuning.
     trials : int or None
-        Settings that were tried; None where nobody counted.
+        Settings tried; None if not counted.
     steps, seconds : float or None
         Of one training seed, the mean over the seeds [1], [s].
     hardware : str
     command : str
-        What trains the first seed again.
+        Trains the first seed again.
     """
 
     tuning: str
@@ -245,7 +245,7 @@ class Cost:
 
 
 def cost_of(row: Mapping[str, Any]) -> Cost:
-    """Return what a controller cost to make, as its row states it."""
+    """Return the cost of tuning and training a controller, as stated in its row."""
     tuning = row["controller"]["tuning"]
     records = row["controller"].get("training") or []
     hardware = dict.fromkeys(str(r["hardware"]) for r in records if r.get("hardware"))

@@ -16,7 +16,7 @@ from benchmarks.runs.store import CHECKSUM
 from pam_envs import citations
 
 SEPARATOR = "; "
-"""Between the parts of a citation."""
+"""Separator between the parts of a citation."""
 
 Fields = Mapping[str, Any]
 
@@ -108,7 +108,7 @@ def package() -> str:
 
 
 AUTHORS = "The pam-envs authors"
-"""Of a row whose controller names none."""
+"""Author of a row whose controller names none."""
 
 
 def _row_entry(row: Mapping[str, Any]) -> str:
@@ -140,7 +140,7 @@ def _row_entry(row: Mapping[str, Any]) -> str:
 
 
 def _unbraced(text: str) -> str:
-    """Return a maker's words without what BibTeX would read as its own."""
+    """Return a text without the characters that BibTeX interprets."""
     return "".join(letter for letter in text if letter not in "{}\\")
 
 

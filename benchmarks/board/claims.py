@@ -1,4 +1,4 @@
-"""What may be said of a controller against the best paper controller of its track."""
+"""Claims of a controller against the best paper controller of its track."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from benchmarks.scoring.statistics import NOTHING, Interval
 CLAIM_SEEDS = 10
 """Training seeds that a claim needs."""
 PROBABILITY, LOWER_BOUND = 0.95, 0.5
-"""What the probability of improvement has to exceed, and its lower 95 % bound."""
+"""Thresholds of the probability of improvement and of its lower 95 % bound."""
 BETTER, DEARER, NOT_SHOWN = "better", "better error, higher cost", "not shown to be better"
 
 
@@ -29,7 +29,7 @@ class Claim:
     ----------
     row, paper : Row
     split : str
-        Which episodes all of it is of: the audit's if both are in the round.
+        Split of the episodes: the audit's if both are in the round.
     probability : Interval
         Of improvement of the headline over training seeds and paired episodes.
     ratios : mapping from the name of a cost to its ratio
@@ -37,11 +37,11 @@ class Claim:
     verdict : str
         ``BETTER``, ``DEARER`` or ``NOT_SHOWN``.
     reasons : tuple of str
-        What keeps the claim from being ``BETTER``.
+        Violated conditions of ``BETTER``.
     gain : Interval
-        By what share of the paper controller's mean the row's is lower, paired by episode.
+        Relative reduction of the mean against the paper controller, paired by episode.
     remarks : tuple of str
-        What has to be known beside the verdict: on how many settings each side was chosen.
+        Remarks beside the verdict: the numbers of settings that were tried for each side.
     """
 
     row: Row
@@ -71,26 +71,28 @@ def best_paper(rows: Sequence[Row]) -> Row | None:
 
 def cost_ratios(row: Row, paper: Row, split: str) -> dict[str, float]:
     """Return each cost over the paper controller's, means over the episodes of a split."""
-    wanted = [metric for metric in COSTS if metric in of_track(views.content_of(row))]
-    return {COSTS[metric]: _ratio(row, paper, metric, split) for metric in wanted}
+    known = of_track(views.content_of(row))
+    return {
+        name: _ratio(row, paper, metric, split) for metric, name in COSTS.items() if metric in known
+    }
 
 
 def _ratio(row: Row, paper: Row, metric: str, split: str) -> float:
     ours, theirs = (views.mean_of(r, metric, split) for r in (row, paper))
     floor = COST_FLOOR.get(metric, 0.0)
-    if ours <= floor:  # nothing to speak of, whatever the other has
+    if ours <= floor:  # counts as none
         return min(1.0, ours / theirs) if theirs > 0.0 else 1.0
     return ours / max(theirs, floor) if max(theirs, floor) > 0.0 else math.inf
 
 
 def claim(row: Row, paper: Row, doubts: Sequence[str] = ()) -> Claim | None:
-    """Return what may be said of a row, ``None`` if the two have not run the same episodes.
+    """Return the claim of a row, ``None`` if the two have not run the same episodes.
 
     Parameters
     ----------
     row, paper : Row
     doubts : sequence of str
-        What speaks against any claim of the track.
+        Objections to every claim of the track.
     """
     split, probability = views.common_split(row, paper), standings.improvement(row, paper)
     if split is None or probability is None:
@@ -106,7 +108,7 @@ def claim(row: Row, paper: Row, doubts: Sequence[str] = ()) -> Claim | None:
 
 
 def gain(row: Row, paper: Row, split: str) -> Interval:
-    """Return by what share of the paper controller's mean the row's is lower."""
+    """Return the relative reduction of the mean against the paper controller."""
     more, whole = standings.difference(row, paper), views.mean_of(paper, split=split)
     if more is None or not whole > 0.0:
         return NOTHING
@@ -114,7 +116,7 @@ def gain(row: Row, paper: Row, split: str) -> Interval:
 
 
 def _budgets(row: Row, paper: Row) -> tuple[str, ...]:
-    """Return a remark where the two were not chosen from as many settings."""
+    """Return a remark if the numbers of settings tried differ."""
     mine, theirs = (views.cost_of(each).trials for each in (row, paper))
     if mine == theirs:
         return ()
@@ -123,7 +125,7 @@ def _budgets(row: Row, paper: Row) -> tuple[str, ...]:
 
 
 def _doubts(row: Row, paper: Row, probability: Interval, gained: Interval, split: str) -> list[str]:
-    """Return what speaks against a lower error, each as a few words."""
+    """Return the objections to a lower error, each in a few words."""
     doubts = []
     if not probability.value > PROBABILITY:
         doubts.append(f"P {probability.value:.2f}, needs more than {PROBABILITY:g}")
@@ -135,7 +137,9 @@ def _doubts(row: Row, paper: Row, probability: Interval, gained: Interval, split
         doubts.append("the interval of the mean's gain holds zero")
     mine, theirs = (each["controller"]["knowledge"] for each in (row, paper))
     if knowledge.is_ahead(mine, theirs):
-        doubts.append(f"knows the plant ({mine}) of which {views.name_of(paper)} is told another")
+        doubts.append(
+            f"knows the plant ({mine}) that differs from the model of {views.name_of(paper)}"
+        )
     seeds = views.training_seeds(row)
     if row["controller"]["kind"] != "classical" and seeds < CLAIM_SEEDS:
         doubts.append(f"{seeds} training seed{'s' * (seeds != 1)}, a claim needs {CLAIM_SEEDS}")
@@ -169,7 +173,7 @@ def learned_claims(rows: Sequence[Row]) -> list[Claim]:
 
 
 def _doubts_of_track(rows: Sequence[Row], paper: Row) -> list[str]:
-    """Return what keeps the best paper controller from being known to be the best."""
+    """Return the reasons why another paper controller may be the best."""
     listing = standings.listing(rows)
     doubts = [f"{name} is in the audit round and has no row" for name in listing.missing]
     best, public = views.name_of(paper), views.mean_of(paper, split=PUBLIC)

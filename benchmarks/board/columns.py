@@ -23,7 +23,7 @@ GAIT: tuple[Column, ...] = (
     ("switch_error", "error at the switch [N]", 1.0),
     ("switch_excess", "excess after it [N]", 1.0),
     ("pressure_jump", "jump of pressure [bar]", 1e-5),
-    ("torque_rms", "assistance RMS, as wanted [N m]", 1.0),
+    ("torque_rms", "assistance RMS, as desired [N m]", 1.0),
     ("torque_ideal_rms", "of the true demand [N m]", 1.0),
     ("emg_ratio", "EMG ratio", 1.0),
     ("emg_extensors_ratio", "of extensors", 1.0),
@@ -33,7 +33,7 @@ GAIT: tuple[Column, ...] = (
     *EFFORT,
     SATURATED,
 )
-"""Metric, heading and factor from SI of the columns after the headline, of a gait."""
+"""Columns of a gait after the headline."""
 
 DEGREES = float(np.degrees(1.0))
 MODEL: Column = ("model_rms_error", "error to its own model, RMS [deg]", DEGREES)
@@ -51,7 +51,7 @@ ELBOW: tuple[Column, ...] = (
     ("switchings", "switchings [1/s]", 1.0),
     OUT_OF_REACH,
 )
-"""Of the elbow orthosis."""
+"""Columns of the elbow orthosis."""
 
 CHAIN: tuple[Column, ...] = (
     ("rms_error", "tip RMS [mm]", 1e3),
@@ -66,7 +66,7 @@ CHAIN: tuple[Column, ...] = (
     *EFFORT,
     OUT_OF_REACH,
 )
-"""Of a chain of joints whose tool follows a path."""
+"""Columns of a chain of joints whose tool follows a path."""
 
 
 def columns_of(content: Mapping[str, Any]) -> tuple[Column, ...]:
@@ -95,7 +95,7 @@ def columns_of(content: Mapping[str, Any]) -> tuple[Column, ...]:
 
 
 def with_costs(columns: Sequence[Column]) -> tuple[Column, ...]:
-    """Return the columns, and the constraint cost where it is not among them: claims rest on it."""
+    """Return the columns with the constraint cost, which claims depend on."""
     if any(metric == "constraint_cost" for metric, _, _ in columns):
         return tuple(columns)
     return (*columns, ("constraint_cost", "constraint cost", 1.0))

@@ -62,7 +62,7 @@ def percent(interval: Interval) -> str:
 
 
 def duration(seconds: float | None) -> str:
-    """Return a time in the unit that suits it, or a dash."""
+    """Return a time in hours, minutes or seconds, or a dash."""
     if seconds is None or not np.isfinite(seconds):
         return "-"
     for unit, size in (("h", 3600.0), ("min", 60.0)):
@@ -113,5 +113,5 @@ def _line(cells: Sequence[str]) -> str:
 
 
 def folded(title: str, lines: Sequence[str]) -> list[str]:
-    """Return lines that a reader opens by a click."""
+    """Return lines that are folded until a reader opens them."""
     return ["<details>", f"<summary>{title}</summary>", "", *lines, "", "</details>", ""]

@@ -23,15 +23,14 @@ _FIXED: dict[str, Any] = {
 
 MARKS = {"classical": "o", "residual": "D", "learned": "s"}
 DRAWN = 8
-"""Classical controllers that are drawn, the best of a track, beside all learned ones."""
+"""Number of classical controllers that are drawn, the best of a track, with all learned ones."""
 
 
 def track_figure(ordered: Sequence[Row]) -> str:
     """Return an SVG of a track: error against effort, and performance profiles.
 
-    Of the rows that are compared with each other, over the episodes that they are compared on.
-
-    The same bytes for equal rows.
+    Of the rows that are compared with each other, on their common episodes. Equal rows give equal
+    bytes.
 
     Parameters
     ----------

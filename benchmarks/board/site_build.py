@@ -1,4 +1,4 @@
-"""The static page: one folder that any browser opens, without a server and without a network."""
+"""Static site: one folder for any browser, without server and network."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ _OWNED = ("data/*.js", "data/traces/*.js", "figures/*.svg", "rows/*.json")
 
 
 def build(results: Path = rows.RESULTS, out: Path = OUT) -> list[Path]:
-    """Write the page from the rows of a folder, the same bytes for the same rows.
+    """Write the site from the rows of a folder; equal rows give equal bytes.
 
     Parameters
     ----------
     results : Path
         Folder of the rows.
     out : Path
-        Folder of the page; what an earlier build left there is replaced.
+        Folder of the site; files of an earlier build are replaced.
 
     Returns
     -------
     list of Path
-        What was written, ``index.html`` first.
+        Written files, ``index.html`` first.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def build(results: Path = rows.RESULTS, out: Path = OUT) -> list[Path]:
 
 
 def page(all_rows: Sequence[Row]) -> dict[str, str]:
-    """Return the page's files by their names, ``index.html`` first."""
+    """Return the site's files by their names, ``index.html`` first."""
     names = ("index.html", "page.css", "draw.js", "detail.js", "page.js")
     texts = {name: (ASSETS / name).read_text() for name in names}
     texts["data/board.js"] = f"const BOARD = {_json(site_data.board(all_rows))};\n"
@@ -67,5 +67,5 @@ def page(all_rows: Sequence[Row]) -> dict[str, str]:
 
 
 def _json(value: Any) -> str:
-    """Return JSON that is also a script: keys in their order, no letters beyond ASCII."""
+    """Return JSON that is valid in a script: ordered keys, ASCII letters."""
     return json.dumps(plain(value), separators=(",", ":"), allow_nan=False)

@@ -1,4 +1,4 @@
-"""What the page shows, as plain data: a pure function of the rows."""
+"""Content of the site as plain data: a pure function of the rows."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ GROUPS = {
     "few": f"Not ranked: fewer than {views.LISTED_SEEDS} training seeds",
     "outside": "Not ranked, not in the audit round: all numbers are of the public episodes",
 }
-"""Parts of a track's table with their titles; that of the first is the track's round."""
+"""Parts of a track's table with their titles; the first has the track's round as its title."""
 
 
 def board(rows: Sequence[Row]) -> dict[str, Any]:
-    """Return all that the page shows but the trajectories.
+    """Return the content of the site without the trajectories.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def board(rows: Sequence[Row]) -> dict[str, Any]:
 
 
 def rounded(value: float | None) -> float | None:
-    """Return a number with six digits, ``None`` for what is none."""
+    """Return a number with six digits, ``None`` if it is not finite."""
     return None if value is None or not np.isfinite(value) else float(f"{value:.6g}")
 
 
@@ -142,7 +142,7 @@ def _row(row: Row, columns: Sequence[Column], against: Claim | None) -> dict[str
 
 
 def _origin(row: Row) -> dict[str, Any]:
-    """Return what the row was made from and how it is run again."""
+    """Return the origin of a row and the commands that reproduce it."""
     controller, cost = row["controller"], views.cost_of(row)
     made = row["made_with"]
     return {

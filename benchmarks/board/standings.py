@@ -1,4 +1,4 @@
-"""Who stands where in a track, by paired differences, and how that changes between tracks."""
+"""Ranks of the rows of a track by paired differences, and rank changes between tracks."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Track = list[Row]
 
 @dataclass(frozen=True)
 class Place:
-    """Where a row stands.
+    """Place of a row in a ranking.
 
     Attributes
     ----------
@@ -58,12 +58,12 @@ class Listing:
 
     @property
     def inside(self) -> Track:
-        """The rows that are compared with each other."""
+        """Rows that are compared with each other."""
         return [*self.ranked, *self.few]
 
     @property
     def split(self) -> str:
-        """Which episodes they are compared on."""
+        """Split of the episodes on which they are compared."""
         return views.published_split(self.inside[0])
 
 
@@ -90,7 +90,7 @@ def by_env(by_track: Mapping[str, Track]) -> dict[str, dict[str, Track]]:
 
 
 def _family(row: Row) -> str:
-    """Return what tracks of one environment sort by: positioning first."""
+    """Return the key by which environments are sorted: positioning first."""
     env = str(row["env"]["id"])
     return "" if "Positioning" in env else env
 
@@ -109,7 +109,7 @@ def _order(row: Row) -> tuple[bool, float, str]:
 
 
 def listing(rows: Sequence[Row]) -> Listing:
-    """Return which rows of a track are compared, and which are listed apart."""
+    """Return the rows of a track that are compared and those that are listed apart."""
     best_first = ordered(rows)
     audited = [row for row in best_first if views.is_audited(row)]
     inside = audited or best_first
@@ -137,7 +137,7 @@ def difference(first: Row, second: Row) -> Interval | None:
 
 
 def improvement(first: Row, second: Row) -> Interval | None:
-    """Return how likely ``first`` has the smaller headline, over training seeds and episodes."""
+    """Return the probability that ``first`` has the lower headline, by paired episodes."""
     split = views.common_split(first, second)
     if split is None:
         return None
@@ -181,7 +181,7 @@ class Changes:
     tracks : tuple of str
         The nominal one first.
     splits : tuple of str
-        Which episodes the places of each track are of.
+        Split of the episodes of each track.
     places : mapping from controller to a place a track
         In the order of the first track.
     agreement : tuple of float
@@ -196,7 +196,7 @@ class Changes:
 
 
 def changes(by_track: Mapping[str, Sequence[Row]]) -> list[Changes]:
-    """Return how ranks change between the tracks of each environment that has more than one.
+    """Return the rank changes between the tracks of each environment with several tracks.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
 """Figures of the elbow orthosis: torques, stiffness, allocation, force law, hysteresis.
 
-The paper prints few numbers (the stroke of 0.066 m and 16.9 %, the hysteresis of 7.5 %, the sign
-change in Fig. 2, the coefficients of Eq. 6); the others stand under *expected*: they were computed
-beforehand by another program from its equations, and are met where ours rounds to the same. Torques
-may be off by 0.02 N m. Its ``k1`` is taken as -0.21 + 4.41 mus per kPa, and as printed only to show
-what that gives. What was put in comes out, the hysteresis and the sign change, and is not judged.
+chakarov2018 prints few numbers: the stroke of 0.066 m and 16.9 %, the hysteresis of 7.5 %, the sign
+change in Fig. 2 and the coefficients of Eq. (6). The *expected* values of the other figures were
+computed from its equations by an independent program; ours must round to the same digits, torques
+may differ by 0.02 N m. ``k1`` is read as -0.21 + 4.41 mus per kPa; the printed value is evaluated
+for comparison only. Hysteresis and sign change are inputs and therefore not judged.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ FIG_2 = {8.0: 66.7, 13.0: 47.3, 19.0: 26.4, 24.0: 11.0, 28.0: 0.0, 32.0: -9.9}
 def expected(
     name: str, where: str, unit: str, value: float, ours: float, tolerance: float, text: str
 ) -> Figure:
-    """Return a figure that the paper does not print and its equations give."""
+    """Return a figure that follows from the paper's equations and is not printed."""
     return Figure(name, where, unit, UNKNOWN, ours, tolerance, text, expected=value)
 
 
 def bounded(name: str, where: str, unit: str, ours: float, text: str, **bounds: Any) -> Figure:
-    """Return a figure that is judged by ``at_least`` and ``at_most``, or not at all."""
+    """Return a figure that is judged by ``at_least`` and ``at_most``, or reported."""
     return Figure(name, where, unit, UNKNOWN, ours, None, text, **bounds)
 
 
@@ -132,7 +132,7 @@ def exactness() -> list[Figure]:
 
 
 def feasible_set() -> list[Figure]:
-    """Stiffness range without torque and area of what is feasible, with C_max = 0.33 and 0.28."""
+    """Stiffness range without torque and area of the feasible set, with C_max = 0.33 and 0.28."""
     wide, where, lines = orthosis(0.33), f"{SOURCE}, section 3", list[Figure]()
     tag = note("predicted", "C_max = 0.33 L_n", BEFORE)
     for degrees, values in RANGES.items():
@@ -233,7 +233,7 @@ def loop_share(plant: Any, pressure: float) -> float:
 
 
 def small_motions() -> list[Figure]:
-    """Stiffness over a degree, where the threads stick, beside that of the law."""
+    """Stiffness over one degree, with sticking threads, beside that of the force law."""
     where, lines = f"{SOURCE}, Eq. (22)", list[Figure]()
     text = note("predicted", "from the angle of the last turn", "the law's is with no hysteresis")
     for kind in ("none", "maxwell_slip", "preisach"):
@@ -269,7 +269,7 @@ def stiffness_of_a_degree(kind: Any, pressure: float, angle: float) -> float:
 
 
 def filling() -> list[Figure]:
-    """How long bundles take to fill through the valve that the paper names."""
+    """Time to fill bundles through the valve named in the paper."""
     where, lines = f"{SOURCE}, Fig. 2", list[Figure]()
     text = note("predicted", "the figure's axis ends at 2 s; slower at high contraction, as stated")
     for share in (8.0, 24.0):
@@ -283,7 +283,7 @@ def filling() -> list[Figure]:
     return lines
 
 
-def time_to_pressure(muscles: Any, share: float, supply: float, wanted: float) -> float:
+def time_to_pressure(muscles: Any, share: float, supply: float, target: float) -> float:
     """Return the time [s] in which one valve that stays open fills a bundle of a fixed length.
 
     Parameters
@@ -291,8 +291,8 @@ def time_to_pressure(muscles: Any, share: float, supply: float, wanted: float) -
     muscles : QuadraticBundle
     share : float
         Contraction over the nominal length.
-    supply, wanted : float
-        Pressures [Pa] of the supply, and at which the bundle is filled.
+    supply, target : float
+        Pressures [Pa] of the supply and of the filled bundle.
     """
     from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
     from pam_envs.pneumatics.on_off_pair import OnOffValve, filled
@@ -300,7 +300,7 @@ def time_to_pressure(muscles: Any, share: float, supply: float, wanted: float) -
     valve, supply, step = OnOffValve(), supply + ATMOSPHERE, 1e-3
     per_volume = PRESSURE_PER_DENSITY / float(muscles.volume(share * muscles.nominal_length))
     air, time = ATMOSPHERE / per_volume, valve.opening_time
-    while air * per_volume - ATMOSPHERE < wanted:
+    while air * per_volume - ATMOSPHERE < target:
         air += filled(air, per_volume, supply, valve.conductance, valve.critical_ratio, step)
         time += step
     return time

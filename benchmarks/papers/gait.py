@@ -1,13 +1,13 @@
-"""Figures of the orthosis paper that need the leg, or a switch between two controllers.
+"""Figures of yeh2010 that need the leg or a switch between two controllers.
 
-The paper measured the EMG of the thigh with and without the orthosis. A simulation has no EMG: it
-has torques, and what a muscle shows for them is a reading (:mod:`pam_envs.muscle.emg`). Scored is
-the *uncalibrated* one, reported as it comes out. An assistance of 20 % that is delivered exactly
-takes 20 % off a proxy that is proportional to torque, and no more; what the paper reports is
-possible only if the true demand is less than Eq. (1) says (reading A) or if EMG grows faster than
-torque (reading B). Each of these has one constant an activity, *fitted* to the three published
-figures with 20 % of Eq. (1) delivered at once: that they are met says nothing. What is left of
-them behind the paper's own low-pass, in stance alone, is reported beside them.
+The paper measured the EMG of the thigh with and without the orthosis. The simulation computes
+torques; a reading (:mod:`pam_envs.muscle.emg`) predicts the muscle activity from them. The
+*uncalibrated* reading is scored. With it, an exactly delivered assistance of 20 % reduces activity
+by 20 % at most. The larger published reductions are possible only if the true demand is below Eq.
+(1) (reading A) or if EMG grows faster than torque (reading B). Readings A and B have one constant
+for each activity, *fitted* to the published figures with 20 % of Eq. (1) delivered at once, so that
+reaching these figures proves nothing. Their values behind the paper's low-pass, in stance alone,
+are reported beside them.
 """
 
 from __future__ import annotations
@@ -41,12 +41,11 @@ ASSUMED: dict[Activity, str] = {
     "stairs_down": ", with synthetic stairs",
 }
 LEANS = ("the shank itself", "the ankle's angle, foot flat")
-"""What Eq. (1) takes for the shank's lean, ``shoe.flat_foot`` 0 and 1."""
+"""Source of the shank's lean in Eq. (1), for ``shoe.flat_foot`` 0 and 1."""
 LEFT_OUT = ("horizontal force", "weight of the shank")
-"""What the paper says that Eq. (1) neglects, beside all acceleration."""
+"""Terms that Eq. (1) neglects according to the paper, besides acceleration."""
 MOST_ERROR = 4.0
-"""Our target [N m] for Eq. (1) at the paper's pace, where the paper takes it to be good; it gives
-no error of its own."""
+"""Our target [N m] for the error of Eq. (1) at the paper's pace; the paper gives no error."""
 READINGS: tuple[Reading, ...] = ("A", "B")
 MISMATCH = 10.0
 """Error [N] of the tension's reference in swing."""
@@ -108,7 +107,7 @@ def estimator_error(
     flat_foot : {0.0, 1.0}
         1: the lean is the ankle's angle.
     added : tuple of str
-        Of ``LEFT_OUT``, what is added to Eq. (1).
+        Of ``LEFT_OUT``: terms added to Eq. (1).
     """
     made = stride_record(activity, stride, {"shoe.flat_foot": flat_foot})
     leg = KneeOrthosis.on_leg(activity).leg
@@ -157,7 +156,7 @@ def _centre_as_measured() -> Figure:
 
 
 def _calibrated(activity: Activity, reading: Reading, title: str) -> list[Figure]:
-    """Return a reading as fitted, and what it gives behind the low-pass."""
+    """Return a fitted reading, delivered at once and behind the low-pass."""
     constant = calibration(activity, reading)
     means = {
         "A": f"true demand = {constant:g} of Eq. (1)",
@@ -176,7 +175,7 @@ def _calibrated(activity: Activity, reading: Reading, title: str) -> list[Figure
 
 
 def _natural_pace() -> list[Figure]:
-    """Return what a quick walker would get, which the paper leaves out and warns of."""
+    """Return the figures at natural pace, for which the paper does not recommend Eq. (1)."""
     where, unknown = f"{SOURCE}, section 5.2", float("nan")
     text = note("predicted", f"preset {EXACT}", RMS_NORM,
                 "the paper: faster, Eq. (1) no longer is a good estimate")  # fmt: skip
@@ -187,7 +186,7 @@ def _natural_pace() -> list[Figure]:
 
 
 def _estimator_errors(stride: float) -> list[Figure]:
-    """Return the error of Eq. (1) by what the lean is taken from, and by what is added to it."""
+    """Return the error of Eq. (1) by the source of the lean and by the added terms."""
     where, figures = f"{SOURCE}, sections 2 and 5.2", list[Figure]()
     tag = ("predicted", "preset full balance of the leg", "RMS in stance")
     slow = stride == PAPER_STRIDE
@@ -216,10 +215,10 @@ LATE = (
 
 
 def linear_switch(mismatch: float, compensated: bool) -> tuple[float, float]:
-    """Return what happens when the printed controller takes over on the printed plant.
+    """Return the transient when the printed controller takes over on the printed plant.
 
-    Before, the pressure is held at the nominal one by somebody else, and the controller runs on a
-    reference that is off by ``mismatch`` [N]; then it is on the true one.
+    Before the switch the pressure is held at its nominal value and the controller runs off-line
+    with a reference error of ``mismatch`` [N]; afterwards the reference is the true one.
 
     Returns
     -------

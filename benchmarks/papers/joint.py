@@ -1,8 +1,8 @@
-"""Figures of the joint's control, fluidic_muscles: PI, robustness, hysteresis, inverse, sines, disturbances.
+"""Figures of the joint's control (fluidic_muscles): PI, robustness, hysteresis, steps, sines.
 
-The paper prints few numbers of its control. What is expected here was computed beforehand, from the
-paper's equations, by another program. The figures of the PI are judged within 1 %, all others that
-have an expected value within 5 %; what is out of that is missed, and says why.
+The paper prints few numbers of its control. The expected values were computed from its equations by
+an independent program. The figures of the PI are judged within 1 %, all others with an expected
+value within 5 %; a miss states its reason.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ EXPECTED = {
     "joint_mfc_mu_plain": 0.171,
     "joint_mfc_mu_wrong": 0.142,
 }
-"""Rise [s] of a step of 10 degrees, computed beforehand with loops of 10 %."""
+"""Rise [s] of a step of 10 degrees, computed independently with loops of 10 %."""
 OTHERWISE = {"joint_pid": 0.213, "joint_pi_slow": 0.437}
 """The same, of controllers that were tuned by rules that are not known."""
 HYSTERESIS = "it depends on the hysteresis, of which only the width of its loops is known"
 GAIN = (
-    "the hysteresis slows the PI only by the gain after a turn, which is low for a small step and nears"
-    " 1 as the step grows; on the first rise there is no turn"
+    "the hysteresis slows the PI only by the gain after a turn, which is low for a small step and"
+    " approaches 1 as the step grows; there is no turn on the first rise"
 )
 GRID = 0.6006743720854 / 99
-"""Samples [s] on which the rise and settling of the PI were read beforehand."""
+"""Sampling time [s] of the independently computed rise and settling of the PI."""
 
 
 def nominal_step() -> tuple[Array, Array]:
@@ -78,11 +78,11 @@ def pi_figures() -> list[Figure]:
         ("K_i K", "1/s", 11.5, gains.integral, 1e-9, ""),
         ("overshoot", "%", 4.32, exact.overshoot, EXACT, ""),
         ("rise", "s", 0.1274, exact.rise, EXACT, why),
-        ("rise as it was read beforehand", "s", 0.1274, rise, None, ""),
+        ("rise on the coarse samples", "s", 0.1274, rise, None, ""),
         ("settling to 2 %", "s", 0.370, exact.settling, EXACT, ""),
         ("phase margin", "deg", 65.5, float(np.degrees(margin)), EXACT, ""),
     ]
-    notes = {"rise as it was read beforehand": f"on {coarse}: no figure of its own"}
+    notes = {"rise on the coarse samples": f"on {coarse}: no figure of its own"}
     return [
         near(f"PI: {n}", CONTROL, u, e, o, share, notes.get(n, BEFORE), why)
         for n, u, e, o, share, why in lines
@@ -114,7 +114,7 @@ def robust_figures() -> list[Figure]:
 
 
 def loop_lines() -> list[Figure]:
-    """Robustness of every loop, with what it rejects and how fast it follows."""
+    """Robustness, disturbance rejection and rise time of every loop."""
     from benchmarks.papers.joint_loops import table
 
     figures = []
@@ -131,7 +131,7 @@ def loop_lines() -> list[Figure]:
 
 
 def hysteresis_lines() -> list[Figure]:
-    """Verdicts on the hysteresis of joints and of one muscle, and how well an inverse undoes it."""
+    """Symmetry and congruency of the hysteresis of joints and of one muscle, and of its inverse."""
     from benchmarks.papers.joint_hysteresis import inverse_error, verdicts, width_ratio
     from pam_envs.identification.joint_forc import CONGRUENCY, SYMMETRY
     from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
@@ -164,13 +164,13 @@ def hysteresis_lines() -> list[Figure]:
 
 
 LOOP_ALONE = (
-    "the loop alone, without hysteresis and sampling, takes 0.31 s: what the earlier one was weighted"
-    " with is not known"
+    "the loop alone, without hysteresis and sampling, takes 0.31 s: the weights of the independent"
+    " design are not known"
 )
 HELD = "the reference is held for 10 ms, 5 ms late in the mean; at 1 ms it is within 5 %"
 OTHER_HYSTERESIS = (
-    "without hysteresis the PI is 19.5 % off: what it loses beyond is the hysteresis's, and that of the"
-    " other program is not known"
+    "without hysteresis the error of the PI is 19.5 %; the rest is due to the hysteresis, and that"
+    " of the other program is not known"
 )
 
 

@@ -1,4 +1,7 @@
-"""Hysteresis of a joint and its inverse: loop widths, symmetry, congruency (fluidic_muscles, section 3)."""
+"""Hysteresis of a joint and its inverse: loop widths, symmetry, congruency.
+
+fluidic_muscles, section 3.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ Array = NDArray[np.float64]
 def loop_path(
     plant: Any, model: JointModel, amplitude: float = 20.0 * DEGREE
 ) -> tuple[Array, Array]:
-    """Return wanted and reached angles [rad]: a first rise, then down and up once.
+    """Return desired and reached angles [rad]: a first rise, then down and up once.
 
     Parameters
     ----------
@@ -31,16 +34,16 @@ def loop_path(
     model : JointModel
         Its hysteresis is inverted for the set-points.
     amplitude : float
-        Of the wanted angles [rad].
+        Of the desired angles [rad].
     """
     up = np.linspace(-amplitude, amplitude, 81)
-    wanted = np.concatenate([np.linspace(0.0, amplitude, 41), up[::-1], up])
+    desired = np.concatenate([np.linspace(0.0, amplitude, 41), up[::-1], up])
     commands, state = [], model.rows.initial(1)
-    for angle in wanted:
+    for angle in desired:
         command = np.clip(model.rows.inverse(np.array([angle]), state), model.low, model.high)
         _, state = model.rows.forward(command, state)
         commands.append(float(command[0]))
-    return wanted, plant.rest_angles(np.array(commands))
+    return desired, plant.rest_angles(np.array(commands))
 
 
 def loop_width(plant: Any, model: JointModel, amplitude: float = 20.0 * DEGREE) -> float:
@@ -55,13 +58,13 @@ def width_ratio(plant: Any, amplitude: float = 10.0 * DEGREE) -> float:
     Parameters
     ----------
     plant : object
-        With ``rest_angles``. On one that is a Preisach operator itself the ratio says nothing but
-        how fine the grid of the identified map is.
+        With ``rest_angles``. If it is a Preisach operator itself, the ratio shows only the
+        resolution of the identified map.
     amplitude : float
-        Of the wanted angles [rad].
+        Of the desired angles [rad].
     """
     model = joint_model(plant)
-    widths = [loop_width(plant, told, amplitude) for told in (model.narrowed(0.0), model)]
+    widths = [loop_width(plant, known, amplitude) for known in (model.narrowed(0.0), model)]
     return widths[0] / widths[1]
 
 
@@ -85,25 +88,25 @@ def inverse_error(histories: int = 60) -> tuple[float, float]:
     top = float(model.everett[-1, 0])
     worst_exact = worst_series = 0.0
     for _ in range(histories):
-        wanted = model.start_output + top * draw.uniform(0.0, 1.0, draw.integers(3, 7))
+        desired = model.start_output + top * draw.uniform(0.0, 1.0, draw.integers(3, 7))
         inputs, state = [], model.initial_state()
-        for value in wanted:
+        for value in desired:
             found, state = model.inverse_step(value, state)
             inputs.append(float(found))
         reached = model.simulate(np.array(inputs))[0]
-        worst_exact = max(worst_exact, float(np.max(np.abs(reached - wanted))) / top)
-        printed = series_inverse(model, wanted)
+        worst_exact = max(worst_exact, float(np.max(np.abs(reached - desired))) / top)
+        printed = series_inverse(model, desired)
         worst_series = max(worst_series, float(np.max(np.abs(printed - inputs))) / (2.0 * RANGE))
     return worst_exact, worst_series
 
 
 PRESSURES = (0.5e5, 6.5e5)
-"""Between which the single muscle is driven [Pa]: below, it does not lift its load."""
+"""Range of the single muscle's pressure [Pa]; below, it does not lift its load."""
 
 
 @cache
 def verdicts() -> dict[str, JointHysteresis]:
-    """Return what is found on the simulated rigs: two joints, and one of their muscles."""
+    """Return the measured hysteresis of two simulated joints and of one of their muscles."""
     joints = {
         "paper joint": AntagonisticJoint.paper(),
         "measured joint": AntagonisticJoint.measured(),

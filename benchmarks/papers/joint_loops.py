@@ -1,9 +1,8 @@
-"""What each loop on a joint's angle withstands and rejects, beside how fast it follows a step.
+"""Robustness, disturbance rejection and step response of each loop on a joint's angle.
 
-Of a controller with model-following it is the disturbance loop, of any other the loop itself. All
-are looked at around the same nominal plant and by the same measure
-(:mod:`baselines.robust.requirements`) in continuous time, so that what one buys and what it pays
-stand in one table.
+For a controller with model-following this is the disturbance loop, for any other the loop itself.
+All are evaluated around the same nominal plant with the same measure
+(:mod:`baselines.robust.requirements`) in continuous time.
 """
 
 from __future__ import annotations
@@ -23,12 +22,12 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 LOW = (0.1, 1.0, 4.0)
-"""Frequencies [rad/s] at which the sensitivity is shown."""
+"""Frequencies [rad/s] of the tabulated sensitivity."""
 
 
 @dataclass(frozen=True)
 class LoopFigures:
-    """Of one controller.
+    """Figures of one controller.
 
     Attributes
     ----------
@@ -53,8 +52,8 @@ class LoopFigures:
 def law_response(made: Any, frequency: Array) -> Complex:
     """Return the response of a controller's loop from error to command, shape (n,).
 
-    Its discrete form is of the bilinear rule, which is undone by looking at it at ``z = (1 + s T /
-    2) / (1 - s T / 2)``.
+    Its discrete form follows from the bilinear rule, which is inverted by ``z = (1 + s T / 2) / (1
+    - s T / 2)``.
 
     Parameters
     ----------
@@ -82,5 +81,5 @@ def loop_figures(name: str) -> LoopFigures:
 
 
 def table() -> tuple[LoopFigures, ...]:
-    """Return the figures of every loop that the step is made with."""
+    """Return the figures of every controller of the step study."""
     return tuple(loop_figures(name) for name in STEPPED)

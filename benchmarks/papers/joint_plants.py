@@ -1,9 +1,9 @@
-"""Steps on the plants of ``PAM/AntagonisticJoint-v0``, beside those on the studies' own hysteresis.
+"""Steps on the plants of ``PAM/AntagonisticJoint-v0`` and on the assumed hysteresis of the studies.
 
-How much faster model-following is than the PI alone depends on the hysteresis, on the size of the
-step and on whether a turn lies before it; so each of these is gone through. The plants are those
-of the environment, without noise: *reduced* is the paper's, with the hysteresis that was
-identified on the muscles; *paper* is the joint of two muscles that carries its link.
+The advantage of model-following over the PI alone depends on the hysteresis, on the size of the
+step and on a preceding turn; all combinations are evaluated. The plants are those of the
+environment, without noise: *reduced* is the paper's, with the hysteresis identified on the muscles;
+*paper* is the joint of two muscles that carries its link.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ PLANTS = (STUDY, "reduced", "paper")
 SIZES = (5.0, 10.0, 15.0, 20.0)
 """Of the steps [deg]."""
 CASES = tuple(product(PLANTS, SIZES, (True, False)))
-"""Plant, size [deg], and whether the step is the second of two."""
+"""Plant, size [deg], and whether the step follows a turn."""
 
 
 def plant_run(joint: AntagonisticJoint, name: str, size: float) -> Array:

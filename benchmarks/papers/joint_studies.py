@@ -1,10 +1,10 @@
 """Studies of the joint's control on the paper's reduced plant: fluidic_muscles, sections 3.2 and 4.
 
 The plant is the paper's: a symmetric Preisach operator from set-point to ``w``, then ``23^2 / (s +
-23)^2``. The controllers are those of the catalogue, at 10 ms; the angle is looked at every 1 ms.
+23)^2``. The controllers are those of the catalogue, at 10 ms; the angle is sampled every 1 ms.
 The paper prints no hysteresis; the assumed one has loops whose half-gap is 10 % of their amplitude
 at 10 and at 30 degrees, gain 1 between the tips of the largest loop, and 0.65 after a turn, the low
-end of the uncertain gain. A step is made after a turn, as nearly all are: up, back, and up again.
+end of the uncertain gain. A step follows a turn: up, back, and up again.
 """
 
 from __future__ import annotations
@@ -54,12 +54,12 @@ def assumed_hysteresis(width: float = 1.0) -> Preisach:
 
 @dataclass(frozen=True)
 class ReducedRig:
-    """The reduced plant as what the controllers are told of, and as what they act on.
+    """The reduced plant, both as the simulated plant and as the model of the controllers.
 
     Attributes
     ----------
     width : float
-        Of the hysteresis's loops over the assumed ones.
+        Width of the hysteresis loops relative to the assumed ones.
     """
 
     width: float = 1.0
@@ -73,7 +73,7 @@ class ReducedRig:
         return assumed_hysteresis(self.width)
 
     def digest(self) -> str:
-        """Return what tells this plant from others."""
+        """Return an identifier of this plant."""
         return f"reduced rig {self.width}"
 
     def rest_angles(self, commands: Array) -> Array:
@@ -90,7 +90,7 @@ ACTIONS = Signals([Signal("angle_set_point", "rad", -RANGE, RANGE, 0, normalized
 
 @dataclass(frozen=True)
 class Run:
-    """What a run gives.
+    """Record of a run.
 
     Attributes
     ----------
@@ -131,8 +131,8 @@ def run(
     off = np.zeros(len(time) + 1) if disturbance is None else disturbance(np.append(0.0, time))
     angles, commands, models = np.zeros(len(time)), np.zeros(len(reference)), []
     command, angle = 0.0, float(off[0])
-    for k, wanted in enumerate(reference):
-        action, state = controller.predict(np.array([angle, command, wanted]), state)
+    for k, desired in enumerate(reference):
+        action, state = controller.predict(np.array([angle, command, desired]), state)
         command = float(action[0])
         w, held = hysteresis.step(command, held)
         for i in range(fine * k, fine * (k + 1)):
@@ -205,7 +205,7 @@ class Setting:
     Attributes
     ----------
     width : float
-        Of the hysteresis's loops over the assumed ones; 0: no hysteresis.
+        Width of the hysteresis loops relative to the assumed ones; 0: no hysteresis.
     size : float
         Of the step [rad].
     period : float
@@ -243,14 +243,14 @@ def step(name: str, setting: Setting = Setting()) -> StepFigures:
 
 
 def rejection(name: str, width: float = 1.0, size: float = 2.0 * DEGREE) -> float:
-    """Return when [s] a step added to the angle is down to 10 % for good, the joint at rest at 0.
+    """Return the time [s] after which a step added to the angle stays below 10 % of its size.
 
     Parameters
     ----------
     name : str
         Of the controller.
     width : float
-        Of the hysteresis's loops over the assumed ones.
+        Width of the hysteresis loops relative to the assumed ones.
     size : float
         [rad].
     """
@@ -300,7 +300,7 @@ def tracking_error(
 
 
 def half_gap(amplitude: float) -> float:
-    """Return half the largest width of the assumed hysteresis's loop, over its amplitude [rad]."""
+    """Return half the largest loop width of the assumed hysteresis, over its amplitude [rad]."""
     up = np.linspace(-amplitude, amplitude, 201)
     path = np.concatenate([np.linspace(0.0, amplitude, 101), up[::-1], up])
     output = assumed_hysteresis().simulate(path)[0]

@@ -1,4 +1,4 @@
-"""Figures of the orthosis paper that need no leg: loop shape, hysteresis inverse, tracking.
+"""Figures of yeh2010 that need no leg: loop shape, hysteresis inverse, tracking.
 
 Two presets of the rig, because the printed figures fit no single one: *static* has a lag of
 0.0466 s behind the hysteresis (the printed plant's 0.3 s would alone give 13 % where 2.07 % is
@@ -31,8 +31,8 @@ FRICTION, LAG = 0.5e5, 0.0466
 and 2.07 %."""
 LOOP_WIDTHS = (0.0, 0.25e5, 0.5e5)
 LINE = {0.0: 0.94, 0.25e5: 1.25, 0.5e5: 1.59}
-"""Errors [%] with a straight line as feed-forward, which the paper has not: computed beforehand by
-another program, whose loops are anchored otherwise."""
+"""Errors [%] with a straight line as feedforward, which is not in the paper: computed by an
+independent program with other anchors of the loops."""
 ALONE = {0.0: 5.05, 0.5e5: 5.52}
 """The same without any feed-forward: from 5.05 to 5.52."""
 PRINTED = {"LTR": 4.66, "LTR + inverse": 1.33}
@@ -62,12 +62,12 @@ def stiffness_tracking(friction: float = FRICTION, lag: float = LAG) -> tuple[fl
 
     hysteresis, step = even_model(FULL_PRESSURE, FULL_STIFFNESS, friction), 1e-3
     time = np.arange(round((DROPPED + 2.0 / FREQUENCY) / step)) * step
-    wanted = 3600.0 - 3500.0 * np.cos(2.0 * np.pi * FREQUENCY * time)
-    line = wanted * (FULL_PRESSURE / FULL_STIFFNESS)
+    desired = 3600.0 - 3500.0 * np.cos(2.0 * np.pi * FREQUENCY * time)
+    line = desired * (FULL_PRESSURE / FULL_STIFFNESS)
     errors = []
-    for pressure in (hysteresis.inverse_simulate(wanted)[0], line):
+    for pressure in (hysteresis.inverse_simulate(desired)[0], line):
         stiffness = _lagged(hysteresis.simulate(pressure)[0], lag, step)
-        errors.append(half_range_error(stiffness, wanted, step))
+        errors.append(half_range_error(stiffness, desired, step))
     return errors[0], errors[1]
 
 
@@ -112,23 +112,23 @@ def _tracked(friction: float, feed_forward: str) -> float:
     rig = discrete(plant, PERIOD, "zoh")
     controller = discrete(printed_controller(), PERIOD)
     time = np.arange(round((DROPPED + 2.0 / FREQUENCY) / PERIOD)) * PERIOD
-    wanted = 205.0 - 125.0 * np.cos(2.0 * np.pi * FREQUENCY * time)
+    desired = 205.0 - 125.0 * np.cos(2.0 * np.pi * FREQUENCY * time)
     ahead = {
         "none": np.full_like(time, NOMINAL_PRESSURE),
-        "inverse": hysteresis.inverse_simulate(wanted / DELTA_LENGTH)[0],
-        "line": wanted * (FULL_PRESSURE / (FULL_STIFFNESS * DELTA_LENGTH)),
+        "inverse": hysteresis.inverse_simulate(desired / DELTA_LENGTH)[0],
+        "line": desired * (FULL_PRESSURE / (FULL_STIFFNESS * DELTA_LENGTH)),
     }[feed_forward]
     state = controller.initial_state()
     _, slips = hysteresis.inverse_step(START_TENSION / DELTA_LENGTH, hysteresis.initial_state())
     inside = rig.rest_state(START_TENSION / plant.dcgain())
     measured = np.empty_like(time)
-    for k, reference in enumerate(wanted):
+    for k, reference in enumerate(desired):
         measured[k] = float(inside @ rig.c)
         command, state = controller.step(reference - measured[k], state)
         pressure = min(max(float(ahead[k]) + 1e3 * float(command), 0.0), FULL_PRESSURE)
         stiffness, slips = hysteresis.step(pressure, slips)
         inside = rig.advance(stiffness * DELTA_LENGTH / plant.dcgain(), inside)
-    return half_range_error(measured, wanted, PERIOD)
+    return half_range_error(measured, desired, PERIOD)
 
 
 NORM = "RMS over half-range, first 2 s dropped"
@@ -179,7 +179,7 @@ def loop_shape() -> list[Figure]:
 def _judged(
     name: str, where: str, unit: str, value: float, ours: float, band: float, text: str
 ) -> Figure:
-    """Return a figure whose value stands as published, or as expected if it was computed."""
+    """Return a figure with a published value, or with an expected one if it was computed."""
     if text.endswith(BEFORE):
         return Figure(name, where, unit, UNKNOWN, ours, band, text, expected=value)
     return Figure(name, where, unit, value, ours, band, text)
@@ -218,7 +218,7 @@ def tension_feedback() -> list[Figure]:
 
 
 def _gains(best: Tracking, where: str) -> list[Figure]:
-    """Return what the inverse gains over no feed-forward, and over a straight line."""
+    """Return the gain of the inverse over no feedforward and over a straight line."""
     tag = ("predicted", f"{DYNAMIC}, loop width {1e-5 * FRICTION:g} bar", f"ratio of two {NORM}")
     over_none, over_line = (e / best.with_inverse for e in (best.feedback, best.with_line))
     return [

@@ -1,7 +1,7 @@
-"""Figures of the orthosis paper as the environments give them, with the paper's control system.
+"""Figures of yeh2010 in the environments, with the paper's control system.
 
-Beside :mod:`benchmarks.papers.knee`, which needs no environment: there the printed transfer
-functions act on the hysteresis alone, here the plant has everything that it has for any controller.
+In :mod:`benchmarks.papers.knee` the printed transfer functions act on the hysteresis alone; here
+the plant is complete.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pam_envs.references.gait import NATURAL_STRIDE
 RIG = "preset dynamic (isometric rig, printed frequency response and controller)"
 WEARABLE = "preset wearable (brace free, regulator's lag)"
 JUDGED = "rig, 0.5 bar"
-"""The run that the published figures are from, as far as one can tell."""
+"""Run that presumably gave the published figures."""
 NO_NOISE = "in the environment, no sensor noise"
 
 
@@ -82,7 +82,7 @@ def switch_environment() -> list[Figure]:
 
 
 def _by_mismatch(where: str) -> list[Figure]:
-    """Return what the mismatch as such adds to the transient."""
+    """Return the increase of the transient by the mismatch."""
     from benchmarks.papers.knee_studies import switching
 
     figures = []
@@ -119,7 +119,7 @@ TARGETS: dict[str, dict[str, Any]] = {
     "without bumpless transfer": {"at_least": 40.0},
     "with bumpless transfer": {"at_most": 15.0},
 }
-"""Of the tension's error at the mismatch [N]."""
+"""Bounds of the tension error at the mismatch [N]."""
 
 
 HANDOVERS = (
@@ -129,7 +129,7 @@ HANDOVERS = (
      "what is left without mismatch is the lag: the reference falls by 100 N in 0.2 s"),
     ("with bumpless transfer, one lag of preview", True, True, "the paper has no preview"),
 )  # fmt: skip
-"""How the controllers hand over, and what there is to say of it."""
+"""Bumpless transfer and preview of the controllers, with a remark."""
 
 
 def emg_environment() -> list[Figure]:

@@ -1,4 +1,4 @@
-"""Runs of the knee's environments that compare with what yeh2010 reports.
+"""Runs of the knee environments for comparison with yeh2010.
 
 An error is a root mean square over the half-range of the reference, the first 2 s dropped as the
 paper's transient. Sensors show the truth, and the controllers know the plant.
@@ -213,7 +213,7 @@ def switching(
     error = signals["output"] - signals["reference"]
     seconds = (metrics_knee.JUMP_SECONDS, metrics_knee.BRIEF_SECONDS)
     long, brief = (round(s / period) for s in seconds)
-    # the signals of a step are seen at the next one, whose set-point stands one place further on
+    # signals of step k are recorded after it: its next setpoint has index k + 1
     jumps = [abs(signals["set_point"][k + 1] - signals["set_point"][k]) for k in starts]
     peaks = [float(np.abs(error[k : k + long]).max()) for k in starts]
     return Switch(

@@ -1,9 +1,9 @@
-"""Figures of the manipulator paper on the planning of paths (fluidic_muscles, section 2).
+"""Figures of path planning of the manipulator (fluidic_muscles, section 2).
 
-The paper shows two plans of one path, without numbers but the limit of 30 degrees. The numbers
-here were computed beforehand by another program, for three paths, of which one is known by its
-ends. The other two are ours, calibrated: drawn so that their peaks are those, which are therefore
-inputs and judge nothing. What the weight does where nothing was fitted is said of drawn paths.
+The paper shows two plans of one path; its only number is the limit of 30 degrees. The expected
+values were computed by an independent program for three paths. The ends of one path are known; the
+other two paths were chosen to have these peaks, which are therefore inputs and not judged. Freely
+drawn paths show the effect of the weight without any fit.
 """
 
 from __future__ import annotations
@@ -78,15 +78,15 @@ def peaks() -> list[Figure]:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """What becomes of paths that are drawn freely, as shares of all.
+    """Statistics of freely drawn paths, as shares of all.
 
     Attributes
     ----------
     paths : int
     crossed, crossed_weighted : float
-        On which a joint goes past 30 degrees.
+        Paths on which a joint exceeds 30 degrees.
     leapt, leapt_weighted : float
-        On which the plan leaps from one branch of solutions to another.
+        Paths on which the plan leaps between branches of solutions.
     iterations : float
         Largest of the medians of the weighted plans.
     """
@@ -101,9 +101,9 @@ class HeldOut:
 
 @lru_cache(maxsize=4)
 def held_out(number: int = HELD_OUT, seed: int = 0) -> HeldOut:
-    """Return what becomes of freely drawn paths: both ends anywhere within 27 degrees a joint.
+    """Return the statistics of freely drawn paths with both ends within 27 degrees a joint.
 
-    None is left out but those that are short or nearly straight, which are not drawn.
+    Short and nearly straight paths are not drawn; no drawn path is left out.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def held_out(number: int = HELD_OUT, seed: int = 0) -> HeldOut:
 
 
 def drawn_lines() -> list[Figure]:
-    """Paths that nothing was fitted to: how many joints cross their limit on."""
+    """Share of freely drawn paths on which joints exceed their limit or the plan leaps."""
     found = held_out()
     text = f"of {found.paths} freely drawn paths, none left out"
     leap = f"{text}; most do so along a hundred times as many poses: the branch of solutions ends"
@@ -172,8 +172,8 @@ def newton() -> list[Figure]:
     """Newton's method on the weighted plans: iterations, and errors left."""
     figures = []
     for path in PATHS:
-        plan, wanted = plans(path).weighted, arm().pose(path.angles())
-        off = float(np.max(np.abs(arm().pose(plan.angles) - wanted)))
+        plan, desired = plans(path).weighted, arm().pose(path.angles())
+        off = float(np.max(np.abs(arm().pose(plan.angles) - desired)))
         figures += [
             Figure(f"{path.name}: median iterations", SOURCE, "1", UNKNOWN,
                    float(np.median(plan.iterations)), None,

@@ -20,10 +20,10 @@ Array = NDArray[np.float64]
 Signals = Mapping[str, Array]
 
 STANCE = "#e8edf3"
-WANTED, OURS, PRESSURE, FREE = "0.25", "#0072b2", "#009e73", "#d55e00"
+DESIRED, OURS, PRESSURE, FREE = "0.25", "#0072b2", "#009e73", "#d55e00"
 BAR, DEGREES = 1e-5, 180.0 / np.pi
 LOOK_AFTER = 0.5
-"""Seconds after a switch in which its transient is looked for, as in the metrics."""
+"""Seconds after a switch that contain its transient, as in the metrics."""
 
 
 def spans(flags: Array, time: Array) -> list[tuple[float, float]]:
@@ -102,7 +102,7 @@ def _shade(ax: Any, signals: Signals) -> None:
 
 
 def _phases(ax: Any, signals: Signals) -> None:
-    """Write above the panel which phase a span is, and what is controlled in it."""
+    """Write the phase of each span and its controlled quantity above the panel."""
     time, stance = signals["time"], signals["state/stance"]
     for flags, name in ((stance, "stance: tension"), (1.0 - stance, "swing: angle")):
         for begin, end in spans(flags, time):
@@ -113,16 +113,16 @@ def _phases(ax: Any, signals: Signals) -> None:
 
 def _tension(ax: Any, signals: Signals) -> None:
     both = (signals["state/stance"] > 0.5) & (signals["sensor/stance"] > 0.5)
-    wanted = np.where(both, signals["reference"], np.nan)
+    desired = np.where(both, signals["reference"], np.nan)
     ax.plot(signals["time"], signals["output"], color=OURS, label="tension")
-    ax.plot(signals["time"], wanted, color=WANTED, linestyle="--", label="wanted in stance")
+    ax.plot(signals["time"], desired, color=DESIRED, linestyle="--", label="desired in stance")
     at, error = after_switch(signals)
     ax.annotate(f"{error:.0f} N off\nafter the switch", xy=at, xytext=(3.6, 120.0), fontsize=9,
                 ha="center", arrowprops={"arrowstyle": "->", "color": "0.3"})  # fmt: skip
 
 
 def after_switch(signals: Signals) -> tuple[tuple[float, float], float]:
-    """Return when [s] and where [N] the tension is off most after heel contact, by how much [N]."""
+    """Return time [s], tension [N] and size [N] of the largest error after heel contact."""
     time, stance = signals["time"], signals["state/stance"] > 0.5
     looked = stance & (signals["sensor/stance"] > 0.5) & (time >= 0.0) & (time < LOOK_AFTER)
     error = np.where(looked, np.abs(signals["output"] - signals["reference"]), -1.0)
@@ -133,7 +133,7 @@ def after_switch(signals: Signals) -> tuple[tuple[float, float], float]:
 def _angle(ax: Any, signals: Signals) -> None:
     path = signals["state/angle"] - signals["state/deviation"]
     ax.plot(signals["time"], DEGREES * signals["state/angle"], color=OURS, label="angle")
-    ax.plot(signals["time"], DEGREES * path, color=WANTED, linestyle="--", label="wearer's path")
+    ax.plot(signals["time"], DEGREES * path, color=DESIRED, linestyle="--", label="wearer's path")
 
 
 def _pressure(ax: Any, signals: Signals) -> None:
@@ -214,13 +214,13 @@ def _draw_steps(ax: Any) -> None:
 def _draw_loops(ax: Any) -> None:
     joint = AntagonisticJoint.paper()
     model = joint_model(joint)
-    for told, label, colour in (
+    for known, label, colour in (
         (model.narrowed(0.0), "straight line", "#009e73"),
         (model, "inverse of the identified hysteresis", "#d55e00"),
     ):
-        wanted, reached = loop_path(joint, told, STEP)
-        ax.plot(wanted / DEGREE, reached / DEGREE, color=colour, label=label)
-    ax.set_xlabel("wanted angle [deg]")
+        desired, reached = loop_path(joint, known, STEP)
+        ax.plot(desired / DEGREE, reached / DEGREE, color=colour, label=label)
+    ax.set_xlabel("desired angle [deg]")
     ax.set_ylabel("angle at rest [deg]")
     ax.set_title("open loop at 10 degrees,\njoint of two muscles", fontsize=9)
     ax.grid(True, linewidth=0.3)

@@ -109,7 +109,7 @@ POSITIONING: dict[str, tuple[float, float]] = {
     "one cubic for both branches": (1.171, 2.191),
 }
 """RMS and largest positioning error [mm] on the tables' own repeats, one repeat left out: computed
-from the paper's tables beforehand, by another program."""
+from the paper's tables by an independent program."""
 
 
 def positioning_errors() -> list[Figure]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-BEFORE = "not in the paper: computed beforehand by another program"
+BEFORE = "not in the paper: computed independently by another program"
 UNKNOWN = float("nan")
 """Published value of a figure that the paper does not print."""
 NEAR = 0.05
@@ -29,7 +29,7 @@ class Figure:
         expected; ``None`` if it is not judged so.
     note : str
     expected : float, optional
-        Computed beforehand from the paper's own equations by another program.
+        Computed from the paper's own equations by an independent program.
     at_most, at_least : float, optional
         Bounds on ours.
     given : bool

@@ -78,7 +78,7 @@ def write_json(path: Path, record: Mapping[str, Any]) -> None:
 
 
 def read_json(path: Path) -> Any:
-    """Return the content of a JSON file, compressed or not; its checksum is not looked at.
+    """Return the content of a JSON file, compressed or not; its checksum is not verified.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""scoring."""
+"""Metrics of an episode and statistics over episodes."""

@@ -1,4 +1,4 @@
-"""What is scored of the elbow orthosis, beyond what every family has.
+"""Metrics of the elbow orthosis, in addition to the common ones.
 
 Torque and stiffness are one thing, the torque here and near here, and one number says how far off
 it is: ``impedance_rms``, the headline. ``rms_error`` is of the torque alone, which is best where
@@ -35,7 +35,7 @@ ELBOW: dict[str, str] = {
 and stiffness. RMS error of the stiffness. RMS of the torque that the orthosis puts on the wearer
 less that of the object he is to feel. The same of free motion alone, where it is all that he feels
 (transparency), and NaN where there is none. Coils
-switched on. Share of time in which torque or stiffness were asked for that no pressures give, and
+switched on. Share of time in which the desired torque or stiffness is infeasible, and
 by how much, RMS. Share of time with a slack bundle."""
 NEAR = 0.2
 """Angle [rad] at which an error of the stiffness counts: 11 degrees."""

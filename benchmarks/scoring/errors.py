@@ -1,4 +1,4 @@
-"""What the metrics of all environments are made of."""
+"""Error measures of all metrics."""
 
 from __future__ import annotations
 

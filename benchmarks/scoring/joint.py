@@ -1,4 +1,4 @@
-"""What is scored of an antagonistic joint and of a chain of them, beyond what every family has.
+"""Metrics of an antagonistic joint and of a chain of joints, in addition to the common ones.
 
 Which of these a track has is written in its scenario file (``metrics: [joint]`` or ``[chain]``).
 The headline of a joint is of the true output and the external reference. A tool has a place and a
@@ -37,7 +37,7 @@ CHAIN: dict[str, str] = {
 joint angles, the largest angle of a joint, and what is common."""
 POSITION, DIRECTION = ("x", "y", "z"), ("point_x", "point_y", "point_z")
 MODEL = "model/"
-"""What the keys of a controller's model begin with: ``model/0`` is of the first joint."""
+"""Prefix of the keys of a controller's model: ``model/0`` is of the first joint."""
 
 
 def _common(signals: Mapping[str, Array], window: Mask, angles: list[str]) -> dict[str, float]:
@@ -85,19 +85,19 @@ def tool_error(signals: Mapping[str, Array], window: Mask, length: float) -> flo
 
 
 def _off(signals: Mapping[str, Array], names: tuple[str, ...]) -> Array:
-    """Return true minus wanted parts of a pose, shape (3, n)."""
+    """Return true minus desired parts of a pose, shape (3, n)."""
     return np.array([signals[f"state/{k}"] - signals[f"state/reference_{k}"] for k in names])
 
 
 def way(signals: Mapping[str, Array]) -> Array:
-    """Return how far the wanted pose has gone, shape (n,): it rests where the pose does.
+    """Return the path length of the desired pose, shape (n,), constant while the pose rests.
 
     Parameters
     ----------
     signals : mapping of (n,) array
     """
-    wanted = np.array([signals[f"state/reference_{k}"] for k in (*POSITION, *DIRECTION)])
-    steps = np.linalg.norm(np.diff(wanted, axis=1), axis=0)
+    desired = np.array([signals[f"state/reference_{k}"] for k in (*POSITION, *DIRECTION)])
+    steps = np.linalg.norm(np.diff(desired, axis=1), axis=0)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 

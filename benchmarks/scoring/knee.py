@@ -1,4 +1,4 @@
-"""What is scored of the knee's brace and of a gait, beyond what every family has.
+"""Metrics of the knee brace and of a gait, in addition to the common ones.
 
 Which of these a track has is written in its scenario file (``metrics: [range, gait]``). A gait is
 scored by phase: the tension where the heel bears weight, the angle where it does not, each where
@@ -51,7 +51,7 @@ torque held against for long costs next to nothing. Open at 4.5 bar the walk has
 B 0.77; on stairs, where the knee asks for more than the muscle has, all three fall below 1."""
 
 JUMP_SECONDS = 0.5
-"""After a switch to stance, in which the tension's error is looked at."""
+"""Window after a switch to stance for the error of the tension."""
 BRIEF_SECONDS = 0.1
 """After a switch, in which the pressure's largest change is its jump."""
 SWING_SECONDS = 0.3
@@ -194,7 +194,7 @@ def _fitted(
 
 
 def _more(proxy: EmgProxy) -> Array:
-    """Return what the flexors do more than without the orthosis."""
+    """Return the additional activity of the flexors with the orthosis."""
     return np.maximum(0.0, proxy.flexors - proxy.flexors_free)
 
 

@@ -1,4 +1,4 @@
-"""What is scored, as pure functions of recorded signals.
+"""Metrics as pure functions of recorded signals.
 
 All arrays have one entry per control period and are in SI. The headline compares the true output
 with the external reference; what a sensor saw is scored beside it and never instead of it.
@@ -39,7 +39,7 @@ GROUPS: dict[str, dict[str, str]] = {
     "joint": metrics_joint.JOINT,
     "chain": metrics_joint.CHAIN,
 }
-"""What a track may be scored by beside ``METRICS``, by the names that its file gives."""
+"""Additional groups of metrics by the names in scenario files."""
 
 COST_RATIO = 1.1
 """Largest ratio of effort or constraint cost to the paper controller's, of a better controller."""
@@ -74,7 +74,7 @@ def percentile_95(error: Array) -> float:
 
 
 def settled(reference: Array, hold: int) -> NDArray[np.bool_]:
-    """Return where a reference has not moved for ``hold`` samples, shape (n,).
+    """Return the mask of samples at which a reference has rested for ``hold`` samples, shape (n,).
 
     Parameters
     ----------

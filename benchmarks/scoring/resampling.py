@@ -1,8 +1,7 @@
-"""Which episodes and training seeds the resamples of a bootstrap hold.
+"""Resampling of episodes and training seeds for the bootstrap.
 
 A group of n is resampled by n - 1 draws: with n draws an interval would be too narrow by
-sqrt((n - 1) / n), a tenth for five seeds (J. N. K. Rao and C. F. J. Wu, "Resampling inference with
-complex survey data", Journal of the American Statistical Association 83 (1988) 231).
+sqrt((n - 1) / n), a tenth for five seeds (rao1988, p. 231).
 """
 
 from __future__ import annotations
@@ -77,7 +76,7 @@ def _clusters(strata: tuple[Hashable, ...], resamples: int, seed: int) -> NDArra
 
 
 def counts(draws: NDArray[np.int64], size: int) -> NDArray[np.float64]:
-    """Return how often each of ``size`` was drawn, shape (resamples, size)."""
+    """Return the number of draws of each of ``size``, shape (resamples, size)."""
     table = np.zeros((len(draws), size))
     np.add.at(table, (np.arange(len(draws))[:, None], draws), 1.0)
     return table

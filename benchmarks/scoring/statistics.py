@@ -1,4 +1,4 @@
-"""Means with intervals over scenarios and seeds, and who is likely to do better than whom.
+"""Means with intervals over scenarios and seeds, and the probability of improvement.
 
 Interquartile mean, probability of improvement and performance profile are those of R. Agarwal et
 al., "Deep reinforcement learning at the edge of the statistical precipice", NeurIPS 34 (2021):
@@ -6,8 +6,8 @@ runs are training seeds, tasks are paired episodes, and less is better.
 
 Episodes are drawn again within their scenario (stratified), with a fixed seed, so that the same
 scores give the same interval to the last bit. Training seeds are drawn as wholes, since one policy
-answers in all scenarios. Episodes of two scenarios have to be independent, so no seed may stand in
-both. How it is drawn stands in :mod:`benchmarks.scoring.resampling`.
+answers in all scenarios. Episodes of two scenarios have to be independent, so no seed may be in
+both. :mod:`benchmarks.scoring.resampling` draws the resamples.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ BOOTSTRAP_SEED = 20_000_003
 RESAMPLES = 5000
 _BOUNDS = (0.025, 0.975)
 _LARGEST = 4_000_000
-"""Numbers that resamples may hold at once."""
+"""Limit of the size of an array of resamples."""
 
 Array = NDArray[np.float64]
 Statistic = Callable[[Array], Array]
@@ -42,7 +42,7 @@ class Interval:
 
 
 NOTHING = Interval(float("nan"), float("nan"), float("nan"))
-"""The estimate of a quantity that no episode has."""
+"""Estimate of a metric that applies to no episode."""
 
 
 def mean(samples: Array) -> Array:
@@ -180,7 +180,7 @@ def bootstrap(
 
 
 def applying(table: Array) -> NDArray[np.bool_]:
-    """Return the columns that count, shape (n,): an episode has to apply in every run."""
+    """Return the mask of episodes in which a metric applies in every run, shape (n,)."""
     return np.asarray(np.isfinite(table).all(axis=0))
 
 
@@ -259,7 +259,7 @@ def difference_of_splits(
     resamples: int = RESAMPLES,
     seed: int = BOOTSTRAP_SEED,
 ) -> Interval:
-    """Return by how much the same runs have a larger mean in one set of episodes than in another.
+    """Return the difference of the means of the same runs over two sets of episodes.
 
     Runs are paired, so that the scatter between policies cancels; episodes are not.
 
@@ -285,7 +285,7 @@ def probability_of_improvement(
     resamples: int = RESAMPLES,
     seed: int = BOOTSTRAP_SEED,
 ) -> Interval:
-    """Return how likely a run of ``first`` is below one of ``second``, over paired episodes.
+    """Return the probability that a run of ``first`` is below one of ``second``, paired.
 
     The share of pairs of runs in which the first is below, ties half (the Mann-Whitney statistic
     over the product of the numbers of runs), averaged over episodes. Drawn again are the training
