@@ -20,7 +20,7 @@ from pam_envs.plants.antagonistic_joint.step import (
     replacements,
     start_hysteresis,
 )
-from pam_envs.plants.core.rollout import BEGIN, REST, Loop, run
+from pam_envs.plants.core.rollout import BEGIN, REST, Loop, biased_output, run
 from pam_envs.plants.core.tiles import drives_of, first_of
 
 OUTPUTS = {
@@ -92,20 +92,41 @@ def advance_joint(
     advance(rows, fixed, counts, table, K.END, elements, substeps, period, work)
 
 
-def loop_of(plant: AntagonisticJoint, extended: bool = False) -> Loop:
-    """Return the loop of a make of the joint."""
+def channels_of(plant: AntagonisticJoint) -> dict[str, float]:
+    """Return what drives the joint, with defaults; ``direct`` above 0: pressures are given."""
+    names = ("command", "prestress", "disturbance", "payload", "pressure_a", "pressure_b", "direct")
+    return dict.fromkeys(names, 0.0) | {"prestress": plant.prestress}
+
+
+def readings_of(plant: AntagonisticJoint) -> dict[str, tuple[int, int]]:
+    """Return the sensors by name, each with its place among the readings and its bias' row."""
+    biases = (K.ANGLE_BIAS, K.PRESSURE_BIAS, K.PRESSURE_BIAS)
+    names = ("angle", "pressure_a", "pressure_b")
+    return {name: (k, bias) for k, (name, bias) in enumerate(zip(names, biases, strict=True))}
+
+
+def loop_of(plant: AntagonisticJoint, extended: bool = False, readings: bool = False) -> Loop:
+    """Return the loop of a make of the joint; with ``readings`` those of its sensors come out."""
     kind, dynamics = plant.hysteresis.kind, plant.dynamics
     effects = K.END + 2 * state_rows(kind)
-    kernels = {
+    kernels: dict[str, Any] = {
         "plant_drive": drive,
         "plant_begin": begin,
         "plant_rest": come_to_rest,
         "plant_advance": advance_joint,
     }
+    outputs: tuple[int, ...] = tuple(OUTPUTS.values())
+    if readings:
+        read = readings_of(plant).values()
+        kernels["BIAS_ROWS"] = tuple(bias for _, bias in read)
+        kernels["plant_output"] = biased_output
+        outputs = tuple(effects + K.STATE.sensors + place for place, _ in read)
     return Loop(
-        f"joint_{kind}_{dynamics}" + ("_extended" if extended else ""),
+        f"joint_{kind}_{dynamics}"
+        + ("_extended" if extended else "")
+        + ("_readings" if readings else ""),
         kernels | replacements(kind, dynamics, effects if extended else None),
-        tuple(OUTPUTS.values()),
+        outputs,
         rows=effects + (K.STATE.end if extended else 0),
         parameters=K.N_PARAMETERS,
         counts=K.N_COUNTS,

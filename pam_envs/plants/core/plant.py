@@ -131,6 +131,10 @@ class Plant:
         """Return this plant and the equally good fits beside it."""
         return (self, *(self.replace(values) for values in self.ensemble))
 
+    def parameter_rows(self) -> NDArray[np.float64]:
+        """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
+        raise NotImplementedError
+
     @property
     def elements(self) -> int:
         """Elements of the hysteresis that the kernels loop over."""

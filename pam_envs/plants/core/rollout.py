@@ -234,13 +234,16 @@ def run(
 def call(
     loop: Loop, plant: Any, state: Sequence[Any], fixed: Array, drives: Array,
     flags: NDArray[np.int64], outputs: Array, substeps: int | None = None,
-    period: float | None = None, *, begun: int = 0, before: bool = False, parallel: bool = False,
+    period: float | None = None, *, table: Array | None = None, begun: int = 0, before: bool = False, parallel: bool = False,
     compiled: bool = COMPILED,
 ) -> None:  # fmt: skip
-    """Run tiles that exist already; their state and the outputs change in place (:func:`run`)."""
+    """Run tiles that exist already; their state and the outputs change in place (:func:`run`).
+
+    ``table`` is that of the hysteresis; default: of ``plant``.
+    """
     rows, counts = state
     arrays = [
-        rows, fixed, counts, plant.hysteresis_tables()[:1], loop.extra,
+        rows, fixed, counts, plant.hysteresis_tables()[:1] if table is None else table, loop.extra,
         np.ascontiguousarray(drives), flags, outputs,
     ]  # fmt: skip
     numbers = (

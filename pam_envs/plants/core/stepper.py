@@ -72,6 +72,7 @@ class PlantBatch:
         self._kelvin = columns[:, R.place("muscle.temperature")]
         self._fixed = in_tiles(columns, len(plants), LANES)
         self._load = load_kg
+        self._table = plants[0].hysteresis_tables()[:1]
         self._loop = loop_of(plants[0], True, readings=True)
         self.reset()
 
@@ -106,7 +107,7 @@ class PlantBatch:
         flags[0] = BEGIN if self._periods == 0 else 0
         call(
             self._loop, self.plants[0], self._state, self._fixed, drives, flags, outputs, 1,
-            self.period, begun=self._periods,
+            self.period, table=self._table, begun=self._periods,
         )  # fmt: skip
         self._periods += len(given)
         self.position = outputs[POSITION, -1]

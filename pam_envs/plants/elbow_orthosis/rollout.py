@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import COMPILED, LANES, kernel
-from pam_envs.plants.core.rollout import Loop, run
+from pam_envs.plants.core.rollout import Loop, biased_output, run
 from pam_envs.plants.core.tiles import drives_of, first_of
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
@@ -83,15 +83,41 @@ def advance_elbow(
     advance(rows, fixed, counts, table, K.END, elements, substeps, period, work)
 
 
-def loop_of(plant: ElbowOrthosis, extended: bool = False) -> Loop:
-    """Return the loop of a make of the orthosis."""
+def channels_of(plant: ElbowOrthosis) -> dict[str, float]:
+    """Return what drives the orthosis, with defaults; ``start`` are the pressures at rest."""
+    motion = ("intent", "intent_rate", "intent_acceleration")
+    names = ("command_a", "command_b", *motion, "disturbance", "start_a", "start_b")
+    return dict.fromkeys(names, 0.0) | {"intent": 1.0}
+
+
+def readings_of(plant: ElbowOrthosis) -> dict[str, tuple[int, int]]:
+    """Return the sensors by name, each with its place among the readings and its bias' row."""
+    biases = (K.ANGLE_BIAS, K.PRESSURE_BIAS, K.PRESSURE_BIAS)
+    names = ("angle", "pressure_a", "pressure_b")
+    return {name: (k, bias) for k, (name, bias) in enumerate(zip(names, biases, strict=True))}
+
+
+def loop_of(plant: ElbowOrthosis, extended: bool = False, readings: bool = False) -> Loop:
+    """Return the loop of a make of the orthosis; with ``readings`` those of its sensors come out."""
     kind, valves = plant.hysteresis.kind, plant.valves
     effects = K.END + state_rows(kind)
-    kernels = {"plant_drive": drive, "plant_begin": begin, "plant_advance": advance_elbow}
+    kernels: dict[str, Any] = {
+        "plant_drive": drive,
+        "plant_begin": begin,
+        "plant_advance": advance_elbow,
+    }
+    outputs: tuple[int, ...] = tuple(OUTPUTS.values())
+    if readings:
+        read = readings_of(plant).values()
+        kernels["BIAS_ROWS"] = tuple(bias for _, bias in read)
+        kernels["plant_output"] = biased_output
+        outputs = tuple(effects + K.STATE.sensors + place for place, _ in read)
     return Loop(
-        f"elbow_{kind}_{valves}" + ("_extended" if extended else ""),
+        f"elbow_{kind}_{valves}"
+        + ("_extended" if extended else "")
+        + ("_readings" if readings else ""),
         kernels | replacements(kind, valves, effects if extended else None),
-        tuple(OUTPUTS.values()),
+        outputs,
         rows=effects + (K.STATE.end if extended else 0),
         parameters=K.N_PARAMETERS,
         counts=K.N_COUNTS,

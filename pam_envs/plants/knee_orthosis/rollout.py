@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import COMPILED, LANES, kernel
-from pam_envs.plants.core.rollout import Loop, run
+from pam_envs.plants.core.rollout import Loop, biased_output, run
 from pam_envs.plants.core.tiles import drives_of, first_of
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
@@ -86,15 +86,39 @@ def advance_knee(
     advance(rows, fixed, counts, table, extra, K.END, elements, substeps, period, work)
 
 
-def loop_of(plant: KneeOrthosis, extended: bool = False) -> Loop:
-    """Return the loop of a make of the orthosis."""
+def channels_of(plant: KneeOrthosis) -> dict[str, float]:
+    """Return what drives the orthosis, with defaults: set-point, and phase and pressure at rest."""
+    return {"set_point": 0.0, "phase": 0.0, "pressure": 0.0}
+
+
+def readings_of(plant: KneeOrthosis) -> dict[str, tuple[int, int]]:
+    """Return the sensors by name, each with its place among the readings and its bias' row."""
+    biases = (K.TENSION_BIAS, K.ANGLE_BIAS, K.PRESSURE_BIAS, K.HEEL_BIAS, K.GROUND_BIAS)
+    several = (*biases, K.COP_BIAS, K.ANKLE_BIAS)
+    return {name: (k, bias) for k, (name, bias) in enumerate(zip(K.SENSORS, several, strict=True))}
+
+
+def loop_of(plant: KneeOrthosis, extended: bool = False, readings: bool = False) -> Loop:
+    """Return the loop of a make of the orthosis; with ``readings`` those of its sensors come out."""
     kind, mounting, dynamics = plant.hysteresis.kind, plant.mounting, plant.dynamics
     effects = K.END + state_rows(kind)
-    kernels = {"plant_drive": drive, "plant_begin": begin, "plant_advance": advance_knee}
+    kernels: dict[str, Any] = {
+        "plant_drive": drive,
+        "plant_begin": begin,
+        "plant_advance": advance_knee,
+    }
+    outputs: tuple[int, ...] = tuple(OUTPUTS.values())
+    if readings:
+        read = readings_of(plant).values()
+        kernels["BIAS_ROWS"] = tuple(bias for _, bias in read)
+        kernels["plant_output"] = biased_output
+        outputs = tuple(effects + K.STATE.sensors + place for place, _ in read)
     return Loop(
-        f"knee_{kind}_{mounting}_{dynamics}" + ("_extended" if extended else ""),
+        f"knee_{kind}_{mounting}_{dynamics}"
+        + ("_extended" if extended else "")
+        + ("_readings" if readings else ""),
         kernels | replacements(kind, mounting, dynamics, effects if extended else None),
-        tuple(OUTPUTS.values()),
+        outputs,
         rows=effects + (K.STATE.end if extended else 0),
         parameters=K.N_PARAMETERS,
         counts=K.N_COUNTS,

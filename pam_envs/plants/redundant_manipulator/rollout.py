@@ -11,7 +11,7 @@ from pam_envs.kernels.build import COMPILED, LANES, kernel
 from pam_envs.mechanics.serial_chain.kinematics import N_STAGES
 from pam_envs.mechanics.serial_chain.rows import parameter_rows
 from pam_envs.plants.antagonistic_joint.pair import command
-from pam_envs.plants.core.rollout import Loop, run
+from pam_envs.plants.core.rollout import Loop, biased_output, run
 from pam_envs.plants.core.tiles import drives_of
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
@@ -74,17 +74,43 @@ def advance_arm(
     advance(rows, fixed, counts, table, M.END, elements, substeps, period, work)
 
 
-def loop_of(plant: RedundantManipulator, extended: bool = False) -> Loop:
-    """Return the loop of arms with a hysteresis and a number of joints."""
+def channels_of(plant: RedundantManipulator) -> dict[str, float]:
+    """Return what drives the arm, with defaults."""
+    joints = range(plant.stages)
+    commands = [*(f"command_{k}" for k in joints), *(f"disturbance_{k}" for k in joints)]
+    return {"payload": 0.0, "prestress": plant.prestress} | dict.fromkeys(commands, 0.0)
+
+
+def readings_of(plant: RedundantManipulator) -> dict[str, tuple[int, int]]:
+    """Return the sensors by name, each with its place among the readings and its bias' row."""
+    n = plant.stages
+    angles = {f"angle_{k}": (k, M.ANGLE_BIAS) for k in range(n)}
+    return angles | {f"pressure_{m}": (n + m, M.PRESSURE_BIAS) for m in range(2 * n)}
+
+
+def loop_of(plant: RedundantManipulator, extended: bool = False, readings: bool = False) -> Loop:
+    """Return the loop of arms with a hysteresis and a number of joints; with ``readings`` those of its sensors come out."""
     kind, stages = plant.hysteresis.kind, plant.stages
     effects = M.END + hysteresis_rows(kind, stages)
-    kernels = {"plant_drive": drive, "plant_begin": begin, "plant_advance": advance_arm}
+    kernels: dict[str, Any] = {
+        "plant_drive": drive,
+        "plant_begin": begin,
+        "plant_advance": advance_arm,
+    }
     joints = [row + k for row in JOINT_OUTPUTS.values() for k in range(stages)]
     muscles = [row + m for row in MUSCLE_OUTPUTS.values() for m in range(2 * stages)]
+    outputs: tuple[int, ...] = (*joints, *muscles)
+    if readings:
+        read = readings_of(plant).values()
+        kernels["BIAS_ROWS"] = tuple(bias for _, bias in read)
+        kernels["plant_output"] = biased_output
+        outputs = tuple(effects + M.STATE.sensors + place for place, _ in read)
     return Loop(
-        f"arm_{kind}_{stages}" + ("_extended" if extended else ""),
+        f"arm_{kind}_{stages}"
+        + ("_extended" if extended else "")
+        + ("_readings" if readings else ""),
         kernels | replacements(kind, stages, effects if extended else None),
-        (*joints, *muscles),
+        outputs,
         rows=effects + (M.STATE.end if extended else 0),
         parameters=M.CHAIN + parameter_rows(stages),
         counts=M.N_COUNTS,

@@ -112,6 +112,18 @@ def output(rows: Any, fixed: Any, k: int, j: int) -> float:
 OUTPUT_ROWS: tuple[int, ...] = ()  # a placeholder
 
 
+def channels_of(plant: SingleMuscle) -> dict[str, float]:
+    """Return what drives the muscle, with defaults (``COMMAND`` to ``HELD``)."""
+    names = ("set_point", "load", "temperature", "start_pressure", "held")
+    usual = {"load": plant.mass.load, "temperature": plant.muscle.temperature}
+    return dict.fromkeys(names, 0.0) | usual
+
+
+def readings_of(plant: SingleMuscle) -> dict[str, tuple[int, int]]:
+    """Return the sensors by name, each with its place among the readings and its bias' row."""
+    return {"contraction": (0, R.POSITION_BIAS), "pressure": (1, R.PRESSURE_BIAS)}
+
+
 def loop_of(plant: SingleMuscle, extended: bool, readings: bool = False) -> Loop:
     """Return the loop of muscles with a hysteresis.
 
