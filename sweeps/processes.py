@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from sweeps.engine import Act, Done, Task
+from sweeps.task import Act, Done, Task
 from sweeps.worker import do, starter
 
 ATTEMPTS = 3

@@ -8,7 +8,7 @@ import threading
 import time
 from typing import Any
 
-from sweeps.engine import Act, Done, Task
+from sweeps.task import Act, Done, Task
 
 LOOK = 0.25
 """Seconds between two checks that the driver is alive."""

@@ -10,7 +10,8 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
-from sweeps.engine import Cluster, Done, run
+from sweeps.engine import Cluster, run
+from sweeps.task import Done
 from tests.sweeps.dask_processes import DaskProcesses
 from tests.sweeps.processes_of import alive, new_family, start, wait_until
 from tests.sweeps.sweep_fakes import Number, square

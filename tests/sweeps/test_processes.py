@@ -11,7 +11,8 @@ import pytest
 from joblib.externals.loky import get_reusable_executor
 
 from sweeps import worker
-from sweeps.engine import Cluster, Done, run
+from sweeps.engine import Cluster, run
+from sweeps.task import Done
 from tests.sweeps.processes_of import alive, new_family, start, wait_until
 from tests.sweeps.sweep_fakes import Number, square
 
