@@ -174,7 +174,7 @@ def test_odd_files_are_refused(tmp_path):
     path.write_text("time_s,pressure_command_bar,pressure_bar\n")
     assert "no rows below the header" in refusal(path)
     path.write_text("time_s,pressure_command_bar,pressure_bar,pressure_bar\n0,1,1,1\n")
-    assert "column pressure_bar stands twice" in refusal(path)
+    assert "column pressure_bar appears twice" in refusal(path)
     path.write_text("time_s,pressure_command_bar,pressure_bar\n0,1,1\n0.02,1\n0.04,1,1,1\n")
     assert "3 cells a row are needed, got 2 in rows 3 and 4" in refusal(path)
     assert "5 rows are no recording" in refusal(write(tmp_path, sheet(5)))

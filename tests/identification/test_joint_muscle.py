@@ -57,5 +57,5 @@ def test_muscle_at_rest_carries_its_load() -> None:
     "joint", [AntagonisticJoint.reduced(), AntagonisticJoint.paper("none")], ids=["reduced", "none"]
 )
 def test_plant_without_hysteresis_of_its_muscles_is_refused(joint: AntagonisticJoint) -> None:
-    with pytest.raises(ValueError, match="has no muscle that remembers"):
+    with pytest.raises(ValueError, match="has no muscle with hysteresis"):
         HangingMuscle(joint)
