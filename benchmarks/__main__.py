@@ -62,8 +62,7 @@ def run(
         address: Of the Dask scheduler, like tcp://host:8786.
         dry_run: List the cells and whether they are there, and stop.
     """
-    from benchmarks.runs import console as telling
-    from benchmarks.runs import runner
+    from benchmarks.runs import console, runner
 
     folder = runner.CELLS if cells is None else cells
     options = runner.Options(jobs, force, out, folder, backend, address)
@@ -84,7 +83,7 @@ def run(
     print(f"looking at {len(pairs)} rows: what they need, and what is there", file=sys.stderr)
     with progress("cells") as start:
         report = runner.run(pairs, options, start)
-    return telling.run(report)
+    return console.run(report)
 
 
 def audit(
@@ -110,8 +109,7 @@ def audit(
         address: Of the Dask scheduler, like tcp://host:8786.
     """
     from benchmarks.identity import audit as auditing
-    from benchmarks.runs import console as telling
-    from benchmarks.runs import runner
+    from benchmarks.runs import console, runner
 
     if bool(track) == all:
         raise ValueError("name tracks, or give --all")
@@ -121,10 +119,10 @@ def audit(
     pairs = runner.pairs_of(controllers.available().values(), tracks)
     for chosen in tracks:
         drawn = auditing.draw(chosen, [entrant for entrant, other in pairs if other is chosen])
-        print(f"{chosen.name}: {telling.round_in_words(drawn)}", flush=True)
+        print(f"{chosen.name}: {console.round_in_words(drawn)}", flush=True)
     with progress("cells") as start:
         report = runner.run(pairs, options, start)
-    return telling.run(report)
+    return console.run(report)
 
 
 def cite(row: Positional[tuple[str, ...]]) -> int:
@@ -193,48 +191,63 @@ def verify(
     row: Positional[tuple[str, ...]] = (),
     jobs: int = os.cpu_count() or 1,
     all: bool = False,
-    compare: Literal["either", "bits", "elsewhere"] = "either",
     backend: Literal["loky", "dask"] = "loky",
     address: str = "",
 ) -> int:
-    """Run rows again from their own record; exit code 1 if one has drifted.
+    """Compute rows again and compare; exit code 1 if one has drifted.
 
-    A row must come out equal to the last bit. One that was made with other packages or on another
-    processor, where last digits differ, has to agree nearly, and is noted as verified elsewhere.
-
-    What holds is noted in verified.json beside the rows; exit code 2 if that is refused, since
-    code is not as in the last commit.
+    A row must be reproduced to the last bit, or within rounding if it was made with other packages
+    or on another processor. The result is noted in verified.json beside the rows.
 
     Args:
         row: Files or names of rows.
         jobs: Processes of this machine.
         all: Every row of benchmarks/results.
-        compare: To the last bit, nearly as of another machine, or whichever the row asks for.
         backend: Processes of this machine, or a running Dask cluster.
         address: Of the Dask scheduler, like tcp://host:8786.
     """
-    from benchmarks.identity import verified
-    from benchmarks.identity import verify as checking
-    from benchmarks.runs import console as telling
+    from benchmarks.runs import console, verified
+    from benchmarks.runs import verify as checking
     from sweeps.engine import Cluster
 
-    paths = [_row_path(name) for name in row]
-    paths += rows.files() if all else []
-    if not paths:
-        raise ValueError("name a row, or give --all")
-    verdicts, refusal = [], verified.refusal()
-    for path in paths:
-        found = checking.verify(path, Cluster(jobs, backend, address), compare)
-        if not refusal:
-            verified.note(path, found.checksum if found.holds else "", found.mode, found.sources)
-        telling.verdict(found)
+    verdicts = []
+    for path in _row_paths(row, all):
+        found = checking.verify(path, Cluster(jobs, backend, address))
+        verified.note(path, found.checksum if found.holds else "", found.mode)
+        console.verdict(found)
         verdicts.append(found)
     if len(verdicts) > 1:
-        print(telling.counted(verdicts))
-    if refusal:
-        print(f"error: {refusal}", file=sys.stderr)
-    drifted = sum(not found.holds for found in verdicts)
-    return 1 if drifted else 2 if refusal else 0
+        print(console.counted(verdicts))
+    return 1 if any(not found.holds for found in verdicts) else 0
+
+
+def void(row: Positional[tuple[str, ...]] = (), all: bool = False) -> int:
+    """List rows whose task or controller has changed, by behaviour; exit code 1 if there are some.
+
+    Every environment runs one short episode and every controller answers stored observations;
+    no row is computed again.
+
+    Args:
+        row: Files or names of rows.
+        all: Every row of benchmarks/results.
+    """
+    from benchmarks.runs import verify as checking
+
+    paths, count = _row_paths(row, all), 0
+    for path in paths:
+        why = checking.void(rows.load(path))
+        count += bool(why)
+        if why:
+            print(f"{rows.name_of(path)}: {'; '.join(why)}", flush=True)
+    print(f"{count} of {len(paths)} rows are void")
+    return 1 if count else 0
+
+
+def _row_paths(names: tuple[str, ...], all: bool) -> list[Path]:
+    paths = [_row_path(name) for name in names] + (rows.files() if all else [])
+    if not paths:
+        raise ValueError("name a row, or give --all")
+    return paths
 
 
 def _row_path(name: str) -> Path:
@@ -464,6 +477,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "board": board,
     "site": site,
     "verify": verify,
+    "void": void,
     "audit": audit,
     "cite": cite,
     "show-row": show_row,

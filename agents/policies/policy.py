@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import math
 from pathlib import Path
 from typing import Any
 
@@ -244,6 +245,13 @@ def _signals(described: Any, name: str) -> Signals:
         raise PolicyFileError(f"{name}: its card describes no signals ({error})") from error
 
 
+def _equal(a: Any, b: Any) -> bool:
+    """Return whether two entries of a signal are equal, numbers up to the rounding of a product."""
+    if isinstance(a, float) and isinstance(b, float):
+        return math.isclose(a, b, rel_tol=1e-12)
+    return bool(a == b)
+
+
 def _compare(mine: Signals, theirs: Signals, what: str) -> None:
     a, b = list(mine.names()), list(theirs.names())
     if a != b:
@@ -253,7 +261,7 @@ def _compare(mine: Signals, theirs: Signals, what: str) -> None:
         )
     for trained, given in zip(mine, theirs, strict=True):
         for field in FIELDS:
-            if getattr(trained, field) != getattr(given, field):
+            if not _equal(getattr(trained, field), getattr(given, field)):
                 raise PolicyFileError(
                     f"{what}: {trained.name} had {field} = {getattr(trained, field)!r} in "
                     f"training, now {getattr(given, field)!r}; make the environment alike"

@@ -162,18 +162,17 @@ def failures_of(row: Mapping[str, Any], split: str = "") -> tuple[int, int]:
 
 
 def is_verified(row: Mapping[str, Any]) -> bool:
-    """Return whether the row was run again with the code as it is and held, nearly at least."""
-    found = row.get(VERIFIED)
-    return bool(found) and not found["older"]
+    """Return whether the row was reproduced, to the last bit or within tolerance."""
+    return bool(row.get(VERIFIED))
 
 
 def verified_words(row: Mapping[str, Any]) -> str:
-    """Return whether and when the row was run again and came out the same, and with which code."""
+    """Return whether and when the row was reproduced."""
     found = row.get(VERIFIED)
     if not found:
         return "not verified yet"
     where = " elsewhere" if found["mode"] == "elsewhere" else ""
-    return f"verified {found['date']}{where}" + (", at an older code" if found["older"] else "")
+    return f"verified {found['date']}{where}"
 
 
 JUMPING = ("steps", "staircase")

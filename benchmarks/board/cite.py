@@ -9,7 +9,6 @@ import yaml
 
 from benchmarks.board import accessors as views
 from benchmarks.board.format import bounded
-from benchmarks.identity import audit
 from benchmarks.runs.provenance import ROOT
 from benchmarks.runs.rows import shown
 from benchmarks.runs.store import CHECKSUM
@@ -123,7 +122,7 @@ def _row_entry(row: Mapping[str, Any]) -> str:
         f"environment {env['id']}",
         f"scenarios {row['scenarios']['name']} version {row['scenarios']['version']}",
         f"task {row['task'][:16]}",
-        f"artefact {audit.artefact_of(row)[:16]}",
+        f"artefact {row['controller']['artefact']['digest'][:16]}",
         f"commit {row['made_with']['commit']}",
         f"SHA-256 of the row {row[CHECKSUM]}",
     ]
@@ -136,7 +135,7 @@ def _row_entry(row: Mapping[str, Any]) -> str:
         "note": ", ".join(map(_unbraced, said)),
         "howpublished": f"python -m benchmarks verify {row['row']}",
     }
-    return entry(f"{_key(row['row'])}-{audit.artefact_of(row)[:8]}", fields)
+    return entry(f"{_key(row['row'])}-{row['controller']['artefact']['digest'][:8]}", fields)
 
 
 def _unbraced(text: str) -> str:

@@ -12,8 +12,8 @@ from benchmarks.board.environment_page import page_text
 from benchmarks.board.format import number, table
 from benchmarks.board.summary import board_text
 from benchmarks.board.words import short_env
-from benchmarks.identity import audit, verified
-from benchmarks.runs import controllers, rows
+from benchmarks.identity import audit
+from benchmarks.runs import rows, verified
 from benchmarks.runs.rows import Row
 from benchmarks.runs.store import write_text
 
@@ -32,8 +32,8 @@ def load(folder: Path) -> list[Row]:
     """
     if not folder.is_dir():
         raise ValueError(f"{folder}: no such folder of rows; run `python -m benchmarks run` first")
-    found, entrants = verified.read(folder), controllers.available()
-    return [_in_round(row, verified.of(row, found, entrants)) for row in rows.load_all(folder)]
+    found = verified.read(folder)
+    return [_in_round(row, verified.of(row, found)) for row in rows.load_all(folder)]
 
 
 def _in_round(row: Row, verification: Mapping[str, Any] | None) -> Row:

@@ -14,7 +14,6 @@ from benchmarks.board.claims import Claim
 from benchmarks.board.columns import Column, columns_of, with_costs
 from benchmarks.board.format import percent
 from benchmarks.board.standings import Changes, Listing, Track
-from benchmarks.identity import audit
 from benchmarks.runs.cells import PUBLIC
 from benchmarks.runs.rows import Row, shown
 from benchmarks.runs.store import CHECKSUM
@@ -157,7 +156,7 @@ def _origin(row: Row) -> dict[str, Any]:
         },
         "audit": _audit_words(row),
         "task": row.get("task", ""),
-        "artefact": audit.artefact_of(row) if controller.get("artefact") else "",
+        "artefact": controller["artefact"]["digest"] if controller.get("artefact") else "",
         "checksum": row.get(CHECKSUM, ""),
         "made_with": ", ".join(f"{name} {v}" for name, v in sorted(made["packages"].items())),
         "commit": made["commit"],

@@ -1,1 +1,1 @@
-"""identity."""
+"""Identity of tasks and controllers by behaviour, and audit rounds."""

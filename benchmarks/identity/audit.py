@@ -1,53 +1,44 @@
-"""Audit rounds: seeds from the task, all artefacts of a track, and a salt drawn after them.
+"""Audit rounds: seeds drawn once for all controllers of a track, after they were frozen.
 
-Whoever makes a controller can try it on the public seeds as often as he likes. What the board
-compares is therefore episodes whose seeds nobody could know: the first eight bytes of
+Public seeds can be tried as often as the maker of a controller likes. Controllers are therefore
+compared on episodes whose seeds nobody could know: the first eight bytes, less their last eleven
+bits so that every reader of JSON holds the number exactly, of
 
-    sha256(task | entrants | salt | scenario | number)
+    sha256(frozen | salt | scenario | number)
 
-less their last eleven bits, so that every reader of JSON holds the number exactly. *Entrants* is
-the digest of all artefacts of the track by their controllers' names. The maintainer draws one salt
-for all of them, once git has them as committed, so that all are compared on the same episodes.
-Rounds are only ever added to ``rounds.json``; what has changed since the last one is self-reported
-until the next.
-
-A controller that is designed when it is built, by a Riccati equation say, holds other last digits
-on another processor, and its artefact is another by its digest. It is in the round all the same if
-git says that what it is made of is, byte by byte, what it was when the salt was drawn.
+where *frozen* is the digest of the task and of all artefacts of the track, and the salt is drawn
+after them. Rounds are only added to ``rounds.json``; a controller or task that changed since the
+last round reports itself until the next one.
 """
 
 from __future__ import annotations
 
 import datetime
 import hashlib
-import importlib
-import inspect
 import json
 import math
 import secrets
-import subprocess
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import yaml
 from filelock import FileLock
 
 from benchmarks.identity import artefacts, tasks, trainings
+from benchmarks.identity.artefacts import Artefact
 from benchmarks.identity.hashing import digest
-from benchmarks.identity.source_code import code_text
 from benchmarks.runs import provenance
 from benchmarks.runs.controllers import Entrant
 from benchmarks.runs.store import write_text
-from benchmarks.scenarios import scenario as scenarios
 from benchmarks.scenarios.scenario import ScenarioSet
 
 FILE = Path(__file__).resolve().parents[1] / "rounds.json"
 EPISODES = 30
-"""Audit episodes that a row has at least."""
+"""Audit episodes of a row, at least."""
 PER_SCENARIO = 2
-"""And at least so many of each scenario, since an interval needs the scatter within one."""
+"""Audit episodes of each scenario, at least: an interval needs the scatter within one."""
 
 
 @dataclass(frozen=True)
@@ -59,20 +50,23 @@ class Round:
     track : str
     number : int
         From 1 in each track.
-    task : str
-        Digest of the task.
-    entrants : mapping of str
-        Digest of the artefact of each controller.
+    task : mapping
+        Record of the task's identity.
+    entrants : mapping of mapping
+        Record of each controller's artefact by name.
+    frozen : str
+        Digest of task and artefacts from which the seeds are derived.
     salt, drawn : str
         ``drawn`` is the day.
     commit : str
-        In which all of it was committed.
+        Commit of the checkout in which the salt was drawn; a note.
     """
 
     track: str
     number: int
-    task: str
-    entrants: Mapping[str, str]
+    task: Mapping[str, Any]
+    entrants: Mapping[str, Mapping[str, Any]]
+    frozen: str
     salt: str
     drawn: str
     commit: str
@@ -80,38 +74,42 @@ class Round:
     def seeds(self, names: Sequence[str]) -> dict[str, tuple[int, ...]]:
         """Return the audit seeds of each of a track's scenarios."""
         each = max(PER_SCENARIO, math.ceil(EPISODES / len(names)))
-        all_artefacts = digest(self.entrants)
         return {
-            name: tuple(seed_of(self.task, all_artefacts, self.salt, name, k) for k in range(each))
+            name: tuple(seed_of(self.frozen, self.salt, name, k) for k in range(each))
             for name in names
         }
+
+    def changes(self, entrant: Entrant, track: ScenarioSet) -> list[str]:
+        """Return the differences of the present task and controller from the frozen ones."""
+        if entrant.name not in self.entrants:
+            return [f"no entrant of round {self.number}"]
+        found = tasks.of(track).identity.changes(self.task)
+        return found + artefacts.of(entrant, track).changes(self.entrants[entrant.name])
 
 
 @dataclass(frozen=True)
 class Audit:
-    """A controller's place in the last round of a track.
+    """Place of a controller in the last round of a track.
 
     Attributes
     ----------
     round : Round
+    artefact : str
+        Digest of the controller's artefact in that round.
     entry : int
-        How many different artefacts the controller's name has had in the rounds of the track.
+        Number of different artefacts that the controller's name has had in the track's rounds.
     seeds : mapping of tuple
         Seeds of each scenario.
-    artefact : str
-        Digest that the round has of it, where it is another here since it is designed here; empty
-        otherwise.
     """
 
     round: Round
+    artefact: str
     entry: int
     seeds: Mapping[str, tuple[int, ...]]
-    artefact: str = ""
 
     def record(self) -> dict[str, Any]:
-        """Return the audit as a row holds it, less its scores; ``artefact`` where it is another."""
-        drawn_as = {"artefact": self.artefact} if self.artefact else {}
-        return drawn_as | {
+        """Return the audit in the form of a row, without its scores."""
+        return {
             "round": self.round.number,
             "salt": self.round.salt,
             "drawn": self.round.drawn,
@@ -121,9 +119,9 @@ class Audit:
         }
 
 
-def seed_of(task: str, entrants: str, salt: str, scenario: str, number: int) -> int:
+def seed_of(frozen: str, salt: str, scenario: str, number: int) -> int:
     """Return a seed, 53 bits."""
-    text = "|".join((task, entrants, salt, scenario, str(number)))
+    text = "|".join((frozen, salt, scenario, str(number)))
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big") >> 11
 
 
@@ -139,24 +137,35 @@ def rounds(file: Path | None = None) -> list[Round]:
     if not path.exists():
         return []
     try:
-        found = [Round(**entry) for entry in json.loads(path.read_text("utf-8"))["rounds"]]
+        found = list(_parsed(path.read_text("utf-8")))
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(f"{path}: not a list of rounds ({error}); restore it from git") from error
     for number, entry in _numbered(found):
         if entry.number != number:
             raise ValueError(
-                f"{path}: round {entry.number} of {entry.track} stands where round {number} has "
-                "to be; restore the file from git"
+                f"{path}: round {entry.number} of {entry.track} in place of round {number}; "
+                "restore the file from git"
             )
     return found
 
 
+@lru_cache(maxsize=2)
+def _parsed(text: str) -> tuple[Round, ...]:
+    return tuple(Round(**entry) for entry in json.loads(text)["rounds"])
+
+
 def _numbered(found: Iterable[Round]) -> Iterable[tuple[int, Round]]:
-    """Yield rounds with the numbers that they have to have."""
+    """Yield rounds with the numbers that they must have."""
     seen: dict[str, int] = {}
     for entry in found:
         seen[entry.track] = seen.get(entry.track, 0) + 1
         yield seen[entry.track], entry
+
+
+def write(found: Iterable[Round]) -> None:
+    """Write the file of rounds."""
+    text = json.dumps({"rounds": [asdict(entry) for entry in found]}, indent=1)
+    write_text(FILE, text + "\n")
 
 
 def last(track: str, file: Path | None = None) -> Round | None:
@@ -165,80 +174,27 @@ def last(track: str, file: Path | None = None) -> Round | None:
 
 
 def find(entrant: Entrant, track: ScenarioSet) -> Audit | None:
-    """Return the audit of a controller as it is now, ``None`` where it is in no last round.
-
-    It is in the round if its artefact is, or if it is what was drawn but for last digits.
-    """
+    """Return the audit of a controller, ``None`` unless it and the task are those of the round."""
     found = last(track.name)
     if found is None or entrant.name not in found.entrants:  # saves building controllers
         return None
-    artefact = artefacts.of(entrant, track).digest
-    return _place(found, entrant, track, tasks.task_digest(track), artefact)
-
-
-def of_row(row: Mapping[str, Any], entrant: Entrant, track: ScenarioSet) -> Audit | None:
-    """Return the audit of the artefact that a row says it is of.
-
-    Whether the controller is what was drawn is told by :func:`history`. One whose digest the round
-    does not know may have been designed on another machine; then it has to be.
-    """
-    found, artefact = last(track.name), row["controller"]["artefact"]["digest"]
-    if found is None or entrant.name not in found.entrants:
+    if found.changes(entrant, track):
         return None
-    return _place(found, entrant, track, row["task"], artefact)
-
-
-def _place(
-    found: Round, entrant: Entrant, track: ScenarioSet, task: str, artefact: str
-) -> Audit | None:
-    """Return the audit of an artefact in a round that knows its controller."""
-    if found.task != task or not _is_of(found, entrant, track, artefact):
-        return None
-    name, drawn_as = entrant.name, found.entrants[entrant.name]
-    mine = [entry for entry in rounds() if entry.track == track.name]
-    had = {entry.entrants[name] for entry in mine if name in entry.entrants}
-    seeds = found.seeds([scenario.name for scenario in track.scenarios()])
-    return Audit(found, len(had), seeds, "" if artefact == drawn_as else drawn_as)
-
-
-def _is_of(found: Round, entrant: Entrant, track: ScenarioSet, artefact: str) -> bool:
-    """Return whether a round is of an artefact, or of what it is but for last digits.
-
-    Of the latter it is if git knows that its commit holds all that the controller is made of.
-    """
-    if artefact == found.entrants[entrant.name]:
-        return True
-    said = history(found, entrant, track)
-    return said.complete and not said.wrong
-
-
-def _designer(entrant: Entrant) -> Path | None:
-    """Return the package that designs a controller: its own, or that of what it corrects.
-
-    A policy is designed by none: it is a file.
-    """
-    name = entrant.source.partition(".")[0]
-    if entrant.files:
-        name = artefacts.BASELINES if entrant.kind == artefacts.RESIDUAL else ""
-    if not name:
-        return None
-    page = Path(inspect.getfile(importlib.import_module(name))).resolve()
-    return page.parent if page.name == "__init__.py" else page
-
-
-def artefact_of(row: Mapping[str, Any]) -> str:
-    """Return the digest of a row's artefact, that of its round where it was designed elsewhere."""
-    own = row["controller"]["artefact"]["digest"]
-    return str((row["audit"] or {}).get("artefact", own))
+    names = [scenario.name for scenario in track.scenarios()]
+    own = [entry.entrants.get(entrant.name) for entry in rounds() if entry.track == track.name]
+    different = {record["digest"] for record in own if record}
+    artefact = str(found.entrants[entrant.name]["digest"])
+    return Audit(found, artefact, len(different), found.seeds(names))
 
 
 def in_last_round(row: Mapping[str, Any]) -> bool:
-    """Return whether a row's audit is of the last round of its track; if not, it reports itself."""
-    found, said, name = last(row["scenarios"]["name"]), row["audit"], row["controller"]["name"]
+    """Return whether task, controller and salt of a row are those of its track's last round."""
+    found, said, about = last(row["scenarios"]["name"]), row["audit"], row["controller"]
     if found is None or said is None:
         return False
-    mine = (row["task"], artefact_of(row), said["round"], said["salt"])
-    return mine == (found.task, found.entrants.get(name), found.number, found.salt)
+    entry = found.entrants.get(about["name"], {})
+    mine = (row["task"], about["artefact"]["digest"], said["round"], said["salt"])
+    return mine == (found.task["digest"], entry.get("digest"), found.number, found.salt)
 
 
 def draw(track: ScenarioSet, entrants: Sequence[Entrant]) -> Round:
@@ -247,154 +203,33 @@ def draw(track: ScenarioSet, entrants: Sequence[Entrant]) -> Round:
     Raises
     ------
     ValueError
-        If something is not as in the last commit, an older round was changed, or policies are not
-        of different training seeds.
+        If policies are not of different training seeds.
     """
     with FileLock(FILE.with_name(f".{FILE.name}.lock")):
         for entrant in entrants:
             trainings.check_files(entrant)
-        task = tasks.task_digest(track)
-        here = {entrant.name: artefacts.of(entrant, track).digest for entrant in entrants}
+        task = tasks.of(track).identity
+        here = {entrant.name: artefacts.of(entrant, track) for entrant in entrants}
         there = last(track.name)
-        same = there is not None and (there.task, set(there.entrants)) == (task, set(here))
-        if same and all(_is_of(there, one, track, here[one.name]) for one in entrants):
+        if there is not None and _same(there, task, here):
             return there
-        check_only_added()
-        _check_committed(track, entrants)
+        records = {name: made.record() for name, made in here.items()}
         made = Round(
             track=track.name,
             number=1 if there is None else there.number + 1,
-            task=task,
-            entrants=here,
+            task=task.record(),
+            entrants=records,
+            frozen=digest({"task": task.digest, "entrants": records}),
             salt=secrets.token_hex(16),
             drawn=datetime.datetime.now(datetime.UTC).date().isoformat(),
-            commit=provenance.git("rev-parse", "HEAD", folder=FILE.parent),
+            commit=provenance.commit(),
         )
-        text = json.dumps({"rounds": [asdict(entry) for entry in [*rounds(), made]]}, indent=1)
-        write_text(FILE, text + "\n")
+        write([*rounds(), made])
     return made
 
 
-def _check_committed(track: ScenarioSet, entrants: Sequence[Entrant]) -> None:
-    """Raise unless artefacts, task and code are as in the last commit."""
-    files = {scenarios.FOLDER / f"{track.name}.yaml"}
-    files = files.union(*(artefacts.files_of(entrant, track) for entrant in entrants))
-    names = [file.name for file in artefacts.uncommitted(files)] or provenance.changed()
-    if names:
-        raise ValueError(
-            f"{track.name}: not as in the last commit: {provenance.listed(names)}; commit it "
-            "first, the salt is drawn after it"
-        )
-
-
-def check_only_added() -> None:
-    """Raise if a round that the last commit holds was changed, moved or taken out.
-
-    Raises
-    ------
-    ValueError
-        Naming the file. A file outside of a checkout has no history to compare with.
-    """
-    try:
-        committed = artefacts.committed_bytes(FILE)
-    except ValueError:
-        return
-    old = [Round(**entry) for entry in json.loads(committed)["rounds"]] if committed else []
-    if rounds()[: len(old)] != old:
-        raise ValueError(f"{FILE}: rounds of the last commit were changed; restore it from git")
-
-
-@dataclass(frozen=True)
-class History:
-    """What git says of a round.
-
-    Attributes
-    ----------
-    wrong : tuple of str
-        What contradicts it.
-    unknown : str
-        Why something could not be looked up, empty if all could.
-    complete : bool
-        Whether all was looked up that a controller is made of, the package that designs it too.
-    """
-
-    wrong: tuple[str, ...] = ()
-    unknown: str = ""
-    complete: bool = False
-
-
-def history(found: Round, entrant: Entrant, track: ScenarioSet) -> History:
-    """Return whether the commit of a round is one of this checkout, and holds artefact and task.
-
-    Where the artefact is another by its digest, its last digits may differ and nothing that makes
-    them: all files of the package that designs it are compared byte by byte.
-    """
-    try:
-        top = artefacts.top_of(FILE.parent)
-        shallow = provenance.git("rev-parse", "--is-shallow-repository", folder=top) == "true"
-    except (OSError, subprocess.SubprocessError):
-        return History(unknown="this is no git checkout: the commit of the round was not looked up")
-    try:
-        provenance.git("merge-base", "--is-ancestor", found.commit, "HEAD", folder=top)
-    except subprocess.CalledProcessError:
-        if shallow:
-            return History(
-                unknown="this clone is shallow: the commit of the round was not looked up; "
-                "`git fetch --unshallow` gets it"
-            )
-        return History((f"audit.commit: {found.commit[:12]} is none of the present commit's past",))
-    files = sorted(artefacts.files_of(entrant, track) | tasks.files_of(track))
-    inside = [file for file in files if file.is_relative_to(top)]
-    touched = _touched(found.commit, inside, top)
-    other = [file.name for file in touched if not _same(entrant, found.commit, file, top)]
-    designer = _designer(entrant)
-    complete = designer is not None and designer.is_relative_to(top)
-    if complete and artefacts.of(entrant, track).digest != found.entrants.get(entrant.name):
-        other += _other_bytes(found.commit, designer, top)
-    outside = provenance.listed([file.name for file in files if not file.is_relative_to(top)])
-    return History(
-        tuple(f"audit.commit: {found.commit[:12]} has another {name}" for name in other),
-        f"not looked up in the round's commit, as outside of its checkout: {outside}"
-        if outside
-        else "",
-        complete,
-    )
-
-
-def _other_bytes(commit: str, place: Path, top: Path) -> list[str]:
-    """Return the files under a folder that are not as in a commit, also those that git ignores not.
-
-    What docstrings say may be read as data, and so may files of any kind.
-    """
-    commands = (
-        ("diff", "--no-renames", "--name-only", commit),
-        ("ls-files", "--others", "--exclude-standard"),
-    )
-    said = [provenance.git(*command, "--", str(place), folder=top) for command in commands]
-    return sorted({name for lines in said for name in lines.splitlines()})
-
-
-def _touched(commit: str, files: Sequence[Path], top: Path) -> list[Path]:
-    """Return the files that are not, byte by byte, those of a commit."""
-
-    def names(*command: str) -> set[str]:
-        said = provenance.git(*command, "-z", "--name-only", commit, folder=top)
-        return set(said.split("\0"))
-
-    there, changed = names("ls-tree", "-r"), names("diff", "--no-renames")
-    placed = {file: file.relative_to(top).as_posix() for file in files}
-    return [file for file, name in placed.items() if name in changed or name not in there]
-
-
-def _same(entrant: Entrant, commit: str, file: Path, top: Path) -> bool:
-    """Return whether a file says the same in a commit: policies to the byte, code as code.
-
-    Of the knobs those of the controller count, since searches for others add to their file.
-    """
-    then, now = artefacts.bytes_at(commit, file, top), file.read_bytes()
-    if then is not None and file == artefacts.TUNED:
-        said = (yaml.safe_load(then) or {}).get("tuned") or {}
-        return said.get(entrant.tuned, {}).get("knobs") == dict(entrant.knobs)
-    if then is None or file.suffix != ".py":
-        return then == now
-    return code_text(then.decode()) == code_text(now.decode())
+def _same(there: Round, task: tasks.Identity, here: Mapping[str, Artefact]) -> bool:
+    """Return whether a round froze this task and these controllers."""
+    if task.changes(there.task) or set(there.entrants) != set(here):
+        return False
+    return not any(made.changes(there.entrants[name]) for name, made in here.items())

@@ -1,48 +1,130 @@
-"""What a score is of: environment, scenarios, plants, models and scoring, in one digest."""
+"""Identity of a task: scenarios, parameters of plants and models, trajectories and scores."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property, lru_cache
 from typing import Any
 
 import gymnasium as gym
 
-from benchmarks.identity.hashing import SOURCES, digest, sources_digest
-from benchmarks.identity.source_code import code_digest
-from benchmarks.runs.provenance import HERE, ROOT, SCORING
+from benchmarks.identity import behaviour
+from benchmarks.identity.hashing import digest
 from benchmarks.scenarios.scenario import ScenarioSet
 from benchmarks.scenarios.scenario_env import make_env, model_of
 
-GROUPS_OF = {
-    "metrics_knee.py": {"range", "gait"},
-    "metrics_elbow.py": {"elbow"},
-    "metrics_joint.py": {"joint", "chain"},
-}
-"""Pages of metrics that only tracks with one of these groups are scored by."""
-ENVIRONMENTS = ROOT / "pam_envs"
-"""Package of the environments, whose code is of every task."""
+
+@dataclass(frozen=True)
+class Setting:
+    """Inputs from which the controllers of a track are built.
+
+    Attributes
+    ----------
+    model : object
+        Nominal plant.
+    env : gymnasium.Env
+        Only its named signals are used.
+    observations : sequence of ndarray, shape (n, n_signals)
+        Observations whose answers identify a controller.
+    """
+
+    model: Any
+    env: Any
+    observations: behaviour.Sequences
 
 
 @dataclass(frozen=True)
-class Built:
-    """What is known of a track once its environments were built.
+class Identity:
+    """Parts of a task's identity.
+
+    Attributes
+    ----------
+    scenarios : str
+        Digest of the scenario file's content.
+    plants, models : mapping of str
+        Digest of the parameters of each scenario's plant, and of its nominal model.
+    trajectories : mapping of str
+        Hash of each scenario's trajectory under fixed actions.
+    scores : mapping of str
+        Digest of each scenario's scores of that trajectory.
+    """
+
+    scenarios: str
+    plants: Mapping[str, str]
+    models: Mapping[str, str]
+    trajectories: Mapping[str, str]
+    scores: Mapping[str, str]
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of all parts."""
+        return digest(asdict(self))
+
+    def record(self) -> dict[str, Any]:
+        """Return the parts and their digest in JSON's types."""
+        return {"digest": self.digest, **asdict(self)}
+
+    def changes(self, record: Mapping[str, Any]) -> list[str]:
+        """Return a sentence for every part that differs from a recorded identity."""
+        if record["digest"] == self.digest:
+            return []
+        own, found = asdict(self), []
+        for part, value in own.items():
+            old = record.get(part)
+            if not isinstance(value, Mapping) or not isinstance(old, Mapping):
+                found += [f"{part} changed"] if value != old else []
+                continue
+            names = [n for n in {**old, **value} if old.get(n) != value.get(n)]
+            found += [f"{part} changed: {', '.join(names)}"] if names else []
+        return found
+
+
+@dataclass(frozen=True)
+class Task:
+    """Track with its environments built once.
 
     Attributes
     ----------
     env : dict
-        Id, version and digest.
-    plants, models : dict of str
-        Digest of each scenario's plant, and of the model that controllers are told.
-    told : tuple of (model, gymnasium.Env)
-        What controllers are built from, each model and set of signals once.
+        Id and version of the environment.
+    identity : Identity
+    settings : tuple of Setting
+        Each nominal model and set of signals once.
     """
 
     env: dict[str, Any]
-    plants: dict[str, str]
-    models: dict[str, str]
-    told: tuple[tuple[Any, Any], ...]
+    identity: Identity
+    settings: tuple[Setting, ...]
+
+
+@lru_cache(maxsize=64)
+def of(track: ScenarioSet) -> Task:
+    """Return a track's task; every environment runs one episode, once in a process."""
+    plants, models, trajectories, scores = ({} for _ in range(4))
+    settings: dict[Any, tuple[Any, Any]] = {}
+    observed: dict[Any, list[behaviour.Sequences]] = {}
+    for scenario in track.scenarios():
+        env = make_env(track.env, scenario.kwargs)
+        model, base = model_of(track.env, scenario, env), env.unwrapped
+        plants[scenario.name], models[scenario.name] = base.plant.digest(), model.digest()
+        found = behaviour.of_environment(env, track.content, scenario.rests)
+        trajectories[scenario.name] = found.trajectory
+        scores[scenario.name] = digest(found.scores)[:16]
+        key = (model.digest(), *base.signals, *base.action_signals)
+        settings.setdefault(key, (model, env))
+        observed.setdefault(key, []).append(found.observations)
+        env.close()
+    identity = Identity(track.digest, plants, models, trajectories, scores)
+    about = {"id": track.env, "version": env_version(track.env)}
+    made = (Setting(*settings[key], _spread(found)) for key, found in observed.items())
+    return Task(about, identity, tuple(made))
+
+
+def _spread(found: Sequence[behaviour.Sequences]) -> behaviour.Sequences:
+    """Return one episode's observations, each part from another scenario as far as there are."""
+    parts = len(found[0])
+    return tuple(found[k * len(found) // parts][k] for k in range(parts))
 
 
 def env_version(env: str) -> int:
@@ -74,78 +156,3 @@ def check_version(env: str, row: str) -> None:
             f"{row} is of {env}, and this checkout has {here}: results of different versions are "
             "not compared; run the controller again here, or check out the commit of the row"
         )
-
-
-def describe_env(env: str) -> dict[str, Any]:
-    """Return id, version and digest of an environment: its registration, signals and plant."""
-    made = make_env(env, {})
-    base, spec = made.unwrapped, made.spec
-    about = {
-        "id": env,
-        "entry_point": str(spec.entry_point),
-        "kwargs": dict(gym.spec(env).kwargs),
-        "plant": base.plant.digest(),
-        "period": base.control_period,
-        "signals": [list(vars(signal).items()) for signal in base.signals],
-        "actions": [list(vars(signal).items()) for signal in base.action_signals],
-    }
-    made.close()
-    return {"id": env, "version": env_version(env), "digest": digest(about)}
-
-
-@lru_cache(maxsize=64)
-def built(track: ScenarioSet) -> Built:
-    """Return what the environments of a track are; they are built once in a process."""
-    plants, models = {}, {}
-    told: dict[Any, tuple[Any, Any]] = {}
-    for scenario in track.scenarios():
-        env = make_env(track.env, scenario.kwargs)
-        model, base = model_of(track.env, scenario, env), env.unwrapped
-        plants[scenario.name], models[scenario.name] = base.plant.digest(), model.digest()
-        told.setdefault((model.digest(), *base.signals, *base.action_signals), (model, env))
-        env.close()
-    return Built(describe_env(track.env), plants, models, tuple(told.values()))
-
-
-def scoring_files(groups: frozenset[str]) -> frozenset[Path]:
-    """Return the files of the code that runs and scores tracks of these groups."""
-    unused = {name for name, own in GROUPS_OF.items() if not own & groups}
-    return frozenset(HERE / name for name in set(SCORING) - unused)
-
-
-@lru_cache(maxsize=16)
-def scoring_digest(groups: frozenset[str]) -> str:
-    """Return the digest of what the code says that runs and scores tracks of these groups."""
-    return code_digest(scoring_files(groups), HERE)
-
-
-@lru_cache(maxsize=1)
-def environments_digest() -> str:
-    """Return the digest of what the environments' code says, and of their data."""
-    code = code_digest(ENVIRONMENTS.rglob("*.py"), ROOT)
-    return digest([code, sources_digest([ENVIRONMENTS], SOURCES - {".py"})])
-
-
-def files_of(track: ScenarioSet) -> frozenset[Path]:
-    """Return every file of code and data that a track's scores depend on, controllers aside."""
-    environments = (file for file in ENVIRONMENTS.rglob("*") if file.suffix in SOURCES)
-    return scoring_files(_groups(track)).union(environments)
-
-
-def _groups(track: ScenarioSet) -> frozenset[str]:
-    return frozenset(track.content.get("metrics") or ())
-
-
-def task_digest(track: ScenarioSet) -> str:
-    """Return the SHA-256 of environment, scenarios, plants, models, and the code that scores."""
-    found = built(track)
-    return digest(
-        {
-            "env": found.env,
-            "scenarios": track.content,
-            "scoring": scoring_digest(_groups(track)),
-            "environments": environments_digest(),
-            "plants": found.plants,
-            "models": found.models,
-        }
-    )

@@ -1,7 +1,7 @@
-"""The trainings behind a learned row: the first n seeds of one training, none twice or left out.
+"""Trainings of a learned row: the first n seeds of one training, none copied or left out.
 
-How much seeds differ is what several of them are for. A policy that is copied, a seed that is
-dropped because it came out badly, or a lucky one of other settings would make that look smaller.
+Several seeds show the scatter of a training. A copied policy, a seed that is dropped because of its
+score, or a lucky one of other settings would make it look smaller.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from benchmarks.runs.controllers import Entrant
 SETTINGS = (
     *("algo", "env", "env_kwargs", "plant", "plants", "signals", "action_signals", "steps"),
 )
-"""Of a card: what seeds of one training have in common."""
+"""Entries of a card that all seeds of one training share."""
 LEFT_OUT = ("search", "checkpoint_steps")
-"""Of a configuration: what changes nothing that is learned."""
+"""Entries of a configuration without effect on the training."""
 
 
 def of(entrant: Entrant) -> list[dict[str, Any]] | None:
-    """Return the training of each policy file as the card beside it says, ``None`` without any."""
+    """Return the training of each policy file from the record beside it, ``None`` without any."""
     if not entrant.files:
         return None
     return [{"training_seed": seed, **_beside(path)} for seed, path in entrant.files]
@@ -33,7 +33,7 @@ def of(entrant: Entrant) -> list[dict[str, Any]] | None:
 
 def _beside(policy: Path) -> dict[str, Any]:
     said = _json(policy)
-    known = {key: said[key] for key in ("command", "steps") if key in said}
+    known: dict[str, Any] = {key: said[key] for key in ("command", "steps") if key in said}
     return known | dict(said.get("training") or {})
 
 
@@ -43,13 +43,13 @@ def _json(policy: Path) -> dict[str, Any]:
 
 
 def card_record(controller: Any) -> dict[str, Any]:
-    """Return seed and settings of the training of a policy, as the card inside its file says."""
+    """Return seed and settings of the training of a policy, from the card inside its file."""
     card = getattr(controller, "card", None)
     said = dict(card) if isinstance(card, Mapping) else {}
     config = dict(said.get("config") or {})
     settings = {name: said.get(name) for name in SETTINGS}
     settings["config"] = {name: v for name, v in config.items() if name not in LEFT_OUT}
-    corrected = dict(said.get("baseline") or {})  # with a probe, whose digits machines change
+    corrected = dict(said.get("baseline") or {})  # recorded answers differ by rounding
     settings["baseline"] = [corrected.get(name) for name in ("name", "scale")]
     return {"seed": said.get("seed"), "settings": digest(settings)[:16]}
 
@@ -60,7 +60,7 @@ def check_files(entrant: Entrant) -> None:
     Raises
     ------
     ValueError
-        Saying what to do.
+        With the remedy.
     """
     seeds = [seed for seed, _ in entrant.files]
     if seeds != list(range(len(seeds))):

@@ -1,1 +1,1 @@
-"""runs."""
+"""Runs of controllers over scenarios, their rows, and verification."""

@@ -1,16 +1,13 @@
-"""A cell: one controller in one scenario, over its public or its audit seeds. It is kept as one.
+"""Cells of the checkpoint: one controller in one scenario, over its public or its audit seeds.
 
-What is computed as one is a group: the cells of one policy in one scenario, whose episodes run as
-rows of one batch. A record does not depend on the group that its cell was computed in.
+The cells of one policy in one scenario form a group, whose episodes are the rows of one batch. The
+record of a cell does not depend on its group.
 """
 
 from __future__ import annotations
 
-import base64
-import math
-import zlib
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -25,14 +22,12 @@ from benchmarks.runs import controllers, knowledge, provenance, rollout, traces
 from benchmarks.runs.controllers import Entrant
 from benchmarks.scenarios.scenario import Scenario, ScenarioSet
 from benchmarks.scenarios.scenario_env import make_batch, make_env, model_of, plant_digests
-from benchmarks.scoring import metrics
+from benchmarks.scoring.episodes import scores_of
 
-SCHEMA = 2
+SCHEMA = 3
 PUBLIC, AUDIT = "public", "audit"
 PROBED_STEPS = 250
 """Steps of the episode on which the use of the preview is measured."""
-MOST_ACTIONS = 10_000_000
-"""Numbers that the recorded actions of an episode may be."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +45,7 @@ class Cell:
     split : {"public", "audit"}
     seeds : tuple of int
     probe : bool
-        Whether the use of the preview and of the model is measured here.
+        Whether the use of the preview is measured here.
     """
 
     entrant: Entrant
@@ -63,7 +58,7 @@ class Cell:
 
     @property
     def key(self) -> str:
-        """Digest of all that the result depends on: the name under which it is kept."""
+        """Digest of everything that the result depends on: the name of its record."""
         grid = ("grid", "per_reference", "title", "seeds")
         return digest(
             {
@@ -77,13 +72,13 @@ class Cell:
                 "episodes": [self.split, self.training_seed, self.seeds, self.probe, self.drawn],
                 "packages": provenance.packages(),
                 "cpu": provenance.cpu(),
-                "sources": sources(self.entrant),
+                "sources": provenance.sources(),
             }
         )[:32]
 
     @property
     def first(self) -> bool:
-        """Whether actions and pictures of this cell are kept: of one training seed, public."""
+        """Whether pictures of this cell may be kept: public, of the first training seed."""
         return self.split == PUBLIC and self.training_seed == self.entrant.training_seeds[0]
 
     @property
@@ -97,14 +92,6 @@ class Cell:
         return artefacts.file_record(files[seed], seed) if seed is not None else None
 
 
-def sources(entrant: Entrant) -> dict[str, str]:
-    """Return digests of the code that a controller's scores depend on."""
-    found = provenance.sources(entrant.source.partition(".")[0], bool(entrant.files))
-    if entrant.kind == artefacts.RESIDUAL:
-        return provenance.sources(artefacts.BASELINES) | found
-    return found
-
-
 def cells_of(entrant: Entrant, track: ScenarioSet, found: Audit | None = None) -> list[Cell]:
     """Return the cells of a row, public ones first, by training seed and scenario.
 
@@ -113,7 +100,7 @@ def cells_of(entrant: Entrant, track: ScenarioSet, found: Audit | None = None) -
     entrant : Entrant
     track : ScenarioSet
     found : Audit, optional
-        Whose episodes are run as well.
+        Adds its episodes.
     """
     scenarios, public = track.scenarios(), track.seeds
     probed = next((s.name for s in scenarios if not s.rests), scenarios[0].name)
@@ -142,7 +129,7 @@ class Group:
 
     @property
     def key(self) -> str:
-        """Digest of all that the records depend on: no cell is in two groups."""
+        """Digest of everything that the records depend on: no cell is in two groups."""
         return self.cells[0].key
 
 
@@ -168,8 +155,6 @@ def compute(group: Group) -> dict[str, dict[str, Any]]:
         "track": track.name,
         "scenario": first.scenario.name,
         "training_seed": first.training_seed,
-        "controller_digest": controllers.parameters_digest(controller),
-        "code_digest": artefacts.controller_code(entrant, controller),
         "plant_digest": env.unwrapped.plant.digest(),
         "model_digest": model.digest(),
         "knows_plant": knowledge.knows_plant(entrant, controller, model, env),
@@ -181,8 +166,6 @@ def compute(group: Group) -> dict[str, dict[str, Any]]:
     records = {}
     for cell in group.cells:
         record = {**said, "split": cell.split}
-        if cell.probe and entrant.knowledge in knowledge.IGNORANT:
-            record["uses_model"] = knowledge.uses_model(entrant, model, env, cell.training_seed)
         own = [next(episodes) for _ in cell.seeds]
         numbered = zip(cell.seeds, own, strict=True)
         record["episodes"] = [episode_record(cell, seed, episode) for seed, episode in numbered]
@@ -210,10 +193,8 @@ def _controller(cell: Cell, model: Any, env: Any) -> controllers.Controller:
 def _kept(
     cell: Cell, env: Any, controller: Any, seed: int, episode: rollout.Episode
 ) -> dict[str, Any]:
-    """Return what a record keeps of one episode: its actions, its picture, the preview's use."""
+    """Return the parts of a record from one episode: its picture, and the use of the preview."""
     kept: dict[str, Any] = {}
-    if cell.entrant.files:
-        kept["actions"] = {str(seed): pack(episode.actions)}
     if cell.drawn and len(episode.actions):
         content = cell.track.content
         made = traces.of_episode(
@@ -239,16 +220,8 @@ def _preview_seconds(env: Any, controller: Any, episode: rollout.Episode) -> flo
 
 
 def episode_record(cell: Cell, seed: int, episode: rollout.Episode) -> dict[str, Any]:
-    """Return the scores of an episode; one that did not end by its time gets the worst case."""
-    content = cell.track.content
-    signals = {**episode.signals}
-    signals["sensed"] = signals[content["sensed"]]
-    scores = _scores(signals, episode, content)
-    if episode.failed:
-        scores = metrics.worst_of(scores, content["worst_case"])
-    if not cell.scenario.rests:
-        scores["steady_state_error"] = float("nan")
-    saturated = signals.get("saturated", np.zeros(0))
+    """Return the scores of an episode; one that did not reach its end gets the worst case."""
+    saturated = episode.signals.get("saturated", np.zeros(0))
     return {
         "scenario": cell.scenario.name,
         "seed": seed,
@@ -258,60 +231,6 @@ def episode_record(cell: Cell, seed: int, episode: rollout.Episode) -> dict[str,
         "failed": episode.failed,
         "failure": episode.failure,
         "saturated": float(np.mean(saturated)) if len(saturated) else 0.0,
-        "scores": scores,
+        "scores": scores_of(episode, cell.track.content, cell.scenario.rests),
         "trajectory": arrays_digest([episode.actions, *episode.signals.values()]),
     }
-
-
-def _scores(
-    signals: Mapping[str, NDArray[Any]], episode: rollout.Episode, content: Mapping[str, Any]
-) -> dict[str, float]:
-    """Return what can be scored of an episode: nothing, if it failed before there was anything."""
-    if episode.failed and not len(episode.actions):
-        return {}
-    try:
-        return metrics.score(
-            signals,
-            episode.period,
-            float(content["settle_seconds"]),
-            float(content["hold_seconds"]),
-            content["cost_scales"],
-            content.get("gate") or (),
-            content.get("metrics") or (),
-            content.get("activity", ""),
-            content.get("half_range"),
-            content.get("tool_length"),
-        )
-    except ValueError:  # nothing left to score after settling
-        if not episode.failed:
-            raise
-        return {}
-
-
-def pack(actions: NDArray[Any]) -> dict[str, Any]:
-    """Return actions as text that JSON holds, to the last bit."""
-    exact = np.ascontiguousarray(actions)
-    text = base64.b85encode(zlib.compress(exact.tobytes(), 9)).decode()
-    return {"dtype": exact.dtype.str, "shape": list(exact.shape), "data": text}
-
-
-def unpack(packed: Mapping[str, Any]) -> NDArray[Any]:
-    """Return the actions that :func:`pack` wrote.
-
-    Raises
-    ------
-    ValueError
-        If they are not of the size that they say, or too many: the text may be a stranger's.
-    """
-    kind, shape = np.dtype(str(packed["dtype"])), [int(n) for n in packed["shape"]]
-    size = math.prod(shape)
-    if kind.kind != "f" or min(shape, default=0) < 0 or size > MOST_ACTIONS:
-        raise ValueError(f"recorded actions of type {kind} and shape {shape} are none")
-    try:
-        expected = size * kind.itemsize
-        raw = zlib.decompressobj().decompress(base64.b85decode(packed["data"]), expected + 1)
-    except zlib.error as error:
-        raise ValueError(f"recorded actions are damaged: {error}") from error
-    if len(raw) != expected:
-        raise ValueError(f"recorded actions are not of shape {shape}; run the row again")
-    return np.frombuffer(raw, kind).reshape(shape).copy()

@@ -1,4 +1,4 @@
-"""What the command line says of runs and of rows that were verified."""
+"""Output of the command line on runs and on rows that were verified."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.identity import verified
 from benchmarks.identity.audit import Round
-from benchmarks.identity.verify import Verdict
-from benchmarks.runs import rows
+from benchmarks.runs import rows, verified
+from benchmarks.runs.cells import AUDIT, PUBLIC
 from benchmarks.runs.runner import Report
+from benchmarks.runs.verify import Verdict
 from benchmarks.scoring.metrics import headline_of
 
 LINES = 40
@@ -37,16 +37,20 @@ def _score(path: Path) -> str:
     content = row["scenarios"]["content"]
     headline, (unit, factor) = headline_of(content), rows.shown(content)
 
-    def words(scores: rows.Row) -> str:
-        mean, low, high = (factor * scores[headline][name] for name in ("mean", "low", "high"))
-        return f"{mean:.3f} {unit} [{low:.3f}, {high:.3f}]"
+    def means(split: str) -> dict[str, float]:
+        scores = rows.aggregate(rows.episodes_of(row, split), [headline])[headline]
+        return {name: factor * scores[name] for name in ("mean", "low", "high")}
 
-    said = f"{row['row']}: RMS {words(row['aggregate'])}"
-    if row["failures"]:
-        said += f", {row['failures']} of {len(rows.episodes_of(row))} episodes failed"
+    def words(scores: dict[str, float]) -> str:
+        return f"{scores['mean']:.3f} {unit} [{scores['low']:.3f}, {scores['high']:.3f}]"
+
+    public = means(PUBLIC)
+    said = f"{row['row']}: RMS {words(public)}"
+    if failed := rows.failures(rows.episodes_of(row)):
+        said += f", {failed} of {len(rows.episodes_of(row))} episodes failed"
     if row["audit"]:
-        gap = factor * row["audit"]["gap"][headline]
-        said += f"; audit {words(row['audit']['aggregate'])}, gap {gap:+.3f}"
+        unseen = means(AUDIT)
+        said += f"; audit {words(unseen)}, gap {unseen['mean'] - public['mean']:+.3f}"
     return said
 
 
@@ -58,25 +62,25 @@ def round_in_words(found: Round) -> str:
     )
 
 
-HOLDS, NEARLY, DRIFTED = "holds", "holds nearly, as of another machine", "DRIFTED"
+HOLDS, NEARLY, DRIFTED = "reproduced", "reproduced within tolerance", "DRIFTED"
 
 
 def outcome(found: Verdict) -> str:
-    """Return in words whether a row holds: to the last bit, nearly, or not."""
+    """Return in words whether a row was reproduced: to the last bit, within tolerance, or not."""
     if not found.holds:
         return DRIFTED
     return HOLDS if found.mode == verified.BITS else NEARLY
 
 
 def counted(found: Sequence[Verdict]) -> str:
-    """Return a line that says how many rows came to which outcome."""
+    """Return the number of rows by outcome."""
     outcomes = [outcome(one) for one in found]
     counts = [(outcomes.count(word), word) for word in (HOLDS, NEARLY, DRIFTED)]
     return f"{len(outcomes)} rows: " + "; ".join(f"{n} {word}" for n, word in counts if n)
 
 
 def verdict(found: Verdict) -> None:
-    """Print whether a row holds, what has drifted, and what to do about it."""
+    """Print whether a row was reproduced, what has drifted, and what to do about it."""
     print(f"{found.row}: {outcome(found)}", flush=True)
     for line in found.drifted[:LINES]:
         print(f"  {line}")

@@ -1,4 +1,4 @@
-"""The one place where controllers come from: ``baselines`` and, where installed, ``agents``."""
+"""Controllers of the catalogues of ``baselines`` and, where installed, of ``agents``."""
 
 from __future__ import annotations
 
@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from benchmarks.identity.hashing import object_digest
-
 ROOT = Path(__file__).resolve().parents[2]
 
 
 class Controller(Protocol):
-    """What stable-baselines3 calls a policy predictor."""
+    """Policy predictor, in the terms of stable-baselines3."""
 
     def predict(
         self,
@@ -47,15 +45,15 @@ class Entrant:
         Training seed and policy file (relative to the checkout), ascending; none for a controller
         that is not trained.
     trials : int or None
-        Settings that were tried out to choose its numbers; None where nobody counted.
+        Number of settings tried to choose its numbers; None if unknown.
     tuning : str
-        How they were chosen.
+        Method of that choice.
     author : str
-        Who made it, as BibTeX wants it; empty for the authors of this package.
+        Author in the form of BibTeX; empty for the authors of this package.
     tuned : str
         Name in ``baselines/core/tuned.yaml``; of a residual controller that of the one it corrects.
     knobs : tuple of (str, float)
-        The numbers that stand there under that name, none for a controller that is not tuned.
+        Its numbers there, none for a controller that is not tuned.
     trained_with : (tuple of str, tuple of str) or None
         Names of the signals and actions of a policy's training.
     """
@@ -130,7 +128,7 @@ def _entrant(name: str, entry: Any, module: str, kind: str) -> Entrant | None:
 
 
 def _movable(path: Path) -> Path:
-    """Return a path relative to the checkout where it is in it: another may lie elsewhere."""
+    """Return a path relative to the checkout where it is inside, so that the checkout may move."""
     whole = Path(path).resolve()
     return whole.relative_to(ROOT) if whole.is_relative_to(ROOT) else whole
 
@@ -169,7 +167,7 @@ def make(
     ----------
     entrant : Entrant
     model : object
-        The plant that the controller is told.
+        Nominal model of the controller.
     env : gymnasium.Env
         Only its named signals are used, never its plant.
     seed : int
@@ -184,8 +182,3 @@ def make(
         told["training_seed"] = training_seed
     made: Controller = maker(entrant.name, seed=seed, **told)
     return made
-
-
-def parameters_digest(controller: Controller) -> str:
-    """Return a digest of all that the controller holds."""
-    return object_digest(controller)

@@ -1,48 +1,24 @@
-"""What a controller is built from, tried out and not only claimed."""
+"""Model knowledge of a controller in a track: of the true plant, or of a nominal one."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from benchmarks.runs import controllers
 from benchmarks.runs.controllers import Entrant
 
 IGNORANT = ("nothing", "tables")
-"""Labels of controllers that must not depend on the model."""
+"""Labels of controllers that do not depend on the model; a test builds them from another one."""
 NOMINAL, TRUE = "nominal model", "true model"
 TRAINED = "nominal model, trained on the plant"
-"""Label of a policy that has met, in training, the plant of which others are told another."""
-MOVED = 1.01
-"""Factor by which a foil's parameters differ."""
-
-
-def foil(plant: Any) -> Any:
-    """Return a plant whose every parameter is a little off, but those that must not move."""
-    for name in getattr(plant, "names", ()):
-        for factor in (MOVED, 1.0 / MOVED):
-            try:
-                plant = plant.replace({name: plant.value(name) * factor})
-                break
-            except (ValueError, TypeError):
-                continue  # out of bounds, or bound to another parameter
-    return plant
-
-
-def uses_model(entrant: Entrant, model: Any, env: Any, seed: int | None) -> bool:
-    """Return whether a controller comes out otherwise when the model is another one."""
-    made = [
-        controllers.parameters_digest(controllers.make(entrant, told, env, training_seed=seed))
-        for told in (model, foil(model))
-    ]
-    return made[0] != made[1]
+"""Label of a policy whose training had the simulated plant, of which others know a nominal model."""
 
 
 def knows_plant(entrant: Entrant, controller: Any, model: Any, env: Any) -> bool:
-    """Return whether all that a controller was told is of the plant that is simulated.
+    """Return whether a controller's model is the simulated plant.
 
-    A policy was told the plants of its training, as its card says; a residual one was built from
-    the model as well.
+    A policy knows the plants of its training, named on its card; a residual one is built from the
+    nominal model as well.
     """
     base = env.unwrapped
     card = getattr(controller, "card", None)
@@ -56,10 +32,10 @@ def knows_plant(entrant: Entrant, controller: Any, model: Any, env: Any) -> bool
 
 
 def trained_on_plant(controller: Any, model: Any, env: Any) -> bool:
-    """Return whether a policy was trained on a plant that is simulated and that it is not told.
+    """Return whether a policy was trained on the simulated plant, and its nominal model is another.
 
-    On drawn plants that is one whose training drew them, too, or was on their middle where the
-    model is another.
+    With drawn plants this is a policy whose training drew them as well, or was on the plant that
+    they are drawn around where the model is another.
     """
     card = getattr(controller, "card", None)
     if not isinstance(card, Mapping):
@@ -71,16 +47,16 @@ def trained_on_plant(controller: Any, model: Any, env: Any) -> bool:
 
 
 def label(claimed: str, cells: Sequence[Mapping[str, Any]]) -> str:
-    """Return what a controller knows in a track.
+    """Return the label of a controller's knowledge in a track.
 
     Parameters
     ----------
     claimed : str
         By its catalogue.
     cells : sequence of mapping
-        Records with ``knows_plant``, ``trained_on_plant`` and, where it was tried, ``uses_model``.
+        Records with ``knows_plant`` and ``trained_on_plant``.
     """
-    if claimed in IGNORANT and not any(cell.get("uses_model") for cell in cells):
+    if claimed in IGNORANT:
         return claimed
     if all(cell["knows_plant"] for cell in cells):
         return TRUE
@@ -88,5 +64,5 @@ def label(claimed: str, cells: Sequence[Mapping[str, Any]]) -> str:
 
 
 def is_ahead(mine: str, other: str) -> bool:
-    """Return whether a label says that one knows the plant of which the other is told another."""
+    """Return whether one label means the true plant and the other a nominal model."""
     return mine in (TRUE, TRAINED) and other == NOMINAL

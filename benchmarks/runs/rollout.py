@@ -27,25 +27,25 @@ Watch = Callable[[Any], None]
 
 @dataclass(frozen=True)
 class Episode:
-    """What was recorded of one episode of n steps.
+    """Record of one episode of n steps.
 
     Attributes
     ----------
     signals : mapping of (n,) array
         Every entry of ``info``, SI; and ``model/0``, ``model/1``, ... where the controller has a
-        model to follow: what it says that each output of the model is then.
+        model to follow: the outputs of that model.
     observations : (n, n_obs) array
-        What the controller was given at each step.
+        Inputs of the controller.
     actions : (n, n_act) array
-        What it answered.
+        Its outputs.
     seconds : (m,) array
         Times that answers to one observation took [s], not of all steps where episodes ran as
         rows of a batch.
     period : float
         Control period [s].
     failure : str
-        Why the episode ended before its time, in the words of the error where a controller raised
-        one; empty if it did not.
+        Reason of an early end, the message of the error if a controller raised one; empty
+        otherwise.
     """
 
     signals: Mapping[str, Array]
@@ -128,7 +128,7 @@ def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None)
 
 
 def _named(keys: Sequence[str], table: Array, models: Array) -> dict[str, Array]:
-    """Return the columns of ``info`` and of what a model says, by name."""
+    """Return the columns of ``info`` and of a model's output, by name."""
     return {
         **{key: np.ascontiguousarray(table[:, i]) for i, key in enumerate(keys)},
         **{f"model/{k}": one.copy() for k, one in enumerate(models.T)},
@@ -144,9 +144,9 @@ def run_all(
     """Run an episode for each seed, as rows of a batch where that gives the same bits.
 
     A row of a batch is the single environment to the last bit, and a row of a controller should be.
-    Whether it is, is looked at: the first answers to the first and to the last row are asked for
-    again, alone. Where one differs, each episode is a batch of its own. Where the controller takes
-    no batch, or raises anything, the episodes are run as if there were none.
+    This is checked: the first answers in the first and the last row are computed again, alone. Where
+    one differs, each episode is a batch of its own. Where the controller takes no batch, or raises
+    an error, the episodes are run one by one.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def run_all(
     Raises
     ------
     RuntimeError
-        If nobody waits for the episodes any more.
+        If the run was cancelled.
     Exception
         Whatever the environment raises of an action that it has to take; see :func:`run`.
     """
@@ -171,7 +171,7 @@ def run_all(
             _still_wanted()
             try:
                 made += _rows(make(len(group)), controller, group)
-            except _NotAsRows:  # the single run tells what is wrong, in the words of one row
+            except _NotAsRows:  # the single run reports the error
                 break
         else:
             return made
@@ -188,11 +188,11 @@ def _still_wanted() -> None:
 
 
 class _NotAsRows(Exception):
-    """A controller takes no batch, or its rows are not what they are alone."""
+    """The controller takes no batch, or its rows differ from single episodes."""
 
 
 def _rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> list[Episode]:
-    """Return the episodes as rows of a batch; raise where the controller's are not single ones."""
+    """Return the episodes as rows of a batch; raise where they differ from single ones."""
     course = _run_rows(batch, controller, seeds)
     batch.close()
     seconds: list[Array] = []
@@ -211,7 +211,7 @@ def _rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> list[Epis
 
 @dataclass(frozen=True)
 class _Course:
-    """What was recorded of a batch in n steps: until its last row had ended.
+    """Record of a batch over n steps, until its last row ended.
 
     Attributes
     ----------
@@ -249,7 +249,7 @@ class _Course:
 
 @contextmanager
 def _asked() -> Iterator[None]:
-    """Take whatever a controller raises to say that it takes no batch."""
+    """Treat any error of a controller as a refusal of batches."""
     try:
         yield
     except Exception as error:
@@ -284,8 +284,15 @@ def _run_rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> _Cour
             end = table[keys.index("time"), row]
             failures[row] = f"a limit ended the episode at {end:g} s"
         observation, running = after, running & ~start
-    recorded = (np.array(each) for each in (infos, models, observations, actions))
-    return _Course(keys, *recorded, lengths, failures)
+    return _Course(
+        keys,
+        np.array(infos),
+        np.array(models),
+        np.array(observations),
+        np.array(actions),
+        lengths,
+        failures,
+    )
 
 
 def _acceptable(action: Any, env: Any) -> bool:
@@ -298,14 +305,14 @@ def _acceptable(action: Any, env: Any) -> bool:
 
 
 def _sentence(error: Exception) -> str:
-    """Return kind and message of an error, without what differs from run to run."""
+    """Return kind and message of an error, without addresses and paths."""
     text = f"{type(error).__name__}: {error}".replace(f"{ROOT}/", "")
     text = re.sub(r"0x[0-9a-fA-F]{6,}", "0x...", " ".join(text.split()))
     return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
 
 
 def preview_used(episode: Episode, controller: Controller, signals: Any) -> float:
-    """Return how far ahead a controller reads the reference [s], measured on what it does.
+    """Return the preview horizon that a controller uses [s], measured by its answers.
 
     The episode's observations are shown to it again with the last samples replaced by the
     present reference. The first replacement that changes an action marks the last sample in use.
@@ -348,7 +355,7 @@ def _answers(controller: Controller, observations: NDArray[Any]) -> NDArray[Any]
 
 
 def _timed(controller: Controller, observations: NDArray[Any]) -> tuple[NDArray[Any], Array]:
-    """Return what a controller answers to an episode's observations, and the times it took [s]."""
+    """Return a controller's answers to an episode's observations, and their times [s]."""
     answers, seconds, state, clock = [], [], None, time.perf_counter
     for i, observation in enumerate(observations):
         begin = clock()

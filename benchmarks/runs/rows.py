@@ -1,4 +1,4 @@
-"""A row of the board: one controller over one scenario file, with all that runs it again."""
+"""Rows of the board: one controller over one scenario file, with everything to reproduce it."""
 
 from __future__ import annotations
 
@@ -11,23 +11,22 @@ import numpy as np
 
 from benchmarks.identity import artefacts, tasks, trainings
 from benchmarks.identity.audit import Audit
-from benchmarks.identity.hashing import digest
 from benchmarks.runs import knowledge, provenance
-from benchmarks.runs.cells import AUDIT, PUBLIC, Cell, cells_of, sources
+from benchmarks.runs.cells import PUBLIC, Cell, cells_of
 from benchmarks.runs.controllers import Entrant
 from benchmarks.runs.store import read_record, write_record
 from benchmarks.scenarios import scenario as scenarios
 from benchmarks.scenarios.scenario import ScenarioSet
 from benchmarks.scoring import statistics
-from benchmarks.scoring.metrics import METRICS, headline_of, of_track
+from benchmarks.scoring.metrics import METRICS, headline_of
 
-SCHEMA = 3
+SCHEMA = 4
 RESULTS = Path(__file__).parents[1] / "results"
 KEYS: dict[str, tuple[str, ...]] = {
     "row": (),
-    "env": ("id", "version", "digest"),
+    "env": ("id", "version"),
     "task": (),
-    "controller": ("name", "kind", "digest", "parameters", "artefact"),
+    "controller": ("name", "kind", "artefact"),
     "scenarios": ("name", "version", "digest", "content"),
     "plants": (),
     "models": (),
@@ -35,19 +34,16 @@ KEYS: dict[str, tuple[str, ...]] = {
     "training_seeds": (),
     "made_with": (),
     "episodes": (),
-    "failures": (),
-    "aggregate": (),
-    "by": (),
     "audit": (),
     "traces": (),
     "volatile": (),
 }
-"""What a row has, and what is in it that others look up by name."""
+"""Entries of a row, and their entries that other modules read."""
 _NAME = re.compile(r"[A-Za-z0-9_]+")
 
 Row = dict[str, Any]
 SHOWN: dict[str, Any] = {"unit": "mm", "factor": 1e3}
-"""How errors are shown where the scenario file does not say."""
+"""Unit of errors unless the scenario file names one."""
 
 
 def shown(content: Mapping[str, Any]) -> tuple[str, float]:
@@ -98,57 +94,41 @@ def assemble(
     found : Audit, optional
         With which the cells were listed.
     """
-    built = tasks.built(track)
+    task = tasks.of(track)
+    identity = task.identity
     _check_complete(entrant, track, cells, found)
-    _check_plants(entrant, built, cells)
+    _check_plants(entrant, identity, cells)
     trainings.check_cells(entrant, cells)
     public = [cell for cell in cells if cell["split"] == PUBLIC]
-    episodes = [episode for cell in cells for episode in cell["episodes"]]
-    scored = [episode for episode in episodes if episode["split"] == PUBLIC]
-    unseen = [episode for episode in episodes if episode["split"] == AUDIT]
-    row: Row = {
+    return {
         "schema": SCHEMA,
         "row": row_name(track.name, entrant.name),
-        "env": built.env,
-        "task": tasks.task_digest(track),
-        "controller": _controller(entrant, public),
+        "env": task.env,
+        "task": identity.digest,
+        "controller": _controller(entrant, track, public, found),
         "scenarios": {
             "name": track.name,
             "version": track.content["version"],
             "digest": track.digest,
             "content": track.content,
         },
-        "plants": built.plants,
-        "models": built.models,
+        "plants": identity.plants,
+        "models": identity.models,
         "seeds": {name: list(seeds) for name, seeds in track.seeds.items()},
         "training_seeds": [seed for seed, _ in entrant.files],
         "made_with": {
             "packages": provenance.packages(),
-            "sources": sources(entrant),
             "commit": provenance.commit(),
             "cpu": provenance.cpu(),
         },
-        "episodes": episodes,
-        "failures": failures(scored),
-        "aggregate": aggregate(scored, of_track(track.content)),
-        "by": breakdown(track, scored),
-        "audit": None,
+        "episodes": [episode for cell in cells for episode in cell["episodes"]],
+        "audit": None if found is None else found.record(),
         "traces": [trace for cell in public for trace in cell.get("traces", ())],
         "volatile": {
             **provenance.occasion(),
             "predict_us": _median_times([cell["volatile"]["predict_us"] for cell in cells]),
         },
     }
-    if found is not None:
-        scores = aggregate(unseen, of_track(track.content))
-        row["audit"] = found.record() | {
-            "failures": failures(unseen),
-            "aggregate": scores,
-            "gap": gap(scores, row["aggregate"]),
-        }
-    if entrant.files:
-        row["actions"] = {c["scenario"]: c["actions"] for c in public if "actions" in c}
-    return row
 
 
 def _check_complete(
@@ -170,7 +150,7 @@ def _check_complete(
         )
 
 
-def _check_plants(entrant: Entrant, built: tasks.Built, cells: Sequence[Record]) -> None:
+def _check_plants(entrant: Entrant, built: tasks.Identity, cells: Sequence[Record]) -> None:
     """Raise unless the cells are of the plants and models that the track has now."""
     for cell in cells:
         name = cell["scenario"]
@@ -181,35 +161,27 @@ def _check_plants(entrant: Entrant, built: tasks.Built, cells: Sequence[Record])
             )
 
 
-def _controller(entrant: Entrant, cells: Sequence[Record]) -> dict[str, Any]:
-    parameters = {_place(cell): cell["controller_digest"] for cell in cells}
-    code = [cell["code_digest"] for cell in cells]
+def _controller(
+    entrant: Entrant, track: ScenarioSet, cells: Sequence[Record], found: Audit | None
+) -> dict[str, Any]:
+    made = artefacts.of(entrant, track)
     return {
         "name": entrant.name,
         "kind": entrant.kind,
-        "source": entrant.source,
         "summary": entrant.summary,
         "knowledge": knowledge.label(entrant.knowledge, cells),
         "claimed": entrant.knowledge,
         "author": entrant.author,
         "citation": entrant.citation,
-        "digest": digest(parameters)[:16],
-        "parameters": parameters,
         "preview_seconds": max(cell.get("preview_used", 0.0) for cell in cells),
         "tuning": {"trials": entrant.trials, "how": entrant.tuning},
-        "artefact": artefacts.combine(entrant, parameters.values(), code).record(),
+        "artefact": {
+            "digest": made.record()["digest"] if found is None else found.artefact,
+            "files": [dict(file) for file in made.files],
+            "knobs": dict(made.knobs),
+        },
         "training": trainings.of(entrant),
     }
-
-
-def _place(cell: Record) -> str:
-    seed = cell["training_seed"]
-    return str(cell["scenario"]) + ("" if seed is None else f"#s{seed}")
-
-
-def gap(audited: Record, public: Record) -> dict[str, float]:
-    """Return by how much the mean of each metric is higher in the audit."""
-    return {name: audited[name]["mean"] - public[name]["mean"] for name in audited}
 
 
 def failures(episodes: Sequence[Record]) -> int:
@@ -232,7 +204,7 @@ def _median_times(times: Sequence[Mapping[str, Any]]) -> dict[str, float | None]
 
 
 def scores_of(episodes: Sequence[Mapping[str, Any]], metric: str) -> np.ndarray[Any, Any]:
-    """Return one metric of all episodes, NaN where it does not apply."""
+    """Return one metric of all episodes; NaN if it does not apply."""
     values = [episode["scores"][metric] for episode in episodes]
     return np.array([np.nan if value is None else value for value in values], float)
 
@@ -347,7 +319,7 @@ def load_all(folder: Path = RESULTS) -> list[Row]:
     ------
     ValueError
         If one is damaged, of an environment version that is not here, or of another task than
-        the other rows of its track: a board leaves nothing out silently and mixes nothing.
+        the other rows of its track.
     """
     found = [load(path) for path in files(folder)]
     for row in found:
@@ -357,12 +329,12 @@ def load_all(folder: Path = RESULTS) -> list[Row]:
 
 
 def check_together(found: Sequence[Record]) -> None:
-    """Raise unless the rows of each track are of one environment, one task and one code.
+    """Raise unless the rows of each track are of one environment and one task.
 
     Raises
     ------
     ValueError
-        Naming what differs and a row of each, or a row that is there twice.
+        Naming the difference and a row of each, or a row that is there twice.
     """
     first: dict[str, Record] = {}
     names: set[str] = set()
@@ -383,11 +355,5 @@ def check_together(found: Sequence[Record]) -> None:
 
 
 def _shared(row: Record) -> dict[str, str]:
-    """Return what the rows of a track have to have in common, in words."""
-    made = row["made_with"].get("sources") or {}
-    return {
-        "environment": str(row["env"]["id"]),
-        "task": str(row["task"])[:12],
-        "pam_envs": str(made.get("pam_envs")),
-        "benchmarks": str(made.get("benchmarks")),
-    }
+    """Return the properties that all rows of a track share."""
+    return {"environment": str(row["env"]["id"]), "task": str(row["task"])[:12]}

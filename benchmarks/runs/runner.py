@@ -24,14 +24,14 @@ Pair = tuple[Entrant, ScenarioSet]
 
 @dataclass(frozen=True)
 class Plan:
-    """A row to be made.
+    """Plan of a row.
 
     Attributes
     ----------
     entrant : Entrant
     track : ScenarioSet
     found : Audit, optional
-        Where the controller as it is now is in the last round of the track.
+        If the present controller is in the last round of the track.
     """
 
     entrant: Entrant
@@ -45,13 +45,13 @@ class Plan:
 
 
 def plans(pairs: Iterable[Pair]) -> list[Plan]:
-    """Return what has to be run for rows."""
+    """Return the plans of rows."""
     return [Plan(*pair, audit.find(*pair)) for pair in pairs]
 
 
 @dataclass
 class Report:
-    """What a run did.
+    """Report of a run.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Report:
 
 @dataclass(frozen=True)
 class Options:
-    """How to run.
+    """Options of a run.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ class Options:
 
     @property
     def cluster(self) -> engine.Cluster:
-        """Where to compute."""
+        """Processes of this machine, or a cluster."""
         return engine.Cluster(self.jobs, self.backend, self.address)
 
 
@@ -111,7 +111,7 @@ def run(
     options: Options,
     start: Callable[[int], Advance] = lambda total: lambda: None,
 ) -> Report:
-    """Compute what is missing of the rows and write each row that is whole.
+    """Compute the missing cells of rows and write each complete row.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def run(
         One row each.
     options : Options
     start : callable
-        Called with the number of cells to compute; returns what to call after each of them.
+        Called with the number of cells to compute; returns the callback after each of them.
     """
     cluster, store = options.cluster, Store(options.cells)
     report = Report(swept=store.sweep() + sweep(options.out))
@@ -157,7 +157,7 @@ def planned(pairs: Sequence[Pair], options: Options) -> Iterator[tuple[Cell, boo
 
 @dataclass(frozen=True)
 class _Outcome:
-    """What became of a row: where it is, or what is wrong, or which cells are gone and why."""
+    """Outcome of a row: its file, or an error, or the cells that are gone."""
 
     rows: tuple[Path, ...] = ()
     wrong: tuple[str, ...] = ()
@@ -247,7 +247,7 @@ def fits(entrant: Entrant, track: ScenarioSet) -> bool:
     """
     if entrant.trained_with is None:
         return True
-    bases = [env.unwrapped for _, env in tasks.built(track).told]
+    bases = [setting.env.unwrapped for setting in tasks.of(track).settings]
     return all(
         entrant.trained_with == (tuple(base.signals.names()), tuple(base.action_signals.names()))
         for base in bases

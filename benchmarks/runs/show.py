@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.runs import controllers, rollout
-from benchmarks.runs.cells import make_env
 from benchmarks.runs.episode_plot import episode_figure
+from benchmarks.scenarios.scenario_env import make_env
 from benchmarks.scoring import metrics
 
 
@@ -22,12 +22,12 @@ def play(
     seed: int,
     video: Path | None = None,
 ) -> tuple[rollout.Episode, Any]:
-    """Run one episode, and film it where a path is given.
+    """Run one episode, and film it if a path is given.
 
     Returns
     -------
     Episode and mapping of (n,) array
-        The recording, and the set-points that were asked for, by name, SI.
+        The recording, and the commanded setpoints by name, SI.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def play(
 
 
 def _made(env_id: str, kwargs: Mapping[str, Any]) -> Any:
-    """Return the environment; what it says of its arguments is told without Gymnasium's addition.
+    """Return the environment; messages on its arguments are without Gymnasium's addition.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def _made(env_id: str, kwargs: Mapping[str, Any]) -> Any:
 
 
 def _set_points(env: Any, actions: NDArray[Any]) -> dict[str, NDArray[np.float64]]:
-    """Return what was asked for of each set-point, within its range, SI."""
+    """Return each commanded setpoint, within its range, SI."""
     space, signals = env.action_space, env.unwrapped.action_signals
     inside = np.clip(actions.reshape(-1, len(signals)), space.low, space.high)
     return {name: signals.decode(inside, name) for name in signals.names()}
@@ -77,10 +77,11 @@ class Film:
     """Writes a frame of the environment every few steps, at the speed of life."""
 
     def __init__(self, path: Path, env: Any) -> None:
-        import imageio_ffmpeg
+        import imageio_ffmpeg  # type: ignore[import-untyped]
 
         self._open = imageio_ffmpeg.write_frames
-        self._path, self._frames, self._step = path, None, 0
+        self._path, self._step = path, 0
+        self._frames: Any = None
         self._every = max(1, round(0.04 / env.unwrapped.control_period))
         self._fps = 1.0 / (self._every * env.unwrapped.control_period)
 

@@ -1,4 +1,4 @@
-"""Search for the numbers that a paper's controller leaves free: its knobs, on tuning seeds.
+"""Search the knobs of a paper's controller, the numbers that it leaves free, on tuning seeds.
 
 The settings of learned controllers are searched for; so that classical ones have the same chance,
 this gives them as many trials, by the same sampler, on the same seeds
@@ -54,7 +54,7 @@ EPISODES = 30
 STARTUP = 8
 """Trials that are drawn evenly before the sampler learns from them."""
 MOST_RATIO = 100.0
-"""Where a cost stops counting as higher still."""
+"""Largest ratio of a cost that counts."""
 STORAGE = controllers.ROOT / "runs" / "tuning.db"
 UNTUNED = "untuned"
 SPLIT = "tuning"
@@ -96,7 +96,7 @@ class Job:
 
     @property
     def command(self) -> str:
-        """What searches again."""
+        """Command that repeats the search."""
         said = f"python -m benchmarks tune {self.controller} --env {self.env}"
         more = "" if self.episodes == EPISODES else f" --episodes {self.episodes}"
         return f"{said} --trials {self.trials} --seed {self.seed}{more} --write"
@@ -109,7 +109,7 @@ def job_of(controller: str, env: str = "", **how: Any) -> Job:
     ----------
     controller : str
     env : str
-        Id of the environment, or its last part; may be left out where there is only one.
+        Id of the environment, or its last part; optional if there is only one.
     **how
         The rest of :class:`Job`.
 
@@ -138,7 +138,7 @@ def job_of(controller: str, env: str = "", **how: Any) -> Job:
 
 
 def nominal_track(env: str) -> ScenarioSet:
-    """Return the track of an environment whose plant is the model that controllers are told."""
+    """Return the track of an environment whose plant is the nominal model."""
     made = (track for track in scenarios.available().values() if track.env == env)
     found = [track for track in made if track.name.endswith("_nominal")]
     if len(found) != 1:
@@ -148,12 +148,12 @@ def nominal_track(env: str) -> ScenarioSet:
     return found[0]
 
 
-# --- what a setting is worth ------------------------------------------------------------------
+# --- objective ------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Measured:
-    """What a controller did in the tuning episodes.
+    """Result of a controller in the tuning episodes.
 
     Attributes
     ----------
@@ -223,7 +223,7 @@ def seeds_of(track: ScenarioSet, episodes: int) -> dict[str, tuple[int, ...]]:
 
 
 def measured(kinds: Mapping[str, Sequence[Mapping[str, Any]]], track: ScenarioSet) -> Measured:
-    """Return what the records of episodes, by kind of reference, say together."""
+    """Return the result of episodes, by kind of reference."""
     headline = headline_of(track.content)
     records = [record for of_kind in kinds.values() for record in of_kind]
 
@@ -239,7 +239,7 @@ def measured(kinds: Mapping[str, Sequence[Mapping[str, Any]]], track: ScenarioSe
 
 
 def worth(found: Measured, untuned: Measured) -> float:
-    """Return what a search makes small [SI]; see this module's page."""
+    """Return the objective of a search [SI]; see this module."""
     excess = max(0.0, found.mean / untuned.mean - 1.0)
     excess += max(0, found.failures - untuned.failures)
     for name, cost in found.costs.items():
@@ -250,7 +250,7 @@ def worth(found: Measured, untuned: Measured) -> float:
     return max(found.error, untuned.error) * (1.0 + excess) if excess else found.error
 
 
-# --- the search -------------------------------------------------------------------------------
+# --- search -------------------------------------------------------------------------------
 
 
 def search(job: Job, measure: Callable[[Knobs], Measured], start: Start | None = None) -> Tuned:
@@ -260,13 +260,13 @@ def search(job: Job, measure: Callable[[Knobs], Measured], start: Start | None =
     ----------
     job : Job
     measure : callable
-        From knobs to what they do; :meth:`Course.measure`.
+        From knobs to their result; :meth:`Course.measure`.
     start : callable, optional
         Of a progress bar.
     """
     study = open_study(job)
     untuned = _untuned(study, measure)
-    advance = start(job.trials) if start else lambda: None
+    advance: Callable[[], None] = start(job.trials) if start else lambda: None
     for _ in _finished(study)[: job.trials]:
         advance()
     while (done := len(_finished(study))) < job.trials:
@@ -293,12 +293,12 @@ def open_study(job: Job) -> optuna.Study:
         load_if_exists=True,
     )
     for lost in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
-        study.tell(lost.number, state=TrialState.FAIL)  # the sampler would reckon with it
+        study.tell(lost.number, state=TrialState.FAIL)  # the sampler would count it
     return study
 
 
 def _task(job: Job) -> str:
-    """Return the digest of track, bounds and code, without what searches wrote."""
+    """Return the digest of track, bounds and code, without the results of searches."""
     folders = [[controllers.ROOT / "baselines"], [controllers.ROOT / "pam_envs"]]
     code = [
         sources_digest(folder, kinds)
@@ -309,7 +309,7 @@ def _task(job: Job) -> str:
 
 
 def _untuned(study: optuna.Study, measure: Callable[[Knobs], Measured]) -> Measured:
-    """Return what the controller as published does; measured once in a search."""
+    """Return the result of the published controller, measured once in a search."""
     if UNTUNED not in study.user_attrs:
         study.set_user_attr(UNTUNED, dataclasses.asdict(measure({})))
     return Measured(**study.user_attrs[UNTUNED])
@@ -340,18 +340,18 @@ def _found(job: Job, study: optuna.Study) -> Tuned:
 
 
 def sentence(found: Tuned) -> str:
-    """Return what a search found, in one line."""
+    """Return the result of a search in one line."""
     turned = ", ".join(f"{name} {value:g}" for name, value in found.knobs.items())
     change = f"{found.before:.4g} to {found.after:.4g} in {found.trials} trials"
     return f"{found.name}: {change}, with {turned}"
 
 
 def write(found: Tuned, file: Path = tuned.FILE) -> None:
-    """Put what a search found into the file that the catalogue reads, in place of an older one."""
+    """Write the result of a search into the catalogue's file, in place of an older one."""
     with FileLock(file.with_name(f".{file.name}.lock")):
         text = file.read_text(encoding="utf-8")
         entries = tuned.read(file) | {found.name: found}
-        tuned.entries(catalogue.PUBLISHED, entries)  # raises where one is not as it should be
+        tuned.entries(catalogue.PUBLISHED, entries)  # raises if one is invalid
         head = [line for line in text.splitlines() if line.startswith("#")]
         plain = {name: dataclasses.asdict(entries[name]) for name in sorted(entries)}
         content = {"schema": tuned.SCHEMA, "tuned": plain}

@@ -1,1 +1,1 @@
-"""scenarios."""
+"""Scenario files and their environments."""

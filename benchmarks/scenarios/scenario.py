@@ -1,4 +1,4 @@
-"""Fixed scenario files: which episodes are run, and how they are scored.
+"""Scenario files: episodes of an environment and the rules of their scores.
 
 A file names an environment, a grid of keyword arguments, the number of seeds, the settling window
 and the worst-case values. What is digested is the content and not the layout, so that a comment
@@ -113,7 +113,7 @@ class ScenarioSet:
     Attributes
     ----------
     content : mapping
-        The file as plain data: what is digested and kept with every row.
+        The file as plain data, kept with every row.
     """
 
     content: Mapping[str, Any]
@@ -163,11 +163,11 @@ class ScenarioSet:
 
     @property
     def digest(self) -> str:
-        """SHA-256 of the content."""
-        return digest(self.content)
+        """SHA-256 of the content; the title is description."""
+        return digest(identifying(self.content))
 
     def __hash__(self) -> int:
-        """Return a hash of the content, so that what is built of a track can be kept by it."""
+        """Return a hash of the content, so that results can be cached by track."""
         return hash(self.digest)
 
     def scenarios(self) -> tuple[Scenario, ...]:
@@ -198,6 +198,11 @@ def _word(axis: str, value: Any) -> str:
     if isinstance(value, (int, float)):
         return f"{value:g}{_UNITS.get(axis, '')}"
     return Path(value).stem if axis == "plant" else str(value)
+
+
+def identifying(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the content of a scenario file without its title, which is description."""
+    return {key: value for key, value in content.items() if key != "title"}
 
 
 def load(path: Path) -> ScenarioSet:

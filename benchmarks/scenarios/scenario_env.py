@@ -1,7 +1,7 @@
 """Environments and nominal models of a scenario.
 
-A scenario may be from a stranger: it names a registered environment and plants of this checkout, and
-nothing else. ``gymnasium.make`` would import the module before a colon.
+A scenario may be from a stranger: it names a registered environment and plants of this checkout,
+and nothing else. ``gymnasium.make`` would import the module before a colon.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ def make_env(env: str, kwargs: Mapping[str, Any]) -> Any:
     Raises
     ------
     ValueError
-        If the id is not that of a registered environment, or the plant is not the mere name of a file.
+        If no environment has that id, or the plant is not the mere name of a file.
     """
     return gym.make(_checked(env), disable_env_checker=True, **_arguments(kwargs))
 
 
 def make_batch(env: str, kwargs: Mapping[str, Any], rows: int) -> Any:
     """Return the batched environment of a scenario; see :func:`make_env`."""
-    how = {"num_envs": rows, "vectorization_mode": "vector_entry_point"}
-    return gym.make_vec(_checked(env), **how, **_arguments(kwargs))
+    mode = "vector_entry_point"
+    return gym.make_vec(_checked(env), rows, vectorization_mode=mode, **_arguments(kwargs))
 
 
 def _checked(env: str) -> str:
@@ -79,7 +79,7 @@ def plant_digests(scenario: Scenario) -> dict[str, str]:
 
 
 def model_of(env_id: str, scenario: Scenario, env: Any) -> Any:
-    """Return the plant that a controller is told: the environment's, or the scenario's model."""
+    """Return the nominal model of controllers: the environment's plant, or the scenario's model."""
     if not scenario.model:
         return env.unwrapped.plant
     other = make_env(env_id, {**scenario.kwargs, **scenario.model})

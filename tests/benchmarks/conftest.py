@@ -21,9 +21,9 @@ CONTENT = board_fakes.CONTENT | {
 
 @pytest.fixture(autouse=True)
 def anew() -> Iterator[None]:
-    """Forget what was built of tracks and controllers: tests change what they are built from."""
-    for kept in (tasks.built, artefacts._built):
-        kept.cache_clear()
+    """Clear the identities of tracks and controllers: tests change what they are built from."""
+    tasks.of.cache_clear()
+    artefacts._answers.cache_clear()
     yield
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import subprocess
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -12,9 +11,8 @@ import bench_fakes
 import pytest
 import yaml
 
-from benchmarks.identity import artefacts, audit
-from benchmarks.identity.artefacts import uncommitted
-from benchmarks.runs import controllers, provenance
+from benchmarks.identity import audit
+from benchmarks.runs import controllers
 from benchmarks.runs.controllers import find
 from benchmarks.runs.runner import Options, run
 from benchmarks.scenarios import scenario as scenarios
@@ -32,41 +30,18 @@ TINY: dict[str, Any] = {
 }
 
 
-def git(folder: Path, *arguments: str) -> None:
-    """Run git in a folder, under a name of its own."""
-    who = ["-c", "user.name=tests", "-c", "user.email=tests@example.org"]
-    subprocess.run(["git", "-C", str(folder), *who, *arguments], check=True, capture_output=True)
-
-
-def commit(folder: Path) -> None:
-    """Commit all that is in a folder."""
-    git(folder, "add", "--all")
-    git(folder, "commit", "--quiet", "--allow-empty", "--message", "as it is")
-
-
 @contextmanager
 def place(folder: Path) -> Iterator[Path]:
-    """Make a folder a checkout of policies, scenarios and rounds, which the harness then uses."""
+    """Make a folder of policies, scenarios and rounds, which the harness then uses."""
     (folder / "tiny.yaml").write_text(yaml.safe_dump(TINY))
     bench_fakes.write_policies(folder / "policies", *GAINS)
     bench_fakes.write_knobs(folder / "policies")
-    git(folder, "init", "--quiet")
-    commit(folder)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(controllers, "SOURCES", (("bench_fakes", "bench_fakes", "classical"),))
         patch.setattr(bench_fakes, "POLICIES", folder / "policies")
-        patch.setattr(artefacts, "TUNED", folder / "policies" / "tuned.yaml")
         patch.setattr(scenarios, "FOLDER", folder)
         patch.setattr(audit, "FILE", folder / "rounds.json")
-        # the checkout that is tested may hold what is not committed yet
-        patch.setattr(provenance, "changed", lambda: [])
-        patch.setattr(artefacts, "uncommitted", lambda files: uncommitted(outside(files)))
         yield folder
-
-
-def outside(files: Iterable[Path]) -> list[Path]:
-    """Return files that are not of the checkout that is tested."""
-    return [file for file in files if not file.is_relative_to(controllers.ROOT)]
 
 
 def tiny(folder: Path) -> ScenarioSet:

@@ -19,9 +19,9 @@ from baselines.joint import model as joint_model
 from baselines.joint.tracking import make_model_loop
 from baselines.knee import design as knee_design
 from baselines.linear.simc import simc_rule
-from benchmarks.identity.hashing import object_digest
 from benchmarks.papers.joint_studies import ReducedRig
 from pam_envs.identification.frequency import fit_rational
+from tests.object_digest import object_digest
 
 FREQUENCIES = np.geomspace(0.5, 60.0, 24)
 RIG = fit_rational(FREQUENCIES, 1.2 / (1.0 + 0.05j * FREQUENCIES), 1)

@@ -21,7 +21,7 @@ from benchmarks.runs.provenance import ROOT
 from benchmarks.runs.store import write_record
 from benchmarks.scenarios.scenario import ScenarioSet
 from pam_envs import citations
-from tests.benchmarks.test_harness import options, score
+from tests.benchmarks.runs.test_harness import options, score
 
 SIMC = "S. Skogestad, Simple analytic rules for model reduction and PID controller tuning, 2003"
 PPO = "Schulman et al., Proximal policy optimization algorithms, arXiv:1707.06347, 2017"

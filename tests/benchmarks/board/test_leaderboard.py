@@ -15,9 +15,8 @@ from benchmarks.board import accessors as views
 from benchmarks.board import claims, format, leaderboard, plots, standings, summary
 from benchmarks.board.columns import columns_of, with_costs
 from benchmarks.board.format import duration, number, table
-from benchmarks.identity import audit, verified
-from benchmarks.runs import cells, rows
-from benchmarks.runs.controllers import available, find
+from benchmarks.identity import audit
+from benchmarks.runs import rows
 from benchmarks.scoring.metrics import of_track
 
 BOARD, PAGE = leaderboard.BOARD.name, "leaderboard/MusclePositioning.md"
@@ -132,16 +131,13 @@ def test_verified_row_shows_its_day() -> None:
     row = fakes.row("pid", 1e-3)
     assert "not verified yet" in page(row)
     assert "0 of 1 rows are verified.\n" in summary.board_text([row])
-    row["verified"] = {"date": "2026-01-03", "mode": "bits", "older": False}
+    row["verified"] = {"date": "2026-01-03", "mode": "bits"}
     assert "| verified 2026-01-03 |" in page(row)
     board = summary.board_text([row, fakes.row("zero", 2e-3)])
     assert "1 of 2 rows are verified, last on 2026-01-03.\n" in board
     row["verified"]["mode"] = "elsewhere"
     assert "| verified 2026-01-03 elsewhere |" in page(row)
     assert ", 1 of them within tolerance on another machine." in summary.verified_words([row])
-    row["verified"]["older"] = True
-    assert "| verified 2026-01-03 elsewhere, at an older code |" in page(row)
-    assert "0 of 1 rows are verified" in summary.board_text([row])
 
 
 def test_row_of_an_older_round_is_self_reported(
@@ -163,29 +159,11 @@ def test_verification_counts_only_for_the_row_with_its_checksum(
 ) -> None:
     given = [fakes.row("pid", 1e-3), fakes.row("zero", 2e-3)]
     monkeypatch.setattr(rows, "load_all", lambda folder: given)
-    sources = cells.sources(find("pid"))
-    entry = {"checksum": "e" * 64, "date": "2026-01-03", "mode": "bits", "sources": sources}
+    entry = {"checksum": "e" * 64, "date": "2026-01-03", "mode": "bits"}
     held = {given[0]["row"]: entry, given[1]["row"]: {**entry, "checksum": "an older row"}}
     (tmp_path / "verified.json").write_text(json.dumps(held))
     words = [views.verified_words(row) for row in leaderboard.load(tmp_path)]
     assert words == ["verified 2026-01-03", "not verified yet"]
-
-
-@pytest.mark.parametrize("package", ["pam_envs", "baselines", "benchmarks", ""])
-def test_a_verification_is_of_the_code_that_it_ran(package: str) -> None:
-    row = fakes.row("pid", 1e-3)
-    now = cells.sources(find("pid"))
-    entry = {"checksum": row["checksum"], "date": "2026-01-03", "mode": "bits"}
-
-    def older(**others: object) -> bool:
-        found = verified.of(row, {row["row"]: {**entry, **others}}, available())
-        assert found is not None
-        return bool(found["older"])
-
-    assert not older(sources=now)
-    assert older(sources={**now, package: "another"}) if package else older()
-    row["controller"]["name"] = "nobody"
-    assert older(sources=now)
 
 
 def test_board_without_rows_states_that(tmp_path: Path) -> None:

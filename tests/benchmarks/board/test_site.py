@@ -115,7 +115,7 @@ drive().catch((fault) => told.faults.push(String(fault))).finally(() => {
 def page_rows() -> list[dict[str, Any]]:
     made = fakes.board()
     made[0]["controller"]["summary"] = HOSTILE
-    made[1]["verified"] = {"date": "2026-01-03", "mode": "bits", "older": False}
+    made[1]["verified"] = {"date": "2026-01-03", "mode": "bits"}
     for episode in made[3]["episodes"]:
         episode["scores"]["rms_error"] = None  # a row without a score breaks no table
     return made

@@ -27,7 +27,7 @@ from tests.sweeps.dask_processes import DaskProcesses
 from tests.sweeps.processes_of import alive, new_family, start, wait_until
 
 pytestmark = pytest.mark.xdist_group("row_sweep")  # one cluster
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 NAMES = ("low", "middle", "integral")
 
 PROGRAM = """

@@ -10,11 +10,11 @@ import bench_fakes
 import pytest
 
 from benchmarks.identity import trainings
-from benchmarks.identity.verify import verify
 from benchmarks.runs import rows
 from benchmarks.runs.controllers import find
 from benchmarks.runs.runner import Options, run
-from tests.benchmarks.row_helpers import GAINS, commit, draw, place, run_row, tiny
+from benchmarks.runs.verify import verify
+from tests.benchmarks.row_helpers import GAINS, draw, place, run_row, tiny
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,6 @@ def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def put_back(board: Path) -> Iterator[None]:
     yield
     bench_fakes.write_policies(board / "policies", *GAINS)
-    commit(board)
 
 
 def card(board: Path, seed: int) -> Path:
@@ -78,7 +77,6 @@ CHANGES: dict[str, tuple[Callable[[Path], object], str]] = {
 def test_seeds_that_are_no_trainings_of_their_own_make_no_row(what: str, board: Path) -> None:
     change, words = CHANGES[what]
     change(board)
-    commit(board)
     options = Options(jobs=1, out=board / "new", cells=board / "cells")
     report = run([(find("trained"), tiny(board))], options)
     assert report.rows == []
@@ -92,7 +90,6 @@ def test_seeds_that_are_no_trainings_of_their_own_make_no_row(what: str, board: 
 
 def test_a_round_takes_no_copies(board: Path) -> None:
     CHANGES["copied"][0](board)
-    commit(board)
     with pytest.raises(ValueError, match="are one policy"):
         draw(board, "trained")
 

@@ -1,13 +1,11 @@
-"""Cells: what their keys follow, what they may be of, and actions that strangers have packed."""
+"""Cells: dependence of their keys, admissible environments, and groups."""
 
 from __future__ import annotations
 
 import dataclasses
 import shutil
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
 
 from benchmarks.identity.hashing import canonical_text
@@ -48,48 +46,6 @@ def test_only_environments_of_this_package_are_made(env: str) -> None:
 def test_only_plants_of_the_folder_of_plants_are_read(plant: str) -> None:
     with pytest.raises(ValueError, match="is not the mere name of a file"):
         making.make_env("PAM/AntagonisticJoint-v0", {"plant": plant})
-
-
-@pytest.mark.parametrize("kind", [np.float32, np.float64])
-def test_actions_are_kept_to_the_bit(kind: type) -> None:
-    actions = np.random.default_rng(0).normal(size=(50, 2)).astype(kind)
-    again = cells.unpack(cells.pack(actions))
-    assert again.dtype == actions.dtype
-    assert np.array_equal(again, actions)
-    assert cells.unpack(cells.pack(actions[:0])).shape == (0, 2)
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"shape": [10, 1]}, "are not of shape"),
-        ({"shape": [1000, 1]}, "are not of shape"),
-        ({"shape": [10**9, 10**9]}, "are none"),
-        ({"shape": [-1, -100]}, "are none"),
-        ({"dtype": "O"}, "are none"),
-        ({"data": "ZZZZZ"}, "are damaged"),
-    ],
-)
-def test_actions_that_are_not_what_they_say_are_refused(change: dict[str, Any], words: str) -> None:
-    packed = cells.pack(np.zeros((100, 1))) | change
-    with pytest.raises(ValueError, match=words):
-        cells.unpack(packed)
-
-
-def test_a_bomb_is_not_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:
-    bomb = cells.pack(np.zeros((4_000_000, 1))) | {"shape": [100, 1]}
-    sizes: list[int] = []
-    make = cells.zlib.decompressobj
-
-    class Counting:
-        def decompress(self, data: bytes, most: int) -> bytes:
-            sizes.append(most)
-            return make().decompress(data, most)
-
-    monkeypatch.setattr(cells.zlib, "decompressobj", Counting)
-    with pytest.raises(ValueError, match="are not of shape"):
-        cells.unpack(bomb)
-    assert sizes == [801]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,166 @@
+"""Behaviour under fixed inputs: trajectories of environments and answers of controllers.
+
+The actions are made of integers and the environments' steps are bit-exact on every processor, so
+that the hash of a trajectory is portable. Controllers may be designed by iterations that round
+differently; their answers are compared within a tolerance.
+"""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.core.recorded_answers import answers
+from benchmarks.identity.hashing import arrays_digest
+from benchmarks.runs import rollout
+from benchmarks.scoring.episodes import scores_of
+
+SEED = 1
+HOLD = 25
+"""Control periods for which an action is held."""
+SHARE = 0.6
+"""Largest action in half ranges: no scenario of the board ends early under it."""
+LEVELS = 5
+PERIODS = 12
+"""Observations at the start of each part of a trajectory that controllers answer."""
+SCALES = (1.0, 0.25, 1.0, 0.25)
+"""Parts of a trajectory, and the factor of their distance from its first observation.
+
+Under small errors fewer answers are at an end of the range, where they would say nothing.
+"""
+TOLERANCE = 1e-6
+"""Difference of two answers, in action ranges, that is rounding."""
+DIGITS = 10
+"""Significant digits of a score: sums of numpy may differ beyond."""
+
+Array = NDArray[np.float32]
+Sequences = tuple[Array, ...]
+
+
+class FixedActions:
+    """Controller of levels that are held for a quarter of a second, whatever it observes."""
+
+    def __init__(self, space: Any) -> None:
+        self.middle = (space.high + space.low) / 2
+        self.half = (space.high - space.low) / 2
+
+    def predict(
+        self,
+        observation: Any,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[Array, int]:
+        """Return the action of the present control period, and the number of the next one."""
+        period = 0 if state is None or episode_start else state
+        action = self.middle + SHARE * self.half * self._levels(period // HOLD)
+        return action.astype(np.float32), period + 1
+
+    def model_output(self, state: int) -> Array:
+        """Return levels in place of a model's output, which some metrics compare with."""
+        return self._levels(state // HOLD)
+
+    def _levels(self, number: int) -> Any:
+        channels = np.arange(len(self.middle)) * (1 + number % 2)
+        steps = (3 * number + 2 * channels + number**2) % (2 * LEVELS + 1)
+        return (steps - LEVELS) / LEVELS
+
+
+@dataclass(frozen=True)
+class Behaviour:
+    """Behaviour of a scenario under fixed actions.
+
+    Attributes
+    ----------
+    trajectory : str
+        Hash of observations and physical signals; reward terms do not count.
+    scores : mapping of str
+        Metrics of that episode, and of the same one if it had failed, to ten digits.
+    observations : tuple of ndarray, shape (n, n_signals)
+        Consecutive observations from the start of each part.
+    """
+
+    trajectory: str
+    scores: Mapping[str, str]
+    observations: Sequences
+
+
+def of_environment(env: Any, content: Mapping[str, Any], rests: bool) -> Behaviour:
+    """Return the behaviour of an environment in one episode.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+    content : mapping
+        Of the scenario file that scores it.
+    rests : bool
+        Whether the reference rests, so that a steady-state error is scored.
+    """
+    episode = rollout.run(env, FixedActions(env.action_space), SEED)
+    signals = [v for name, v in episode.signals.items() if not name.startswith(("reward", "model"))]
+    found = scores_of(episode, content, rests)
+    failed = scores_of(episode, content, rests, failed=True)
+    scores = {name: f"{found[name]:.{DIGITS}g} {failed[name]:.{DIGITS}g}" for name in found}
+    return Behaviour(
+        arrays_digest([episode.observations, *signals]), scores, _sequences(episode.observations)
+    )
+
+
+def _sequences(observations: Any) -> Sequences:
+    """Return the observations that controllers answer, by operations that round equally."""
+    parts = np.array_split(observations.astype(np.float32), len(SCALES))
+    first = parts[0][:1]
+    scaled = zip(SCALES, parts, strict=True)
+    return tuple(first + np.float32(scale) * (part[:PERIODS] - first) for scale, part in scaled)
+
+
+def of_controller(controller: Any, observations: Sequences, space: Any) -> Array:
+    """Return a controller's answers to observations, as shares of the action range.
+
+    Parameters
+    ----------
+    controller : Controller
+    observations : sequence of ndarray, shape (n, n_signals)
+        The controller starts anew with each.
+    space : gymnasium.spaces.Box
+        Of the actions.
+
+    Returns
+    -------
+    ndarray, shape (n, n_actions)
+        Fewer rows where the controller raised an error.
+    """
+    span = space.high - space.low
+    found = []
+    for sequence in observations:
+        try:
+            given = answers(controller, sequence)
+        except Exception:
+            break
+        found += [(np.asarray(action, np.float64) - space.low) / span for action in given]
+    return np.array(found, np.float32).reshape(len(found), -1)
+
+
+def difference(first: Array, second: Array) -> float:
+    """Return the largest difference of answers in action ranges; infinite for other shapes."""
+    if first.shape != second.shape or not np.array_equal(np.isnan(first), np.isnan(second)):
+        return float("inf")
+    return float(np.nanmax(np.abs(first - second), initial=0.0))
+
+
+def pack(given: Array) -> dict[str, Any]:
+    """Return answers in JSON's types, to the last bit."""
+    data = zlib.compress(given.astype("<f4").tobytes(), 9)
+    return {"shape": list(given.shape), "data": base64.b85encode(data).decode()}
+
+
+def unpack(packed: Mapping[str, Any]) -> Array:
+    """Return the answers that :func:`pack` wrote."""
+    data = zlib.decompress(base64.b85decode(packed["data"]))
+    return np.frombuffer(data, "<f4").reshape(packed["shape"])

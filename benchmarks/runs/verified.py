@@ -1,0 +1,76 @@
+"""Notes of verification beside the rows: which rows were reproduced, when and how exactly."""
+
+from __future__ import annotations
+
+import datetime
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from filelock import FileLock
+
+from benchmarks.runs import provenance, rows
+from benchmarks.runs.store import CHECKSUM, write_text
+
+FILE = "verified.json"
+"""Beside the rows: of each row ``checksum``, ``date``, ``mode``, ``commit`` and ``packages``."""
+BITS, ELSEWHERE = "bits", "elsewhere"
+"""Reproduced to the last bit; within tolerance, with other packages or on another processor."""
+
+Found = Mapping[str, Mapping[str, Any]]
+
+
+def read(folder: Path) -> Found:
+    """Return the verifications of a folder of rows; none where there is no such file.
+
+    Raises
+    ------
+    ValueError
+        If the file is damaged.
+    """
+    path = folder / FILE
+    try:
+        return dict(json.loads(path.read_text(encoding="utf-8")))
+    except FileNotFoundError:
+        return {}
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{path}: {error}; restore it from git, or verify again") from error
+
+
+def of(row: Mapping[str, Any], found: Found) -> Mapping[str, Any] | None:
+    """Return the verification of a row, ``None`` where there is none since the row changed."""
+    entry = found.get(row["row"])
+    return entry if entry and entry["checksum"] == row.get(CHECKSUM) else None
+
+
+def note(path: Path, checksum: str, mode: str) -> None:
+    """Note that a row was reproduced, or remove its note where it was not.
+
+    A row that was once reproduced to the last bit keeps that mode.
+
+    Parameters
+    ----------
+    path : Path
+        File of the row.
+    checksum : str
+        Of the row that was verified; empty where it was not reproduced.
+    mode : {"bits", "elsewhere"}
+    """
+    folder, name = path.parents[1], rows.name_of(path)
+    with FileLock(folder / f".{FILE}.lock"):
+        before = read(folder)
+        old = before.get(name, {})
+        if mode == ELSEWHERE and (old.get("checksum"), old.get("mode")) == (checksum, BITS):
+            return
+        known = {row: entry for row, entry in before.items() if row != name}
+        if checksum:
+            known[name] = {
+                "checksum": checksum,
+                "commit": provenance.commit(),
+                "packages": provenance.packages(),
+                "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+                "mode": mode,
+            }
+        if known != before:
+            write_text(folder / FILE, json.dumps(known, indent=1, sort_keys=True) + "\n")

@@ -1,0 +1,222 @@
+"""Verification of rows: whether they are void, and whether they can be reproduced.
+
+Nothing in a row is trusted but the place where it was made: environment, scenarios, policy files,
+salt and the set of episodes are those of this checkout, and every number is computed again. A row
+that says that it was made with other packages or on another processor may differ by rounding, and
+is noted as verified elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from benchmarks.identity import artefacts, audit, tasks
+from benchmarks.identity.audit import Audit
+from benchmarks.identity.hashing import plain
+from benchmarks.runs import cells, comparison, rows, verified
+from benchmarks.runs.cells import Cell, cells_of
+from benchmarks.runs.comparison import differences
+from benchmarks.runs.controllers import Entrant, find
+from benchmarks.runs.store import CHECKSUM, comparable, fault, read_json
+from benchmarks.scenarios import scenario as scenarios
+from benchmarks.scenarios.scenario import ScenarioSet
+from sweeps import engine
+
+Record = Mapping[str, Any]
+
+DESCRIPTION = ("summary", "citation", "author")
+"""Entries of a row's controller that describe it, in the words of the catalogue."""
+
+
+@dataclass
+class Verdict:
+    """Result of computing a row again.
+
+    Attributes
+    ----------
+    row : str
+    mode : {"bits", "elsewhere"}
+        Whether it was compared to the last bit, or within the rounding of another machine.
+    drifted : list of str
+        Every field that differs, with both values; empty if the row is reproduced.
+    notes : list of str
+        Differences that are no drift by themselves (versions, commit, description).
+    checksum : str
+        Of the row that was read.
+    """
+
+    row: str
+    mode: str = verified.BITS
+    drifted: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    checksum: str = ""
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing has drifted."""
+        return not self.drifted
+
+
+def void(row: Record) -> list[str]:
+    """Return why a row is no result of the present task and controller, without running it."""
+    about, name = row["controller"], row["scenarios"]["name"]
+    try:
+        tasks.check_version(row["env"]["id"], row["row"])
+        entrant, track = find(about["name"]), _track(row)
+    except (OSError, ValueError) as error:
+        return [str(error)]
+    found = audit.last(name)
+    if row["audit"] and found:
+        drawn = found.changes(entrant, track)
+        return drawn or ([] if audit.in_last_round(row) else [f"not of round {found.number}"])
+    changes = [] if row["task"] == tasks.of(track).identity.digest else ["task changed"]
+    made = artefacts.of(entrant, track)
+    if about["artefact"]["files"] != plain([dict(file) for file in made.files]):
+        changes.append("policy files changed")
+    return changes + differences(about["artefact"]["knobs"], dict(made.knobs), "knobs")
+
+
+def verify(path: Path, cluster: engine.Cluster | None = None) -> Verdict:
+    """Compute the row of a file again and compare.
+
+    Parameters
+    ----------
+    path : Path
+    cluster : Cluster, optional
+        Where to compute; in this process by default.
+    """
+    verdict = Verdict(rows.name_of(path))
+    try:
+        stored = read_json(path)
+        rows.check_schema(stored, path)
+    except (OSError, ValueError, AttributeError, TypeError) as error:
+        verdict.drifted.append(f"the file cannot be read: {error}")
+        return verdict
+    verdict.checksum = str(stored.get(CHECKSUM))
+    wrong = fault(stored)
+    if wrong:
+        verdict.drifted.append(f"file: {wrong}")
+    try:
+        _check(stored, cluster or engine.Cluster(), verdict)
+    except KeyError as error:
+        verdict.drifted.append(f"cannot be run again: there is no {error}")
+    except Exception as error:
+        verdict.drifted.append(f"cannot be run again: {type(error).__name__}: {error}")
+    return verdict
+
+
+def _track(row: Record) -> ScenarioSet:
+    return scenarios.load(scenarios.FOLDER / f"{row['scenarios']['name']}.yaml")
+
+
+def _check(stored: Record, cluster: engine.Cluster, verdict: Verdict) -> None:
+    tasks.check_version(stored["env"]["id"], stored["row"])
+    entrant, track = find(stored["controller"]["name"]), _track(stored)
+    other = _other_scenarios(stored, track)
+    if other:  # a stranger's scenarios are not run
+        verdict.drifted += other
+        return
+    found = audit.find(entrant, track)
+    verdict.drifted += _other_audit(stored, entrant, track, found)
+    wanted = cells_of(entrant, track, found)
+    verdict.drifted += _other_episodes(stored, wanted)
+    _compare(stored, _run_again(entrant, track, found, wanted, cluster), verdict)
+
+
+def _other_scenarios(stored: Record, track: ScenarioSet) -> list[str]:
+    """Return in what the recorded scenarios differ from those of the checkout's file."""
+    said, file = stored["scenarios"], f"{track.name}.yaml, version {track.content['version']}"
+    found = []
+    if scenarios.identifying(said["content"]) != plain(scenarios.identifying(track.content)):
+        found.append(f"scenarios: the content is not that of {file}; run the row again")
+    if said["digest"] != track.digest:
+        found.append(
+            f"scenarios.digest: {str(said['digest'])[:16]} recorded, {track.digest[:16]} of {file}"
+        )
+    if stored["env"]["id"] != track.env:
+        found.append(f"env.id: {stored['env']['id']} recorded, {track.env} of {file}")
+    return found
+
+
+def _other_audit(
+    stored: Record, entrant: Entrant, track: ScenarioSet, found: Audit | None
+) -> list[str]:
+    """Return why a row has an audit that it may not have, or lacks one."""
+    if found is not None and stored["audit"] is None:
+        return [
+            f"audit: left out, though round {found.round.number} was drawn on {found.round.drawn}; "
+            "run the row again"
+        ]
+    if found is None and stored["audit"] is not None:
+        there = audit.last(track.name)
+        why = "; ".join(there.changes(entrant, track)) if there else "no round was drawn"
+        return [
+            f"audit: task and controller are not those of the last round of {track.name} ({why}); "
+            f"run `python -m benchmarks audit {track.name}`"
+        ]
+    return []
+
+
+def _other_episodes(stored: Record, wanted: Sequence[Cell]) -> list[str]:
+    """Return which episodes are missing or superfluous."""
+    recorded = Counter(
+        (e["split"], e["training_seed"], e["scenario"], e["seed"]) for e in stored["episodes"]
+    )
+    needed = Counter(
+        (cell.split, cell.training_seed, cell.scenario.name, seed)
+        for cell in wanted
+        for seed in cell.seeds
+    )
+    found = []
+    for what, which in (("missing", needed - recorded), ("superfluous", recorded - needed)):
+        if which:
+            split, run, scenario, seed = next(iter(which))
+            trained = "" if run is None else f", training seed {run}"
+            found.append(
+                f"episodes: {which.total()} {what}, the first: {split}, {scenario}, seed {seed}"
+                + trained
+            )
+    return found
+
+
+def _run_again(
+    entrant: Entrant,
+    track: ScenarioSet,
+    found: Audit | None,
+    wanted: Sequence[Cell],
+    cluster: engine.Cluster,
+) -> dict[str, Any]:
+    keys = [cell.key for cell in wanted]
+    records: dict[str, Any] = {}
+    for done in engine.run(cells.compute, cells.grouped(wanted), cluster):
+        if done.error is not None:
+            raise ValueError(done.error)
+        records |= done.value
+    return dict(plain(rows.assemble(entrant, track, [records[key] for key in keys], found)))
+
+
+def _compare(stored: Record, again: Record, verdict: Verdict) -> None:
+    before, after = ({**comparable(row), "schema": rows.SCHEMA} for row in (stored, again))
+    made, here = (row.pop("made_with", {}) for row in (before, after))
+    verdict.notes += differences(made, here, "made_with")
+    verdict.notes += differences(_described(before), _described(after), "description")
+    verdict.drifted += (drifted := differences(before, after))
+    if drifted and any(made.get(key) != here.get(key) for key in ("packages", "cpu")):
+        verdict.mode = verified.ELSEWHERE
+        verdict.notes.append(f"{len(drifted)} fields differ in bits, the first: {drifted[0]}")
+        beyond = comparison.beyond_rounding(before, after)
+        verdict.drifted[:] = [line for line in verdict.drifted if line not in drifted] + beyond
+
+
+def _described(row: dict[str, Any]) -> dict[str, Any]:
+    """Take the description out of a row and return it."""
+    controller, scenario = dict(row["controller"]), dict(row["scenarios"])
+    found = {key: controller.pop(key, None) for key in DESCRIPTION}
+    content = dict(scenario["content"])
+    found["title"] = content.pop("title", None)
+    row["controller"], row["scenarios"] = controller, {**scenario, "content": content}
+    return found

@@ -1,0 +1,432 @@
+"""Verification tells altered rows, whatever their checksum says, and void rows by behaviour."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import bench_fakes
+import numpy as np
+import pytest
+
+from benchmarks.__main__ import main
+from benchmarks.identity import audit
+from benchmarks.identity.hashing import digest
+from benchmarks.runs import provenance, rows, traces, verified, verify
+from benchmarks.runs.store import read_json, read_record, write_json, write_record
+from benchmarks.scoring import metrics
+from pam_envs.envs.positioning import env as muscle_positioning
+from tests.benchmarks.row_helpers import draw, place, run_row
+
+Row = dict[str, Any]
+Change = Callable[[Row], object]
+DRAWN, SALT = "5a" * 16, "4f" * 16
+"""Salt of the round, and one that was not drawn."""
+
+
+@pytest.fixture(scope="module")
+def board(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    with place(tmp_path_factory.mktemp("board")) as folder:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(audit.secrets, "token_hex", lambda _: DRAWN)
+            draw(folder, "trained", "inverse", "tuned")
+        for name in ("trained", "tuned", "integral", "raises"):
+            run_row(folder, name)
+        yield folder
+
+
+def path_of(board: Path, name: str) -> Path:
+    return rows.path_of(f"tiny--{name}", board / "out")
+
+
+def verdict_of(board: Path, name: str) -> verify.Verdict:
+    return verify.verify(path_of(board, name))
+
+
+@pytest.fixture
+def forged(board: Path) -> Iterator[Callable[..., verify.Verdict]]:
+    """Return a function that alters a row, seals it anew and verifies it; then it is put back."""
+    kept: dict[Path, bytes] = {}
+
+    def alter(name: str, change: Change, loads: bool = True) -> verify.Verdict:
+        path = path_of(board, name)
+        path.write_bytes(kept.setdefault(path, path.read_bytes()))
+        row = read_record(path)
+        before = copy.deepcopy(row)
+        change(row)
+        assert row != before
+        write_record(path, row)
+        if loads:  # the new checksum fits
+            assert rows.load(path)
+        return verdict_of(board, name)
+
+    yield alter
+    for path, content in kept.items():
+        path.write_bytes(content)
+
+
+def assert_drifted(verdict: verify.Verdict, words: str) -> None:
+    assert not verdict.holds
+    assert any(words in line for line in verdict.drifted), verdict.drifted
+
+
+@pytest.mark.parametrize("name", ["trained", "tuned", "integral", "raises"])
+def test_honest_row_is_reproduced_to_the_last_bit(name: str, board: Path) -> None:
+    verdict = verdict_of(board, name)
+    assert (verdict.drifted, verdict.mode) == ([], "bits")
+    assert not [note for note in verdict.notes if "commit" not in note]
+    assert verify.void(rows.load(path_of(board, name))) == []
+
+
+def scaled(record: Row, key: str) -> None:
+    record[key] *= 1.0 - 1e-12 if isinstance(record[key], float) else 2
+
+
+def moved(seeds: dict[str, list[int]]) -> None:
+    seeds[next(iter(seeds))][0] += 1
+
+
+def replaced(row: Row) -> None:
+    row["episodes"][-1] = copy.deepcopy(row["episodes"][0])
+
+
+def without_audit(row: Row) -> None:
+    row["audit"] = None
+    row["episodes"] = rows.episodes_of(row)
+
+
+FORGERIES: dict[str, tuple[str, Change, str]] = {
+    "score": (
+        "integral",
+        lambda row: scaled(row["episodes"][-1]["scores"], "rms_error"),
+        "episodes[3].scores.rms_error",
+    ),
+    "audit score": (
+        "trained",
+        lambda row: scaled(row["episodes"][-1]["scores"], "rms_error"),
+        "].scores.rms_error",
+    ),
+    "training cost": (
+        "trained",
+        lambda row: scaled(row["controller"]["training"][0], "steps"),
+        "controller.training[0].steps",
+    ),
+    "knowledge": (
+        "integral",
+        lambda row: row["controller"].update(knowledge="nothing"),
+        "controller.knowledge: 'nothing' recorded, 'true model' now",
+    ),
+    "policy hash": (
+        "trained",
+        lambda row: row["controller"]["artefact"]["files"][0].update(sha256="0" * 64),
+        "controller.artefact.files[0].sha256",
+    ),
+    "artefact": (
+        "trained",
+        lambda row: row["controller"]["artefact"].update(digest="0" * 64),
+        "controller.artefact.digest",
+    ),
+    "plants": (
+        "integral",
+        lambda row: row.update(plants=dict.fromkeys(row["plants"], "0" * 16)),
+        "plants.",
+    ),
+    "dropped failure": (
+        "raises",
+        lambda row: row["episodes"].pop(),
+        "episodes: 1 missing, the first: public, ",
+    ),
+    "denied failure": (
+        "raises",
+        lambda row: row["episodes"][0].update(failed=False),
+        "failed: False",
+    ),
+    "replaced episode": ("trained", replaced, "episodes: 1 missing, the first: audit, "),
+    "superfluous episode": ("trained", replaced, "episodes: 1 superfluous, the first: public, "),
+    "version": ("integral", lambda row: row["env"].update(version=1), "env.version: 1 recorded"),
+    "salt": (
+        "trained",
+        lambda row: row["audit"].update(salt=SALT),
+        f"audit.salt: '{SALT}' recorded, ",
+    ),
+    "round": ("trained", lambda row: row["audit"].update(round=2), "audit.round: "),
+    "entry": ("trained", lambda row: row["audit"].update(entry=2), "audit.entry: "),
+    "seeds": ("trained", lambda row: moved(row["audit"]["seeds"]), "audit.seeds."),
+    "no audit": ("trained", without_audit, "audit: left out, though round 1 was drawn on 20"),
+    "picture": (
+        "trained",
+        lambda row: scaled(row["traces"][0]["signals"]["output"], "high"),
+        "traces[0].signals.output.high",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", FORGERIES)
+def test_forged_entry_is_told(what: str, forged: Any) -> None:
+    name, change, words = FORGERIES[what]
+    assert_drifted(forged(name, change), words)
+
+
+def test_changed_description_is_a_note(forged: Any) -> None:
+    verdict = forged("integral", lambda row: row["controller"].update(summary="another"))
+    assert verdict.holds
+    assert any(note.startswith("description.summary: 'another'") for note in verdict.notes)
+
+
+def test_swapped_policy_is_told(board: Path) -> None:
+    try:
+        bench_fakes.write_policies(board / "policies", 0.02, 0.0500001)
+        verdict = verdict_of(board, "trained")
+        why = verify.void(rows.load(path_of(board, "trained")))
+    finally:
+        bench_fakes.write_policies(board / "policies", 0.02, 0.05)
+    assert_drifted(verdict, "controller.artefact.files[1].sha256")
+    assert_drifted(verdict, "of the last round of tiny (policy files changed); run `python -m")
+    assert why == ["policy files changed"]
+
+
+def test_turned_knob_voids_exactly_the_rows_of_its_controller(board: Path) -> None:
+    try:
+        bench_fakes.write_knobs(board / "policies", tuned={"gain": 0.020000001}, other={"lead": 2})
+        why = {n: verify.void(rows.load(path_of(board, n))) for n in ("tuned", "integral")}
+        verdict = verdict_of(board, "tuned")
+    finally:
+        bench_fakes.write_knobs(board / "policies")
+    assert why == {"tuned": ["knob gain changed: 0.02 to 0.020000001"], "integral": []}
+    assert_drifted(verdict, "knob gain changed")
+
+
+def test_row_of_another_controller_under_a_name_is_told(board: Path) -> None:
+    path = path_of(board, "low")
+    row = read_record(path_of(board, "integral"))
+    row["controller"]["name"], row["row"] = "low", "tiny--low"
+    write_record(path, row)
+    verdict = verdict_of(board, "low")
+    path.unlink()
+    assert_drifted(verdict, "controller.artefact.digest")
+
+
+def test_changed_environment_voids_rows(board: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    low, high = muscle_positioning.REFERENCE_RANGE
+    monkeypatch.setattr(muscle_positioning, "REFERENCE_RANGE", (low, high * (1.0 - 1e-9)))
+    row = rows.load(path_of(board, "trained"))
+    assert verify.void(row)[0].startswith("trajectories changed: ")
+    assert_drifted(verdict_of(board, "integral"), "task: ")
+
+
+def test_scenarios_of_another_version_are_not_run(forged: Any) -> None:
+    def change(row: Row) -> None:
+        row["scenarios"]["content"]["settle_seconds"] = 0.25
+
+    verdict = forged("integral", change)
+    (line,) = verdict.drifted
+    assert "scenarios: the content is not that of tiny.yaml, version 1" in line
+
+
+def test_row_of_another_environment_version_is_refused(forged: Any) -> None:
+    def change(row: Row) -> None:
+        text = json.dumps(row).replace("Positioning-v0", "Positioning-v1")
+        row.update(json.loads(text.replace('"version": 0', '"version": 1')))
+
+    words = "MusclePositioning-v1, and this checkout has PAM/MusclePositioning-v0"
+    assert_drifted(forged("integral", change), words)
+
+
+@pytest.mark.parametrize("honest", [False, True])
+def test_environment_and_code_that_a_row_names_are_not_run(
+    honest: bool, forged: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A row may hold digests that fit its own content: none of it is imported."""
+    module, mark = tmp_path / "stranger.py", tmp_path / "ran"
+    module.write_text(f"open({str(mark)!r}, 'w')")
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def change(row: Row) -> None:
+        said = row["scenarios"]
+        said["content"]["env"] = "stranger:PAM/MusclePositioning-v0"
+        said["content"]["kwargs"]["episode_seconds"] = 1e9
+        if honest:
+            said["digest"] = digest(said["content"])
+
+    assert_drifted(forged("integral", change), "the content is not that of tiny.yaml")
+    assert not mark.exists()
+
+
+def test_names_with_a_path_are_not_read(forged: Any) -> None:
+    verdict = forged("integral", lambda row: row.update(row="../../../escaped"), loads=False)
+    assert_drifted(verdict, "file, row, track and controller have to agree")
+
+
+def test_missing_entries_are_named(forged: Any) -> None:
+    verdict = forged("integral", lambda row: row.pop("env"), loads=False)
+    assert_drifted(verdict, "a row without env, env.id, env.version")
+    verdict = forged("integral", lambda row: row["episodes"][0].pop("split"))
+    assert_drifted(verdict, "cannot be run again: there is no 'split'")
+
+
+def test_audit_without_a_round_is_told(board: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(audit, "FILE", board / "none.json")
+    words = "the last round of tiny (no round was drawn); run `python -m benchmarks audit tiny`"
+    assert_drifted(verdict_of(board, "trained"), words)
+
+
+def test_damaged_files_are_told(board: Path, tmp_path: Path) -> None:
+    path = rows.path_of("tiny--integral", tmp_path)
+    path.parent.mkdir()
+    row = read_json(path_of(board, "integral"))
+    row["training_seeds"] = [1]
+    write_json(path, row)
+    assert_drifted(verify.verify(path), "file: the checksum does not match")
+    path.write_text("no row")
+    assert_drifted(verify.verify(path), "cannot be read")
+    write_record(path, {**row, "schema": 1})
+    assert_drifted(verify.verify(path), "run it again: python -m benchmarks run --track tiny")
+
+
+# On another processor last digits differ. A row that says so is compared within tolerance.
+
+
+@pytest.fixture
+def elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another processor, on which controllers round otherwise."""
+    monkeypatch.setattr(provenance, "cpu", lambda: "another")
+    for kind in (bench_fakes.Trained, bench_fakes.Inverse):
+        monkeypatch.setattr(kind, "predict", rounding(kind.predict))
+
+
+def rounding(predict: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a method whose first answer of an episode differs in its last digit."""
+
+    def rounded(self: Any, observation: Any, state: Any = None, *others: Any) -> Any:
+        action, after = predict(self, observation, state, *others)
+        return np.nextafter(action, np.float32(0)) if state is None else action, after
+
+    return rounded
+
+
+@pytest.mark.parametrize("name", ["trained", "tuned", "integral"])
+def test_elsewhere_a_row_is_reproduced_within_tolerance(
+    name: str, board: Path, elsewhere: None
+) -> None:
+    verdict = verdict_of(board, name)
+    assert (verdict.drifted, verdict.mode) == ([], "elsewhere")
+    assert any(" fields differ in bits, the first: " in note for note in verdict.notes)
+    assert verify.void(rows.load(path_of(board, name))) == []  # still in its round
+
+
+def test_elsewhere_another_design_is_not_that_of_the_round(
+    board: Path, elsewhere: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make = bench_fakes.make_controller
+
+    def designed(name: str, *arguments: Any, **named: Any) -> Any:
+        made = make(name, *arguments, **named)
+        return dataclasses.replace(made, gain=made.gain * 1.1)
+
+    monkeypatch.setattr(bench_fakes, "make_controller", designed)
+    (why,) = verify.void(rows.load(path_of(board, "tuned")))
+    assert why.startswith("answers changed by ")
+    assert_drifted(verdict_of(board, "tuned"), "audit: task and controller are not those of")
+
+
+def test_elsewhere_next_to_nothing_may_be_another_nothing(
+    board: Path, elsewhere: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    score = metrics.score
+    path = run_row(board, "integral", out=board / "nothing", cells=board / "nothing cells")
+    row = read_record(path)
+    for value, holds in ((5.1e-16, True), (1e-6, False)):
+        monkeypatch.setattr(metrics, "score", lambda *a, **k: {**score(*a, **k), "p95_error": 0.0})
+        for episode in row["episodes"]:
+            episode["scores"]["p95_error"] = value
+        row["made_with"]["cpu"] = "a third"
+        write_record(path, row)
+        assert any("scores.p95_error" in line for line in verify.verify(path).drifted) is not holds
+
+
+FOUND_ELSEWHERE: dict[str, tuple[Change, str]] = {
+    "episode": (
+        lambda row: row["episodes"][-1]["scores"].update(
+            rms_error=0.999 * row["episodes"][-1]["scores"]["rms_error"]
+        ),
+        "].scores.rms_error",
+    ),
+    "failure": (lambda row: row["episodes"][-1].update(failure="the weather"), "].failure"),
+    "dropped": (lambda row: row["episodes"].pop(), "episodes: 1 missing"),
+    "picture": (
+        lambda row: row["traces"][0]["signals"].update(
+            output=traces.pack(0.99 * traces.unpack(row["traces"][0]["signals"]["output"]))
+        ),
+        "traces[0].signals.output: another curve now",
+    ),
+    "tuning": (lambda row: row["controller"]["tuning"].update(trials=1), "controller.tuning"),
+}
+
+
+@pytest.mark.parametrize("what", FOUND_ELSEWHERE)
+def test_forgery_beyond_rounding_is_told_elsewhere(what: str, forged: Any) -> None:
+    """A row that falsely says that it was made elsewhere gains nothing."""
+
+    def change(row: Row) -> None:
+        row["made_with"]["cpu"] = "anything"
+        FOUND_ELSEWHERE[what][0](row)
+
+    verdict = forged("trained", change)
+    assert verdict.mode == "elsewhere"
+    assert_drifted(verdict, FOUND_ELSEWHERE[what][1])
+
+
+def test_metric_that_does_not_apply_is_no_drift(
+    board: Path, elsewhere: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    score = metrics.score
+    undefined = {"p95_error": float("nan")}
+    monkeypatch.setattr(metrics, "score", lambda *a, **k: score(*a, **k) | undefined)
+    path = run_row(board, "integral", out=board / "none", cells=board / "none cells")
+    assert verify.verify(path).holds
+
+
+def test_commands_print_outcomes_and_note_them(
+    board: Path, forged: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    honest, other = (str(path_of(board, name)) for name in ("integral", "raises"))
+    assert main(["verify", honest, other, "--jobs", "1"]) == 0
+    assert "tiny--integral: reproduced\n" in capsys.readouterr().out
+    found = verified.read(board / "out")
+    assert set(found) == {"tiny--integral", "tiny--raises"}
+    row = rows.load(Path(honest))
+    entry = verified.of(row, found)
+    assert entry is not None
+    assert (entry["mode"], entry["commit"]) == ("bits", provenance.commit())
+    assert verified.of({**row, "checksum": "another"}, found) is None
+    assert main(["void", honest, other]) == 0
+    assert "0 of 2 rows are void" in capsys.readouterr().out
+    forged("raises", lambda row: row["episodes"].pop())
+    assert main(["verify", honest, other, "--jobs", "1"]) == 1
+    said = capsys.readouterr().out
+    assert "2 rows: 1 reproduced; 1 DRIFTED\n" in said
+    assert "tiny--raises: DRIFTED\n  episodes: 1 missing, the first: public, " in said
+    assert "run the row again: python -m benchmarks run --track tiny --controller raises" in said
+    assert set(verified.read(board / "out")) == {"tiny--integral"}
+    for command in ("verify", "void", "cite"):
+        assert main([command, "tiny--nobody"]) == 2
+        assert "there is no row 'tiny--nobody'" in capsys.readouterr().err
+
+
+def test_row_once_reproduced_to_the_last_bit_keeps_that_note(tmp_path: Path) -> None:
+    path = rows.path_of("a--b", tmp_path)
+
+    def noted(checksum: str, mode: str) -> str | None:
+        verified.note(path, checksum, mode)
+        entry = verified.read(tmp_path).get("a--b")
+        return entry and entry["mode"]
+
+    assert noted("1", "elsewhere") == "elsewhere"
+    assert noted("1", "bits") == "bits"
+    assert noted("1", "elsewhere") == "bits"
+    assert noted("2", "elsewhere") == "elsewhere"
+    assert noted("", "elsewhere") is None
