@@ -1,4 +1,4 @@
-"""What the diagnosis benchmark counts, and with which bounds."""
+"""Statistics of the diagnosis benchmark and their bounds."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from benchmarks.diagnosis.report import figures, page
 
 
 @pytest.mark.parametrize(("count", "n"), [(0, 300), (1, 1500), (49, 50), (50, 50), (7, 12), (0, 1)])
-def test_bounds_are_those_of_the_exact_binomial_test(count: int, n: int) -> None:
+def test_bounds_equal_exact_binomial_test(count: int, n: int) -> None:
     both = stats.binomtest(count, n).proportion_ci(0.95, "exact")
     assert exact_interval(count, n) == pytest.approx([both.low, both.high])
     one = stats.binomtest(count, n, alternative="less").proportion_ci(0.95, "exact")
@@ -26,7 +26,7 @@ def test_300_clean_rigs_without_alarm_bound_it_at_one_percent() -> None:
     assert upper_bound(1, 300) > 0.01
 
 
-def test_a_share_of_nothing_is_no_share() -> None:
+def test_share_without_marks_is_none() -> None:
     assert share([]) == {"count": 0, "n": 0, "value": None, "interval": None, "upper": None}
     assert share([True, False, True, True])["value"] == 0.75
 
@@ -69,7 +69,7 @@ def test_words_for_two_effects() -> None:
     assert third.wrong and third.extra and not third.both
 
 
-def test_a_failed_run_is_wrong_wherever_it_counts() -> None:
+def test_failed_run_counts_as_wrong() -> None:
     made = figures(
         [
             failed(),
@@ -178,7 +178,7 @@ def test_traces_recovery_errors_and_times_of_a_sample() -> None:
     assert made["runtime_s"]["most"] == 9.0
 
 
-def test_the_detection_curve_of_a_sample() -> None:
+def test_detection_curve_of_a_sample() -> None:
     by_size = {(c["low"], c["high"]): c for c in figures(sample())["curve"]}
     assert counted(by_size[0.2, 0.35]["detected"]) == (1, 2)
     assert counted(by_size[0.2, 0.35]["wrong"]) == (1, 2)
@@ -187,7 +187,7 @@ def test_the_detection_curve_of_a_sample() -> None:
     assert sum(c["exact"]["n"] for c in by_size.values()) == 9
 
 
-def test_experiments_that_resolved_what_they_promised() -> None:
+def test_resolved_experiments_are_counted() -> None:
     ahead = figures(sample())["next"]
     assert (ahead["ambiguous"], ahead["promised"]) == (4, 2)
     assert counted(ahead["resolved"]) == (1, 2)
@@ -198,7 +198,7 @@ def test_experiments_that_resolved_what_they_promised() -> None:
     assert "did not resolve" in page(figures([broken]), "")
 
 
-def test_closed_loops_count_where_there_is_a_gap() -> None:
+def test_closed_loops_count_only_with_a_gap() -> None:
     loops = [loop(1.0, 0.6, 0.5), loop(1.0, 0.9, 0.5), loop(1.0, 1.2, 0.8), loop(1.0, 1.1, 0.9)]
     made = figures([record(names=["creep"], loop=made) for made in loops])["loop"]
     assert (made["n"], made["gap"]) == (4, 3)

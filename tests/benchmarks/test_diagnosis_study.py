@@ -1,4 +1,4 @@
-"""The benchmark of the diagnosis: which cases it runs, runs that go on, what a study finds."""
+"""Diagnosis benchmark: cases, resumed runs, studies."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # --- which cases ---------------------------------------------------------------------------------
 
 
-def test_a_fraction_is_of_every_kind_and_in_a_larger_one() -> None:
+def test_fractions_are_stratified_and_nested() -> None:
     tenth, fifth = (select(Options("tune", fraction=f)) for f in (0.1, 0.2))
     assert set(tenth) < set(fifth)
     for name in hidden.EFFECTS:
@@ -55,7 +55,7 @@ def test_kinds_and_names_are_chosen_and_wrong_ones_refused() -> None:
         select(Options(fraction=0))
 
 
-def test_the_command_is_told_as_it_was_given() -> None:
+def test_command_is_told_as_it_was_given() -> None:
     options = Options("tune", 3, 0.1, ("single",), ("creep", "leak"), 5, 2, True)
     assert options.arguments == (
         "--chosen tune --offset 3 --fraction 0.1 --kind single --name creep leak --limit 5 "
@@ -98,7 +98,7 @@ class Counting:
         return answer(case, stages)
 
 
-def test_a_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
+def test_run_resumes_after_interruption(tmp_path: Path) -> None:
     class Stopped(BaseException):
         pass
 
@@ -122,13 +122,13 @@ def test_a_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
     assert run(Options(folder=tmp_path, force=True), act=again).computed == total
 
 
-def test_a_failed_case_is_kept_told_and_counted_as_wrong(tmp_path: Path) -> None:
+def test_failed_case_is_stored_and_counts_as_wrong(tmp_path: Path) -> None:
     report = run(Options(kinds=("decoy",), folder=tmp_path), act=answer)
     assert len(report.failed) == 2 and report.failed[0].endswith(": ValueError: no")
     assert counted(figures(report.records)["false_alarms"]) == (2, 2)
 
 
-def test_a_corrupt_record_is_made_again(tmp_path: Path) -> None:
+def test_corrupt_record_is_recomputed(tmp_path: Path) -> None:
     options = Options(kinds=("pair",), folder=tmp_path)
     before = run(options, act=answer).records
     sorted(tmp_path.glob("*.json"))[0].write_text("{}")
@@ -158,7 +158,7 @@ def test_records_belong_to_the_numbers_of_rule_and_causes(
     assert run(options, act=answer).computed == 0
 
 
-def test_loops_and_experiments_are_run_where_they_count(tmp_path: Path) -> None:
+def test_closed_loops_and_experiments_run_for_their_cases(tmp_path: Path) -> None:
     counting = Counting()
     options = Options("tune", fraction=0.1, folder=tmp_path, loops=2, next=True)
     report = run(options, act=counting)
@@ -173,7 +173,7 @@ def test_loops_and_experiments_are_run_where_they_count(tmp_path: Path) -> None:
     assert counted(made["next"]["resolved"]) == (len(ahead), len(ahead))
 
 
-def test_a_loop_that_fails_leaves_the_verdict(tmp_path: Path) -> None:
+def test_failed_closed_loop_keeps_verdict(tmp_path: Path) -> None:
     def failing(case: Case, stages: Collection[str]) -> dict[str, Any]:
         return {**answer(case, stages), "failure": "no loop" if "loop" in stages else None}
 
@@ -189,7 +189,7 @@ def deadly(case: Case, stages: Collection[str]) -> dict[str, Any]:
     return answer(case, stages)
 
 
-def test_a_case_that_kills_its_worker_is_a_failed_one(
+def test_case_that_kills_its_worker_is_failed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(Path(__file__).parent)]))
@@ -201,7 +201,7 @@ def test_a_case_that_kills_its_worker_is_a_failed_one(
     assert "its worker died 3 times" in report.failed[0]
 
 
-def test_records_are_judged_anew(tmp_path: Path) -> None:
+def test_records_are_rejudged_by_the_present_rule(tmp_path: Path) -> None:
     def rival(names: list[str], gain: float) -> dict[str, Any]:
         return {"names": names, "forms": ["linear"], "gain": gain, "better": 0.0}
 
@@ -235,7 +235,7 @@ def test_records_are_judged_anew(tmp_path: Path) -> None:
 # --- a study -------------------------------------------------------------------------------------
 
 
-def test_a_case_that_cannot_be_made_is_a_failed_record(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_impossible_case_is_a_failed_record(monkeypatch: pytest.MonkeyPatch) -> None:
     def never(case: Case) -> None:
         raise ValueError("on none can the effect be so large")
 
@@ -286,7 +286,7 @@ def made_rig(name: str) -> Any:
 
 
 @pytest.mark.parametrize("name", ["creep", "dead_time", "sensor_delay"])
-def test_the_oracle_is_the_rig_that_is_driven_without_its_noise(name: str) -> None:
+def test_oracle_is_the_rig_that_is_driven_without_its_noise(name: str) -> None:
     made = made_rig(name)
     rig, oracle = DrivenRig(made, 30.0, 24.0), OracleRig(made, 30.0, 24.0)
     commands = np.repeat(np.random.default_rng(0).uniform(0.0, 5e5, 6), 30)
@@ -310,7 +310,7 @@ def test_the_oracle_is_the_rig_that_is_driven_without_its_noise(name: str) -> No
 
 
 @pytest.mark.parametrize("seconds", [30.0, 60.0])
-def test_a_brief_recording_is_the_beginning_of_a_whole_one(seconds: float) -> None:
+def test_brief_recording_is_the_start_of_a_whole_one(seconds: float) -> None:
     brief = make(Case("brief", 11, campaign="short", seconds=seconds))
     whole = make(Case("clean", 11, campaign="short"))
     n = len(brief.recording.time)

@@ -1,4 +1,4 @@
-"""The horizontal force that Eq. (1) leaves out, found among rival terms on unseen strides."""
+"""Diagnosis of the horizontal force missing in yeh2010, Eq. 1, on held-out strides."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_strides_differ_and_are_held_out_whole() -> None:
     assert all(len(np.unique(blocks.train[made.stride == k])) == 1 for k in range(STRIDES))
 
 
-def test_at_natural_pace_the_horizontal_force_is_named_and_rivals_are_not(
+def test_horizontal_force_is_named_at_natural_pace(
     natural: study.Outcome,
 ) -> None:
     assert natural.decision.verdict == "named"
@@ -82,14 +82,14 @@ def test_two_paces_give_the_share_to_some_percent() -> None:
     assert found.values["horizontal.share"] == pytest.approx(1.0, abs=0.02)
 
 
-def test_at_the_papers_pace_it_is_the_weight_of_the_shank() -> None:
+def test_shank_weight_is_named_at_the_papers_pace() -> None:
     found = study.diagnose(record(PAPER_STRIDE, STRIDES, 1))
     assert "shank_weight" in found.names  # which of two is found first depends on the draw
     assert "horizontal_force" not in found.names
     assert found.error(found.base) < 4.0
 
 
-def test_one_pace_between_misleads_and_a_second_one_does_not() -> None:
+def test_second_pace_removes_confusion_of_one_pace() -> None:
     one = study.diagnose(record(3.0, STRIDES, 1))
     assert "horizontal_force" not in one.names
     assert one.gain_of("horizontal_force") > 0.8 * one.gain_of("lean_bias")
@@ -116,7 +116,7 @@ def test_nothing_else_is_called_horizontal_force(name: str, value: float, cause:
         assert found.values[name.replace("_", ".")] == pytest.approx(value, rel=0.1)
 
 
-def test_noise_is_told_from_motion_and_from_what_is_missing() -> None:
+def test_noise_is_separated_from_motion_and_model_error() -> None:
     stride = np.repeat(np.arange(10), 120)
     values = 50.0 * np.sin(np.arange(1200) / 20.0) + 100.0 * stride
     noisy = values + 1.5 * np.random.default_rng(0).standard_normal(1200)
@@ -130,7 +130,7 @@ def test_recordings_of_two_legs_are_not_put_together() -> None:
         made.and_then(replace(made, leg=replace(made.leg, body_mass=60.0)))
 
 
-def test_the_page_of_results_names_it(capsys: pytest.CaptureFixture[str]) -> None:
+def test_page_of_results_names_it(capsys: pytest.CaptureFixture[str]) -> None:
     study.main(strides=12)
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("1.224 s a stride: named; horizontal.share 1.0")

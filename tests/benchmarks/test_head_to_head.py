@@ -28,7 +28,7 @@ def force() -> np.ndarray:
     return campaign(SEED).force
 
 
-def test_the_rig_moves_as_its_equation_says():
+def test_rig_moves_as_its_equation_says():
     rig = Oscillator.drawn(SEED)
     force = another(SEED).force[:600]
     state, found = np.zeros(2), []
@@ -47,14 +47,14 @@ def test_the_rig_moves_as_its_equation_says():
     np.testing.assert_allclose(rig.positions(force), found, atol=1e-8)
 
 
-def test_friction_holds_the_mass_until_the_force_breaks_it_away():
+def test_static_friction_holds_mass_until_breakaway():
     rig = Oscillator(friction=1.0, breakaway=1.2)
     ramp = np.linspace(0.0, 3.0, 301)
     moved = np.flatnonzero(rig.positions(ramp) != 0.0)
     assert ramp[moved[0] - 1] == pytest.approx(1.2, abs=0.011)  # the force of the step before
 
 
-def test_friction_halts_a_swing_within_the_band_that_it_can_hold():
+def test_friction_stops_oscillation_within_its_dead_zone():
     rig = Oscillator(friction=1.0, breakaway=1.0)
     force = np.concatenate([np.full(300, 8.0), np.zeros(500)])
     x = rig.positions(force)
@@ -73,21 +73,21 @@ def test_rig_and_candidate_agree_on_the_same_plant(force, friction, most):
     assert 0.0 < off < most  # two integrators: near, not the same
 
 
-def test_the_rig_shares_no_code_with_what_is_fitted_to_it():
+def test_rig_shares_no_code_with_what_is_fitted_to_it():
     tree = ast.parse(Path(mass_spring_damper_rig.__file__).read_text(encoding="utf-8"))
     names = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
     names |= {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
     assert names == {"__future__", "math", "dataclasses", "numpy", "numpy.typing"}
 
 
-def test_the_library_does_not_know_of_this_plant():
+def test_library_does_not_know_of_this_plant():
     library = Path(head_to_head.__file__).parents[1] / "pam_envs"
     for path in library.rglob("*.py"):
         assert "mass_spring_damper" not in path.read_text(encoding="utf-8").lower()
 
 
 @pytest.mark.parametrize("cause", CAUSES, ids=lambda c: c.name)
-def test_a_cause_is_neutral_until_it_is_fitted(force, cause):
+def test_cause_is_neutral_until_it_is_fitted(force, cause):
     family = MassSpringDamper(force[:3000], PERIOD, {})
     plain = family.simulate(family.column[None])
     for form in cause.forms:
@@ -105,7 +105,7 @@ def test_a_cause_is_neutral_until_it_is_fitted(force, cause):
 
 
 @pytest.mark.parametrize("friction", head_to_head.FRICTIONS)
-def test_hidden_friction_is_named_and_a_plain_rig_is_cleared(force, friction):
+def test_hidden_friction_is_named_and_clean_rig_is_adequate(force, friction):
     rig = Oscillator.drawn(SEED, friction=friction)
     found = diagnose(force, rig.readings(force, SEED))
     decision = found.decision
@@ -136,16 +136,16 @@ def written() -> dict:
     return json.loads(head_to_head.RESULTS.read_text(encoding="utf-8"))
 
 
-def test_every_line_of_a_table_has_all_its_columns():
+def test_table_rows_must_have_all_columns():
     with pytest.raises(ValueError, match="a row of 1 cells in a table of 2 columns"):
         head_to_head_page.table(["a", "b"], [["1"]])
 
 
-def test_the_page_is_that_of_the_results():
+def test_page_matches_the_results():
     assert head_to_head.PAGE.read_text(encoding="utf-8") == head_to_head_page.page(written())
 
 
-def test_the_results_flag_every_friction_and_clear_every_plain_rig():
+def test_results_flag_every_friction_and_clear_every_plain_rig():
     levels = head_to_head_page.by_friction(written()["rows"])
     assert tuple(levels) == head_to_head.FRICTIONS
     for friction, rows in levels.items():
@@ -155,7 +155,7 @@ def test_the_results_flag_every_friction_and_clear_every_plain_rig():
             assert all(row["ours"]["causes"][0] == "dry_friction" for row in rows)
 
 
-def test_a_page_without_mujoco_says_so():
+def test_page_without_mujoco_states_it():
     result = written()
     for row in result["rows"]:
         for key in ("sysid", "sysid_told"):

@@ -1,4 +1,4 @@
-"""The whole way, from two files to a verdict, a better plant and its gain."""
+"""End to end: from two files to verdict, extended plant and gain."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def found(files: Files) -> Diagnosis:
     return diagnose(recording, rig=rig, progress=False)
 
 
-def test_the_cause_is_named_and_the_plant_gets_better(found: Diagnosis) -> None:
+def test_hidden_cause_is_named_and_error_decreases(found: Diagnosis) -> None:
     assert (found.verdict, found.causes) == ("named", ("temperature",))
     before, after = (found.report[k]["contraction"] for k in ("error_before", "error_after"))
     assert after["value"] < 0.7 * before["value"]
@@ -67,7 +67,7 @@ def test_the_cause_is_named_and_the_plant_gets_better(found: Diagnosis) -> None:
     assert "temperature" in found.text
 
 
-def test_the_extended_plant_is_adequate(files: Files, found: Diagnosis) -> None:
+def test_extended_plant_is_adequate(files: Files, found: Diagnosis) -> None:
     recording, rig = files.load()
     again = diagnose(recording, found.plant, rig=rig, progress=False, closed_loop=False)
     assert (again.verdict, again.causes) == ("adequate", ())
@@ -75,7 +75,7 @@ def test_the_extended_plant_is_adequate(files: Files, found: Diagnosis) -> None:
     assert any(entry["name"] == "muscle.temperature_gain" for entry in again.report["calibration"])
 
 
-def test_the_command_writes_the_same_bytes(
+def test_command_line_writes_the_same_report(
     files: Files, found: Diagnosis, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     call = ["diagnose", str(files.recording), "--rig", str(files.rig), "--out", str(tmp_path)]
@@ -95,7 +95,7 @@ def test_the_command_writes_the_same_bytes(
     assert np.isfinite(env.step(env.action_space.sample())[0]).all()
 
 
-def test_without_pressure_what_is_in_the_valve_is_told_apart_or_not_decided(files: Files) -> None:
+def test_without_pressure_valve_causes_are_isolable_or_not_testable(files: Files) -> None:
     recording, rig = files.load()
     columns = {k: getattr(recording, k) for k in ("contraction", "load", "temperature")}
     labels = [recording.segments[k] for k in recording.segment]
@@ -124,7 +124,7 @@ def test_without_pressure_what_is_in_the_valve_is_told_apart_or_not_decided(file
     assert "valve was never shut" in undecidable(shut, bare)["leak"]
 
 
-def test_causes_may_be_named(files: Files) -> None:
+def test_causes_are_given_by_name(files: Files) -> None:
     recording, rig = files.load()
     one = diagnose(recording, rig=rig, causes=["temperature"], progress=False, closed_loop=False)
     assert (one.verdict, one.causes) == ("named", ("temperature",))
@@ -132,7 +132,7 @@ def test_causes_may_be_named(files: Files) -> None:
         diagnose(recording, rig=rig, causes=["temprature"], progress=False)
 
 
-def test_what_no_muscle_does_is_a_sentence_on_the_data(files: Files) -> None:
+def test_impossible_data_give_an_error_with_remedy(files: Files) -> None:
     recording, _ = files.load()
     assert recording.contraction is not None
     metres = dataclasses.replace(recording, contraction=1e-3 * recording.contraction)

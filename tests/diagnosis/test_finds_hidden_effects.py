@@ -1,4 +1,4 @@
-"""A fixed sample of rigs that hide something: what is hidden is named, what is not is not."""
+"""Verdicts on a fixed sample of rigs with and without hidden effects."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def one(case: Case) -> Any:
 
 @compiled
 @pytest.mark.parametrize("case", [one(case) for case in SINGLE])
-def test_one_hidden_effect_is_the_first_name(case: Case, records: Records) -> None:
+def test_hidden_effect_is_named_first(case: Case, records: Records) -> None:
     found = records[case]
     assert found["failure"] is None
     assert found["truths"][0]["size"] == pytest.approx(SIZE, rel=0.05)
@@ -90,7 +90,7 @@ def test_one_hidden_effect_is_the_first_name(case: Case, records: Records) -> No
 
 @compiled
 @pytest.mark.parametrize("case", ADEQUATE, ids=lambda case: f"{case.kind}-{case.seed - SEED}")
-def test_nothing_is_called_missing_where_nothing_is_hidden(case: Case, records: Records) -> None:
+def test_clean_rig_is_adequate(case: Case, records: Records) -> None:
     found = records[case]
     assert found["failure"] is None
     assert (found["verdict"], found["names"]) == ("adequate", [])
@@ -98,7 +98,7 @@ def test_nothing_is_called_missing_where_nothing_is_hidden(case: Case, records: 
 
 @compiled
 @pytest.mark.parametrize("case", FAINT, ids=lambda case: case.names[0])
-def test_below_the_noise_nothing_wrong_is_named(case: Case, records: Records) -> None:
+def test_effect_below_noise_gives_no_wrong_name(case: Case, records: Records) -> None:
     found = records[case]
     assert found["failure"] is None
     assert found["verdict"] in ("adequate", "named", "ambiguous")
@@ -106,13 +106,13 @@ def test_below_the_noise_nothing_wrong_is_named(case: Case, records: Records) ->
 
 
 @compiled
-def test_a_recording_in_which_nothing_moves_decides_nothing(records: Records) -> None:
+def test_recording_without_motion_is_insufficient(records: Records) -> None:
     found = records[IDLE]
     assert (found["verdict"], found["names"]) == ("insufficient", [])
 
 
 @compiled
-def test_a_wrong_base_parameter_is_refitted_and_reported_as_such() -> None:
+def test_wrong_base_parameter_is_calibrated_not_named() -> None:
     made = make(Case("decoy", SEED + 22))
     found = diagnosed(made.recording, made.sheet)
     told = {entry["name"]: entry for entry in found.report["calibration"]}
@@ -124,7 +124,7 @@ def test_a_wrong_base_parameter_is_refitted_and_reported_as_such() -> None:
 
 
 @compiled
-def test_two_hidden_effects_are_both_named(records: Records) -> None:
+def test_two_hidden_effects_are_named(records: Records) -> None:
     found = records[PAIR]
     assert found["failure"] is None
     assert found["verdict"] in ("named", "ambiguous")
@@ -132,7 +132,7 @@ def test_two_hidden_effects_are_both_named(records: Records) -> None:
 
 
 @compiled
-def test_an_effect_outside_the_catalogue_is_left_unexplained(records: Records) -> None:
+def test_effect_outside_catalogue_is_unexplained(records: Records) -> None:
     found = records[UNKNOWN]
     assert found["failure"] is None
     assert found["verdict"] == "unexplained"
@@ -144,7 +144,7 @@ def test_one_process_makes_the_sample(request: pytest.FixtureRequest) -> None:
     assert request.node.nodeid.endswith("@hidden effects")
 
 
-def test_nothing_in_the_library_imports_the_tests() -> None:
+def test_library_does_not_import_tests() -> None:
     folder = Path(pam_envs.__file__).parent
     files = sorted(folder.rglob("*.py"))
     assert len(files) > 100
@@ -186,6 +186,6 @@ def _called(function: ast.expr) -> str:
         "__import__('tests')",
     ],
 )
-def test_an_import_of_the_tests_would_be_seen(line: str) -> None:
+def test_import_of_tests_is_detected(line: str) -> None:
     assert "tests" in _roots(ast.parse(line))
     assert "tests" not in _roots(ast.parse("from pam_envs.tests import x\nfrom .tests import y"))

@@ -1,4 +1,4 @@
-"""The rigs that hide effects: independent, clean when nothing is hidden, and physical."""
+"""Hidden rigs: independence of the library, exact neutrality, physical plausibility."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def _imports(tree: ast.AST) -> set[str]:
     return names
 
 
-def test_the_rigs_import_nothing_but_numbers():
+def test_hidden_rigs_import_only_numpy_and_numba():
     files = sorted(FOLDER.rglob("*.py"))
     assert len(files) > 10
     for file in files:
@@ -103,7 +103,7 @@ def test_there_are_25_effects_and_two_disjoint_sets_outside_the_catalogue():
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_an_amplitude_of_zero_is_exactly_clean_and_a_small_one_nearly(name, short, clean_short):
+def test_zero_amplitude_is_exactly_clean(name, short, clean_short):
     base, effect = _base(), _effect(name)
     zero = hidden.simulate(base, [(effect, 0.0)], short)
     assert all(np.array_equal(clean_short[key], zero[key]) for key in clean_short)
@@ -111,7 +111,7 @@ def test_an_amplitude_of_zero_is_exactly_clean_and_a_small_one_nearly(name, shor
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_every_effect_shows_and_stays_physical(name, short, clean_short):
+def test_each_effect_is_visible_and_physical(name, short, clean_short):
     base, effect = _base(), _effect(name)
     shown = hidden.simulate(base, [(effect, 5.0)], short)
     assert _size(shown, clean_short) > 1.0
@@ -122,12 +122,12 @@ def test_every_effect_shows_and_stays_physical(name, short, clean_short):
     assert -0.7 < strong["pressure_bar"].min() <= strong["pressure_bar"].max() < 9.0
 
 
-def test_a_negative_amplitude_is_refused(short):
+def test_negative_amplitude_is_refused(short):
     with pytest.raises(ValueError, match=r"amplitude -1\.0 of creep is negative"):
         hidden.simulate(_base(), [(_effect("creep"), -1.0)], short)
 
 
-def test_the_same_seeds_give_the_same_recording(short):
+def test_same_seeds_give_the_same_recording(short):
     def recording(noise_seed: int) -> dict:
         effects = [(_effect("creep"), 2.0), (_effect("leak"), 1.0)]
         return hidden.make_recording(_base(), effects, short, noise_seed)
@@ -140,7 +140,7 @@ def test_the_same_seeds_give_the_same_recording(short):
 
 
 @pytest.mark.parametrize("factor", [1.0, 3.0])
-def test_noise_has_its_size_and_a_slow_part(factor, standard, clean):
+def test_noise_has_declared_size_and_slow_part(factor, standard, clean):
     base = dataclasses.replace(_base(), coloured=0.5, grain_mm=0.0, grain_bar=0.0)
     noise = {name: [] for name in CHANNELS}
     for seed in range(4):
@@ -154,7 +154,7 @@ def test_noise_has_its_size_and_a_slow_part(factor, standard, clean):
         assert lagged == pytest.approx(0.5 * np.exp(-1.0), abs=0.08)
 
 
-def test_the_campaign_has_every_kind_twice_under_four_loads_or_more(standard):
+def test_campaign_has_every_kind_twice_under_four_loads_or_more(standard):
     kinds: dict[str, set] = {}
     for label in dict.fromkeys(standard.segment.tolist()):
         kinds.setdefault(label.rpartition("_")[0], set()).add(label)
@@ -181,7 +181,7 @@ def test_repeated_segments_have_the_same_commands_and_loads(standard):
         assert np.array_equal(standard.load_N[one], standard.load_N[other])
 
 
-def test_a_shut_valve_holds_the_pressure_until_something_leaks(standard, clean):
+def test_closed_valve_holds_pressure_without_leak(standard, clean):
     leaking = hidden.simulate(_base(), [(_effect("leak"), 5.0)], standard)
     assert standard.closed_segments() == ["shut_a", "shut_b"]
     for label, level in (("shut_a", 2.0), ("shut_b", 4.5)):
@@ -200,7 +200,7 @@ def test_long_short_and_idle_campaigns(short):
     assert np.ptp(hidden.simulate(_base(), [], idle)["contraction_mm"]) < 0.01
 
 
-def test_the_regulator_of_a_clean_rig_is_one_lag():
+def test_clean_regulator_is_a_first_order_lag():
     base = _base()
     step = hidden.simulate(base, [], _single(np.full(200, 3.0), period=0.01))
     expected = base.gain * 3.0 * (1.0 - np.exp(-step["time"] / base.lag))
@@ -208,7 +208,7 @@ def test_the_regulator_of_a_clean_rig_is_one_lag():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_slow_loop_is_as_wide_as_drawn_and_the_stroke_is_a_muscles(seed):
+def test_loop_width_and_stroke_are_as_drawn(seed):
     base = _base(seed)
     half = np.linspace(0.0, 6.0, 2000)
     run = hidden.simulate(base, [], _single(np.concatenate([half, half[::-1], half, half[::-1]])))
@@ -220,7 +220,7 @@ def test_a_slow_loop_is_as_wide_as_drawn_and_the_stroke_is_a_muscles(seed):
     assert 0.12 < run["contraction_mm"].max() / base.length_mm < 0.2
 
 
-def test_loads_stretch_a_muscle_at_rest_only_when_they_change():
+def test_muscle_at_rest_moves_only_with_load_changes():
     base = _base()
     steady = hidden.simulate(base, [], _single(np.zeros(100), load=30.0))
     assert np.max(np.abs(steady["contraction_mm"])) < 1e-6
@@ -229,7 +229,7 @@ def test_loads_stretch_a_muscle_at_rest_only_when_they_change():
     assert hidden.simulate(base, [], changed)["contraction_mm"][-1] < -0.2
 
 
-def test_decoys_lie_outside_the_usual_range():
+def test_decoys_are_outside_the_usual_range():
     rng = np.random.default_rng(0)
     for base in [hidden.decoys(rng) for _ in range(20)]:
         assert not 0.035 <= base.lag <= 0.12
@@ -239,7 +239,7 @@ def test_decoys_lie_outside_the_usual_range():
 
 
 @pytest.mark.parametrize("name", ["dead_time", "creep", "stick_slip", "sensor_delay", "wire_slack"])
-def test_a_stepped_rig_does_what_a_campaign_does(name):
+def test_stepped_rig_equals_campaign(name):
     rng = np.random.default_rng(0)
     command = np.repeat(rng.uniform(0.0, 5.0, 12), 40)
     base, effects = _base(), [(_effect(name), 3.0)]
@@ -253,7 +253,7 @@ def test_a_stepped_rig_does_what_a_campaign_does(name):
         assert pressure == pytest.approx(rows["pressure_bar"][row], abs=max(base.grain_bar, 1e-9))
 
 
-def test_a_reset_starts_the_rig_and_its_noise_anew():
+def test_reset_restarts_rig_and_noise():
     stepper = Stepper(_base(), [(_effect("creep"), 3.0)], 15.0, noise_seed=4)
     first = [stepper.step(3.0) for _ in range(50)]
     stepper.reset(4)
@@ -262,12 +262,12 @@ def test_a_reset_starts_the_rig_and_its_noise_anew():
     assert [stepper.step(3.0) for _ in range(50)] != first
 
 
-def test_a_period_must_be_whole_milliseconds():
+def test_period_must_be_whole_milliseconds():
     with pytest.raises(ValueError, match=r"period 0\.0125 s is not a whole number"):
         Stepper(_base(), [], 0.0, 0, period=0.0125)
 
 
-def test_the_file_holds_what_the_recording_holds(short, tmp_path):
+def test_csv_file_equals_recording(short, tmp_path):
     columns = hidden.make_recording(_base(), [], short, 0)
     path = tmp_path / "rig.csv"
     hidden.write_csv(columns, path)
@@ -283,7 +283,7 @@ def test_the_file_holds_what_the_recording_holds(short, tmp_path):
     assert np.allclose(read, columns["contraction_mm"], atol=6e-6)
 
 
-def test_the_owner_writes_what_he_knows(standard):
+def test_rig_file_declares_the_constants(standard):
     base = _base()
     sheet = hidden.rig_yaml(base, standard, noise_factor=3.0)
     assert sheet["plant"] == "single_muscle"

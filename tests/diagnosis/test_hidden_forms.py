@@ -1,4 +1,4 @@
-"""The forms of the hidden effects: what each equation of the rigs does, and no candidate's does."""
+"""Mathematical forms of the hidden effects, different from those of the candidates."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def short() -> Campaign:
 
 @pytest.mark.parametrize("seed", [1, 2, 5])
 @pytest.mark.parametrize("name", FORMED)
-def test_a_larger_amplitude_shows_more_and_a_little_larger_a_little_more(name, seed, short):
+def test_size_increases_continuously_with_amplitude(name, seed, short):
     base, effect = _base(), _effect(name, seed)
     clean = hidden.simulate(base, [], short)
 
@@ -77,14 +77,14 @@ def test_a_larger_amplitude_shows_more_and_a_little_larger_a_little_more(name, s
     assert sizes[1] < 1.2 * sizes[0]
 
 
-def test_every_effect_of_the_catalogue_has_its_two_forms_told():
+def test_both_forms_of_each_effect_are_documented():
     rows = [line for line in catalogue.__doc__.splitlines() if line[:1].isalpha()]
     told = {row.split()[0]: row[28:].strip() for row in rows}
     for name in hidden.EFFECTS:
         assert len(told[name]) > 20
 
 
-def test_a_restriction_is_choked_then_an_ellipse_then_straight():
+def test_flow_of_restriction_is_choked_then_elliptic_then_linear():
     critical = 0.3
     down = np.linspace(0.0, 7.0, 701)
     flow = np.array([passed(critical, 7.0, value) for value in down])
@@ -98,7 +98,7 @@ def test_a_restriction_is_choked_then_an_ellipse_then_straight():
     assert passed(critical, 2.0, 3.0) == 0.0
 
 
-def test_a_muscle_swells_as_it_shortens():
+def test_muscle_volume_increases_with_contraction():
     p, _ = _rig(_effect("supply_droop"), 3.0)
     assert volume(p, 0.0)[0] == pytest.approx(1.0)
     for strain in (0.0, 0.08, 0.16):
@@ -121,7 +121,7 @@ def test_what_the_muscle_takes_the_reservoir_loses_and_gets_back_through_the_ori
     assert left * wide + (2.0 + ATMOSPHERE) * slope * s.speed == pytest.approx(most)
 
 
-def test_a_reservoir_fills_ever_faster_by_share_of_what_is_missing():
+def test_reservoir_refill_rate_over_deficit_increases():
     p, s = _rig(_effect("supply_droop"), 3.0)
     s.supply = p.supply - 2.0
     gaps = []
@@ -136,7 +136,7 @@ def test_a_reservoir_fills_ever_faster_by_share_of_what_is_missing():
 
 
 @pytest.mark.parametrize("iron", [0.0, 1.0])
-def test_no_soft_minimum_of_power_two_bends_as_the_coil_does(iron):
+def test_soft_minimum_cannot_imitate_the_coil(iron):
     p, _ = _rig(_effect("slew_limit", iron=iron), 3.0)
     errors = np.linspace(-5.0, 5.0, 201)
     bent = np.array([driven(p, error) for error in errors])
@@ -153,7 +153,7 @@ def test_no_soft_minimum_of_power_two_bends_as_the_coil_does(iron):
     assert driven(p, 1e-3) == pytest.approx(1e-3, rel=1e-3)
 
 
-def test_a_spool_opens_without_a_jump_and_leaks_in_its_overlap():
+def test_spool_opens_continuously_and_leaks_in_overlap():
     p, _ = _rig(_effect("valve_dead_band"), 3.0)
     errors = np.linspace(-6.0, 6.0, 2401) * p.overlap
     flow = np.array([uncovered(p, error) for error in errors])
@@ -167,7 +167,7 @@ def test_a_spool_opens_without_a_jump_and_leaks_in_its_overlap():
     assert 4.5 * p.overlap < flow[-1] < 5.5 * p.overlap  # nothing is made up for beyond
 
 
-def test_a_guide_bends_before_it_slips_and_springs_back_in_part():
+def test_guide_deflects_before_slipping_and_partly_recovers():
     p, s = _rig(_effect("stick_slip"), 3.0)
     mass, damping = p.length * 0.3, p.length * 150.0
     most = 0.5 * p.breakaway
@@ -180,7 +180,7 @@ def test_a_guide_bends_before_it_slips_and_springs_back_in_part():
     assert bent - 1e3 * p.length * s.strain == pytest.approx(p.bristle * np.log(1.5), rel=0.05)
 
 
-def test_a_guide_drags_less_the_faster_it_slips():
+def test_guide_friction_decreases_with_speed():
     p, s = _rig(_effect("stick_slip"), 3.0)
     mass, damping = p.length * 0.3, p.length * 150.0
     for share in (1.2, 2.0, 4.0):
@@ -205,14 +205,14 @@ def _peaks(effect: Effect, channel: str) -> np.ndarray:
     return hertz[found[np.argsort(-power[found])]]
 
 
-def test_a_tube_rings_at_its_quarter_wave_and_at_three_times_that():
+def test_tube_resonates_at_quarter_wave_and_third_harmonic():
     tube = _effect("resonance", line=1.0, hertz=6.0, damping=0.03, wall=0.05)
     peaks = _peaks(tube, "pressure_bar")
     assert peaks[0] == pytest.approx(6.0, rel=0.05)
     assert np.min(np.abs(peaks / peaks[0] - 3.0)) < 0.15
 
 
-def test_a_bracket_and_its_foot_ring_in_two_modes():
+def test_bracket_and_foot_resonate_in_two_modes():
     share, ratio = 0.2, 1.6
     mount = _effect(
         "resonance", line=0.0, hertz=6.0, damping=0.03, foot=ratio, share=share, lever=-4.0
@@ -223,7 +223,7 @@ def test_a_bracket_and_its_foot_ring_in_two_modes():
     assert np.sort(_peaks(mount, "contraction_mm")[:2]) == pytest.approx(expected, rel=0.05)
 
 
-def test_a_tray_hangs_the_more_the_heavier_the_load_and_scales_add_in_proportion():
+def test_tray_and_scale_errors_increase_with_load():
     p, s = _rig(_effect("payload_error", scale=0.2), 3.0)
 
     def more(told: float) -> float:

@@ -1,4 +1,4 @@
-"""A cause costs one file, and one more for its hidden counterpart: both are added from outside."""
+"""A cause is one file, with one more for its hidden counterpart: both added from outside."""
 
 from __future__ import annotations
 

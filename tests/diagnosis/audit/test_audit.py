@@ -1,4 +1,4 @@
-"""The audit of recordings and tables, and the noise floor, on data made by numpy alone."""
+"""Audit of recordings and tables, and noise floor, on synthetic data."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def rows(recording: Recording, label: str) -> np.ndarray:
     return recording.rows_of(label)
 
 
-def test_a_sound_recording_passes_without_a_word():
+def test_sound_recording_has_no_warning():
     for seed in range(5):
         columns = arrays(seed, white=0.8, slow=0.6)
         recording = Recording.from_arrays(columns.pop("time"), columns.pop("command"), **columns)
@@ -113,7 +113,7 @@ def test_a_sound_recording_passes_without_a_word():
         assert undecidable(recording, RIG) == {}
 
 
-def test_rounded_readings_pass_too():
+def test_rounded_readings_have_no_warning():
     columns = arrays()
     columns["contraction"] = 5e-5 * np.round(columns["contraction"] / 5e-5)
     columns["pressure"] = 450.0 * np.round(columns["pressure"] / 450.0)
@@ -124,7 +124,7 @@ def test_rounded_readings_pass_too():
 # one channel
 
 
-def test_a_stuck_channel_is_a_problem():
+def test_constant_reading_under_moving_command_is_a_problem():
     pressure = arrays()["pressure"].copy()
     pressure[1000:1500] = 2.5e5
     text = problem(made(pressure=pressure))
@@ -136,7 +136,7 @@ def test_a_stuck_channel_is_a_problem():
     assert "contraction_mm holds one value in all rows" in text
 
 
-def test_a_muscle_that_may_stand_still_is_only_a_warning():
+def test_muscle_at_rest_below_threshold_is_a_warning():
     columns = arrays()
     low = made().rows_of("condition_a")
     columns["contraction"][low[:200]] = columns["contraction"].min() - 1e-4
@@ -149,7 +149,7 @@ def test_a_muscle_that_may_stand_still_is_only_a_warning():
     assert "the sensor was stuck" in problem(made(**columns))
 
 
-def test_what_stands_still_under_a_shut_valve_is_not_stuck():
+def test_constant_reading_with_valve_closed_is_accepted():
     shut = made().rows_of("shut")
     columns = arrays()
     columns["command"][shut] = np.linspace(1e5, 4e5, len(shut))
@@ -157,7 +157,7 @@ def test_what_stands_still_under_a_shut_valve_is_not_stuck():
     assert "is constant at" not in told(made(**columns))
 
 
-def test_a_clipped_channel_is_told_with_its_rows():
+def test_clipped_channel_is_reported_with_rows():
     contraction = np.minimum(arrays()["contraction"], 14e-3)
     text = told(made(contraction=contraction))
     assert f"contraction_mm reads exactly 14 mm in {np.sum(contraction == 14e-3)} rows" in text
@@ -170,7 +170,7 @@ def test_a_clipped_channel_is_told_with_its_rows():
     assert "lower end of its range" in text
 
 
-def test_coarse_readings_are_told():
+def test_resolution_coarser_than_noise_is_reported():
     contraction = 2e-4 * np.round(arrays()["contraction"] / 2e-4)
     text = told(made(contraction=contraction))
     assert (
@@ -179,7 +179,7 @@ def test_coarse_readings_are_told():
     assert "digit by digit" not in text  # coarse readings repeat themselves rightly
 
 
-def test_resolution_is_the_step_between_readings():
+def test_resolution_is_the_common_step_of_readings():
     rng = np.random.default_rng(0)
     values = rng.normal(size=2000)
     assert resolution(values) == 0.0
@@ -188,7 +188,7 @@ def test_resolution_is_the_step_between_readings():
     assert resolution(np.array([0.0, 2.0, 0.0])) == 2.0
 
 
-def test_single_spikes_are_named():
+def test_single_spikes_are_reported_with_rows():
     contraction = arrays()["contraction"].copy()
     contraction[[700, 2100]] += [2e-3, -2e-3]
     text = told(made(contraction=contraction))
@@ -196,7 +196,7 @@ def test_single_spikes_are_named():
     assert "in rows 702 and 2102; correct these readings" in text
 
 
-def test_a_copied_cycle_is_named_with_both_places():
+def test_copied_stretch_is_reported_with_both_places():
     columns = arrays()
     recording = made()
     one, two = rows(recording, "holds_a"), rows(recording, "holds_b")
@@ -216,7 +216,7 @@ def test_a_copied_cycle_is_named_with_both_places():
     assert "rows 1002 to 1064 occur again in rows 3002 to 3064" in told(made(**columns))
 
 
-def test_checks_of_a_fast_recording_see_every_reading():
+def test_fast_recording_is_checked_before_averaging():
     n = 4000
     rng = np.random.default_rng(1)
     command = 1e5 * (2.0 + np.sin(np.arange(n) / 200.0))
@@ -227,7 +227,7 @@ def test_checks_of_a_fast_recording_see_every_reading():
     assert "in row 1503;" in told(fast, Rig())
 
 
-def test_the_declared_noise_is_that_of_a_single_reading():
+def test_declared_noise_is_compared_with_single_readings():
     rng = np.random.default_rng(1)
     command = np.repeat(1e5 * rng.uniform(0.0, 5.0, 20), 2000)
     pressure = command + 800.0 * rng.standard_normal(40_000)
@@ -252,7 +252,7 @@ def test_the_declared_noise_is_that_of_a_single_reading():
         (1e-3, "no muscle runs at this pressure"),
     ],
 )
-def test_pressures_in_other_units_are_named(factor, advice):
+def test_wrong_pressure_unit_is_detected(factor, advice):
     text = problem(made(pressure=factor * arrays()["pressure"]))
     assert "pressure_bar " in text
     assert advice in text
@@ -261,14 +261,14 @@ def test_pressures_in_other_units_are_named(factor, advice):
 @pytest.mark.parametrize(
     ("factor", "advice"), [(100.0, "kPa: divide by 100"), (14.5, "psi: divide by 14.504")]
 )
-def test_commands_in_other_units_are_named(factor, advice):
+def test_wrong_command_unit_is_detected(factor, advice):
     columns = arrays()
     both = {name: factor * columns[name] for name in ("command", "pressure")}
     text = problem(made(**both))
     assert f"pressure_command_bar goes up to {factor * 5.5:.4g}; it looks like {advice}" in text
 
 
-def test_a_command_near_zero_is_wrong_only_if_the_pressure_rises():
+def test_small_command_is_a_problem_only_with_rising_pressure():
     columns = arrays()
     text = problem(made(command=0.1 * columns["command"]))
     assert "pressure_command_bar never exceeds 0.55 while the pressure goes to 5.5" in text
@@ -277,7 +277,7 @@ def test_a_command_near_zero_is_wrong_only_if_the_pressure_rises():
     assert "pressure_command_bar never exceeds 0 bar: nothing is excited" in text
 
 
-def test_pressures_all_in_mpa_are_suspected():
+def test_all_pressures_in_mpa_are_suspected():
     columns = arrays()
     both = {name: 0.1 * columns[name] for name in ("command", "pressure")}
     assert "if the pressures are in MPa, multiply by 10" in told(made(**both))
@@ -288,7 +288,7 @@ def test_absolute_pressure_is_suspected():
     assert "gauge pressure is expected: if it is absolute, subtract 1.013" in text
 
 
-def test_contractions_that_cannot_be_right():
+def test_implausible_contractions_are_problems():
     contraction = arrays()["contraction"]
     text = problem(made(contraction=10.0 * contraction))
     assert "more than 40% of the rest length of 200 mm; check its unit" in text
@@ -297,7 +297,7 @@ def test_contractions_that_cannot_be_right():
     assert "contraction_mm falls as the pressure rises" in told(made(contraction=-contraction))
 
 
-def test_a_stroke_in_metres_is_named():
+def test_stroke_in_metres_is_detected():
     contraction = arrays()["contraction"]
     for rig in (RIG, Rig(), Rig(rest_length=0.2)):
         text = problem(made(contraction=1e-3 * contraction), rig)
@@ -308,7 +308,7 @@ def test_a_stroke_in_metres_is_named():
     assert "looks like metres" not in told(made(contraction=0.2 * contraction), Rig())
 
 
-def test_a_small_stroke_may_be_right():
+def test_small_stroke_at_low_pressure_is_accepted():
     columns = arrays()
     narrow = {name: 0.2 * columns[name] for name in ("command", "pressure")}
     text = told(made(contraction=1e-3 * columns["contraction"], **narrow), Rig())
@@ -317,7 +317,7 @@ def test_a_small_stroke_may_be_right():
     assert audit(made(contraction=jig), RIG).problems == ()
 
 
-def test_what_is_told_in_vain_is_said():
+def test_unused_declarations_are_reported():
     columns = arrays()
     text = told(made(supply=np.full(len(columns["time"]), 7e5)))
     assert "supply_pressure_bar is not used" in text
@@ -328,14 +328,14 @@ def test_what_is_told_in_vain_is_said():
     assert text == "tolerance of muscle.rest_length is not used: no refit moves it"
 
 
-def test_a_tolerance_of_no_parameter_is_a_problem():
+def test_tolerance_of_unknown_parameter_is_a_problem():
     rig = dataclasses.replace(RIG, tolerance={"mass.laod": 0.02})
     assert "tolerance names 'mass.laod'; did you mean 'mass.load'?" in problem(made(), rig)
     rig = dataclasses.replace(RIG, tolerance={"engine.oil": 0.02})
     assert "'engine.oil', which is not a parameter of the plant" in problem(made(), rig)
 
 
-def test_loads_in_kilograms_are_found_by_the_force():
+def test_load_in_kilograms_is_detected_by_the_force():
     load = arrays()["load"]
     text = problem(made(load=load / 9.80665, force=load + 0.1))
     assert "load_N looks like kilograms: multiply by 9.80665" in text
@@ -343,7 +343,7 @@ def test_loads_in_kilograms_are_found_by_the_force():
     assert "load_N goes down to -45 N" in problem(made(load=-load))
 
 
-def test_a_command_above_the_regulators_range_is_told():
+def test_command_above_regulator_range_is_reported():
     rig = dataclasses.replace(RIG, max_pressure=5e5)
     assert "the command goes to 5.5 bar, above the regulator's 5 bar" in told(made(), rig)
 
@@ -351,7 +351,7 @@ def test_a_command_above_the_regulators_range_is_told():
 # what is missing
 
 
-def test_what_the_campaign_lacks_is_told():
+def test_missing_experiments_are_reported():
     columns = arrays()
     bare = made(
         load=25.0,
@@ -371,21 +371,21 @@ def test_what_the_campaign_lacks_is_told():
     assert "there is no column contraction_mm" in told(made(contraction=None))
 
 
-def test_notes_of_the_reading_are_among_the_warnings():
+def test_notes_of_reading_are_warnings():
     recording = dataclasses.replace(made(), notes=("row 7 was mended",))
     assert audit(recording, RIG).warnings[0] == "row 7 was mended"
 
 
-def test_a_rig_that_names_other_segments_is_a_problem():
+def test_unknown_segments_in_rig_file_are_a_problem():
     assert "'holds_c'" in problem(made(), Rig(repeats=(("holds_a", "holds_c"),)))
 
 
-def test_repeats_must_have_one_command():
+def test_repeats_with_different_commands_are_reported():
     rig = dataclasses.replace(RIG, repeats=(("holds_a", "condition_b"),))
     assert "'holds_a' and 'condition_b' should repeat one another" in told(made(), rig)
 
 
-def test_what_absent_columns_make_undecidable():
+def test_missing_columns_make_causes_undecidable():
     reasons = undecidable(made(temperature=None, load=25.0, pressure=None, valve_closed=()), RIG)
     assert reasons["temperature"] == "the temperature was not recorded"
     assert reasons["payload_error"] == "the load was 25 N throughout"
@@ -403,7 +403,7 @@ def test_what_absent_columns_make_undecidable():
     }
 
 
-def test_loads_that_were_not_weighed_have_no_error():
+def test_payload_error_needs_declared_tolerance():
     reasons = undecidable(made(), dataclasses.replace(RIG, tolerance={}))
     assert set(reasons) == {"payload_error"}
     assert "add tolerance: {mass.load: 0.02} to RIG.yaml" in reasons["payload_error"]
@@ -422,7 +422,7 @@ NEEDY = {
 
 
 @pytest.mark.parametrize("word", NEEDS)
-def test_a_users_cause_is_asked_what_it_needs(word):
+def test_requirements_of_a_users_cause_are_checked(word):
     poor, rig, reason = NEEDY[word]
     cause = Cause("gremlins", "gremlins", (), needs=(word,))
     assert undecidable(made(), RIG, [cause]) == {}
@@ -431,7 +431,7 @@ def test_a_users_cause_is_asked_what_it_needs(word):
     assert reason in found["gremlins"]
 
 
-def test_a_need_that_no_recording_has_is_refused():
+def test_unknown_requirement_is_refused():
     with pytest.raises(ValueError, match="'load', which no recording has; did you mean 'loads'"):
         Cause("gremlins", "gremlins", (), needs=("contraction", "load"))
     with pytest.raises(ValueError, match="known: contraction"):
@@ -440,7 +440,7 @@ def test_a_need_that_no_recording_has_is_refused():
         Cause("gremlins", "gremlins", (), needs="loads")
 
 
-def test_what_a_campaign_cannot_show():
+def test_campaign_without_excitation_makes_causes_undecidable():
     even = made(temperature=np.full(len(made().time), 20.0))
     assert "varied by only 0 K" in undecidable(even)["temperature"]
     tired = dataclasses.replace(RIG, cycles_since_rest=6)
@@ -458,7 +458,7 @@ def test_what_a_campaign_cannot_show():
     assert "dead_time" not in reasons
 
 
-def test_two_seconds_of_a_shut_valve_do_not_show_a_leak():
+def test_leak_needs_more_than_two_seconds_of_closed_valve():
     columns = arrays()
     shut = made().rows_of("shut")
     columns["segment"][shut[100] :] = ["after"] * (len(shut) - 100)
@@ -473,7 +473,7 @@ def test_two_seconds_of_a_shut_valve_do_not_show_a_leak():
 @pytest.mark.parametrize(
     ("white", "slow", "correlation"), [(1.0, 0.0, 1.0), (0.8, 0.6, 0.3), (0.7, 0.7, 1.0)]
 )
-def test_the_floor_is_the_noise_white_and_coloured(white, slow, correlation):
+def test_noise_floor_estimates_white_and_coloured_noise(white, slow, correlation):
     true = np.hypot(white, slow)
     found = {"repeats": [], "holds": [], "innovations": []}
     for seed in range(4):
@@ -489,7 +489,7 @@ def test_the_floor_is_the_noise_white_and_coloured(white, slow, correlation):
     assert np.mean(found["innovations"]) == pytest.approx(white, rel=0.06)
 
 
-def test_the_correlation_time_is_that_of_the_noise():
+def test_correlation_time_is_that_of_the_noise():
     columns = arrays(1, white=0.0, slow=1.0, correlation=0.5)
     recording = Recording.from_arrays(columns.pop("time"), columns.pop("command"), **columns)
     assert noise_floor(recording, RIG)["contraction"].correlation_time == pytest.approx(
@@ -500,7 +500,7 @@ def test_the_correlation_time_is_that_of_the_noise():
     assert time < PERIOD
 
 
-def test_without_repeats_the_holds_serve_and_without_holds_the_differences():
+def test_noise_source_falls_back_to_holds_then_innovations():
     assert noise_floor(made(), Rig())["pressure"].source == "holds"
     n = 3000
     rng = np.random.default_rng(0)
@@ -517,7 +517,7 @@ def test_without_repeats_the_holds_serve_and_without_holds_the_differences():
         floor["contraction"]
 
 
-def test_repeats_that_differ_give_way_to_the_holds():
+def test_differing_repeats_are_replaced_by_holds():
     contraction = arrays()["contraction"].copy()
     second = made().rows_of("holds_b")
     contraction[second] += 3e-4 * np.sin(np.arange(len(second)) / 200.0)
@@ -529,7 +529,7 @@ def test_repeats_that_differ_give_way_to_the_holds():
     assert floor["pressure"].source == "repeats"
 
 
-def test_an_offset_between_repeats_is_not_noise():
+def test_offset_between_repeats_is_not_noise():
     contraction = arrays()["contraction"].copy()
     contraction[made().rows_of("holds_b")] += 1e-3
     floor = noise_floor(made(contraction=contraction), RIG)["contraction"]
@@ -537,7 +537,7 @@ def test_an_offset_between_repeats_is_not_noise():
     assert floor.value == pytest.approx(3e-5, rel=0.06)
 
 
-def test_outliers_and_copies_do_not_move_the_floor():
+def test_outliers_and_copies_do_not_change_noise_floor():
     contraction = arrays()["contraction"].copy()
     second = made().rows_of("holds_b")
     contraction[second[::97]] += 5e-3
@@ -552,7 +552,7 @@ def test_outliers_and_copies_do_not_move_the_floor():
 @pytest.mark.parametrize(
     ("factor", "warned"), [(0.5, True), (0.8, False), (1.25, False), (2.0, True)]
 )
-def test_a_wrong_declaration_is_told(factor, warned):
+def test_wrong_declared_noise_is_reported(factor, warned):
     rig = dataclasses.replace(RIG, contraction_noise=factor * 3e-5)
     floor = noise_floor(made(), rig)
     assert floor["contraction"].declared == factor * 3e-5
@@ -576,7 +576,7 @@ def test_noise_below_the_resolution():
     assert floor["pressure"].value == 800.0
 
 
-def test_holds_end_settled_and_within_one_experiment():
+def test_hold_ends_are_settled_and_within_one_experiment():
     recording = made()
     for end in hold_ends(recording):
         assert np.ptp(recording.command[end]) == 0.0
@@ -587,7 +587,7 @@ def test_holds_end_settled_and_within_one_experiment():
     assert len(hold_ends(recording)) > 20
 
 
-def test_white_noise_ignores_what_moves():
+def test_white_noise_ignores_motion():
     recording = made()
     assert recording.contraction is not None
     assert white_noise(recording, recording.contraction) == pytest.approx(3e-5, rel=0.05)
@@ -596,7 +596,7 @@ def test_white_noise_ignores_what_moves():
 # tables
 
 
-def test_the_published_table_is_audited():
+def test_published_table_is_audited():
     """The figures of the tables' own analysis: only the unloaded muscle drifts."""
     table = load_contraction_table()
     trend = repeat_trend(table, 0.0)
@@ -614,11 +614,11 @@ def test_the_published_table_is_audited():
     assert "a quadratic load law cannot be separated from a dead zone" in text
 
 
-def test_an_even_table_of_five_loads_passes():
+def test_even_table_of_five_loads_has_no_warning():
     assert audit(_table(np.random.default_rng(3), loads=5)).warnings == ()
 
 
-def test_identical_repeats_are_named():
+def test_identical_repeats_are_reported():
     table = _table(np.random.default_rng(3), loads=5)
     contraction = table.contraction_m.copy()
     at = table.load_kg == 2.0
@@ -627,7 +627,7 @@ def test_identical_repeats_are_named():
     assert "repeats 1 and 3 at 2 kg are equal digit by digit" in text
 
 
-def test_few_loads_and_single_repeats_are_told(tmp_path):
+def test_few_loads_and_single_repeats_are_reported(tmp_path):
     table = _table(np.random.default_rng(0), loads=1, repeats=1)
     text = "\n".join(audit(table).warnings)
     assert "there is one load" in text

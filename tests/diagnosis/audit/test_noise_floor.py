@@ -1,4 +1,4 @@
-"""The noise floor where repeats differ by more than noise."""
+"""Noise floor of repeats that differ by more than noise."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def contraction(recording: Recording, rig: Rig) -> ChannelFloor:
 
 @pytest.mark.parametrize("rig", [RIG, UNDECLARED])
 @pytest.mark.parametrize("share", [0.7, 1.0])
-def test_an_effect_in_the_repeats_does_not_raise_the_floor(rig, share):
+def test_effect_between_repeats_does_not_raise_noise_floor(rig, share):
     floor = contraction(changed(share), rig)
     assert floor.estimates["repeats"] > 1.15 * NOISE["contraction"]
     assert floor.source in ("holds", "declared")
@@ -48,7 +48,7 @@ def test_an_effect_in_the_repeats_does_not_raise_the_floor(rig, share):
 
 
 @pytest.mark.parametrize("rig", [RIG, UNDECLARED])
-def test_a_drift_during_the_repeats_does_not_raise_the_floor(rig):
+def test_drift_between_repeats_does_not_raise_noise_floor(rig):
     columns = arrays()
     second = made().rows_of("holds_b")
     slow = 9e-5 * np.linspace(0.0, 1.0, len(second)) ** 2
@@ -61,7 +61,7 @@ def test_a_drift_during_the_repeats_does_not_raise_the_floor(rig):
 
 
 @pytest.mark.parametrize(("white", "slow", "most"), [(1.0, 0.0, 0), (0.8, 0.6, 0), (0.7, 0.7, 1)])
-def test_repeats_that_repeat_are_believed(white, slow, most):
+def test_consistent_repeats_are_used(white, slow, most):
     """Slow noise is hard to know from short holds: there one in twenty may be doubted."""
     doubted = 0
     for seed in range(5):
@@ -73,13 +73,13 @@ def test_repeats_that_repeat_are_believed(white, slow, most):
     assert doubted <= most
 
 
-def test_a_small_effect_is_no_more_than_noise():
+def test_small_effect_between_repeats_counts_as_noise():
     floor = contraction(changed(0.2), RIG)
     assert floor.source == "repeats"
     assert floor.warnings == ()
 
 
-def test_noise_of_the_motion_is_noise():
+def test_noise_of_motion_counts_as_noise():
     """What is fast and not in holds is no change of the rig: every model leaves it."""
     columns = arrays()
     for label in ("holds_a", "holds_b"):
@@ -94,7 +94,7 @@ def test_noise_of_the_motion_is_noise():
     assert floor.warnings == ()
 
 
-def test_a_declaration_below_the_holds_is_not_believed():
+def test_declared_noise_below_holds_is_not_used():
     """An owner who is too sure of the sensor does not lower the floor."""
     sure = dataclasses.replace(RIG, contraction_noise=0.75 * NOISE["contraction"])
     floor = contraction(changed(1.0), sure)
@@ -105,7 +105,7 @@ def test_a_declaration_below_the_holds_is_not_believed():
     assert plain.value == pytest.approx(NOISE["contraction"], rel=0.06)
 
 
-def test_what_is_declared_counts_where_holds_do_not_contradict_it():
+def test_declared_noise_is_used_if_holds_agree():
     """Holds miss what is slower than they last, declared noise does not."""
     recording = changed(1.2, white=0.9, slow=0.3)
     floor = contraction(recording, RIG)
@@ -115,7 +115,7 @@ def test_what_is_declared_counts_where_holds_do_not_contradict_it():
     )
 
 
-def test_without_holds_the_declared_noise_is_compared():
+def test_declared_noise_is_compared_without_holds():
     n, period = 3000, 0.02
     rng = np.random.default_rng(3)
     one = 1e5 * (2.5 + 2.0 * np.sin(0.02 * np.arange(n)))

@@ -1,4 +1,4 @@
-"""The catalogue of causes: complete, documented, and each one acts on the plant."""
+"""Catalogue of causes: completeness, documentation, effect on the plant."""
 
 from __future__ import annotations
 
@@ -18,40 +18,13 @@ from pam_envs.diagnosis.fit.single_muscle import BASE, MuscleFamily, declared, s
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.replay import Inputs, replay
+from tests.diagnosis import hidden
 from tests.diagnosis.causes import causes_page as page
 from tests.diagnosis.causes import users_cause
 
 CATALOGUE = catalogue()
 NAMES = [cause.name for cause in CATALOGUE]
-PUBLISHED = set(
-    [
-        "creep",
-        "leak",
-        "valve_dead_band",
-        "dead_time",
-        "slew_limit",
-        "sensor_bias",
-        "sensor_drift",
-        "sensor_delay",
-        "viscous_loss",
-        "temperature",
-        "first_cycle_softening",
-        "load_dependent_hysteresis",
-        "load_dependent_compliance",
-        "hysteresis_shape",
-        "hysteresis_drive",
-        "supply_droop",
-        "stick_slip",
-        "threshold_pressure",
-        "exhaust_asymmetry",
-        "pressure_dependent_friction",
-        "sensor_nonlinearity",
-        "resonance",
-        "slip_step",
-        "wire_slack",
-        "payload_error",
-    ]
-)
+PUBLISHED = set(hidden.EFFECTS)
 """Names that reports already use; further causes may follow."""
 FILES = [p for p in Path(package.__file__).parent.rglob("*.py") if p.name != "__init__.py"]
 PLANT = start_plant(Rig(rest_length=0.2))
@@ -130,14 +103,14 @@ def test_each_file_declares_the_cause_of_its_name(path):
     assert importlib.import_module(module).CAUSE is by_name(path.stem)
 
 
-def test_an_unknown_cause_is_refused_by_name():
+def test_unknown_cause_name_is_refused():
     with pytest.raises(ValueError, match="no cause named 'gremlins'; known: creep, dead_time"):
         by_name("gremlins")
     with pytest.raises(ValueError, match=r"no cause named 'leek'; did you mean 'leak'\?"):
         by_name("leek")
 
 
-def test_causes_are_chosen_by_name_or_given():
+def test_causes_are_selected_by_name_or_value():
     assert selected() == CATALOGUE
     assert selected(["leak", users_cause.CAUSE]) == (by_name("leak"), users_cause.CAUSE)
     with pytest.raises(ValueError, match="did you mean 'creep'"):
@@ -152,13 +125,13 @@ def test_causes_are_chosen_by_name_or_given():
         selected([3])
 
 
-def test_what_a_controller_can_compensate_is_said_of_each_cause():
+def test_compensable_causes_are_declared():
     assert tuple(c.name for c in CATALOGUE if c.compensable) == COMPENSABLE
     assert not by_name("slip_step").compensable
     assert by_name("payload_error").compensable
 
 
-def test_what_acts_in_the_valve_alone():
+def test_causes_upstream_of_the_pressure():
     assert {c.name for c in CATALOGUE if c.in_valve} == {
         "leak",
         "valve_dead_band",
@@ -170,7 +143,7 @@ def test_what_acts_in_the_valve_alone():
 
 
 @pytest.mark.parametrize("cause", CATALOGUE, ids=NAMES)
-def test_a_cause_is_documented(cause):
+def test_cause_is_documented(cause):
     for text in (cause.signature, cause.experiment, cause.source, cause.sensor):
         assert text.strip()
     assert 5 < len(cause.title) <= 40
@@ -179,7 +152,7 @@ def test_a_cause_is_documented(cause):
 
 
 @pytest.mark.parametrize("cause", CATALOGUE, ids=NAMES)
-def test_neighbours_are_causes_and_mutual(cause):
+def test_neighbours_are_mutual(cause):
     assert cause.neighbours
     assert len(set(cause.neighbours)) == len(cause.neighbours)
     for name in cause.neighbours:
@@ -187,7 +160,7 @@ def test_neighbours_are_causes_and_mutual(cause):
         assert cause.name in by_name(name).neighbours, f"{name} does not know {cause.name}"
 
 
-def test_what_a_cause_needs_is_said_on_the_page():
+def test_requirements_of_causes_have_words():
     assert {n for cause in CATALOGUE for n in cause.needs} <= set(NEEDS)
     for word in ("loads", "temperature"):
         assert all("contraction" in by_name(name).needs for name in needing(word))
@@ -196,7 +169,7 @@ def test_what_a_cause_needs_is_said_on_the_page():
 
 
 @pytest.mark.parametrize(("form", "term"), TERMS)
-def test_fits_begin_within_bounds(form, term):
+def test_starting_values_are_within_bounds(form, term):
     d = declared(PLANT, term.name)
     low = d.low if term.low is None else term.low
     high = d.high if term.high is None else term.high
@@ -209,7 +182,7 @@ def test_fits_begin_within_bounds(form, term):
 
 
 @pytest.mark.parametrize(("cause", "form"), FORMS)
-def test_a_form_has_an_amount_that_can_be_switched_off(cause, form):
+def test_each_form_has_an_amount_with_neutral_value(cause, form):
     off = neutral(form)
     assert off
     for term in form.terms:
@@ -223,29 +196,29 @@ def test_every_parameter_is_in_one_class(name):
     assert [kind for kind, _ in page.classes_of(name)] in (["base"], ["cause"], ["declared"])
 
 
-def test_no_class_holds_what_is_not_a_parameter():
+def test_classes_contain_only_parameters():
     assert {*page.named_by(), *page.GIVEN, *BASE} <= set(R.NAMES)
 
 
 @pytest.mark.parametrize("name", page.PARTS)
-def test_the_page_says_what_is_declared(name):
+def test_page_matches_the_declarations(name):
     assert page.part(name) == page.PARTS[name](), "run python -m tests.diagnosis.causes.causes_page"
 
 
-def test_links_of_the_page_have_targets():
+def test_each_cause_has_one_section_on_the_page():
     text = page.PAGE.read_text(encoding="utf-8")
     for name in NAMES:
         assert text.count(f"\n### {name}\n") == 1
 
 
 @pytest.mark.parametrize(("cause", "form"), FORMS)
-def test_a_cause_changes_what_is_measured(cause, form, plain):
+def test_each_form_changes_the_readings(cause, form, plain):
     changed = differences(plain, replay(PLANT.replace(started(form)), INPUTS))
     assert changed["contraction"] > 5e-6 or changed["pressure"] > 100.0
 
 
 @pytest.mark.parametrize(("form", "term"), TERMS)
-def test_every_parameter_of_a_form_matters(form, term):
+def test_each_parameter_of_a_form_changes_the_readings(form, term):
     values = started(form)
     span = abs(values[term.name]) or term.scale
     moved = values[term.name] + (0.3 * span if term.high is None else -0.3 * span)
@@ -255,28 +228,28 @@ def test_every_parameter_of_a_form_matters(form, term):
 
 
 @pytest.mark.parametrize(("cause", "form"), FORMS)
-def test_a_cause_that_is_off_changes_nothing(cause, form, plain):
+def test_neutral_cause_changes_no_bit(cause, form, plain):
     off = replay(PLANT.replace(started(form, **neutral(form))), INPUTS)
     for name, values in plain.items():
         assert np.array_equal(off[name], values)
 
 
 @pytest.mark.parametrize("name", needing("contraction"))
-def test_causes_that_need_the_contraction_leave_the_pressure_alone(name, plain):
+def test_muscle_causes_leave_pressure_unchanged(name, plain):
     for form in by_name(name).forms:
         changed = replay(PLANT.replace(started(form)), INPUTS)
         assert np.array_equal(changed["pressure"], plain["pressure"])
 
 
 @pytest.mark.parametrize("name", needing("loads"))
-def test_causes_of_the_load_do_nothing_without_one(name):
+def test_load_causes_have_no_effect_without_load(name):
     empty = replay(PLANT, EMPTY)
     for form in by_name(name).forms:
         changed = replay(PLANT.replace(started(form)), EMPTY)
         assert np.array_equal(changed["contraction"], empty["contraction"])
 
 
-def test_a_leak_takes_the_pressure_down_while_the_valve_is_shut(plain):
+def test_leak_lowers_pressure_with_valve_closed(plain):
     shut = INPUTS.command < 0.0
     leaking = replay(PLANT.replace(started(by_name("leak").forms[0])), INPUTS)
     still, falling = plain["pressure"][1:][shut[:-1]], leaking["pressure"][1:][shut[:-1]]
@@ -285,7 +258,7 @@ def test_a_leak_takes_the_pressure_down_while_the_valve_is_shut(plain):
     assert (np.diff(falling[:half]) < 0.0).all()
 
 
-def test_exhaust_asymmetry_acts_on_the_way_down_only():
+def test_exhaust_asymmetry_acts_on_deflation_only():
     inputs = campaign()
     rising = np.maximum.accumulate(np.maximum(inputs.command, 0.0))
     up = Inputs(
@@ -297,7 +270,7 @@ def test_exhaust_asymmetry_acts_on_the_way_down_only():
 
 
 @pytest.mark.parametrize(("cause", "form"), FORMS)
-def test_a_plant_with_a_cause_is_a_file(cause, form, tmp_path):
+def test_plant_with_a_cause_survives_yaml(cause, form, tmp_path):
     plant = PLANT.replace(started(form))
     plant.to_yaml(tmp_path / "plant.yaml")
     assert SingleMuscle.from_yaml(tmp_path / "plant.yaml") == plant
@@ -306,13 +279,13 @@ def test_a_plant_with_a_cause_is_a_file(cause, form, tmp_path):
 # --- a user's own -------------------------------------------------------------------------------
 
 
-def test_a_users_cause_uses_what_ours_do_not():
+def test_users_cause_uses_an_unused_parameter():
     form = users_cause.CAUSE.forms[0]
     assert users_cause.CAUSE.name not in NAMES
     assert not {t.name for t in form.terms} & {*page.named_by(), *BASE}
 
 
-def test_a_users_cause_acts_on_the_plant(plain):
+def test_users_cause_changes_contraction_only(plain):
     form = users_cause.CAUSE.forms[0]
     changed = replay(PLANT.replace(started(form)), INPUTS)
     assert differences(plain, changed)["contraction"] > 5e-6
@@ -321,7 +294,7 @@ def test_a_users_cause_acts_on_the_plant(plain):
     assert np.array_equal(off["contraction"], plain["contraction"])
 
 
-def test_a_users_cause_is_fitted_as_ours_are():
+def test_users_cause_is_fitted_like_shipped_ones():
     family = MuscleFamily(PLANT, INPUTS)
     form = users_cause.CAUSE.forms[0]
     (free,) = frees_for(family, form, (0.4,))

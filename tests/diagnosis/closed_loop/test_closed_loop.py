@@ -1,4 +1,4 @@
-"""What a better model is worth in closed loop: stepped plants, the inverse, the comparison."""
+"""Closed-loop comparison: stepped plants, plant inverse, scores."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def random_holds(periods: int, seed: int = 0) -> np.ndarray:
 # --- stepped plants -----------------------------------------------------------------------------
 
 
-def test_a_stepped_plant_shows_what_a_replayed_one_does() -> None:
+def test_stepper_equals_replay() -> None:
     plant = muscle(**HIDDEN["creep"], **{"position.delay": 0.015, "regulator.leak": 0.1})
     periods = 400 if COMPILED else 40
     commands = random_holds(periods)
@@ -87,7 +87,7 @@ def test_a_stepped_plant_shows_what_a_replayed_one_does() -> None:
     assert np.ptp(stepped[:, 0]) > 5e-4
 
 
-def test_looking_ahead_leaves_the_plant_as_it_is_and_tells_its_future() -> None:
+def test_trial_rollouts_leave_state_and_predict_future() -> None:
     stepper = PlantStepper(muscle(**HIDDEN["creep"]), LOAD)
     for u in random_holds(60):
         stepper.step(u)
@@ -103,7 +103,7 @@ def test_looking_ahead_leaves_the_plant_as_it_is_and_tells_its_future() -> None:
     assert ahead[-1, -1] - ahead[-1, 0] > 1e-4
 
 
-def test_plants_side_by_side_move_as_each_alone() -> None:
+def test_batch_equals_single_plants() -> None:
     plants = [muscle(), muscle(**HIDDEN["creep"]), muscle(**HIDDEN["dead_time"])] * 12
     together = PlantBatch(plants, LOAD)
     commands = np.stack([random_holds(60, i) for i in range(len(plants))], axis=1)
@@ -113,7 +113,7 @@ def test_plants_side_by_side_move_as_each_alone() -> None:
         assert np.array_equal(alone.run(commands[:, lane : lane + 1])[2, :, 0], positions[:, lane])
 
 
-def test_a_reset_plant_repeats_itself_and_its_noise() -> None:
+def test_reset_repeats_motion_and_noise() -> None:
     stepper = PlantStepper(muscle(), LOAD, noise_seed=3)
     first = [stepper.step(3e5) for _ in range(50)]
     stepper.reset(3)
@@ -124,7 +124,7 @@ def test_a_reset_plant_repeats_itself_and_its_noise() -> None:
     assert apart == pytest.approx(np.sqrt(2.0) * stepper.noise, rel=0.35)
 
 
-def test_what_cannot_be_stepped_is_refused() -> None:
+def test_unsupported_plants_are_refused() -> None:
     with pytest.raises(ValueError, match=r"period = 0\.02"):
         PlantStepper(muscle(), LOAD, period=0.02)
     with pytest.raises(ValueError, match="one hysteresis"):
@@ -134,14 +134,14 @@ def test_what_cannot_be_stepped_is_refused() -> None:
 # --- the controller -----------------------------------------------------------------------------
 
 
-def test_the_crossing_is_the_one_nearest_the_middle() -> None:
+def test_crossing_is_the_zero_nearest_the_middle() -> None:
     slopes = np.arange(-3.0, 4.0)
     assert crossing(slopes, slopes - 0.5, 3) == pytest.approx(0.5)
     twice = np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
     assert crossing(slopes, twice, 3) == pytest.approx(0.5)
 
 
-def test_without_a_crossing_the_gentlest_of_the_best_is_taken() -> None:
+def test_without_zero_crossing_the_gentlest_best_slope_is_used() -> None:
     slopes = np.arange(-3.0, 4.0)
     assert crossing(slopes, np.ones(7), 3) == 0.0
     assert crossing(slopes, np.maximum(slopes, 1.0), 3) == 0.0
@@ -149,14 +149,14 @@ def test_without_a_crossing_the_gentlest_of_the_best_is_taken() -> None:
 
 
 @compiled
-def test_the_dead_time_is_seen_from_outside() -> None:
+def test_dead_time_is_measured_from_the_response() -> None:
     late = PlantStepper(muscle(**{"regulator.dead_time": 0.06}), LOAD)
     assert dead_periods(late) == dead_periods(PlantStepper(muscle(), LOAD)) + 5
 
 
 @compiled
 @pytest.mark.parametrize("cause", HIDDEN | SLOW)
-def test_a_plant_follows_through_its_own_inverse(cause: str) -> None:
+def test_plant_inverse_tracks_reference(cause: str) -> None:
     plant = muscle(**(HIDDEN | SLOW)[cause], **{"muscle.temperature": KELVIN})
     model = PlantStepper(plant, LOAD)
     reference = short(stroke(model), 6.0)["sines"]
@@ -173,7 +173,7 @@ def test_a_plant_follows_through_its_own_inverse(cause: str) -> None:
 
 
 @compiled
-def test_the_loop_corrects_what_the_plant_does_not_know() -> None:
+def test_feedback_corrects_model_error() -> None:
     plant, rig = muscle(), PlantStepper(muscle(**{"regulator.gain": 0.9}), LOAD)
     controller = design(plant)
     silent = InversePi(controller.inverse, Gains(0.0, 0.0))
@@ -183,7 +183,7 @@ def test_the_loop_corrects_what_the_plant_does_not_know() -> None:
     assert controller.gains.integral > 0.0
 
 
-def test_the_integral_stops_where_the_set_point_does() -> None:
+def test_integral_stops_at_setpoint_limit() -> None:
     full, error = 6e5, np.array([1e-3, -1e-3, 1e-3])
     total, forward = np.array([1e4, 1e4, 1e4]), np.array([5.95e5, 6e5, 3e5])
     output, after = correction(error, total, forward, 1e7, 1e6, full)
@@ -196,7 +196,7 @@ def test_the_integral_stops_where_the_set_point_does() -> None:
 
 
 @compiled
-def test_a_reference_out_of_reach_is_left_as_soon_as_it_falls() -> None:
+def test_unreachable_reference_causes_no_windup() -> None:
     plant = muscle()
     stepper, controller = PlantStepper(plant, LOAD), design(plant)
     top = stroke(stepper)
@@ -211,7 +211,7 @@ def test_a_reference_out_of_reach_is_left_as_soon_as_it_falls() -> None:
 
 @compiled
 @pytest.mark.parametrize("cause", HIDDEN)
-def test_a_controller_that_knows_the_cause_tracks_better(cause: str) -> None:
+def test_knowledge_of_the_cause_reduces_tracking_error(cause: str) -> None:
     true = muscle(**HIDDEN[cause])
     rig = PlantStepper(true, LOAD, 0, kelvin=KELVIN)
     found = closed_loop(
@@ -225,7 +225,7 @@ def test_a_controller_that_knows_the_cause_tracks_better(cause: str) -> None:
 
 
 @compiled
-def test_equal_plants_make_no_difference() -> None:
+def test_equal_plants_have_equal_errors() -> None:
     found = closed_loop(muscle(), muscle(), references=short(0.01), load=LOAD)
     assert found is not None
     assert found["better_percent"] == {"value": 0.0, "interval": [0.0, 0.0]}
@@ -234,14 +234,14 @@ def test_equal_plants_make_no_difference() -> None:
 
 
 @compiled
-def test_the_same_arguments_give_the_same_report() -> None:
+def test_same_arguments_give_the_same_report() -> None:
     true = muscle(**HIDDEN["dead_time"])
     one, two = (closed_loop(muscle(), true, references=short(0.01, 6.0), load=LOAD) for _ in "ab")
     assert one == two
 
 
 @compiled
-def test_an_oracle_that_is_the_extended_plant_leaves_no_gap() -> None:
+def test_oracle_equal_to_extended_plant_has_no_gap() -> None:
     true = muscle(**HIDDEN["dead_time"])
     found = closed_loop(muscle(), true, oracle=true, references=short(0.01, 6.0), load=LOAD)
     assert found is not None
@@ -251,7 +251,7 @@ def test_an_oracle_that_is_the_extended_plant_leaves_no_gap() -> None:
 
 
 @compiled
-def test_a_plant_that_cannot_move_gives_no_comparison() -> None:
+def test_plant_without_stroke_gives_no_comparison() -> None:
     weak = muscle(**{"regulator.supply_pressure": 5e4, "hysteresis.threshold": 1e5})
     assert closed_loop(muscle(), weak, load=LOAD) is None
 
@@ -270,7 +270,7 @@ class Holding:
         return 0.5 * self.plant.regulator.max_pressure
 
 
-def test_another_design_routine_gets_the_plants_of_the_runs() -> None:
+def test_design_routine_receives_plants_of_the_runs() -> None:
     made: list[Holding] = []
 
     def hold_the_middle(plant: SingleMuscle) -> Holding:
@@ -299,7 +299,7 @@ def test_another_design_routine_gets_the_plants_of_the_runs() -> None:
 
 
 @compiled
-def test_the_default_references_and_the_seed_of_the_residuals() -> None:
+def test_residual_seed_and_default_references() -> None:
     residuals = Residuals(np.random.default_rng(1).normal(0.0, 5e-5, 500), 0.02)
     reports = [
         closed_loop(muscle(), muscle(), Holding, residuals=residuals, load=LOAD, seed=seed)
@@ -312,7 +312,7 @@ def test_the_default_references_and_the_seed_of_the_residuals() -> None:
     assert reports[0]["before"]["value"] == pytest.approx(np.sqrt(np.mean(squares)))
 
 
-def test_residuals_move_the_reading_and_the_position() -> None:
+def test_residuals_are_added_to_reading_and_position() -> None:
     trace = np.linspace(1e-4, 2e-4, 200)
     plain, moved = ReplayedRig(muscle(), None), ReplayedRig(muscle(), Residuals(trace, 0.02))
     still = PlantStepper(muscle(), LOAD)
@@ -328,7 +328,7 @@ def test_residuals_move_the_reading_and_the_position() -> None:
     assert plain.position == still.position
 
 
-def test_resampled_residuals_are_pieces_of_the_trace() -> None:
+def test_resampled_residuals_are_pieces_of_the_series() -> None:
     residuals = Residuals(np.arange(500.0), 0.02)
     drawn = residuals.resampled(7, 0.01, 1000)
     assert np.array_equal(drawn, residuals.resampled(7, 0.01, 1000))
@@ -338,7 +338,7 @@ def test_resampled_residuals_are_pieces_of_the_trace() -> None:
     assert len(Residuals(np.ones(10), 0.02).resampled(0, 0.01, 300)) == 300
 
 
-def test_references_rise_from_rest_and_stay_within_reach() -> None:
+def test_references_start_at_rest_and_are_within_reach() -> None:
     for name, path in fixed_references(0.02).items():
         settled = path[200:]
         assert path[0] == 0.0
@@ -360,7 +360,7 @@ def test_scores_of_known_errors() -> None:
     assert scores(table[[1, 1, 1]], ["one"], 0)["recovered"] is None
 
 
-def test_segments_are_drawn_in_pairs() -> None:
+def test_bootstrap_of_segments_is_paired() -> None:
     rng = np.random.default_rng(0)
     squares = rng.lognormal(0.0, 2.0, (1, 30)) * 1e-8
     found = scores(np.array([squares, 0.81 * squares]), ["one"], 0)
@@ -369,7 +369,7 @@ def test_segments_are_drawn_in_pairs() -> None:
     assert low < 0.8 * found["before"]["value"] < found["before"]["value"] < high
 
 
-def test_the_sentence_says_what_the_numbers_do() -> None:
+def test_sentence_matches_the_numbers() -> None:
     squares = np.array([[[4e-8] * 5], [[1e-8] * 5], [[0.64e-8] * 5]])
     found = {**scores(squares, ["one"], 0), "where": "the rig"}
     text = sentence(found)
@@ -378,7 +378,7 @@ def test_the_sentence_says_what_the_numbers_do() -> None:
     assert "100 % more" in worse and "Designed on the rig itself" not in worse
 
 
-def test_errors_of_the_position_sensor_are_not_counted_as_compensable() -> None:
+def test_position_sensor_errors_are_not_compensable() -> None:
     assert len(set(COMPENSABLE)) == len(COMPENSABLE)
     never = {"sensor_bias", "sensor_drift", "sensor_nonlinearity", "slip_step", "stick_slip"}
     assert not never & set(COMPENSABLE)

@@ -1,4 +1,4 @@
-"""What is held out, intervals of parameters, why rivals go: on plain numbers."""
+"""Held-out data, confidence intervals, reasons of rivals, on plain numbers."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def blocks_of(record: Any) -> Blocks:
     return Blocks.make(record.time, np.zeros((1, len(record.time))))
 
 
-def test_whole_kinds_are_held_out_and_named() -> None:
+def test_whole_kinds_are_held_out() -> None:
     record = recording("sine_a", "steps", "sine_b", "ramp", "holds")
     choice = choose(record, blocks_of(record))
     assert choice.by == "kinds"
@@ -47,7 +47,7 @@ def test_whole_kinds_are_held_out_and_named() -> None:
 
 
 @pytest.mark.parametrize("labels", [("a",), ("sine", "steps"), ("run1", "run2", "run3", "run4")])
-def test_with_too_few_kinds_blocks_are_held_out_and_it_says_so(labels: tuple[str, ...]) -> None:
+def test_blocks_are_held_out_with_too_few_kinds(labels: tuple[str, ...]) -> None:
     record = recording(*labels, seconds=60.0)
     blocks = blocks_of(record)
     choice = choose(record, blocks)
@@ -66,7 +66,7 @@ def held(blocks: int) -> HeldOut:
     return HeldOut(choice, None, part, 0, before, after)  # type: ignore[arg-type]
 
 
-def test_a_gain_has_an_interval_only_with_blocks_enough() -> None:
+def test_gain_interval_needs_enough_blocks() -> None:
     many, few = held(LEAST_BLOCKS), held(LEAST_BLOCKS - 1)
     found = many.gain(many.base, many.model)
     low, high = found["interval"]
@@ -90,7 +90,7 @@ def free(log: bool = False) -> Free:
         (100.0, 0.7, True, (25.36, 394.3), False, True),
     ],
 )
-def test_an_interval_says_what_it_is_worth(
+def test_wide_intervals_are_flagged(
     value: float,
     sd: float,
     log: bool,
@@ -115,7 +115,7 @@ def row(c: Candidate, gain: float, better: float, imitates: bool = False) -> dic
     return made | {"imitates": imitates}
 
 
-def test_the_words_on_rivals_are_those_of_the_decision() -> None:
+def test_reasons_of_rivals_match_the_decision() -> None:
     best, close, like, weak, worse = (
         candidate(n) for n in ("leak", "creep", "resonance", "temperature", "wire_slack")
     )
@@ -133,7 +133,7 @@ def test_the_words_on_rivals_are_those_of_the_decision() -> None:
     assert [word in EXCLUDED for word in found] == [False, False, False, True, True]
 
 
-def test_where_nothing_was_named_every_rival_gains_too_little() -> None:
+def test_without_a_name_every_rival_gains_too_little() -> None:
     rival = candidate("leak")
     evidence = {"levels": [{"rivals": []}, {"rivals": [row(rival, 0.01, 1.0)]}]}
     decision = Decision("adequate", candidate(), [rival], [], {}, evidence)

@@ -1,4 +1,4 @@
-"""Which causes a recording can show: at their bounds, on both sides, and beside one another."""
+"""Isolability and testability of causes on a recording."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def cause_of(name: str, parameter: str, start: float, **bounds: float) -> Cause:
 
 
 @needs_kernels
-def test_what_a_cause_shows_at_most_is_at_its_bounds(study):
+def test_largest_effect_is_at_the_bounds(study):
     """The bound counts, not a multiple of where a fit begins; and both signs."""
     narrow = cause_of("narrow", "position.bias", 1e-7, low=-1e-6, high=1e-6)
     wide = cause_of("wide", "position.bias", 1e-7, low=-1e-6, high=5e-4)
@@ -96,7 +96,7 @@ def test_what_a_cause_shows_at_most_is_at_its_bounds(study):
 
 
 @needs_kernels
-def test_both_bounds_of_every_form_are_looked_at(study):
+def test_both_bounds_of_each_form_are_tried(study):
     for cause in (by_name("creep"), by_name("exhaust_asymmetry"), by_name("supply_droop")):
         for form in cause.forms:
             fits = initial_fits(study.problem, study.family, study.base.fit, cause, form)
@@ -110,7 +110,7 @@ def test_both_bounds_of_every_form_are_looked_at(study):
 
 
 @needs_kernels
-def test_what_shows_nothing_where_it_begins_has_no_absorbed_share(study):
+def test_invisible_start_has_no_absorbed_share(study):
     silent = cause_of("silent", "position.bias", 1e-12, low=-5e-4, high=5e-4)
     found = of(study, [silent, by_name("leak")])
     assert np.isnan(found.absorbed[0])
@@ -121,7 +121,7 @@ def test_what_shows_nothing_where_it_begins_has_no_absorbed_share(study):
 
 
 @needs_kernels
-def test_no_more_is_simulated_than_two_columns_a_form_and_one_a_start(study):
+def test_number_of_simulated_columns(study):
     columns = []
     problem = dataclasses.replace(
         study.problem, simulate=lambda c: (columns.append(len(c)), study.problem.simulate(c))[1]
@@ -133,7 +133,7 @@ def test_no_more_is_simulated_than_two_columns_a_form_and_one_a_start(study):
 
 
 @needs_kernels
-def test_a_form_that_has_no_effect_here_is_left_out_with_its_reason(study):
+def test_ineffective_form_is_not_testable(study):
     reasons = told(study, list(catalogue()))
     left = {c.name for c in catalogue()} - set(reasons)
     assert {"creep", "leak", "temperature", "sensor_bias", "stick_slip"} <= left
@@ -148,7 +148,7 @@ def test_a_form_that_has_no_effect_here_is_left_out_with_its_reason(study):
 
 
 @needs_kernels
-def test_a_users_cause_is_judged_as_ours(study):
+def test_users_cause_is_judged_like_shipped_ones(study):
     assert told(study, [users_cause.CAUSE]) == {}
     one_load = dataclasses.replace(study.recording, load=np.full(len(study.recording.time), 20.0))
     reasons = not_testable(
@@ -161,7 +161,7 @@ def test_a_users_cause_is_judged_as_ours(study):
 
 
 @needs_kernels
-def test_without_pressure_what_looks_alike_is_not_decided(blind, study):
+def test_without_pressure_similar_causes_are_not_testable(blind, study):
     """A gain of the reading of the pressure shows in nothing else; a delay shows as another."""
     late = cause_of("late", "regulator.dead_time", 0.01)
     later = dataclasses.replace(late, name="later")
@@ -177,7 +177,7 @@ def test_without_pressure_what_looks_alike_is_not_decided(blind, study):
 
 
 @needs_kernels
-def test_without_pressure_every_cause_of_the_valve_is_told_apart_or_listed(blind):
+def test_without_pressure_valve_causes_are_isolable_or_listed(blind):
     causes = list(catalogue())
     found, reasons = not_testable(
         blind.problem, blind.family, blind.base.fit, causes, blind.recording, blind.sheet
@@ -195,7 +195,7 @@ def test_without_pressure_every_cause_of_the_valve_is_told_apart_or_listed(blind
 # loads that are known to a tolerance
 
 
-def test_an_error_of_the_load_is_inside_what_was_declared_or_not():
+def test_load_error_is_compared_with_its_tolerance():
     loads = [0.0, 1.5, 3.0, 6.0]
     assert load_error_limit(loads, 0.02) == pytest.approx(0.03)
     assert may_be_within((-0.01, 0.01), loads, 0.02)
@@ -210,7 +210,7 @@ def test_an_error_of_the_load_is_inside_what_was_declared_or_not():
 
 
 @needs_kernels
-def test_a_released_load_is_refitted_within_its_tolerance(study):
+def test_load_is_refitted_within_its_tolerance(study):
     free = refit_load(study.problem, study.blocks, study.family, study.base, 0.03)
     value = free.fit.values()["mass.load_error"]
     assert abs(value) <= 0.03
@@ -226,5 +226,5 @@ def test_a_released_load_is_refitted_within_its_tolerance(study):
     ("testable", "asked", "few"),
     [(0, 1, True), (1, 1, False), (2, 3, False), (1, 3, True), (4, 25, True), (5, 25, False)],
 )
-def test_few_testable_causes_count_against_those_asked_for(testable, asked, few):
+def test_few_testable_causes_are_insufficient(testable, asked, few):
     assert too_few_testable(testable, asked) is few

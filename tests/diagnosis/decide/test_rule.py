@@ -1,4 +1,4 @@
-"""The rule on plain evidence, kinds of experiment, and peaks of a spectrum."""
+"""Decision rule on plain evidence, kinds of experiment, spectral peaks."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ BOTH = rival("leak", "creep", gain=1.3, better=1.0)
         (evidence(level(3.0, LEAK), level(3.08, BOTH, added=0.08, possible=0.1)), "named", 1),
     ],
 )
-def test_evidence_words_the_verdict(found: dict[str, Any], verdict: str, names: int) -> None:
+def test_verdict_follows_from_evidence(found: dict[str, Any], verdict: str, names: int) -> None:
     judged = judge(found, RULE)
     assert (judged.verdict, judged.level) == (verdict, names)
 
@@ -102,7 +102,7 @@ def test_what_is_left_decides_whether_a_cause_explains(after: float, verdict: st
         ("7", "7"),
     ],
 )
-def test_a_label_names_a_kind(label: str, kind: str) -> None:
+def test_label_gives_kind_of_experiment(label: str, kind: str) -> None:
     assert kind_of(label) == kind
 
 

@@ -1,4 +1,4 @@
-"""The next experiment: what a rig can do, and what tells fitted rivals apart."""
+"""Design of the next experiment: capabilities of a rig, separation of rivals."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def proposed(first: Rival, *others: Rival, noise=NOISE, means=ABLE):
 # what a rig can do
 
 
-def test_means_are_what_the_recording_shows():
+def test_capabilities_are_read_from_the_recording():
     plain = Means.of(recording(), Rig())
     assert plain == Means(pytest.approx(4e5, rel=1e-3), (10.0, 40.0), shut=False, warm=False)
     assert Means.of(recording(valve_closed=("shut",)), Rig()).shut
@@ -66,13 +66,13 @@ def test_means_are_what_the_recording_shows():
     assert Means.of(recording(temperature=np.full(2000, 20.0)), Rig()).warm
 
 
-def test_a_rig_that_can_do_it_all_is_offered_every_plan():
+def test_fully_capable_rig_has_every_plan():
     names = [p.name for p in plans(ABLE)]
     assert len(set(names)) == len(names)
     assert {"valve_shut", "warm_muscle", "heavy_load", "light_load", "several_loads"} <= set(names)
 
 
-def test_a_poor_rig_is_offered_what_it_can_do():
+def test_plans_respect_capabilities_of_the_rig():
     offered = plans(POOR)
     assert {p.name for p in plans(ABLE)} - {p.name for p in offered} == {
         "valve_shut",
@@ -88,7 +88,7 @@ def test_a_poor_rig_is_offered_what_it_can_do():
 
 
 @pytest.mark.parametrize("means", [ABLE, POOR, Means(2e5, (5.0, 8.0), shut=True, warm=False)])
-def test_no_plan_leaves_what_was_recorded(means):
+def test_plans_stay_within_recorded_range(means):
     for plan in plans(means):
         assert set(plan.loads) <= set(means.loads)
         assert plan.command.max() <= means.full
@@ -97,7 +97,7 @@ def test_no_plan_leaves_what_was_recorded(means):
         assert 30.0 < len(plan.command) * PERIOD <= 125.0
 
 
-def test_the_segments_are_what_is_run():
+def test_segments_are_what_is_run():
     for plan in plans(ABLE):
         assert sum(s["seconds"] for s in plan.segments) == pytest.approx(
             len(plan.command) * PERIOD, abs=0.05
@@ -123,7 +123,7 @@ def test_the_segments_are_what_is_run():
 
 
 @compiled
-def test_a_sensor_that_is_not_there_sees_nothing():
+def test_missing_sensor_gives_no_separation():
     plain, bowed = rival("plain"), rival("sensor_nonlinearity", pressure__bow=0.05)
     inputs = inputs_of(plans(ABLE)[0])
     (both,) = separations(PLANT, (plain, bowed), inputs, Sensors(NOISE))
@@ -134,7 +134,7 @@ def test_a_sensor_that_is_not_there_sees_nothing():
 
 
 @compiled
-def test_a_rival_that_only_has_to_be_refitted_is_not_apart():
+def test_refittable_difference_is_no_separation():
     """More of the same cause is no other cause, however large the difference."""
     little = rival("leak", {"regulator.leak": 0.0101}, regulator__leak=0.01)
     more = rival("leak", {"regulator.leak": 0.0102}, regulator__leak=0.0101)
@@ -150,7 +150,7 @@ def test_a_rival_that_only_has_to_be_refitted_is_not_apart():
 
 
 @compiled
-def test_shutting_the_valve_is_proposed_for_a_leak_where_it_can_be_shut():
+def test_closing_the_valve_is_proposed_for_a_leak_if_possible():
     leak = rival("leak", {"regulator.leak": 0.011}, regulator__leak=0.01)
     creep = rival("creep", {"hysteresis.creep_2": 0.011}, hysteresis__creep_2=0.01)
     able = proposed(leak, creep)
@@ -166,7 +166,7 @@ def test_shutting_the_valve_is_proposed_for_a_leak_where_it_can_be_shut():
 
 
 @compiled
-def test_the_nearest_rival_decides():
+def test_nearest_rival_decides():
     """Each rival alone has its best experiment; for all of them the least one counts."""
     leak = rival("leak", regulator__leak=0.01)
     creep = rival("creep", hysteresis__creep_2=0.01)
@@ -194,7 +194,7 @@ def test_what_no_experiment_tells_apart_is_said():
     assert by_name("sensor_bias").sensor in found["sensor"]
 
 
-def test_a_fit_becomes_a_rival_with_its_own_parameters_moved():
+def test_rival_has_perturbed_own_parameters():
     family = MuscleFamily(PLANT, inputs_of(plans(POOR)[0]))
     base = family.free("regulator.gain")
     own = (

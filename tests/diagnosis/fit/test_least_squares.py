@@ -1,4 +1,4 @@
-"""Least squares on simulation error: optimum, bounds, priors, shared Jacobians, intervals."""
+"""Simulation-error least squares: optimum, bounds, priors, shared Jacobians, intervals."""
 
 from __future__ import annotations
 
@@ -66,14 +66,14 @@ def fitted(problem: Problem, *frees: Free, rounds: int = 30) -> Fit:
     return fit
 
 
-def test_parameters_without_noise_come_back() -> None:
+def test_noise_free_fit_recovers_parameters() -> None:
     fit = fitted(problem_of(np.zeros((2, len(TIME)))), GAIN, LAG, SLOPE)
     found = fit.values()
     assert [found["gain"], found["lag"], found["slope"]] == pytest.approx(TRUTH[:3], rel=1e-4)
     assert fit.cost < 1e-4
 
 
-def test_a_parameter_ends_at_its_bound() -> None:
+def test_fit_stops_at_bound() -> None:
     narrow = replace(GAIN, high=1.5, start=1.0)
     fit = fitted(problem_of(drawn(1)), narrow, LAG, SLOPE)
     assert fit.values()["gain"] == 1.5
@@ -81,7 +81,7 @@ def test_a_parameter_ends_at_its_bound() -> None:
     assert fit.cost > free.cost
 
 
-def test_a_prior_holds_what_the_data_do_not_say() -> None:
+def test_prior_determines_unidentified_parameter() -> None:
     train = np.zeros(len(TIME), bool)
     train[:40] = True  # the drift has not begun
     prior = replace(SLOPE, start=0.1, prior=1e-4)
@@ -91,7 +91,7 @@ def test_a_prior_holds_what_the_data_do_not_say() -> None:
     assert abs(free.values()["slope"] - 0.1) > 5e-3
 
 
-def test_samples_held_out_do_not_move_a_fit() -> None:
+def test_held_out_samples_do_not_change_fit() -> None:
     train = TIME < 40.0
     noise = drawn(3)
     one = fitted(problem_of(noise, train), GAIN, LAG, SLOPE)
@@ -102,7 +102,7 @@ def test_samples_held_out_do_not_move_a_fit() -> None:
     assert np.abs(one.residual - other.residual).max() > 10.0
 
 
-def test_missing_readings_do_not_count() -> None:
+def test_missing_readings_are_ignored() -> None:
     problem = problem_of(drawn(4))
     measured = problem.measured.copy()
     measured[0, 500:900] = np.nan
@@ -111,7 +111,7 @@ def test_missing_readings_do_not_count() -> None:
     assert fit.values()["gain"] == pytest.approx(2.0, abs=0.02)
 
 
-def test_a_simulation_that_breaks_down_is_never_chosen() -> None:
+def test_diverged_simulation_is_never_selected() -> None:
     def breaks(columns: Array) -> Array:
         outputs = simulate(columns)
         outputs[:, :, columns[:, 0] > 1.5] = np.nan
@@ -122,7 +122,7 @@ def test_a_simulation_that_breaks_down_is_never_chosen() -> None:
     assert np.abs(fit.residual).max() < WORST
 
 
-def test_fits_that_share_the_jacobian_of_the_base_reach_the_same_optimum() -> None:
+def test_shared_jacobian_reaches_the_same_optimum() -> None:
     problem = problem_of(drawn(6) + np.array([[0.4], [0.0]]))
     base = fitted(problem, GAIN, LAG, SLOPE)
     differentiate(problem, [base])
@@ -139,7 +139,7 @@ def test_fits_that_share_the_jacobian_of_the_base_reach_the_same_optimum() -> No
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_a_step_within_bounds_is_that_of_bounded_least_squares(seed: int) -> None:
+def test_bounded_step_equals_bounded_least_squares(seed: int) -> None:
     rng = np.random.default_rng(seed)
     slopes, target = rng.standard_normal((40, 6)), rng.standard_normal(40)
     low, high = -0.1 * rng.random(6), 0.1 * rng.random(6)
@@ -153,7 +153,7 @@ def test_a_step_within_bounds_is_that_of_bounded_least_squares(seed: int) -> Non
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
-def test_intervals_hold_the_truth_as_often_as_they_say(correlation: float) -> None:
+def test_confidence_intervals_have_nominal_coverage(correlation: float) -> None:
     hits = np.zeros(3)
     draws = 60
     for seed in range(draws):

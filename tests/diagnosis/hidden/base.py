@@ -1,4 +1,4 @@
-"""A clean rig: one pneumatic muscle that lifts a hanging load under a pressure regulator.
+"""Clean rig: pneumatic muscle with a hanging load under a pressure regulator.
 
 The law is a braid geometry blended with a dome over the strain, times the pressure after friction,
 less a bladder of exponential, neo-Hookean and saturating parts. Friction is a chain of 24 sliders

@@ -1,4 +1,4 @@
-"""What is done to a rig: commands, loads and the room's temperature, cut into labelled segments.
+"""Campaign of a rig: commands, loads and room temperature in labelled segments.
 
 A label is a kind of experiment and a letter of the instance: `random_b` is the second of `random`.
 The load changes only in rests near 0 bar.

@@ -1,4 +1,4 @@
-"""Every effect that can be hidden, by name.
+"""Catalogue of hidden effects.
 
 None is the equation of the candidate that a diagnosis would explain it with:
 

@@ -1,4 +1,4 @@
-"""One hidden effect: a name, the shape drawn for it, and how it enters the constants of a rig."""
+"""Hidden effect: name, drawn shape, and its entry in the constants of a rig."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Effects in what pressure, strands and the guide hold back."""
+"""Friction effects of pressure, strands and guide."""
 
 from __future__ import annotations
 

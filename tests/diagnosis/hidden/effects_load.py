@@ -1,4 +1,4 @@
-"""Effects between the muscle and its load: clamp, wire, scales."""
+"""Effects between muscle and load: clamp, wire, scales."""
 
 from __future__ import annotations
 

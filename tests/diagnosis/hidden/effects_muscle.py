@@ -1,4 +1,4 @@
-"""Effects in the muscle: slow hysteresis, losses, heat, the first cycles, the bladder."""
+"""Effects in the muscle: creep, losses, heat, first cycles, bladder."""
 
 from __future__ import annotations
 

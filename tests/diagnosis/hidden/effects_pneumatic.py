@@ -1,4 +1,4 @@
-"""Effects in the air: valve, line, supply, leak."""
+"""Pneumatic effects: valve, line, supply, leak."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Effects in what is read, not in what happens."""
+"""Sensor effects."""
 
 from __future__ import annotations
 

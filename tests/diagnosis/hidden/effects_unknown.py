@@ -1,4 +1,4 @@
-"""Effects that no catalogue lists: half of them for tuning, half kept for the final run."""
+"""Effects outside the catalogue, one set for tuning and one for the final run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rig's own integrator: one millisecond a step, the linearly implicit midpoint rule."""
+"""Integrator of the rig: linearly implicit midpoint rule with steps of 1 ms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Jitted: regulator, supply and line, from the command to the pressure.
+"""Kernels of regulator, supply and line, from the command to the pressure.
 
 In all kernels `p` is the record of constants and `s` that of the state; see `records` for units.
 """

@@ -1,4 +1,4 @@
-"""Jitted: how load, slow hysteresis and what else can move go on by one step."""
+"""Kernels of motion: one step of load, creep and other moving parts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Jitted: friction and force of the muscle, and the load that hangs on it."""
+"""Kernels of friction, muscle force and hanging load."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Jitted: what the sensors of position and pressure say."""
+"""Kernels of the position and pressure sensors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the jitted files share."""
+"""Constants and functions common to the kernels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the jitted loop reads (constants of one rig) and what it carries from step to step.
+"""Records of the kernels: constants of a rig, and its state.
 
 Pressures are gauge pressures in bar, lengths are strains (contraction over rest length) unless the
 name says mm, forces N, masses kg, times s. Every constant of an effect is neutral at zero.

@@ -1,4 +1,4 @@
-"""A rig in use: what it does under a campaign, and the recording that its owner hands in."""
+"""Simulation of a rig under a campaign, and its recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A rig that a controller drives, one command after the other."""
+"""Rig driven by a controller, one command at a time."""
 
 from __future__ import annotations
 

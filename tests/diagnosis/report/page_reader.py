@@ -1,4 +1,4 @@
-"""Reads a page back."""
+"""Reader of a report page."""
 
 from __future__ import annotations
 

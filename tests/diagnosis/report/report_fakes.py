@@ -1,4 +1,4 @@
-"""A made-up diagnosis: what an engine would hand to the report, for every verdict."""
+"""Synthetic diagnoses of every verdict, as input of the report."""
 
 from __future__ import annotations
 

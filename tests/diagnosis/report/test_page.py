@@ -1,4 +1,4 @@
-"""The page of a diagnosis and its figures."""
+"""Page of a diagnosis and its figures."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def html():
     return page(json.loads(report_json(made.report)), made.traces)
 
 
-def test_the_page_does_not_say_how_long_it_took(monkeypatch):
+def test_page_does_not_show_the_runtime(monkeypatch):
     monkeypatch.setattr(page_module, "draw", lambda *_: {})
     made = fakes.diagnosis("named")
     quick, slow = (
@@ -49,7 +49,7 @@ def test_each_section_has_its_figures_with_caption_and_alternative(html):
     assert all(len(label) > 20 for label in read.labels)
 
 
-def test_the_page_is_self_contained(html):
+def test_page_is_self_contained(html):
     read = Page(html)
     assert "http" not in html
     assert "@import" not in html
@@ -66,7 +66,7 @@ def test_ids_are_unique_and_every_reference_has_its_target(html):
     assert len(wanted) > 20
 
 
-def test_figures_take_their_colours_from_the_page(html):
+def test_figures_use_colours_of_the_page(html):
     used = set(re.findall(r"var\(--([a-z]+)\)", html))
     assert used <= set(re.findall(r"--([a-z]+):", html))
     drawn = "".join(re.findall(r"<svg.*?</svg>", html, re.DOTALL))
@@ -116,7 +116,7 @@ def test_one_output_alone(channel):
     assert any(label.startswith(f"residual of {channel} over") for label in read.labels)
 
 
-def test_parts_that_a_recording_lacks():
+def test_missing_channels_are_left_out_of_the_page():
     made = without("temperature", "load", "command")
     made.report |= {"closed_loop": None, "isolability": None, "rivals": [], "calibration": []}
     made.report["closed_loop_reason"] = "a controller cannot compensate creep"
@@ -182,7 +182,7 @@ def test_settled_readings_are_drawn_by_load():
     assert "load-blind" in read.text
 
 
-def test_the_ambiguous_headline_names_each_rival_once():
+def test_ambiguous_headline_names_each_rival_once():
     assert headline(fakes.report("ambiguous")) == "Creep of the muscle or first cycle softening"
 
 
@@ -204,7 +204,7 @@ def test_numbers_are_written_with_three_digits():
     ]
 
 
-def test_a_thinned_line_keeps_its_extremes():
+def test_thinned_line_keeps_extremes():
     rng = np.random.default_rng(0)
     x, y = np.arange(30_000.0), rng.normal(size=30_000)
     y[12_345], y[20_001] = 50.0, -50.0
@@ -217,18 +217,18 @@ def test_a_thinned_line_keeps_its_extremes():
     assert np.array_equal(np.interp(u, x, np.nan_to_num(y)), np.nan_to_num(v))
 
 
-def test_a_page_of_a_long_recording_stays_small():
+def test_page_of_long_recording_is_small():
     made = fakes.diagnosis("named", rows=30_000, period=0.02)
     html = page(json.loads(report_json(made.report)), made.traces)
     assert len(html.encode()) < 3e6
 
 
-def test_the_clock_runs_on_when_a_recording_starts_anew():
+def test_clock_runs_on_when_a_recording_starts_anew():
     time = np.array([0.0, 0.1, 0.2, 0.0, 0.1, 50.0, 50.1])
     assert elapsed(time) == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
 
 
-def test_the_close_up_is_where_the_error_is_largest():
+def test_close_up_is_where_the_error_is_largest():
     view = View.of(fakes.traces())
     span = view.spans[4]
     error = np.zeros(len(view.clock))
@@ -249,7 +249,7 @@ def test_causes_that_look_alike_stand_side_by_side():
     assert all(abs(order.index(a) - order.index(b)) == 1 for a, b in ((0, 3), (1, 4), (2, 5)))
 
 
-def test_an_extension_that_changes_nothing_is_not_drawn():
+def test_extension_that_changes_nothing_is_not_drawn():
     made = fakes.traces()
     made.extended = {channel: values.copy() for channel, values in made.base.items()}
     assert View.of(made).extended == {}

@@ -1,4 +1,4 @@
-"""The files of a diagnosis: schema, bytes, what is left when something fails."""
+"""Files of a diagnosis: schema, bytes, behaviour on failures."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def plain_page(monkeypatch):
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)
-def test_every_verdict_makes_a_valid_report_and_a_page(tmp_path, verdict):
+def test_each_verdict_gives_valid_report_and_page(tmp_path, verdict):
     folder = folder_of(tmp_path, verdict)
     found = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     jsonschema.validate(found, SCHEMA)
@@ -77,7 +77,7 @@ def test_every_verdict_makes_a_valid_report_and_a_page(tmp_path, verdict):
         (("provenance", "rig"), "single_muscle"),
     ],
 )
-def test_the_schema_refuses_what_is_wrong(path, value):
+def test_schema_refuses_wrong_values(path, value):
     found = json.loads(report_json(fakes.report()))
     place = found
     for key in path[:-1]:
@@ -91,7 +91,7 @@ def told(verdict: str, **changes: Any) -> str:
     return sentence(json.loads(report_json(fakes.report(verdict) | changes)), Rule())
 
 
-def test_the_sentence_says_on_what_and_which_rivals_stay():
+def test_sentence_names_held_out_data_and_open_rivals():
     text = told("ambiguous")
     assert "held-out experiments of the kinds steps_held and sine_held" in text
     assert "Not excluded: first_cycle_softening." in text
@@ -99,7 +99,7 @@ def test_the_sentence_says_on_what_and_which_rivals_stay():
     assert "blocks of 4 s" in told("adequate", held_out={"by": "blocks", "kinds": [], "share": 0.3})
 
 
-def test_of_several_causes_one_that_may_gain_nothing_is_said_to():
+def test_insignificant_gain_of_a_cause_is_stated():
     weak = {"name": "leak", "title": "a leak", "gain": {"value": 0.03, "interval": [-0.01, 0.1]}}
     text = told("named", causes=[fakes.CREEP, fakes.CREEP | weak])
     assert "lacks creep of the muscle and a leak" in text
@@ -107,7 +107,7 @@ def test_of_several_causes_one_that_may_gain_nothing_is_said_to():
     assert "gain of creep" not in text
 
 
-def test_what_was_added_without_sufficing_is_said():
+def test_insufficient_extension_is_stated():
     report = fakes.report("unexplained")
     after = {"contraction": fakes.error(0.18, "mm", 0.05, 0.1)}
     text = told("unexplained", causes=[fakes.CREEP], error_after=after)
@@ -117,7 +117,7 @@ def test_what_was_added_without_sufficing_is_said():
     assert "Adding" not in sentence(report, Rule())
 
 
-def test_every_key_is_in_the_schema_and_every_one_is_documented():
+def test_each_key_is_in_schema_and_documentation():
     document = (Path(__file__).parents[3] / "docs/diagnosis_report.md").read_text(encoding="utf-8")
     parts = [SCHEMA, *SCHEMA["$defs"].values(), *SCHEMA["properties"].values()]
     keys = {key for part in parts for key in part.get("properties", {})}
@@ -125,13 +125,13 @@ def test_every_key_is_in_the_schema_and_every_one_is_documented():
     assert {key for key in keys if f"`{key}`" not in document} == set()
 
 
-def test_the_same_diagnosis_gives_the_same_bytes(tmp_path):
+def test_same_diagnosis_gives_same_bytes(tmp_path):
     first, second = folder_of(tmp_path / "a"), folder_of(tmp_path / "b")
     for name in FILES:
         assert (first / name).read_bytes() == (second / name).read_bytes()
 
 
-def test_keys_come_in_a_fixed_order():
+def test_keys_have_a_fixed_order():
     report = fakes.report()
     turned = dict(reversed(report.items()))
     turned["causes"] = [dict(reversed(c.items())) for c in report["causes"]]
@@ -142,7 +142,7 @@ def test_keys_come_in_a_fixed_order():
     assert list(found["noise_floor"]["contraction"]) == ["value", "unit", "from"]
 
 
-def test_numbers_have_six_digits_and_what_is_not_finite_is_null():
+def test_numbers_have_six_digits_and_infinite_ones_are_null():
     found = plain({"a": 1.23456789e-7, "b": np.float32(0.1), "c": np.array([np.nan, np.inf, -0.0])})
     assert found == {"a": 1.23457e-7, "b": 0.1, "c": [None, None, 0.0]}
     assert str(found["c"][2]) == "0.0"
@@ -170,12 +170,12 @@ def test_nan_in_a_report_becomes_null_and_a_dash(tmp_path):
     assert not re.search(r"\bnan\b", html, re.IGNORECASE)
 
 
-def test_a_value_that_json_lacks_is_refused_by_name():
+def test_value_without_json_type_is_refused():
     with pytest.raises(TypeError, match=r"text holds .* of type complex"):
         report_json({**fakes.report(), "text": 1j})
 
 
-def test_what_fits_on_a_line_stands_on_one():
+def test_short_objects_are_on_one_line():
     value = {"a": [1, 2], "b": ["x" * 60, "y" * 60]}
     text = dumps(value)
     assert json.loads(text) == value
@@ -183,13 +183,13 @@ def test_what_fits_on_a_line_stands_on_one():
     assert len(text.splitlines()) == 7
 
 
-def test_nothing_temporary_is_left(plain_page, tmp_path):
+def test_no_temporary_file_is_left(plain_page, tmp_path):
     folder = folder_of(tmp_path)
     assert {p.name for p in folder.iterdir()} == FILES
     assert (folder / "plant.yaml").read_text(encoding="utf-8") == "schema: 1\n"
 
 
-def test_when_drawing_fails_the_old_files_stay(plain_page, tmp_path, monkeypatch):
+def test_failed_drawing_keeps_old_files(plain_page, tmp_path, monkeypatch):
     folder = folder_of(tmp_path)
     before = {p.name: p.read_bytes() for p in folder.iterdir()}
 
@@ -202,7 +202,7 @@ def test_when_drawing_fails_the_old_files_stay(plain_page, tmp_path, monkeypatch
     assert {p.name: p.read_bytes() for p in folder.iterdir()} == before
 
 
-def test_when_writing_fails_the_old_file_stays(plain_page, tmp_path, monkeypatch):
+def test_failed_write_keeps_old_file(plain_page, tmp_path, monkeypatch):
     folder = folder_of(tmp_path)
     before = (folder / "report.html").read_bytes()
     monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(OSError("disk is full")))
@@ -212,13 +212,13 @@ def test_when_writing_fails_the_old_file_stays(plain_page, tmp_path, monkeypatch
     assert (folder / "report.html").read_bytes() == before
 
 
-def test_a_folder_never_holds_parts_of_two_diagnoses(plain_page, tmp_path):
+def test_folder_contains_one_diagnosis(plain_page, tmp_path):
     folder = folder_of(tmp_path, "named")
     write(fakes.diagnosis("adequate", plant=False), folder)
     assert {p.name for p in folder.iterdir()} == FILES - {"plant.yaml"}
 
 
-def test_without_matplotlib_the_numbers_are_written_and_the_remedy_is_said(tmp_path, monkeypatch):
+def test_without_matplotlib_numbers_are_written_with_a_remedy(tmp_path, monkeypatch):
     (tmp_path / "report.html").write_text("of an earlier diagnosis", encoding="utf-8")
     for name in [n for n in sys.modules if n.partition(".")[0] == "matplotlib"]:
         monkeypatch.delitem(sys.modules, name)

@@ -1,4 +1,4 @@
-"""Reports of real diagnoses: layout, what was held out, provenance, reasons."""
+"""Reports of real diagnoses: layout, held-out data, provenance, reasons."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Diagnosis]
 
 
 @pytest.mark.parametrize("name", ["temperature", "slip_step", "none"])
-def test_a_real_report_has_the_layout_and_is_what_is_written(
+def test_real_report_is_valid_and_equals_written_file(
     told: Callable[[str], Diagnosis], name: str, tmp_path: Path
 ) -> None:
     found = told(name)
@@ -77,7 +77,7 @@ def test_a_real_report_has_the_layout_and_is_what_is_written(
     assert SingleMuscle.from_yaml(tmp_path / "plant.yaml").digest() == found.plant.digest()
 
 
-def test_the_report_says_what_was_held_out(told: Callable[[str], Diagnosis]) -> None:
+def test_report_says_what_was_held_out(told: Callable[[str], Diagnosis]) -> None:
     kinds, once = told("temperature"), told("slip_step")
     assert kinds.report["held_out"]["by"] == "kinds"
     assert all(kind in kinds.text for kind in kinds.report["held_out"]["kinds"])
@@ -91,7 +91,7 @@ def test_the_report_says_what_was_held_out(told: Callable[[str], Diagnosis]) -> 
     assert "blocks of 4 s" in once.text
 
 
-def test_gains_are_those_of_the_errors_on_what_was_held_out(
+def test_gains_equal_held_out_error_ratios(
     told: Callable[[str], Diagnosis],
 ) -> None:
     report = told("temperature").report
@@ -104,7 +104,7 @@ def test_gains_are_those_of_the_errors_on_what_was_held_out(
     assert {name for name, by in on.items() if by == "blocks"} <= {"slip_step"}
 
 
-def test_parameters_say_where_they_come_from(told: Callable[[str], Diagnosis]) -> None:
+def test_parameters_have_provenance(told: Callable[[str], Diagnosis]) -> None:
     found = told("temperature")
     marks, report = found.plant.provenance, found.report
     source = report["provenance"]["recording"]["digest"][:12]
@@ -115,7 +115,7 @@ def test_parameters_say_where_they_come_from(told: Callable[[str], Diagnosis]) -
     assert "published" not in {kind for kind, _ in marks.values()}
 
 
-def test_the_rig_can_be_traced(told: Callable[[str], Diagnosis]) -> None:
+def test_rig_can_be_traced(told: Callable[[str], Diagnosis]) -> None:
     report = told("temperature").report
     assert report["provenance"]["rig"]["source"].endswith("rig.yaml")
     rig = Rig(repeats=(("a", "b"),), tolerance={"mass.load": 0.02})

@@ -1,4 +1,4 @@
-"""Tables of a made-up muscle, in forms of its own: nothing here comes from the library's models.
+"""Tables of a synthetic muscle, independent of the library's models.
 
 Its spring, the spread of its friction and the way a load acts are other functions than those that
 the diagnosis fits.

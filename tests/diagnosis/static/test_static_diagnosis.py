@@ -1,4 +1,4 @@
-"""Diagnosis of settled readings: the measured tables, and made-up ones whose truth is known."""
+"""Diagnosis of settled readings: measured tables, and synthetic ones with known truth."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ def test_measured_causes_are_named_in_the_order_of_evidence(measured):
     assert measured["causes"][0]["form"] == "pressure shift"
 
 
-def test_the_floor_is_that_of_the_repeats(measured):
+def test_floor_is_that_of_the_repeats(measured):
     floor = measured["noise_floor"]["contraction"]
     assert floor["value"] == pytest.approx(0.168, abs=0.001)
     assert floor["from"] == "repeats"
 
 
-def test_the_load_blind_model_is_three_floors_off(measured):
+def test_load_blind_model_is_three_floors_off(measured):
     base = _rung(measured)
     assert base["cells_mm"] == pytest.approx(0.475, abs=0.005)
     assert base["load_left_out_mm"] == pytest.approx(0.634, abs=0.01)
@@ -63,7 +63,7 @@ def test_the_load_blind_model_is_three_floors_off(measured):
     assert structure["r2"]["load"] == pytest.approx(0.67, abs=0.02)
 
 
-def test_effects_linear_in_load_cut_the_error_on_a_load_left_out_by_30_percent(measured):
+def test_linear_load_effects_reduce_held_out_load_error_by_30_percent(measured):
     before, after = (
         measured[key]["contraction"]["kinds"]["loads, one held out (mean)"]
         for key in ("error_before", "error_after")
@@ -77,7 +77,7 @@ def test_effects_linear_in_load_cut_the_error_on_a_load_left_out_by_30_percent(m
     assert both["load_left_out_mm"] <= 0.7 * before
 
 
-def test_the_zeroed_form_of_the_shift_is_told_as_an_equal(measured):
+def test_zeroed_form_of_the_shift_is_told_as_an_equal(measured):
     forms = {r["form"]: r for r in measured["rivals"]}
     assert not forms["pressure shift, zeroed at each load"]["excluded"]
     assert forms["smaller stroke"]["excluded"]
@@ -94,7 +94,7 @@ def test_shift_and_width_come_with_intervals(measured):
     assert width["interval"] == pytest.approx([-0.077, -0.037], abs=0.008)
 
 
-def test_the_width_is_masked_until_the_shift_is_in(measured):
+def test_width_is_significant_only_beside_the_shift(measured):
     alone = _tried(_rung(measured), "width linear in load")
     beside = _tried(_rung(measured, "pressure shift"), "width linear in load")
     assert alone["p"] > 0.3
@@ -106,13 +106,13 @@ def test_the_width_is_masked_until_the_shift_is_in(measured):
     assert "significant only beside load_dependent_compliance" in measured["text"]
 
 
-def test_residual_creep_and_a_threshold_are_not_needed(measured):
+def test_residual_creep_and_threshold_are_not_accepted(measured):
     last = measured["readings"]["ladder"][-1]
     assert last["chosen"] is None
     assert {t["name"] for t in last["tried"]} == {"creep", "threshold_pressure"}
 
 
-def test_an_exponent_is_post_hoc_and_cannot_be_told_from_a_dead_zone(measured):
+def test_exponent_is_post_hoc_and_not_separable_from_dead_zone(measured):
     power, dead = measured["readings"]["load_laws"]
     assert power["value"] == pytest.approx(1.92, abs=0.03)
     assert power["load_left_out_mm"] == pytest.approx(0.22, abs=0.01)
@@ -125,13 +125,13 @@ def test_an_exponent_is_post_hoc_and_cannot_be_told_from_a_dead_zone(measured):
     assert "1.5 kg and 3.6 kg" in measured["experiment"]["description"]
 
 
-def test_the_floor_is_not_reached_and_the_report_says_by_how_much(measured):
+def test_noise_floor_is_not_reached(measured):
     assert measured["readings"]["lack_of_fit"]["after"]["F"] > 8.0
     assert measured["error_after"]["contraction"]["times_floor"] == pytest.approx(1.57, abs=0.05)
     assert "The noise floor is not reached" in measured["text"]
 
 
-def test_the_audit_finds_drift_unequal_scatter_and_the_missed_set_point(measured):
+def test_audit_finds_drift_unequal_scatter_and_missed_setpoint(measured):
     told = " ".join(measured["warnings"])
     assert "drift by +0.033 mm a repeat" in told
     assert "scatter differently" in told
@@ -142,7 +142,7 @@ def test_the_audit_finds_drift_unequal_scatter_and_the_missed_set_point(measured
     assert abs(point["others"][0]) < 0.2
 
 
-def test_the_same_table_and_seed_give_the_same_report():
+def test_same_table_and_seed_give_the_same_report():
     small = table(pressures=PRESSURES[::2], loads=(0.0, 3.0), repeats=2)
     made = [diagnose_readings(small, seed=4) for _ in range(2)]
     for one in made:
@@ -150,21 +150,21 @@ def test_the_same_table_and_seed_give_the_same_report():
     assert json.dumps(made[0]) == json.dumps(made[1])
 
 
-def test_a_table_that_the_load_does_not_touch_is_adequate():
+def test_table_without_load_effect_is_adequate():
     found = diagnose_readings(table(seed=1))
     assert found["verdict"] == "adequate"
     assert found["causes"] == []
     assert found["error_before"]["contraction"]["times_floor"] < 1.1
 
 
-def test_a_table_whose_loops_narrow_with_the_load_is_named_so():
+def test_loops_narrowing_with_load_are_named():
     found = diagnose_readings(table(seed=2, width=lambda m: np.exp(-0.08 * m)))
     assert found["verdict"] == "named"
     assert [c["name"] for c in found["causes"]] == [WIDTH]
     assert "The noise floor is reached" in found["text"]
 
 
-def test_a_law_of_five_loads_is_judged_without_each():
+def test_load_law_of_five_loads_is_held_out():
     loads = (0.0, 1.2, 2.4, 3.6, 4.8)
     found = diagnose_readings(table(loads, seed=3, shift=lambda m: 0.4 * (m / 4.8) ** 2))
     assert [c["name"] for c in found["causes"]] == [COMPLIANCE]
@@ -183,7 +183,7 @@ def test_with_one_load_causes_of_the_load_are_not_testable():
     assert found["experiment"] is None
 
 
-def test_with_one_repeat_the_floor_is_unknown_and_the_shift_still_named():
+def test_one_repeat_leaves_noise_floor_unknown_and_names_shift():
     found = diagnose_readings(table(repeats=1, seed=5, shift=lambda m: 0.36 * (m / 4.55) ** 1.3))
     assert found["noise_floor"]["contraction"]["value"] is None
     assert found["causes"][0]["name"] == COMPLIANCE
@@ -191,7 +191,7 @@ def test_with_one_repeat_the_floor_is_unknown_and_the_shift_still_named():
     assert any("noise floor is not known" in told for told in found["warnings"])
 
 
-def test_copies_of_a_repeat_are_told_and_give_no_floor():
+def test_copied_repeats_are_reported_and_give_no_noise_floor():
     one = table((0.0, 3.0), repeats=1, pressures=PRESSURES[::2])
     columns = {f.name: np.tile(getattr(one, f.name), 2) for f in dataclasses.fields(one)}
     columns["repeat"] = np.repeat([1, 2], len(one.repeat))
@@ -200,7 +200,7 @@ def test_copies_of_a_repeat_are_told_and_give_no_floor():
     assert any("one is a copy" in told for told in found["warnings"])
 
 
-def test_a_zero_common_to_all_loads_is_named_as_stretch_at_rest():
+def test_common_zero_is_named_stretch_at_rest():
     one = table((0.0, 2.0, 4.0), repeats=2, pressures=PRESSURES[::2])
     sunk = one.contraction_m - 1e-3 * one.load_kg + 1e-4
     found = diagnose_readings(dataclasses.replace(one, contraction_m=sunk))
@@ -236,7 +236,7 @@ PUBLISHED = {
 }
 
 
-def test_the_published_polynomial_3_is_found_to_be_a_copy_of_1():
+def test_published_polynomial_3_is_found_to_be_a_copy_of_1():
     found = audit_polynomials(TABLE, PUBLISHED)
     by_name = {e["name"]: e for e in found["equations"]}
     assert by_name["(3)"]["copy_of"] == "(1)"
@@ -272,7 +272,7 @@ def test_every_term_is_neutral_at_its_neutral_value():
         np.testing.assert_allclose(predict(study.cells, values | added), plain, atol=1e-9)
 
 
-def test_a_fit_worse_than_its_part_is_refused():
+def test_fit_worse_than_nested_model_is_refused():
     parent = Fit((), np.zeros((1, 9)), np.array([1.0]))
     child = Fit((SHIFT,), np.zeros((1, 10)), np.array([1.1]))
     with pytest.raises(RuntimeError, match="fits worse"):
