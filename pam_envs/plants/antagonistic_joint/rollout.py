@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import COMPILED, LANES, kernel
 from pam_envs.plants.antagonistic_joint import rows as K
-from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.step import (
     N_WORK,
     advance,
@@ -20,8 +19,12 @@ from pam_envs.plants.antagonistic_joint.step import (
     replacements,
     start_hysteresis,
 )
+from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.core.rollout import BEGIN, REST, Loop, biased_output, run
 from pam_envs.plants.core.tiles import drives_of, first_of
+
+if TYPE_CHECKING:
+    from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
 OUTPUTS = {
     "angle": K.ANGLE,
@@ -173,7 +176,7 @@ def simulate_joint(
         Each signal of ``OUTPUTS`` at the end of each control period, free of noise, shape (T,) for
         one plant and (T, n) for several.
     """
-    several = [plants] if isinstance(plants, AntagonisticJoint) else list(plants)
+    several = [plants] if isinstance(plants, Plant) else list(plants)
     first = first_of(several, "hysteresis.kind", "dynamics", "substeps")
     stress = first.prestress if prestress is None else prestress
     given = (0.0, 0.0) if pressures is None else pressures
@@ -186,7 +189,7 @@ def simulate_joint(
     columns = [plant.parameter_rows() for plant in several]
     n = len(several) if len(several) > 1 else drives.shape[2]
     made = run(loop, first, columns, drives, plants=n, flags=flags, compiled=compiled)
-    single = isinstance(plants, AntagonisticJoint) and all(np.ndim(d) < 2 for d in channels)
+    single = isinstance(plants, Plant) and all(np.ndim(d) < 2 for d in channels)
     return {name: made[k, :, 0] if single else made[k] for k, name in enumerate(OUTPUTS)}
 
 
