@@ -78,7 +78,7 @@ class TorqueStiffness:
         1.3, "rad", 0.0, 3.0, "assumed", "bent by 74 degrees, so that reaches come to it"
     )
     softest_wall: float = parameter(
-        5.0, "N m/rad", 0.0, 50.0, "assumed", "twice as stiff as what is free"
+        5.0, "N m/rad", 0.0, 50.0, "assumed", "twice the stiffness of free motion"
     )
     stiffest_wall: float = parameter(
         7.0, "N m/rad", 0.0, 50.0, "assumed", "nearly the stiffest that the bundles can be there"

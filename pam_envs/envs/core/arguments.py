@@ -119,10 +119,11 @@ class Common:
         found: Any = made
         if hysteresis is not None and model_of(hysteresis).identity:
             return found.replace({"hysteresis.operator": None})  # type: ignore[no-any-return]
-        if hysteresis is not None and hysteresis != found.hysteresis.choice:
+        own = found.hysteresis.choice
+        if hysteresis is not None and hysteresis != own:
             raise ValueError(
-                f"hysteresis = {hysteresis!r} but the plant's hysteresis is {found.hysteresis.choice!r}; "
-                "leave hysteresis out, or give a plant identified with that hysteresis"
+                f"hysteresis = {hysteresis!r} but the plant's hysteresis is {own!r}; leave "
+                "hysteresis out, or give a plant identified with that hysteresis"
             )
         return made
 
@@ -160,17 +161,19 @@ class Common:
             samples = np.array(reference, np.float64)
         except (TypeError, ValueError) as error:
             raise ValueError(
-                f"reference = {str(reference)[:60]!r} must be one of {', '.join(families)} or samples"
+                f"reference = {str(reference)[:60]!r} must be one of {', '.join(families)} or "
+                "samples"
             ) from error
         shaped = samples[:, None] if samples.ndim == channels == 1 else samples
         if shaped.ndim != 2 or not len(shaped) or not np.isfinite(shaped).all():
             raise ValueError(
-                f"reference has shape {samples.shape}; give a finite sample [{unit}] for each control "
-                "period"
+                f"reference has shape {samples.shape}; give a finite sample [{unit}] for each "
+                "control period"
             )
         if shaped.shape[1] != channels:
             raise ValueError(
-                f"reference has shape {samples.shape}; give {channels} numbers for each control period"
+                f"reference has shape {samples.shape}; give {channels} numbers for each control "
+                "period"
             )
         sizes, bounds = np.abs(shaped).max(axis=0), np.broadcast_to(largest, channels)
         for size, bound, own in zip(sizes, bounds, unit.split(", "), strict=True):
@@ -223,7 +226,7 @@ class Common:
                     f"randomize: {name} has low = {low:g} above high = {high:g}; swap them"
                 )
             for end in (low, high):
-                plant.replace({name: end})  # refuses what is out of bounds or cannot be simulated
+                plant.replace({name: end})  # refuses values out of bounds and unstable plants
             table.append((names.index(name), low, high))
         worst = {name: pick(ranges[name]) for name, pick in corner.items() if name in ranges}
         for member in plant.members() if ranges else ():
@@ -256,9 +259,9 @@ def environment_arguments(
 ) -> Callable[[Callable[..., Setup]], Callable[..., Setup]]:
     """Give a function the arguments of :class:`Common`, with these defaults, beside its own.
 
-    The function gets a :class:`Common` as its first argument. Without keyword arguments of an
-    unknown name: a ``TypeError`` lists the known ones. Every check raises a ``ValueError`` that names
-    the argument, its value, the bounds and the remedy.
+    The function gets a :class:`Common` as its first argument. An argument of an unknown name raises
+    a ``TypeError`` that lists the known ones; every check raises a ``ValueError`` that names the
+    argument, its value, the bounds and the remedy.
     """
     defaults = Common(reference, preview, preview_stride, episode_seconds)
 

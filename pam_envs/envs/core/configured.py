@@ -50,7 +50,7 @@ class Configured:
         return setup
 
     def _numbers(self, given: Any, shape: tuple[int, ...], word: str) -> NDArray[np.float64]:
-        """Return actions as an array, or raise naming what is wrong with them."""
+        """Return actions as an array, or raise an error that names the fault."""
         try:
             if np.iscomplexobj(given):
                 raise TypeError("complex numbers")

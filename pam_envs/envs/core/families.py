@@ -22,7 +22,7 @@ class Kernels:
     Attributes
     ----------
     name : str
-        Name of the machine code on disk: the family and what its kernels depend on.
+        Name of the machine code on disk: the family and the key.
     maker, key : callable, tuple
         ``maker(*key)`` returns these kernels again: machine code is not pickled.
     report : Report

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 PREFIXES = ("reward", "cost", "margin", "effort", "state", "sensor")
-"""Groups of the entries of ``info``; ``time``, ``reference``, ``output``, ``saturated`` have none."""
+"""Groups of the entries of ``info``, besides ``time``, ``reference``, ``output``, ``saturated``."""
 
 
 def indices(keys: Iterable[str], first: int = 0) -> Any:

@@ -21,7 +21,7 @@ from pam_envs.parameters import Signal, Signals
 Part = tuple[str, str, float, float]
 """Name, unit and range of a signal."""
 STEP, STEP_AND_RESTART, BEGIN = 0, 1, 2
-"""Modes of the kernels: step; step and reset what has ended; reset what is flagged."""
+"""Modes of the kernels: step; step and reset ended episodes; reset flagged ones."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def compose(
     tables : ndarray, shape (members, n, m), optional
         Tables of the hysteresis models of the plant and its members.
     view : str
-        Import name of the :class:`~pam_envs.envs.rendering.scene.View`, like ``my_family.view:VIEW``.
+        Import name of the :class:`~pam_envs.envs.rendering.scene.View`: ``my_family.view:VIEW``.
     """
     signals = _observed(observation, references, given, plant.control_period)
     actions = Signals(Signal(*part, i, given.normalize) for i, part in enumerate(action))

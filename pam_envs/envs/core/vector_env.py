@@ -34,8 +34,8 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
     """``num_envs`` environments stepped by one kernel call.
 
     Row ``i`` of a batch reset with seed ``s`` is the single environment reset with ``s + i``, bit
-    for bit, through every automatic reset. Resets happen in the same step: where an episode ends, the
-    observation is the first one of the next episode, and ``infos["final_obs"]`` and
+    for bit, through every automatic reset. Resets happen in the same step: where an episode ends,
+    the observation is the first one of the next episode, and ``infos["final_obs"]`` and
     ``infos["final_info"]`` hold the last ones of the ended episode.
 
     Parameters
@@ -125,7 +125,7 @@ class PlantVectorEnv(Configured, VectorEnv[Any, Any, Any]):
                 counts[episode][lane] = 0
 
     def _outputs(self) -> tuple[NDArray[Any], ...]:
-        """Return fresh arrays: observations, reward with info (both also of ended episodes), flags."""
+        """Return fresh arrays: observations, reward with info (also of ended episodes), flags."""
         n, keys = self.num_envs, self._keys if self.with_info else 0
         return (
             np.empty((2, n, len(self.signals)), np.float32),

@@ -3,8 +3,8 @@
 Two bundles of pneumatic muscles turn the elbow of an orthosis through a pulley: bundle b flexes it,
 bundle a extends it. The two pressures set torque and stiffness of the joint together. The wearer
 moves the forearm along an intended motion and holds it like a spring and a damper; the orthosis has
-to render a weight in the hand, a wall, or free motion. Desired torque and stiffness are functions of
-the angle, limited to what the pressures can give there, torque first.
+to render a weight in the hand, a wall, or free motion. Desired torque and stiffness are functions
+of the angle, clipped to the range of the pressures there, torque first.
 
 Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=False``):
 
@@ -213,8 +213,8 @@ def _weights(task: TorqueStiffness, weight: Any, kind: int) -> tuple[float, floa
         return task.lightest, task.heaviest
     if kind not in (WEIGHT, MIXED):
         raise ValueError(
-            f"weight = {weight!r} but the reference has no weight; leave it out, or take reference = "
-            "'weight' or 'mixed'"
+            f"weight = {weight!r} but the reference has no weight; leave it out, or take "
+            "reference = 'weight' or 'mixed'"
         )
     kilograms = check_number("weight", weight, 0.0, 20.0, "kg")
     return kilograms, kilograms

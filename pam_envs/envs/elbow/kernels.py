@@ -273,7 +273,7 @@ def begin_elbow(
 
 @lru_cache(maxsize=16)
 def kernels_for(kind: str, valves: str, extended: bool = False) -> Kernels:
-    """Return the kernels for a kind of hysteresis and a make of the valves, plain or with effects."""
+    """Return the kernels for a hysteresis model and valves, plain or with effects."""
     rows = L.HYSTERESIS + state_rows(kind)
     return Kernels(
         f"elbow_{kind}_{valves}" + ("_extended" if extended else ""),

@@ -85,8 +85,8 @@ MODEL = indices(
         *("low_a", "high_a", "low_b", "high_b", "full_pressure", "weight"),
     )
 )
-"""Nominal model of the bundles, in the first own row of the settings. The other two rows hold torque
-and stiffness where the task is given as samples."""
+"""Nominal model of the bundles, in the first own row of the settings. The other two rows hold
+torque and stiffness where the task is given as samples."""
 
 NOISE_ANGLE, NOISE_A, NOISE_B, START, TASK = 1, 2, 3, 5, 6
 """Random streams."""

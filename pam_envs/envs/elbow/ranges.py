@@ -11,7 +11,7 @@ from pam_envs.parameters import declarations
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 
 LEAST_RANGES, ROUND = (30.0, 15.0), 5.0
-"""Smallest ranges of torque [N m] and stiffness [N m/rad], and the step to which they are rounded."""
+"""Smallest ranges of torque [N m] and stiffness [N m/rad], and the step of rounding."""
 
 
 def _corners(plant: ElbowOrthosis) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -170,8 +170,9 @@ def begin_joint(
     key_a, key_b, config = counts[K.KEY_A][j], counts[K.KEY_B][j], settings[0]
     counts[K.MEMBER][j] = member
     payloads = settings[choices[CHOICE.at_own]]
+    number, change = choices[L.CHOICE.payloads], config[L.CONFIG.payload_change]
     draw_payload(
-        rows, key_a, key_b, L.START, payloads, choices[L.CHOICE.payloads], config[L.CONFIG.payload_change],
+        rows, key_a, key_b, L.START, payloads, number, change,
         config[EPISODE_SECONDS], L.DECLARED_PAYLOAD, K.PAYLOAD, j,
     )  # fmt: skip
     rows[K.DISTURBANCE][j] = 0.0
@@ -192,7 +193,7 @@ def begin_joint(
 
 @lru_cache(maxsize=16)
 def kernels_for(kind: str, dynamics: str, extended: bool = False) -> Kernels:
-    """Return the kernels for a kind of hysteresis and a make of the plant, plain or with effects."""
+    """Return the kernels for a hysteresis model and a dynamics, plain or with effects."""
     rows = L.HYSTERESIS + 2 * state_rows(kind)
     return Kernels(
         f"joint_{kind}_{dynamics}" + ("_extended" if extended else ""),

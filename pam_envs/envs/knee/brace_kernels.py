@@ -115,7 +115,7 @@ def draw_paper(rows: Any, j: int, low: float, high: float, frequency: float) -> 
 
 @lru_cache(maxsize=16)
 def kernels_for(kind: str, mounting: str, dynamics: str, extended: bool = False) -> Kernels:
-    """Return the kernels for a hysteresis model, a mounting and the dynamics of the pressure, plain or with effects."""
+    """Return the kernels for a hysteresis model, mounting and dynamics, plain or with effects."""
     rows = L.HYSTERESIS + state_rows(kind)
     return Kernels(
         f"brace_{kind}_{mounting}_{dynamics}" + ("_extended" if extended else ""),

@@ -228,7 +228,7 @@ def begin_leg(
 
 @lru_cache(maxsize=16)
 def kernels_for(kind: str, dynamics: str, extended: bool = False) -> Kernels:
-    """Return the kernels for a kind of hysteresis and the dynamics of the pressure, plain or with effects."""
+    """Return the kernels for a hysteresis model and a dynamics, plain or with effects."""
     rows = L.HYSTERESIS + state_rows(kind)
     return Kernels(
         f"gait_{kind}_{dynamics}" + ("_extended" if extended else ""),

@@ -1,14 +1,14 @@
 """``PAM/RedundantManipulator-v0``: a hanging arm of six antagonistic joints, fluidic_muscles.
 
-Twelve pneumatic muscles bend an arm of six links about axes x, y, x, y, x, y. Its tool has to follow
-a path in position and direction: five numbers for six joints, so that the arm is redundant. The
-joint angles along the path are planned in advance, with the weight of Eq. (2.1) of the paper that
-keeps joints away from their limits, and can be observed. The action is a set-point of each angle,
-which the static laws of the muscles convert to pressures; or all pressures. Weight, links and
-payload couple the joints.
+Twelve pneumatic muscles bend an arm of six links about axes x, y, x, y, x, y. Its tool has to
+follow a path in position and direction: five numbers for six joints, so that the arm is redundant.
+The joint angles along the path are planned in advance, with the weight of Eq. (2.1) of the paper
+that keeps joints away from their limits, and can be observed. The action is a set-point of each
+angle, which the static laws of the muscles convert to pressures; or all pressures. Weight, links
+and payload couple the joints.
 
-Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=False``), for n joints
-counted from the base, k = 0 .. n - 1:
+Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=False``), for n
+joints counted from the base, k = 0 .. n - 1:
 
 | how many | signal | unit | range |
 |----------|--------|------|-------|

@@ -50,8 +50,8 @@ def apply_chain(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any,
         for k in range(N_STAGES):
             for j in range(LANES):
                 short = command(
-                    rows, fixed, j, rows[L.ACTION + k][j], config[L.CONFIG.prestress], M.COMMAND + k,
-                    M.PRESTRESS + k, M.SET_POINT + 2 * k,
+                    rows, fixed, j, rows[L.ACTION + k][j], config[L.CONFIG.prestress],
+                    M.COMMAND + k, M.PRESTRESS + k, M.SET_POINT + 2 * k,
                 )  # fmt: skip
                 saturated[j] = max(saturated[j], short)
 
@@ -108,8 +108,9 @@ def begin_chain(
     key_a, key_b, config = counts[M.KEY_A][j], counts[M.KEY_B][j], settings[0]
     counts[M.MEMBER][j] = member
     payloads = settings[choices[CHOICE.at_own]]
+    number, change = choices[L.CHOICE.payloads], config[L.CONFIG.payload_change]
     draw_payload(
-        rows, key_a, key_b, L.START, payloads, choices[L.CHOICE.payloads], config[L.CONFIG.payload_change],
+        rows, key_a, key_b, L.START, payloads, number, change,
         config[EPISODE_SECONDS], L.DECLARED_PAYLOAD, M.PAYLOAD, j,
     )  # fmt: skip
     path = int(uniform(key_a, key_b, L.START, 3) * choices[L.CHOICE.paths])

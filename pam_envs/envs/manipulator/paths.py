@@ -1,4 +1,4 @@
-"""The paths that a manipulator's tool follows, with the joint angles that are planned for them."""
+"""Reference paths of a manipulator's tool, with planned joint angles."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ Array = NDArray[np.float64]
 
 NAMES = tuple(path.name for path in PATHS)
 REFERENCES = (*NAMES, "paths", "drawn")
-"""One of the presets; an episode draws one of them; it draws one of a pool of random ones."""
+"""A preset; one of the presets, drawn each episode; one of a pool of random paths."""
 DRAWN, DRAW_SEED = 16, 2
-"""How many paths the pool has, and their seed."""
+"""Number of paths in the pool, and their seed."""
 TRIED, LEAP = 48, 5.0
-"""How many are drawn for it; a plan leaps where a joint moves by more than so many even steps."""
+"""Candidates for the pool; largest step of a joint in a continuous plan, in even steps."""
 PRESET_JOINTS = len(PATHS[0].start_degrees)
 LONGEST = 10_000
-"""Most poses of a given path."""
+"""Largest number of poses of a given path."""
 USUAL_PAYLOAD = 0.03
-"""Drawn paths are such that this payload [kg] is borne on them."""
+"""Payload [kg] that every drawn path allows."""
 
 
 def paths_for(plant: RedundantManipulator, reference: Any, weighted: bool) -> dict[str, Array]:
-    """Return poses and planned angles of all paths that episodes draw from, by their names.
+    """Return poses and planned angles of all paths from which episodes draw, by name.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def _preset(chain: SerialChain, limit: float, name: str, weighted: bool) -> Arra
 
 
 def _drawn(plant: RedundantManipulator, weighted: bool) -> dict[str, Array]:
-    """Return the first of the paths drawn on which the plan does not leap and weights are borne."""
+    """Return the first drawn paths with continuous plans that allow the usual payload."""
     chain, limit = plant.nominal_chain, plant.angle_range[1]
     kept: dict[str, Array] = {}
     for i in range(TRIED):
@@ -123,14 +123,14 @@ def _drawn(plant: RedundantManipulator, weighted: bool) -> dict[str, Array]:
             return kept
     raise ValueError(
         f"of {TRIED} paths drawn within {np.degrees(limit):.1f} degrees a joint only {len(kept)} "
-        f"have a plan without a leap on which {USUAL_PAYLOAD:g} kg are borne, and {DRAWN} are "
-        "needed; take lighter links, or give poses"
+        f"have a continuous plan that allows {USUAL_PAYLOAD:g} kg, and {DRAWN} are needed; take "
+        "lighter links, or give poses"
     )
 
 
 @lru_cache(maxsize=128)
 def _drawn_path(chain: SerialChain, limit: float, i: int) -> Array | None:
-    """Return path ``i`` of those drawn, or None if its plan leaps where a minimum vanishes."""
+    """Return path ``i`` of those drawn, or None if its plan is not continuous."""
     first, last = (ends[i] for ends in _ends(chain.stages, limit))
     line = joint_line(first, last)
     found = planned(chain, poses_of(chain, line), limit, True)

@@ -1,4 +1,4 @@
-"""A camera for three-dimensional scenes: where a point of the world stands in the picture."""
+"""Camera of three-dimensional scenes: projection of points to the picture."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from pam_envs.envs.rendering.scene import Point
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera far away that looks at a world whose z points down.
+    """Parallel projection of a world whose z points down.
 
     Attributes
     ----------
     azimuth, elevation : float
-        Where it stands [rad]: around the vertical, and above the horizontal.
+        Direction of the camera [rad]: around the vertical, and above the horizontal.
     scale : float
-        Pixels for a metre.
+        Pixels per metre.
     middle : tuple of float
-        Where the world's origin stands [pixels].
+        Position of the world's origin [pixels].
     """
 
     azimuth: float
@@ -41,15 +41,15 @@ class Camera:
         return np.asarray(self.scale * flat + np.array(self.middle))
 
     def line(self, points: ArrayLike) -> list[Point]:
-        """Return points (n, 3) [m] as a list of places in the picture."""
+        """Return points (n, 3) [m] as a list of positions [pixels]."""
         return [(float(x), float(y)) for x, y in self.flat(points)]
 
     def at(self, point: Iterable[float]) -> Point:
-        """Return the place of one point [m]."""
+        """Return the position [pixels] of one point [m]."""
         return self.line([tuple(point)])[0]
 
     def fitted(self, points: ArrayLike, box: tuple[float, float, float, float]) -> Camera:
-        """Return the camera that sees points (n, 3) [m] as large as a box allows.
+        """Return the camera with the largest scale at which points (n, 3) [m] fit a box.
 
         Parameters
         ----------

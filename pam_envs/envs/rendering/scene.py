@@ -213,7 +213,7 @@ class Axes:
 def pressure_scale(
     canvas: Canvas, pressure: float, full: float, left: float = 262.0, top: float = 100.0
 ) -> None:
-    """Draw the colour scale of pressures [Pa] from 0 to ``full``, with a pointer at ``pressure``."""
+    """Draw the colour scale of pressures [Pa] from 0 to ``full``, and a pointer."""
     height = 120.0
     for i in range(60):
         color = blend(HOT, COLD, i / 59)

@@ -52,7 +52,7 @@ EVERY_EFFECT = {
     "pressure.drift": 10.0,
     "pressure.bow": 0.01,
 }
-"""What a recording may show, all at once."""
+"""Every effect at once."""
 
 OWN: dict[str, dict[str, dict[str, Any]]] = {
     "PAM/MusclePositioning-v0": {
