@@ -1,4 +1,4 @@
-"""What may be claimed, and each thing that keeps it from being claimed."""
+"""Claims of rows, and each condition that prevents one."""
 
 from __future__ import annotations
 
@@ -54,11 +54,13 @@ def test_ten_seeds_below_at_no_higher_cost_are_better() -> None:
         ({"constraint_cost": 0.012}, "constraint cost 1.20x"),
     ],
 )
-def test_a_lower_error_at_a_higher_cost_says_so(changes: dict[str, float], words: str) -> None:
+def test_lower_error_at_higher_cost_has_its_own_verdict(
+    changes: dict[str, float], words: str
+) -> None:
     assert verdict(learned(**changes)) == (claims.DEARER, words)
 
 
-def test_a_cost_of_a_tenth_more_is_allowed() -> None:
+def test_cost_ratio_up_to_1_1_is_allowed() -> None:
     assert verdict(learned(travel=1.0999e5))[0] == claims.BETTER
 
 
@@ -72,13 +74,13 @@ def test_a_cost_of_a_tenth_more_is_allowed() -> None:
         (learned(TEN * 3), "P 0.00, needs more than 0.95"),
     ],
 )
-def test_what_keeps_a_claim_from_being_made(row: dict[str, Any], words: str) -> None:
+def test_conditions_that_prevent_a_claim(row: dict[str, Any], words: str) -> None:
     found, reasons = verdict(row)
     assert found == claims.NOT_SHOWN
     assert words in reasons
 
 
-def test_a_lower_error_in_most_episodes_and_not_in_the_mean_is_not_better() -> None:
+def test_lower_error_in_most_episodes_but_not_in_mean_is_not_better() -> None:
     many = learned(np.full(40, 0.9e-3))
     one = [episode for episode in many["episodes"] if episode["training_seed"] == 0]
     for episode in one:
@@ -87,7 +89,7 @@ def test_a_lower_error_in_most_episodes_and_not_in_the_mean_is_not_better() -> N
     assert (found, reasons) == (claims.NOT_SHOWN, "lower in most episodes, not in the mean")
 
 
-def test_a_mean_whose_gain_may_be_none_is_not_better() -> None:
+def test_gain_whose_interval_contains_zero_is_not_better() -> None:
     found = claims.claim(learned([*np.full(39, 0.99e-3), 1.2e-3]), PAPER)
     assert found is not None
     assert found.probability.value > claims.PROBABILITY
@@ -95,7 +97,7 @@ def test_a_mean_whose_gain_may_be_none_is_not_better() -> None:
     assert found.reasons == ("the interval of the mean's gain holds zero",)
 
 
-def test_the_gain_is_a_share_of_the_paper_controllers_mean() -> None:
+def test_gain_is_relative_to_the_paper_controllers_mean() -> None:
     found = claims.claim(learned(np.full(10, 0.75e-3)), PAPER)
     assert found is not None
     assert found.gain.value == pytest.approx(0.25)
@@ -103,7 +105,7 @@ def test_the_gain_is_a_share_of_the_paper_controllers_mean() -> None:
 
 
 @pytest.mark.parametrize("knows", [knowledge.TRUE, knowledge.TRAINED])
-def test_who_met_the_plant_of_which_the_other_is_told_another_is_not_better(knows: str) -> None:
+def test_row_that_knows_the_plant_is_not_better_than_one_with_another_model(knows: str) -> None:
     found, reasons = verdict(learned(knowledge=knows))
     assert found == claims.NOT_SHOWN
     assert "that differs from the model of inverse" in reasons
@@ -116,7 +118,7 @@ def test_who_met_the_plant_of_which_the_other_is_told_another_is_not_better(know
     ("trials", "words"),
     [(60, "settings tried: 60, paper's 0"), (None, "tried: by hand, paper's 0")],
 )
-def test_unequal_budgets_stand_beside_the_verdict(trials: int | None, words: str) -> None:
+def test_unequal_budgets_are_shown_beside_the_verdict(trials: int | None, words: str) -> None:
     row = learned()
     row["controller"]["tuning"] = {"trials": trials, "how": "search"}
     found = claims.claim(row, PAPER)
@@ -144,7 +146,7 @@ GROUND = {
 
 
 @pytest.mark.parametrize("kind", GROUND)
-def test_a_ground_row_gains_nothing(kind: str) -> None:
+def test_row_selected_on_public_episodes_gains_no_claim(kind: str) -> None:
     changes, words = GROUND[kind]
     row = learned(**changes)
     if "hair" in kind:  # as good as the paper controller, with the scatter that episodes have
@@ -165,7 +167,7 @@ def test_a_ground_row_gains_nothing(kind: str) -> None:
         assert [str(place) for place in places] == ["1=", "1="]
 
 
-def test_what_was_lost_on_the_public_episodes_does_not_count_either() -> None:
+def test_failures_on_public_episodes_do_not_count_in_audit() -> None:
     unlucky = learned(public=TEN * 4, audit=TEN, failed=3)
     (found,) = claims.learned_claims(in_round(PAPER, unlucky))
     assert found.verdict == claims.BETTER
@@ -178,14 +180,14 @@ def test_without_a_round_nothing_is_better() -> None:
     assert found.reasons[0] == "not audited"
 
 
-def test_a_paper_controller_outside_of_the_round_is_a_doubt() -> None:
+def test_better_paper_controller_outside_the_round_prevents_claims() -> None:
     told = fakes.row("inverse", 1e-3, constraint_cost=0.01, air_use=1e-5)
     (found,) = claims.learned_claims(in_round(learned(audit=2.5e-3), told))
     assert found.verdict == claims.NOT_SHOWN
     assert "inverse not audited" in found.reasons
 
 
-def test_a_paper_controller_is_not_spared_for_want_of_an_audit() -> None:
+def test_paper_controller_without_audit_is_still_compared() -> None:
     told = fakes.row("inverse", 0.1e-3)
     pid = fakes.row("pid", 1e-3, audit=1e-3, constraint_cost=0.01, air_use=1e-5)
     (found,) = claims.learned_claims(in_round(pid, told, learned()))
@@ -196,7 +198,7 @@ def test_a_paper_controller_is_not_spared_for_want_of_an_audit() -> None:
     assert found.verdict == claims.BETTER
 
 
-def test_an_entrant_of_the_round_without_a_row_is_a_doubt() -> None:
+def test_round_entrant_without_row_prevents_claims() -> None:
     rows = in_round(PAPER, learned())
     for row in rows:
         row["audit"]["entrants"]["lost"] = "b" * 64
@@ -204,7 +206,7 @@ def test_an_entrant_of_the_round_without_a_row_is_a_doubt() -> None:
     assert found.reasons == ("lost is in the audit round and has no row",)
 
 
-def test_a_constraint_cost_that_is_next_to_nothing_is_none() -> None:
+def test_negligible_constraint_cost_counts_as_none() -> None:
     clean = fakes.row("inverse", 1e-3, constraint_cost=0.0)
 
     def ratio(cost: float) -> float:
@@ -215,7 +217,7 @@ def test_a_constraint_cost_that_is_next_to_nothing_is_none() -> None:
     assert ratio(0.1) == pytest.approx(100.0)
 
 
-def test_the_best_paper_controller_is_classical_and_has_a_source() -> None:
+def test_best_paper_controller_is_classical_with_source() -> None:
     rows = [
         fakes.row("trivial", 0.1e-3, citation=""),
         learned(),
@@ -229,7 +231,7 @@ def test_the_best_paper_controller_is_classical_and_has_a_source() -> None:
     assert claims.learned_claims(rows[:2]) == []
 
 
-def test_the_likeliest_claim_comes_first_and_the_audited_before_the_others() -> None:
+def test_claims_are_ordered_by_verdict_audit_and_probability() -> None:
     worse, outside = learned(TEN * 3), learned(audit=None)
     worse["controller"]["name"], outside["controller"]["name"] = "sac", "td3"
     found = claims.learned_claims(in_round(worse, outside, PAPER, learned()))

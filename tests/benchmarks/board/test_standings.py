@@ -40,7 +40,7 @@ def test_ranks_follow_paired_differences_and_not_overlapping_intervals() -> None
     assert places(rows) == {"first": "1", "second": "2"}
 
 
-def test_a_row_shares_a_place_where_the_difference_may_be_zero() -> None:
+def test_rows_share_a_place_if_their_difference_interval_contains_zero() -> None:
     rows = [jittered(name, 1e-3, 1e-4, k) for k, name in enumerate(("a", "b"))]
     rows.append(fakes.row("last", 5e-3))
     assert list(places(rows).values()) == ["1=", "1=", "3"]
@@ -82,7 +82,7 @@ def test_ranks_are_of_the_audit_whatever_the_public_episodes_say() -> None:
     assert found.value == pytest.approx(0.5e-3)
 
 
-def test_a_row_in_the_round_and_one_outside_are_compared_on_what_both_have() -> None:
+def test_rows_inside_and_outside_the_round_are_compared_on_common_episodes() -> None:
     inside, outside = fakes.row("a", 2e-3, audit=1e-3), fakes.row("b", 3e-3)
     assert views.common_split(inside, outside) == "public"
     found = standings.difference(outside, inside)
@@ -90,7 +90,7 @@ def test_a_row_in_the_round_and_one_outside_are_compared_on_what_both_have() -> 
     assert found.value == pytest.approx(1e-3)
 
 
-def test_the_score_of_a_row_in_the_round_is_that_of_its_audit() -> None:
+def test_score_of_row_in_round_is_its_audit_score() -> None:
     row = fakes.row("pid", 2e-3, audit=2.6e-3)
     assert views.interval(row).value == pytest.approx(2.6e-3)
     assert views.mean_of(row, split=views.PUBLIC) == pytest.approx(2e-3)
@@ -112,7 +112,7 @@ def test_policies_that_differ_do_not_hide_that_each_does_worse_unseen() -> None:
     assert views.is_worse_unseen(row)
 
 
-def test_an_episode_that_does_not_apply_in_one_training_counts_in_none() -> None:
+def test_episode_without_metric_in_one_training_seed_is_left_out_in_all() -> None:
     row = fakes.row("ppo", [1e-3, 3e-3], kind="learned", steady_state_error=1.0)
     first, *_ = row["episodes"]
     for episode in row["episodes"]:
@@ -130,7 +130,7 @@ def test_scores_of_each_training_seed() -> None:
     assert views.by_training_seed(fakes.row("pid", 1e-3)) == {}
 
 
-def test_a_score_over_smooth_references_leaves_the_steps_out() -> None:
+def test_smooth_reference_score_excludes_steps() -> None:
     found = views.smooth(fakes.row("pid", 3e-3))  # 4 mm of steps, 2 mm of sines
     assert found is not None
     assert found.value == pytest.approx(2e-3)

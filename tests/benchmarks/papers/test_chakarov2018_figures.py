@@ -34,23 +34,23 @@ def test_torques_of_the_table_are_judged_within_two_hundredths() -> None:
     assert all(f.passed and f.tolerance == 0.02 for f in torques)
 
 
-def test_the_figures_are_in_the_table_of_all_papers() -> None:
+def test_elbow_figures_are_in_the_table_of_all_papers() -> None:
     assert set(figures.GROUPS) <= set(papers.GROUPS)
 
 
-def test_the_tolerances_can_fail() -> None:
+def test_tolerances_of_elbow_can_fail() -> None:
     """With the law as printed the torques are far off, and the sign changes elsewhere."""
     wrong = figures.printed_bundle(3)
     assert abs(float(wrong.law(4e5, 0.0)) - figures.READ[3]) > 100.0
     assert figures.sign_change(figures.bundle(1, 0.33)) == pytest.approx(0.33, abs=1e-3)
 
 
-def test_a_valve_takes_longer_at_high_contraction() -> None:
+def test_filling_is_slower_at_high_contraction() -> None:
     low, high = (figures.time_to_pressure(figures.bundle(1), s, 5e5, 4.5e5) for s in (0.08, 0.24))
     assert 0.3 < low < high < 2.0
 
 
-def test_the_picture_shows_every_bundle_at_both_pressures() -> None:
+def test_picture_shows_every_bundle_at_both_pressures() -> None:
     left, right = figures.bundle_figure().axes
     for ax, pressure in ((left, 4e5), (right, 0.0)):
         solid = [

@@ -1,4 +1,4 @@
-"""The page on the elbow says what the code computes."""
+"""Numbers of the page on the elbow equal the computed ones."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ def row(first: str) -> list[str]:
     return [cell.strip() for cell in line.split("|")]
 
 
-def test_the_snippet_gives_what_was_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+def test_snippet_reaches_desired_torque_and_stiffness(capsys: pytest.CaptureFixture[str]) -> None:
     run_snippets(PAGE)
     assert "2.000000 N m and 4.000000 N m/rad" in capsys.readouterr().out
 
 
-def test_the_law_as_printed_and_as_read() -> None:
+def test_force_law_as_printed_and_as_read() -> None:
     for n in (1, 2, 3, 4):
         made = [figures.printed_bundle(n), figures.bundle(n, 0.33)]
         assert row(str(n)) == [f"{float(m.law(4e5, 0.0)):.0f} N" for m in made]
@@ -61,7 +61,7 @@ def test_torque_and_stiffness() -> None:
     assert f"no torque at {even:.0f} degrees only" in FLAT
 
 
-def test_what_can_be_had() -> None:
+def test_feasible_stiffness_range() -> None:
     wide, plant = figures.orthosis(0.33), figures.orthosis()
     for degrees in figures.RANGES:
         ends = figures.stiffness_range(wide, np.radians(degrees))
@@ -75,7 +75,7 @@ def test_what_can_be_had() -> None:
     assert trip < 1e-9
 
 
-def test_what_a_hand_meets_in_a_small_motion() -> None:
+def test_stiffness_of_small_motions() -> None:
     other = (DOCS / "envs" / "elbow_orthosis.md").read_text()
     names = {"none: the law": "none", "Maxwell-slip": "maxwell_slip", "Preisach": "preisach"}
     for first, kind in names.items():
@@ -85,7 +85,7 @@ def test_what_a_hand_meets_in_a_small_motion() -> None:
 
 
 @pytest.mark.parametrize("name", ["elbow_pid", "elbow_pid_hysteresis", "elbow_allocation"])
-def test_the_table_of_the_environments_page_roughly(name: str) -> None:
+def test_table_of_environment_page_roughly(name: str) -> None:
     """One of the four episodes that a cell is the mean of."""
     env: Any = gym.make("PAM/ElbowOrthosis-v0", reference="free", motion="sines",
                         episode_seconds=6.0).unwrapped  # fmt: skip
@@ -98,7 +98,7 @@ def test_the_table_of_the_environments_page_roughly(name: str) -> None:
     assert float(np.sqrt(np.mean(error**2))) == pytest.approx(told, rel=0.3)
 
 
-def test_what_does_not_reproduce() -> None:
+def test_page_lists_the_missed_figure() -> None:
     missed = [f for group in (figures.feasible_set, figures.force_law) for f in group()]
     (miss,) = [f for f in missed if f.verdict == "MISSED"]
     assert row(miss.name)[:2] == ["2.75 N m/rad", f"{miss.ours:.2f} N m/rad"]

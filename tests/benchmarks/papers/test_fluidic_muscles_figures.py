@@ -1,4 +1,4 @@
-"""fluidic_muscles, sections 3 and 4: every figure of the joint's control, and which of them are missed."""
+"""fluidic_muscles, sections 3 and 4: figures of the joint's control, met or missed with a reason."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def ratios() -> list[Figure]:
     return [figure for name, figure in figures().items() if title.search(name)]
 
 
-def test_what_is_missed_is_known_and_says_why() -> None:
+def test_missed_figures_are_known_and_have_a_reason() -> None:
     left = [f for f in figures().values() if f not in ratios()]
     assert {f.name for f in left if f.passed is False} == MISSED
     for figure in figures().values():
@@ -68,7 +68,7 @@ def test_figures_of_the_pi() -> None:
     assert read.ours == pytest.approx(0.1274, abs=5e-5)
 
 
-def test_the_ratio_to_the_same_pi_is_shown_for_every_plant_size_and_turn() -> None:
+def test_rise_ratio_is_shown_for_every_plant_size_and_turn() -> None:
     assert len(ratios()) == len(CASES) == 24
     found = {case for case, figure in zip(CASES, ratios(), strict=True) if figure.passed}
     assert found == REACHED
@@ -87,7 +87,7 @@ def test_inverse_shrinks_the_loop_of_the_muscles() -> None:
     assert min(f.ours for f in widths) == pytest.approx(10.2, abs=0.1)
 
 
-def test_every_loop_shows_what_it_withstands_beside_how_fast_it_is() -> None:
+def test_every_loop_shows_robustness_and_step_response() -> None:
     from benchmarks.papers.joint_studies import STEPPED
 
     for name in STEPPED:
@@ -95,12 +95,12 @@ def test_every_loop_shows_what_it_withstands_beside_how_fast_it_is() -> None:
         assert all(word in note for word in ("|S|", "peak", "rise", "overshoot", "settling"))
 
 
-def test_the_groups_stand_in_the_table_of_all_papers() -> None:
+def test_joint_figures_are_in_the_table_of_all_papers() -> None:
     made = papers.GROUPS
     assert {*papers_joint.GROUPS} <= set(made)
 
 
-def test_an_input_is_never_judged_and_a_reason_makes_a_miss() -> None:
+def test_input_is_not_judged_and_reason_makes_a_miss() -> None:
     given = Figure("a", "b", "", 3.0, 9.0, 0.1, given=True, at_most=1.0)
     assert (given.passed, given.verdict, given.judged_by) == (None, "input", "")
     known = Figure("a", "b", "", 3.0, 9.0, 0.1, "note", why="because")

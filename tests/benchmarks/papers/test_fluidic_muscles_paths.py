@@ -13,7 +13,7 @@ PUBLISHED = {"path_1": (34.2, 27.6), "path_2": (33.2, 26.2), "path_3": (37.1, 27
 
 
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.name)
-def test_the_weight_keeps_the_limits_that_the_smallest_angles_cross(path) -> None:
+def test_weighted_plan_keeps_limits_that_unweighted_plan_exceeds(path) -> None:
     both = figures.plans(path)
     assert len(both.weighted.angles) == POINTS == 41
     unweighted, weighted = PUBLISHED[path.name]
@@ -26,7 +26,7 @@ def test_the_weight_keeps_the_limits_that_the_smallest_angles_cross(path) -> Non
     assert 1.25 <= both.price <= 1.3401
 
 
-def test_the_example_is_a_straight_line_of_the_joints() -> None:
+def test_example_path_is_a_straight_line_of_the_joints() -> None:
     """Of its ends only: as a straight line of the tool the peaks are others than stated."""
     both = figures.plans(PATHS[-1])
     peaks = np.rad2deg([both.unweighted.peak, both.weighted.peak])
@@ -58,7 +58,7 @@ def test_calibrated_paths_are_inputs_and_the_known_one_is_judged() -> None:
     assert judged == ["path_3, unweighted: largest angle", "path_3, weighted: largest angle"]
 
 
-def test_of_freely_drawn_paths_a_ninth_crosses_the_limit_and_with_the_weight_none() -> None:
+def test_one_ninth_of_drawn_paths_exceeds_the_limit_and_none_with_weight() -> None:
     found = figures.held_out()
     assert found.paths == 500
     assert found.crossed == pytest.approx(0.112)

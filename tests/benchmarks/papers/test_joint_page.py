@@ -1,4 +1,4 @@
-"""The page on joint and arm says what the code prints."""
+"""Numbers of the page on joint and arm equal the computed ones."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_ratios_and_the_sentence_on_them() -> None:
     assert "1.2 is reached at 5 degrees after a turn on all three plants" in FLAT
 
 
-def test_what_stands_between_the_tables() -> None:
+def test_text_between_the_tables() -> None:
     bare = Setting(width=0.0)
     pair = [step(n, bare).rise for n in ("joint_pi", "joint_mfc_mu")]
     assert f"PI rises in {pair[0]:.3f} s and model-following in {pair[1]:.3f} s" in FLAT
@@ -119,7 +119,7 @@ MISSED = {
 
 
 @pytest.mark.parametrize("first", sorted(MISSED))
-def test_what_does_not_reproduce(first: str) -> None:
+def test_page_lists_the_missed_figures(first: str) -> None:
     name, form = MISSED[first]
     figure = figures()[name]
     assert figure.verdict == "MISSED"

@@ -1,4 +1,4 @@
-"""The studies of the joint give the figures of fluidic_muscles, or known ones."""
+"""Studies of the joint reproduce the figures of fluidic_muscles, or known ones."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_loops_are_looked_at_as_they_were_designed():
         np.testing.assert_allclose(made, law(1j * frequency), rtol=1e-6)
 
 
-def test_only_the_synthesised_loop_withstands_the_hysteresis_and_the_fastest_withstands_least():
+def test_only_synthesised_loop_is_robust_and_fastest_loop_is_least_robust():
     """What is fast on the nominal plant is not what is robust: model-following buys the latter."""
     table = {row.name: row for row in joint_loops.table()}
     assert set(table) == set(studies.STEPPED)

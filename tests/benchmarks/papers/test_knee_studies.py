@@ -1,4 +1,4 @@
-"""The studies of the knee give the figures that the orthosis paper reports, or known ones."""
+"""Studies of the knee reproduce the figures of yeh2010, or known ones."""
 
 from __future__ import annotations
 

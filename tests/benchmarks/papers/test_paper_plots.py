@@ -1,4 +1,4 @@
-"""The picture of a stride: what it cuts out, and what it writes into its panels."""
+"""Picture of a stride: its section of the record and its annotations."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_spans_are_where_the_flags_are_set() -> None:
     assert found == [(0.0, 1.0), (2.0, 2.5)]
 
 
-def test_the_clock_of_a_cut_begins_at_heel_contact() -> None:
+def test_clock_of_a_cut_begins_at_heel_contact() -> None:
     made = cut(record(), 9.2, 15.4)
     assert made["time"][0] == pytest.approx(-0.8, abs=0.011)
     first = np.flatnonzero(made["state/stance"] > 0.5)[0]
@@ -46,7 +46,7 @@ def test_the_clock_of_a_cut_begins_at_heel_contact() -> None:
     assert len({len(values) for values in made.values()}) == 1
 
 
-def test_what_is_written_is_what_is_drawn() -> None:
+def test_stride_picture_shows_error_and_emg_reduction() -> None:
     made = cut(record(), 9.2, 15.4)
     (when, tension), error = after_switch(made)
     assert error == pytest.approx(30.0, abs=2.0)

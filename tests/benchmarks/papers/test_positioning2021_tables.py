@@ -164,7 +164,7 @@ def test_inverse_equations_on_table_6(equation):
     np.testing.assert_allclose(fit, coefficients, rtol=0, atol=0.5001e-5)
 
 
-def test_the_wrong_entry_of_table_6_was_in_the_published_fit():
+def test_published_fit_contains_the_wrong_entry_of_table_6():
     """With 1.43 bar the paper's determination comes out; Table 5 itself says 2.05 bar."""
     fits = errors.table_6_error_table()
     assert round(fits["refit"][4].determination, 4) == 0.9972

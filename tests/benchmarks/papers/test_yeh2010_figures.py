@@ -73,7 +73,7 @@ def test_controller_is_a_design_on_the_inferred_plant():
     assert loop.peak_tracking < 1.001
 
 
-def test_a_bandwidth_of_10_hz_serves_as_well():
+def test_bandwidth_of_10_hz_gives_the_same_figure():
     assert seed.refit_controller(20.0 * math.pi).largest_error < 6.5e-4
 
 
@@ -84,7 +84,7 @@ def test_both_plants_fit_the_same_measurement():
     assert np.max(np.abs(np.degrees(np.angle(ratio)))) < 5.0
 
 
-def test_the_controller_is_not_a_design_on_the_printed_plant():
+def test_printed_controller_is_no_design_on_the_printed_plant():
     distance = np.abs(CONTROLLER.zeros()[:, None] - PLANT.poles()[None, :]).min(axis=1)
     assert np.max(distance) > 10.0
 
@@ -132,7 +132,7 @@ MISSED = ("error of Eq. (1), 5 s a stride, lean from the shank itself",)
 @pytest.mark.parametrize(
     "group", [*figures.GROUPS, *gait.GROUPS, *envs.GROUPS], ids=lambda g: g.__name__
 )
-def test_every_figure_is_within_its_tolerance_and_says_how_it_came_about(group):
+def test_every_figure_is_within_tolerance_and_states_its_origin(group):
     if group is figures.bumpless_inequality:
         pytest.importorskip("cvxpy")
     for figure in group():
@@ -146,14 +146,14 @@ def test_every_figure_is_within_its_tolerance_and_says_how_it_came_about(group):
             assert "first 2 s dropped" in norm
 
 
-def test_what_is_fitted_is_called_calibrated_and_what_is_not_judged_is_not_fitted():
+def test_fitted_figures_are_called_calibrated_and_only_they_are_judged():
     for figure in gait.emg_reductions():
         fitted = "fitted to this figure" in figure.note
         assert fitted == figure.note.startswith("calibrated")
         assert (figure.verdict in ("reported", "MISSED")) != fitted
 
 
-def test_the_table_holds_the_figures_of_all_groups():
+def test_table_contains_figures_of_all_groups():
     made = papers.GROUPS
     assert {*positioning.GROUPS, *figures.GROUPS, *gait.GROUPS, *envs.GROUPS} <= set(made)
     assert len(set(made)) == len(made)
@@ -163,7 +163,7 @@ def test_the_table_holds_the_figures_of_all_groups():
     assert ["pass" in line for line in lines[1:]] == ["tension" in line[:10] for line in lines[1:]]
 
 
-def test_a_figure_is_judged_by_what_is_expected_and_by_its_bounds():
+def test_figure_is_judged_by_expected_value_and_bounds():
     def judged(ours, tolerance=None, **bounds):
         return Figure("a", "b", "", 3.5, ours, tolerance, **bounds).verdict
 
@@ -175,7 +175,7 @@ def test_a_figure_is_judged_by_what_is_expected_and_by_its_bounds():
     assert judged(3.5, expected=5.52) == "reported"
 
 
-def test_a_group_that_cannot_be_computed_is_one_line(monkeypatch):
+def test_group_that_fails_is_one_line(monkeypatch):
     def broken():
         """Say what is missing."""
         raise ModuleNotFoundError("no such thing")

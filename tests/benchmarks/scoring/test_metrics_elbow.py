@@ -50,13 +50,13 @@ def score(**changes: Any) -> dict[str, float]:
 OWN = ("stiffness", "felt", "object", "slack", "torque_clipped", "stiffness_clipped")
 
 
-def test_a_perfect_record_scores_nothing() -> None:
+def test_perfect_record_has_zero_error() -> None:
     scores = score()
     assert set(scores) == set(metrics.of_track({"metrics": ["elbow"]}))
     assert all(scores[name] == 0.0 for name in (*ELBOW, "rms_error"))
 
 
-def test_each_metric_sees_what_it_is_of() -> None:
+def test_each_metric_responds_to_its_own_error() -> None:
     assert score(stiffness=4.5 + WAVE)["stiffness_rms"] == pytest.approx(0.5)
     assert score(stiffness=4.5 + WAVE)["impedance_rms"] == pytest.approx(0.5 * NEAR)
     assert score(output=WAVE + 0.3)["impedance_rms"] == pytest.approx(0.3)

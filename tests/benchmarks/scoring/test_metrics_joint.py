@@ -51,7 +51,7 @@ def score(record: dict[str, np.ndarray], group: str) -> dict[str, float]:
     return metrics.score(record, PERIOD, 2.0, 0.5, costs, groups=(group,), tool_length=0.25)
 
 
-def test_the_error_is_over_half_the_range() -> None:
+def test_percent_error_is_relative_to_half_range() -> None:
     reference = joint()["reference"]
     scores = score(joint(output=reference + 0.02), "joint")
     assert scores["rms_error"] == pytest.approx(0.02)
@@ -59,7 +59,7 @@ def test_the_error_is_over_half_the_range() -> None:
     assert set(scores) == set(metrics.of_track({"metrics": ["joint"]}))
 
 
-def test_the_sensed_error_and_that_to_the_model_stand_beside_the_headline() -> None:
+def test_sensed_and_model_errors_are_scored_beside_the_headline() -> None:
     angle = joint()["state/angle"]
     scores = score(joint(sensed=angle + 0.01), "joint")
     assert scores["rms_error"] == 0.0
@@ -77,7 +77,7 @@ def test_shares_of_time_are_of_the_window_after_settling() -> None:
     assert scores["slack_time"] == pytest.approx(0.5)
 
 
-def test_of_a_chain_tip_pointing_joints_and_model_are_scored_apart() -> None:
+def test_chain_scores_tip_pointing_joints_and_model_separately() -> None:
     models = {"model/0": np.full(N, 0.04), "model/1": np.full(N, -0.3)}
     scores = score(chain(**models), "chain")
     assert set(scores) == set(metrics.of_track({"metrics": ["chain"]}))
@@ -91,12 +91,12 @@ def test_of_a_chain_tip_pointing_joints_and_model_are_scored_apart() -> None:
     assert np.isnan(one["model_rms_error"])  # a model of one joint is no model of the arm
 
 
-def test_a_tip_that_is_off_moves_the_tool_as_a_whole() -> None:
+def test_tip_error_displaces_the_whole_tool() -> None:
     scores = score(chain(**{"state/x": np.full(N, 3e-3)}), "chain")
     assert scores["tool_rms_error"] == pytest.approx(3e-3)
 
 
-def test_a_direction_given_up_for_the_tip_counts_by_half_of_what_it_moves() -> None:
+def test_pointing_error_counts_by_half_of_its_displacement() -> None:
     turned = {"state/point_y": np.full(N, 0.04)}  # the tip is right, the other point 10 mm off
     scores = score(chain(output=np.zeros(N), **turned), "chain")
     assert scores["rms_error"] == 0.0
@@ -109,12 +109,12 @@ def test_a_direction_given_up_for_the_tip_counts_by_half_of_what_it_moves() -> N
     assert score(chain(**about), "chain")["tool_rms_error"] == pytest.approx(5e-3)
 
 
-def test_the_tool_is_scored_after_settling_only() -> None:
+def test_tool_is_scored_after_settling_only() -> None:
     early = {"state/z": np.where(TIME <= 2.0, 0.1, 0.0)}
     assert score(chain(**early), "chain")["tool_rms_error"] == 0.0
 
 
-def test_the_tip_is_steady_where_its_path_has_rested() -> None:
+def test_steady_state_error_of_tip_is_scored_where_its_path_rests() -> None:
     moving = np.clip(TIME - 3.0, 0.0, 2.0)  # 3 s to 5 s; it counts as at rest from 5.5 s on
     off = np.where((TIME > 2.5) & (TIME < 5.5), 0.02, 1e-3)
     record = chain(output=off, **{f"state/{r}point_x": moving for r in ("", "reference_")})
@@ -126,7 +126,7 @@ def test_the_tip_is_steady_where_its_path_has_rested() -> None:
     assert still[-1] == pytest.approx(2.0)
 
 
-def test_a_chain_is_ranked_by_its_whole_tool() -> None:
+def test_chain_is_ranked_by_its_whole_tool() -> None:
     arm, one = TRACKS["manipulator_nominal"].content, TRACKS["joint_nominal"].content
     assert metrics.headline_of(arm) == "tool_rms_error"
     assert metrics.headline_of(one) == metrics.HEADLINE == "rms_error"
@@ -151,7 +151,7 @@ def _row(content: Any, name: str, tip: float, tool: float) -> dict[str, Any]:
     }
 
 
-def test_the_breakdown_is_of_the_headline() -> None:
+def test_breakdown_uses_the_headline() -> None:
     track = TRACKS["manipulator_nominal"]
     episodes = [
         {"scenario": s.name, "scores": {"rms_error": 9.0, "tool_rms_error": 1.0 + i}}
@@ -179,7 +179,7 @@ class Follower:
 
 
 @pytest.mark.parametrize(("name", "joints"), [(JOINT, 1), (CHAIN, 6)])
-def test_an_episode_records_what_a_model_does_at_the_same_instants(name: str, joints: int) -> None:
+def test_episode_records_model_output_at_the_same_instants(name: str, joints: int) -> None:
     env = gym.make(name, episode_seconds=0.2)
     episode = rollout.run(env, Follower(joints), 0)
     for k in range(joints):
@@ -204,7 +204,7 @@ def test_tracks_name_signals_that_there_are(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(TRACKS))
-def test_the_environments_of_all_scenarios_are_made(name: str) -> None:
+def test_environments_of_all_scenarios_can_be_made(name: str) -> None:
     """Payloads and references of the tracks are what the muscles bear."""
     for scenario in TRACKS[name].scenarios():
         env = make_env(TRACKS[name].env, scenario.kwargs)
@@ -212,13 +212,13 @@ def test_the_environments_of_all_scenarios_are_made(name: str) -> None:
         assert TRACKS[name].content.get("tool_length", 0.25) == lengths[-1]
 
 
-def test_each_kind_of_track_is_there_for_both() -> None:
+def test_joint_and_chain_have_every_kind_of_track() -> None:
     for word in ("joint", "manipulator"):
         assert {f"{word}_nominal", f"{word}_payload", f"{word}_wrong_model"} <= set(TRACKS)
     assert {"joint_disturbed", "joint_reduced"} <= set(TRACKS)
 
 
-def test_a_run_that_the_stop_ends_counts_at_the_worst_case() -> None:
+def test_run_ended_by_a_stop_counts_at_worst_case() -> None:
     content = TRACKS["joint_nominal"].content
     scores = score(joint(), "joint")
     worst = metrics.worst_of(scores, content["worst_case"])

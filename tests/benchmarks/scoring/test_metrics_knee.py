@@ -84,7 +84,7 @@ def test_tension_counts_in_stance_and_angle_in_swing() -> None:
 
 
 @pytest.mark.parametrize("seen", [0.0, 1.0])
-def test_a_sample_in_which_sensor_and_truth_disagree_moves_no_score(seen: float) -> None:
+def test_samples_with_wrong_sensed_phase_are_not_scored(seen: float) -> None:
     record = signals()
     record["output"] = record["reference"] + 5.0
     record["state/angle"] = record["state/angle_reference"] + 0.1
@@ -98,7 +98,7 @@ def test_a_sample_in_which_sensor_and_truth_disagree_moves_no_score(seen: float)
         assert after[name] == pytest.approx(before[name], rel=1e-3), name
 
 
-def test_a_valve_that_is_open_is_no_help_to_the_wearer() -> None:
+def test_open_valve_does_not_reduce_emg() -> None:
     env: Any = gym.make("PAM/KneeWalk-v0", start="heel_contact", episode_seconds=16.0).unwrapped
     full = Constant(tuple(env.action_signals), (4.5e5,))
     made = rollout.run(env, full, 0).signals
@@ -126,7 +126,7 @@ def test_reading_b_makes_little_of_a_small_torque_that_is_held_against_for_long(
     assert ratios["emg_ratio_fitted_a"] > 0.65  # (27.5 - 15) / 27.5 and 15 / 27.5
 
 
-def test_a_gate_that_never_opens_is_told() -> None:
+def test_gate_that_never_opens_is_reported() -> None:
     with pytest.raises(ValueError, match="state/stance and sensor/stance are never 1 together"):
         score(signals(**{"state/stance": np.zeros(N)}))
 
@@ -158,7 +158,7 @@ def test_saturated_time_is_the_share_at_the_capacity() -> None:
     assert score(signals(**{"cost/pressure": over}))["saturated_time"] == pytest.approx(0.25)
 
 
-def test_a_muscle_that_never_works_has_no_ratio() -> None:
+def test_inactive_muscle_has_no_emg_ratio() -> None:
     still = np.zeros(N)
     scores = score(signals(**{"effort/flexors": still, "effort/flexors_free": still}))
     assert np.isnan(scores["emg_flexors_ratio"])
@@ -171,7 +171,7 @@ def test_units_follow_the_track() -> None:
     assert metrics.of_track({}) == metrics.METRICS
 
 
-def test_a_track_with_an_unknown_group_or_a_missing_worst_case_is_refused() -> None:
+def test_unknown_metric_group_or_missing_worst_case_is_refused() -> None:
     content = dict(available()["knee_walk_nominal"].content)
     with pytest.raises(ValueError, match="choose from range, gait"):
         ScenarioSet(content | {"metrics": ["stride"]})

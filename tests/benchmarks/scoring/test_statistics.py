@@ -1,4 +1,4 @@
-"""Statistics against numbers worked out by hand, and against scipy's own."""
+"""Statistics against hand-computed numbers and scipy."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_probability_of_improvement_is_mann_whitney_averaged_over_tasks() -> Non
     assert found.low < found.value < found.high
 
 
-def test_a_sure_improvement_has_no_spread_and_one_seed_in_two_has_all() -> None:
+def test_certain_improvement_has_no_spread_and_one_seed_in_two_has_full_spread() -> None:
     always = statistics.probability_of_improvement(np.zeros((10, 6)), np.ones((1, 6)), [0, 1] * 3)
     assert always == statistics.Interval(1.0, 1.0, 1.0)
     half = np.repeat([[0.0], [2.0]], 6, axis=1)
@@ -84,7 +84,7 @@ def test_one_training_seed_gives_the_bits_of_none() -> None:
     assert statistics.bootstrap(values, strata, runs=[0] * 12, pairs=pairs) == plain
 
 
-def test_the_order_of_episodes_does_not_matter_to_training_seeds() -> None:
+def test_episode_order_does_not_affect_training_seeds() -> None:
     random = np.random.default_rng(3)
     runs = np.repeat([4, 5, 6], 4)
     pairs = [("a", 1), ("a", 2), ("b", 1), ("b", 2)] * 3
@@ -98,7 +98,7 @@ def test_the_order_of_episodes_does_not_matter_to_training_seeds() -> None:
     assert statistics.bootstrap(values[::-1], strata[::-1], **turned) == found
 
 
-def test_a_training_seed_that_lacks_an_episode_is_refused() -> None:
+def test_training_seed_with_missing_episode_is_refused() -> None:
     runs, pairs = [0, 0, 1], ["a", "b", "a"]
     with pytest.raises(ValueError, match="every training seed must be run in every episode"):
         statistics.bootstrap(np.ones(3), ["s"] * 3, runs=runs, pairs=pairs)
@@ -155,7 +155,7 @@ def covered(random: np.random.Generator, common: float) -> bool:
     return found.low <= 0.0 <= found.high
 
 
-def test_the_interval_covers_as_it_says_where_scenarios_have_seeds_of_their_own() -> None:
+def test_interval_has_its_coverage_with_independent_scenario_seeds() -> None:
     random = np.random.default_rng(7)
     share = np.mean([covered(random, 0.0) for _ in range(4000)])
     assert 0.925 <= share <= 0.965  # 400 resamples give 0.94; a standard error is 0.004
@@ -173,13 +173,13 @@ def audited(random: np.random.Generator) -> bool:
     return found.low <= 0.0 <= found.high
 
 
-def test_the_interval_of_an_audit_covers_as_it_says() -> None:
+def test_audit_interval_has_its_coverage() -> None:
     random = np.random.default_rng(9)
     share = np.mean([audited(random) for _ in range(400)])
     assert 0.89 <= share <= 0.96  # 0.92: ten policies, and no Student's t
 
 
-def test_the_gap_between_splits_is_paired_by_training_seed() -> None:
+def test_gap_between_splits_is_paired_by_training_seed() -> None:
     random = np.random.default_rng(10)
     policies = random.normal(0.0, 5.0, (10, 1))
     public = policies + 0.1 * random.normal(size=(10, 12))
@@ -191,7 +191,7 @@ def test_the_gap_between_splits_is_paired_by_training_seed() -> None:
     assert found.high < 0.6
 
 
-def test_the_band_of_a_profile_is_of_the_same_resamples_as_a_mean() -> None:
+def test_profile_band_uses_the_resamples_of_the_mean() -> None:
     random = np.random.default_rng(11)
     scores, strata = random.normal(size=(4, 12)), np.repeat([0, 1, 2], 4)
     low, high = statistics.profile_band(scores, strata, [-9.0, 0.0, 9.0], resamples=300)

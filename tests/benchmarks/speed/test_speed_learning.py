@@ -1,4 +1,4 @@
-"""The probe of training counts what is spent within the plants, whatever is wrapped around them."""
+"""Probe of training: time within the plants, below all wrappers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from benchmarks.speed import learning as speed_learning
 @pytest.mark.parametrize(
     ("rest", "share", "verdict"), [(38.0, 0.05, "pass"), (18.0, 0.1, "MISSED")]
 )
-def test_a_share_is_of_the_whole_rollout(
+def test_environment_share_is_of_whole_rollout(
     monkeypatch: pytest.MonkeyPatch, rest: float, share: float, verdict: str
 ) -> None:
     now = [0.0]
