@@ -24,7 +24,7 @@ PROVENANCES: tuple[str, ...] = ("published", "derived", "assumed", "identified")
 
 @dataclasses.dataclass(frozen=True)
 class Declaration:
-    """What is declared of one parameter.
+    """Declaration of one parameter.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Declaration:
     low, high : float
         Bounds within which the parameter is physical, in ``unit``.
     provenance : {"published", "derived", "assumed", "identified"}
-        Where the default comes from.
+        Origin of the default.
     source : str
         The paper and place, or the reason for an assumption.
     neutral : float or None
@@ -110,7 +110,7 @@ def row_blocks(start: int = 0, **sizes: int) -> Any:
 
 
 def parameter_rows(*components: type) -> Any:
-    """Return the rows, from 0, of the declared parameters of components (see :func:`named_rows`)."""
+    """Return the :func:`named_rows` of the declared parameters of components."""
     return named_rows(*(name for component in components for name in declarations(component)))
 
 
@@ -156,7 +156,7 @@ class Signal:
     normalized : bool
         Whether the vector holds the normalised or the SI value.
     ahead : float
-        How far [s] in the future of the observation the value applies, for previews.
+        Time [s] after the observation to which the value applies, for previews.
     """
 
     name: str

@@ -89,13 +89,13 @@ def coil_window(
     Parameters
     ----------
     left : float
-        How long the coil stays on [s].
+        Time [s] for which the coil stays on.
     lift : float
         From 0, where the coil has long been off, to 1, where it has been on for ``opening``.
     opened : float
         1 while the valve is open, else 0.
     opening, closing : float
-        How long it takes [s].
+        Duration [s].
     h : float
         [s].
 

@@ -151,7 +151,7 @@ assert AIR_STATE.line + LINE_STATE.rate == AIR_STATE.line_rate
 
 @kernel
 def delayed_fraction(end: float, per_width: float, switch: float) -> float:
-    """Return the share of an interval that lies after ``switch``.
+    """Return the share of an interval after ``switch``.
 
     The interval ends at ``end`` and is ``1 / per_width`` wide; shares within 1e-9 of 0 and 1 are
     rounding errors and count as such.

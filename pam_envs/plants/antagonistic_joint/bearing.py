@@ -13,7 +13,7 @@ SMALLEST_ARM = 1e-12
 
 
 class Bearer(Protocol):
-    """What these functions need of a plant with n joints."""
+    """A plant with n joints that bears weights."""
 
     def weight_torque(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
         """Return the torques [N m] that hold plant and payload [kg] at angles (..., n) [rad]."""
@@ -58,7 +58,7 @@ def check_borne(
     payload : float
         The heaviest [kg].
     where : str
-        What the plan is of, for the error's sentence.
+        Subject of the error's sentence.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a stage of antagonistic muscles moves, and the point for which it is laid out."""
+"""Link of a stage of antagonistic muscles, and its nominal point."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Link(BearingEffects, Stage):
 
 @dataclass(frozen=True)
 class ArmFactors:
-    """What all links and all joints of a chain have in common beside their own numbers.
+    """Factors that all links and all joints of a chain have in common.
 
     The masses of fluidic_muscles's arm are not published. A link weighs what
     :class:`~pam_envs.mechanics.serial_chain.chain.LinkForm` says, unless a chain is given.

@@ -52,9 +52,9 @@ def fill(pressure: Any, set_point: Any, was: Any, fixed: Any, h: float) -> None:
 
 @kernel
 def contract(rows: Any, fixed: Any, j: int, angle: float, at: int, straight: int) -> None:
-    """Write the contractions of a pair at an angle, as its hysteresis models' inputs (two rows from ``at``).
+    """Write the contractions of a pair at an angle into two rows from ``at``.
 
-    They count from that of the straight joint, which stands in the row ``straight``.
+    They count from that of the straight joint, row ``straight``.
     """
     x_a, _, _ = lever_of(fixed, j, angle, 1.0)
     x_b, _, _ = lever_of(fixed, j, angle, -1.0)
@@ -67,8 +67,7 @@ def clear_hysteresis_models(
 ) -> None:
     """Put the hysteresis models of one lane into their virgin state, ``number`` of them.
 
-    Their state is all that stands in ``rows`` from ``hysteresis`` on; their counts begin at
-    ``first``.
+    Their state is all rows from ``hysteresis`` on; their counts begin at ``first``.
     """
     for k in range(len(rows) - hysteresis):
         rows[hysteresis + k][j] = 0.0

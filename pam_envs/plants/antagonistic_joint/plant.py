@@ -9,9 +9,10 @@ regulators' lag and the damped stiffness of the muscles are then two real poles 
 paper's reduced plant, a Preisach operator and two poles, is the make ``dynamics="reduced"``.
 
 Effects (off unless set): of both regulators, static gain, dead time, dead band, spool overlap,
-rounded slew limit, slow and choked exhaust, leak, limited and drooping supply, resonance of the line;
-of both muscles, creep, first cycles and temperature; stick-slip of the bearing; delay, drift, ramp,
-bow and slip of both kinds of sensor. In the reduced plant only pressures and sensors have them.
+rounded slew limit, slow and choked exhaust, leak, limited and drooping supply, resonance of the
+line; of both muscles, creep, first cycles and temperature; stick-slip of the bearing; delay,
+drift, ramp, bow and slip of both kinds of sensor. In the reduced plant only pressures and sensors
+have them.
 """
 
 from __future__ import annotations
@@ -177,7 +178,7 @@ class AntagonisticJoint(Plant):
 
     @property
     def largest_angle(self) -> float:
-        """Where the mechanical stop stands [rad]."""
+        """Angle of the mechanical stop [rad]."""
         return self.link.stop
 
     @property
@@ -214,7 +215,7 @@ class AntagonisticJoint(Plant):
         return pair_statics.pressures_for(self, angle, stress, torque)
 
     def torque(self, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
-        """Return the muscles' torque [N m] at an angle [rad] and pressures [Pa], without hysteresis."""
+        """Return the muscles' torque [N m] at an angle [rad] and pressures [Pa], hysteresis apart."""
         return pair_statics.pull(self, angle, pressure_a, pressure_b)
 
     def stiffness_at(self, angle: ArrayLike, prestress: ArrayLike | None = None) -> Array:

@@ -109,7 +109,7 @@ def readings_of(plant: AntagonisticJoint) -> dict[str, tuple[int, int]]:
 
 
 def loop_of(plant: AntagonisticJoint, extended: bool = False, readings: bool = False) -> Loop:
-    """Return the loop of a make of the joint; with ``readings`` those of its sensors come out."""
+    """Return the loop of a make of the joint; ``readings``: of its sensors alone."""
     kind, dynamics = plant.hysteresis.kind, plant.dynamics
     effects = K.END + 2 * state_rows(kind)
     kernels: dict[str, Any] = {

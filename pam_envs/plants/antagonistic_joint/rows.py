@@ -81,7 +81,7 @@ MUSCLE_PARAMETERS = (
     "pressure.resolution",
     "pressure.bias",
 )
-"""What a stage has alone and in a chain."""
+"""Parameters of a stage, alone and in a chain."""
 (
     MAX_PRESSURE,
     TIME_CONSTANT,

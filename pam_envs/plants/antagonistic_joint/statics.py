@@ -18,7 +18,7 @@ SMALLEST_TORQUE = 1e-9
 
 
 class Limits(Protocol):
-    """Where set-points and motion end."""
+    """Limits of set-points and of the motion."""
 
     @property
     def limit(self) -> float:
@@ -30,7 +30,7 @@ class Limits(Protocol):
 
 
 class Pair(Protocol):
-    """What these functions need of a plant."""
+    """A plant with a pair of muscles on a lever."""
 
     @property
     def muscle(self) -> ForceMap:

@@ -86,7 +86,7 @@ move: Any = None
 rest: Any = None
 report: Any = None
 EFFECTIVE_A, SENSED_ANGLE, SENSED_PRESSURE = PRESSURE_A, ANGLE, PRESSURE_A
-"""Rows of effective pressures and undisturbed readings; those of the extended plant replace them."""
+"""Rows of effective pressures and readings; those of the extended plant replace them."""
 
 
 @kernel

@@ -53,7 +53,7 @@ class Plant:
     names : tuple of str
         Dotted names of the parameters that the kernels read.
     choices : tuple of str
-        What else a file names, where the plants of a family come in several makes.
+        Further keys of a file, of families with several makes.
     effects : tuple of tuple of str
         Parameters that switch an effect on, each with those that shape it. A file leaves out what
         is off, so that a plant's digest stays when a new effect is added.

@@ -194,14 +194,14 @@ class PlantStepper:
         return float(sensor.resolution * round(value / sensor.resolution))
 
     def try_ahead(self, set_points: ArrayLike, periods: int) -> Array:
-        """Return where copies of the plant would be; the plant itself stays as it is.
+        """Return the positions predicted by copies of the plant, which itself does not move.
 
         Parameters
         ----------
         set_points : array_like, shape (m,) or (periods, m)
             Set-points [Pa] of at most ``LANES`` copies, held or one a period.
         periods : int
-            How far to look.
+            Prediction horizon.
 
         Returns
         -------

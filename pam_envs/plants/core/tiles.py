@@ -1,4 +1,4 @@
-"""How parameter sets and what drives them are laid out for kernels that run tiles of plants."""
+"""Layout of parameter sets and drives in tiles of plants."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def in_tiles(parameters: ArrayLike, plants: int, lanes: int) -> Array:
     parameters : array_like, shape (n, n_parameters)
         The last set fills up what it takes to ``plants``, and the last tile.
     plants : int
-        How many run side by side, at least n.
+        Number of plants side by side, at least n.
     lanes : int
         Plants that one tile holds.
     """

@@ -9,10 +9,10 @@ are linear in the two pressures, so that a command of both is met exactly where 
 parallelogram of the four corners at which each bundle is empty or full. The stiffness is minus the
 paper's ``K_q``, which is negative.
 
-Effects (off unless set): of the regulators, static gain, dead time, dead band, spool overlap, rounded
-slew limit, slow and choked exhaust, leak, limited and drooping supply, resonance of the line (on/off
-valves have none of these); of both bundles, creep and first cycles, and of each its temperature;
-stick-slip of the bearing; delay, drift, ramp, bow and slip of both kinds of sensor.
+Effects (off unless set): of the regulators, static gain, dead time, dead band, spool overlap,
+rounded slew limit, slow and choked exhaust, leak, limited and drooping supply, resonance of the
+line (on/off valves have none of these); of both bundles, creep and first cycles, and of each its
+temperature; stick-slip of the bearing; delay, drift, ramp, bow and slip of both kinds of sensor.
 """
 
 from __future__ import annotations

@@ -98,7 +98,7 @@ def readings_of(plant: ElbowOrthosis) -> dict[str, tuple[int, int]]:
 
 
 def loop_of(plant: ElbowOrthosis, extended: bool = False, readings: bool = False) -> Loop:
-    """Return the loop of a make of the orthosis; with ``readings`` those of its sensors come out."""
+    """Return the loop of a make of the orthosis; ``readings``: of its sensors alone."""
     kind, valves = plant.hysteresis.kind, plant.valves
     effects = K.END + state_rows(kind)
     kernels: dict[str, Any] = {

@@ -90,7 +90,7 @@ settle: Any = None
 start_air: Any = None
 MODEL_STATE = 0
 EFFECTIVE_A, SENSED_ANGLE, SENSED_PRESSURE = PRESSURE_A, ANGLE, PRESSURE_A
-"""Rows of effective pressures and undisturbed readings; those of the extended plant replace them."""
+"""Rows of effective pressures and readings; those of the extended plant replace them."""
 
 
 @kernel

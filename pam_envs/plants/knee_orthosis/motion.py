@@ -1,4 +1,4 @@
-"""How the brace moves: held in a rig, free without a leg, or carried along by a walking leg.
+"""Motion of the brace: held in a rig, free without a leg, or carried along by a walking leg.
 
 Each motion is four functions. ``begin_period`` looks up what a control period needs, ``move``
 advances a tile by one sub-step, ``rest`` puts a lane at rest, and ``report`` writes what can be

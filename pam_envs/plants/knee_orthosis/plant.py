@@ -10,11 +10,11 @@ the *leg* it opens with the knee, ``theta = mount angle + knee flexion``; the we
 stairs on a path that he holds with a stiffness of his own, and the knee bears the full balance of
 ground force, weight and acceleration, of which the paper's Eq. (1) sees the vertical force alone.
 
-Effects (off unless set): of the regulator, static gain, dead time, dead band, spool overlap, rounded
-slew limit, slow and choked exhaust, leak, limited and drooping supply, resonance of the line (the
-measured dynamics take the place of all these); of the muscle, creep, first cycles and temperature,
-before its hysteresis; stick-slip of the brace's bearing where it is alone; delay, drift, ramp, bow
-and slip of all sensors.
+Effects (off unless set): of the regulator, static gain, dead time, dead band, spool overlap,
+rounded slew limit, slow and choked exhaust, leak, limited and drooping supply, resonance of the
+line (the measured dynamics take the place of all these); of the muscle, creep, first cycles and
+temperature, before its hysteresis; stick-slip of the brace's bearing where it is alone; delay,
+drift, ramp, bow and slip of all sensors.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ STAIRS_MOUNT_ANGLE = 1.4835
 
 @dataclass(frozen=True)
 class Fixture:
-    """What holds the muscle at its length."""
+    """Fixture that holds the muscle at its length."""
 
     length: float = parameter(
         0.22, "m", 0.05, 1.0, "published", "nominal length, yeh2010, section 4.1"
@@ -118,7 +118,7 @@ class KneeOrthosis(Plant):
         published, or the published frequency response ``G_T / G_T(0)``, for which the feedback was
         designed. The paper's figures for the two exclude each other.
     activity : {"walk", "stairs_up", "stairs_down"}
-        What the leg does.
+        Activity of the leg.
     regulator, hysteresis, muscle, lever, fixture, leg, stride, shoe, activation
         The components.
     tension, angle, pressure, heel, ground, cop, ankle
@@ -236,7 +236,7 @@ class KneeOrthosis(Plant):
         Parameters
         ----------
         activity : {"walk", "stairs_up", "stairs_down"}
-            What the leg does.
+            Activity of the leg.
         stride : float
             Duration of a stride [s]; 5 s in the paper, 1.224 s at natural pace.
         hysteresis, dynamics, **changes

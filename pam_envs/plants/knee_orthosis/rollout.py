@@ -99,7 +99,7 @@ def readings_of(plant: KneeOrthosis) -> dict[str, tuple[int, int]]:
 
 
 def loop_of(plant: KneeOrthosis, extended: bool = False, readings: bool = False) -> Loop:
-    """Return the loop of a make of the orthosis; with ``readings`` those of its sensors come out."""
+    """Return the loop of a make of the orthosis; ``readings``: of its sensors alone."""
     kind, mounting, dynamics = plant.hysteresis.kind, plant.mounting, plant.dynamics
     effects = K.END + state_rows(kind)
     kernels: dict[str, Any] = {

@@ -3,7 +3,7 @@
     set-point -> regulator -> pressure -> hysteresis -> stiffness -> tension -> brace (and leg)
 
 The regulator is exact at the end of a sub-step, and the hysteresis then too, where the pressure
-goes one way within a sub-step; the motion is of second order (see ``knee_orthosis_motion``).
+goes one way within a sub-step; the motion is of second order (see ``motion``).
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def advance(
 
 @kernel
 def start_hysteresis(rows: Any, counts: Any, hysteresis: int, j: int) -> None:
-    """Clear what one lane remembers; :func:`begin_lane` then fills in what it begins with."""
+    """Clear the hysteresis of one lane; :func:`begin_lane` then begins it."""
     for k in range(len(rows) - hysteresis):
         rows[hysteresis + k][j] = 0.0
     counts[K.STACK_COUNT][j] = 1

@@ -13,10 +13,10 @@ the arm is as if its muscles weighed nothing. Each joint has, beside the viscosi
 the damping that gives it a ratio of one half with the rest of the straight arm held rigid. Both
 have a common factor (``arm.mass_factor``, ``arm.damping_factor``) that can be drawn.
 
-Effects (off unless set), the same for all joints: of the regulators, static gain, dead time, dead band,
-spool overlap, rounded slew limit, slow and choked exhaust, leak, limited and drooping supply,
-resonance of the line; of the muscles, creep, first cycles and temperature; delay, drift, ramp, bow
-and slip of all sensors. The bearings have viscous friction only.
+Effects (off unless set), the same for all joints: of the regulators, static gain, dead time, dead
+band, spool overlap, rounded slew limit, slow and choked exhaust, leak, limited and drooping
+supply, resonance of the line; of the muscles, creep, first cycles and temperature; delay, drift,
+ramp, bow and slip of all sensors. The bearings have viscous friction only.
 """
 
 from __future__ import annotations
@@ -244,7 +244,7 @@ class RedundantManipulator(Plant):
 
     @property
     def largest_angle(self) -> float:
-        """Where the mechanical stops stand [rad]."""
+        """Angle of the mechanical stops [rad]."""
         return self.link.stop
 
     @property
@@ -313,7 +313,7 @@ class RedundantManipulator(Plant):
         Parameters
         ----------
         angles : array_like, shape (..., n)
-            Where the joints shall rest [rad].
+            Desired angles at rest [rad].
         payload : array_like, shape (...)
             Mass at the tip [kg].
         """

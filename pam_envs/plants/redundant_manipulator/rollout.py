@@ -89,7 +89,7 @@ def readings_of(plant: RedundantManipulator) -> dict[str, tuple[int, int]]:
 
 
 def loop_of(plant: RedundantManipulator, extended: bool = False, readings: bool = False) -> Loop:
-    """Return the loop of arms with a hysteresis and a number of joints; with ``readings`` those of its sensors come out."""
+    """Return the loop of a make of the arm; ``readings``: of its sensors alone."""
     kind, stages = plant.hysteresis.kind, plant.stages
     effects = M.END + hysteresis_rows(kind, stages)
     kernels: dict[str, Any] = {

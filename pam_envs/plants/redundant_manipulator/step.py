@@ -9,8 +9,8 @@ the stiffness and damping of the joints, which their inertia couples:
 
 It is of second order, and has no stability limit from stiff muscles on light links.
 
-A factor ``f`` of all links' masses stands before the whole of M and bias, with the payload over
-``f`` in them: so ``f`` divides what stands beside them, and the chain's terms do not know it.
+A factor ``f`` of all links' masses multiplies M and bias, with the payload over ``f`` in them: so
+``f`` divides the other terms, and those of the chain do not depend on it.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ RESTING = 30
 
 MODEL_STATE = 0  # a placeholder
 EFFECTIVE, SENSED_ANGLE, SENSED_PRESSURE = PRESSURE, ANGLE, PRESSURE
-"""Rows of effective pressures and undisturbed readings; those of the extended plant replace them."""
+"""Rows of effective pressures and readings; those of the extended plant replace them."""
 
 
 @kernel
@@ -329,7 +329,7 @@ def weight_bound(rows: Any, fixed: Any, j: int, k: int) -> float:
 
 @kernel
 def moment_beyond(rows: Any, fixed: Any, j: int, i: int) -> float:
-    """Return the weight of what lies beyond joint ``i`` of the straight arm, times its distance."""
+    """Return the weight beyond joint ``i`` of the straight arm, times its distance."""
     moment, distance = 0.0, 0.0
     for k in range(i, N_STAGES):
         link = CHAIN + GRAVITY_ROWS + LINK_ROWS * k

@@ -6,12 +6,13 @@
 The measured quantity is the contraction from the rest length under the load that hangs at the
 start, as in the paper's tables.
 
-Effects (off unless set): of the regulator, static gain, dead band, spool overlap, rounded slew limit,
-slow and choked exhaust, leak, limited and drooping supply, resonance of the line; of the hysteresis,
-shape and pressure dependence of the friction, threshold, first cycles, creep; of the muscle, finer
-terms of the static law, temperature, dependence on the load, creep of the length, friction of the
-strands, viscosity; of the mass, load error, support, guide and mount; delay, drift, ramp, bow and
-slip of the sensors. The parameters with a neutral value in ``SingleMuscle.neutral`` switch them on.
+Effects (off unless set): of the regulator, static gain, dead band, spool overlap, rounded slew
+limit, slow and choked exhaust, leak, limited and drooping supply, resonance of the line; of the
+hysteresis, shape and pressure dependence of the friction, threshold, first cycles, creep; of the
+muscle, finer terms of the static law, temperature, dependence on the load, creep of the length,
+friction of the strands, viscosity; of the mass, load error, support, guide and mount; delay,
+drift, ramp, bow and slip of the sensors. The parameters with a neutral value in
+``SingleMuscle.neutral`` switch them on.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Inputs:
-    """What acts on a plant from outside, sample by sample.
+    """Inputs of a plant, sample by sample.
 
     Attributes
     ----------
@@ -41,11 +41,11 @@ class Inputs:
     kelvin : ndarray, shape (n,)
         Temperature [K].
     fresh : ndarray of bool, shape (n,)
-        Where the muscle starts anew from rest, the first sample among them.
+        Samples at which the muscle begins anew from rest, the first among them.
     start_pressure : ndarray, shape (n,)
         Pressure [Pa] at which it starts there.
     rezeroed : ndarray of bool, shape (n,)
-        Where the position sensor was zeroed again, at rest without pressure.
+        Samples at which the position sensor was zeroed again, at rest without pressure.
     longest_step : float
         Longest sub-step [s].
     """
