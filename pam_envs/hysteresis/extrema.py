@@ -223,7 +223,7 @@ def preisach_inverse(
 ) -> float:  # fmt: skip
     """Return the input that takes the output of one lane to ``y``; the state is not changed.
 
-    The recursion ``E(u_next, u_turn) = y - y_turn`` from the last turn that ``y`` does not wipe out:
+    The recursion ``E(u_next, u_turn) = y - y_turn`` from the last turn that ``y`` leaves:
     exact, other than a series over an inverted Everett map, which holds only for relay densities
     of ``alpha - beta`` alone. An output out of reach gives the end of the range. Parameters are
     those of :func:`preisach_step`.
@@ -268,9 +268,9 @@ def invert_rows(
 
 
 # --- tiles of lanes -----------------------------------------------------------------------------
-# Most inputs continue along the present branch. So its end points are kept in rows of their own, the
-# stack is read only where an input leaves the branch, and the outputs of all lanes are evaluated
-# in one loop without branches. The bits are those of preisach_step.
+# Most inputs continue along the present branch. So its end points are kept in rows of their own,
+# the stack is read only where an input leaves the branch, and the outputs of all lanes are
+# evaluated in one loop without branches. The bits are those of preisach_step.
 
 PRESENT, OUTPUT, TURN, TURN_OUTPUT, PART, BOUND = range(2 * DEPTH, 2 * DEPTH + 6)
 """State rows after stack and sums: present input and output, turn and output that the branch is

@@ -410,8 +410,8 @@ class ModifiedMaxwellSlip(HysteresisModel):
     def scaled(self, width: float, slope: float | None = None) -> ModifiedMaxwellSlip:
         """Return this model with its hysteresis ``width`` times as wide, 0 for none.
 
-        The spring takes over the pressure of the elements at the tips of the major loop, so that the
-        tips stay where they are, whatever ``slope``.
+        The spring takes over the pressure of the elements at the tips of the major loop; the tips
+        are the same, whatever ``slope``.
         """
         (width,) = floats("width", (width,))
         check_not_negative("width", (width,), "to stay passive")

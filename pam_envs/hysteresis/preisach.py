@@ -208,7 +208,7 @@ class Preisach(HysteresisModel):
         output = width * self.start_output + slope * start
         return replace(self, table=table, start_output=output)  # type: ignore[arg-type]
 
-    # --- properties of the map ----------------------------------------------------------------------
+    # --- properties of the map ------------------------------------------------------------------
 
     @cached_property
     def everett(self) -> Array:

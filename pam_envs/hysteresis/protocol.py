@@ -2,11 +2,10 @@
 
 A model is one class in one file of this folder, marked :func:`register`. It offers
 
-- a value: :meth:`HysteresisModel.step`, :meth:`~HysteresisModel.inverse_step`, :meth:`~HysteresisModel.scaled`;
+- an operator: ``step``, ``inverse_step``, ``simulate``, ``scaled``;
 - :class:`Kernels` that advance the state rows of a tile of lanes from declared offsets;
-- the rows that these kernels read: :meth:`~HysteresisModel.numbers` (a column of the plant's
-  parameters, so that each member of an ensemble, drawn per lane, has its own) and
-  :meth:`~HysteresisModel.tables`;
+- the rows that these kernels read: ``numbers`` (a column of the plant's parameters, so that each
+  member of an ensemble, drawn per lane, has its own) and ``table_rows``;
 - a record for plant files, and a preset that resembles a reference model.
 
 Everything else (plants, environments, plant files, the command line) reads the registry.
@@ -112,15 +111,16 @@ class Kernels(NamedTuple):
     elements : int
         :attr:`HysteresisModel.elements`.
     at, model, count, member : int
-        First row of the model's state in ``rows`` (:attr:`HysteresisModel.state_rows` of them), of its
-        numbers in ``fixed`` (``NUMBERS``, the slope first), and the rows of ``counts`` that the
-        model may use (1 at the start of a history) and that holds the member.
+        First row of the model's state in ``rows`` (``state_rows`` of them), of its numbers in
+        ``fixed`` (``NUMBERS``, the slope first), and the rows of ``counts`` for the model's use (1
+        at the start of a history) and with the member.
     first, last : int
         Lanes.
 
     ``lag`` writes ``x - output`` in place of the output; ``peek`` also, from 0 (all slips) to 1
     (all sticks), the slope of the lag; ``scaled`` takes the factor on the hysteretic part, one a
-    lane, after ``y`` (a model that plants only use so needs no ``step``); ``begin`` writes the state at the beginning of one lane ``j``, after zeros.
+    lane, after ``y`` (a model that is used in no other way needs no ``step``); ``begin`` writes
+    the state at the beginning of one lane ``j``, after zeros.
     """
 
     step: Any = None

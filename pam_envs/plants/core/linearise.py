@@ -6,7 +6,7 @@ Five lines from a plant to a linear-quadratic regulator of one's own::
     from pam_envs.plants import SingleMuscle
     model = SingleMuscle.mas10(mass__load=2.55).linearise(pressure=3e5)
     gain, _, poles = control.lqr(model, np.diag([0.0, 1e6, 1e2]), [[1e-9]])
-    set_point = lambda state, rest: 3e5 - gain @ (state - rest)  # state: pressure, contraction, velocity
+    set_point = lambda state, rest: 3e5 - gain @ (state - rest)  # state: model.state_labels
 
 A family of plants declares its smooth equations in a module ``at_rest`` beside its ``plant``: a
 function ``at_rest(plant, ...)`` of the operating point that returns an :class:`Equilibrium`. The
@@ -15,7 +15,7 @@ motion. Dead time and rate limit of a regulator have no part in them; ``control.
 adds a dead time.
 
 Hysteresis is replaced by the slope of one branch: ``branch="loading"`` (default) is the branch on
-which the point was reached from the state at the beginning, for motions that go on in the same
+which the point was reached from the state at the beginning, for motions that continue in that
 direction; ``branch="turned"`` the one right after a turn, for small motions about the point. A
 plant without hysteresis has neither.
 """

@@ -38,7 +38,7 @@ from pam_envs.plants.core.operator_component import OperatorComponent
 SMALLEST, LARGEST = 6e-4, 9e-3
 """Thresholds of the preset's plays [m]: 0.15 % and 2.3 % of the nominal length."""
 WIDEST, LEVELS = 0.06, 121
-"""Travel [m] on either side of the middle that a Preisach hysteresis spans, and levels of its map."""
+"""Range [m] of a Preisach hysteresis on either side of the middle, and levels of its map."""
 SLIDING = 0.8
 """Part of the slope that has hysteresis, of either preset."""
 HALF_GAP = 7.75e-3
