@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from baselines.core.controller import Array, Prediction, encode_actions, reset_rows, row_count
+from baselines.core.controller import Array, Prediction, RowController, encode_actions, row_count
 from baselines.core.entry import Entry
 from baselines.core.environments import ELBOW, KNEE, POSITIONING
 from baselines.knee.published import NOMINAL_PRESSURE
@@ -17,7 +17,7 @@ from pam_envs.parameters import Signal, Signals
 
 
 @dataclass(frozen=True)
-class Constant:
+class Constant(RowController):
     """Constant action.
 
     Attributes
@@ -31,14 +31,11 @@ class Constant:
     signals: Sequence[Signal]
     values: Sequence[float]
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: Any = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the action, no state; see :class:`~baselines.core.controller.Controller`."""
+    def initial_state(self, observation: ArrayLike) -> None:
+        """Return no state."""
+
+    def respond(self, observation: ArrayLike, state: Any) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
         values = np.repeat(np.array(self.values)[:, None], row_count(observation), axis=1)
         return encode_actions(self.signals, values, observation), None
 
@@ -50,7 +47,7 @@ class RandomState(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Random:
+class Random(RowController):
     """Uniformly distributed actions, drawn in each control period.
 
     Draw ``k`` of row ``i`` is a function of seed, signal, ``i`` and ``k`` alone: the same calls
@@ -66,28 +63,23 @@ class Random:
     signals: Sequence[Signal]
     seed: int = 0
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: RandomState | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the next draw; see :class:`~baselines.core.controller.Controller`."""
-        values, after = self.draw(row_count(observation), state, episode_start)
+    def initial_state(self, observation: ArrayLike) -> RandomState:
+        """Return the state before the first draw."""
+        return RandomState(np.zeros(row_count(observation), np.uint64))
+
+    def respond(self, observation: ArrayLike, state: RandomState) -> Prediction:
+        """Return the action of the next draw, and the state after it."""
+        values, after = self.draw(state)
         return encode_actions(self.signals, values, observation), after
 
-    def draw(
-        self, rows: int, state: RandomState | None, episode_start: ArrayLike | None
-    ) -> tuple[Array, RandomState]:
-        """Return SI values, shape (n_signals, rows), and the next state."""
-        now = reset_rows(state, episode_start, rows, lambda: RandomState(np.zeros(rows, np.uint64)))
-        row, values = np.arange(rows, dtype=np.uint64), []
+    def draw(self, state: RandomState) -> tuple[Array, RandomState]:
+        """Return SI values, shape (n_signals, n_env), and the next state."""
+        row, values = np.arange(len(state.draw), dtype=np.uint64), []
         for k, signal in enumerate(self.signals):
             seed = np.uint64((self.seed * len(self.signals) + k) % 2**32)
-            share = _uniform(seed, row, now.draw)
+            share = _uniform(seed, row, state.draw)
             values.append(signal.low + (signal.high - signal.low) * share)
-        return np.array(values), RandomState(now.draw + np.uint64(1))
+        return np.array(values), RandomState(state.draw + np.uint64(1))
 
 
 def _uniform(seed: np.uint64, row: NDArray[np.uint64], draw: NDArray[np.uint64]) -> Array:

@@ -8,8 +8,9 @@ single observation); it is passed in and returned, and never changed in place.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -53,6 +54,35 @@ class Controller(Protocol):
         state : tuple of ndarray
         """
         ...
+
+
+class RowController(ABC):
+    """Base of the controllers here: two methods, for all rows at once.
+
+    ``predict`` handles starts of episodes; a controller defines the state at a start and the
+    response to an observation.
+    """
+
+    @abstractmethod
+    def initial_state(self, observation: ArrayLike) -> Any:
+        """Return the state of all rows at the start of an episode; None without state."""
+
+    @abstractmethod
+    def respond(self, observation: ArrayLike, state: Any) -> Prediction:
+        """Return the action and the next state; see :class:`Controller`."""
+
+    @final
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: Any = None,
+        episode_start: ArrayLike | None = None,
+        deterministic: bool = True,
+    ) -> Prediction:
+        """Return the action and the next state; see :class:`Controller`."""
+        rows = row_count(observation)
+        now = reset_rows(state, episode_start, rows, lambda: self.initial_state(observation))
+        return self.respond(observation, now)
 
 
 class Reader(NamedTuple):

@@ -1,14 +1,13 @@
-"""Torque and stiffness at once: exact allocation, pressure loops, and the hysteresis undone.
+"""Torque and stiffness control of the elbow: exact allocation, pressure loops, friction compensation.
 
-The controller of chakarov2018, Fig. 7: pressures that give the wanted torque and stiffness at the
+The controller of chakarov2018, Fig. 7: pressures for the reference torque and stiffness at the
 present angle, and a loop around each bundle's pressure. Friction inside the bundles is driven by
-the angle, which is sensed: a nominal hysteresis that follows it says by how much the bundles pull
-more on one way and less on the other, and the pressures are those of the bundles as they are. That
-is the exact inverse of the hysteresis.
+the angle, which is sensed: a nominal hysteresis driven by it gives the loss of each bundle's force,
+and the allocation accounts for it, the exact inverse of the hysteresis.
 
-While a pressure lags, both pressures together give neither the torque nor the stiffness. With
-``early`` the wish is answered within what the valves come to in their next step: torque first holds
-on the way as well.
+While a pressure lags, the two pressures together give neither the torque nor the stiffness. With
+``early`` the allocation is restricted to the pressures reachable in the valves' next step, torque
+first, so that the torque holds during the transition.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Prediction, reset_rows
+from baselines.core.controller import Prediction, RowController, row_count
 from baselines.core.entry import Entry
 from baselines.core.environments import ELBOW
 from baselines.core.knobs import AS_DESIGNED, Knobs
@@ -34,14 +33,14 @@ from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 
 
 class AllocationState(NamedTuple):
-    """The nominal hysteresis, first axis n_env."""
+    """State of the nominal hysteresis, first axis n_env."""
 
     hysteresis: HysteresisState
 
 
 @dataclass(frozen=True)
-class ElbowAllocation:
-    """Allocation and pressure loops; see this module's page.
+class ElbowAllocation(RowController):
+    """Allocation and pressure loops; see the module.
 
     Attributes
     ----------
@@ -49,9 +48,9 @@ class ElbowAllocation:
     signals : ElbowSignalMap
     loop : PressureLoop
     friction : ElbowFriction
-        That is undone; none is if its hysteresis never lags.
+        Compensated friction.
     early : bool
-        Whether the pressures are chosen among those of the next step.
+        Whether pressures are restricted to those reachable in the next step.
     """
 
     allocation: Allocation
@@ -60,25 +59,19 @@ class ElbowAllocation:
     friction: ElbowFriction
     early: bool = False
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: AllocationState | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the commands; see :class:`~baselines.core.controller.Controller`."""
+    def initial_state(self, observation: ArrayLike) -> AllocationState:
+        """See :class:`~baselines.core.controller.RowController`."""
+        return AllocationState(self.friction.initial(row_count(observation)))
+
+    def respond(self, observation: ArrayLike, state: AllocationState) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
         view = self.signals.read(observation)
-        rows = len(view.angle)
-        state = reset_rows(
-            state, episode_start, rows, lambda: AllocationState(self.friction.initial(rows))
-        )
-        friction, hysteresis = self.friction.taken(view, state.hysteresis)
+        friction, hysteresis = self.friction.losses(view, state.hysteresis)
         limits = self.loop.reach(view) if self.early else None
-        wanted = self.allocation.pressures(
-            view.angle, view.wanted, view.stiffness, friction, limits
+        pressures = self.allocation.pressures(
+            view.angle, view.torque_reference, view.stiffness_reference, friction, limits
         )
-        commands = self.loop.commands(view, np.array(wanted))
+        commands = self.loop.commands(view, np.array(pressures))
         return self.signals.write(commands, observation), AllocationState(hysteresis)
 
 
@@ -97,7 +90,7 @@ def make_elbow_allocation(
     plant : ElbowOrthosis
     signals, action_signals : Signals
     hysteresis : bool
-        Whether the nominal hysteresis is undone.
+        Whether the nominal friction is compensated.
     early : bool
         See :class:`ElbowAllocation`.
     knobs : mapping

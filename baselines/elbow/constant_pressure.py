@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Prediction
+from baselines.core.controller import Prediction, RowController
 from baselines.core.entry import Entry
 from baselines.core.environments import ELBOW
 from baselines.elbow.valves import PressureLoop, make_pressure_loop
@@ -18,7 +18,7 @@ from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 
 
 @dataclass(frozen=True)
-class ConstantPressure:
+class ConstantPressure(RowController):
     """Constant pressures in both bundles.
 
     Attributes
@@ -33,14 +33,11 @@ class ConstantPressure:
     loop: PressureLoop
     pressure: float
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: Any = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the commands, no state; see :class:`~baselines.core.controller.Controller`."""
+    def initial_state(self, observation: ArrayLike) -> None:
+        """Return no state."""
+
+    def respond(self, observation: ArrayLike, state: Any) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
         view = self.signals.read(observation)
         commands = self.loop.commands(view, np.full_like(view.pressure, self.pressure))
         return self.signals.write(commands, observation), None

@@ -1,7 +1,7 @@
-"""The bundles' friction as a nominal hysteresis tells it from the angle.
+"""Friction of the bundles from the sensed angle by a nominal hysteresis.
 
-Friction inside the bundles is driven by their contraction, and so by the angle, which is sensed: a
-hysteresis that follows it says by how much the bundles pull more on one way and less on the other.
+Friction inside the bundles is driven by their contraction, and so by the angle: a hysteresis driven
+by it gives the additional pull in one direction and the loss in the other.
 """
 
 from __future__ import annotations
@@ -25,26 +25,26 @@ class ElbowFriction:
     ----------
     plant : ElbowOrthosis
     hysteresis : Rows
-        Nothing lags and nothing is taken if it is none.
+        :class:`NoHysteresis` for no friction.
     """
 
     plant: ElbowOrthosis
     hysteresis: Rows
 
     def initial(self, rows: int) -> HysteresisState:
-        """Return the hysteresis of bundles that were never moved."""
+        """Return the hysteresis state of bundles that never moved."""
         return self.hysteresis.initial(rows)
 
-    def taken(self, view: ElbowView, state: HysteresisState) -> tuple[Shares, HysteresisState]:
-        """Return what friction takes of both bundles' shapes [m^2], and the hysteresis after it."""
+    def losses(self, view: ElbowView, state: HysteresisState) -> tuple[Shares, HysteresisState]:
+        """Return the losses of both bundles' shapes [m^2], and the next hysteresis state."""
         travel = self.plant.pulley.travel(view.angle)
         follows, after = self.hysteresis.forward(travel, state)
         return self.plant.friction(travel - follows), after
 
-    def torque(self, view: ElbowView, taken: Shares) -> Array:
-        """Return the torque [N m] that friction adds at the pressures as sensed."""
+    def torque(self, view: ElbowView, losses: Shares) -> Array:
+        """Return the torque [N m] of friction at the sensed pressures."""
         factor_a, factor_b = self.plant.coefficients(*view.pressure)
-        return self.plant.pulley.torque(-factor_a * taken[0], -factor_b * taken[1])
+        return self.plant.pulley.torque(-factor_a * losses[0], -factor_b * losses[1])
 
 
 def make_elbow_friction(plant: ElbowOrthosis, known: bool) -> ElbowFriction:

@@ -1,14 +1,14 @@
-"""PI control of the torque alone, and no word of stiffness.
+"""PI control of the elbow's torque, without control of the stiffness.
 
-Both pressures start from the same one and move against each other: bundle b up, bundle a down. The
-torque that is fed back is the estimate from angle and pressures, since there is no sensor of it.
-The pressure that both start from, a fifth of the largest, gives a stiffness amid those that the
-tasks ask for; friction grows with it, so that a higher one makes the torque worse.
-Tuning: SIMC for a lag (S. Skogestad, J. Process Control 13 (2003) 291-309) with the steepest torque
-per pressure over the range, and the regulator's lag. On/off valves are no lag but a rate, of 3 bar
-in 3 s: the rule is shown a plant with one cycle for its lag, which is a choice and no tuning by
-rule. The dead time is half of what a command is held for, and a control period for a computer to
-work it out.
+Both pressures start from one value and move in opposite directions: bundle b up, bundle a down.
+The feedback is the torque estimated from angle and pressures, since there is no torque sensor. The
+common pressure, a fifth of the largest, gives a stiffness in the middle of the tasks' references;
+friction grows with it, so that a higher one degrades the torque.
+
+Tuning: SIMC (skogestad2003) for a lag, with the steepest torque per pressure over the range and the
+regulator's lag. On/off valves have a rate (3 bar in 3 s) instead of a lag: the rule is applied to
+one cycle as lag, an assumption. The dead time is half of the hold of a command, and a control
+period of computing.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Prediction, reset_rows
+from baselines.core.controller import Prediction, RowController
 from baselines.core.entry import Entry
 from baselines.core.environments import ELBOW
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.elbow.friction import ElbowFriction, make_elbow_friction
 from baselines.elbow.valves import PressureLoop, make_pressure_loop
-from baselines.elbow.view import ElbowSignalMap, ElbowView, make_elbow_signal_map
+from baselines.elbow.view import ElbowSignalMap, make_elbow_signal_map
 from baselines.linear.simc import PI_KNOBS, simc_rule
 from baselines.positioning.nominal import HysteresisState
 from baselines.positioning.pid import Gains, PidState, pid_start, pid_step
@@ -34,13 +34,13 @@ from pam_envs.parameters import Signals
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 
 SHARE = 0.2
-"""Pressure that both bundles start from, over the largest."""
+"""Common pressure of both bundles, over the largest."""
 KNOBS: Bounds = {**PI_KNOBS, "start": (0.5, 2.0)}
-"""Those of the rule, and on the pressure that both start from."""
+"""Those of the rule, and a factor on the common pressure."""
 
 
 def simc_torque(plant: ElbowOrthosis, knobs: Knobs = AS_DESIGNED) -> Gains:
-    """Return the gains [Pa/(N m)] of the SIMC rule; see this module's page."""
+    """Return the gains [Pa/(N m)] of the SIMC rule; see the module."""
     angles, full = np.linspace(*plant.angle_range, 25), plant.full_pressure
     swing = plant.torque(angles, 0.0, full) - plant.torque(angles, full, 0.0)
     steepest = float(np.max(swing)) / full
@@ -59,28 +59,28 @@ def simc_torque(plant: ElbowOrthosis, knobs: Knobs = AS_DESIGNED) -> Gains:
 
 
 class ElbowPidState(NamedTuple):
-    """The PI's state and the nominal hysteresis, first axis n_env."""
+    """States of the PI and of the nominal hysteresis, first axis n_env."""
 
     pid: PidState
     hysteresis: HysteresisState
 
 
 @dataclass(frozen=True)
-class ElbowPid:
-    """PI on the torque as estimated; see this module's page.
+class ElbowPid(RowController):
+    """PI of the estimated torque; see the module.
 
     Attributes
     ----------
     gains : Gains
     signals : ElbowSignalMap
     loop : PressureLoop or None
-        Around the pressures of on/off valves; regulators have one inside.
+        Of on/off valves; regulators contain their own.
     middle, full : float
-        Pressure [Pa] that both start from, and the largest.
+        Common pressure [Pa], and the largest.
     period : float
         Control period [s].
     friction : ElbowFriction
-        That is added to the estimate; none is if its hysteresis never lags.
+        Added to the estimate.
     """
 
     gains: Gains
@@ -91,27 +91,22 @@ class ElbowPid:
     period: float
     friction: ElbowFriction
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: ElbowPidState | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the commands; see :class:`~baselines.core.controller.Controller`."""
+    def initial_state(self, observation: ArrayLike) -> ElbowPidState:
+        """See :class:`~baselines.core.controller.RowController`."""
         view = self.signals.read(observation)
-        state = reset_rows(state, episode_start, len(view.angle), lambda: self._start(view))
-        taken, hysteresis = self.friction.taken(view, state.hysteresis)
-        torque, most = view.torque + self.friction.torque(view, taken), self.full
-        error = view.wanted - torque
-        shift, after = pid_step(self.gains, state.pid, error, torque, -most, most, self.period)
-        wanted = np.clip(self.middle + np.array([-shift, shift]), 0.0, most)
-        commands = wanted if self.loop is None else self.loop.commands(view, wanted)
-        return self.signals.write(commands, observation), ElbowPidState(after, hysteresis)
-
-    def _start(self, view: ElbowView) -> ElbowPidState:
         pid = pid_start(0.5 * np.diff(view.pressure, axis=0)[0], view.torque)
         return ElbowPidState(pid, self.friction.initial(len(view.angle)))
+
+    def respond(self, observation: ArrayLike, state: ElbowPidState) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
+        view = self.signals.read(observation)
+        losses, hysteresis = self.friction.losses(view, state.hysteresis)
+        torque, full = view.torque + self.friction.torque(view, losses), self.full
+        error = view.torque_reference - torque
+        shift, after = pid_step(self.gains, state.pid, error, torque, -full, full, self.period)
+        target = np.clip(self.middle + np.array([-shift, shift]), 0.0, full)
+        commands = target if self.loop is None else self.loop.commands(view, target)
+        return self.signals.write(commands, observation), ElbowPidState(after, hysteresis)
 
 
 def make_elbow_pid(
@@ -131,7 +126,7 @@ def make_elbow_pid(
     gains : Gains, optional
         Default: those of :func:`simc_torque`.
     hysteresis : bool
-        Whether the nominal hysteresis's friction is added to the estimate of the torque.
+        Whether the nominal friction is added to the estimated torque.
     knobs : mapping
         Of ``KNOBS``.
     """

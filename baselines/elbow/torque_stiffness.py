@@ -1,9 +1,8 @@
-"""From torque and stiffness to two pressures: the exact solution, held within reach, torque first.
+"""Allocation of torque and stiffness to two pressures: exact solution within limits, torque first.
 
 chakarov2018 finds the pressures by an optimisation. Torque and stiffness are linear in both
-pressures, so that a system of two equations gives them exactly; where it asks for more than there
-is, the torque is held first and the stiffness gets what is left
-(:mod:`pam_envs.mechanics.allocation`).
+pressures, so that two linear equations give them exactly; references out of reach keep the torque
+first, and the stiffness as near as possible (:mod:`pam_envs.mechanics`).
 """
 
 from __future__ import annotations
@@ -44,11 +43,11 @@ class Allocation:
         angle : ndarray, shape (n_env,)
             Of the elbow [rad].
         torque, stiffness : ndarray, shape (n_env,)
-            That are wanted [N m], [N m/rad].
+            References [N m], [N m/rad].
         friction : tuple of ndarray
-            What friction takes of the shapes of bundles a and b [m^2].
+            Losses of the shapes of bundles a and b [m^2].
         limits : tuple of ndarray, shapes (2, n_env), optional
-            Lowest and highest pressures [Pa] of bundles a and b. Default: all that there are.
+            Lowest and highest pressures [Pa] of bundles a and b. Default: the whole range.
         """
         plant, full = self.plant, self.plant.full_pressure
         phi_a, phi_b, psi_a, psi_b = (np.ravel(x) for x in plant.geometry(angle))

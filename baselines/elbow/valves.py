@@ -1,17 +1,16 @@
-"""The inner loops: from wanted pressures to what the valves are told.
+"""Inner pressure loops of the elbow: from reference pressures to valve commands.
 
-A regulator lags. Its set-point is put ahead of the wanted pressure, by a share of what the sensed
-pressure is still short of, so that the loop is as fast as ``QUICK`` control periods.
+Regulators lag: the set-point leads the reference by a multiple of the remaining pressure error, so
+that the loop takes ``LOOP_PERIODS`` control periods.
 
-On/off valves take one pulse in a cycle. Its width is the one that lets in or out the air that the
-bundle is short of at the end of the cycle: the bundle's volume there, with the rate at which the
-elbow turns, times the wanted pressure, less the air inside; over the flow through the valve at a
-pressure half-way; longer by the opening time and shorter by the closing time. What the shortest
-pulse would overshoot by more than it is short now, is left, and so is what sensors hardly tell,
-unless it is half of what a whole cycle brings: near empty, air leaves slowly.
+On/off valves accept one pulse in a cycle. Its width supplies or removes the mass of air missing at
+the end of the cycle (the volume then, at the present rate of the elbow, times the reference
+pressure, less the air inside) over the flow through the valve at the mean pressure; longer by the
+opening time and shorter by the closing time. No pulse is given where the shortest one would
+overshoot by more than the present error, or where the error is not resolved by the sensors, unless
+it is half of the effect of a whole cycle: near empty, air leaves slowly.
 
-Each loop also says within which limits the pressures can be at the end of its next step, for those
-who want to choose among what is to be had then.
+Each loop also gives the limits of the pressures at the end of its next step.
 """
 
 from __future__ import annotations
@@ -30,21 +29,21 @@ from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 from pam_envs.pneumatics.on_off_pair import mass_flow
 
-QUICK = 2.0
-"""Control periods that the loop around a regulator takes; fewer would act on sensor noise."""
-TOLD = 1e3
-"""Difference of pressures [Pa] that sensors hardly tell: some three times a gauge's noise."""
+LOOP_PERIODS = 2.0
+"""Control periods of the loop around a regulator; fewer would amplify sensor noise."""
+RESOLVED = 1e3
+"""Pressure difference [Pa] resolved by the sensors: about three times a gauge's noise."""
 KNOBS: Bounds = {"pressure_loop": (0.5, 3.0)}
-"""On what a wanted pressure is beyond the sensed one."""
+"""Factor on the difference between reference and sensed pressure."""
 EARLY_KNOBS: Bounds = {**KNOBS, "step": (0.5, 4.0)}
-"""Also on how far the pressures are taken to come in the next step."""
+"""Also a factor on the reachable change of pressure in the next step."""
 
 
 class PressureLoop(Protocol):
-    """From wanted pressures to commands."""
+    """From reference pressures to commands."""
 
-    def commands(self, view: ElbowView, wanted: Array) -> Array:
-        """Return the commands for wanted pressures [Pa], shapes (2, n_env)."""
+    def commands(self, view: ElbowView, reference: Array) -> Array:
+        """Return the commands for reference pressures [Pa], shapes (2, n_env)."""
         ...
 
     def reach(self, view: ElbowView) -> tuple[Array, Array]:
@@ -54,7 +53,7 @@ class PressureLoop(Protocol):
 
 @dataclass(frozen=True)
 class RegulatorLoop:
-    """For proportional regulators; see this module's page.
+    """For proportional regulators; see the module.
 
     Attributes
     ----------
@@ -65,16 +64,18 @@ class RegulatorLoop:
 
     @cached_property
     def lead(self) -> float:
-        """Set-point beyond the sensed pressure, over what the wanted one is beyond it."""
-        return max(1.0, self.plant.regulator.time_constant / (QUICK * self.plant.control_period))
+        """Difference of set-point and sensed pressure over that of reference and sensed pressure."""
+        return max(
+            1.0, self.plant.regulator.time_constant / (LOOP_PERIODS * self.plant.control_period)
+        )
 
-    def commands(self, view: ElbowView, wanted: Array) -> Array:
+    def commands(self, view: ElbowView, reference: Array) -> Array:
         """Return set-points [Pa]; see :class:`PressureLoop`."""
-        return view.pressure + self.lead * (wanted - view.pressure)
+        return view.pressure + self.lead * (reference - view.pressure)
 
     def reach(self, view: ElbowView) -> tuple[Array, Array]:
-        """Return what a regulator comes to in ``QUICK`` periods; see :class:`PressureLoop`."""
-        law, time = self.plant.regulator, QUICK * self.plant.control_period
+        """Return the pressures reachable in ``LOOP_PERIODS`` periods; see :class:`PressureLoop`."""
+        law, time = self.plant.regulator, LOOP_PERIODS * self.plant.control_period
         share, most = 1.0 - math.exp(-time / law.time_constant), time * law.slew_rate
         there = view.pressure
         low = np.maximum((1.0 - share) * there, there - most)
@@ -83,7 +84,7 @@ class RegulatorLoop:
 
 @dataclass(frozen=True)
 class PulseLoop:
-    """For pairs of on/off valves; see this module's page.
+    """For pairs of on/off valves; see the module.
 
     Attributes
     ----------
@@ -92,18 +93,18 @@ class PulseLoop:
 
     plant: ElbowOrthosis
 
-    def commands(self, view: ElbowView, wanted: Array) -> Array:
-        """Return pulse widths [s]; 0 where none is taken. See :class:`PressureLoop`."""
+    def commands(self, view: ElbowView, reference: Array) -> Array:
+        """Return pulse widths [s]; 0 where no pulse is accepted. See :class:`PressureLoop`."""
         inside, still, per_volume = self._closed(view)
-        short = (wanted + ATMOSPHERE) / per_volume - inside
+        short = (reference + ATMOSPHERE) / per_volume - inside
         widths = [
             [self._width(*row) for row in zip(*(x.tolist() for x in side), strict=True)]
-            for side in zip(short, still, wanted, strict=True)
+            for side in zip(short, still, reference, strict=True)
         ]
-        return np.where(view.taken, np.array(widths), 0.0)
+        return np.where(view.accepts, np.array(widths), 0.0)
 
     def reach(self, view: ElbowView) -> tuple[Array, Array]:
-        """Return what the longest pulses come to; see :class:`PressureLoop`."""
+        """Return the pressures reachable by the longest pulses; see :class:`PressureLoop`."""
         plant, (_, still, per_volume) = self.plant, self._closed(view)
         time = plant.cycle - plant.valve.opening_time + plant.valve.closing_time
         filled, emptied = (
@@ -139,22 +140,24 @@ class PulseLoop:
         ends = (valve.supply_pressure + ATMOSPHERE, inside) if fills else (inside, ATMOSPHERE)
         return mass_flow(*ends, valve.conductance, valve.critical_ratio)
 
-    def _width(self, short: float, pressure: float, wanted: float) -> float:
-        """Return the signed width [s] of the pulse that brings the air [kg] that is short.
+    def _width(self, short: float, pressure: float, reference: float) -> float:
+        """Return the signed width [s] of the pulse that supplies missing air [kg].
 
         Parameters
         ----------
         short : float
-            [kg]; negative where there is too much.
-        pressure, wanted : float
-            That the bundle would have at the end of the cycle, and should have [Pa].
+            Missing air [kg]; negative for an excess.
+        pressure, reference : float
+            Of the bundle at the end of the cycle without a pulse, and desired [Pa].
         """
         valve = self.plant.valve
-        flow = self._flow(short > 0.0, 0.5 * (pressure + wanted))
+        flow = self._flow(short > 0.0, 0.5 * (pressure + reference))
         least = 0.5 * flow * valve.closing_time
-        hardly = abs(wanted - pressure) < TOLD and abs(short) < 0.5 * flow * self.plant.cycle
-        empty = short < 0.0 and pressure < TOLD
-        if flow <= 0.0 or abs(short) < least or hardly or empty:
+        unresolved = (
+            abs(reference - pressure) < RESOLVED and abs(short) < 0.5 * flow * self.plant.cycle
+        )
+        empty = short < 0.0 and pressure < RESOLVED
+        if flow <= 0.0 or abs(short) < least or unresolved or empty:
             return 0.0
         needed = abs(short) / flow + valve.opening_time - valve.closing_time
         width = min(self.plant.cycle, max(valve.opening_time, needed))
@@ -162,28 +165,28 @@ class PulseLoop:
 
 
 @dataclass(frozen=True)
-class PacedLoop:
-    """An inner loop that is told to go further, or less far, than the wanted pressures.
+class ScaledLoop:
+    """An inner loop with scaled reference and reachable range.
 
     Attributes
     ----------
     loop : PressureLoop
-    pace : float
-        What it is told beyond the sensed pressure, over what the wanted one is beyond it.
+    factor : float
+        On the difference of reference and sensed pressure.
     step : float
-        How far the pressures are taken to come in the next step, over what ``loop`` says.
+        On the reachable change of pressure in the next step.
     full : float
         Largest pressure [Pa].
     """
 
     loop: PressureLoop
-    pace: float
+    factor: float
     step: float
     full: float
 
-    def commands(self, view: ElbowView, wanted: Array) -> Array:
+    def commands(self, view: ElbowView, reference: Array) -> Array:
         """Return the commands; see :class:`PressureLoop`."""
-        return self.loop.commands(view, self._beyond(view, wanted, self.pace))
+        return self.loop.commands(view, self._beyond(view, reference, self.factor))
 
     def reach(self, view: ElbowView) -> tuple[Array, Array]:
         """Return the limits of the next step; see :class:`PressureLoop`."""
@@ -201,5 +204,5 @@ def make_pressure_loop(plant: ElbowOrthosis, knobs: Knobs = AS_DESIGNED) -> Pres
     Its ``knobs`` are those of ``EARLY_KNOBS``.
     """
     loop = PulseLoop(plant) if plant.valves == "on_off" else RegulatorLoop(plant)
-    pace, step = knob(knobs, "pressure_loop"), knob(knobs, "step")
-    return loop if pace == step == 1.0 else PacedLoop(loop, pace, step, plant.full_pressure)
+    factor, step = knob(knobs, "pressure_loop"), knob(knobs, "step")
+    return loop if factor == step == 1.0 else ScaledLoop(loop, factor, step, plant.full_pressure)

@@ -1,4 +1,4 @@
-"""What the controllers of the elbow read and write."""
+"""Observation and action of the elbow's controllers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from baselines.core.controller import Array, Reader, Rows, reader
+from baselines.core.controller import Array, Reader, Rows, encode_actions, reader
 from pam_envs.parameters import Signal, Signals
 
 NAMES = (
@@ -28,35 +28,35 @@ class ElbowView(NamedTuple):
     Attributes
     ----------
     angle, rate : ndarray
-        As sensed [rad], [rad/s].
+        Sensed [rad], [rad/s].
     pressure : ndarray, shape (2, n_env)
-        As sensed [Pa]: bundles a and b.
+        Sensed [Pa]: bundles a and b.
     torque : ndarray
-        As estimated [N m].
-    wanted, stiffness : ndarray
-        Torque [N m] and stiffness [N m/rad] that are asked for.
-    taken : ndarray of bool
-        Where the next action is one that the valves take.
+        Estimated [N m].
+    torque_reference, stiffness_reference : ndarray
+        [N m], [N m/rad].
+    accepts : ndarray of bool
+        Rows whose valves accept the next action.
     """
 
     angle: Array
     rate: Array
     pressure: Array
     torque: Array
-    wanted: Array
-    stiffness: Array
-    taken: Rows
+    torque_reference: Array
+    stiffness_reference: Array
+    accepts: Rows
 
 
 @dataclass(frozen=True)
 class ElbowSignalMap:
-    """Makes an :class:`ElbowView` of observations, and actions of two commands.
+    """Reader of observations as an :class:`ElbowView`, and writer of actions.
 
     Attributes
     ----------
     reader : Reader
     to_pulse : Reader or None
-        Of the time until on/off valves take a pulse.
+        Of the time until on/off valves accept a pulse.
     actions : tuple of Signal
         Of bundles a and b.
     period : float
@@ -69,27 +69,27 @@ class ElbowSignalMap:
     period: float
 
     def read(self, observation: ArrayLike) -> ElbowView:
-        """Return what an observation of shape (n_obs,) or (n_env, n_obs) shows."""
-        angle, rate, a, b, torque, wanted, stiffness = self.reader.rows(observation)
-        taken = np.ones(len(angle), bool)
+        """Return the view of an observation of shape (n_obs,) or (n_env, n_obs)."""
+        angle, rate, a, b, torque, torque_reference, stiffness_reference = self.reader.rows(
+            observation
+        )
+        accepts = np.ones(len(angle), bool)
         if self.to_pulse is not None:
-            taken = self.to_pulse.rows(observation)[0] < 0.5 * self.period
-        return ElbowView(angle, rate, np.array([a, b]), torque, wanted, stiffness, taken)
+            accepts = self.to_pulse.rows(observation)[0] < 0.5 * self.period
+        pressure = np.array([a, b])
+        return ElbowView(
+            angle, rate, pressure, torque, torque_reference, stiffness_reference, accepts
+        )
 
     def write(self, commands: Array, observation: ArrayLike) -> NDArray[np.float32]:
         """Return the action for commands of both bundles, shape (2, n_env)."""
-        action = np.zeros((commands.shape[1], 2))
-        for signal, value in zip(self.actions, commands, strict=True):
-            gain, offset = signal.scale
-            action[:, signal.index] = gain * np.clip(value, signal.low, signal.high) + offset
-        made = action.astype(np.float32)
-        return made if np.ndim(observation) == 2 else made[0]
+        return encode_actions(self.actions, commands, observation)
 
 
 def make_elbow_signal_map(
     signals: Signals, action_signals: Signals, period: float
 ) -> ElbowSignalMap:
-    """Return what reads and writes the signals of the elbow.
+    """Return the reader and writer of the elbow's signals.
 
     Raises
     ------

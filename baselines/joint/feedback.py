@@ -1,22 +1,21 @@
-"""Single loops on the angles of joints, without a model of the hysteresis: PI, slow PI and PID.
+"""Feedback of the joints' angles without a model of the hysteresis: PI, slow PI and PID.
 
-PI and slow PI: see :mod:`baselines.joint.loop`; fluidic_muscles, section 4, with the gain of the
+PI and slow PI: :mod:`baselines.joint.loop`; fluidic_muscles, section 4, with the gain of the
 nominal plant between the tips of the hysteresis loop.
 
 PID: SIMC (:mod:`baselines.linear.simc`) for both lags ``1 / p`` and the gain of the nominal plant,
 in its cascade form, the derivative on the measurement. For one stage, whose two poles are real,
-``tau_c = theta`` as the rule recommends. In an arm the double pole stands in for a joint that
-swings and is moved by the others, which the rule does not describe: there the closed loop is at
+``tau_c = theta`` as the rule recommends. In an arm the double pole approximates a joint that
+oscillates and is coupled to the others, which the rule does not cover: there the closed loop is at
 most twice as fast as the joint, ``tau_c = max(theta, 1 / (2 p))``. The smooth PID is as fast as the
 plant, ``tau_c = 1 / p``.
 
-A straight arm of six joints without friction leaves the PID a phase margin of 18 degrees at the
+For a straight arm of six joints without friction the PID has a phase margin of 18 degrees at the
 base (3 with 0.1 kg at the tip), the smooth PID 39 (18), the PI 56 (31). With ``tau_c = theta`` it
-would be unstable. The hysteresis's lower gain after a turn, and its friction, leave the true arm
-more.
+would be unstable. The lower gain of the hysteresis after a reversal, and its friction, increase the
+margins of the true arm.
 
-Ahead, a loop is given the previewed reference, so that its delay is made up for
-(:mod:`baselines.joint.preview`).
+With preview, a loop tracks the reference later by its own delay (:mod:`baselines.joint.preview`).
 """
 
 from __future__ import annotations
@@ -29,13 +28,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Prediction, reset_rows
+from baselines.core.controller import Array, Prediction, RowController
 from baselines.core.entry import Entry
 from baselines.core.environments import JOINT
 from baselines.core.knobs import AS_DESIGNED, Knobs
 from baselines.joint.gravity import Gravity
 from baselines.joint.loop import (
-    SLOW,
+    SLOW_CROSSOVER,
     PiGains,
     make_loop,
     pi_system,
@@ -44,10 +43,10 @@ from baselines.joint.loop import (
 )
 from baselines.joint.model import POLE, JointModel, joint_model
 from baselines.joint.poles import joint_poles
-from baselines.joint.preview import KNOBS, Lookahead, double_lags, lookahead_for
-from baselines.joint.view import JointSignalMap, JointView, make_joint_signal_map
+from baselines.joint.preview import KNOBS, Lookahead, double_pole_delays, lookahead_for
+from baselines.joint.view import JointSignalMap, make_joint_signal_map
 from baselines.linear.bumpless import Bumpless, BumplessState
-from baselines.linear.simc import PID_KNOBS, WAIT, Simc, simc_rule
+from baselines.linear.simc import DELAY_PERIODS, PID_KNOBS, Simc, simc_rule
 from baselines.linear.systems import DiscreteSystem, discrete, from_polynomials
 from pam_envs.parameters import Signals
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
@@ -62,7 +61,7 @@ Kind = Literal["pi", "pi_slow", "pid", "pid_smooth"]
 
 
 def closed_loop_time(pole: float, dead_time: float, in_arm: bool, smooth: bool = False) -> float:
-    """Return ``tau_c`` [s] for a joint with a pole [rad/s]; see this module's page."""
+    """Return ``tau_c`` [s] for a joint with a pole [rad/s]; see the module."""
     if smooth:
         return 1.0 / pole
     return max(dead_time, 0.5 / pole) if in_arm else dead_time
@@ -76,7 +75,7 @@ def simc_joint(
     smooth: bool = False,
     knobs: Knobs = AS_DESIGNED,
 ) -> Simc:
-    """Return the parameters of the rule for a joint; see this module's page.
+    """Return the parameters of the rule for a joint; see the module.
 
     Parameters
     ----------
@@ -87,13 +86,13 @@ def simc_joint(
     period : float
         Control period [s].
     in_arm : bool
-        Whether the joint is one of several.
+        Whether the joint belongs to an arm.
     smooth : bool
-        Whether the loop is to be as fast as the plant and not faster.
+        Whether the closed loop is as fast as the plant.
     knobs : mapping
         Of :data:`baselines.linear.simc.PID_KNOBS`.
     """
-    lag, wait = 1.0 / pole, WAIT * period
+    lag, wait = 1.0 / pole, DELAY_PERIODS * period
     pace = closed_loop_time(pole, wait, in_arm, smooth)
     return simc_rule(gain, lag, lag, wait, pace, knobs)
 
@@ -106,28 +105,28 @@ def pid_system(law: Simc) -> StateSpace:
 
 
 def reference_filter(law: Simc) -> StateSpace:
-    """Return what takes the derivative off the reference."""
+    """Return the reference filter that removes the derivative action on the reference."""
     return from_polynomials([law.derivative_time / FILTER, 1.0], [law.derivative_time, 1.0])
 
 
 def pid_delay(law: Simc, gain: float) -> float:
     """Return the delay [s] of the PID's closed loop for slow references.
 
-    It is what a ramp is missed by, ``tau_I / (K_c K)``, and the lag of the reference's filter.
+    The sum of the ramp error ``tau_I / (K_c K)`` and the lag of the reference filter.
     """
-    missed = law.integral_time / (law.gain * gain)
-    return missed + law.derivative_time * (1.0 - 1.0 / FILTER)
+    ramp = law.integral_time / (law.gain * gain)
+    return ramp + law.derivative_time * (1.0 - 1.0 / FILTER)
 
 
 class FeedbackState(NamedTuple):
-    """Hysteresis models of the loops and of the reference's filters."""
+    """States of the loops and of the reference filters."""
 
     loop: BumplessState
     reference: Array
 
 
 @dataclass(frozen=True)
-class JointFeedback:
+class JointFeedback(RowController):
     """A loop for every joint.
 
     Attributes
@@ -148,27 +147,22 @@ class JointFeedback:
     lookahead: Lookahead
     prefilter: DiscreteSystem | None = None
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: FeedbackState | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the set-points; see :class:`~baselines.core.controller.Controller`."""
+    def initial_state(self, observation: ArrayLike) -> FeedbackState:
+        """See :class:`~baselines.core.controller.RowController`."""
         view = self.signals.read(observation)
-        state = reset_rows(state, episode_start, len(view.angle), lambda: self._start(view))
-        shift = self.gravity.shift(view.reference, view.payload)
-        aim = self.lookahead.wanted(view.samples)
-        wanted, filtered = self._filtered(aim, state.reference)
-        low, high = self.model.low - shift, self.model.high - shift
-        command = self.loop.output(wanted, view.angle, state.loop, low, high)
-        loop = self.loop.advance(wanted, view.angle, command, state.loop)
-        return self.signals.write(command + shift, observation), FeedbackState(loop, filtered)
-
-    def _start(self, view: JointView) -> FeedbackState:
         held = view.set_point - self.gravity.shift(view.angle, view.payload)
         return FeedbackState(self.loop.holding_state(held), self._rest(view.angle))
+
+    def respond(self, observation: ArrayLike, state: FeedbackState) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
+        view = self.signals.read(observation)
+        shift = self.gravity.shift(view.reference, view.payload)
+        aim = self.lookahead.reference(view.samples)
+        reference, filtered = self._filtered(aim, state.reference)
+        low, high = self.model.low - shift, self.model.high - shift
+        command = self.loop.output(reference, view.angle, state.loop, low, high)
+        loop = self.loop.advance(reference, view.angle, command, state.loop)
+        return self.signals.write(command + shift, observation), FeedbackState(loop, filtered)
 
     def _rest(self, angle: Array) -> Array:
         return self.prefilter.rest_state(angle) if self.prefilter else np.zeros((*angle.shape, 0))
@@ -197,11 +191,11 @@ def make_joint_feedback(
     signals, action_signals : Signals
     kind : {"pi", "pi_slow", "pid", "pid_smooth"}
     gravity : bool
-        Whether the set-points carry the weight of the links and the payload that is told.
+        Whether the set-points compensate the weight of the links and of the declared payload.
     ahead : bool
-        Whether the loop is given the reference ahead of time, by its own delay.
+        Whether the reference is previewed by the loop's own delay.
     knobs : mapping
-        Of :data:`baselines.linear.simc.PID_KNOBS`, which a PI has not, and of
+        Of :data:`baselines.linear.simc.PID_KNOBS` (PID only), and of
         :data:`baselines.joint.preview.KNOBS`.
     """
     model = joint_model(plant, poles=joint_poles(plant)).narrowed(0.0)
@@ -231,9 +225,11 @@ class Loops(NamedTuple):
 
 def _loops(model: JointModel, kind: Kind, in_arm: bool, knobs: Knobs) -> Loops:
     if kind == "pi":
-        return Loops(_pi(model, pole_cancelling), double_lags(model.poles))
+        return Loops(_pi(model, pole_cancelling), double_pole_delays(model.poles))
     if kind == "pi_slow":
-        return Loops(_pi(model, slow_gains), [POLE / (SLOW * pole) for pole in model.poles])
+        return Loops(
+            _pi(model, slow_gains), [POLE / (SLOW_CROSSOVER * pole) for pole in model.poles]
+        )
 
     def rule(pole: float) -> Simc:
         return simc_joint(model.gain, pole, model.period, in_arm, kind == "pid_smooth", knobs)

@@ -1,8 +1,8 @@
-"""Feed-forward of gravity: what to add to set-points so that links and payload are carried.
+"""Gravity feedforward: change of the set-points that compensates the weight of links and payload.
 
-The nominal plant gives it: the torque of the weight at the wanted angles, and the set-point with
-which the muscles exert that torque there. For a manipulator the angles of all joints count for the
-torque. It looks at the wanted angles and not at those sensed, which would be a feedback.
+From the nominal plant: the torque of the weight at the reference angles, and the set-point at which
+the muscles exert that torque there. In a manipulator the torque depends on the angles of all
+joints. Reference angles are used instead of sensed ones, which would be a feedback.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from baselines.core.controller import Array
 from pam_envs.plants.antagonistic_joint.statics import shift_for
 
 ANGLES, TORQUES = 61, 81
-"""Points of the table of shifts."""
+"""Size of the table of shifts."""
 LARGEST_TORQUE = 8.0
-"""End of the table [N m]; beyond it a shift counts as that at the end."""
+"""End of the table [N m]; torques are clipped to it."""
 
 
 @dataclass(frozen=True)
 class Gravity:
-    """The feed-forward, or none.
+    """Gravity feedforward, or none.
 
     Attributes
     ----------
     plant : AntagonisticJoint, RedundantManipulator or None
-        Nominal plant; None for no feed-forward.
+        Nominal plant; None for no feedforward.
     """
 
     plant: Any = None
 
     def shift(self, angles: Array, payload: Array) -> Array:
-        """Return what to add [rad] at angles (n_env, n_joints) with payloads [kg], (n_env,)."""
+        """Return the shift [rad] at angles (n_env, n_joints) with payloads [kg], (n_env,)."""
         if self.plant is None:
             return np.zeros_like(angles)
         low, high = self.plant.angle_range
@@ -52,7 +52,7 @@ class Gravity:
 
     @cached_property
     def _table(self) -> Array:
-        """Shifts [rad] by angle and torque: straight in between."""
+        """Shifts [rad] by angle and torque."""
         low, high = self.plant.angle_range
         angle = np.linspace(low, high, ANGLES)[:, None]
         torque = np.linspace(-LARGEST_TORQUE, LARGEST_TORQUE, TORQUES)[None, :]
@@ -60,7 +60,7 @@ class Gravity:
 
 
 def _between(table: Array, along: Array, across: Array) -> Array:
-    """Return a table's values between its points, by straight lines."""
+    """Return a table's values by bilinear interpolation."""
     i = np.minimum(along.astype(int), table.shape[0] - 2)
     j = np.minimum(across.astype(int), table.shape[1] - 2)
     s, t = along - i, across - j

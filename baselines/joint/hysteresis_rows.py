@@ -1,4 +1,4 @@
-"""A hysteresis of every joint of every environment: lanes in one row, states with the row first."""
+"""Hysteresis of every joint of every environment: states with row and joint first."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from baselines.positioning.nominal import HysteresisState
 
 
 @dataclass(frozen=True)
-class JointHysteresisModels:
+class JointHysteresis:
     """The hysteresis of a model, for arrays of shape (n_env, n_joints).
 
     Attributes
@@ -21,18 +21,18 @@ class JointHysteresisModels:
     model: JointModel
 
     def start(self, set_point: Array) -> tuple[Array, HysteresisState]:
-        """Return the angles at rest under first set-points [rad], and the hysteresis they leave."""
+        """Return the angles at rest under first set-points [rad], and the state after them."""
         found, state = self.model.virgin(set_point.ravel())
         return found.reshape(set_point.shape), _packed(state, set_point.shape)
 
     def forward(self, set_point: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
-        """Return the angles at rest [rad] under set-points, and the hysteresis after them."""
+        """Return the angles at rest [rad] under set-points, and the state after them."""
         found, after = self.model.rows.forward(set_point.ravel(), _flat(state))
         return found.reshape(set_point.shape), _packed(after, set_point.shape)
 
-    def inverse(self, wanted: Array, state: HysteresisState) -> Array:
-        """Return the set-points [rad] that give angles at rest; the hysteresis stays."""
-        return self.model.rows.inverse(wanted.ravel(), _flat(state)).reshape(wanted.shape)
+    def inverse(self, angle: Array, state: HysteresisState) -> Array:
+        """Return the set-points [rad] of angles at rest; the state is unchanged."""
+        return self.model.rows.inverse(angle.ravel(), _flat(state)).reshape(angle.shape)
 
 
 def _flat(state: HysteresisState) -> HysteresisState:

@@ -1,10 +1,10 @@
-"""Set-points of joints without feedback: the reference itself, or the inverse of the hysteresis.
+"""Feedforward control of joints: the reference itself, or the inverse of the hysteresis.
 
     u = H^-1(r)                                              fluidic_muscles, section 3.2, Fig. 10
 
-``H^-1`` is the exact recursive inverse of the hysteresis as identified on the nominal plant, in the
-history of what was commanded: ``E(u_next, u_turn) = f_next - f_turn``. The printed sum (3.5) is
-exact only up to the first turn (:mod:`pam_envs.identification.everett_series`).
+``H^-1`` is the exact recursive inverse of the hysteresis identified on the nominal plant, for the
+history of commands: ``E(u_next, u_turn) = f_next - f_turn``. The printed sum (3.5) is exact only up
+to the first reversal (:mod:`pam_envs.identification.everett_series`).
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Prediction, reset_rows
+from baselines.core.controller import Prediction, RowController
 from baselines.core.entry import Entry
 from baselines.core.environments import JOINT
 from baselines.core.knobs import AS_DESIGNED, Knobs
 from baselines.joint.gravity import Gravity
-from baselines.joint.hysteresis_rows import JointHysteresisModels
+from baselines.joint.hysteresis_rows import JointHysteresis
 from baselines.joint.model import JointModel, joint_model
 from baselines.joint.poles import joint_delays
 from baselines.joint.preview import KNOBS, Lookahead, lookahead_for
-from baselines.joint.view import JointSignalMap, JointView, make_joint_signal_map
+from baselines.joint.view import JointSignalMap, make_joint_signal_map
 from baselines.positioning.nominal import HysteresisState
 from pam_envs.parameters import Signals
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
@@ -33,8 +33,8 @@ from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 
 
 @dataclass(frozen=True)
-class JointInverse:
-    """The inverse of the hysteresis as feed-forward.
+class JointInverse(RowController):
+    """Inverse of the hysteresis as feedforward.
 
     Attributes
     ----------
@@ -49,25 +49,20 @@ class JointInverse:
     gravity: Gravity
     lookahead: Lookahead
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: HysteresisState | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the set-points; see :class:`~baselines.core.controller.Controller`."""
-        view, hysteresis_models = self.signals.read(observation), JointHysteresisModels(self.model)
-        state = reset_rows(state, episode_start, len(view.angle), lambda: self._start(view))
-        shift = self.gravity.shift(view.reference, view.payload)
-        found = hysteresis_models.inverse(self.lookahead.wanted(view.samples), state) + shift
-        set_point = np.minimum(np.maximum(found, self.model.low), self.model.high)
-        after = hysteresis_models.forward(set_point - shift, state)[1]
-        return self.signals.write(set_point, observation), after
-
-    def _start(self, view: JointView) -> HysteresisState:
+    def initial_state(self, observation: ArrayLike) -> HysteresisState:
+        """See :class:`~baselines.core.controller.RowController`."""
+        view = self.signals.read(observation)
         held = view.set_point - self.gravity.shift(view.angle, view.payload)
-        return JointHysteresisModels(self.model).start(held)[1]
+        return JointHysteresis(self.model).start(held)[1]
+
+    def respond(self, observation: ArrayLike, state: HysteresisState) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
+        view, hysteresis = self.signals.read(observation), JointHysteresis(self.model)
+        shift = self.gravity.shift(view.reference, view.payload)
+        found = hysteresis.inverse(self.lookahead.reference(view.samples), state) + shift
+        set_point = np.minimum(np.maximum(found, self.model.low), self.model.high)
+        after = hysteresis.forward(set_point - shift, state)[1]
+        return self.signals.write(set_point, observation), after
 
 
 def make_joint_inverse(
@@ -87,12 +82,12 @@ def make_joint_inverse(
         Nominal plant.
     signals, action_signals : Signals
     inverse : float
-        Width of the hysteresis that is inverted over the identified one; 0: the reference goes
-        through the line between the tips of the loop.
+        Width of the inverted hysteresis over the identified one; 0: the line between the tips of
+        the loop.
     gravity : bool
-        Whether the set-points carry the weight of the links and the payload that is told.
+        Whether the set-points compensate the weight of the links and of the declared payload.
     ahead : bool
-        Whether the previewed reference is inverted, ahead by the delay of each joint.
+        Whether the reference is previewed by the delay of each joint.
     knobs : mapping
         Of :data:`baselines.joint.preview.KNOBS`.
     """

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from control import StateSpace
 
 DAMPING = 1.0 / math.sqrt(2.0)
-SLOW = 4.0
+SLOW_CROSSOVER = 4.0
 """Crossover of the slow PI [rad/s] at poles of 23 rad/s."""
 
 
@@ -56,7 +56,7 @@ def pole_cancelling(gain: float = 1.0, pole: float = POLE, damping: float = DAMP
 
 def slow_gains(gain: float = 1.0, pole: float = POLE) -> PiGains:
     """Return the gains of the slow PI; see this module's page."""
-    proportional = SLOW / (POLE * gain)
+    proportional = SLOW_CROSSOVER / (POLE * gain)
     return PiGains(proportional, proportional * pole)
 
 

@@ -1,9 +1,9 @@
-"""What the controllers of joints know of a nominal plant: its hysteresis, and a model of its motion.
+"""Nominal model of joints: identified hysteresis and motion.
 
-The hysteresis is identified on the nominal plant as fluidic_muscles (section 3.2) does it on the
-rig, by first-order descending curves (:mod:`pam_envs.identification.joint_forc`), and made
-symmetric. The motion behind it is the paper's nominal model (section 4), two real poles at 23
-rad/s. For a manipulator it is one stage, without the others.
+The hysteresis is identified on the nominal plant as in fluidic_muscles (section 3.2) on the rig, by
+first-order descending curves (:mod:`pam_envs.identification.joint_forc`), and made symmetric. The
+motion behind it is the paper's nominal model (section 4), two real poles at 23 rad/s. For a
+manipulator it is one stage, without the others.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _HYSTERESIS_MODELS: dict[str, Preisach] = {}
 
 @dataclass(frozen=True)
 class LineRows:
-    """A line through 0, worked by rows like a hysteresis."""
+    """Line through 0 in place of a hysteresis."""
 
     slope: float
 
@@ -40,9 +40,9 @@ class LineRows:
         """Return no state."""
         return ()
 
-    def forward(self, felt: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
+    def forward(self, value: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
         """Return the output of an input."""
-        return self.slope * felt, state
+        return self.slope * value, state
 
     def inverse(self, wanted: Array, state: HysteresisState) -> Array:
         """Return the input of an output."""
@@ -89,12 +89,12 @@ class JointModel:
 
     @cached_property
     def rows(self) -> Rows | LineRows:
-        """The hysteresis worked by rows."""
+        """The hysteresis vectorised over rows."""
         return LineRows(self.slope) if self.hysteresis is None else self.hysteresis.rows()
 
     @cached_property
     def reach(self) -> tuple[float, float]:
-        """Angles at rest [rad] at the ends of the set-point's range, coming from the other end."""
+        """Angles at rest [rad] at the ends of the set-point's range, reached from the other end."""
         ends = np.array([self.low, self.high])
         state = self.rows.initial(2)
         for u in (ends[::-1], ends):
@@ -102,18 +102,18 @@ class JointModel:
         return float(found[0]), float(found[1])
 
     def virgin(self, set_point: Array) -> tuple[Array, HysteresisState]:
-        """Return angles at rest [rad] under first set-points (n,), and the hysteresis they leave."""
+        """Return angles at rest [rad] under first set-points (n,), and the state after them."""
         return self.rows.forward(set_point, self.rows.initial(len(set_point)))
 
     def narrowed(self, width: float) -> JointModel:
-        """Return the model with a hysteresis ``width`` times as wide, the tips the same; 0: a line."""
+        """Return the model with the hysteresis' width scaled, its tips unchanged; 0: a line."""
         if self.hysteresis is None or width == 0.0:
             return replace(self, hysteresis=None, slope=self.gain)
         return replace(self, hysteresis=self.hysteresis.scaled(width, self.gain))
 
 
 def joint_model(plant: Any, levels: int = LEVELS, poles: tuple[float, ...] = (POLE,)) -> JointModel:
-    """Return the nominal model of a plant with ``rest_angles``, identified once for each plant.
+    """Return the nominal model of a plant with ``rest_angles``, cached by plant.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def joint_model(plant: Any, levels: int = LEVELS, poles: tuple[float, ...] = (PO
     Warns
     -----
     UserWarning
-        If the hysteresis is no symmetric Preisach operator; the model is then the map as measured.
+        If the hysteresis is not a symmetric Preisach operator; the model is then the measured map.
     """
     key = f"{plant.digest()} {levels}"
     low, high = plant.angle_range

@@ -1,19 +1,20 @@
-"""Model-following control of joints with an inverse of the hysteresis: fluidic_muscles, section 4, Fig. 11.
+"""Model-following control of joints with an inverse of the hysteresis.
+
+fluidic_muscles, section 4, Fig. 11:
 
     model loop         u_mod = C_t (r - phi_mod),      phi_mod = G u_mod
     disturbance loop   u_dis = C_d (phi_mod - phi)
-    command            u = H^-1(u_mod + u_dis)         (+ what carries gravity)
+    command            u = H^-1(u_mod + u_dis)         (+ gravity feedforward)
 
-The model loop has no disturbance, so that its PI (pole cancelled, ``D = 1/sqrt(2)``) is designed
-for tracking alone; the disturbance loop compares the joint with the model and not with the
-reference, and is designed for rejection alone (:mod:`baselines.robust.loops`). With an exact
-inverse and motion the joint is its model, and the disturbance loop rests.
+The model loop has no disturbance: its PI (pole cancellation, ``D = 1/sqrt(2)``) is designed for
+tracking alone. The disturbance loop compares the joint with the model instead of the reference, and
+is designed for rejection alone (:mod:`baselines.robust.loops`). With an exact inverse and motion
+the joint equals its model, and the disturbance loop is at rest.
 
-``H^-1`` is the exact recursive inverse of the hysteresis as identified on the nominal plant
-(:mod:`baselines.joint.model`), in the history of what was commanded. Left out, ``u = (u_mod +
-u_dis) / K``. Limits: ``u_mod`` keeps within the angles that can be held, so that the model
-saturates as the joint does, ``u_dis`` within what is left; the disturbance loop is told what was
-applied (:mod:`baselines.joint.loop`).
+``H^-1`` is the exact recursive inverse of the identified hysteresis (:mod:`baselines.joint.model`),
+for the history of commands; without it ``u = (u_mod + u_dis) / K``. ``u_mod`` is limited to the
+angles that can be held, so that the model saturates as the joint does, and ``u_dis`` to the rest;
+the disturbance loop receives the applied command (:mod:`baselines.joint.loop`).
 """
 
 from __future__ import annotations
@@ -25,17 +26,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Prediction, reset_rows
+from baselines.core.controller import Array, Prediction, RowController
 from baselines.core.entry import Entry
 from baselines.core.environments import JOINT
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.joint.gravity import Gravity
-from baselines.joint.hysteresis_rows import JointHysteresisModels
+from baselines.joint.hysteresis_rows import JointHysteresis
 from baselines.joint.loop import DAMPING, make_loop
 from baselines.joint.model import JointModel, joint_model
 from baselines.joint.poles import joint_poles
 from baselines.joint.preview import KNOBS as PREVIEW_KNOBS
-from baselines.joint.preview import Lookahead, double_lags, lookahead_for
+from baselines.joint.preview import Lookahead, double_pole_delays, lookahead_for
 from baselines.joint.tracking import make_model_loop
 from baselines.joint.view import JointSignalMap, JointView, make_joint_signal_map
 from baselines.linear.bumpless import Bumpless, BumplessState
@@ -47,11 +48,11 @@ from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 
 KNOBS: Bounds = {"damping": (0.5, 1.5), "disturbance": (0.5, 2.0)}
-"""On the damping of the model loop and on the bandwidth of the disturbance loop."""
+"""Factors on the damping of the model loop and the bandwidth of the disturbance loop."""
 
 
 class FollowingState(NamedTuple):
-    """Hysteresis models of model, loops and inverse, shapes (n_env, n_joints, ...).
+    """States of model, loops and inverse, shapes (n_env, n_joints, ...).
 
     Attributes
     ----------
@@ -71,13 +72,13 @@ class FollowingState(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ModelFollowing:
-    """Model loop, inverse and disturbance loop; see this module's page.
+class ModelFollowing(RowController):
+    """Model loop, inverse and disturbance loop; see the module.
 
     Attributes
     ----------
     model : JointModel
-        Whose hysteresis is inverted.
+        Of hysteresis and motion.
     tracking : DiscreteSystem
         Model loop, from reference to mean command.
     disturbance : Bumpless
@@ -94,16 +95,22 @@ class ModelFollowing:
     gravity: Gravity
     lookahead: Lookahead
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: FollowingState | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the set-points; see :class:`~baselines.core.controller.Controller`."""
+    def initial_state(self, observation: ArrayLike) -> FollowingState:
+        """Return the state of joints at rest at the present angle and set-point."""
         view = self.signals.read(observation)
-        state = reset_rows(state, episode_start, len(view.angle), lambda: self._start(view))
+        shift = self.gravity.shift(view.angle, view.payload)
+        held, hysteresis = JointHysteresis(self.model).start(view.set_point - shift)
+        angle = view.angle
+        return FollowingState(
+            self.model.motion.rest_state(angle),
+            self.tracking.rest_state(angle),
+            self.disturbance.holding_state(held - angle),
+            hysteresis,
+        )
+
+    def respond(self, observation: ArrayLike, state: FollowingState) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
+        view = self.signals.read(observation)
         shift = self.gravity.shift(view.reference, view.payload)
         tracking, correction = self._commands(view, state)
         set_point = self._inverse(tracking + correction, state.hysteresis) + shift
@@ -116,23 +123,11 @@ class ModelFollowing:
         """Return the model's angles [rad], shape (n_env, n_joints), when the action has acted."""
         return self.model.motion.output(np.zeros(state.model.shape[:-1]), state.model)
 
-    def _start(self, view: JointView) -> FollowingState:
-        """Return the state of a joint that rests where it is, at the set-point that it has."""
-        shift = self.gravity.shift(view.angle, view.payload)
-        held, hysteresis = JointHysteresisModels(self.model).start(view.set_point - shift)
-        angle = view.angle
-        return FollowingState(
-            self.model.motion.rest_state(angle),
-            self.tracking.rest_state(angle),
-            self.disturbance.holding_state(held - angle),
-            hysteresis,
-        )
-
     def _commands(self, view: JointView, state: FollowingState) -> tuple[Array, Array]:
         """Return the commands of model and disturbance loop: angles at rest [rad]."""
         low, high = self.model.reach
         angle = self.model_output(state)
-        aim = self.lookahead.wanted(view.samples)
+        aim = self.lookahead.reference(view.samples)
         tracking = np.clip(self.tracking.output(aim, state.tracking), low, high)
         more = self.disturbance.output(
             angle, view.angle, state.disturbance, low - tracking, high - tracking
@@ -140,19 +135,19 @@ class ModelFollowing:
         return tracking, more
 
     def _inverse(self, wanted: Array, hysteresis: HysteresisState) -> Array:
-        return JointHysteresisModels(self.model).inverse(wanted, hysteresis)
+        return JointHysteresis(self.model).inverse(wanted, hysteresis)
 
     def _after(
         self, view: JointView, state: FollowingState, tracking: Array, applied: Array
     ) -> FollowingState:
         angle = self.model_output(state)
-        held, hysteresis = JointHysteresisModels(self.model).forward(applied, state.hysteresis)
+        held, hysteresis = JointHysteresis(self.model).forward(applied, state.hysteresis)
         disturbance = self.disturbance.advance(
             angle, view.angle, held - tracking, state.disturbance
         )
         return FollowingState(
             self.model.motion.advance(tracking, state.model),
-            self.tracking.advance(self.lookahead.wanted(view.samples), state.tracking),
+            self.tracking.advance(self.lookahead.reference(view.samples), state.tracking),
             disturbance,
             hysteresis,
         )
@@ -178,20 +173,19 @@ def make_model_following(
     kind : {"mu", "hinf"}
         Of the disturbance loop.
     inverse : float
-        Width of the hysteresis that is inverted over the identified one: 1 is the exact inverse, 0
-        none.
+        Width of the inverted hysteresis over the identified one: 1 is the exact inverse, 0 none.
     gravity : bool
-        Whether the set-points carry the weight of the links and the payload that is told.
+        Whether the set-points compensate the weight of the links and of the declared payload.
     ahead : bool
-        Whether the model loop is given the previewed reference in place of the present one.
+        Whether the reference of the model loop is previewed.
     knobs : mapping
-        Of ``KNOBS`` and of :data:`baselines.joint.preview.KNOBS`. The model loop's delay goes with
-        the square of its damping.
+        Of ``KNOBS`` and of :data:`baselines.joint.preview.KNOBS`. The delay of the model loop is
+        proportional to the square of its damping.
     """
     model = joint_model(plant, poles=joint_poles(plant)).narrowed(inverse)
     made = make_joint_signal_map(signals, action_signals)
     damping, pace = knob(knobs, "damping"), knob(knobs, "disturbance")
-    delays = [damping**2 * delay for delay in double_lags(model.poles)]
+    delays = [damping**2 * delay for delay in double_pole_delays(model.poles)]
     return ModelFollowing(
         model,
         make_model_loop(model, damping * DAMPING),

@@ -1,11 +1,11 @@
-"""How fast each joint of a nominal plant is: the double pole that stands for it in a controller.
+"""Equivalent double pole and delay of each joint of a nominal plant.
 
-A stage alone is the paper's nominal model, two poles at 23 rad/s. In an arm a joint also moves what
-hangs on it. Its pole is then the frequency at which its angle lags its own set-point by a quarter
-of a turn, as ``p^2 / (s + p)^2`` does at ``p`` (and a swinging joint at its natural frequency), but
-not above that of a stage. Beside it stands the joint's delay for slow set-points, ``2 / p`` of a
-double pole, but less of a joint that swings: the mean time of its answer to a pulse. Both are found
-by small steps of one joint after the other, the arm straight and the hysteresis off.
+A single stage is the paper's nominal model, two poles at 23 rad/s. In an arm a joint also moves the
+links behind it: its pole is the frequency at which its angle lags its own set-point by 90 degrees,
+as ``p^2 / (s + p)^2`` does at ``p`` (and an oscillating joint at its natural frequency), at most
+that of a single stage. Its delay for slow set-points is the mean time of its impulse response,
+``2 / p`` for a double pole and less for an oscillating joint. Both are found by small steps of one
+joint at a time, with the arm straight and without hysteresis.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ FREQUENCIES = np.geomspace(0.5, 60.0, 400)
 """[rad/s]."""
 
 
-class Pace(NamedTuple):
-    """How fast a joint is.
+class JointDynamics(NamedTuple):
+    """Equivalent dynamics of a joint.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Pace(NamedTuple):
     delay: float
 
 
-_PACES: dict[str, tuple[Pace, ...]] = {}
+_DYNAMICS: dict[str, tuple[JointDynamics, ...]] = {}
 
 
 def joint_poles(plant: Any) -> tuple[float, ...]:
@@ -50,26 +50,26 @@ def joint_poles(plant: Any) -> tuple[float, ...]:
     plant : AntagonisticJoint or RedundantManipulator
         Nominal plant.
     """
-    return tuple(pace.pole for pace in joint_paces(plant))
+    return tuple(pace.pole for pace in joint_dynamics(plant))
 
 
 def joint_delays(plant: Any) -> tuple[float, ...]:
-    """Return the delay of each joint [s] for slow set-points, without that of the hold."""
-    return tuple(pace.delay for pace in joint_paces(plant))
+    """Return the delay of each joint [s] for slow set-points, without the hold."""
+    return tuple(pace.delay for pace in joint_dynamics(plant))
 
 
-def joint_paces(plant: Any) -> tuple[Pace, ...]:
-    """Return how fast each joint is, found once for each plant."""
+def joint_dynamics(plant: Any) -> tuple[JointDynamics, ...]:
+    """Return the dynamics of each joint, cached by plant."""
     if plant.stages == 1:
-        return (Pace(POLE, 2.0 / POLE),)
+        return (JointDynamics(POLE, 2.0 / POLE),)
     key = plant.digest()
-    if key not in _PACES:
+    if key not in _DYNAMICS:
         smooth = plant.replace({"hysteresis.width": 0.0})
-        _PACES[key] = tuple(_pace(smooth, k) for k in range(plant.stages))
-    return _PACES[key]
+        _DYNAMICS[key] = tuple(_dynamics(smooth, k) for k in range(plant.stages))
+    return _DYNAMICS[key]
 
 
-def _pace(plant: Any, joint: int) -> Pace:
+def _dynamics(plant: Any, joint: int) -> JointDynamics:
     from pam_envs.plants.redundant_manipulator.rollout import simulate_manipulator
 
     period = plant.control_period
@@ -78,22 +78,22 @@ def _pace(plant: Any, joint: int) -> Pace:
     pulse = np.diff(simulate_manipulator(plant, commands)["angle"][:, joint])
     behind = np.flatnonzero(-phase(pulse, period) > 0.5 * np.pi)
     pole = min(POLE, float(FREQUENCIES[behind[0]])) if behind.size else POLE
-    return Pace(pole, mean_time(pulse, period))
+    return JointDynamics(pole, mean_time(pulse, period))
 
 
 def mean_time(pulse: Array, period: float) -> float:
-    """Return the delay [s] for slow inputs of what answers a held step with these increments.
+    """Return the delay [s] for slow inputs from the increments of a step response.
 
-    Half a period is taken off for the hold.
+    Half a period of the hold is subtracted.
     """
     time = (np.arange(len(pulse)) + 1.0) * period
     return float(time @ pulse / np.sum(pulse)) - 0.5 * period
 
 
 def phase(pulse: Array, period: float) -> Array:
-    """Return the phase [rad] at ``FREQUENCIES`` of what answers a held step with these increments.
+    """Return the phase [rad] at ``FREQUENCIES`` from the increments of a step response.
 
-    Half a period is taken off for the hold.
+    Half a period of the hold is subtracted.
     """
     time = (np.arange(len(pulse)) + 1.0) * period
     response = np.exp(-1j * np.multiply.outer(FREQUENCIES, time)) @ pulse

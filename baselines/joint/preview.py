@@ -1,17 +1,17 @@
-"""Reference ahead of time: what a loop has to be given so that its output is not late.
+"""Preview of the reference by the delay of a loop.
 
-A controller reads the reference as it will be when its own delay for slow references, and half a
-control period of the hold, have gone by: by straight lines between the previewed samples. Where the
-previews end before, as they do for the slow joints of an arm, the straight line from the present to
-the last sample is prolonged.
+A controller reads the reference later by its own delay for slow references and half a control
+period of the hold, by linear interpolation of the previewed samples. Where the preview horizon is
+too short, as for the slow joints of an arm, the line from the present to the last sample is
+extrapolated.
 
 The loop of the pole-cancelling PI and the nominal model (:mod:`baselines.joint.loop`) is, at a
 damping of ``1 / sqrt(2)``,
 
     T(s) = 1 / (1 + 2 (s / p) + 2 (s / p)^2)
 
-which is ``exp(-2 s / p)`` up to the third order: for a smooth reference a delay of ``2 / p`` and
-nothing else. (Of the double pole without a loop the delay is the same, up to the second order.)
+which equals ``exp(-2 s / p)`` up to the third order: for a smooth reference a pure delay of
+``2 / p``. (The double pole without a loop has the same delay, up to the second order.)
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from baselines.core.controller import Array
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
 from baselines.joint.view import JointSignalMap
 
-MOST = 2.0
-"""How far the previewed stretch is prolonged at most, in its own length."""
+MAX_EXTRAPOLATION = 2.0
+"""Largest extrapolation over the preview horizon."""
 KNOBS: Bounds = {"lead": (0.25, 4.0)}
-"""On the delays that are made up for."""
+"""Factor on the compensated delays."""
 
 
-def double_lags(poles: Sequence[float]) -> list[float]:
+def double_pole_delays(poles: Sequence[float]) -> list[float]:
     """Return the delays [s] of double poles [rad/s], and of the PI's loops around them."""
     return [2.0 / pole for pole in poles]
 
 
 @dataclass(frozen=True)
 class Lookahead:
-    """Reads a reference ahead of time, for each joint by another time.
+    """Interpolation of a previewed reference, for each joint at its own time.
 
     Attributes
     ----------
@@ -49,18 +49,18 @@ class Lookahead:
 
     weights: NDArray[np.float64]
 
-    def wanted(self, samples: Array) -> Array:
-        """Return the references [rad], shape (n_env, n_joints), from all their samples."""
+    def reference(self, samples: Array) -> Array:
+        """Return the references [rad], shape (n_env, n_joints), from their samples."""
         return np.asarray(np.add.reduce(samples * self.weights, axis=-1))
 
 
 def present(samples: int) -> Lookahead:
-    """Return what reads the present reference."""
+    """Return the weights of the present reference."""
     return Lookahead(np.eye(1, samples))
 
 
 def ahead_by(leads: Sequence[float], times: Sequence[float]) -> Lookahead:
-    """Return what reads the reference of each joint so much later [s].
+    """Return the weights of the reference later by a lead [s] of each joint.
 
     Parameters
     ----------
@@ -78,13 +78,13 @@ def lookahead_for(
     period: float,
     knobs: Knobs = AS_DESIGNED,
 ) -> Lookahead:
-    """Return what makes up for the delays of joints [s] and for the hold, or reads the present.
+    """Return the weights that compensate the delays of joints [s] and the hold.
 
     Parameters
     ----------
     signals : JointSignalMap
     delays : sequence of float or None
-        Without that of the hold; None for the present.
+        Without that of the hold; None for the present reference.
     period : float
         Control period [s].
     knobs : mapping
@@ -96,7 +96,7 @@ def lookahead_for(
 
 
 def _weights(lead: float, times: Array) -> Array:
-    """Return the weights of samples at times [s] that give the value at another."""
+    """Return the interpolation weights of samples at times [s] for a lead [s]."""
     made, last = np.zeros(len(times)), len(times) - 1
     if last == 0:
         made[0] = 1.0
@@ -105,6 +105,6 @@ def _weights(lead: float, times: Array) -> Array:
         share = (lead - times[k]) / (times[k + 1] - times[k])
         made[k : k + 2] = 1.0 - share, share
     else:
-        beyond = min(lead / times[last] - 1.0, MOST)
+        beyond = min(lead / times[last] - 1.0, MAX_EXTRAPOLATION)
         made[0], made[last] = -beyond, 1.0 + beyond
     return made

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Prediction, row_count
+from baselines.core.controller import Prediction, RowController
 from baselines.core.entry import Entry
 from baselines.core.environments import JOINT
 from baselines.joint.view import JointSignalMap, make_joint_signal_map
@@ -17,25 +17,22 @@ from pam_envs.parameters import Signals
 
 
 @dataclass(frozen=True)
-class ZeroAngle:
+class ZeroAngle(RowController):
     """Set-points of 0; a co-contraction is kept."""
 
     signals: JointSignalMap
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: Any = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return 0, no state; see :class:`~baselines.core.controller.Controller`."""
+    def initial_state(self, observation: ArrayLike) -> None:
+        """Return no state."""
+
+    def respond(self, observation: ArrayLike, state: Any) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
         angle = self.signals.read(observation).angle
         return self.signals.write(np.zeros_like(angle), observation), None
 
 
 @dataclass(frozen=True)
-class JointRandom:
+class JointRandom(RowController):
     """Uniformly distributed set-points; a co-contraction is kept.
 
     Attributes
@@ -47,15 +44,13 @@ class JointRandom:
     signals: JointSignalMap
     random: Random
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: RandomState | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the next draws; see :class:`~baselines.core.controller.Controller`."""
-        values, after = self.random.draw(row_count(observation), state, episode_start)
+    def initial_state(self, observation: ArrayLike) -> RandomState:
+        """Return the state before the first draw."""
+        return self.random.initial_state(observation)
+
+    def respond(self, observation: ArrayLike, state: RandomState) -> Prediction:
+        """Return the action of the next draw, and the state after it."""
+        values, after = self.random.draw(state)
         return self.signals.write(values.T, observation), after
 
 

@@ -1,8 +1,8 @@
-"""What the controllers of joints read and write: one joint, or every joint of a manipulator.
+"""Observation and action of the joints' controllers: one joint, or every joint of a manipulator.
 
-A manipulator is controlled joint by joint (decentralised): each joint of each environment is a
-*lane*, and the controllers work on all lanes alike. The names of the signals tell which it is:
-``angle``, ``set_point``, ``reference``, or ``angle_k``, ``set_point_k``, ``joint_reference_k``.
+A manipulator is controlled joint by joint (decentralised); the controllers are vectorised over rows
+and joints. Signals are named ``angle``, ``set_point``, ``reference`` for one joint, and
+``angle_k``, ``set_point_k``, ``joint_reference_k`` for a manipulator.
 """
 
 from __future__ import annotations
@@ -13,7 +13,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from baselines.core.controller import Array, Reader, reader
+from baselines.core.controller import (
+    Array,
+    Reader,
+    encode_actions,
+    preview_names,
+    reader,
+    row_count,
+)
 from pam_envs.parameters import Signal, Signals
 
 
@@ -23,13 +30,13 @@ class JointView(NamedTuple):
     Attributes
     ----------
     angle : ndarray
-        As sensed [rad].
+        Sensed [rad].
     set_point : ndarray
         Of the last period [rad].
     samples : ndarray, shape (n_env, n_joints, n_samples)
-        Angle that is wanted [rad]: now, and as previewed.
+        Reference angle [rad]: present and previewed.
     payload : ndarray, shape (n_env,)
-        As told [kg]; 0 where nothing is said of it.
+        Declared payload [kg]; 0 if not observed.
     """
 
     angle: Array
@@ -39,26 +46,26 @@ class JointView(NamedTuple):
 
     @property
     def reference(self) -> Array:
-        """Angle that is wanted now [rad], shape (n_env, n_joints)."""
+        """Present reference angle [rad], shape (n_env, n_joints)."""
         return self.samples[..., 0]
 
 
 @dataclass(frozen=True)
 class JointSignalMap:
-    """Makes a :class:`JointView` of observations, and actions of set-points.
+    """Reader of observations as a :class:`JointView`, and writer of actions.
 
     Attributes
     ----------
     angle, set_point : Reader
     samples : Reader
-        Of the wanted angles, joint by joint: now, and as previewed.
+        Of the reference angles, joint by joint: present and previewed.
     times : tuple of float
-        Of these samples, from now on [s].
+        Of these samples, after the present [s].
     payload, prestress : Reader or None
     actions : tuple of Signal
         Set-points of the joints, in their order.
     prestress_action : Signal or None
-        Co-contraction, held where it is.
+        Co-contraction, kept at its present value.
     """
 
     angle: Reader
@@ -81,7 +88,7 @@ class JointSignalMap:
         return self.actions[0].high
 
     def read(self, observation: ArrayLike) -> JointView:
-        """Return what an observation of shape (n_obs,) or (n_env, n_obs) shows."""
+        """Return the view of an observation of shape (n_obs,) or (n_env, n_obs)."""
         angle = self.angle.rows(observation).T
         payload = np.zeros(len(angle))
         if self.payload is not None:
@@ -92,34 +99,28 @@ class JointSignalMap:
 
     def write(self, set_points: Array, observation: ArrayLike) -> NDArray[np.float32]:
         """Return the action for set-points [rad], shape (n_env, n_joints)."""
-        held = np.minimum(np.maximum(set_points, self.low), self.high)
-        width = len(self.actions) + (self.prestress_action is not None)
-        action = np.zeros((len(held), width))
-        for k, signal in enumerate(self.actions):
-            gain, offset = signal.scale
-            action[:, signal.index] = gain * held[:, k] + offset
+        signals, values = list(self.actions), list(set_points.T)
         if self.prestress_action is not None:
-            action[:, self.prestress_action.index] = self._prestress(observation)
-        made = action.astype(np.float32)
-        return made if np.ndim(observation) == 2 else made[0]
+            signals.append(self.prestress_action)
+            values.append(self._prestress(observation))
+        return encode_actions(signals, np.array(values), observation)
 
     def _prestress(self, observation: ArrayLike) -> Array:
+        """Return the observed co-contraction, or the middle of its range, shape (n_env,)."""
         signal = self.prestress_action
         assert signal is not None
-        gain, offset = signal.scale
-        value = np.array([0.5 * (signal.low + signal.high)])
         if self.prestress is not None:
-            value = self.prestress.rows(observation)[0]
-        return np.asarray(gain * np.minimum(np.maximum(value, signal.low), signal.high) + offset)
+            return np.asarray(self.prestress.rows(observation)[0])
+        return np.full(row_count(observation), 0.5 * (signal.low + signal.high))
 
 
 def make_joint_signal_map(signals: Signals, action_signals: Signals) -> JointSignalMap:
-    """Return what reads and writes the signals of one joint or of a manipulator.
+    """Return the reader and writer of the signals of one joint or of a manipulator.
 
     Raises
     ------
     ValueError
-        If the actions are not set-points of angles, or the wanted angles are not observed.
+        If the actions are not set-points of angles, or the reference angles are not observed.
     """
     actions, names = set(action_signals.names()), set(signals.names())
     ends = [""] if "angle_set_point" in actions else _numbered(actions)
@@ -128,13 +129,12 @@ def make_joint_signal_map(signals: Signals, action_signals: Signals) -> JointSig
             f"the actions are {', '.join(sorted(actions))}; these controllers give set-points of"
             " angles: make the environment with action='angle'"
         )
-    wanted = [f"{'reference' if ends == [''] else 'joint_reference'}{end}" for end in ends]
-    if wanted[0] not in names:
+    references = [f"{'reference' if ends == [''] else 'joint_reference'}{end}" for end in ends]
+    if references[0] not in names:
         raise ValueError(
-            f"there is no signal {wanted[0]!r}; these controllers follow planned angles: make the"
+            f"there is no signal {references[0]!r}; these controllers track planned angles: make the"
             " environment with plan=True, or take 'joint_inverse_kinematics', which plans itself"
         )
-    previews = _previews(wanted[0], names)
 
     def known(name: str) -> Reader | None:
         return reader(signals, [name]) if name in names else None
@@ -142,8 +142,8 @@ def make_joint_signal_map(signals: Signals, action_signals: Signals) -> JointSig
     return JointSignalMap(
         reader(signals, [f"angle{end}" for end in ends]),
         reader(signals, [f"set_point{end}" for end in ends]),
-        reader(signals, [f"{name}{late}" for name in wanted for late in previews]),
-        tuple(signals[f"{wanted[0]}{late}"].ahead for late in previews),
+        reader(signals, [name for first in references for name in preview_names(first, signals)]),
+        tuple(signals[name].ahead for name in preview_names(references[0], signals)),
         known("payload"),
         known("prestress"),
         tuple(action_signals[f"angle_set_point{end}"] for end in ends),
@@ -156,11 +156,3 @@ def _numbered(names: set[str]) -> list[str]:
     while f"angle_set_point_{len(ends)}" in names:
         ends.append(f"_{len(ends)}")
     return ends
-
-
-def _previews(name: str, names: set[str]) -> list[str]:
-    """Return the ends of the names of a signal and its previews, the present one first."""
-    found = [""]
-    while f"{name}_{len(found)}" in names:
-        found.append(f"_{len(found)}")
-    return found

@@ -1,9 +1,8 @@
-"""Feed-forwards of the knee: from a wanted tension to a pressure.
+"""Feedforward of the knee: from a reference tension to a pressure.
 
-The wanted tension over the muscle's stretch, as measured, is the wanted stiffness (yeh2010,
-section 4.1). The pressure that gives it comes from the inverse of the identified hysteresis, or
-from the straight line between the tips of its loop, or it is the nominal pressure whatever is
-wanted.
+The reference tension over the measured stretch of the muscle is the reference stiffness (yeh2010,
+section 4.1). Its pressure comes from the inverse of the identified hysteresis ("inverse"), from the
+straight line between the tips of its loop ("line"), or is the nominal pressure ("nominal").
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ Kind = Literal["nominal", "line", "inverse"]
 
 @dataclass(frozen=True)
 class Forward:
-    """A feed-forward; its state is the nominal muscle's hysteresis.
+    """Feedforward; its state is that of the nominal hysteresis.
 
     Attributes
     ----------
@@ -35,8 +34,8 @@ class Forward:
     kind: Kind
 
     def start(self, pressure: Array) -> HysteresisState:
-        """Return the state of muscles that were inflated to a pressure [Pa], shape (n_env,)."""
-        return self.nominal.rested(pressure) if self.kind == "inverse" else ()
+        """Return the state after inflation to a pressure [Pa], shape (n_env,)."""
+        return self.nominal.inflated(pressure) if self.kind == "inverse" else ()
 
     def pressure(self, tension: Array, stretch: Array, state: HysteresisState) -> Array:
         """Return the pressure [Pa], within the capacity, for a tension [N] at a stretch [m]."""
@@ -47,6 +46,6 @@ class Forward:
             return self.nominal.pressure_for(stiffness, state)
         return np.minimum(self.nominal.line(stiffness), self.nominal.full_pressure)
 
-    def move(self, pressure: Array, state: HysteresisState) -> HysteresisState:
-        """Return the state after a pressure [Pa] of this feed-forward."""
-        return self.nominal.felt(pressure, state) if self.kind == "inverse" else state
+    def advance(self, pressure: Array, state: HysteresisState) -> HysteresisState:
+        """Return the state after a pressure [Pa] of this feedforward."""
+        return self.nominal.advance(pressure, state) if self.kind == "inverse" else state

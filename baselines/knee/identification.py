@@ -1,14 +1,14 @@
-"""Frequency response tests of a nominal knee orthosis, as yeh2010 (section 4.1) makes them.
+"""Frequency response tests of a nominal knee orthosis: yeh2010, section 4.1.
 
-The set-point swings about 2 bar, one sine a run, and tension or angle is measured. What the
-orthosis is mounted on in the test is part of what is identified:
+The set-point oscillates about 2 bar, one sine a run, and tension or angle is measured. The mounting
+of the orthosis in the test is part of the identified plant:
 
 - tension of the brace alone: free to move, as in the paper;
-- tension in a rig or on a leg: at the nominal length, as a leg that bears weight holds it;
-- angle on a leg: with the inertia, damping and hold of a leg that hangs.
+- tension in a rig or on a leg: at the nominal length, as held by a leg that bears weight;
+- angle on a leg: with the inertia, damping and hold of a hanging leg.
 
-The paper's tests are all without a leg. Its angle controller would then meet 25 times the inertia
-that it was designed for.
+The paper's tests are all without a leg: its angle controller would meet 25 times the inertia of its
+design.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from pam_envs.plants.knee_orthosis.rollout import simulate_knee
 Output = Literal["tension", "angle"]
 
 CENTRE = 2e5
-"""Pressure [Pa] that the sines swing about."""
+"""Mean pressure [Pa] of the sines."""
 AMPLITUDE = 0.5e5
-"""[Pa]; smaller, and the muscle's friction lets less through."""
+"""[Pa]; a smaller amplitude is attenuated by the muscle's friction."""
 FREQUENCIES = np.geomspace(0.5, 60.0, 24)
 """[rad/s]."""
 SETTLING, MEASURED = 4.0, 26.0
-"""Seconds before a measurement, and of it, rounded to whole periods of each sine."""
+"""Duration [s] before and of a measurement, rounded to whole periods of each sine."""
 ORDERS: dict[tuple[str, str, str], tuple[int, int]] = {
     ("no_load", "tension", "lag"): (3, 2),
     ("rig", "tension", "lag"): (1, 1),
@@ -47,7 +47,7 @@ ORDERS: dict[tuple[str, str, str], tuple[int, int]] = {
 
 
 def tested(plant: KneeOrthosis, output: Output) -> KneeOrthosis:
-    """Return the orthosis as it is mounted in the test of an output; see the module."""
+    """Return the orthosis as mounted in the test of an output; see the module."""
     quiet = plant.without_noise()
     if output == "tension":
         free = plant.mounting == "no_load"
@@ -76,7 +76,7 @@ def frequency_response(
     frequencies: Array = FREQUENCIES,
     amplitude: float = AMPLITUDE,
 ) -> NDArray[np.complex128]:
-    """Return the response from pressure set-point [kPa] to an output, one sine after the other.
+    """Return the response from pressure set-point [kPa] to an output, one sine a run.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def frequency_response(
     Returns
     -------
     ndarray of complex, shape (m,)
-        Of the first harmonic; the hold of the control period is divided out.
+        Response of the first harmonic, without the hold of the control period.
     """
     h = plant.control_period
     time = h * np.arange(round((SETTLING + MEASURED) / h), dtype=float)
@@ -107,7 +107,7 @@ def frequency_response(
 
 
 def _harmonic(time: Array, signal: Array, w: float) -> complex:
-    """Return the first harmonic over as many whole periods as were measured."""
+    """Return the first harmonic over the whole periods measured."""
     period = 2.0 * np.pi / w
     start = time[-1] - np.floor((time[-1] - time[0] - SETTLING) / period) * period
     kept = time > start
@@ -123,7 +123,7 @@ _FITS: dict[tuple[str, str], RationalFit] = {}
 def identify(plant: KneeOrthosis, output: Output) -> RationalFit:
     """Return the transfer function from set-point [kPa] to tension [N] or angle [rad].
 
-    The test and its fit are made once for each plant.
+    Cached by plant.
     """
     test = tested(plant, output)
     key = (test.digest(), output)

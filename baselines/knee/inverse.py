@@ -1,8 +1,8 @@
-"""Feed-forward alone: the inverse of the hysteresis, or the straight line, without feedback.
+"""Feedforward control of the knee: the inverse of the hysteresis, or a straight line.
 
-In stance, and with the brace alone, the wanted tension is the reference; in swing it is the one
-that takes the wire's torque off the knee. The inverse is static, as in yeh2010: it knows nothing
-of the regulator's lag. With a preview it aims at the reference one lag ahead.
+In stance, and with the brace alone, the reference tension is tracked; in swing the tension cancels
+the wire's torque on the knee. The inverse is static, as in yeh2010, without the regulator's lag.
+With a preview it tracks the reference of one lag later.
 """
 
 from __future__ import annotations
@@ -14,73 +14,72 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Prediction, encode_action, reset_rows
+from baselines.core.controller import Array, Prediction, RowController, encode_action
 from baselines.core.entry import Entry
 from baselines.core.environments import GAIT, KNEE
 from baselines.core.knobs import AS_DESIGNED, Knobs
 from baselines.knee.feedforward import Forward, Kind
 from baselines.knee.nominal import KneeNominal
-from baselines.knee.preview import KNOBS, Ahead, free_tension, make_ahead, tension
-from baselines.knee.view import Eyes, View, make_eyes
+from baselines.knee.preview import (
+    KNOBS,
+    StiffnessPreview,
+    free_tension,
+    make_stiffness_preview,
+    tension,
+)
+from baselines.knee.view import KneeObserver, KneeView, make_knee_observer
 from baselines.positioning.nominal import HysteresisState
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 
 class ForwardState(NamedTuple):
-    """The nominal hysteresis, first axis n_env."""
+    """State of the nominal hysteresis, first axis n_env."""
 
     hysteresis: HysteresisState
 
 
 @dataclass(frozen=True)
-class KneeForward:
-    """Feed-forward alone; see this module's page.
+class KneeForward(RowController):
+    """Feedforward control; see the module.
 
     Attributes
     ----------
     forward : Forward
-    eyes : Eyes
+    observer : KneeObserver
     action_signal : Signal
     assist : bool
-        Whether the reference is followed in stance; otherwise the wire's torque is taken off
-        always, so that the orthosis neither helps nor hinders.
-    ahead : Ahead, optional
-        Looks one lag ahead.
+        Whether the reference is tracked in stance; otherwise the wire's torque is cancelled
+        throughout, so that the orthosis neither assists nor resists.
+    preview : StiffnessPreview, optional
+        Of one lag.
     """
 
     forward: Forward
-    eyes: Eyes
+    observer: KneeObserver
     action_signal: Signal
     assist: bool = True
-    ahead: Ahead | None = None
+    preview: StiffnessPreview | None = None
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: ForwardState | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the set-point; see :class:`~baselines.core.controller.Controller`."""
-        view = self.eyes.look(observation)
-        state = reset_rows(
-            state,
-            episode_start,
-            len(view.tension),
-            lambda: ForwardState(self.forward.start(view.set_point)),
-        )
+    def initial_state(self, observation: ArrayLike) -> ForwardState:
+        """See :class:`~baselines.core.controller.RowController`."""
+        view = self.observer.read(observation)
+        return ForwardState(self.forward.start(view.set_point))
+
+    def respond(self, observation: ArrayLike, state: ForwardState) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
+        view = self.observer.read(observation)
         pressure = self.forward.pressure(
-            self._wanted(view, observation), view.stretch, state.hysteresis
+            self._reference(view, observation), view.stretch, state.hysteresis
         )
-        after = ForwardState(self.forward.move(pressure, state.hysteresis))
+        after = ForwardState(self.forward.advance(pressure, state.hysteresis))
         return encode_action(self.action_signal, pressure, observation), after
 
-    def _wanted(self, view: View, observation: ArrayLike) -> Array:
-        free = free_tension(self.eyes, self.ahead, view, observation)
+    def _reference(self, view: KneeView, observation: ArrayLike) -> Array:
+        free = free_tension(self.observer, self.preview, view, observation)
         if not self.assist:
             return free
-        return np.where(view.stance, tension(self.ahead, view, observation), free)
+        return np.where(view.stance, tension(self.preview, view, observation), free)
 
 
 def make_knee_forward(
@@ -102,15 +101,15 @@ def make_knee_forward(
     assist : bool
         See :class:`KneeForward`.
     preview : bool
-        Whether it looks one lag ahead.
+        Whether the reference is previewed by one lag.
     knobs : mapping
         Of :data:`baselines.knee.preview.KNOBS`.
     """
     nominal = KneeNominal(plant)
-    eyes = make_eyes(nominal, signals)
-    ahead = make_ahead(nominal, signals, eyes, knobs) if preview else None
+    observer = make_knee_observer(nominal, signals)
+    ahead = make_stiffness_preview(nominal, signals, observer, knobs) if preview else None
     signal = action_signals["pressure_set_point"]
-    return KneeForward(Forward(nominal, kind), eyes, signal, assist, ahead)
+    return KneeForward(Forward(nominal, kind), observer, signal, assist, ahead)
 
 
 FORWARD = partial(Entry, knowledge="nominal model", envs=KNEE, plants=(KneeOrthosis,))

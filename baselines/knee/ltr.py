@@ -1,15 +1,14 @@
-"""Feedback of tension in stance and of angle in swing, with a feed-forward: yeh2010, section 4.
+"""Feedback of tension in stance and of angle in swing, with a feedforward: yeh2010, section 4.
 
     stance   set-point = forward(T_d) + K_T (T_d - T)
     swing    set-point = forward(T_0) + K_theta (theta_d - theta)
 
-``T_d`` is the reference, ``T_0`` the tension that takes the wire's torque off the knee. Both
-controllers run always; which of them is applied is told by the heel's load as sensed. The one
-off-line is shown what the environment's references are then (in swing a tension that may be off,
-in stance the angle itself). With the compensators each knows what was applied in its place;
-without them it goes on integrating an error that it cannot change (the one in charge is
-clamped, so that the difference is the hand-over). With the brace alone it is
-always stance.
+``T_d`` is the reference tension, ``T_0`` the tension of zero wire torque on the knee. Both
+controllers always run; the sensed load of the heel selects which is applied. The controller
+off-line receives the references of the environment (in swing a tension that may have an offset, in
+stance the angle itself). With compensators each controller receives the applied command; without
+them it integrates an error that it cannot change, and the controller in charge is clamped, so that
+both forms differ in the transfer alone. With the brace alone it is always stance.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Prediction, encode_action, reset_rows
+from baselines.core.controller import Array, Prediction, RowController, encode_action
 from baselines.core.entry import Entry
 from baselines.core.environments import GAIT, KNEE
 from baselines.core.knobs import AS_DESIGNED, Knobs
@@ -29,8 +28,8 @@ from baselines.knee.design import KNOBS, make_loop, printed_loop
 from baselines.knee.feedforward import Forward, Kind
 from baselines.knee.nominal import KneeNominal
 from baselines.knee.preview import KNOBS as PREVIEW_KNOBS
-from baselines.knee.preview import Ahead, free_tension, make_ahead, tension
-from baselines.knee.view import Eyes, View, make_eyes
+from baselines.knee.preview import StiffnessPreview, free_tension, make_stiffness_preview, tension
+from baselines.knee.view import KneeObserver, KneeView, make_knee_observer
 from baselines.linear.bumpless import Bumpless, BumplessState
 from baselines.positioning.nominal import HysteresisState
 from pam_envs.parameters import Signal, Signals
@@ -38,7 +37,7 @@ from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 
 class LtrState(NamedTuple):
-    """Hysteresis models of both controllers and of the feed-forward, first axis n_env.
+    """States of both controllers and of the feedforward's hysteresis, first axis n_env.
 
     Attributes
     ----------
@@ -54,8 +53,8 @@ class LtrState(NamedTuple):
 
 
 @dataclass(frozen=True)
-class KneeLtr:
-    """Feedback and feed-forward; see this module's page.
+class KneeLtr(RowController):
+    """Feedback and feedforward; see the module.
 
     Attributes
     ----------
@@ -63,70 +62,71 @@ class KneeLtr:
     angle : Bumpless, optional
         None without a gait.
     forward : Forward
-    eyes : Eyes
+    observer : KneeObserver
     action_signal : Signal
-    ahead : Ahead, optional
-        Has the feed-forward look one lag ahead.
+    preview : StiffnessPreview, optional
+        Of the feedforward, by one lag.
     """
 
     tension: Bumpless
     angle: Bumpless | None
     forward: Forward
-    eyes: Eyes
+    observer: KneeObserver
     action_signal: Signal
-    ahead: Ahead | None = None
+    preview: StiffnessPreview | None = None
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: LtrState | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the set-point; see :class:`~baselines.core.controller.Controller`."""
-        view = self.eyes.look(observation)
-        state = reset_rows(state, episode_start, len(view.tension), lambda: self._start(view))
+    def initial_state(self, observation: ArrayLike) -> LtrState:
+        """Return the state at rest, or holding the present set-point."""
+        view = self.observer.read(observation)
+        held = np.zeros_like(view.set_point)
+        if self.forward.kind == "nominal":
+            held = view.set_point - self.forward.pressure(view.reference, view.stretch, ())
+        angle = () if self.angle is None else self.angle.holding_state(held)
+        return LtrState(self.tension.holding_state(held), angle, self.forward.start(view.set_point))
+
+    def respond(self, observation: ArrayLike, state: LtrState) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
+        view = self.observer.read(observation)
         forward, free = self._forward(view, observation, state.hysteresis)
-        stance = forward + self._share(self.tension, view.wanted, view.tension, forward, state[0])
+        stance = forward + self._share(
+            self.tension, view.reference, view.tension, forward, state[0]
+        )
         command, used, angle = stance, forward, state.angle
         if self.angle is not None and state.angle:
-            path, sensed = view.angle_wanted, view.angle
+            path, sensed = view.angle_reference, view.angle
             swing = free + self._share(self.angle, path, sensed, free, state.angle)
             command = np.where(view.stance, stance, swing)
             used = np.where(view.stance, forward, free)
             off = ~view.stance
             angle = self.angle.advance(path, sensed, command - free, state.angle, off)
         stance_state = self.tension.advance(
-            view.wanted, view.tension, command - forward, state.tension, view.stance
+            view.reference, view.tension, command - forward, state.tension, view.stance
         )
-        after = LtrState(stance_state, angle, self.forward.move(used, state.hysteresis))
+        after = LtrState(stance_state, angle, self.forward.advance(used, state.hysteresis))
         return encode_action(self.action_signal, command, observation), after
 
     def _forward(
-        self, view: View, observation: ArrayLike, hysteresis: HysteresisState
+        self, view: KneeView, observation: ArrayLike, hysteresis: HysteresisState
     ) -> tuple[Array, Array]:
-        """Return the feed-forwards [Pa] of stance and of swing."""
-        wanted = tension(self.ahead, view, observation)
-        stance = self.forward.pressure(wanted, view.stretch, hysteresis)
+        """Return the feedforward pressures [Pa] of stance and of swing."""
+        reference = tension(self.preview, view, observation)
+        stance = self.forward.pressure(reference, view.stretch, hysteresis)
         if self.angle is None:
             return stance, stance
-        free = free_tension(self.eyes, self.ahead, view, observation)
+        free = free_tension(self.observer, self.preview, view, observation)
         return stance, self.forward.pressure(free, view.stretch, hysteresis)
 
-    def _start(self, view: View) -> LtrState:
-        """Return the state at the beginning: at rest, or holding what the set-point was."""
-        held = np.zeros_like(view.set_point)
-        if self.forward.kind == "nominal":
-            held = view.set_point - self.forward.pressure(view.wanted, view.stretch, ())
-        angle = () if self.angle is None else self.angle.holding_state(held)
-        return LtrState(self.tension.holding_state(held), angle, self.forward.start(view.set_point))
-
     def _share(
-        self, loop: Bumpless, wanted: Array, measured: Array, forward: Array, state: BumplessState
+        self,
+        loop: Bumpless,
+        reference: Array,
+        measured: Array,
+        forward: Array,
+        state: BumplessState,
     ) -> Array:
-        """Return a loop's share of the set-point [Pa], within what the feed-forward leaves."""
+        """Return a loop's share of the set-point [Pa], within the range left by the feedforward."""
         low, high = self.action_signal.low - forward, self.action_signal.high - forward
-        return loop.output(wanted, measured, state, low, high)
+        return loop.output(reference, measured, state, low, high)
 
 
 def make_knee_ltr(
@@ -147,25 +147,25 @@ def make_knee_ltr(
     signals, action_signals : Signals
     forward : {"inverse", "line", "nominal"}
     bumpless : bool
-        Whether the compensators are on.
+        Whether the compensators act.
     printed : bool
-        Whether the tension's controller is the printed one and not a design.
+        Whether the tension controller is the printed one instead of a design.
     preview : bool
-        Whether the feed-forward looks one lag ahead.
+        Whether the feedforward is previewed by one lag.
     knobs : mapping
-        Of :data:`baselines.knee.design.KNOBS`, for the tension's loop alone, and of
+        Of :data:`baselines.knee.design.KNOBS`, for the tension loop alone, and of
         :data:`baselines.knee.preview.KNOBS`.
     """
     nominal = KneeNominal(plant)
-    eyes = make_eyes(nominal, signals)
+    observer = make_knee_observer(nominal, signals)
     loop = printed_loop(plant) if printed else make_loop(plant, "tension", bumpless, knobs)
     return KneeLtr(
         loop,
-        make_loop(plant, "angle", bumpless) if eyes.gait else None,
+        make_loop(plant, "angle", bumpless) if observer.gait else None,
         Forward(nominal, forward),
-        eyes,
+        observer,
         action_signals["pressure_set_point"],
-        make_ahead(nominal, signals, eyes, knobs) if preview else None,
+        make_stiffness_preview(nominal, signals, observer, knobs) if preview else None,
     )
 
 

@@ -1,7 +1,6 @@
-"""A nominal knee orthosis, worked by rows: what the model-based controllers of the knee know.
+"""Nominal knee orthosis vectorised over rows, as used by the model-based controllers.
 
-Everything is computed from the nominal :class:`~pam_envs.plants.knee_orthosis.plant.KneeOrthosis`
-alone.
+Everything is computed from the nominal :class:`~pam_envs.plants.knee_orthosis.plant.KneeOrthosis`.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from pam_envs.hysteresis.protocol import Rows, operator_of
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
 SHORTEST_STRETCH = 1e-3
-"""Length [m] above the shortest below which a muscle is not divided by its stretch."""
+"""Lower bound [m] of the stretch that tensions are divided by."""
 CURVE_POINTS = 451
 
 
@@ -28,7 +27,7 @@ class KneeNominal:
     Attributes
     ----------
     plant : KneeOrthosis
-        What the controller believes.
+        Nominal plant.
     """
 
     plant: KneeOrthosis
@@ -57,7 +56,7 @@ class KneeNominal:
         return np.maximum(SHORTEST_STRETCH, length - self.plant.muscle.shortest_length)
 
     def free_tension(self, angle: Array) -> Array:
-        """Return the tension [N] that takes the wire's torque off the knee, not below 0."""
+        """Return the tension [N] of zero wire torque on the knee, at least 0."""
         return np.maximum(0.0, self.plant.tension_for(angle))
 
     # --- stiffness and pressure -----------------------------------------------------------------
@@ -73,15 +72,15 @@ class KneeNominal:
             self.hysteresis.forward(full, self.hysteresis.initial(1))[0][0]
         )
 
-    def rested(self, pressure: Array) -> HysteresisState:
-        """Return the hysteresis of muscles that were inflated from none to a pressure [Pa]."""
+    def inflated(self, pressure: Array) -> HysteresisState:
+        """Return the hysteresis state after inflation from 0 to a pressure [Pa]."""
         _, state = self.hysteresis.forward(
             np.zeros_like(pressure), self.hysteresis.initial(len(pressure))
         )
-        return self.felt(pressure, state)
+        return self.advance(pressure, state)
 
-    def felt(self, pressure: Array, state: HysteresisState) -> HysteresisState:
-        """Return the hysteresis after a pressure [Pa]."""
+    def advance(self, pressure: Array, state: HysteresisState) -> HysteresisState:
+        """Return the hysteresis state after a pressure [Pa]."""
         return self.hysteresis.forward(pressure, state)[1]
 
     def pressure_for(self, stiffness: Array, state: HysteresisState) -> Array:
@@ -94,7 +93,7 @@ class KneeNominal:
     def tension_at_rest(self, pressure: Array) -> Array:
         """Return the tension [N] at rest without hysteresis: held in a rig, or free to move.
 
-        On a leg, that of the rig: a leg that bears weight holds the muscle's length.
+        On a leg it is that of the rig: a leg that bears weight holds the muscle's length.
         """
         stiffness = pressure * (self._full_stiffness / self.full_pressure)
         if self.plant.mounting == "no_load":
@@ -111,7 +110,7 @@ class KneeNominal:
         return stiffness * self.stretch(angle), angle
 
     def angle_of(self, tension: Array) -> Array:
-        """Return the angle [rad] at which a tension [N] rests: of the brace alone, or the rig."""
+        """Return the angle [rad] in equilibrium with a tension [N]: brace alone, or rig."""
         if self.plant.mounting != "no_load":
             angle = self.plant.lever.angle(np.asarray(self.plant.fixture.length))
             return np.full_like(tension, float(angle))

@@ -1,11 +1,11 @@
-"""PI control of the knee's tension, tuned by a rule from the nominal plant.
+"""PI control of the knee's tension, SIMC tuning from the nominal plant (skogestad2003).
 
-Tuning rule: SIMC for a lag with dead time (:mod:`baselines.linear.simc`) and ``tau_c = theta``,
-with K the steepest tension per pressure of the nominal orthosis at rest. For a regulator that lags,
-tau_1 is its time constant and theta one and a half control periods. For the published dynamics,
-whose 0.3 s are spread over seven poles, the rule's half rule gives half of their sum to each.
+Tuning: :mod:`baselines.linear.simc` for a lag with dead time and ``tau_c = theta``, with K the
+steepest static tension per pressure of the nominal orthosis. For a regulator with lag, tau_1 is its
+time constant and theta one and a half control periods. For the published dynamics, whose 0.3 s are
+distributed over seven poles, the half rule gives half of their sum to each.
 
-The tension's reference is followed in stance and in swing: there is no second controller.
+The reference tension is tracked in stance and in swing: there is no second controller.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Prediction, encode_action, reset_rows
+from baselines.core.controller import Prediction, RowController, encode_action
 from baselines.core.entry import Entry
 from baselines.core.environments import KNEE
 from baselines.core.knobs import AS_DESIGNED, Knobs
 from baselines.knee.nominal import KneeNominal
 from baselines.knee.published import printed_plant
-from baselines.knee.view import Eyes, make_eyes
-from baselines.linear.simc import PI_KNOBS, WAIT, simc_rule
+from baselines.knee.view import KneeObserver, make_knee_observer
+from baselines.linear.simc import DELAY_PERIODS, PI_KNOBS, simc_rule
 from baselines.positioning.pid import Gains, PidState, pid_start, pid_step
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
@@ -33,7 +33,7 @@ def simc_tension(plant: KneeOrthosis, knobs: Knobs = AS_DESIGNED) -> Gains:
     Its ``knobs`` are those of :data:`baselines.linear.simc.PI_KNOBS`.
     """
     period = plant.control_period
-    theta, tau = WAIT * period, plant.regulator.time_constant
+    theta, tau = DELAY_PERIODS * period, plant.regulator.time_constant
     if plant.dynamics == "measured":
         tau = 0.5 * _sum_of_lags()
         theta = theta + tau
@@ -54,40 +54,33 @@ def _sum_of_lags() -> float:
 
 
 @dataclass(frozen=True)
-class KneePid:
-    """PI from the tension as sensed.
+class KneePid(RowController):
+    """PI of the sensed tension.
 
     Attributes
     ----------
     gains : Gains
-    eyes : Eyes
+    observer : KneeObserver
     action_signal : Signal
     period : float
         Control period [s].
     """
 
     gains: Gains
-    eyes: Eyes
+    observer: KneeObserver
     action_signal: Signal
     period: float
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: PidState | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the PI's set-point; see :class:`~baselines.core.controller.Controller`."""
-        view = self.eyes.look(observation)
-        state = reset_rows(
-            state,
-            episode_start,
-            len(view.tension),
-            lambda: pid_start(view.set_point, view.tension),
-        )
+    def initial_state(self, observation: ArrayLike) -> PidState:
+        """See :class:`~baselines.core.controller.RowController`."""
+        view = self.observer.read(observation)
+        return pid_start(view.set_point, view.tension)
+
+    def respond(self, observation: ArrayLike, state: PidState) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
+        view = self.observer.read(observation)
         low, high = self.action_signal.low, self.action_signal.high
-        error = view.wanted - view.tension
+        error = view.reference - view.tension
         output, after = pid_step(self.gains, state, error, view.tension, low, high, self.period)
         return encode_action(self.action_signal, output, observation), after
 
@@ -102,7 +95,7 @@ def make_knee_pid(
     """Return the controller, with the gains of :func:`simc_tension` unless others are given."""
     return KneePid(
         simc_tension(plant, knobs) if gains is None else gains,
-        make_eyes(KneeNominal(plant), signals),
+        make_knee_observer(KneeNominal(plant), signals),
         action_signals["pressure_set_point"],
         plant.control_period,
     )

@@ -1,14 +1,13 @@
-"""The orthosis paper's printed tension plant and controller, and the plant behind the controller.
+"""Printed tension plant and controller of the orthosis paper, and the plant behind the controller.
 
-yeh2010 (T.-J. Yeh et al., "Control of McKibben pneumatic muscles for a power-assist, lower-limb
-orthosis", Mechatronics 20, 2010), equations (10), (11) and section 4.2. Both transfer functions
-are between kPa and N, about 2 bar, 22 cm and 158 N.
+yeh2010, Eqs. 10 and 11, and section 4.2. Both transfer functions are between kPa and N, about 2
+bar, 22 cm and 158 N.
 
-The controller (11) is not a design on the plant (10): loop transfer recovery puts zeros of the
-controller on the poles of the plant, and they are elsewhere. Read the other way round, its zeros
-are the poles of another fit of the same muscle, here called the *inferred plant*. Four unknowns of
-that plant and its design (gain, one zero, bandwidth and control weight) then give back the nine
-coefficients that are left (:func:`refit_controller`).
+The controller (11) is not a design on the plant (10): loop transfer recovery places zeros of the
+controller on the poles of the plant, and those of (11) are elsewhere. Conversely, its zeros are the
+poles of another fit of the same muscle, here called the *inferred plant*. Four unknowns of that
+plant and its design (gain, one zero, bandwidth and control weight) reproduce the nine remaining
+coefficients (:func:`refit_controller`).
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from control import StateSpace
 
 NOMINAL_PRESSURE = 2e5
-"""Pressure [Pa] that deviations are counted from (section 4.1)."""
+"""Operating pressure [Pa] (yeh2010, section 4.1)."""
 
 CONTROLLER_NUMERATOR = (
     6.418e4, 6.679e6, 2.892e8, 6.714e9, 8.96e10, 6.816e11, 2.713e12, 4.343e12,
@@ -45,7 +44,7 @@ BUMPLESS_DIRECT_GAIN = -1.4758
 """Printed ``K`` and ``L`` of the bumpless compensator, section 4.2."""
 
 CANCELLED_POLES = (-19.94664586, -15.06844573, -7.00013042)
-"""Real poles [rad/s] of (11) that are taken as zeros of the inferred plant."""
+"""Real poles [rad/s] of (11), taken as zeros of the inferred plant."""
 
 
 def printed_plant_polynomials() -> tuple[Array, Array]:
@@ -97,12 +96,12 @@ class Refit:
 
 
 def refit_controller(bandwidth: float | None = None) -> Refit:
-    """Return the plant and the design that give back the printed controller.
+    """Return the plant and the design that reproduce the printed controller.
 
     Parameters
     ----------
     bandwidth : float, optional
-        ``1/sqrt(mu)`` [rad/s], held at this value; free if not given.
+        ``1/sqrt(mu)`` [rad/s], fixed; free if not given.
     """
     start = [0.0, 0.0, 0.0] if bandwidth else [0.0, 0.0, 0.0, 0.0]
 

@@ -1,8 +1,8 @@
-"""What the controllers of the knee read: named signals, turned into tensions and angles.
+"""Observation of the knee's controllers: named signals as tensions and angles.
 
 The environments of the brace alone track a tension or a stiffness, those of the gait a tension in
-stance and an angle in swing. Told apart by the names and units of their signals, they look the
-same from here: a stiffness ``s`` is wanted as the tension ``s (L - L_min)`` at the angle sensed.
+stance and an angle in swing. The names and units of the signals determine which. A reference
+stiffness ``s`` becomes the reference tension ``s (L - L_min)`` at the sensed angle.
 """
 
 from __future__ import annotations
@@ -22,35 +22,35 @@ NAMES = ("tension", "angle", "set_point", "reference")
 GAIT_NAMES = ("stance", "angle_reference")
 
 
-class View(NamedTuple):
+class KneeView(NamedTuple):
     """One observation of every row, arrays of shape (n_env,).
 
     Attributes
     ----------
     tension, angle, set_point : ndarray
-        As sensed [N], [rad]; of the last period [Pa].
-    wanted : ndarray
-        Tension [N] that is asked for; in swing, what the tension's controller is shown off-line.
+        Sensed [N], [rad]; of the last period [Pa].
+    reference : ndarray
+        Reference tension [N]; in swing that of the tension controller off-line.
     stretch : ndarray
         Muscle's length above its shortest [m].
     stance : ndarray of bool
-        Where the tension is tracked; everywhere without a gait.
-    angle_wanted : ndarray
-        Angle [rad] asked for in swing; the angle as sensed without a gait.
+        Rows that track the tension; all without a gait.
+    angle_reference : ndarray
+        Reference angle [rad] in swing; the sensed angle without a gait.
     """
 
     tension: Array
     angle: Array
     set_point: Array
-    wanted: Array
+    reference: Array
     stretch: Array
     stance: Rows
-    angle_wanted: Array
+    angle_reference: Array
 
 
 @dataclass(frozen=True)
-class Eyes:
-    """Makes a :class:`View` of observations.
+class KneeObserver:
+    """Reader of observations as a :class:`KneeView`.
 
     Attributes
     ----------
@@ -67,14 +67,14 @@ class Eyes:
     gait: bool
     stiffness: bool
 
-    def look(self, observation: ArrayLike) -> View:
-        """Return what an observation of shape (n_obs,) or (n_env, n_obs) shows."""
-        tension, angle, set_point, wanted, *more = self.reader.rows(observation)
+    def read(self, observation: ArrayLike) -> KneeView:
+        """Return the view of an observation of shape (n_obs,) or (n_env, n_obs)."""
+        tension, angle, set_point, reference, *more = self.reader.rows(observation)
         stretch = self.nominal.stretch(angle)
         if self.stiffness:
-            wanted = wanted * stretch
+            reference = reference * stretch
         stance, path = self._phase(more, angle)
-        return View(tension, angle, set_point, wanted, stretch, stance, path)
+        return KneeView(tension, angle, set_point, reference, stretch, stance, path)
 
     def _phase(self, more: list[Array], angle: Array) -> tuple[Rows, Array]:
         if not self.gait:
@@ -87,12 +87,12 @@ class Eyes:
         return self.nominal.full_pressure
 
 
-def make_eyes(nominal: KneeNominal, signals: Signals) -> Eyes:
-    """Return what reads the signals of any environment of the knee."""
+def make_knee_observer(nominal: KneeNominal, signals: Signals) -> KneeObserver:
+    """Return the reader of the signals of any environment of the knee."""
     there = set(signals.names())
     gait = set(GAIT_NAMES) <= there
     names = [*NAMES, *(GAIT_NAMES if gait else ())]
     unit = signals["reference"].unit
     if unit not in ("N", "N/m"):
         raise ValueError(f"reference is in {unit}; the knee's controllers track N or N/m")
-    return Eyes(nominal, reader(signals, names), gait, unit == "N/m")
+    return KneeObserver(nominal, reader(signals, names), gait, unit == "N/m")

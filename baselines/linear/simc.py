@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
 
-WAIT = 1.5
+DELAY_PERIODS = 1.5
 """Control periods of dead time: hold and computing."""
 PI_KNOBS: Bounds = {"closed_loop_time": (0.25, 4.0), "integral_time": (0.25, 4.0)}
 PID_KNOBS: Bounds = {**PI_KNOBS, "derivative_time": (0.25, 4.0)}

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Prediction, reader, reset_rows
+from baselines.core.controller import Array, Prediction, RowController, reader
 from baselines.core.entry import Entry
 from baselines.core.environments import ARM
 from pam_envs.mechanics.redundancy.resolution import LIMIT, Resolution, UnreachablePose, resolve
@@ -47,7 +47,7 @@ class PlanState(NamedTuple):
     missed: Array
 
 
-class InverseKinematics:
+class InverseKinematics(RowController):
     """Set-points of all joints for the wanted pose: feed-forward, without feedback of the tool.
 
     Parameters
@@ -82,25 +82,19 @@ class InverseKinematics:
         scales = [actions[f"angle_set_point_{k}"].scale for k in joints]
         self._gain, self._offset = np.array(scales).T
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: PlanState | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the action for an observation, and the state (see ``Controller.predict``)."""
-        poses, sensed = self._wanted.rows(observation).T, self._sensed.rows(observation).T
-        state = reset_rows(state, episode_start, len(poses), lambda: self.initial_state(sensed))
-        after = self.plan(poses, state)
-        action = (self._gain * after.angles + self._offset).astype(np.float32)
-        return (action if np.ndim(observation) == 2 else action[0]), after
-
-    def initial_state(self, sensed: Array) -> PlanState:
-        """Return the state at sensed angles [rad], shape (rows, n)."""
+    def initial_state(self, observation: ArrayLike) -> PlanState:
+        """Return the state at the sensed angles, within the limit."""
+        sensed = self._sensed.rows(observation).T
         edge = INSIDE * self.limit
         rows = len(sensed)
         return PlanState(np.clip(sensed, -edge, edge), np.zeros((rows, 5)), np.zeros(rows))
+
+    def respond(self, observation: ArrayLike, state: PlanState) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
+        poses = self._wanted.rows(observation).T
+        after = self.plan(poses, state)
+        action = (self._gain * after.angles + self._offset).astype(np.float32)
+        return (action if np.ndim(observation) == 2 else action[0]), after
 
     def plan(self, poses: Array, state: PlanState) -> PlanState:
         """Return the state with set-points for poses, shape (rows, 6)."""

@@ -30,10 +30,10 @@ from baselines.core.controller import (
     Array,
     Prediction,
     Reader,
+    RowController,
     encode_action,
     preview_names,
     reader,
-    reset_rows,
 )
 from baselines.core.entry import Entry
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
@@ -89,7 +89,7 @@ def preview_weights(samples: int, spacing: float, ahead: float) -> Array:
 
 
 @dataclass(frozen=True)
-class Inverse:
+class Inverse(RowController):
     """Exact inverse of the nominal muscle; see this module's page.
 
     Attributes
@@ -115,26 +115,21 @@ class Inverse:
     horizon: float = HORIZON
 
     @cached_property
-    def _haste(self) -> float:
+    def _lag_gain(self) -> float:
         return 1.0 / self.nominal.arrival(self.horizon)
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: InverseState | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the inverse's set-point; see :class:`~baselines.core.controller.Controller`."""
+    def initial_state(self, observation: ArrayLike) -> InverseState:
+        """See :class:`~baselines.core.controller.RowController`."""
+        return self.explaining_state(self.reader.rows(observation))
+
+    def respond(self, observation: ArrayLike, now: InverseState) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
         measured = self.reader.rows(observation)
-        now = reset_rows(
-            state, episode_start, measured.shape[1], lambda: self.initial_state(measured)
-        )
         set_point = self.feed_forward(measured, now)
         after = self.advance(now, set_point, measured[2])
         return encode_action(self.action_signal, set_point, observation), after
 
-    def initial_state(self, measured: Array) -> InverseState:
+    def explaining_state(self, measured: Array) -> InverseState:
         """Return the state that explains first measurements, rows as in ``reader``."""
         contraction, pressure, load = measured[:3]
         hysteresis: Any = None
@@ -143,13 +138,13 @@ class Inverse:
             hysteresis = _placed(hysteresis, part, rows, len(load))
         drive = np.empty(len(load))
         for muscle, rows in self.nominal.groups(load):
-            drive[rows] = muscle.felt(pressure[rows], _taken(hysteresis, rows))[0]
+            drive[rows] = muscle.advance(pressure[rows], _taken(hysteresis, rows))[0]
         return InverseState(pressure, drive, hysteresis)
 
     def feed_forward(self, measured: Array, now: InverseState) -> Array:
         """Return the set-point [Pa], shape (n_env,), that the reference needs."""
         wanted = self._wanted(measured, now)
-        set_point = now.pressure + self._haste * (wanted - now.pressure)
+        set_point = now.pressure + self._lag_gain * (wanted - now.pressure)
         signal = self.action_signal
         return np.asarray(np.minimum(np.maximum(set_point, signal.low), signal.high))
 
@@ -175,7 +170,7 @@ class Inverse:
         drive = np.empty(len(load))
         hysteresis: Any = None
         for muscle, rows in self.nominal.groups(load):
-            drive[rows], part = muscle.felt(pressure[rows], _taken(now.hysteresis, rows))
+            drive[rows], part = muscle.advance(pressure[rows], _taken(now.hysteresis, rows))
             hysteresis = _placed(hysteresis, part, rows, len(load))
         return InverseState(pressure, drive, hysteresis)
 

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Prediction, encode_action, reset_rows
+from baselines.core.controller import Array, Prediction, RowController, encode_action
 from baselines.core.entry import Entry
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs
 from baselines.linear.simc import PID_KNOBS
@@ -48,7 +48,7 @@ class InversePidState(NamedTuple):
 
 
 @dataclass(frozen=True)
-class InversePid:
+class InversePid(RowController):
     """Feed-forward and PID; see this module's page.
 
     Attributes
@@ -68,18 +68,20 @@ class InversePid:
         age = (plant.regulator.dead_time + nominal.mechanical_lag) / plant.control_period
         return int(age), age - int(age)
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: InversePidState | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the sum's set-point; see :class:`~baselines.core.controller.Controller`."""
+    def initial_state(self, observation: ArrayLike) -> InversePidState:
+        """See :class:`~baselines.core.controller.RowController`."""
         measured = self.inverse.reader.rows(observation)
-        now = reset_rows(
-            state, episode_start, measured.shape[1], lambda: self._initial_state(measured)
+        inverse = self.inverse.explaining_state(measured)
+        expected = self._at_rest(inverse, measured[2])
+        return InversePidState(
+            inverse,
+            pid_start(np.zeros_like(expected), measured[0] - expected),
+            np.repeat(expected[:, None], self._delay[0] + 2, axis=1),
         )
+
+    def respond(self, observation: ArrayLike, now: InversePidState) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
+        measured = self.inverse.reader.rows(observation)
         contraction, load = measured[0], measured[2]
         forward = self.inverse.feed_forward(measured, now.inverse)
         whole, part = self._delay
@@ -98,15 +100,6 @@ class InversePid:
         newest = self._at_rest(inverse, load)[:, None]
         after = InversePidState(inverse, pid, np.hstack([newest, now.expected[:, :-1]]))
         return encode_action(signal, forward + correction, observation), after
-
-    def _initial_state(self, measured: Array) -> InversePidState:
-        inverse = self.inverse.initial_state(measured)
-        expected = self._at_rest(inverse, measured[2])
-        return InversePidState(
-            inverse,
-            pid_start(np.zeros_like(expected), measured[0] - expected),
-            np.repeat(expected[:, None], self._delay[0] + 2, axis=1),
-        )
 
     def _at_rest(self, state: InverseState, load: Array) -> Array:
         """Return the nominal contraction at rest [m], shape (n_env,)."""

@@ -62,7 +62,7 @@ class LoadedMuscle:
         """Return the contraction [m] at rest under an effective pressure [Pa]."""
         return np.interp(drive, *self._curve)
 
-    def felt(self, drive: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
+    def advance(self, drive: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
         """Return the effective pressure [Pa] at a pressure [Pa], and the hysteresis it leaves."""
         law, full = self.plant.hysteresis, self.plant.regulator.max_pressure
         output, after = self.hysteresis.forward(law.stretched(drive, full), state)
@@ -91,8 +91,8 @@ class LoadedMuscle:
         return self._after(low, pressure)[1]
 
     def _after(self, peak: Array, pressure: Array) -> tuple[Array, HysteresisState]:
-        _, state = self.felt(peak, self.hysteresis.initial(len(peak)))
-        return self.felt(pressure, state)
+        _, state = self.advance(peak, self.hysteresis.initial(len(peak)))
+        return self.advance(pressure, state)
 
 
 @dataclass(frozen=True)

@@ -22,10 +22,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from baselines.core.controller import Array, Prediction, Reader, encode_action, reader, reset_rows
+from baselines.core.controller import (
+    Array,
+    Prediction,
+    Reader,
+    RowController,
+    encode_action,
+    reader,
+)
 from baselines.core.entry import Entry
 from baselines.core.knobs import AS_DESIGNED, Bounds, Knobs, knob
-from baselines.linear.simc import PID_KNOBS, WAIT, simc_rule
+from baselines.linear.simc import DELAY_PERIODS, PID_KNOBS, simc_rule
 from baselines.positioning.nominal import Nominal
 from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.single_muscle.plant import SingleMuscle
@@ -81,7 +88,7 @@ def simc(
         Of :data:`baselines.linear.simc.PID_KNOBS`.
     """
     nominal, period = Nominal(plant), plant.control_period
-    theta = plant.regulator.dead_time + WAIT * period
+    theta = plant.regulator.dead_time + DELAY_PERIODS * period
     tau_1, tau_2 = plant.regulator.time_constant, nominal.mechanical_lag
     tau_c = max(theta, SWING / nominal.slowest_swing - theta)
     if closed_loop_time is not None:
@@ -156,7 +163,7 @@ def pid_step(
 
 
 @dataclass(frozen=True)
-class Pid:
+class Pid(RowController):
     """PID from the present reference and the measured contraction and pressure.
 
     Attributes
@@ -177,18 +184,14 @@ class Pid:
     period: float
     reach: float = math.inf
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: PidState | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the PID's set-point; see :class:`~baselines.core.controller.Controller`."""
-        contraction, pressure, set_point, reference = self.reader.rows(observation)
-        state = reset_rows(
-            state, episode_start, len(contraction), lambda: pid_start(set_point, contraction)
-        )
+    def initial_state(self, observation: ArrayLike) -> PidState:
+        """See :class:`~baselines.core.controller.RowController`."""
+        contraction, _, set_point, _ = self.reader.rows(observation)
+        return pid_start(set_point, contraction)
+
+    def respond(self, observation: ArrayLike, state: PidState) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
+        contraction, pressure, _, reference = self.reader.rows(observation)
         signal = self.action_signal
         output, after = pid_step(
             self.gains,

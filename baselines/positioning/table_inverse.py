@@ -28,10 +28,10 @@ from baselines.core.controller import (
     Array,
     Prediction,
     Reader,
+    RowController,
     encode_action,
     group_by_load,
     reader,
-    reset_rows,
 )
 from baselines.core.entry import Entry
 from baselines.positioning.branch import DEAD_BAND, Branch, first_branch, next_branch
@@ -53,7 +53,7 @@ SPACING = 2e-6
 
 
 @dataclass(frozen=True)
-class TwoBranch:
+class TwoBranch(RowController):
     """Curve of the present branch at the present reference.
 
     The two curves of a load are tabulated when that load first occurs.
@@ -74,18 +74,14 @@ class TwoBranch:
     action_signal: Signal
     dead_band: float = DEAD_BAND
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: Branch | None = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the set-point; see :class:`~baselines.core.controller.Controller`."""
-        contraction, load, reference = self.reader.rows(observation)
-        state = reset_rows(
-            state, episode_start, len(load), lambda: first_branch(reference, contraction)
-        )
+    def initial_state(self, observation: ArrayLike) -> Branch:
+        """See :class:`~baselines.core.controller.RowController`."""
+        contraction, _, reference = self.reader.rows(observation)
+        return first_branch(reference, contraction)
+
+    def respond(self, observation: ArrayLike, state: Branch) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
+        _, load, reference = self.reader.rows(observation)
         branch = next_branch(state, reference, self.dead_band)
         pressure = np.empty(len(load))
         for key, rows in group_by_load(load):
@@ -109,7 +105,7 @@ class TwoBranch:
 
 
 @dataclass(frozen=True)
-class Line:
+class Line(RowController):
     """``set_point = slope * reference``: straight line through the end points of a table.
 
     Attributes
@@ -128,14 +124,11 @@ class Line:
     loads: tuple[float, ...]
     slopes: tuple[float, ...]
 
-    def predict(
-        self,
-        observation: ArrayLike,
-        state: Any = None,
-        episode_start: ArrayLike | None = None,
-        deterministic: bool = True,
-    ) -> Prediction:
-        """Return the set-point; see :class:`~baselines.core.controller.Controller`."""
+    def initial_state(self, observation: ArrayLike) -> None:
+        """Return no state."""
+
+    def respond(self, observation: ArrayLike, state: Any) -> Prediction:
+        """See :class:`~baselines.core.controller.RowController`."""
         load, reference = self.reader.rows(observation)
         nearest = np.abs(load[:, None] - np.array(self.loads)).argmin(axis=1)
         value = np.array(self.slopes)[nearest] * reference

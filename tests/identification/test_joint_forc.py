@@ -34,7 +34,7 @@ def test_single_muscle_fails_the_symmetry():
     def rig(pressures):
         state, outputs = muscle.hysteresis.initial(1), []
         for pressure in pressures:
-            drive, state = muscle.felt(np.array([pressure]), state)
+            drive, state = muscle.advance(np.array([pressure]), state)
             outputs.append(float(muscle.contraction_at(drive)[0]))
         return np.array(outputs)
 

@@ -148,11 +148,13 @@ def test_the_estimate_with_friction_is_the_torque_of_the_bundles():
     state, off = friction.initial(1), []
     for _ in range(299):
         seen = view.read(observation)
-        state = friction.taken(seen, state)[1]
+        state = friction.losses(seen, state)[1]
         observation, *_, info = env.step(action)
         off.append([info["sensor/torque"] - info["output"], 0.0])
         seen = view.read(observation)
-        off[-1][1] = float((seen.torque + friction.torque(seen, friction.taken(seen, state)[0]))[0])
+        off[-1][1] = float(
+            (seen.torque + friction.torque(seen, friction.losses(seen, state)[0]))[0]
+        )
         off[-1][1] -= info["output"]
     plain, known = np.abs(np.array(off)[50:]).max(axis=0)
     assert plain > 0.3

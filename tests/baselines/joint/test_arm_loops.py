@@ -15,7 +15,7 @@ import pytest
 from baselines.joint.feedback import pid_system, simc_joint
 from baselines.joint.loop import pi_system, pole_cancelling
 from baselines.joint.poles import joint_delays, joint_poles, mean_time
-from baselines.linear.simc import WAIT
+from baselines.linear.simc import DELAY_PERIODS
 from baselines.linear.systems import discrete, double_lag
 from baselines.robust.loops import robust_controller
 from baselines.robust.requirements import FREQUENCIES, RobustDesign
@@ -145,7 +145,7 @@ def _loop(design):
 
 
 def test_neglected_dynamics_cover_hold_and_computing():
-    late = np.abs(np.exp(-1j * FREQUENCIES * WAIT * PERIOD) - 1.0)
+    late = np.abs(np.exp(-1j * FREQUENCIES * DELAY_PERIODS * PERIOD) - 1.0)
     assert np.all(late < np.abs(RobustDesign().neglected(1j * FREQUENCIES)))
 
 

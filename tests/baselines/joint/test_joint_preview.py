@@ -15,7 +15,7 @@ from baselines.joint.feedback import (
 from baselines.joint.loop import pi_system, pole_cancelling
 from baselines.joint.model import POLE
 from baselines.joint.model_following import make_model_following
-from baselines.joint.preview import MOST, ahead_by, double_lags, present
+from baselines.joint.preview import MAX_EXTRAPOLATION, ahead_by, double_pole_delays, present
 from baselines.linear.systems import discrete, double_lag
 from benchmarks.papers.joint_studies import ACTIONS, RANGE, ReducedRig
 from pam_envs.parameters import Signal, Signals
@@ -32,7 +32,7 @@ RIG = ReducedRig(0.0)
 def test_straight_line_is_read_exactly_within_and_beyond_the_previews():
     leads = (0.0, 0.01, 0.05, 0.12, 0.2)
     samples = np.tile(0.3 - 2.0 * np.array(TIMES), (1, len(leads), 1))
-    found = ahead_by(leads, TIMES).wanted(samples)
+    found = ahead_by(leads, TIMES).reference(samples)
     np.testing.assert_allclose(found, [0.3 - 2.0 * np.array(leads)], atol=1e-12)
 
 
@@ -43,19 +43,19 @@ def test_only_the_samples_around_are_read_within_the_previews():
 
 def test_stretch_is_prolonged_so_far_and_no_further():
     samples = np.array([[[0.0, 0.0, 0.0, 1.0]]])
-    assert ahead_by((99.0,), TIMES).wanted(samples)[0, 0] == 1.0 + MOST
+    assert ahead_by((99.0,), TIMES).reference(samples)[0, 0] == 1.0 + MAX_EXTRAPOLATION
 
 
 def test_without_previews_the_present_is_read():
     np.testing.assert_array_equal(ahead_by((0.3,), (0.0,)).weights, present(1).weights)
     samples = np.array([[[0.2, 0.5, 0.1]]])
-    assert present(3).wanted(samples)[0, 0] == 0.2
+    assert present(3).reference(samples)[0, 0] == 0.2
 
 
 @pytest.mark.parametrize("pole", [5.5, POLE])
 def test_loop_of_the_pi_is_its_delay_up_to_the_third_order(pole):
     loop = double_lag(pole) * pi_system(pole_cancelling(pole=pole))
-    delay = double_lags([pole])[0]
+    delay = double_pole_delays([pole])[0]
 
     def gap(w):
         closed = loop(1j * w) / (1.0 + loop(1j * w))

@@ -22,7 +22,7 @@ def test_hysteresis_is_the_plants_own(plant):
     muscle, own = Nominal(plant).at(2.55), plant.hysteresis.inverse(2.55, 6e5)
     state, theirs = muscle.hysteresis.initial(1), own.initial_state((1,))
     for pressure in PATH:
-        drive, state = muscle.felt(np.array([pressure]), state)
+        drive, state = muscle.advance(np.array([pressure]), state)
         expected, theirs = own.drive(np.array([pressure]), theirs)
         np.testing.assert_allclose(drive, expected, rtol=1e-12, atol=1e-6)
         wanted = drive + np.array([2e4])
@@ -35,10 +35,10 @@ def test_inverse_undoes_the_hysteresis_anywhere_in_a_history(plant):
     muscle = Nominal(plant).at(4.55)
     state = muscle.hysteresis.initial(1)
     for pressure in PATH:
-        _, state = muscle.felt(np.array([pressure]), state)
+        _, state = muscle.advance(np.array([pressure]), state)
         for target in (1e5, 2.7e5, 4e5):
             found = muscle.pressure_for(np.array([target]), state)
-            assert muscle.felt(found, state)[0] == pytest.approx(target, abs=1e-3)
+            assert muscle.advance(found, state)[0] == pytest.approx(target, abs=1e-3)
 
 
 def test_static_curve_is_the_plants_own(plant):
@@ -54,8 +54,8 @@ def test_static_curve_is_the_plants_own(plant):
 def test_first_measurement_explains_the_history(plant):
     muscle = Nominal(plant).at(2.55)
     peak, now = np.array([5e5, 3e5, 2e5]), np.array([2e5, 2.5e5, 2e5])
-    _, truth = muscle.felt(peak, muscle.hysteresis.initial(3))
-    drive, truth = muscle.felt(now, truth)
+    _, truth = muscle.advance(peak, muscle.hysteresis.initial(3))
+    drive, truth = muscle.advance(now, truth)
     state = muscle.explain(muscle.contraction_at(drive), now)
     for target in (1.2e5, 2.8e5):
         wanted = np.full(3, target)
