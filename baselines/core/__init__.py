@@ -1,1 +1,1 @@
-"""core."""
+"""Catalogue, entries, knobs and the policy-predictor protocol of controllers."""

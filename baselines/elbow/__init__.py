@@ -1,1 +1,1 @@
-"""elbow."""
+"""Controllers of the elbow orthosis."""

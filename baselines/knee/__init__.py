@@ -1,1 +1,1 @@
-"""knee."""
+"""Controllers of the knee orthosis."""

@@ -1,1 +1,1 @@
-"""linear."""
+"""Linear control design: SIMC, loop transfer recovery, bumpless transfer, reduction."""

@@ -1,18 +1,16 @@
-"""The SIMC tuning rule for PI and PID, once for all plants.
+"""SIMC tuning rule for PI and PID (skogestad2003).
 
-S. Skogestad, "Simple analytic rules for model reduction and PID controller tuning", J. Process
-Control 13 (2003) 291-309. A plant of two lags and a dead time, ``K exp(-theta s) / ((tau_1 s + 1)
-(tau_2 s + 1))``, gets the cascade form
+A plant of two lags and a dead time, ``K exp(-theta s) / ((tau_1 s + 1) (tau_2 s + 1))``, has the
+cascade form
 
     K_c = tau_1 / (K (tau_c + theta)),  tau_I = min(tau_1, 4 (tau_c + theta)),  tau_D = tau_2
 
-The rule's one choice is the time constant ``tau_c`` of the closed loop; its own recommendation,
-"fast, with good robustness", is ``tau_c = theta``.
+The rule's one choice is the time constant ``tau_c`` of the closed loop; its recommendation, "fast,
+with good robustness", is ``tau_c = theta``.
 
-``theta`` counts one and a half control periods besides what the plant itself waits: half a period
-for the hold, and one in which the computer of a real rig works out its answer. The environments
-have no such delay (an action acts from the instant of its observation on), so that there the whole
-period is margin.
+``theta`` includes one and a half control periods besides the plant's dead time: half a period of
+the hold, and one of computing on a real rig. The environments have no computing delay (an action
+acts from the instant of its observation), so that there the whole period is margin.
 """
 
 from __future__ import annotations
@@ -25,7 +23,7 @@ DELAY_PERIODS = 1.5
 """Control periods of dead time: hold and computing."""
 PI_KNOBS: Bounds = {"closed_loop_time": (0.25, 4.0), "integral_time": (0.25, 4.0)}
 PID_KNOBS: Bounds = {**PI_KNOBS, "derivative_time": (0.25, 4.0)}
-"""On ``tau_c``, ``tau_I`` and ``tau_D``."""
+"""Factors on ``tau_c``, ``tau_I`` and ``tau_D``."""
 
 
 class Simc(NamedTuple):
@@ -52,7 +50,7 @@ def simc_rule(
     closed_loop_time: float | None = None,
     knobs: Knobs = AS_DESIGNED,
 ) -> Simc:
-    """Return the parameters of the rule; see this module's page.
+    """Return the parameters of the rule; see the module.
 
     Parameters
     ----------
@@ -65,12 +63,12 @@ def simc_rule(
     closed_loop_time : float, optional
         ``tau_c`` [s]; default ``theta``.
     knobs : mapping
-        Of ``PID_KNOBS``; a factor on ``tau_c`` acts on all that the rule makes of it.
+        Of ``PID_KNOBS``; the factor on ``tau_c`` acts before the rule.
     """
-    wanted = dead_time if closed_loop_time is None else closed_loop_time
-    pace = dead_time + knob(knobs, "closed_loop_time") * wanted
+    chosen = dead_time if closed_loop_time is None else closed_loop_time
+    total = dead_time + knob(knobs, "closed_loop_time") * chosen
     return Simc(
-        slow / (gain * pace),
-        knob(knobs, "integral_time") * min(slow, 4.0 * pace),
+        slow / (gain * total),
+        knob(knobs, "integral_time") * min(slow, 4.0 * total),
         knob(knobs, "derivative_time") * fast,
     )

@@ -1,1 +1,1 @@
-"""manipulator."""
+"""Inverse kinematics of the redundant manipulator."""

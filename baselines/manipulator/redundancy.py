@@ -1,11 +1,10 @@
-"""Joint set-points for a wanted pose of the tool, found anew in each control period.
+"""Inverse kinematics of a manipulator: joint set-points for a reference pose in each control period.
 
-fluidic_muscles, section 2: of all joint angles that give a pose, those that minimise the weight
-(2.1), which keeps joints off their limits, or the sum of their squares. A period starts from the
-angles and multipliers of the period before, so that a few Newton iterations do; an episode starts
-from the sensed angles. A pose out of reach, or without a direction, leaves the set-points where
-they are, and is counted. A whole path is planned at once by
-:func:`pam_envs.mechanics.redundancy.resolution.resolve`, which raises there.
+fluidic_muscles, section 2: of all joint angles of a pose, those that minimise the weight (2.1),
+which keeps joints off their limits, or the sum of their squares. A period starts from the angles
+and multipliers of the last one, so that a few Newton iterations suffice; an episode starts from the
+sensed angles. A pose out of reach, or without a direction, leaves the set-points unchanged, and is
+counted. :func:`pam_envs.mechanics.redundancy.resolve` plans a whole path, and raises there.
 """
 
 from __future__ import annotations
@@ -26,11 +25,11 @@ from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 
 POSE = ("x", "y", "z", "point_x", "point_y", "point_z")
 INSIDE = 0.999
-"""Share of the limit within which a start has to lie."""
+"""Largest start angle over the limit."""
 
 
 class PlanState(NamedTuple):
-    """What is known of the period before, one row an environment.
+    """Solution of the last period, one row an environment.
 
     Attributes
     ----------
@@ -48,7 +47,7 @@ class PlanState(NamedTuple):
 
 
 class InverseKinematics(RowController):
-    """Set-points of all joints for the wanted pose: feed-forward, without feedback of the tool.
+    """Set-points of all joints for the reference pose, without feedback of the tool.
 
     Parameters
     ----------
@@ -61,8 +60,8 @@ class InverseKinematics(RowController):
         Largest angle of a joint [rad].
     weighted : bool
         Whether the weight (2.1) or the sum of squares is minimised.
-    ahead : int
-        Which preview of the pose to aim at; 0 is the present one.
+    preview : int
+        Index of the preview sample of the pose; 0 is the present one.
     """
 
     def __init__(
@@ -72,13 +71,13 @@ class InverseKinematics(RowController):
         actions: Signals,
         limit: float = LIMIT,
         weighted: bool = True,
-        ahead: int = 0,
+        preview: int = 0,
     ) -> None:
         self.chain, self.limit, self.weighted = chain, limit, weighted
         joints = range(chain.stages)
-        tail = f"_{ahead}" if ahead else ""
+        tail = f"_{preview}" if preview else ""
         self._sensed = reader(signals, [f"angle_{k}" for k in joints])
-        self._wanted = reader(signals, [f"reference_{name}{tail}" for name in POSE])
+        self._reference = reader(signals, [f"reference_{name}{tail}" for name in POSE])
         scales = [actions[f"angle_set_point_{k}"].scale for k in joints]
         self._gain, self._offset = np.array(scales).T
 
@@ -91,7 +90,7 @@ class InverseKinematics(RowController):
 
     def respond(self, observation: ArrayLike, state: PlanState) -> Prediction:
         """See :class:`~baselines.core.controller.RowController`."""
-        poses = self._wanted.rows(observation).T
+        poses = self._reference.rows(observation).T
         after = self.plan(poses, state)
         action = (self._gain * after.angles + self._offset).astype(np.float32)
         return (action if np.ndim(observation) == 2 else action[0]), after
@@ -136,7 +135,7 @@ ENTRIES = {
 
 @dataclass(frozen=True)
 class Comparison:
-    """The plan of a path with the weight (2.1), beside that of the smallest angles.
+    """Plans of a path with the weight (2.1) and with the smallest angles.
 
     Attributes
     ----------

@@ -1,1 +1,1 @@
-"""positioning."""
+"""Controllers of the single muscle."""

@@ -1,16 +1,14 @@
-"""Which branch of the loop to use, as a programmable logic controller decides it.
+"""Branch selection for hysteresis curves, as in a programmable logic controller.
 
-The controllers that work with one curve for inflation and one for deflation must know which way
-the muscle goes. They look at the reference alone: the branch changes when the reference has gone
-back by more than a dead band from the furthest point of its present run, and that furthest point
-is remembered. A held reference therefore keeps its branch, a step chooses the right one at once,
-and a slow ramp does after the dead band; sensor noise plays no part.
+Controllers with one curve for inflation and one for deflation must know the direction of motion.
+The reference alone determines it: the branch changes when the reference has reversed by more than a
+dead band from the extremum since the last change. A held reference keeps its branch, a step selects
+the right one at once, and a slow ramp does after the dead band; sensor noise has no influence.
 
-What this logic cannot do: after a small reversal, wider than the dead band, it jumps from one
-branch of the *major* loop to the other, though the muscle has only entered a narrow inner loop.
-The set-point then jumps by up to the width of the major loop (1 bar), which is up to 3 mm. Only a
-hysteresis of the extrema can tell how far the muscle has crossed (see
-``baselines.positioning.inverse``).
+Limitation: after a small reversal, wider than the dead band, the curve jumps from one branch of the
+*major* loop to the other, though the muscle has only entered a narrow inner loop. The set-point
+then jumps by up to the width of the major loop (1 bar), up to 3 mm of contraction. Only a state of
+all extrema resolves inner loops (:mod:`baselines.positioning.inverse`).
 """
 
 from __future__ import annotations
@@ -27,14 +25,14 @@ DEAD_BAND = 5e-5
 
 
 class Branch(NamedTuple):
-    """Direction and furthest reference of the present run, shapes (n_env,)."""
+    """Direction, and extremum of the reference since the last change, shapes (n_env,)."""
 
     inflating: NDArray[np.bool_]
-    furthest: Array
+    extremum: Array
 
 
 def first_branch(reference: Array, contraction: Array) -> Branch:
-    """Return the branch at an episode's start: towards the reference from where the muscle is.
+    """Return the branch at an episode's start: from the contraction towards the reference.
 
     Parameters
     ----------
@@ -54,9 +52,9 @@ def next_branch(branch: Branch, reference: Array, dead_band: float = DEAD_BAND) 
     reference : ndarray, shape (n_env,)
         [m].
     dead_band : float
-        How far [m] the reference must go back before the branch changes.
+        Reversal [m] of the reference at which the branch changes.
     """
-    back = np.where(branch.inflating, branch.furthest - reference, reference - branch.furthest)
+    back = np.where(branch.inflating, branch.extremum - reference, reference - branch.extremum)
     turned = back > dead_band
-    furthest = np.where(turned | (back < 0.0), reference, branch.furthest)
-    return Branch(branch.inflating ^ turned, furthest)
+    extremum = np.where(turned | (back < 0.0), reference, branch.extremum)
+    return Branch(branch.inflating ^ turned, extremum)

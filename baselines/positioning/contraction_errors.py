@@ -1,10 +1,9 @@
-"""How well each inverse of the contraction tables positions, judged on the tables' own repeats.
+"""Positioning errors of the inverses of the contraction tables, by cross-validation over repeats.
 
-The rule: of five repeats an inverse sees four, and commands the pressure for every target from
-2 to 14 mm; the contraction that this pressure gave is read from the fifth repeat, linearly between
-its readings. Each repeat is left out in turn, at every load, on both branches. Commands are clipped
-to the regulator's 0 to 6 bar. The published equations and those refitted to Table 6 had seen all
-five repeats.
+Of five repeats an inverse is made from four, and gives the pressure for every target from 2 to 14
+mm; the contraction at this pressure is read from the fifth repeat, linearly between its readings.
+Each repeat is left out in turn, at every load, on both branches. Pressures are clipped to the
+regulator's 0 to 6 bar. The published equations and those refitted to Table 6 used all five repeats.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ from baselines.positioning.contraction_tables import (
 from pam_envs.data.tables import BAR, MM, ContractionTable, load_contraction_table
 
 TARGETS = MM * np.arange(2.0, 14.01, 0.25)
-"""The contractions asked for [m], shape (49,)."""
+"""Target contractions [m], shape (49,)."""
 
 INVERSES: dict[str, Callable[[ContractionTable], ContractionInverse]] = {
     "published": lambda _: published_inverse(),
@@ -48,7 +47,7 @@ INVERSES: dict[str, Callable[[ContractionTable], ContractionInverse]] = {
     "pchip": pchip_inverse,
     "one cubic for both branches": one_cubic_inverse,
 }
-"""What the error table compares: name to the inverse made from the repeats that may be seen."""
+"""Inverses of the error table, by name: from the repeats of the training set."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,7 +69,7 @@ class PositioningError:
 
 @dataclasses.dataclass(frozen=True)
 class FitError:
-    """What is left between a polynomial and the points it stands for.
+    """Residual of a polynomial fit.
 
     Attributes
     ----------
@@ -93,7 +92,7 @@ def positioning_error_table(
 ) -> dict[str, PositioningError]:
     """Return the positioning error of every inverse of :data:`INVERSES`, by its name.
 
-    ``"table 6 refit"`` keeps the paper's erroneous 1.43 bar; the corrected one stands beside it.
+    ``"table 6 refit"`` keeps the paper's erroneous 1.43 bar; the corrected one is listed beside it.
     """
     readings = load_contraction_table() if table is None else table
     return {name: positioning_error(make, readings) for name, make in INVERSES.items()}
@@ -107,7 +106,7 @@ def positioning_error(
     Parameters
     ----------
     make : callable
-        Makes the inverse from a table without the repeat it is judged on.
+        Makes the inverse from a table without the validation repeat.
     table : ContractionTable
         The readings; every load needs the same repeats.
     """
@@ -127,8 +126,8 @@ def positioning_error(
 def repeatability_floor(table: ContractionTable | None = None) -> float:
     """Return the RMS distance [m] of a reading from the mean of the other repeats, all readings.
 
-    No controller that knows the past repeats can promise less. The readings before a cycle, zero by
-    definition, count too.
+    Lower bound of the error of a controller that knows the other repeats. The readings before a
+    cycle, zero by definition, are included.
     """
     readings = load_contraction_table() if table is None else table
     cycles = [readings.cycles(load)[1] for load in readings.loads]
@@ -139,7 +138,7 @@ def repeatability_floor(table: ContractionTable | None = None) -> float:
 def forward_error_table(
     table: ContractionTable | None = None,
 ) -> dict[str, tuple[FitError, ...]]:
-    """Return how Equations 1 to 6 fit the mean readings [m], as printed and refitted.
+    """Return the residuals of Equations 1 to 6 on the mean readings [m], printed and refitted.
 
     Returns
     -------
@@ -152,7 +151,7 @@ def forward_error_table(
 
 
 def table_6_error_table() -> dict[str, tuple[FitError, ...]]:
-    """Return how Equations 7 to 12 fit Table 6 [Pa].
+    """Return the residuals of Equations 7 to 12 on Table 6 [Pa].
 
     Returns
     -------
@@ -170,7 +169,7 @@ def table_6_error_table() -> dict[str, tuple[FitError, ...]]:
 
 
 def _errors(inverse: ContractionInverse, table: ContractionTable, repeat: int) -> Array:
-    """Return reached less wanted contraction [m] on one repeat, shape (6, 49)."""
+    """Return reached less target contraction [m] on one repeat, shape (6, 49)."""
     rows = []
     for load in table.loads:
         for inflating in BRANCHES:

@@ -1,18 +1,17 @@
-"""Pressure for a contraction, from a measured table: the inverses a logic controller can hold.
+"""Inverses of measured contraction tables: the pressure for a contraction.
 
 positioning2021 programs a proportional regulator with six cubics p(x), one for each load and
-direction (Equations 7 to 12). Here they stand exactly as printed, beside the same method done with
-care, and beside other curves through the same readings. Each inverse answers
-``pressure(contraction, inflating, load)`` in SI, element by element over arrays.
+direction (Eqs. 7 to 12): here exactly as printed, refitted with care, and compared with other
+curves through the same readings. Each inverse has ``pressure(contraction, inflating, load)`` in SI,
+element by element over arrays.
 
-Loads between the measured ones: the answer lies on the straight line between the pressures of the
-two neighbouring loads; loads outside their range count as the nearest one. Both are assumed: the
-paper measured three loads and says nothing of others. Answers may leave the regulator's 0 to 6 bar;
-whoever commands them clips them.
+Between the measured loads the pressure is interpolated linearly; loads outside their range count as
+the nearest one. Both are assumed: the paper measured three loads only. Pressures may exceed the
+regulator's 0 to 6 bar; the caller clips them.
 
-Curves are held in the paper's units, mm and bar, and ``curves[load][branch]`` is their order
-throughout, branch 0 being inflation: the order of Equations 1 to 6 and 7 to 12.
-How well each inverse positions is measured in ``baselines.positioning.contraction_errors``.
+Curves are in the paper's units, mm and bar, in the order ``curves[load][branch]``, branch 0 being
+inflation: the order of Equations 1 to 6 and 7 to 12. Positioning errors:
+:mod:`baselines.positioning.contraction_errors`.
 """
 
 from __future__ import annotations
@@ -75,13 +74,13 @@ TABLE_6_PRESSURE = np.array(
 )
 """Pressures [bar] of Table 6 as printed, shape (3, 2, 7)."""
 TABLE_6_ERROR = (2, 0, 0)
-"""Where Table 6 is wrong: 4.55 kg, inflation, 2 mm reads 1.43 bar."""
+"""Index of the wrong entry of Table 6: 4.55 kg, inflation, 2 mm reads 1.43 bar."""
 TABLE_6_CORRECTION = 2.05
-"""What interpolation between the readings of Table 5 gives there [bar]."""
+"""Its value interpolated from the readings of Table 5 [bar]."""
 
 
 class ContractionInverse(Protocol):
-    """Anything that names the pressure for a contraction."""
+    """Pressure as a function of contraction, branch and load."""
 
     def pressure(self, contraction: ArrayLike, inflating: ArrayLike, load: ArrayLike) -> Array:
         """Return the pressure to command.
@@ -89,7 +88,7 @@ class ContractionInverse(Protocol):
         Parameters
         ----------
         contraction : array_like of float
-            Wanted contraction [m].
+            Desired contraction [m].
         inflating : array_like of bool
             Whether the muscle comes from less contraction.
         load : array_like of float
@@ -115,7 +114,7 @@ class PolynomialInverse:
         [bar] of [mm], highest power first.
     span : ndarray, shape (n_loads, 2, 2), optional
         Lowest and highest contraction [mm] of the readings behind each polynomial. Contractions
-        outside are moved to the nearer end, where a high power would run away. Default: no ends.
+        outside are clipped, since high powers extrapolate badly. Default: no limits.
     """
 
     loads: tuple[float, ...]
@@ -190,7 +189,7 @@ class ForwardPolynomials:
 
 
 def published_inverse() -> PolynomialInverse:
-    """Return Equations 7 to 12 exactly as printed, misprints and all."""
+    """Return Equations 7 to 12 exactly as printed, misprints included."""
     return PolynomialInverse(LOADS, PUBLISHED_INVERSE)
 
 
@@ -203,13 +202,13 @@ def table_6_pressures(*, corrected: bool = True) -> Array:
 
 
 def table_6_inverse(*, corrected: bool = True) -> PolynomialInverse:
-    """Return Equations 7 to 12 as the paper meant them: cubics through Table 6, uncut.
+    """Return Equations 7 to 12 refitted: cubics through Table 6 in full precision.
 
     Parameters
     ----------
     corrected : bool
-        True puts 2.05 bar for the 1.43 bar of 4.55 kg, inflation, 2 mm; False keeps it, as the
-        paper did: its coefficients and its coefficient of determination then come out.
+        True replaces the 1.43 bar of 4.55 kg, inflation, 2 mm by 2.05 bar; False keeps it, which
+        reproduces the paper's coefficients and coefficient of determination.
     """
     pressures = table_6_pressures(corrected=corrected)
     fits = [[np.polyfit(TABLE_6_CONTRACTION, p, 3) for p in load] for load in pressures]
@@ -239,12 +238,12 @@ def quintic_inverse(table: ContractionTable | None = None) -> PolynomialInverse:
 
 
 def one_cubic_inverse(table: ContractionTable | None = None) -> PolynomialInverse:
-    """Return one cubic p(x) a load for both branches: what ignoring the hysteresis costs.
+    """Return one cubic p(x) a load for both branches, without hysteresis.
 
     Parameters
     ----------
     table : ContractionTable, optional
-        Default: the published readings. Both branches count their common turning point.
+        Default: the published readings. The common turning point counts in both branches.
     """
     table = _default(table)
     fits, spans = [], []
@@ -256,7 +255,7 @@ def one_cubic_inverse(table: ContractionTable | None = None) -> PolynomialInvers
 
 
 def published_forward() -> ForwardPolynomials:
-    """Return Equations 1 to 6 exactly as printed, misprints and all."""
+    """Return Equations 1 to 6 exactly as printed, misprints included."""
     return ForwardPolynomials(LOADS, PUBLISHED_FORWARD)
 
 
@@ -270,8 +269,8 @@ def fitted_forward(table: ContractionTable | None = None) -> ForwardPolynomials:
 def forward_cubic_inverse(table: ContractionTable | None = None) -> CurveInverse:
     """Return the inverse of :func:`fitted_forward` over 0 to 6 bar.
 
-    Where a cubic falls (4.55 kg inflating below 0.4 bar, 0 kg deflating at the very top), its
-    running maximum stands in.
+    Where a cubic decreases (4.55 kg inflating below 0.4 bar, 0 kg deflating at the top), its
+    running maximum is used.
     """
     forward = fitted_forward(table)
     curves = [[_inverted(fit) for fit in load] for load in forward.coefficients]
@@ -318,19 +317,19 @@ def _inverted(coefficients: Array) -> Curve:
     return partial(_between_points, contraction, pressure)
 
 
-def _between_points(contraction: Array, pressure: Array, wanted: Array) -> Array:
-    return np.interp(wanted, contraction, pressure)
+def _between_points(contraction: Array, pressure: Array, target: Array) -> Array:
+    return np.interp(target, contraction, pressure)
 
 
 def _pchip(pressure: Array, contraction: Array) -> Curve:
-    """Return the monotone interpolant p(x); a mean that does not rise is passed over."""
+    """Return the monotone interpolant p(x); means that do not increase are left out."""
     rising = np.r_[True, contraction[1:] > np.maximum.accumulate(contraction)[:-1]]
     return partial(_held, PchipInterpolator(contraction[rising], pressure[rising]))
 
 
-def _held(curve: PchipInterpolator, wanted: Array) -> Array:
+def _held(curve: PchipInterpolator, target: Array) -> Array:
     """Return the interpolant within its readings and its end values beyond."""
-    return np.asarray(curve(np.clip(wanted, curve.x[0], curve.x[-1])))
+    return np.asarray(curve(np.clip(target, curve.x[0], curve.x[-1])))
 
 
 def _between_loads(

@@ -1,20 +1,19 @@
-"""Feed-forward through the exact inverse of the identified muscle.
+"""Feedforward control by the exact inverse of the identified muscle.
 
-    reference, a lead ahead -> inverse static law -> inverse hysteresis -> inverse regulator
+    reference, previewed -> inverse static law -> inverse hysteresis -> inverse regulator
 
-The hysteresis is not that of the *commanded* pressures but of the pressures that the nominal
-regulator makes of them (first-order lag, slew limit): a pressure that was commanded but not
-reached leaves no trace in the muscle. Its start is the simplest history that explains the first
-measurement of an episode; from then on nothing is measured.
+The hysteresis is driven by the pressures of the nominal regulator (first-order lag, slew limit)
+instead of the commanded ones: a pressure that was not reached leaves no trace in the muscle. Its
+initial state is the simplest history that explains the first measurement of an episode; later
+measurements are not used.
 
 Lead. A set-point acts on the contraction after the dead time, the horizon in which the regulator
-is driven to its target and the lag of the mass. With a preview, the controller aims at the
-reference that far ahead, straight between the samples of the preview. Without one it aims at the
-present reference, and what is left is the delay.
+is driven to its target, and the lag of the mass. With preview, the target is the reference later by
+this lead, linearly interpolated. Without preview it is the present reference, and the delay remains.
 
-Early start. A step takes the regulator, at its slew limit, longer than the lead. The error of the
-transit is least when half of it comes before the step. So a later sample of the preview becomes
-the aim as soon as the travel to it takes ``EARLY`` times what is left of the time.
+Early start. For a step, the regulator at its slew limit takes longer than the lead. The error of
+the transition is least when half of it precedes the step: a later sample of the preview becomes the
+target when the travel time to it exceeds ``EARLY`` times the remaining time.
 """
 
 from __future__ import annotations
@@ -42,20 +41,20 @@ from pam_envs.parameters import Signal, Signals
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 HORIZON = 0.02
-"""Time [s] in which the set-point would take the nominal pressure to where it should be."""
+"""Time [s] in which the set-point would take the nominal pressure to its target."""
 EARLY = 1.6
-"""Travel time over time left at which a step is begun. 2 would centre the transit on the step if
-it lay at the sample that first shows it; it lies up to a preview spacing before."""
+"""Travel time over remaining time at which a step is started. 2 would centre the transition on a
+step at the first sample that shows it; the step is up to a preview spacing before."""
 KNOBS: Bounds = {"horizon": (0.5, 4.0), "lead": (0.5, 2.0), "early": (0.5, 2.0)}
 
 
 class InverseState(NamedTuple):
-    """What the nominal muscle has gone through.
+    """State of the nominal muscle.
 
     Attributes
     ----------
     pressure : ndarray, shape (n_env,)
-        Nominal pressure [Pa], one dead time from now: all that is under way has arrived.
+        Nominal pressure [Pa] one dead time later.
     drive : ndarray, shape (n_env,)
         Nominal effective pressure [Pa] then.
     hysteresis : tuple of ndarray, first axis n_env
@@ -67,17 +66,17 @@ class InverseState(NamedTuple):
     hysteresis: HysteresisState
 
 
-def preview_weights(samples: int, spacing: float, ahead: float) -> Array:
+def preview_weights(samples: int, spacing: float, lead: float) -> Array:
     """Return weights of the reference and its preview that give the reference at a later time.
 
     Parameters
     ----------
     samples : int
-        Preview samples there are; 0 gives the weight 1 for the present reference.
+        Number of preview samples; 0 gives the weight 1 for the present reference.
     spacing : float
-        Time [s] between them; the reference counts as straight in between.
-    ahead : float
-        The later time [s]; beyond the preview's end the end is taken.
+        Time [s] between them; linear interpolation.
+    lead : float
+        The later time [s]; clipped to the preview horizon.
 
     Returns
     -------
@@ -85,12 +84,12 @@ def preview_weights(samples: int, spacing: float, ahead: float) -> Array:
         They add up to 1.
     """
     nodes = spacing * np.arange(samples + 1)
-    return np.array([np.interp(ahead, nodes, row) for row in np.eye(samples + 1)])
+    return np.array([np.interp(lead, nodes, row) for row in np.eye(samples + 1)])
 
 
 @dataclass(frozen=True)
 class Inverse(RowController):
-    """Exact inverse of the nominal muscle; see this module's page.
+    """Exact inverse of the nominal muscle; see the module.
 
     Attributes
     ----------
@@ -99,12 +98,12 @@ class Inverse(RowController):
         Of contraction, set-point, load, reference and its preview.
     action_signal : Signal
     aims : ndarray, shape (n_aims, n_preview + 1)
-        Weights of reference and preview that give each aim, the nearest first.
+        Weights of reference and preview of each target, the nearest first.
     due : ndarray, shape (n_aims,)
-        Travel time [s] from which an aim is taken rather than the ones before it.
+        Travel time [s] from which a target replaces the earlier ones.
     horizon : float
-        Time [s], above 0, in which the set-point would take the nominal pressure to the wanted
-        one: the regulator's inverse. The longer, the calmer the set-point.
+        Time [s], above 0, in which the set-point would take the nominal pressure to its
+        target: the regulator's inverse. A longer horizon smooths the set-point.
     """
 
     nominal: Nominal
@@ -142,27 +141,27 @@ class Inverse(RowController):
         return InverseState(pressure, drive, hysteresis)
 
     def feed_forward(self, measured: Array, now: InverseState) -> Array:
-        """Return the set-point [Pa], shape (n_env,), that the reference needs."""
-        wanted = self._wanted(measured, now)
-        set_point = now.pressure + self._lag_gain * (wanted - now.pressure)
+        """Return the set-point [Pa], shape (n_env,), for the reference."""
+        target = self._target(measured, now)
+        set_point = now.pressure + self._lag_gain * (target - now.pressure)
         signal = self.action_signal
         return np.asarray(np.minimum(np.maximum(set_point, signal.low), signal.high))
 
-    def _wanted(self, measured: Array, now: InverseState) -> Array:
-        """Return the pressure [Pa] to go for: that of the last aim that is due."""
+    def _target(self, measured: Array, now: InverseState) -> Array:
+        """Return the target pressure [Pa]: that of the last target that is due."""
         load = measured[2]
         aims = np.add.reduce(self.aims[:, :, None] * measured[3:], axis=1)
-        wanted = np.empty_like(aims)
+        target = np.empty_like(aims)
         for muscle, rows in self.nominal.groups(load):
             drive = muscle.drive_for(aims[:, rows]).ravel()
             hysteresis = tuple(
                 np.concatenate([a] * len(aims)) for a in _taken(now.hysteresis, rows)
             )
-            wanted[:, rows] = muscle.pressure_for(drive, hysteresis).reshape(len(aims), -1)
-        travel = np.abs(wanted - now.pressure) / self.nominal.plant.regulator.slew_rate
+            target[:, rows] = muscle.pressure_for(drive, hysteresis).reshape(len(aims), -1)
+        travel = np.abs(target - now.pressure) / self.nominal.plant.regulator.slew_rate
         due = travel >= self.due[:, None]
         last = len(aims) - 1 - np.argmax(due[::-1], axis=0)
-        return np.asarray(wanted[last, np.arange(len(load))])
+        return np.asarray(target[last, np.arange(len(load))])
 
     def advance(self, now: InverseState, set_point: Array, load: Array) -> InverseState:
         """Return the nominal muscle's state one control period on."""
@@ -190,7 +189,7 @@ def _placed(whole: Any, part: HysteresisState, rows: Any, n: int) -> HysteresisS
 
 
 def aims_of(samples: int, spacing: float, lead: float, early: float = EARLY) -> tuple[Array, Array]:
-    """Return the aims of :class:`Inverse` and when they are due, for a preview."""
+    """Return the targets of :class:`Inverse` and their due times, for a preview."""
     aims, due = [preview_weights(samples, spacing, lead)], [0.0]
     for i in range(1, samples + 1):
         left = i * spacing - lead
@@ -216,11 +215,11 @@ def make_inverse(
         Nominal plant.
     signals, action_signals : Signals
     preview : bool
-        Whether to look ahead; without, the present reference is the aim.
+        Whether the reference is previewed.
     horizon : float
         See :class:`Inverse`.
     knobs : mapping
-        Of ``KNOBS``: factors on the horizon, on the lead that goes with it, and on ``EARLY``.
+        Of ``KNOBS``: factors on the horizon, on the lead, and on ``EARLY``.
     """
     nominal = Nominal(plant)
     references = preview_names("reference", signals) if preview else ["reference"]

@@ -1,12 +1,10 @@
-"""Inverse feed-forward with a PID for what the nominal model does not know.
+"""Inverse feedforward with a PID on the deviation from the nominal model (astrom2006, chapter 5).
 
-The PID does not compare the contraction with the reference, which would have it fight the dead
-time, the slew limit and every early start. It compares the contraction with what the *nominal*
-muscle would do under the same commands: dead time, regulator, hysteresis and static law, the lag of
-the mass counted as delay. While the model is right the PID rests, and the feed-forward acts alone;
-what it corrects is a wrong history, a wrong parameter or an unannounced load. (Two degrees of
-freedom with an internal model; K. J. Astrom, T. Hagglund, "Advanced PID Control", ISA 2006,
-chapter 5.)
+The PID does not compare the contraction with the reference, which would make it counteract the dead
+time, the slew limit and every early start. It compares the contraction with that of the *nominal*
+muscle under the same commands: dead time, regulator, hysteresis and static law, the lag of the mass
+counted as delay. With an exact model the PID is at rest; it corrects a wrong history, a wrong
+parameter or an undeclared load. (Two degrees of freedom with an internal model.)
 """
 
 from __future__ import annotations
@@ -32,14 +30,14 @@ KNOBS: Bounds = {**INVERSE_KNOBS, "closed_loop_time": PID_KNOBS["closed_loop_tim
 
 
 class InversePidState(NamedTuple):
-    """State of the feed-forward, of the PID, and what is under way.
+    """States of the feedforward and of the PID, and the delayed nominal contraction.
 
     Attributes
     ----------
     inverse : InverseState
     pid : PidState
     expected : ndarray, shape (n_env, n_delay)
-        Nominal contraction at rest [m] under the pressures under way, newest first.
+        Nominal static contraction [m] under the pressures of the last periods, newest first.
     """
 
     inverse: InverseState
@@ -49,7 +47,7 @@ class InversePidState(NamedTuple):
 
 @dataclass(frozen=True)
 class InversePid(RowController):
-    """Feed-forward and PID; see this module's page.
+    """Feedforward and PID; see the module.
 
     Attributes
     ----------
@@ -62,7 +60,7 @@ class InversePid(RowController):
 
     @cached_property
     def _delay(self) -> tuple[int, float]:
-        """Delay from the model's pressure to the contraction: whole periods, and the rest."""
+        """Delay from the model's pressure to the contraction: whole and fractional periods."""
         nominal = self.inverse.nominal
         plant = nominal.plant
         age = (plant.regulator.dead_time + nominal.mechanical_lag) / plant.control_period
@@ -118,7 +116,7 @@ def make_inverse_pid(
     gains: Gains | None = None,
     knobs: Knobs = AS_DESIGNED,
 ) -> InversePid:
-    """Return the controller; the parameters are those of ``make_inverse`` and ``make_pid``."""
+    """Return the controller; parameters as of ``make_inverse`` and ``make_pid``."""
     inverse = make_inverse(plant, signals, action_signals, preview, horizon, knobs)
     return InversePid(inverse, simc(plant, knobs=knobs) if gains is None else gains)
 

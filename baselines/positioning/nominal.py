@@ -1,9 +1,8 @@
-"""A nominal plant, worked by rows: what the model-based controllers know.
+"""Nominal muscle vectorised over rows, as used by the model-based controllers.
 
-Everything here is computed from the nominal
-:class:`~pam_envs.plants.single_muscle.plant.SingleMuscle` alone. Rows may hang different loads:
-they are worked load by load, and what a load needs (the hysteresis at that load, its inverse, the
-static curve) is prepared once, when it is first met.
+Everything is computed from the nominal :class:`~pam_envs.plants.single_muscle.plant.SingleMuscle`.
+Rows may have different loads: they are processed by load, and the model at a load (hysteresis, its
+inverse, static curve) is prepared when that load first occurs.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 HysteresisState = RowsState
 CURVE_POINTS = 1001
-"""Points of the tabulated static curve; straight in between to 0.05 um."""
+"""Points of the tabulated static curve; linear interpolation is exact to 0.05 um."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,7 @@ class LoadedMuscle:
         return np.interp(drive, *self._curve)
 
     def advance(self, drive: Array, state: HysteresisState) -> tuple[Array, HysteresisState]:
-        """Return the effective pressure [Pa] at a pressure [Pa], and the hysteresis it leaves."""
+        """Return the effective pressure [Pa] at a pressure [Pa], and the next state."""
         law, full = self.plant.hysteresis, self.plant.regulator.max_pressure
         output, after = self.hysteresis.forward(law.stretched(drive, full), state)
         return law.unstretched(output, full), after
@@ -75,18 +74,18 @@ class LoadedMuscle:
         return law.unstretched(np.minimum(np.maximum(found, 0.0), full), full)
 
     def explain(self, contraction: Array, pressure: Array) -> HysteresisState:
-        """Return the hysteresis of the simplest history that explains a first measurement.
+        """Return the hysteresis state of the simplest history of a first measurement.
 
-        That history is: from no pressure up to a peak, and down to the present pressure. The
-        higher the peak, the more contraction is left; it is found by bisection. What is out of
-        reach gets the nearest end (never above the present pressure, or the full pressure).
+        That history is: from no pressure up to a peak, and down to the present pressure. A
+        higher peak leaves more contraction; it is found by bisection between the present and the
+        full pressure, and clipped to these.
         """
-        wanted = self.drive_for(contraction)
+        target = self.drive_for(contraction)
         low = np.array(pressure, float)
         high = np.full_like(low, self.plant.regulator.max_pressure)
         for _ in range(14):
             middle = 0.5 * (low + high)
-            more = self._after(middle, pressure)[0] < wanted
+            more = self._after(middle, pressure)[0] < target
             low, high = np.where(more, middle, low), np.where(more, high, middle)
         return self._after(low, pressure)[1]
 
@@ -97,12 +96,12 @@ class LoadedMuscle:
 
 @dataclass(frozen=True)
 class Nominal:
-    """The nominal plant by rows, each with its own load.
+    """Nominal plant over rows, each with its own load.
 
     Attributes
     ----------
     plant : SingleMuscle
-        What the controller believes.
+        Nominal plant.
     """
 
     plant: SingleMuscle
@@ -112,7 +111,7 @@ class Nominal:
         return {}
 
     def at(self, load: float) -> LoadedMuscle:
-        """Return the plant with a load [kg] on it; prepared once."""
+        """Return the plant with a load [kg], cached."""
         if load not in self._met:
             self._met[load] = LoadedMuscle(self.plant, load)
         return self._met[load]
@@ -149,7 +148,7 @@ class Nominal:
         return math.sqrt(stiffness / (max(LOADS) + self.plant.mass.moving_mass))
 
     def next_pressure(self, pressure: Array, set_point: Array) -> Array:
-        """Return the regulator's pressure [Pa] one control period on, its dead time left out."""
+        """Return the regulator's pressure [Pa] after one control period, without its dead time."""
         law, period = self.plant.regulator, self.plant.control_period
         gap = set_point - pressure
         size = np.abs(gap)
@@ -159,5 +158,5 @@ class Nominal:
         return np.asarray(set_point - np.copysign(left, gap))
 
     def arrival(self, seconds: float) -> float:
-        """Return the share of a gap that the regulator closes in so many seconds."""
+        """Return the share of a step that the regulator completes in a time [s]."""
         return -math.expm1(-seconds / self.plant.regulator.time_constant)

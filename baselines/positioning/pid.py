@@ -1,16 +1,15 @@
-"""PID control of the contraction, tuned by a rule from the nominal plant.
+"""PID control of the contraction, SIMC tuning from the nominal plant (skogestad2003).
 
-Tuning rule: SIMC for a second-order plant with dead time (:mod:`baselines.linear.simc`), with K the
-steepest static gain of the nominal muscle over its stroke (so that the loop is stable where the
-muscle is most willing), tau_1 the regulator's lag, tau_2 the lag of the mass, and theta the
-regulator's dead time, half a control period of the hold, and one of computing. The rule's one
-choice is tau_c = theta, made longer only where the loop would otherwise come within a factor of
-``SWING`` of the natural frequency of the load on the muscle, which the rule's real lags do not
-describe. :func:`simc` is a pure function of the plant.
+SIMC for a second-order plant with dead time (:mod:`baselines.linear.simc`), with K the steepest
+static gain of the nominal muscle over its stroke (so that the loop is stable at the steepest
+point), tau_1 the regulator's lag, tau_2 the lag of the mass, and theta the regulator's dead time,
+half a control period of the hold, and one of computing. tau_c = theta, increased only where the
+bandwidth would otherwise come within a factor of ``SWING`` of the natural frequency of the load on
+the muscle, which the rule's real lags do not describe.
 
-The regulator's slew limit winds an integral up as its range does. So the set-point is held within
-reach of the *measured* pressure: ``REACH`` times the least lead that keeps the nominal regulator
-at its slew limit.
+The regulator's slew limit causes windup as its range does: the set-point is limited about the
+*measured* pressure, to ``REACH`` times the smallest lead that keeps the nominal regulator at its
+slew limit.
 """
 
 from __future__ import annotations
@@ -43,8 +42,8 @@ SWING = 4.0
 """Least natural frequency of the load over the loop's bandwidth ``1 / (tau_c + theta)``."""
 
 REACH = 1.5
-"""Margin for a regulator that is slower than the nominal one; the overshoot of a step grows with
-it (0.5 % of the step at 1, 10 % at 1.5, 25 % at 2)."""
+"""Margin for a regulator slower than the nominal one; the overshoot of a step increases with it
+(0.5 % of the step at 1, 10 % at 1.5, 25 % at 2)."""
 KNOBS: Bounds = {**PID_KNOBS, "reach": (0.67, 2.0)}
 
 
@@ -59,11 +58,11 @@ class Gains:
     integral : float
         [Pa/(m s)].
     derivative : float
-        [Pa s/m]; on the measurement, so that a step of the reference gives no kick.
+        [Pa s/m]; on the measurement, without a kick at reference steps.
     filter_time : float
         Time constant [s] of the first-order filter on the derivative.
     tracking_time : float
-        Time constant [s] with which the integral is pulled back while the output is saturated.
+        Time constant [s] of the integral's back-calculation while the output is saturated.
     """
 
     proportional: float
@@ -76,14 +75,14 @@ class Gains:
 def simc(
     plant: SingleMuscle, closed_loop_time: float | None = None, knobs: Knobs = AS_DESIGNED
 ) -> Gains:
-    """Return the gains of the SIMC rule for a nominal plant; see this module's page.
+    """Return the gains of the SIMC rule for a nominal plant; see the module.
 
     Parameters
     ----------
     plant : SingleMuscle
         Nominal plant.
     closed_loop_time : float, optional
-        ``tau_c`` [s]; default: see this module's page.
+        ``tau_c`` [s]; default: see the module.
     knobs : mapping
         Of :data:`baselines.linear.simc.PID_KNOBS`.
     """
@@ -104,7 +103,7 @@ def simc(
 
 
 class PidState(NamedTuple):
-    """Hysteresis of a PID, shapes (n_env,).
+    """State of a PID, shapes (n_env,).
 
     Attributes
     ----------
@@ -137,8 +136,8 @@ def pid_step(
 ) -> tuple[Array, PidState]:
     """Return the output [Pa], held between ``low`` and ``high``, and the next state.
 
-    Anti-windup by back-calculation: what the limits cut off flows out of the integral with the
-    tracking time, and the integral itself never leaves the limits.
+    Anti-windup by back-calculation: the limited part is subtracted from the integral with the
+    tracking time, and the integral itself stays within the limits.
 
     Parameters
     ----------
@@ -146,7 +145,7 @@ def pid_step(
     state : PidState
         Not changed.
     error, measured : ndarray, shape (n_env,)
-        Wanted less measured, and measured contraction [m].
+        Reference less measured, and measured contraction [m].
     low, high : float or ndarray, shape (n_env,)
         Limits [Pa] of the output.
     period : float
@@ -154,9 +153,9 @@ def pid_step(
     """
     pole = gains.filter_time / (gains.filter_time + period)
     slope = pole * state.slope + (1.0 - pole) * (measured - state.measured) / period
-    wanted = gains.proportional * error + state.integral - gains.derivative * slope
-    output = np.minimum(np.maximum(wanted, low), high)
-    back = (output - wanted) * min(1.0, period / gains.tracking_time)
+    unlimited = gains.proportional * error + state.integral - gains.derivative * slope
+    output = np.minimum(np.maximum(unlimited, low), high)
+    back = (output - unlimited) * min(1.0, period / gains.tracking_time)
     integral = state.integral + gains.integral * period * error + back
     integral = np.minimum(np.maximum(integral, low), high)
     return output, PidState(integral, measured, slope)

@@ -1,1 +1,1 @@
-"""robust."""
+"""Robust disturbance loops of joints."""

@@ -1,16 +1,16 @@
-"""The disturbance loops of joints as they were synthesised: H-infinity and mu, fluidic_muscles, section 4.
+"""Synthesised disturbance loops of joints, H-infinity and mu: fluidic_muscles, section 4.
 
-The numbers come from ``joint_robust.json``, which :mod:`baselines.robust.synthesis` writes. Both
+The numbers are those of ``joint_robust.json``, written by :mod:`baselines.robust.synthesis`. Both
 loops act on the angle of the model less that of the joint, and were designed for poles at 23 rad/s.
-For a joint with other poles ``p`` the loop is ``C(23 s / p)``: time runs slower, and with a double
-pole there the loop gain is the same at ``p / 23`` of the frequency. ``mu`` is then no larger, as
-the bound on what is neglected stays where it is while the loop comes down from it.
+For a joint with other poles ``p`` the loop is ``C(23 s / p)``, scaled in time: with a double pole
+there the loop gain is the same at ``p / 23`` of the frequency. ``mu`` is then not larger, as the
+bound on the neglected dynamics is unchanged while the loop gain decreases at that frequency.
 
-In an arm the double pole only stands in for a joint that swings and is moved by the others: at the
-base the error is a fifth beyond what the design allows for, so that ``mu`` says nothing there. With
-the arm straight and without friction all six loops together are stable over the whole sector of
-gains, with 0.1 kg at the tip too, and at the nominal gain the sensitivity peaks at 1.24 (1.48 with
-the 0.1 kg), where one stage has 1.02.
+In an arm the double pole only approximates a joint that oscillates and is coupled to the others: at
+the base the error exceeds the bound of the design by a fifth, so that ``mu`` does not apply there.
+With the arm straight and without friction all six loops together are stable over the whole sector
+of gains, with 0.1 kg at the tip too, and at the nominal gain the sensitivity peaks at 1.24 (1.48
+with the 0.1 kg), where one stage has 1.02.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Stage = Literal["full", "reduced"]
 
 @cache
 def frozen() -> dict[str, Any]:
-    """Return what the synthesis wrote."""
+    """Return the numbers of the synthesis."""
     text = Path(__file__).with_name("joint_robust.json").read_text(encoding="utf-8")
     return dict(json.loads(text))
 
@@ -59,7 +59,7 @@ def robust_controller(
 
 
 def frozen_loop(kind: Kind) -> DiscreteSystem:
-    """Return a controller at the control period for which it was frozen."""
+    """Return a controller at the control period of its design."""
     numbers = frozen()[kind]["discrete"]
     a, b, c = (np.array(numbers[name]) for name in "abc")
     return DiscreteSystem(a, b, c, np.asarray(numbers["d"]), float(frozen()["period"]))

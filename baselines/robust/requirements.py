@@ -1,25 +1,24 @@
-"""What the disturbance loop of a joint must withstand, and how far a loop is from it.
+"""Robust performance of the disturbance loop of a joint: uncertainty, weights and ``mu``.
 
-The nominal plant is ``G = 23^2 / (s + 23)^2`` (fluidic_muscles, section 4, Fig. 12). The
-hysteresis makes its gain uncertain, within the sector of Fig. 14; what is neglected at high
-frequencies is bounded as in Fig. 15; and the sensitivity is weighted:
+The nominal plant is ``G = 23^2 / (s + 23)^2`` (fluidic_muscles, section 4, Fig. 12). The hysteresis
+makes its gain uncertain, within the sector of Fig. 14; neglected dynamics at high frequencies are
+bounded as in Fig. 15; and the sensitivity is weighted:
 
     plants         G (1 + g delta + W_m Delta),    delta real, Delta complex, both within 1
     performance    |W_p S| <= 1 for all of them
 
-The paper prints neither the sector nor the functions. ``g`` is 0.35; ``W_p`` asks for a bandwidth
-of 4 rad/s; ``W_m`` goes from 10 % to 300 % and through 100 % at 42 rad/s. That covers half a period
-of the hold and a whole one of computing, which a real rig needs and the environments do not have.
-All other fields of :class:`RobustDesign` are assumed. The sensitivity that comes out (0.013, 0.127
-and 0.443 at 0.1, 1 and 4 rad/s) is that of another synthesis for the paper to 1 %; as the fields
-were free, that is no evidence for either. The measure is the structured singular value ``mu`` of
-the three blocks, 1 or less if the performance holds for all plants. With one input and output the
-matrix has rank one, so that ``mu`` is not a bound but a number: the smallest ``k`` with
+The paper prints neither the sector nor the functions. ``g`` is 0.35; ``W_p`` requires a bandwidth
+of 4 rad/s; ``W_m`` increases from 10 % to 300 %, with 100 % at 42 rad/s, which covers half a period
+of the hold and a whole one of computing, as on a real rig. All other fields of
+:class:`RobustDesign` are assumed. The resulting sensitivity (0.013, 0.127 and 0.443 at 0.1, 1 and 4
+rad/s) agrees with another synthesis for the paper to 1 %; as the fields were free, this validates
+neither. The measure is the structured singular value ``mu`` of the three blocks, at most 1 if the
+performance holds for all plants. With one input and output the matrix has rank one, so that ``mu``
+is exact: the smallest ``k`` with
 
     min over |delta| <= k of |1 + L (1 + g delta)|  <=  k (|W_p| + |W_m L|)
 
-A. K. Packard, J. C. Doyle, "The complex structured singular value", Automatica 29 (1993);
-S. Skogestad, I. Postlethwaite, "Multivariable Feedback Control", Wiley 2005, chapter 8.
+Sources: packard1993; skogestad2005, chapter 8.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ if TYPE_CHECKING:
     from control import StateSpace
 
 FREQUENCIES = np.geomspace(1e-2, 1e3, 401)
-"""[rad/s], at which loops are looked at."""
+"""Frequencies [rad/s] at which loops are evaluated."""
 DOUBLINGS = 60
 
 
@@ -51,19 +50,19 @@ class RobustDesign:
     pole : float
         Both poles of the nominal plant [rad/s] (fluidic_muscles, section 4).
     gain_spread : float
-        ``g``; asked for: mu of 1 or less at 35 %.
+        ``g``; required: mu of at most 1 at 35 %.
     bandwidth : float
-        Of the sensitivity [rad/s]; asked for with ``g``.
+        Of the sensitivity [rad/s]; required with ``g``.
     peak : float
         Bound on the sensitivity at high frequencies; assumed.
     at_rest : float
-        Bound on the sensitivity at rest; above 0, for the weight to be stable; assumed.
+        Bound on the static sensitivity; above 0, for a stable weight; assumed.
     neglected_low, neglected_high : float
         ``|W_m|`` at low and at high frequencies; assumed.
     neglected_corner : float
         Frequency [rad/s] of its zero over ``neglected_low``; assumed.
     effort : float
-        Weight on the command: small, only to make the problem regular; assumed.
+        Weight on the command: small, for a regular problem; assumed.
     """
 
     pole: float = 23.0

@@ -47,7 +47,7 @@ def test_previews_are_aimed_at() -> None:
     line = PATH.angles()
     poses = ARM.pose(line[:2])
     seen = observation(line[0], poses[0], poses[1])
-    action, _ = InverseKinematics(ARM, SIGNALS, ACTIONS, ahead=1).predict(seen)
+    action, _ = InverseKinematics(ARM, SIGNALS, ACTIONS, preview=1).predict(seen)
     wanted = resolve(ARM, poses[1:], start=line[0]).angles[0]
     np.testing.assert_allclose(set_points(action), wanted, atol=1e-6)
 
