@@ -1,4 +1,4 @@
-"""Torque and stiffness control of the elbow: exact allocation, pressure loops, friction compensation.
+"""Torque and stiffness control of the elbow: exact allocation with friction compensation.
 
 The controller of chakarov2018, Fig. 7: pressures for the reference torque and stiffness at the
 present angle, and a loop around each bundle's pressure. Friction inside the bundles is driven by

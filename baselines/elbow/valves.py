@@ -64,7 +64,7 @@ class RegulatorLoop:
 
     @cached_property
     def lead(self) -> float:
-        """Difference of set-point and sensed pressure over that of reference and sensed pressure."""
+        """Lead of the set-point over the remaining pressure error."""
         return max(
             1.0, self.plant.regulator.time_constant / (LOOP_PERIODS * self.plant.control_period)
         )

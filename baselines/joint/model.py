@@ -44,9 +44,9 @@ class LineRows:
         """Return the output of an input."""
         return self.slope * value, state
 
-    def inverse(self, wanted: Array, state: HysteresisState) -> Array:
+    def inverse(self, output: Array, state: HysteresisState) -> Array:
         """Return the input of an output."""
-        return wanted / self.slope
+        return output / self.slope
 
 
 @dataclass(frozen=True)

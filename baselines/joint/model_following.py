@@ -113,7 +113,9 @@ class ModelFollowing(RowController):
         view = self.signals.read(observation)
         shift = self.gravity.shift(view.reference, view.payload)
         tracking, correction = self._commands(view, state)
-        set_point = self._inverse(tracking + correction, state.hysteresis) + shift
+        set_point = (
+            JointHysteresis(self.model).inverse(tracking + correction, state.hysteresis) + shift
+        )
         set_point = np.minimum(np.maximum(set_point, self.model.low), self.model.high)
         return self.signals.write(set_point, observation), self._after(
             view, state, tracking, set_point - shift
@@ -133,9 +135,6 @@ class ModelFollowing(RowController):
             angle, view.angle, state.disturbance, low - tracking, high - tracking
         )
         return tracking, more
-
-    def _inverse(self, wanted: Array, hysteresis: HysteresisState) -> Array:
-        return JointHysteresis(self.model).inverse(wanted, hysteresis)
 
     def _after(
         self, view: JointView, state: FollowingState, tracking: Array, applied: Array

@@ -132,8 +132,8 @@ def make_joint_signal_map(signals: Signals, action_signals: Signals) -> JointSig
     references = [f"{'reference' if ends == [''] else 'joint_reference'}{end}" for end in ends]
     if references[0] not in names:
         raise ValueError(
-            f"there is no signal {references[0]!r}; these controllers track planned angles: make the"
-            " environment with plan=True, or take 'joint_inverse_kinematics', which plans itself"
+            f"there is no signal {references[0]!r}; these controllers track planned angles: make"
+            " the environment with plan=True, or take 'joint_inverse_kinematics', which plans itself"
         )
 
     def known(name: str) -> Reader | None:

@@ -4,7 +4,7 @@
 
 with a compensator for transfer between controllers and limited commands
 (:mod:`baselines.linear.bumpless`). The bandwidths are those of yeh2010, section 4.1, read in
-rad/s. The gains of the compensator are 0, which satisfies its matrix inequality for every stable plant.
+rad/s. The gains of the compensator are 0, which satisfies its inequality for every stable plant.
 
 The designs are in kPa, as in the paper; the loops command Pa of deviation from a feedforward.
 """

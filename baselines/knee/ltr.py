@@ -208,7 +208,7 @@ ENTRIES = {
     ),
     "knee_printed": LTR(
         "knee_inverse_ltr with the printed tension controller (11) and compensator; for"
-        ' dynamics="measured" (1.1 % on its sine), limit cycles on plants with the regulator\'s lag',
+        ' dynamics="measured" (1.1 % on its sine), limit cycles on plants with a regulator lag',
         make=partial(make_knee_ltr, printed=True),
         citation="yeh2010",
     ),

@@ -1,4 +1,4 @@
-"""Inverse kinematics of a manipulator: joint set-points for a reference pose in each control period.
+"""Inverse kinematics of a manipulator: joint set-points for a reference pose.
 
 fluidic_muscles, section 2: of all joint angles of a pose, those that minimise the weight (2.1),
 which keeps joints off their limits, or the sum of their squares. A period starts from the angles

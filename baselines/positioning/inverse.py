@@ -9,7 +9,7 @@ measurements are not used.
 
 Lead. A set-point acts on the contraction after the dead time, the horizon in which the regulator
 is driven to its target, and the lag of the mass. With preview, the target is the reference later by
-this lead, linearly interpolated. Without preview it is the present reference, and the delay remains.
+this lead, linearly interpolated. Without preview it is the present reference.
 
 Early start. For a step, the regulator at its slew limit takes longer than the lead. The error of
 the transition is least when half of it precedes the step: a later sample of the preview becomes the
