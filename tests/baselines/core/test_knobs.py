@@ -109,7 +109,7 @@ def test_knee():
     tame = knee_design.design(env.plant, "tension", knobs={"recovery": 10.0}).figures
     assert fast.bandwidth > 1.5 * plain.bandwidth
     assert tame.bandwidth < plain.bandwidth
-    aheads = [built("knee_inverse_ahead", env, lead=k).ahead.weights for k in (1.0, 2.0)]
+    aheads = [built("knee_inverse_ahead", env, lead=k).preview.weights for k in (1.0, 2.0)]
     times = np.arange(len(aheads[0]))
     assert aheads[1] @ times == pytest.approx(2.0 * (aheads[0] @ times))
     loops = [built("knee_inverse_ltr", env, bandwidth=k).tension for k in (1.0, 2.0)]
