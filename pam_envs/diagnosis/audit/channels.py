@@ -8,15 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pam_envs.data.recording.columns import rows_text, span_text
 from pam_envs.data.recording.recording import Recording
+from pam_envs.diagnosis.arrays import Array, Flags
 from pam_envs.diagnosis.audit.noise import resolution
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
 
 UNITS = {
     "contraction": ("contraction_mm", "mm", 1e-3),

@@ -12,15 +12,12 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from pam_envs.data.recording.recording import Recording, repeat_rows
 from pam_envs.data.rig_file import BAR, MM, Rig
+from pam_envs.diagnosis.arrays import Array, Indices
 from pam_envs.diagnosis.audit.repeats import DISAGREE, Source, Trust, best, detrended
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 CHANNELS = {"contraction": ("mm", MM), "pressure": ("bar", BAR)}
 """Measured outputs with unit and scale of display."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from pam_envs.diagnosis.arrays import Array
+
 Source = Literal["repeats", "holds", "innovations", "declared"]
 
 DISAGREE = 1.5

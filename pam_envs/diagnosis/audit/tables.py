@@ -5,13 +5,11 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from pam_envs.data.readings import one_path
 from pam_envs.data.tables import ContractionTable
-
-Array = NDArray[np.float64]
+from pam_envs.diagnosis.arrays import Array
 
 MM = 1e-3
 SIGNIFICANT = 0.05

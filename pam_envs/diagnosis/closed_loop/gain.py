@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.closed_loop.plant_inverse import PREVIEW, Controller, Simulated
 from pam_envs.diagnosis.closed_loop.plant_inverse import design as default_design
@@ -21,7 +21,6 @@ from pam_envs.diagnosis.closed_loop.references import DURATION, fixed_references
 from pam_envs.plants.core.stepper import PERIOD, PlantStepper
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
-Array = NDArray[np.float64]
 Design = Callable[[Any], Controller]
 """Design routine from a plant, with load and temperature of the runs, to a controller."""
 

@@ -20,12 +20,11 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.plants.core.stepper import PlantStepper
 from pam_envs.plants.single_muscle.plant import SingleMuscle
-
-Array = NDArray[np.float64]
 
 PREVIEW = 60
 """Preview of the reference [samples], with the present one."""

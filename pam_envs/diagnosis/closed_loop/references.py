@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.closed_loop.plant_inverse import PREVIEW
 from pam_envs.plants.core.stepper import PERIOD
-
-Array = NDArray[np.float64]
 
 DURATION = 24.0
 """Duration of each reference [s]."""

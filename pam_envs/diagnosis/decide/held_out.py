@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.data.recording.recording import Recording
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import (
     Candidate,
@@ -22,8 +23,6 @@ from pam_envs.diagnosis.fit.candidate import (
     without_each_cause,
 )
 from pam_envs.diagnosis.fit.least_squares import FEW_DAMPINGS, Problem, evaluate, improve, share
-
-Array = NDArray[np.float64]
 
 SHARE = (0.15, 0.4)
 """Least and largest share of a record that is held out."""

@@ -6,14 +6,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.fit.candidate import initial_fits
 from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, column_of
 from pam_envs.diagnosis.fit.plant_protocol import PlantFamily
-
-Array = NDArray[np.float64]
 
 DIRECTIONS = 1e-8
 """Relative size of the singular directions of the base's Jacobian that count."""

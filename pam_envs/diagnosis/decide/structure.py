@@ -13,9 +13,8 @@ from scipy.ndimage import median_filter
 from scipy.signal import lfilter, welch
 from scipy.stats import chi2
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.fit.blocks import Blocks
-
-Array = NDArray[np.float64]
 
 BINS = 12
 LAGS = 20

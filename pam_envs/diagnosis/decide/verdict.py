@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.decide.compare import (
     cross_validate,
@@ -28,7 +29,6 @@ from pam_envs.diagnosis.fit.candidate import Candidate, without_each_cause
 from pam_envs.diagnosis.fit.least_squares import Problem, column_of
 from pam_envs.diagnosis.fit.plant_protocol import PlantFamily
 
-Array = NDArray[np.float64]
 Models = tuple[Candidate, list[Candidate]]
 """The best model with some number of causes, and its rivals, best first."""
 

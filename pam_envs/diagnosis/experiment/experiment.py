@@ -11,16 +11,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pam_envs.constants import GRAVITY, ROOM_TEMPERATURE
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.experiment.plans import PERIOD, Means, Plan, plans
 from pam_envs.diagnosis.fit.least_squares import Fit, column_of
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.replay import LONGEST_STEP, Inputs, replay_rows
-
-Array = NDArray[np.float64]
 
 ENOUGH = 1.0
 """Least mean squared difference of the rivals, in noise variances, of a useful experiment."""

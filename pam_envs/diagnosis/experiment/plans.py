@@ -11,13 +11,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pam_envs.data.recording.recording import Recording
 from pam_envs.data.rig_file import BAR, Rig
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.audit.audit import load_levels
-
-Array = NDArray[np.float64]
 
 PERIOD = 0.02
 WARMER = 10.0

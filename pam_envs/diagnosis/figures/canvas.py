@@ -16,9 +16,8 @@ from html import escape
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from pam_envs.diagnosis.arrays import Array
 
 WIDTH = 900.0
 LEFT, RIGHT = 62.0, 18.0

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.figures.canvas import (
     EXTENDED,
     GREY,
@@ -15,7 +16,6 @@ from pam_envs.diagnosis.figures.canvas import (
     PAPER,
     RULE,
     WIDTH,
-    Array,
     Canvas,
     Picture,
     square,

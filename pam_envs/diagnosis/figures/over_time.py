@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.figures import traces as tv
 from pam_envs.diagnosis.figures.canvas import (
     BASE,
@@ -21,7 +22,6 @@ from pam_envs.diagnosis.figures.canvas import (
     RIGHT,
     RULE,
     WIDTH,
-    Array,
     Canvas,
     Picture,
 )

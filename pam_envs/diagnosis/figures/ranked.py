@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.figures.canvas import (
     BASE,
     DASHES,
@@ -21,7 +22,6 @@ from pam_envs.diagnosis.figures.canvas import (
     RISING,
     RULE,
     WIDTH,
-    Array,
     Canvas,
     Picture,
 )

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.figures import traces as tv
 from pam_envs.diagnosis.figures.canvas import (
     BASE,
@@ -20,7 +21,6 @@ from pam_envs.diagnosis.figures.canvas import (
     MUTED,
     RIGHT,
     WIDTH,
-    Array,
     Canvas,
     Picture,
 )

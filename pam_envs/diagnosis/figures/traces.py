@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from pam_envs.diagnosis.arrays import Array
 
 CHANNELS = ("contraction", "pressure")
 UNITS = {"contraction": ("mm", 1e3), "pressure": ("bar", 1e-5)}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from pam_envs.diagnosis.arrays import Array
 
 BLOCK_SECONDS = 4.0
 """Length of the interleaved blocks [s]."""

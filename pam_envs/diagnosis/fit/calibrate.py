@@ -5,16 +5,14 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import Candidate, fit_base
 from pam_envs.diagnosis.fit.first_guess import balance, start_at_guess
 from pam_envs.diagnosis.fit.least_squares import Fit, Problem, column_of, evaluate, improve
 from pam_envs.diagnosis.fit.single_muscle import MuscleFamily
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
-
-Array = NDArray[np.float64]
 
 PRESSURE = ("regulator.gain", "regulator.time_constant")
 FAST = 0.04

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.cause import Cause, Form
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.least_squares import (
@@ -23,8 +23,6 @@ from pam_envs.diagnosis.fit.least_squares import (
     share,
 )
 from pam_envs.diagnosis.fit.plant_protocol import PlantFamily
-
-Array = NDArray[np.float64]
 
 POLISH = 6
 """Largest number of rounds with the full Jacobian."""

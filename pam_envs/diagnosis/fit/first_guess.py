@@ -15,9 +15,8 @@ from scipy.ndimage import uniform_filter1d
 from scipy.optimize import lsq_linear
 
 from pam_envs.constants import GRAVITY
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.hysteresis.elements import move_plays, simulate_plays
-
-Array = NDArray[np.float64]
 
 SLOW = 0.008
 """Speed [m/s] below which a sample is an equilibrium of forces."""

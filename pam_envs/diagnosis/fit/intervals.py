@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import complete_jacobian
 from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, normal_equations
 
-Array = NDArray[np.float64]
 Json = dict[str, Any]
 
 LEAST_LEFT = 2

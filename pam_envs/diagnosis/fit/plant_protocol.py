@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.fit.least_squares import Free
-
-Array = NDArray[np.float64]
 
 
 class PlantFamily(Protocol):

@@ -8,17 +8,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pam_envs.constants import CELSIUS, GRAVITY
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.parameters import declarations
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import NEUTRAL, SingleMuscle, UnstableParameters
 from pam_envs.plants.single_muscle.replay import CHANNELS, Inputs, replay_rows
-
-Array = NDArray[np.float64]
 
 THRESHOLDS = (3e3, 7e3, 1.2e4, 1.8e4, 2.5e4, 3.3e4, 4.2e4, 5.2e4, 6.3e4, 7.6e4, 9.1e4, 1.1e5)
 """Thresholds [Pa] of the base's play operators."""

@@ -6,7 +6,6 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pam_envs.diagnosis.decide.held_out import HeldOut, kind_of
 from pam_envs.diagnosis.decide.rule import Rule
@@ -14,8 +13,6 @@ from pam_envs.diagnosis.decide.structure import binned_r2, flexible_r2, ljung_bo
 from pam_envs.diagnosis.fit.candidate import Candidate
 from pam_envs.diagnosis.report.summary_causes import SCALE, UNITS, calibration, causes, rivals, seen
 from pam_envs.diagnosis.report.summary_text import sentence
-
-Array = NDArray[np.float64]
 
 
 def report_of(study: Any, rule: Rule, warnings: tuple[str, ...]) -> dict[str, Any]:

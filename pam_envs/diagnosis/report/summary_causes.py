@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pam_envs.diagnosis.decide.isolability import base_subspace, projected, size_over_noise
 from pam_envs.diagnosis.decide.rule import Rule, not_excluded
@@ -15,7 +14,6 @@ from pam_envs.diagnosis.fit.candidate import Candidate
 from pam_envs.diagnosis.fit.intervals import spans
 from pam_envs.diagnosis.fit.single_muscle import declared
 
-Array = NDArray[np.float64]
 Json = dict[str, Any]
 
 UNITS = {"contraction": "mm", "pressure": "bar"}

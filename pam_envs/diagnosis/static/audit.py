@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.data.tables import BAR, MM, ContractionTable
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.static.compare import Model, Study, pure_error
 from pam_envs.diagnosis.static.fit import fit
-
-Array = NDArray[np.float64]
 
 OUTLYING = 3.5
 """Robust standard deviations above which a held-out cell is an outlier."""

@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.data.tables import LOAD_TOLERANCE, MM, ContractionTable
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from pam_envs.diagnosis.arrays import Array, Flags
 
 THRESHOLDS = (1 / 24, 1 / 16, 1 / 12, 1 / 8, 3 / 16)
 """Thresholds of the play operators over the highest pressure."""
@@ -49,8 +47,8 @@ class Cells:
     load: Array
     pressure: Array
     mean: Array
-    falling: Mask
-    used: Mask
+    falling: Flags
+    used: Flags
     group: NDArray[np.int64]
     path: NDArray[np.int64]
     block: NDArray[np.int64]
@@ -94,7 +92,7 @@ def _paths(table: ContractionTable) -> dict[tuple[float, bytes], list[NDArray[np
     return found
 
 
-def _blocks(path: NDArray[np.int64], falling: Mask, used: Mask) -> NDArray[np.int64]:
+def _blocks(path: NDArray[np.int64], falling: Flags, used: Flags) -> NDArray[np.int64]:
     """Return the block of each cell: at most ``BLOCK`` used cells of one branch; -1 if unused."""
     block, last, size = np.full(len(path), -1), -1, 0
     before: tuple[int, bool] | None = None

@@ -11,14 +11,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.static.cells import Cells
 from pam_envs.diagnosis.static.fit import Fit, base_starts, extend, fit, improve, jacobian
 from pam_envs.diagnosis.static.models import Term, predict
 
-Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
 PRESSURE_FOLDS = 6

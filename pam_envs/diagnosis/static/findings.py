@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pam_envs.data.tables import ContractionTable
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.static import search as rule
 from pam_envs.diagnosis.static.audit import SetPoint, missed_set_points
 from pam_envs.diagnosis.static.compare import (
@@ -23,8 +23,6 @@ from pam_envs.diagnosis.static.law import Law, NextLoads, load_laws, next_loads
 from pam_envs.diagnosis.static.models import Term
 from pam_envs.diagnosis.static.search import Search, Trial
 from pam_envs.diagnosis.static.structure import whiteness
-
-Array = NDArray[np.float64]
 
 FLOOR_REACHED = 1.1
 """Held-out error over the noise floor up to which a model is adequate."""

@@ -14,10 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.static.cells import Cells
 from pam_envs.diagnosis.static.models import Number, Term, Values, lags_of, numbers_of, predict
-
-Array = NDArray[np.float64]
 
 MOST_WEIGHT = 0.98
 """Largest sum of the play weights: the muscle follows a reversal a little."""

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.static.cells import Cells
 from pam_envs.diagnosis.static.compare import (
     Interval,
@@ -25,8 +25,6 @@ from pam_envs.diagnosis.static.compare import (
     pure_error,
 )
 from pam_envs.diagnosis.static.models import DEAD_LOAD, EXPONENT, Term, units
-
-Array = NDArray[np.float64]
 
 LOADS_FOR_A_LAW = 5
 """Least number of loads for a law that is fitted without the held-out load."""

@@ -18,13 +18,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pam_envs.data.tables import BAR, MM
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.static.cells import THRESHOLDS, Cells, stops
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 WEIGHTS = tuple(f"weight_{i}" for i in range(1, len(THRESHOLDS) + 1))
 SPRING = ("start_force", "start_length", "stiffness", "hardening")

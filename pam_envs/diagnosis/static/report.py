@@ -7,9 +7,9 @@ from importlib import metadata
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pam_envs.data.tables import BAR, MM, ContractionTable
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.audit.tables import audit_table
 from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.static.compare import (
@@ -26,7 +26,6 @@ from pam_envs.diagnosis.static.search import RULE, Pair, Stage, Trial
 from pam_envs.diagnosis.static.structure import isolability, structure
 from pam_envs.diagnosis.static.text import sentences
 
-Array = NDArray[np.float64]
 Json = dict[str, Any]
 
 STATIC = (

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.static.cells import Cells
 from pam_envs.diagnosis.static.compare import Model, Study, beyond, slopes
 from pam_envs.diagnosis.static.models import Term, predict
 from pam_envs.diagnosis.static.search import available
 
-Array = NDArray[np.float64]
 Json = dict[str, Any]
 
 LAGS = 6
