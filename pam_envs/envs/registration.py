@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import importlib
+import os
 import pkgutil
 from types import ModuleType
 
 import gymnasium as gym
 
 NAMESPACE = "PAM/"
+FAMILIES = "PAM_ENVS_FAMILIES"
+"""Environment variable with the import names of further families, separated by commas."""
 
 
 def register_family(family: ModuleType | str) -> tuple[str, ...]:
@@ -45,13 +48,15 @@ def register_family(family: ModuleType | str) -> tuple[str, ...]:
 
 
 def register_all() -> None:
-    """Register every family: each folder beside this module that declares environments."""
+    """Register every family: each folder beside this module, and those of ``FAMILIES``."""
     package = __name__.rpartition(".")[0]
     for found in pkgutil.iter_modules(importlib.import_module(package).__path__, f"{package}."):
         if found.ispkg:
             family = importlib.import_module(found.name)
             if hasattr(family, "ENVIRONMENTS"):
                 register_family(family)
+    for name in filter(None, os.environ.get(FAMILIES, "").split(",")):
+        register_family(name)
 
 
 def full_id(name: str) -> str:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
+import os
 import shutil
+import subprocess
 import sys
 import warnings
 from collections.abc import Iterator
@@ -24,6 +26,7 @@ from pam_envs.kernels.build import COMPILED
 from tests.envs.cases import actions_for
 
 HERE = Path(__file__).parent
+ROOT = HERE.parents[2]
 ID = "Own/SpringMuscle-v0"
 pytestmark = pytest.mark.skipif(COMPILED, reason="machine code of a toy takes half a minute")
 
@@ -91,6 +94,18 @@ def test_harness_scores_its_scenario_file(
     row = rows.load(path)
     assert {e["scenario"] for e in row["episodes"]} == {"steps", "sines"}
     assert all(not e["failed"] and e["scores"]["rms_error"] > 0.004 for e in row["episodes"])
+
+
+def test_other_processes_register_it_by_an_environment_variable(family: Path) -> None:
+    code = f"import gymnasium, pam_envs; print(gymnasium.spec({ID!r}).entry_point)"
+    variables = {"PAM_ENVS_FAMILIES": "spring_muscle", "PYTHONPATH": f"{family}:{ROOT}"}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, **variables},
+        capture_output=True,
+        text=True,
+    )
+    assert done.stdout.strip() == "spring_muscle.env:SpringMuscleEnv", done.stderr
 
 
 def test_package_without_environments_is_refused() -> None:
