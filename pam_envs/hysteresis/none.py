@@ -1,4 +1,4 @@
-"""No hysteresis: the identity, as a model of the protocol."""
+"""No hysteresis: the identity, as a model of the protocol with no plays."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.hysteresis.elements import plays_lag, plays_peek
 from pam_envs.hysteresis.protocol import HysteresisModel, Kernels, Start, register
 from pam_envs.kernels.build import kernel
 
@@ -22,27 +23,6 @@ def identity_step(
         y[j] = x[j]
 
 
-@kernel
-def identity_lag(
-    x: Any, lag: Any, rows: Any, fixed: Any, counts: Any, table: Any, elements: int, at: int,
-    model: int, count: int, member: int, first: int, last: int,
-) -> None:  # fmt: skip
-    """Write no lag."""
-    for j in range(first, last):
-        lag[j] = 0.0
-
-
-@kernel
-def identity_peek(
-    x: Any, lag: Any, stick: Any, rows: Any, fixed: Any, counts: Any, table: Any, elements: int,
-    at: int, model: int, count: int, member: int, first: int, last: int,
-) -> None:  # fmt: skip
-    """Write no lag and no slope."""
-    for j in range(first, last):
-        lag[j] = 0.0
-        stick[j] = 0.0
-
-
 @register
 @dataclass(frozen=True)
 class NoHysteresis(HysteresisModel):
@@ -50,7 +30,7 @@ class NoHysteresis(HysteresisModel):
 
     kind: ClassVar[str] = "none"
     identity: ClassVar[bool] = True
-    kernels: ClassVar[Kernels] = Kernels(identity_step, lag=identity_lag, peek=identity_peek)
+    kernels: ClassVar[Kernels] = Kernels(identity_step, lag=plays_lag, peek=plays_peek)
     state_rows: ClassVar[int] = 0
 
     def scaled(self, width: float, slope: float | None = None) -> NoHysteresis:
