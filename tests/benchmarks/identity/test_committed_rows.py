@@ -1,0 +1,32 @@
+"""Committed rows: in the last round of their track, verified, and of the present behaviour."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks.identity import audit
+from benchmarks.runs import rows, verified
+from benchmarks.runs.verify import void
+
+CHEAP = {
+    "positioning_disturbed": ("inverse_pid", "pid_tuned", "table"),
+    "knee_walk_nominal": ("knee_inverse", "knee_hold", "ppo_knee_walk"),
+    "elbow_valves": ("elbow_allocation_early_tuned", "elbow_pid"),
+    "joint_payload": ("joint_inverse_ahead", "joint_pid"),
+    "manipulator_payload": ("joint_inverse_kinematics", "joint_pi"),
+}
+"""A track of every family of plants, and controllers that are quickly designed."""
+
+
+def test_every_row_is_in_its_round_and_verified() -> None:
+    noted = verified.read(rows.RESULTS)
+    found = rows.load_all()
+    assert found
+    assert [row["row"] for row in found if not audit.in_last_round(row)] == []
+    assert [row["row"] for row in found if verified.of(row, noted) is None] == []
+
+
+@pytest.mark.parametrize("track", CHEAP)
+def test_no_row_is_void(track: str) -> None:
+    found = [rows.load(rows.path_of(rows.row_name(track, name))) for name in CHEAP[track]]
+    assert {row["row"]: void(row) for row in found} == {row["row"]: [] for row in found}
