@@ -1,4 +1,4 @@
-"""Knobs: at 1 nothing changes, elsewhere each does what it is named for, and bounds hold."""
+"""Knobs: no effect at 1, the effect of their name elsewhere, bounds, and tuned controllers."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_times_of_the_rule():
     assert keen == plain._replace(derivative_time=0.1)
 
 
-def test_muscle():
+def test_knobs_of_the_muscle_act_on_their_numbers():
     env = made_env("PAM/MusclePositioning-v0")
     pid, inverse = built("pid", env), built("inverse", env)
     assert built("pid", env, reach=2.0).reach == pytest.approx(2.0 * pid.reach)
@@ -102,7 +102,7 @@ def test_muscle():
     assert both.gains == built("pid", env, closed_loop_time=2.0).gains
 
 
-def test_knee():
+def test_knobs_of_the_knee_act_on_their_numbers():
     env = made_env("PAM/KneeStiffness-v0")
     plain = knee_design.design(env.plant, "tension").figures
     fast = knee_design.design(env.plant, "tension", knobs={"bandwidth": 2.0}).figures
@@ -116,7 +116,7 @@ def test_knee():
     assert np.abs(loops[1].controller.c).max() != np.abs(loops[0].controller.c).max()
 
 
-def test_joint():
+def test_knobs_of_the_joint_act_on_their_numbers():
     env = made_env("PAM/AntagonisticJoint-v0")
     leads = [built("joint_pid_ahead", env, lead=k).lookahead.weights[0] for k in (0.5, 1.0)]
     times = np.arange(len(leads[0]))

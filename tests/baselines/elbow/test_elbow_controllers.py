@@ -1,4 +1,4 @@
-"""The elbow's controllers keep the contract of a policy predictor, and do what they are for."""
+"""Elbow controllers: allocation, friction compensation, valves and PI."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def test_the_hysteresis_is_undone_exactly_where_nothing_lags(hysteresis):
     assert (plain > 8.0 * rms(record)) == (hysteresis != "none")
 
 
-def test_free_motion_is_hardly_felt_and_the_wearer_goes_where_he_means_to():
+def test_free_motion_needs_little_torque_of_the_wearer():
     env = make_env(plant=quiet("none", prompt=True), reference="free", episode_seconds=6.0)
     record = run(env, built("elbow_allocation", env))
     off = np.abs(record["state/angle"] - record["state/intent"])[50:]
@@ -119,7 +119,7 @@ def test_free_motion_is_hardly_felt_and_the_wearer_goes_where_he_means_to():
     assert felt[0] < 0.2 * felt[1]
 
 
-def test_pid_follows_the_torque_and_leaves_the_stiffness():
+def test_pid_tracks_the_torque_and_not_the_stiffness():
     env = make_env(plant=quiet("none"), reference="weight", motion="sines", episode_seconds=6.0)
     pid, both, limp = (
         run(env, built(name, env)) for name in ("elbow_pid", "elbow_allocation", "elbow_limp")

@@ -1,4 +1,4 @@
-"""The joints' controllers: contract of a predictor, one joint and many, limits, starts."""
+"""Joint controllers: one joint and many, limits, starts, signals."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_other_actions_are_refused():
         make_joint_signal_map(SIGNALS, actions)
 
 
-def test_co_contraction_is_held_where_it_is():
+def test_co_contraction_keeps_its_observed_value():
     names = ("angle", "set_point", "reference", "prestress")
     signals = Signals(Signal(n, "", -1.0, 99.0, k, False) for k, n in enumerate(names))
     low, high = 20.0, 120.0
@@ -134,7 +134,7 @@ def test_feedback_removes_a_standing_error():
         assert abs(found.angle[-1] - 7.0 * DEGREE) < 0.02 * DEGREE
 
 
-def test_gravity_is_carried_as_the_plant_says():
+def test_gravity_feedforward_is_the_shift_of_the_plant():
     plant = AntagonisticJoint.paper()
     angles, payload = np.array([[0.3], [-0.2], [0.05]]), np.array([0.0, 0.1, 0.2])
     found = Gravity(plant).shift(angles, payload)

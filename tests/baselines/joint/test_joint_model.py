@@ -1,4 +1,4 @@
-"""What controllers are built on says so if the hysteresis is not what they take it for."""
+"""Nominal joint model: warning for a hysteresis that is not symmetric."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from baselines.joint.model import joint_model
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
 
-def test_a_hysteresis_that_fails_the_symmetry_is_warned_of_with_value_and_bound() -> None:
+def test_asymmetric_hysteresis_warns_with_value_and_bound() -> None:
     joint = AntagonisticJoint.paper(muscle__imbalance=0.08)
     with pytest.warns(UserWarning, match=r"fails the symmetry: symmetry 0\.0\d\d \(bound 0.03\)"):
         model = joint_model(joint)
@@ -18,7 +18,7 @@ def test_a_hysteresis_that_fails_the_symmetry_is_warned_of_with_value_and_bound(
 
 
 @pytest.mark.parametrize("preset", ["paper", "measured", "reduced"])
-def test_presets_are_taken_without_a_word(preset: str) -> None:
+def test_presets_raise_no_warning(preset: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         model = joint_model(getattr(AntagonisticJoint, preset)())

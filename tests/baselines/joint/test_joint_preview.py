@@ -1,4 +1,4 @@
-"""References read ahead of time: the samples that are read, the delays, and what it brings."""
+"""Preview of joint references: weights, delays, and tracking error."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_only_the_samples_around_are_read_within_the_previews():
     np.testing.assert_allclose(weights, [0.0, 0.75, 0.25, 0.0])
 
 
-def test_stretch_is_prolonged_so_far_and_no_further():
+def test_extrapolation_is_bounded():
     samples = np.array([[[0.0, 0.0, 0.0, 1.0]]])
     assert ahead_by((99.0,), TIMES).reference(samples)[0, 0] == 1.0 + MAX_EXTRAPOLATION
 

@@ -1,4 +1,4 @@
-"""The knee's controllers keep the contract of a policy predictor, and do what they are for."""
+"""Knee controllers: inverse, preview, feedback and zero torque."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_feedback_corrects_a_muscle_that_the_model_does_not_know():
     assert rms[1] < 0.25 * rms[0]
 
 
-def test_free_knee_bears_next_to_no_torque_where_the_muscle_can_pull():
+def test_free_knee_has_little_torque_where_the_muscle_can_pull():
     plant = quiet("on_leg", prompt=True)
     env = make_knee("KneeWalk", plant=plant, start="heel_contact", episode_seconds=5.0)
     pulls, torque = {}, {}

@@ -1,4 +1,4 @@
-"""The designed feedback is what it was designed to be, and switches without a bump."""
+"""Knee feedback by loop transfer recovery: margins, identification, bumpless transfer."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_gains_of_zero_satisfy_the_compensators_inequality():
         assert certificate(plant, BumplessGains(np.zeros(plant.nstates))) > 0.0
 
 
-def test_a_loop_that_begins_with_a_command_holds_it():
+def test_loop_started_from_a_command_holds_it():
     loop = make_loop(KneeOrthosis.rig(), "tension")
     command, full = np.array([-5e4, 2e4]), np.full(2, 4.5e5)
     state = loop.holding_state(command)
@@ -73,7 +73,7 @@ def test_a_loop_that_begins_with_a_command_holds_it():
         state = loop.advance(np.full(2, 158.0), np.full(2, 158.0), given, state)
 
 
-def test_a_reference_out_of_reach_winds_nothing_up():
+def test_unreachable_reference_causes_no_windup():
     plant = quiet("rig")
     wanted = np.where(np.arange(700) < 400, 390.0, 158.0)  # 4.5 bar give 355 N
     env = make_knee("KneeTension", plant=plant, reference=wanted, episode_seconds=7.0)

@@ -1,4 +1,4 @@
-"""The bumpless compensator: its inequality, its exactness on its own model, the switch."""
+"""Bumpless transfer: matrix inequality, exactness on its model, transfer, windup."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_idle_controller_sees_the_loop_it_would_have_closed():
         own, foreign = rig.advance(command, own), rig.advance(pressure, foreign)
 
 
-def test_limits_do_not_wind_the_controller_up():
+def test_limits_cause_no_windup_of_the_controller():
     rig = discrete(PLANT, PERIOD, "zoh")
 
     def time_back(loop: Bumpless) -> int:

@@ -1,4 +1,4 @@
-"""The SIMC rule: its formulas, its own recommendation, and what joints make of it."""
+"""SIMC rule: formulas, recommendation, and loops of joints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Poses followed online, and both plans of a path side by side."""
+"""Inverse kinematics per period, and plans of a path."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_set_points_are_those_of_the_plan() -> None:
     assert state is not None and state.missed[0] == 0
 
 
-def test_previews_are_aimed_at() -> None:
+def test_previewed_pose_is_the_target() -> None:
     line = PATH.angles()
     poses = ARM.pose(line[:2])
     seen = observation(line[0], poses[0], poses[1])
@@ -52,7 +52,7 @@ def test_previews_are_aimed_at() -> None:
     np.testing.assert_allclose(set_points(action), wanted, atol=1e-6)
 
 
-def test_rows_of_a_batch_are_on_their_own() -> None:
+def test_rows_of_a_batch_are_independent() -> None:
     lines = [path.angles() for path in PATHS]
     poses = [ARM.pose(line) for line in lines]
     follower = InverseKinematics(ARM, SIGNALS, ACTIONS, weighted=False)

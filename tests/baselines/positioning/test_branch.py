@@ -1,4 +1,4 @@
-"""The choice between the branch of inflation and that of deflation."""
+"""Selection between the branches of inflation and deflation."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ def test_small_reversals_and_noise_keep_the_branch():
     assert _run(rise).all()
 
 
-def test_furthest_point_is_counted_from_not_the_last():
+def test_extremum_point_is_counted_from_not_the_last():
     creep = np.concatenate([[6e-3, 6e-3 - 0.9 * DEAD_BAND], [6e-3 - 1.2 * DEAD_BAND]])
     np.testing.assert_array_equal(_run(creep), [True, True, False])
 
 
-def test_rows_are_independent_and_the_old_branch_stays():
+def test_rows_are_independent_and_the_old_branch_is_unchanged():
     branch = first_branch(np.array([5e-3, 5e-3]), np.zeros(2))
     after = next_branch(branch, np.array([4e-3, 6e-3]))
     np.testing.assert_array_equal(after.inflating, [False, True])
     np.testing.assert_array_equal(branch.inflating, [True, True])
-    np.testing.assert_array_equal(branch.furthest, [5e-3, 5e-3])
+    np.testing.assert_array_equal(branch.extremum, [5e-3, 5e-3])

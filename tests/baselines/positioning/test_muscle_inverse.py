@@ -1,4 +1,4 @@
-"""The exact inverse puts the muscle where the reference is; curves without hysteresis do not."""
+"""Exact inverse of the muscle against curves without hysteresis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The PID: its rule, its limits, and that it closes the loop."""
+"""PID of the muscle: SIMC gains, limits, closed loop."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_starts_from_the_output_that_was_there():
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_limits_do_not_wind_it_up(sign):
+def test_limits_cause_no_windup(sign):
     outputs, state = _run([sign * 5e-3] * 2000)
     limit = 6e5 if sign > 0 else 0.0
     assert outputs[-1] == limit
@@ -51,7 +51,7 @@ def test_derivative_is_filtered_and_of_the_measurement():
     assert moved[0] < later[0] < 0.0
 
 
-def test_rule_is_skogestads():
+def test_gains_are_those_of_the_simc_rule():
     plant = SingleMuscle.mas10()
     gains = simc(plant)
     theta = plant.regulator.dead_time + 0.015

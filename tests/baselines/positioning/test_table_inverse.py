@@ -1,4 +1,4 @@
-"""The paper's own controller, as printed and as it was meant."""
+"""Controllers from the published tables, as printed and refitted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The frozen disturbance loops reach what they were synthesised for."""
+"""Synthesised disturbance loops: robust performance, reduction, reproduction."""
 
 from __future__ import annotations
 
