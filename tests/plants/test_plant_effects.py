@@ -35,18 +35,18 @@ def muscle(plant: SingleMuscle, pressure: Any) -> Signals:
 
 
 def knee(plant: KneeOrthosis, pressure: Any) -> Signals:
-    made = simulate_knee(plant, pressure)
+    made = simulate_knee(plant, pressure, compiled=False)
     return {"pressure": made["pressure"], "moved": -made["angle"]}
 
 
 def joint(plant: AntagonisticJoint, pressure: Any) -> Signals:
-    made = simulate_joint(plant, pressures=(pressure, np.full(len(pressure), 2e5)))
+    made = simulate_joint(plant, pressures=(pressure, np.full(len(pressure), 2e5)), compiled=False)
     return {"pressure": made["pressure_a"], "moved": made["angle"]}
 
 
 def elbow(plant: ElbowOrthosis, pressure: Any) -> Signals:
     command = np.stack([np.full(len(pressure), 1e5), pressure], axis=1)
-    made = simulate_elbow(plant, command)
+    made = simulate_elbow(plant, command, compiled=False)
     return {"pressure": made["pressure_b"], "moved": made["angle"]}
 
 
