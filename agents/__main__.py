@@ -78,10 +78,10 @@ def train(
         model = training.resume(run)
         console.print(f"continues at {model.num_timesteps:,} of {run.config.steps:,} steps")
     else:
-        wanted = _settings(name, kind, variant, config)
+        settings = _settings(name, kind, variant, config)
         changes = [*set, *([] if steps is None else [f"steps={steps}"])]
         _check_counts(seed=(number, 0))
-        run = training.Run(configs.changed(wanted, changes), number, folder)
+        run = training.Run(configs.changed(settings, changes), number, folder)
         model = training.start(run)
     print(training.train(run, model, console))
 
@@ -213,8 +213,8 @@ def show(policy: Annotated[Path, tyro.conf.Positional], /) -> None:
 def evaluations(policies: Annotated[tuple[Path, ...], tyro.conf.Positional], /) -> None:
     """Print the evaluations on tuning seeds during training, and which policy was exported.
 
-    The number "value" chooses the policy; "kinds" are the RMS errors of the kinds of rows, relative to
-    the first evaluation's, which is the controller's if the policy corrects one.
+    The number "value" chooses the policy; "kinds" are the RMS errors of the kinds of rows,
+    relative to the first evaluation's, which is the controller's if the policy corrects one.
     """
     from agents.policies.policy import OnnxPolicy
 
@@ -321,7 +321,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         return run_cli(
             lambda: ask(COMMANDS, prog="python -m agents", args=arguments),
-            "interrupted; finished results and checkpoints are kept, and the same command continues",
+            "interrupted; finished results and checkpoints are kept; the same command continues",
         )
     except ModuleNotFoundError as error:
         print(f"error: training needs {error.name}; install the extra 'agents'", file=sys.stderr)

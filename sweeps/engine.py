@@ -13,8 +13,6 @@ from dataclasses import dataclass
 
 from sweeps.task import Act, Done, Task
 
-BACKENDS = ("loky", "dask")
-
 
 @dataclass(frozen=True)
 class Cluster:
@@ -36,10 +34,8 @@ class Cluster:
 
     def __post_init__(self) -> None:
         """Refuse contradictory arguments."""
-        if self.backend not in BACKENDS:
-            raise ValueError(
-                f"backend = {self.backend!r}; choose {' or '.join(map(repr, BACKENDS))}"
-            )
+        if self.backend not in ("loky", "dask"):
+            raise ValueError(f"backend = {self.backend!r}; choose 'loky' or 'dask'")
         if self.jobs < 1:
             raise ValueError(f"jobs = {self.jobs} is below 1; give a number of processes")
         if (self.backend == "dask") != bool(self.address):
@@ -69,14 +65,9 @@ def run(act: Act, tasks: Iterable[Task], cluster: Cluster) -> Iterator[Done]:
 
         return dask_cluster.run(act, named, cluster.address)
     if cluster.jobs == 1:
-        return _here(act, named)
+        from sweeps.worker import do
+
+        return (do(act, task, key) for key, task in named.items())
     from sweeps import processes
 
     return processes.run(act, named, cluster.jobs)
-
-
-def _here(act: Act, tasks: dict[str, Task]) -> Iterator[Done]:
-    from sweeps.worker import do
-
-    for key, task in tasks.items():
-        yield do(act, task, key)

@@ -7,10 +7,11 @@ every time. The others continue together.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 
 from sweeps.task import Act, Done, Task
-from sweeps.worker import do, starter
+from sweeps.worker import do, end_with
 
 ATTEMPTS = 3
 """Attempts at a task whose process dies."""
@@ -46,8 +47,8 @@ def _round(act: Act, tasks: Mapping[str, Task], jobs: int, started: list[str]) -
             started.append(key)
             yield delayed(do)(act, task, key)
 
-    start, arguments = starter()
-    with parallel_config("loky", inner_max_num_threads=1, initializer=start, initargs=arguments):
+    driver = {"initializer": end_with, "initargs": (os.getpid(),)}
+    with parallel_config("loky", inner_max_num_threads=1, **driver):
         # one task at a time for each process, so that few are in doubt when one dies
         parallel = Parallel(jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=jobs)
         try:

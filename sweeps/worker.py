@@ -6,7 +6,6 @@ import os
 import sys
 import threading
 import time
-from typing import Any
 
 from sweeps.task import Act, Done, Task
 
@@ -74,8 +73,3 @@ def _watch(driver: int) -> None:
     while os.getppid() == driver:
         time.sleep(LOOK)
     os._exit(1)
-
-
-def starter() -> tuple[Any, tuple[int]]:
-    """Return the initializer of this process's workers, with its arguments."""
-    return end_with, (os.getpid(),)

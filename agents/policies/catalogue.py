@@ -130,7 +130,7 @@ KINDS: dict[str, Kind] = {
     "sac": Kind("sac", "SAC, two layers; no memory", SAC),
     "tqc": Kind("tqc", "TQC, two layers; no memory", TQC),
 }
-"""By algorithm and variant, as in a preset's file name; residuals and a user's presets are apart."""
+"""By algorithm and variant, as in a file name; residuals and a user's presets are apart."""
 NAME = re.compile(r"[a-z0-9_]+")
 """Valid names of controllers."""
 HOW_TO_NAME = "name its file ENV.ALGO-VARIANT.yaml, the variant in small letters, digits and _"

@@ -6,16 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import yaml
-from optuna.distributions import (
-    BaseDistribution,
-    CategoricalDistribution,
-    FloatDistribution,
-    IntDistribution,
-)
+from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 
 from agents.settings.presets import Config, from_mapping, put
 
-Space = Mapping[str, BaseDistribution]
+Distribution = FloatDistribution | IntDistribution | CategoricalDistribution
+Space = Mapping[str, Distribution]
 
 
 def _choice(*values: Any) -> CategoricalDistribution:
@@ -58,7 +54,7 @@ SPACES: Mapping[str, Space] = {
 periods; ``learning_rate`` is the first of the two, whose ratio is the preset's."""
 
 
-def space_of(config: Config) -> dict[str, BaseDistribution]:
+def space_of(config: Config) -> dict[str, Distribution]:
     """Return the search space of a preset."""
     space = dict(SPACES[config.algo])
     if config.residual.controller:
@@ -73,19 +69,17 @@ def suggest(trial: Any, config: Config) -> dict[str, Any]:
     return {name: _suggest(trial, name, own) for name, own in space_of(config).items()}
 
 
-def _suggest(trial: Any, name: str, own: BaseDistribution) -> Any:
-    if isinstance(own, FloatDistribution):
-        return trial.suggest_float(name, own.low, own.high, log=own.log)
-    if isinstance(own, IntDistribution):
-        return trial.suggest_int(name, own.low, own.high, log=own.log)
-    assert isinstance(own, CategoricalDistribution)
-    return trial.suggest_categorical(name, own.choices)
+def _suggest(trial: Any, name: str, own: Distribution) -> Any:
+    if isinstance(own, CategoricalDistribution):
+        return trial.suggest_categorical(name, own.choices)
+    kind = trial.suggest_float if isinstance(own, FloatDistribution) else trial.suggest_int
+    return kind(name, own.low, own.high, log=own.log)
 
 
 def common(config: Config) -> dict[str, Any]:
     """Return one point of a search space, the same for all presets with that space."""
     return {
-        name: own.choices[0] if isinstance(own, CategoricalDistribution) else own.low  # type: ignore[attr-defined]
+        name: own.choices[0] if isinstance(own, CategoricalDistribution) else own.low
         for name, own in space_of(config).items()
     }
 
@@ -123,10 +117,9 @@ def from_settings(config: Config) -> dict[str, Any]:
     return made
 
 
-def _nearest(own: BaseDistribution, value: Any) -> Any:
+def _nearest(own: Distribution, value: Any) -> Any:
     if isinstance(own, CategoricalDistribution):
         return str(value) if str(value) in own.choices else own.choices[0]
-    assert isinstance(own, (FloatDistribution, IntDistribution))
     held = min(max(value, own.low), own.high)
     return round(held) if isinstance(own, IntDistribution) else held
 

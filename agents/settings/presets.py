@@ -159,12 +159,10 @@ class Config:
     def as_dict(self) -> dict[str, Any]:
         """Return plain values, without other algorithms' parts and optional default parts."""
         plain = _plain(dataclasses.asdict(self))
-        idle = [a for a in ALGORITHMS if a != self.algo]
-        idle += [name for name in OPTIONAL if getattr(self, name) == _fresh(name)]
-        for name in idle:
-            del plain[name]
-        made: dict[str, Any] = plain
-        return made
+        default = Config(self.env)
+        omitted = [a for a in ALGORITHMS if a != self.algo]
+        omitted += [name for name in OPTIONAL if getattr(self, name) == getattr(default, name)]
+        return {name: value for name, value in plain.items() if name not in omitted}
 
 
 def check_env(name: str) -> None:
@@ -178,11 +176,6 @@ def check_env(name: str) -> None:
     if not (ENV.fullmatch(name) and name in gym.registry):
         known = [env for env in gym.registry if ENV.fullmatch(env)]
         raise SettingsError(f"env = {name!r} is no environment here{near(name, known)}")
-
-
-def _fresh(name: str) -> Any:
-    kinds = {f.name: f.default_factory for f in dataclasses.fields(Config)}
-    return kinds[name]()  # type: ignore[operator, misc]
 
 
 def _plain(value: Any) -> Any:

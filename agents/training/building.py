@@ -108,8 +108,3 @@ def learning_rate(config: Config) -> Callable[[float], float]:
 def signals_of(env: VecEnv) -> tuple[Any, Any]:
     """Return the signals of the environment's observation and action."""
     return env.get_attr("signals")[0], env.get_attr("action_signals")[0]
-
-
-def logs_each_rollout(config: Config) -> bool:
-    """Return whether each rollout gets a line in the log."""
-    return config.algo in ON_POLICY

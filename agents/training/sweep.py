@@ -85,13 +85,13 @@ def code() -> str:
 
 
 def trainings(
-    wanted: Sequence[Config], seeds: Sequence[int], out: Path, name: str
+    configurations: Sequence[Config], seeds: Sequence[int], out: Path, name: str
 ) -> list[Training]:
     """Return each configuration with each seed, in folders below ``out``.
 
     Parameters
     ----------
-    wanted : sequence of Config
+    configurations : sequence of Config
     seeds : sequence of int
     out : Path
     name : str
@@ -99,7 +99,7 @@ def trainings(
     """
     return [
         Training(config, seed, out.resolve() / config.env.replace("/", "-") / f"{name}-seed{seed}")
-        for config in wanted
+        for config in configurations
         for seed in seeds
     ]
 

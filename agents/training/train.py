@@ -30,7 +30,7 @@ from agents.settings import presets as configs
 from agents.settings.presets import Config
 from agents.training import checkpoint, snapshot
 from agents.training.best import Best
-from agents.training.building import logs_each_rollout, make_env, make_model
+from agents.training.building import make_env, make_model
 from agents.training.callbacks import Cancellation, Checkpoints, Evaluations, WarmUp
 from agents.training.checkpoint import CheckpointError
 from agents.training.progress import TrainingProgress
@@ -177,7 +177,7 @@ def train(run: Run, model: BaseAlgorithm, console: Console) -> Path:
                     TrainingProgress(run.config.steps, begin),
                 ],
                 reset_num_timesteps=model.num_timesteps == 0,
-                log_interval=1 if logs_each_rollout(run.config) else 100,
+                log_interval=1 if run.config.algo in configs.ON_POLICY else 100,
             )
         evaluations.last()
         checkpoints.act()

@@ -1,4 +1,4 @@
-"""What the command line takes for an environment."""
+"""Command line: environment ids and errors."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ NO_SUCH = ["--algo", "ppo", "--variant", "nosuch"]
 
 @pytest.mark.parametrize("given", ["KneeWalk-v0", "PAM/KneeWalk-v0"])
 @pytest.mark.parametrize("command", ["train", "sweep", "tune", "classical"])
-def test_the_namespace_may_be_left_out(
+def test_namespace_of_an_id_is_optional(
     command: str, given: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main([command, given, *NO_SUCH]) == 2
     assert "no ppo-nosuch preset for 'PAM/KneeWalk-v0'" in capsys.readouterr().err
 
 
-def test_a_sweep_of_a_short_id_has_the_folders_of_the_long_one(
+def test_sweep_of_a_short_id_uses_the_full_id(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["sweep", "KneeWalk-v0", "--seeds", "2", "--dry-run", "--out", str(tmp_path)]) == 0
@@ -43,7 +43,7 @@ def test_a_sweep_of_a_short_id_has_the_folders_of_the_long_one(
         (["evaluations"], "name policies"),
     ],
 )
-def test_mistakes_are_one_sentence_and_leave_nothing(
+def test_errors_are_one_sentence_and_leave_no_files(
     arguments: list[str],
     said: str,
     tmp_path: Path,

@@ -1,4 +1,4 @@
-"""Tasks on a Dask cluster whose workers, whose scheduler and whose callers are killed."""
+"""Tasks on a Dask cluster with killed workers, schedulers and drivers."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_a_killed_worker_loses_nothing(dask: DaskProcesses, tmp_path: Path) -> N
     assert tasks[1].begins() == 2
 
 
-def test_a_value_that_is_lost_on_its_way_is_made_again(dask: DaskProcesses, tmp_path: Path) -> None:
+def test_value_lost_with_its_worker_is_computed_again(dask: DaskProcesses, tmp_path: Path) -> None:
     tasks = [
         Number(k, "dies with its value" if k % 3 == 1 else "", str(tmp_path)) for k in range(6)
     ]
@@ -51,7 +51,7 @@ def test_a_value_that_is_lost_on_its_way_is_made_again(dask: DaskProcesses, tmp_
     assert sorted((d.key, d.value) for d in done) == [(str(k), k * k) for k in range(6)]
 
 
-def test_a_task_that_kills_its_workers_is_named_and_costs_no_other(
+def test_task_that_kills_its_workers_is_named_and_others_finish(
     dask: DaskProcesses, tmp_path: Path
 ) -> None:
     tasks = [Number(k, "deadly" if k == 1 else "", str(tmp_path)) for k in range(5)]
@@ -65,7 +65,7 @@ def test_a_task_that_kills_its_workers_is_named_and_costs_no_other(
     ]
 
 
-def test_workers_that_lack_the_code_are_told_apart(
+def test_worker_without_the_code_names_the_remedy(
     dask: DaskProcesses, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     elsewhere = ModuleType("only_here")
@@ -88,7 +88,7 @@ for done in run(square, tasks, Cluster(backend="dask", address=address)):
 """
 
 
-def test_what_a_killed_driver_asked_for_ends(dask: DaskProcesses, tmp_path: Path) -> None:
+def test_tasks_of_a_killed_driver_stop(dask: DaskProcesses, tmp_path: Path) -> None:
     family = new_family()
     driver = start(family, "-c", PROGRAM, str(tmp_path), "endless", dask.address)
     wait_until(lambda: len(list(tmp_path.glob("begun_*"))) == 2)
@@ -101,7 +101,7 @@ def test_what_a_killed_driver_asked_for_ends(dask: DaskProcesses, tmp_path: Path
     assert len(list(tmp_path.glob("begun_*"))) == 2 + len(after)
 
 
-def test_workers_that_are_gone_are_told_and_waited_for(
+def test_missing_workers_are_reported_and_awaited(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sweeps.dask_cluster.LOOK", 0.1)
@@ -131,15 +131,13 @@ def test_workers_that_are_gone_are_told_and_waited_for(
         assert sorted(d.value for d in done) == [k * k for k in range(8)]
 
 
-def test_no_scheduler_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_scheduler_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sweeps.dask_cluster.SECONDS", 1.0)
     with pytest.raises(ValueError, match=r"no Dask scheduler answers at .tcp://127\.0\.0\.1:9."):
         list(run(square, [Number(1)], Cluster(backend="dask", address="tcp://127.0.0.1:9")))
 
 
-def test_a_scheduler_that_goes_away_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_lost_scheduler_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sweeps.dask_cluster.SECONDS", 6.0)
     with DaskProcesses(tmp_path, workers=1) as dask:
         tasks = [Number(k, "slow", str(tmp_path)) for k in range(100)]

@@ -1,4 +1,4 @@
-"""Tasks on processes of this machine: nothing is lost, nothing stays behind."""
+"""Tasks on processes of this machine: results, lost workers, killed drivers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TWO = Cluster(jobs=2)
 
 @pytest.fixture(autouse=True)
 def fresh_pool() -> Iterator[None]:
-    """Workers that no other test has used, and that are gone afterwards."""
+    """Start with new workers, and end them afterwards."""
     get_reusable_executor().shutdown(wait=True)
     yield
     get_reusable_executor().shutdown(wait=True)
@@ -49,7 +49,7 @@ def test_a_killed_worker_loses_nothing(tmp_path: Path) -> None:
     assert sorted((d.key, d.value) for d in done) == [(str(k), k * k) for k in range(10)]
 
 
-def test_a_task_that_kills_its_workers_is_named_and_costs_no_other(tmp_path: Path) -> None:
+def test_task_that_kills_its_workers_is_named_and_others_finish(tmp_path: Path) -> None:
     tasks = numbers(tmp_path, 6, n1="deadly")
     done = {d.key: d for d in run(square, tasks, TWO)}
     assert len(done) == 6
@@ -61,7 +61,7 @@ def test_a_task_that_kills_its_workers_is_named_and_costs_no_other(tmp_path: Pat
             assert done[task.key] == Done(task.key, task.number**2)
 
 
-def test_a_worker_with_other_sources_gives_nothing(tmp_path: Path) -> None:
+def test_worker_with_other_sources_refuses_the_task(tmp_path: Path) -> None:
     tasks = [Number(1, "foreign", str(tmp_path)), Number(2, "", str(tmp_path))]
     foreign, ours = sorted(run(square, tasks, TWO), key=lambda done: done.error is None)
     assert "other sources, package versions" in foreign.error
@@ -78,7 +78,7 @@ def test_a_worker_with_other_sources_gives_nothing(tmp_path: Path) -> None:
         ({"jobs": 0}, "jobs = 0 is below 1"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(given: dict[str, object], said: str) -> None:
+def test_contradictory_arguments_are_refused(given: dict[str, object], said: str) -> None:
     with pytest.raises(ValueError, match=said):
         Cluster(**given)
 

@@ -1,4 +1,4 @@
-"""Every kind of policy, with memory, history and controller: file and training say the same."""
+"""Exported policies of every kind: recurrent, with history, with controller."""
 
 from __future__ import annotations
 
@@ -85,9 +85,7 @@ def test_file_and_torch_agree_over_whole_episodes(name: str, short_run: Run) -> 
 
 
 @pytest.mark.parametrize("name", REMEMBERS)
-def test_a_memory_is_explicit_and_forgets_where_an_episode_begins(
-    name: str, short_run: Run
-) -> None:
+def test_state_is_explicit_and_reset_where_an_episode_begins(name: str, short_run: Run) -> None:
     file = OnnxPolicy.load(short_run(name)[1] / "policy.onnx")
     given = np.zeros((4, 1), np.float32) if file.corrects else None
     seen = np.random.default_rng(2).uniform(-1, 1, (6, 4, len(file.signals))).astype(np.float32)
@@ -107,7 +105,7 @@ def test_a_memory_is_explicit_and_forgets_where_an_episode_begins(
 
 
 @pytest.mark.parametrize("name", REMEMBERS)
-def test_a_row_with_memory_does_not_depend_on_its_batch(name: str, short_run: Run) -> None:
+def test_row_with_state_is_independent_of_its_batch(name: str, short_run: Run) -> None:
     file = OnnxPolicy.load(short_run(name)[1] / "policy.onnx")
     rng = np.random.default_rng(4)
     seen = rng.uniform(-1, 1, (65, len(file.signals))).astype(np.float32)
@@ -132,7 +130,7 @@ def test_policies_without_memory_have_none(name: str, short_run: Run) -> None:
 # --- residuals --------------------------------------------------------------------------------
 
 
-def test_an_untrained_residual_is_its_controller() -> None:
+def test_untrained_residual_is_its_controller() -> None:
     from agents.training.building import make_model
 
     config = kind("residual")
@@ -153,9 +151,7 @@ def test_an_untrained_residual_is_its_controller() -> None:
 
 
 @pytest.mark.parametrize("name", CORRECTS)
-def test_a_residual_moves_the_controllers_action_by_its_share_at_most(
-    name: str, short_run: Run
-) -> None:
+def test_residual_changes_the_action_by_its_scale_at_most(name: str, short_run: Run) -> None:
     file = OnnxPolicy.load(short_run(name)[1] / "policy.onnx")
     scale = file.card["baseline"]["scale"]
     rng = np.random.default_rng(3)
@@ -187,8 +183,8 @@ def test_a_residual_needs_a_known_controller_and_the_plain_range() -> None:
         )
 
 
-def test_the_controllers_last_answer_joins_the_terminal_observation() -> None:
-    """What bootstraps an ended episode has the controller's answer to that observation."""
+def test_terminal_observation_includes_the_controllers_action() -> None:
+    """The bootstrap value of a truncated episode needs the controller's action."""
     config = dataclasses.replace(
         kind("residual"), plants=configs.from_mapping({"env": ID}).plants, num_envs=3
     )
@@ -214,7 +210,7 @@ def test_the_controllers_last_answer_joins_the_terminal_observation() -> None:
 # --- history and mixtures ---------------------------------------------------------------------
 
 
-def test_history_is_what_was_seen_and_ends_with_the_episode() -> None:
+def test_history_holds_past_signals_of_the_episode() -> None:
     env = make_env(tiny(history={"frames": 3, "signals": ["contraction", "pressure"]}))
     names = list(signals_of(env)[0].names())
     columns = [names.index("contraction"), names.index("pressure")]
@@ -263,7 +259,7 @@ def test_rows_on_equal_plants_have_one_controller() -> None:
     assert [rows for rows, _ in base.parts()] == [slice(0, 4), slice(4, 8)]
 
 
-def test_evaluation_is_of_tuning_seeds_and_counts_what_it_says(short_run: Run) -> None:
+def test_evaluation_counts_the_settled_instants_of_tuning_seeds(short_run: Run) -> None:
     config = tiny(evaluation={"episodes": 3, "settle_seconds": 0.1})
     file = OnnxPolicy.load(short_run("ppo")[1] / "policy.onnx")
     score = evaluation.evaluate(file, config)

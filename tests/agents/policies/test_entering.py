@@ -1,4 +1,4 @@
-"""Finished runs are entered as a whole set of one preset, or not at all."""
+"""Entry of finished runs as the complete set of training seeds of a preset."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def both(*stems: str) -> list[str]:
     return sorted(f"{stem}.{end}" for stem in stems for end in ("json", "onnx"))
 
 
-def test_a_set_is_entered_under_its_presets_name(place: Path, tmp_path: Path) -> None:
+def test_runs_are_copied_under_the_presets_name(place: Path, tmp_path: Path) -> None:
     given = runs(tmp_path, [2, 0, 1])
     assert main(["enter", *given]) == 0
     assert names(place) == both(*(f"{NAME}.s{seed}" for seed in range(3)))
@@ -69,7 +69,7 @@ def test_a_set_is_entered_under_its_presets_name(place: Path, tmp_path: Path) ->
         assert catalogue.load_pretrained("ppo_knee_walk", training_seed=seed).card["seed"] == seed
 
 
-def test_the_older_files_of_a_preset_are_replaced_and_told(
+def test_older_files_of_a_preset_are_replaced_and_listed(
     place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["enter", *runs(tmp_path / "old", [0, 1, 2])]) == 0
@@ -125,7 +125,7 @@ REFUSED: dict[str, tuple[list[dict[str, Any]], str]] = {
 
 
 @pytest.mark.parametrize("what", REFUSED)
-def test_what_is_no_whole_set_of_a_preset_is_refused_in_a_sentence(
+def test_incomplete_or_mixed_set_is_refused(
     what: str, place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     cards, message = REFUSED[what]
@@ -137,7 +137,7 @@ def test_what_is_no_whole_set_of_a_preset_is_refused_in_a_sentence(
     assert names(place) == []
 
 
-def test_what_decides_nothing_may_differ(place: Path, tmp_path: Path) -> None:
+def test_settings_without_effect_may_differ(place: Path, tmp_path: Path) -> None:
     config = changed(checkpoint_steps=1234, search__trials=3)
     assert main(["enter", str(run_of(tmp_path / "run", 0, config=config))]) == 0
     assert names(place) == both(f"{NAME}.s0")
@@ -159,7 +159,7 @@ def test_what_decides_nothing_may_differ(place: Path, tmp_path: Path) -> None:
         (lambda run: (run / "policy.onnx").write_bytes(b"no"), "is not an ONNX file"),
     ],
 )
-def test_a_run_that_is_not_finished_is_refused_by_its_folder(
+def test_unfinished_run_is_refused_with_its_folder(
     spoil: Any, message: str, place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     given = runs(tmp_path, [0, 1])
@@ -171,7 +171,7 @@ def test_a_run_that_is_not_finished_is_refused_by_its_folder(
     assert names(place) == []
 
 
-def test_a_preset_of_ones_own_is_entered_under_its_own_name(
+def test_users_preset_is_entered_under_its_own_name(
     place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "configs"

@@ -1,4 +1,4 @@
-"""A policy file computes what torch computes, row by row, and cannot do anything else."""
+"""Policy files: agreement with torch, rows, signals, and refusal of harmful files."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pickle
 import sys
 import zipfile
 from base64 import b64encode
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +59,7 @@ def test_file_and_torch_agree(name: str, request: pytest.FixtureRequest) -> None
     assert np.ptp(wanted) > 1e-3
 
 
-def test_the_normaliser_matters(normalized_ppo: tuple[Any, Path]) -> None:
+def test_normaliser_is_part_of_the_file(normalized_ppo: tuple[Any, Path]) -> None:
     model, folder = normalized_ppo
     seen = observations(50)
     action, _ = OnnxPolicy.load(folder / "policy.onnx").predict(seen)
@@ -67,7 +67,9 @@ def test_the_normaliser_matters(normalized_ppo: tuple[Any, Path]) -> None:
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_a_row_does_not_depend_on_its_batch(name: str, request: pytest.FixtureRequest) -> None:
+def test_action_of_a_row_is_independent_of_its_batch(
+    name: str, request: pytest.FixtureRequest
+) -> None:
     policy = OnnxPolicy.load(request.getfixturevalue(name)[1] / "policy.onnx")
     seen = observations(256)
     whole, _ = policy.predict(seen)
@@ -78,14 +80,14 @@ def test_a_row_does_not_depend_on_its_batch(name: str, request: pytest.FixtureRe
         assert np.array_equal(np.concatenate(parts), whole)
 
 
-def test_actions_stay_in_the_environments_range(ppo: tuple[Any, Path]) -> None:
+def test_actions_are_clipped_to_the_range(ppo: tuple[Any, Path]) -> None:
     policy = OnnxPolicy.load(ppo[1] / "policy.onnx")
     action, _ = policy.predict(1e6 * observations(200))
     assert np.abs(action).max() == 1.0
     assert set(np.sign(action).ravel()) == {-1.0, 1.0}
 
 
-def test_predict_keeps_to_the_controllers_contract(ppo: tuple[Any, Path]) -> None:
+def test_predict_has_the_controllers_interface(ppo: tuple[Any, Path]) -> None:
     policy = OnnxPolicy.load(ppo[1] / "policy.onnx")
     seen = observations(4)
     single, state = policy.predict(seen[0])
@@ -100,7 +102,7 @@ def test_predict_keeps_to_the_controllers_contract(ppo: tuple[Any, Path]) -> Non
     assert np.isfinite(mean)
 
 
-def test_the_same_weights_give_the_same_bytes(ppo: tuple[Any, Path], tmp_path: Path) -> None:
+def test_equal_weights_give_equal_bytes(ppo: tuple[Any, Path], tmp_path: Path) -> None:
     for name in ("a.onnx", "b.onnx"):
         export_policy(ppo[0], tmp_path / name, {"seed": 3})
     first, second = ((tmp_path / n).read_bytes() for n in ("a.onnx", "b.onnx"))
@@ -117,7 +119,7 @@ def test_the_same_weights_give_the_same_bytes(ppo: tuple[Any, Path], tmp_path: P
         ({"reward": {"highest_contraction": 0.018}}, "contraction had high = 0.02"),
     ],
 )
-def test_other_signals_are_refused(
+def test_environment_with_other_signals_is_refused(
     arguments: dict[str, Any], message: str, ppo: tuple[Any, Path]
 ) -> None:
     env = gym.make(ID, **arguments).unwrapped
@@ -125,7 +127,7 @@ def test_other_signals_are_refused(
         OnnxPolicy.load(ppo[1] / "policy.onnx", env.signals, env.action_signals)
 
 
-def test_another_action_is_refused(ppo: tuple[Any, Path]) -> None:
+def test_environment_with_another_action_is_refused(ppo: tuple[Any, Path]) -> None:
     env = gym.make(ID).unwrapped
     weaker = Signals(dataclasses.replace(s, high=5e5) for s in env.action_signals)
     with pytest.raises(PolicyFileError, match="differ in the action"):
@@ -163,7 +165,7 @@ def doctored_zip(path: Path, model: PPO, marker: Path) -> Path:
 
 
 def loaders(path: Path, tmp_path: Path) -> dict[str, Callable[[], Any]]:
-    """Return every public way in which this project opens a file of learning."""
+    """Return every public function that opens a file of a policy or run."""
     folder = tmp_path / "run"
     folder.mkdir(exist_ok=True)
     (folder / "checkpoint.pt").write_bytes(path.read_bytes())
@@ -250,7 +252,7 @@ def gift(tmp_path: Path, ppo: tuple[Any, Path], monkeypatch: pytest.MonkeyPatch)
     return Gift(tmp_path, ppo[1] / "policy.onnx")
 
 
-def test_a_run_or_setting_of_others_cannot_name_a_module(
+def test_settings_cannot_import_a_module(
     gift: Gift, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["train", ID, "--resume", "--out", str(tmp_path)]) == 2
@@ -268,13 +270,13 @@ def test_a_run_or_setting_of_others_cannot_name_a_module(
     assert not gift.marker.exists()
 
 
-def test_the_module_would_run_elsewhere(gift: Gift) -> None:
+def test_module_would_be_imported_by_gymnasium(gift: Gift) -> None:
     """Without this, the test above could pass on a harmless name."""
     gym.make_vec(gift.env, 1, vectorization_mode="vector_entry_point")
     assert gift.marker.exists()
 
 
-def graph(nodes: list[Any], numbers: list[Any] = (), domains: tuple[str, ...] = ("",)) -> Any:  # type: ignore[assignment]
+def graph(nodes: list[Any], numbers: Sequence[Any] = (), domains: Sequence[str] = ("",)) -> Any:
     """Return a model of observation -> action around nodes."""
     made = helper.make_graph(
         nodes,
@@ -348,7 +350,7 @@ def loop() -> Any:
         ),
     ],
 )
-def test_graphs_that_reach_further_are_refused(
+def test_graphs_beyond_plain_arithmetic_are_refused(
     make: Callable[[Path], Any], message: str, tmp_path: Path, ppo: tuple[Any, Path]
 ) -> None:
     model = make(tmp_path)
@@ -359,9 +361,7 @@ def test_graphs_that_reach_further_are_refused(
         OnnxPolicy.load(tmp_path / "p.onnx")
 
 
-def test_large_empty_and_unlabelled_files_are_refused(
-    tmp_path: Path, ppo: tuple[Any, Path]
-) -> None:
+def test_large_empty_and_cardless_files_are_refused(tmp_path: Path, ppo: tuple[Any, Path]) -> None:
     file = tmp_path / "p.onnx"
     file.write_bytes(b"\x08" * (MOST_BYTES + 1))
     with pytest.raises(PolicyFileError, match="larger than"):

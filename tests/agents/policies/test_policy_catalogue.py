@@ -1,4 +1,4 @@
-"""Which controllers presets make, those of one's own too; no file is left out silently."""
+"""Catalogue of policies: entries of presets, also of a user's, and checks of the files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def presets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def test_a_preset_of_ones_own_is_offered_with_what_it_says_of_itself(presets: Path) -> None:
+def test_users_preset_has_an_entry_with_its_comment_as_summary(presets: Path) -> None:
     (presets / "KneeWalk-v0.ppo-mine.yaml").write_text(f"# PPO, with my network.\n{BASE}")
     (presets / "KneeWalk-v0.ppo-terse.yaml").write_text(BASE)
     made = catalogue.offered()
@@ -38,7 +38,7 @@ def test_a_preset_of_ones_own_is_offered_with_what_it_says_of_itself(presets: Pa
     assert made["ppo_terse_knee_walk"].summary.startswith("ppo, variant terse;")
 
 
-def test_a_residual_of_ones_own_is_one_by_its_settings(presets: Path) -> None:
+def test_users_residual_is_recognised_by_its_settings(presets: Path) -> None:
     text = "extends: KneeWalk-v0.sac\nsearch: {trials: 3}\n"
     text += "residual: {controller: knee_pid, scale: 0.1}\n"
     (presets / "KneeWalk-v0.sac-on_pid.yaml").write_text(text)
@@ -67,20 +67,18 @@ def test_a_residual_of_ones_own_is_one_by_its_settings(presets: Path) -> None:
         ),
     ],
 )
-def test_a_preset_that_cannot_be_offered_is_named(
-    name: str, text: str, message: str, presets: Path
-) -> None:
+def test_invalid_preset_is_named(name: str, text: str, message: str, presets: Path) -> None:
     (presets / f"{name}.yaml").write_text(text)
     with pytest.raises(SettingsError, match=message):
         catalogue.offered()
 
 
-def test_an_environment_that_is_not_listed_gives_a_name() -> None:
+def test_suffix_of_an_unlisted_environment() -> None:
     assert catalogue._suffix("AnkleBrace2-v0") == "_ankle_brace2"
     assert catalogue._suffix("MusclePositioning-v0") == ""
 
 
-def test_a_policy_file_of_no_preset_is_named(
+def test_policy_file_without_a_preset_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(catalogue, "FOLDER", tmp_path)

@@ -1,9 +1,11 @@
-"""The policy that comes with the project is the recorded one, and tracks well on unseen seeds."""
+"""Policies that come with the project: their records, plants, names and tracking errors."""
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +15,13 @@ import onnx
 import pytest
 from short_runs import ID
 
-from agents.policies import catalogue
+from agents.policies import catalogue, controllers
 from agents.policies.policy import OnnxPolicy
 from agents.policies.policy_file import CARD, finished
 from agents.policies.residual import ResidualPolicy, with_controller
 from agents.settings import presets as configs
-from benchmarks.runs import controllers, rows
+from benchmarks.runs import controllers as entrants
+from benchmarks.runs import rows
 
 FILES = [path for entry in catalogue.CONTROLLERS.values() for path in entry.files().values()]
 RECORDED = {
@@ -28,7 +31,7 @@ RECORDED = {
 
 
 def rms(controller: object, reference: str, hysteresis: str, load: float) -> float:
-    """Return the RMS error [m] after two seconds, over 16 seeds that training never saw."""
+    """Return the RMS error [m] after two seconds, over 16 seeds outside the training."""
     env = gym.make_vec(
         ID,
         16,
@@ -47,8 +50,8 @@ def rms(controller: object, reference: str, hysteresis: str, load: float) -> flo
     return float(np.sqrt(np.mean(np.square(errors[200:]))))
 
 
-class FeedForward:
-    """Sets the pressure that the static law without memory asks for."""
+class StaticLaw:
+    """Static law without hysteresis."""
 
     def __init__(self, load: float) -> None:
         env = gym.make(ID, load=load).unwrapped
@@ -63,7 +66,7 @@ class FeedForward:
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
-def test_the_file_is_small_and_its_training_is_recorded(path: Path) -> None:
+def test_file_is_small_with_a_training_record(path: Path) -> None:
     assert (
         path.stat().st_size < 250_000
     )  # two layers of 128 on the many inputs of an arm are 199 kB
@@ -78,7 +81,7 @@ def test_the_file_is_small_and_its_training_is_recorded(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
-def test_the_recorded_preset_is_the_one_that_ships(path: Path) -> None:
+def test_settings_on_the_card_are_the_presets(path: Path) -> None:
     card = OnnxPolicy.load(path).card
     read = configs.from_mapping(card["config"]).as_dict()
     told, known = (config.pop("search", {}) for config in (dict(card["config"]), read))
@@ -89,12 +92,35 @@ def test_the_recorded_preset_is_the_one_that_ships(path: Path) -> None:
     assert "--config" not in card["command"]
 
 
+@functools.cache
+def env_of(name: str, kind: str) -> Any:
+    """Return an environment by id and arguments in JSON."""
+    return gym.make(name, **json.loads(kind)).unwrapped
+
+
+@pytest.fixture(scope="module", autouse=True)
+def shared_controllers() -> Iterator[None]:
+    """Build each controller once for all training seeds of a policy."""
+    made: dict[tuple[str, str], Any] = {}
+    make = controllers.make
+
+    def shared(name: str, plant: Any, *signals: Any) -> Any:
+        key = name, plant.digest()
+        if key not in made:
+            made[key] = make(name, plant, *signals)
+        return made[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(controllers, "make", shared)
+        yield
+
+
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
-def test_it_was_trained_on_the_plants_that_ship(path: Path) -> None:
+def test_plants_of_training_are_unchanged(path: Path) -> None:
     policy = OnnxPolicy.load(path)
     plants = []
     for kind in configs.from_mapping(policy.card["config"]).kinds():
-        env = gym.make(policy.card["env"], **kind).unwrapped
+        env = env_of(policy.card["env"], json.dumps(kind, sort_keys=True))
         policy.check(env.signals, env.action_signals)
         with_controller(policy, env.plant)
         plants.append(env.plant.digest())
@@ -112,7 +138,7 @@ def named(source: Path, place: Path, **changes: Any) -> None:
     place.write_bytes(model.SerializeToString())
 
 
-def test_several_trainings_of_one_policy_are_told_apart(
+def test_training_seeds_of_one_policy_are_distinguished(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source = Path(catalogue.PRETRAINED["ppo"])
@@ -136,9 +162,7 @@ def test_several_trainings_of_one_policy_are_told_apart(
         catalogue.load_pretrained("x", training_seed=5)
 
 
-def test_the_author_is_the_one_beside_the_policy(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_author_is_read_from_the_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     source = Path(catalogue.PRETRAINED["ppo"])
     monkeypatch.setattr(catalogue, "FOLDER", tmp_path)
     entry = catalogue.CONTROLLERS["ppo"]
@@ -149,8 +173,7 @@ def test_the_author_is_the_one_beside_the_policy(
     (tmp_path / "MusclePositioning-v0.ppo.s0.json").write_text(json.dumps(beside))
     assert entry.author == "Doe, J."
     assert (
-        controllers._entrant("ppo", entry, "agents.policies.catalogue", "learned").author
-        == "Doe, J."
+        entrants._entrant("ppo", entry, "agents.policies.catalogue", "learned").author == "Doe, J."
     )
     assert catalogue.load_pretrained("ppo").card["seed"] == 0
 
@@ -165,7 +188,7 @@ def test_the_author_is_the_one_beside_the_policy(
         ({"seed": 3, "baseline": {"name": "pid"}}, "of baseline 'pid'"),
     ],
 )
-def test_a_policy_under_anothers_name_is_refused(
+def test_policy_under_another_file_name_is_refused(
     changes: dict[str, Any], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source = Path(catalogue.PRETRAINED["ppo"])
@@ -178,17 +201,17 @@ def test_a_policy_under_anothers_name_is_refused(
 
 @pytest.mark.parametrize("hysteresis", ["maxwell_slip", "preisach"])
 @pytest.mark.parametrize(("reference", "most"), [("sines", 0.15e-3), ("staircase", 0.5e-3)])
-def test_it_tracks_where_a_law_without_memory_cannot(
+def test_tracks_better_than_the_static_law_on_both_hysteresis_models(
     hysteresis: str, reference: str, most: float
 ) -> None:
     policy = catalogue.load_pretrained("ppo")
     for load in (0.0, 2.55, 4.55):
         error = rms(policy, reference, hysteresis, load)
         assert error < most
-        assert error < 0.4 * rms(FeedForward(load), reference, hysteresis, load)
+        assert error < 0.4 * rms(StaticLaw(load), reference, hysteresis, load)
 
 
-def test_benchmarks_find_it_among_the_controllers() -> None:
+def test_catalogue_makes_every_policy() -> None:
     for name, entry in catalogue.CONTROLLERS.items():
         env = gym.make(*entry.envs).unwrapped
         made = catalogue.make_controller(name, env.plant, env.signals, env.action_signals, seed=0)
@@ -214,9 +237,7 @@ def test_benchmarks_find_it_among_the_controllers() -> None:
         ),
     ],
 )
-def test_the_knees_policies_do_better_than_classical_ones(
-    row: str, other: str, share: float
-) -> None:
+def test_knee_policies_beat_classical_controllers(row: str, other: str, share: float) -> None:
     ours, theirs = (rows.load(rows.path_of(name)) for name in (row, other))
     assert ours["failures"] == 0
     errors = [r["aggregate"]["rms_error"]["mean"] for r in (ours, theirs)]

@@ -1,4 +1,4 @@
-"""A residual policy notices another controller than the one that it has learned to correct."""
+"""Residual policies: recorded answers of the controller, its state, the catalogue."""
 
 from __future__ import annotations
 
@@ -34,23 +34,23 @@ RESIDUALS = sorted(key for key in configs.presets() if "residual" in key[2])
 
 @pytest.fixture
 def file(short_run: Callable[[str], tuple[Any, Path]]) -> OnnxPolicy:
-    """Return a policy that corrects inverse_pid on plants with either memory."""
+    """Return a policy that corrects inverse_pid on plants with either hysteresis model."""
     return OnnxPolicy.load(short_run("residual")[1] / "policy.onnx")
 
 
 def plant_with(law: str) -> Any:
-    """Return the nominal plant with a memory."""
+    """Return the nominal plant with a hysteresis model."""
     return gym.make(ID, hysteresis=law).unwrapped.plant
 
 
-def test_the_card_says_which_plants_and_what_each_kind_of_row_has_in_common(
+def test_card_names_plants_and_common_arguments(
     file: OnnxPolicy,
 ) -> None:
     assert file.card["plants"] == [plant_with(law).digest() for law in LAWS]
     assert file.card["env_kwargs"] == {**kind("residual").env_kwargs, "randomize": True}
 
 
-def test_the_card_holds_what_the_controller_was_and_answered(file: OnnxPolicy) -> None:
+def test_card_holds_the_controllers_answers_on_every_plant(file: OnnxPolicy) -> None:
     known = file.card["baseline"]
     assert (known["name"], known["scale"]) == ("inverse_pid", pytest.approx(0.3))
     assert [entry["plant"] for entry in known["recorded"]] == file.card["plants"]
@@ -64,7 +64,7 @@ def test_the_card_holds_what_the_controller_was_and_answered(file: OnnxPolicy) -
 
 
 class Shifted:
-    """A controller whose answers are a little off."""
+    """A controller with an offset."""
 
     def __init__(self, controller: Any, shift: float) -> None:
         self.controller, self.shift = controller, np.float32(shift)
@@ -75,7 +75,7 @@ class Shifted:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_another_controller_is_refused_on_every_plant_of_the_training(
+def test_controller_with_other_answers_is_refused(
     law: str, file: OnnxPolicy, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plant, make = plant_with(law), controllers.make
@@ -99,7 +99,7 @@ def _with_horizon(inverse: Any) -> Any:
     return dataclasses.replace(inverse, horizon=1.5 * inverse.horizon)
 
 
-def test_told_another_plant_it_may_answer_otherwise(file: OnnxPolicy) -> None:
+def test_controller_of_another_plant_may_answer_differently(file: OnnxPolicy) -> None:
     plant = plant_with("preisach")
     told = plant.replace({"mass.damping": 1.2 * plant.mass.damping})
     assert isinstance(with_controller(file, told), ResidualPolicy)
@@ -119,7 +119,7 @@ def test_told_another_plant_it_may_answer_otherwise(file: OnnxPolicy) -> None:
         lambda known: known["recorded"][0].update(answers=[["x"]]),
     ],
 )
-def test_a_card_without_a_sound_record_is_refused(
+def test_card_without_sound_recorded_answers_is_refused(
     spoil: Callable[[Any], None],
     file: OnnxPolicy,
     short_run: Callable[[str], tuple[Any, Path]],
@@ -131,7 +131,7 @@ def test_a_card_without_a_sound_record_is_refused(
         with_controller(OnnxPolicy(data, card), plant_with("maxwell_slip"))
 
 
-def test_a_controller_that_rests_at_a_limit_cannot_be_recorded() -> None:
+def test_controller_at_a_limit_cannot_be_recorded() -> None:
     class Stuck:
         def predict(self, observation: Any, state: Any = None, start: Any = None) -> Any:
             return np.ones((len(observation), 1), np.float32), None
@@ -145,7 +145,7 @@ def test_a_controller_that_rests_at_a_limit_cannot_be_recorded() -> None:
 
 @pytest.fixture(params=RESIDUALS, ids=lambda key: f"{key[0]}-{key[2]}".removeprefix("PAM/"))
 def residual(request: pytest.FixtureRequest) -> ResidualVecEnv:
-    """Return what a residual preset trains in: few rows, of both memories where that is cheap."""
+    """Return the environment of a residual preset, with few rows."""
     config = configs.preset(*request.param)
     laws = LAWS if config.env in BOTH_LAWS else LAWS[:1]
     plain = config.as_dict() | {"history": {}, "share": {}, "per_reference": {}}
@@ -157,10 +157,8 @@ def residual(request: pytest.FixtureRequest) -> ResidualVecEnv:
     return env
 
 
-def test_states_of_controllers_survive_a_checkpoint(
-    residual: ResidualVecEnv, tmp_path: Path
-) -> None:
-    """The same next answers, to the last bit, and every preset's controller can be recorded."""
+def test_controllers_states_survive_a_checkpoint(residual: ResidualVecEnv, tmp_path: Path) -> None:
+    """Answers after a restore are equal bit for bit; every preset's controller is recorded."""
     rng = np.random.default_rng(0)
     residual.seed(900_000)
     residual.reset()
@@ -204,7 +202,7 @@ def _recorded(env: ResidualVecEnv) -> list[dict[str, Any]]:
     return told
 
 
-def test_a_residual_offers_what_its_controllers_model_should_do() -> None:
+def test_residual_has_the_controllers_model_output() -> None:
     class Following:
         def predict(self, observation: Any, state: Any = None, start: Any = None) -> Any:
             return np.zeros(1, np.float32), 7
@@ -227,7 +225,7 @@ def test_a_residual_offers_what_its_controllers_model_should_do() -> None:
     assert not hasattr(ResidualPolicy(Adds(), plain), "model_output")  # type: ignore[arg-type]
 
 
-def test_the_board_offers_what_there_is_a_preset_for() -> None:
+def test_catalogue_has_an_entry_for_every_preset() -> None:
     known = {key for key in configs.presets() if "residual" not in key[2]}
     files = {
         (f"PAM/{entry.file.split('.')[0]}", entry.file.split(".")[1]): entry

@@ -1,4 +1,4 @@
-"""A search proposes by rule, goes on where it was, and leaves its budget in the preset's file."""
+"""Hyper-parameter search: proposals, resumption, budget in the preset's file."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def tried(study: optuna.Study) -> list[tuple[Any, Any]]:
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_every_kind_has_a_space_that_holds_its_preset(name: str) -> None:
+def test_search_space_contains_the_preset(name: str) -> None:
     config = kind(name)
     values = from_settings(config)
     assert set(values) == set(space_of(config))
@@ -54,7 +54,7 @@ def test_every_kind_has_a_space_that_holds_its_preset(name: str) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
-def test_a_search_that_stopped_goes_the_same_way(tmp_path: Path) -> None:
+def test_resumed_search_makes_the_same_proposals(tmp_path: Path) -> None:
     for place in ("whole", "parts"):
         (tmp_path / place).mkdir()
     whole = tune.search(job(tmp_path / "whole", 3), QUIET)
@@ -67,7 +67,7 @@ def test_a_search_that_stopped_goes_the_same_way(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
-def test_a_trial_whose_process_was_killed_is_done_again(
+def test_trial_of_a_killed_process_is_repeated(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     code = f"""
@@ -108,7 +108,7 @@ tune.search(test_tune.job(Path({str(tmp_path)!r}), 1), test_tune.QUIET)
 
 
 @pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
-def test_a_search_counts_those_that_led_to_what_it_began_from(tmp_path: Path) -> None:
+def test_budget_includes_earlier_searches(tmp_path: Path) -> None:
     path = tmp_path / "preset.yaml"
     path.write_text(configs.preset_path(ID, "ppo").read_text(encoding="utf-8"), encoding="utf-8")
     made = job(tmp_path, 1, search={"trials": 20, "earlier": 5})
@@ -121,7 +121,7 @@ def test_a_search_counts_those_that_led_to_what_it_began_from(tmp_path: Path) ->
 
 
 @pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
-def test_the_budget_and_the_best_settings_are_written(tmp_path: Path) -> None:
+def test_best_settings_and_budget_are_written(tmp_path: Path) -> None:
     made = job(tmp_path, 2)
     study = tune.search(made, QUIET)
     path = tmp_path / "preset.yaml"
@@ -140,7 +140,7 @@ def test_the_budget_and_the_best_settings_are_written(tmp_path: Path) -> None:
     assert again.name == wanted.name
     text = path.read_text()
     assert text.startswith("# why\n")
-    assert "# untrained, it keeps the last set-point" in text
+    assert "# the untrained policy keeps the last setpoint" in text
     assert after.network.differences == given.network.differences
     assert after.env_kwargs == given.env_kwargs
 
@@ -166,7 +166,7 @@ def _chosen(config: Config) -> dict[str, Any]:
     return suggest(optuna.trial.FixedTrial(from_settings(config)), config)
 
 
-def test_a_failed_episode_makes_a_trial_worse() -> None:
+def test_failed_episode_increases_the_value() -> None:
     good, bad = Score(0.1, -1.0, 0), Score(0.1, -1.0, 2)
     assert value_of(bad, small()) > 2 * value_of(good, small())
     assert value_of(Score(float("nan"), 0.0, 0), small()) == float("inf")
@@ -177,7 +177,7 @@ def test_a_failed_episode_makes_a_trial_worse() -> None:
     assert value_of(score, by_ratio) == pytest.approx(0.02)
 
 
-def test_a_correction_pays_for_moving_the_set_point_more_than_its_controller() -> None:
+def test_excess_travel_increases_the_value() -> None:
     assert value_of(Score(0.1, 0.0, 0, travel=105.0), small(), 100.0) == pytest.approx(0.1)
     assert value_of(Score(0.1, 0.0, 0, travel=210.0), small(), 100.0) == pytest.approx(0.2)
     assert value_of(Score(0.1, 0.0, 0, travel=210.0), small()) == pytest.approx(0.1)
@@ -189,7 +189,7 @@ def test_the_first_trial_is_the_preset_itself(names: tuple[str, str, str]) -> No
     assert with_settings(config, as_settings(config, _chosen(config))) == config
 
 
-def test_a_study_is_of_settings_whose_values_mean_the_same(tmp_path: Path) -> None:
+def test_study_name_identifies_fixed_settings(tmp_path: Path) -> None:
     one = job(tmp_path)
 
     def named(**changes: Any) -> str:
@@ -208,7 +208,7 @@ def test_a_study_is_of_settings_whose_values_mean_the_same(tmp_path: Path) -> No
 
 
 @pytest.mark.filterwarnings("ignore::optuna.exceptions.ExperimentalWarning")
-def test_searches_side_by_side_propose_different_settings(
+def test_parallel_searches_propose_different_settings(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     proposed = {}
@@ -225,12 +225,12 @@ def test_searches_side_by_side_propose_different_settings(
     assert proposed[1] != proposed[2]
 
 
-def test_a_search_trains_with_seeds_that_no_reported_policy_has() -> None:
+def test_search_seeds_differ_from_reported_seeds() -> None:
     assert min(tune.TRAINING_SEEDS) >= 10_000
     assert len(set(tune.TRAINING_SEEDS)) == 2
 
 
-def test_a_search_needs_something_to_look_at(tmp_path: Path) -> None:
+def test_search_needs_evaluations(tmp_path: Path) -> None:
     blind = tune.Job(tiny(), 1, 256, 0, tmp_path / "s.db")
     with pytest.raises(SettingsError, match=r"evaluation.episodes = 0"):
         tune.search(blind, QUIET)

@@ -1,4 +1,4 @@
-"""Settings are checked, and a mistake is named together with its remedy."""
+"""Checked settings: errors with their remedy, extension, kinds of rows."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LAYERS = {"network": {"linear": False, "hold": []}}
 
 
 @pytest.mark.parametrize(("env", "algo", "variant"), sorted(configs.presets()))
-def test_every_preset_is_sound_and_fits_its_environment(env: str, algo: str, variant: str) -> None:
+def test_preset_fits_its_environment(env: str, algo: str, variant: str) -> None:
     config = configs.preset(env, algo, variant)
     assert (config.env, config.algo) == (env, algo)
     made = gym.make(env, **config.env_kwargs).unwrapped
@@ -75,12 +75,12 @@ def test_every_environment_has_a_preset_of_every_kind() -> None:
         ({"env": "CartPole-v1"}, "is no environment here; known: PAM/"),
     ],
 )
-def test_a_mistake_is_named(given: object, message: str) -> None:
+def test_invalid_setting_is_named(given: object, message: str) -> None:
     with pytest.raises(SettingsError, match=message):
         configs.from_mapping(given)
 
 
-def test_a_preset_may_say_only_what_differs_from_another() -> None:
+def test_preset_extends_another() -> None:
     plain, history = configs.preset(ID, "ppo"), configs.preset(ID, "ppo", "history")
     randomized = configs.preset(ID, "ppo", "randomized")
     assert history.network == plain.network
@@ -109,7 +109,7 @@ def test_presets_that_extend_each_other_are_refused(
         configs.read(tmp_path / "A-v0.ppo.yaml")
 
 
-def test_a_search_is_of_its_own_preset(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_search_budget_is_not_inherited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     searched = f"env: {ID}\nsearch: {{trials: 40, steps: 1000}}\nppo: {{gamma: 0.9}}\n"
     (tmp_path / "A-v0.ppo.yaml").write_text(searched)
     monkeypatch.setattr(configs, "FOLDER", tmp_path)
@@ -118,7 +118,7 @@ def test_a_search_is_of_its_own_preset(tmp_path: Path, monkeypatch: pytest.Monke
     assert configs.read(tmp_path / "A-v0.ppo.yaml").search.trials == 40
 
 
-def test_what_decides_which_policy_is_shipped() -> None:
+def test_decisive_settings() -> None:
     config = configs.preset(ID, "ppo")
     idle = configs.changed(config, ["search.trials=40", "checkpoint_steps=123"])
     assert idle.decisive() == config.decisive()
@@ -126,7 +126,7 @@ def test_what_decides_which_policy_is_shipped() -> None:
         assert configs.changed(config, [change]).decisive() != config.decisive()
 
 
-def test_rows_are_shared_out_among_all_combinations() -> None:
+def test_rows_are_divided_among_all_combinations() -> None:
     made = configs.from_mapping(
         {
             "env": ID,
@@ -184,12 +184,12 @@ def test_yaml_cannot_run_code(tmp_path: Path) -> None:
         configs.read(file)
 
 
-def test_an_unknown_environment_is_answered_with_the_nearest() -> None:
+def test_unknown_environment_names_the_nearest() -> None:
     with pytest.raises(SettingsError, match="did you mean 'PAM/MusclePositioning-v0'"):
         configs.preset("PAM/MusclePositoning-v0", "ppo")
 
 
-def test_a_name_that_is_no_signal_is_refused() -> None:
+def test_unknown_signal_is_refused() -> None:
     network = Network(differences=("reference - contractoin",))
     with pytest.raises(SettingsError, match="no signal named 'contractoin'"):
         input_matrix(network, tuple(gym.make(ID).unwrapped.signals.names()))

@@ -1,4 +1,4 @@
-"""What is shipped is the best policy that was looked at, whatever happens on the way."""
+"""Export of the best evaluated policy."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ WIDE = {"ppo": NARROW, "sac": NARROW, "tqc": NARROW, "recurrent_ppo": {"hidden":
 
 
 class Judge:
-    """Says what policies are worth by their steps, and keeps the weights that it saw."""
+    """Values policies by their steps, and keeps their weights."""
 
     def __init__(self, values: dict[int, float]) -> None:
         self.values = values
@@ -54,7 +54,7 @@ def same(mine: dict[str, torch.Tensor], theirs: dict[str, torch.Tensor]) -> bool
 
 
 @pytest.mark.parametrize("algo", configs.ALGORITHMS)
-def test_the_best_is_shipped_and_not_the_last(
+def test_best_policy_is_exported_instead_of_the_last(
     algo: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     values = {0: 5.0, 512: 1.0, 1024: 3.0}
@@ -66,7 +66,7 @@ def test_the_best_is_shipped_and_not_the_last(
     assert not same(judge.seen[1024], judge.seen[512])
 
 
-def test_what_was_found_can_be_looked_at(
+def test_command_prints_the_evaluations(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     judged(run_in(tmp_path), {0: 5.0, 512: 1.0, 1024: 3.0}, monkeypatch)
@@ -78,9 +78,7 @@ def test_what_was_found_can_be_looked_at(
     assert ["exported" in line for line in lines] == [False, True, False]
 
 
-def test_the_normaliser_is_that_of_the_best(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_normaliser_is_that_of_the_best(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = run_in(tmp_path / "whole", normalize=NORMALIZED)
     _, model, _ = judged(run, {0: 5.0, 512: 1.0, 1024: 3.0}, monkeypatch)
     half = train.Run(run.config, 3, tmp_path / "half")
@@ -90,7 +88,7 @@ def test_the_normaliser_is_that_of_the_best(
     assert not np.array_equal(mine.mean, theirs.mean)
 
 
-def test_an_untrained_policy_is_shipped_only_if_nothing_beats_it(
+def test_untrained_policy_is_exported_only_if_none_is_better(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     judge, model, card = judged(run_in(tmp_path), {0: 1.0, 512: 1.0, 1024: 2.0}, monkeypatch)
@@ -98,7 +96,7 @@ def test_an_untrained_policy_is_shipped_only_if_nothing_beats_it(
     assert same(model.policy.state_dict(), judge.seen[0])
 
 
-def test_what_cannot_be_judged_is_not_preferred(
+def test_policy_without_a_value_is_not_preferred(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     values = {0: float("nan"), 512: float("nan"), 1024: float("nan")}
@@ -108,7 +106,7 @@ def test_what_cannot_be_judged_is_not_preferred(
 
 
 @pytest.mark.parametrize("normalize", [{}, {"normalize": NORMALIZED}], ids=["plain", "normalized"])
-def test_a_killed_run_remembers_its_best(
+def test_resumed_run_keeps_its_best(
     normalize: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     values = {0: 5.0, 512: 1.0, 1024: 3.0}
@@ -121,7 +119,7 @@ def test_a_killed_run_remembers_its_best(
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
-def test_a_longer_training_goes_on_from_the_last_and_not_from_the_best(
+def test_longer_training_continues_from_the_last_policy(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     values = {0: 5.0, 512: 1.0, 1024: 3.0, 1536: 0.5}

@@ -1,4 +1,4 @@
-"""A run goes on where it was: the same bits whether or not it was killed."""
+"""Training runs: exact resumption, checkpoints, cards and records."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_resumed_is_uninterrupted_to_the_last_bit(
+def test_resumed_run_equals_the_uninterrupted_one(
     name: str, tmp_path: Path, short_run: Callable[[str], tuple[Any, Path]]
 ) -> None:
     whole, folder = short_run(name)
@@ -54,7 +54,7 @@ def test_resumed_is_uninterrupted_to_the_last_bit(
     assert (tmp_path / "policy.onnx").read_bytes() == (folder / "policy.onnx").read_bytes()
 
 
-def test_a_normalised_run_resumes_to_the_last_bit(
+def test_resumed_run_restores_the_normaliser(
     tmp_path: Path, normalized_ppo: tuple[Any, Path]
 ) -> None:
     whole, folder = normalized_ppo
@@ -123,7 +123,7 @@ def test_an_interrupted_write_leaves_the_old_checkpoint(
     assert checkpoint.load(file)["a"].tolist() == [0, 1, 2]
 
 
-def test_a_torn_or_foreign_checkpoint_is_never_picked_up(tmp_path: Path) -> None:
+def test_damaged_or_foreign_checkpoint_is_refused(tmp_path: Path) -> None:
     file = tmp_path / checkpoint.NAME
     checkpoint.save(file, {"a": np.arange(300)})
     good = file.read_bytes()
@@ -171,7 +171,7 @@ def test_a_run_is_neither_overwritten_nor_resumed_with_other_settings(
     assert (ppo[1] / checkpoint.NAME).read_bytes() == before
 
 
-def test_a_changed_plant_is_not_trained_on_unnoticed(ppo: tuple[Any, Path], tmp_path: Path) -> None:
+def test_run_is_not_resumed_on_a_changed_plant(ppo: tuple[Any, Path], tmp_path: Path) -> None:
     content = checkpoint.load(ppo[1] / checkpoint.NAME)
     digest = ppo[0].get_env().get_attr("plant")[0].digest()
     content["settings"] = content["settings"].replace(digest, "0123456789abcdef")
@@ -183,14 +183,14 @@ def test_a_changed_plant_is_not_trained_on_unnoticed(ppo: tuple[Any, Path], tmp_
 @pytest.mark.parametrize(
     "given", [["PAM/KneeWalk-v0"], [ID, "--algo", "sac"], [ID, "--seed", "4"]], ids=str
 )
-def test_a_run_is_not_resumed_as_another(
+def test_run_is_not_resumed_as_another(
     given: list[str], ppo: tuple[Any, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["train", *given, "--out", str(ppo[1]), "--resume"]) == 2
     assert f": leave {given[-1]} out" in capsys.readouterr().err
 
 
-def test_a_training_that_lost_its_card_is_finished_again(
+def test_policy_without_its_record_is_exported_again(
     tmp_path: Path, short_run: Callable[[str], tuple[Any, Path]]
 ) -> None:
     _, folder = short_run("ppo")
@@ -202,7 +202,7 @@ def test_a_training_that_lost_its_card_is_finished_again(
     assert (tmp_path / "policy.json").is_file()
 
 
-def test_the_log_and_the_card_are_written(ppo: tuple[Any, Path]) -> None:
+def test_log_and_card_are_written(ppo: tuple[Any, Path]) -> None:
     folder = ppo[1]
     assert list((folder / "tensorboard").glob("events*"))
     card = OnnxPolicy.load(folder / "policy.onnx").card
@@ -216,7 +216,7 @@ def test_the_log_and_the_card_are_written(ppo: tuple[Any, Path]) -> None:
     assert str(ROOT) not in text
 
 
-def test_training_episodes_are_far_from_those_that_are_scored() -> None:
+def test_training_tuning_and_scored_seeds_are_disjoint() -> None:
     config = tiny()
     env = make_env(config)
     make_model(config, 0, env)
@@ -228,7 +228,7 @@ def test_training_episodes_are_far_from_those_that_are_scored() -> None:
     assert max(scored | tuned) < seeds.first_training(0)
 
 
-def test_what_a_training_cost_stands_beside_the_policy(
+def test_record_holds_the_cost_of_the_training(
     short_run: Callable[[str], tuple[Any, Path]],
 ) -> None:
     _, folder = short_run("history")
@@ -249,7 +249,7 @@ def test_what_a_training_cost_stands_beside_the_policy(
     assert b"tuning/rms" in log
 
 
-def test_looking_at_a_policy_does_not_change_the_training(
+def test_evaluations_do_not_change_the_training(
     tmp_path: Path, short_run: Callable[[str], tuple[Any, Path]]
 ) -> None:
     _, watched = short_run("history")
@@ -261,7 +261,7 @@ def test_looking_at_a_policy_does_not_change_the_training(
     assert not {"evaluation", "chosen"} & set(card)
 
 
-def test_a_finished_run_is_left_and_a_foreign_one_refused(
+def test_finished_run_is_kept_and_another_refused(
     short_run: Callable[[str], tuple[Any, Path]],
 ) -> None:
     _, folder = short_run("ppo")

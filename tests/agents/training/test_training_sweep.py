@@ -1,4 +1,4 @@
-"""Training seeds side by side: the policies of lone trainings, whatever is killed on the way."""
+"""Sweeps of training seeds: the same policies as single trainings, whatever is killed."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ sys.exit(bool(report.missing))
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[int, bytes]:
-    """The policies of trainings that nothing disturbs, by seed."""
+    """Return the policies of undisturbed trainings, by seed."""
     policies = {}
     for seed in SEEDS:
         run = train.Run(CONFIG, seed, tmp_path_factory.mktemp(f"seed{seed}"))
@@ -95,7 +95,7 @@ class Driver:
         }
 
 
-def test_whoever_is_killed_the_policies_are_those_of_lone_trainings(
+def test_killed_driver_and_worker_leave_the_policies_unchanged(
     tmp_path: Path, whole: dict[int, bytes]
 ) -> None:
     driver = Driver(tmp_path)
@@ -105,7 +105,7 @@ def test_whoever_is_killed_the_policies_are_those_of_lone_trainings(
     running.wait()
     wait_until(lambda: not alive(driver.family))
     assert len(driver.policies()) < len(SEEDS)
-    first, second = driver.start(), driver.start()  # one waits for what the other trains
+    first, second = driver.start(), driver.start(jobs=1)  # one waits for the other's training
     wait_until(driver.workers)
     driver.workers()[0].kill()
     assert first.wait() == second.wait() == 0, driver.log.read_text()
@@ -139,7 +139,9 @@ def test_training_that_nobody_waits_for_stops(
     assert not training.finished()
 
 
-def test_a_policy_made_elsewhere_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_policy_of_a_remote_worker_is_stored(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     files = {"policy.onnx": b"policy", "policy.json": b"{}"}
     monkeypatch.setattr(sweep, "train", lambda training: files)
     (training,) = sweep.trainings([CONFIG], (3,), tmp_path, "ppo")
@@ -150,7 +152,7 @@ def test_a_policy_made_elsewhere_is_kept(tmp_path: Path, monkeypatch: pytest.Mon
     assert ticks == [1]
 
 
-def test_other_settings_are_not_mixed_up(tmp_path: Path, ppo: tuple[object, Path]) -> None:
+def test_policy_of_other_settings_is_refused(tmp_path: Path, ppo: tuple[object, Path]) -> None:
     def training(config: configs.Config, seed: int) -> sweep.Training:
         return sweep.Training(config, seed, ppo[1])
 
@@ -161,7 +163,7 @@ def test_other_settings_are_not_mixed_up(tmp_path: Path, ppo: tuple[object, Path
             other.finished()
 
 
-def test_a_policy_without_its_own_record_is_made_again(
+def test_policy_without_its_record_is_trained_again(
     tmp_path: Path, whole: dict[int, bytes]
 ) -> None:
     """A process may be killed between the two files."""
@@ -181,7 +183,7 @@ def test_a_policy_without_its_own_record_is_made_again(
     assert policy.read_bytes() == whole[3]
 
 
-def test_the_record_is_written_before_the_policy(
+def test_record_is_written_before_the_policy(
     ppo: tuple[Any, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     written: list[str] = []
@@ -236,7 +238,7 @@ def test_code_is_every_python_file_of_the_packages(
     sweep.code.cache_clear()
 
 
-def test_a_training_that_fails_is_missing_and_says_why(tmp_path: Path) -> None:
+def test_failed_training_is_missing_with_the_reason(tmp_path: Path) -> None:
     wrong = configs.changed(tiny(), ["env_kwargs.load=99.0"])
     (training,) = sweep.trainings([wrong], (3,), tmp_path, "ppo")
     report = sweep.run([training], Cluster())
@@ -252,7 +254,7 @@ def ask(tmp_path: Path) -> Callable[..., int]:
     )
 
 
-def test_the_command_lists_refuses_and_tells(
+def test_command_lists_refuses_and_reports(
     ask: Callable[..., int],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

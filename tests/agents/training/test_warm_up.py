@@ -1,4 +1,4 @@
-"""The critic's lead: the policy keeps still, and its rate rises from 0 afterwards."""
+"""Critic warm-up: the policy is frozen, and its learning rate rises from 0 afterwards."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def config_of(name: str, warm_up: int, **changes: Any) -> configs.Config:
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_the_critic_learns_first_and_alone(name: str) -> None:
+def test_critic_alone_learns_in_the_warm_up(name: str) -> None:
     config = config_of(name, 2, steps=5 * ROLLOUT)
     model = make_model(config, 0, make_env(config))
     model.set_logger(Logger(None, []))
@@ -77,7 +77,7 @@ def test_the_critic_learns_first_and_alone(name: str) -> None:
     assert all(parameter.requires_grad for parameter in model.policy.parameters())
 
 
-def test_the_rate_rises_from_nothing_once_the_policy_learns() -> None:
+def test_rate_rises_from_zero_after_the_warm_up() -> None:
     config = config_of("plain", 4, steps=100 * ROLLOUT)
     usual = learning_rate(config_of("plain", 0, steps=100 * ROLLOUT))
     rate = learning_rate(config)
@@ -88,26 +88,24 @@ def test_the_rate_rises_from_nothing_once_the_policy_learns() -> None:
     assert shares[9:] == [1.0] * 92
 
 
-def test_no_rate_is_below_nothing_where_the_last_rollout_ends_beyond_the_end() -> None:
+def test_rate_is_not_negative_beyond_the_end() -> None:
     rate = learning_rate(config_of("plain", 0, steps=100 * ROLLOUT))
     assert rate(-0.5) == 0.0 < rate(0.5)
 
 
-def test_a_lead_that_leaves_nothing_to_learn_is_refused() -> None:
+def test_warm_up_to_the_end_is_refused() -> None:
     with pytest.raises(SettingsError, match="warm_up = 8 rollouts are 1024 steps of 1024"):
         learning_rate(config_of("plain", 8))
 
 
-def test_off_policy_algorithms_have_no_lead() -> None:
+def test_off_policy_algorithms_have_no_warm_up() -> None:
     assert warm_up_steps(tiny("sac")) == 0
     with pytest.raises(SettingsError, match=r"unknown setting 'sac\.warm_up'"):
         tiny("sac", sac={"warm_up": 2})
 
 
 @pytest.mark.parametrize("name", ["structured", "recurrent"])
-def test_a_run_that_is_killed_in_its_lead_ends_with_the_same_bits(
-    name: str, tmp_path: Path
-) -> None:
+def test_run_killed_in_the_warm_up_resumes_exactly(name: str, tmp_path: Path) -> None:
     config = config_of(name, 4)
     whole = train.train_to_the_end(train.Run(config, 3, tmp_path / "whole"), QUIET)
     run = train.Run(config, 3, tmp_path / "killed")

@@ -1,4 +1,4 @@
-"""The adapter shows stable-baselines3 exactly the batched environment."""
+"""Adapter of batched environments to stable-baselines3."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_infos_are_reported_by_row_when_asked_for() -> None:
     assert np.array_equal(infos[2]["terminal_observation"], last)
 
 
-def test_a_returned_observation_is_not_overwritten_later() -> None:
+def test_returned_arrays_are_not_overwritten() -> None:
     env = make_batch_vec_env(ID, N, **SHORT)
     env.reset()
     kept = [env.step(action) for action in actions(15)]
@@ -125,7 +125,7 @@ def test_a_returned_observation_is_not_overwritten_later() -> None:
         assert np.array_equal(r, old_r)
 
 
-def test_seeds_repeat_and_resets_without_a_seed_go_on() -> None:
+def test_seeds_repeat_and_unseeded_resets_continue() -> None:
     env = make_batch_vec_env(ID, N, **SHORT)
     env.seed(7)
     first, second = env.reset(), env.reset()
@@ -182,7 +182,7 @@ def test_attributes_and_methods_are_those_of_the_batch() -> None:
         env.get_attr("plant", indices=[9])
 
 
-def test_state_goes_back_to_the_last_bit() -> None:
+def test_restored_state_continues_bit_for_bit() -> None:
     env = make_batch_vec_env(ID, N, **SHORT)
     env.seed(SEED)
     env.reset()
@@ -196,7 +196,7 @@ def test_state_goes_back_to_the_last_bit() -> None:
     assert np.array_equal(first, again)
 
 
-def test_another_kind_of_reset_is_refused() -> None:
+def test_other_reset_mode_is_refused() -> None:
     other = SyncVectorEnv([lambda: gym.make(ID)], autoreset_mode=AutoresetMode.NEXT_STEP)
     with pytest.raises(ValueError, match="SAME_STEP"):
         BatchVecEnv(other)
