@@ -14,7 +14,7 @@ from numba.core import caching, cgutils
 from numba.core.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
-from pam_envs.kernels import build
+from pam_envs.kernels import rebind
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": False}
 _CALLEE: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
@@ -168,7 +168,7 @@ _REPLACED: dict[str, Any] = {
 }
 __all__ = ["compiled", "get_num_threads"]
 _DONE: dict[Any, Any] = {}
-FOLDER = build.cache_folder()
+FOLDER = rebind.cache_folder()
 _COMPILER = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:16]
 """Options and intrinsics of this file are part of what it compiles."""
 
@@ -181,13 +181,13 @@ def compiled(
     digests: dict[Any, str] = {}
     entry_name = f"{name}_parallel" if parallel else name
 
-    def finish(made: Callable[..., Any], original: Any, bound: build.Bound) -> Callable[..., Any]:
+    def finish(made: Callable[..., Any], original: Any, bound: rebind.Bound) -> Callable[..., Any]:
         # Code from the disk links by name: the name says what the code is.
         entry = original is function
-        digest = build.graph_digest(original, names, digests)
+        digest = rebind.graph_digest(original, names, digests)
         made.__name__ = f"{entry_name if entry else original.__name__}_{digest}"
         made.__qualname__ = made.__name__
-        made.__module__ = build.__name__  # code from the disk imports it: no kernel's own place
+        made.__module__ = rebind.__name__  # code from the disk imports it: no kernel's own place
         if not entry:
             return njit(forceinline=original.__pam_kernel__, **_CALLEE)(made)  # type: ignore[no-any-return]
         dispatcher = njit(parallel=parallel, **_OPTIONS)(made)
@@ -195,4 +195,4 @@ def compiled(
             dispatcher._cache = _Cache(made)
         return dispatcher  # type: ignore[no-any-return]
 
-    return build.rebind(function, names, finish, _DONE)
+    return rebind.rebind(function, names, finish, _DONE)

@@ -17,6 +17,7 @@ from pam_envs.kernels import arithmetic, random
 from pam_envs.kernels import build as kernels
 from pam_envs.kernels.build import prange
 from pam_envs.kernels.motion import damped_motion, oscillator
+from pam_envs.kernels.rebind import rebind
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -167,7 +168,7 @@ def test_callees_are_built_once_for_each_binding() -> None:
 
     done: dict[Any, Any] = {}
     first, again, other = (
-        kernels.rebind(_both, {"OFFSET": offset, "unused": unused}, finish, done)
+        rebind(_both, {"OFFSET": offset, "unused": unused}, finish, done)
         for offset, unused in ((10, 1), (10, 2), (20, 1))
     )
     assert first is not again
