@@ -54,7 +54,7 @@ format: $(READY) ## Mend style and format
 	$(BIN)/ruff format .
 
 types: $(READY) ## Check types
-	$(BIN)/mypy pam_envs sweeps baselines agents
+	$(BIN)/mypy pam_envs sweeps baselines agents benchmarks
 
 layers: $(READY) ## Check which way imports run
 	$(BIN)/lint-imports --no-logo

@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 import tyro
+from tyro.conf import Positional
 
 from benchmarks.runs import controllers, rows
 from benchmarks.scenarios import scenario as scenarios
 from pam_envs.envs.registration import full_id
 from sweeps.command_line import run_cli
 from sweeps.progress import progress
-
-Positional = tyro.conf.Positional
 
 
 def _choose(names: tuple[str, ...], known: dict[str, Any], what: str) -> list[Any]:
@@ -279,6 +278,7 @@ def tune(
         write: Put what is found into baselines/core/tuned.yaml, which the catalogue reads.
         storage: SQLite file of the trials, runs/tuning.db by default.
     """
+    from baselines.core import tuned
     from benchmarks.runs import tuning
 
     more = {} if storage is None else {"storage": storage}
@@ -289,7 +289,7 @@ def tune(
     print(tuning.sentence(found))
     if write:
         tuning.write(found)
-        print(tuning.tuned.FILE)
+        print(tuned.FILE)
     return 0
 
 

@@ -19,7 +19,7 @@ from pam_envs.kernels.build import prange
 from pam_envs.kernels.motion import damped_motion, oscillator
 from pam_envs.kernels.rebind import rebind
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_decay_equals_the_exponential() -> None:
@@ -282,7 +282,7 @@ for name in sys.argv[1:]:
 @pytest.mark.skipif(not kernels.COMPILED, reason="nothing is kept on disk")
 def test_kernels_that_were_compiled_apart_run_side_by_side(tmp_path: Path) -> None:
     (tmp_path / "apart.py").write_text(_BUILT_APART)
-    library = str(Path(kernels.__file__).parents[1])  # also where the package is not installed
+    library = str(Path(kernels.__file__).parents[2])  # also where the package is not installed
     known = os.pathsep.join(filter(None, (library, os.environ.get("PYTHONPATH"))))
     cache = {"PAM_ENVS_CACHE": str(tmp_path / "cache"), "PYTHONPATH": known}
     environment = {**os.environ, **cache}
@@ -300,7 +300,7 @@ def test_kernels_that_were_compiled_apart_run_side_by_side(tmp_path: Path) -> No
 @pytest.mark.skipif(not kernels.COMPILED, reason="nothing is kept on disk")
 def test_one_name_with_other_values_or_on_both_cores_is_another_file(tmp_path: Path) -> None:
     code = """
-import tests.test_kernels as t
+import tests.kernels.test_kernels as t
 for parallel, offset in ((False, 1), (True, 1), (False, 5)):
     print(t.kernels.build(t._spread, "spread", parallel, OFFSET=offset)(3))
 """
