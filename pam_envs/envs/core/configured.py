@@ -64,7 +64,8 @@ class Configured:
                 f"{word} of shape {made.shape}, expected {shape}: one number for each of "
                 + ", ".join(self.action_signals.names())
             )
-        for place in np.argwhere(~np.isfinite(made))[:1].tolist():
+        if not np.isfinite(made).all():
+            place = np.argwhere(~np.isfinite(made))[0].tolist()
             signal = self.action_signals[place[-1]]
             low, high = (-1.0, 1.0) if signal.normalized else (signal.low, signal.high)
             raise ValueError(
