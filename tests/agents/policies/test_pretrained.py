@@ -239,8 +239,8 @@ def test_catalogue_makes_every_policy() -> None:
 )
 def test_knee_policies_beat_classical_controllers(row: str, other: str, share: float) -> None:
     ours, theirs = (rows.load(rows.path_of(name)) for name in (row, other))
-    assert ours["failures"] == 0
-    errors = [r["aggregate"]["rms_error"]["mean"] for r in (ours, theirs)]
+    assert rows.failures(rows.episodes_of(ours)) == 0
+    errors = [rows.scores_of(rows.episodes_of(r), "rms_error").mean() for r in (ours, theirs)]
     assert errors[0] < share * errors[1]
     policy = catalogue.load_pretrained(ours["controller"]["name"])
     assert policy.card["env"] == ours["env"]["id"]
