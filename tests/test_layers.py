@@ -1,4 +1,4 @@
-"""What using the library brings into hysteresis (import-linter holds the layers in the source)."""
+"""Modules that the library loads when it is used (import-linter checks the layers)."""
 
 import json
 import os
@@ -11,10 +11,10 @@ HEAVY = (
     *("torch", "stable_baselines3", "matplotlib", "pygame", "imageio", "onnxruntime"),
     *("joblib", "dask", "distributed"),
 )
-"""What only learning, drawing and benchmarks need."""
+"""Packages that only learning, drawing and benchmarks need."""
 
 OURS = ("sweeps", "baselines", "agents", "benchmarks", "tests")
-"""What is not in the wheel."""
+"""Packages that are not in the wheel."""
 
 IMPORT = "import pam_envs"
 EPISODE = """

@@ -133,7 +133,7 @@ def make_joint_signal_map(signals: Signals, action_signals: Signals) -> JointSig
     if references[0] not in names:
         raise ValueError(
             f"there is no signal {references[0]!r}; these controllers track planned angles: make"
-            " the environment with plan=True, or take 'joint_inverse_kinematics', which plans itself"
+            " the environment with plan=True, or take 'joint_inverse_kinematics', which plans"
         )
 
     def known(name: str) -> Reader | None:

@@ -64,7 +64,7 @@ class Answer:
 
     @property
     def claims(self) -> bool:
-        """Whether it names a cause, ambiguous or not."""
+        """True if it names a cause, ambiguous or not."""
         return self.verdict in ("named", "ambiguous") and bool(self.names)
 
     @property
@@ -74,39 +74,39 @@ class Answer:
 
     @property
     def right_first(self) -> bool:
-        """Whether the first cause is a hidden one."""
+        """True if the first cause is a hidden one."""
         return self.first in self.truth
 
     @property
     def exact(self) -> bool:
-        """Whether exactly the hidden causes are named, without ambiguity."""
+        """True if exactly the hidden causes are named, without ambiguity."""
         return self.verdict == "named" and set(self.names) == set(self.truth)
 
     @property
     def both(self) -> bool:
-        """Whether exactly the hidden causes are claimed, ambiguous or not."""
+        """True if exactly the hidden causes are claimed, ambiguous or not."""
         return self.claims and set(self.names) == set(self.truth)
 
     @property
     def wrong(self) -> bool:
-        """Whether an absent cause is named without ambiguity."""
+        """True if an absent cause is named without ambiguity."""
         return self.verdict == "failed" or (
             self.verdict == "named" and bool(set(self.names) - set(self.truth))
         )
 
     @property
     def extra(self) -> bool:
-        """Whether an absent cause is claimed beside the hidden ones."""
+        """True if an absent cause is claimed beside the hidden ones."""
         return self.claims and set(self.names) > set(self.truth)
 
     @property
     def listed(self) -> bool:
-        """Whether the hidden causes are among the models that are not excluded."""
+        """True if the hidden causes are among the models that are not excluded."""
         return set(self.truth) in [set(self.names), *self.others]
 
     @property
     def alarm(self) -> bool:
-        """Whether a model error is reported."""
+        """True if a model error is reported."""
         return self.verdict not in ("adequate", "insufficient")
 
     def right_answer(self, verdict: str, names: Iterable[str]) -> bool:

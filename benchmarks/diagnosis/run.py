@@ -64,7 +64,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Options:
-    """What to run.
+    """Selection of cases to run.
 
     Attributes
     ----------
@@ -109,12 +109,12 @@ class Options:
 
     @property
     def cluster(self) -> engine.Cluster:
-        """Where to compute."""
+        """Backend of the computation."""
         return engine.Cluster(self.jobs, self.backend, self.address)
 
     @property
     def whole(self) -> bool:
-        """Whether every case of the set is run."""
+        """True if every case of the set is run."""
         part = self.fraction < 1.0 or self.limit is not None
         return not (part or self.kinds or self.names)
 
@@ -137,7 +137,7 @@ class Options:
 
 @dataclass
 class Report:
-    """What a run did.
+    """Outcome of a run.
 
     Attributes
     ----------

@@ -51,8 +51,8 @@ ENGINE = """\
 
 `MassSpringDamper` uses the engine without a change to it. It provides `column`, `simulate`, `free`,
 `base`, a `Regressors`, and a tuple of `Cause`; calibration is `fit.candidate.fit_base`, the
-decision `decide.verdict.decide`. Specific to the muscle are the command line, the reading of recordings, the
-noise floor and the report; here the noise is the sensor's declared 1 mm.
+decision `decide.verdict.decide`. Specific to the muscle are the command line, the reading of
+recordings, the noise floor and the report; here the noise is the sensor's declared 1 mm.
 """
 
 

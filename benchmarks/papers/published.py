@@ -53,7 +53,7 @@ class Figure:
 
     @property
     def passed(self) -> bool | None:
-        """Whether ours is within tolerance and bounds; ``None`` if it is not judged."""
+        """True if ours is within tolerance and bounds; ``None`` if it is not judged."""
         if self.ours is None or self.given:
             return None
         checks = list[bool]()

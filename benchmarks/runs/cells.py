@@ -78,12 +78,12 @@ class Cell:
 
     @property
     def first(self) -> bool:
-        """Whether pictures of this cell may be kept: public, of the first training seed."""
+        """True if pictures of this cell may be kept: public, of the first training seed."""
         return self.split == PUBLIC and self.training_seed == self.entrant.training_seeds[0]
 
     @property
     def drawn(self) -> bool:
-        """Whether a picture is kept."""
+        """True if a picture is kept."""
         return self.first and self.scenario.name in traces.chosen(self.track)
 
     def _policy(self) -> dict[str, Any] | None:

@@ -11,7 +11,7 @@ IGNORANT = ("nothing", "tables")
 """Labels of controllers that do not depend on the model; a test builds them from another one."""
 NOMINAL, TRUE = "nominal model", "true model"
 TRAINED = "nominal model, trained on the plant"
-"""Label of a policy whose training had the simulated plant, of which others know a nominal model."""
+"""Label of a policy that was trained on the simulated plant; others know a nominal model."""
 
 
 def knows_plant(entrant: Entrant, controller: Any, model: Any, env: Any) -> bool:

@@ -57,7 +57,7 @@ class Episode:
 
     @property
     def failed(self) -> bool:
-        """Whether a limit, a refused action or an error ended the episode."""
+        """True if a limit, a refused action or an error ended the episode."""
         return bool(self.failure)
 
 
@@ -144,8 +144,8 @@ def run_all(
     """Run an episode for each seed, as rows of a batch where that gives the same bits.
 
     A row of a batch is the single environment to the last bit, and a row of a controller should be.
-    This is checked: the first answers in the first and the last row are computed again, alone. Where
-    one differs, each episode is a batch of its own. Where the controller takes no batch, or raises
+    This is checked: the first answers in the first and the last row are computed again, alone.
+    If one differs, each episode is a batch of its own. If the controller takes no batch, or raises
     an error, the episodes are run one by one.
 
     Parameters

@@ -57,7 +57,7 @@ class Verdict:
 
     @property
     def holds(self) -> bool:
-        """Whether nothing has drifted."""
+        """True if nothing has drifted."""
         return not self.drifted
 
 

@@ -53,7 +53,7 @@ class Measurement:
 
     @property
     def passed(self) -> bool | None:
-        """Whether the floor is reached; ``None`` without a floor or a value."""
+        """True if the floor is reached; ``None`` without a floor or a value."""
         return self._reaches(self.floor)
 
     @property

@@ -136,6 +136,6 @@ class Cause:
 
     @property
     def in_valve(self) -> bool:
-        """Whether all forms act upstream of the pressure, or on its reading."""
+        """True if all forms act upstream of the pressure, or on its reading."""
         amounts = [t.name for form in self.forms for t in form.terms if t.amount]
         return all(name.startswith(("regulator.", "pressure.")) for name in amounts)

@@ -41,7 +41,8 @@ class CreepEffects:
 
 @kernel
 def creep_step(
-    rows: Any, fixed: Any, state: int, compliance: int, time: int, first: int, last: int, value: Any,
+    rows: Any, fixed: Any, state: int, compliance: int, time: int, first: int, last: int,
+    value: Any,
     width: Any, total: Any,
 ) -> None:  # fmt: skip
     """Add the creep of lanes ``first`` to ``last`` to ``total``.

@@ -42,7 +42,8 @@ class HangingMuscle:
         if self.plant.dynamics != "muscles" or self.plant.hysteresis.operator is None:
             raise ValueError(
                 f"dynamics = {self.plant.dynamics!r} with hysteresis "
-                f"{self.plant.hysteresis.kind!r} has no muscle with hysteresis; take AntagonisticJoint.paper() or .measured()"
+                f"{self.plant.hysteresis.kind!r} has no muscle with hysteresis; take "
+                "AntagonisticJoint.paper() or .measured()"
             )
 
     def rest_contractions(self, pressures: ArrayLike) -> Array:

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 _FIT = "chakarov2018, Eq. (6)"
 _READ = (
-    "chakarov2018, Eq. (6) prints -21 per kPa, with which up to four muscles push at 400 kPa; read as "
+    "chakarov2018, Eq. (6) prints -21 per kPa: up to four muscles would push at 400 kPa; read as "
     "-0.21, with which the force is in proportion to the muscles, as Fig. 4 shows"
 )
 _ENDS = (

@@ -18,7 +18,8 @@ from pam_envs.pneumatics.regulator import (
 
 @kernel
 def delay_commands(
-    rows: Any, ring: int, set_point: Any, dead: Any, step: Any, period: float, older: Any, newer: Any,
+    rows: Any, ring: int, set_point: Any, dead: Any, step: Any, period: float, older: Any,
+    newer: Any,
     switch: Any,
 ) -> None:  # fmt: skip
     """Write the two delayed set-points of a control period and the time between them.

@@ -102,7 +102,8 @@ def ramp_of(time: float, middle: float, over: float) -> float:
 
 @kernel
 def sense(
-    rows: Any, fixed: Any, j: int, reading: int, ring: int, effects: int, value: float, full: float, step: int,
+    rows: Any, fixed: Any, j: int, reading: int, ring: int, effects: int, value: float,
+    full: float, step: int,
     time: float, period: float,
 ) -> None:  # fmt: skip
     """Write the reading of one lane, without bias, noise and quantisation.

@@ -62,7 +62,7 @@ Records = Mapping[Case, dict[str, Any]]
 
 @pytest.fixture(scope="module")
 def records() -> Records:
-    """What the study of every case of the sample returns; two are made at a time."""
+    """Study of every case of the sample, two at a time."""
     chosen = [*SINGLE, *ADEQUATE, *FAINT, PAIR, UNKNOWN, IDLE]
     with ProcessPoolExecutor(min(2, os.cpu_count() or 1), get_context("spawn")) as pool:
         return dict(zip(chosen, pool.map(study, chosen), strict=True))

@@ -56,7 +56,7 @@ def scale(operator: Preisach) -> float:
     return float(np.max(operator.everett))
 
 
-# --- against relays -------------------------------------------------------------------------------
+# --- against relays ------------------------------------------------------------------------------
 
 
 class Relays:
@@ -147,7 +147,7 @@ def test_textbook_sum_over_dominant_extrema(operator, history):
     assert y[-1] == pytest.approx(expected, abs=1e-12 * scale(operator))
 
 
-# --- hysteresis ---------------------------------------------------------------------------------------
+# --- hysteresis ----------------------------------------------------------------------------------
 
 
 @few
@@ -259,7 +259,7 @@ def test_full_loop_dissipates():
     assert area == pytest.approx(np.sum(up - down) * (HIGH - LOW) / CELLS, rel=1e-12)
 
 
-# --- a full stack, the ends of the range ----------------------------------------------------
+# --- a full stack, the ends of the range ---------------------------------------------------------
 
 SHRINKING = [0.9 * (-0.8) ** k for k in range(8)]
 
@@ -309,7 +309,7 @@ def test_starts_with_its_start_output():
     np.testing.assert_allclose(y, np.array([1, -1, 1]) * scale(virgin) / 2, rtol=1e-12)
 
 
-# --- inverse --------------------------------------------------------------------------------------
+# --- inverse -------------------------------------------------------------------------------------
 
 
 def invert(operator: Preisach, y: Array, state: PreisachState) -> Array:
@@ -431,7 +431,7 @@ def test_inverted_map_holds_for_a_density_of_the_difference():
     assert worst_inverses(operator, 3)[0] < 2e-4  # the grid; it falls with the cell
 
 
-# --- maps -----------------------------------------------------------------------------------------
+# --- maps ----------------------------------------------------------------------------------------
 
 
 @few
@@ -519,7 +519,7 @@ def test_symmetry_error_has_the_expected_size():
     assert symmetry_error(odd.table) > 0.05
 
 
-# --- rows and bits --------------------------------------------------------------------------------
+# --- rows and bits -------------------------------------------------------------------------------
 
 
 @few
@@ -583,7 +583,7 @@ def test_compiled_and_plain_python_agree_to_the_bit():
     assert outputs[0][1:] == outputs[1][1:]
 
 
-# --- errors ---------------------------------------------------------------------------------------
+# --- errors --------------------------------------------------------------------------------------
 
 LINE = [[0.0, -1.0], [1.0, 0.0]]
 

@@ -1,4 +1,4 @@
-"""Lengths and lever arms of fluidic_muscles, Eq. (1.1): virtual work, symmetry, published lengths."""
+"""Lengths and lever arms of fluidic_muscles, Eq. (1.1): virtual work, symmetry, lengths."""
 
 from __future__ import annotations
 

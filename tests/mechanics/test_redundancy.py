@@ -89,7 +89,7 @@ def test_solution_is_a_minimum_on_the_pose(weighted: bool) -> None:
     ],
 )
 def test_iteration_leaves_a_nearby_saddle(start: tuple[float, ...]) -> None:
-    """Where Newton's plain method ends with more weight than it began with, or at a saddle."""
+    """Starts from which Newton's plain method increases the weight or ends at a saddle."""
     pose = ARM.pose(start)
     found = resolve(ARM, pose[None], start=start).angles[0]
     free, _ = free_direction(found, pose)

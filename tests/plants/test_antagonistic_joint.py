@@ -52,7 +52,7 @@ def muscle_under_load(plant: AntagonisticJoint, pressures: np.ndarray) -> np.nda
     return np.array(made)
 
 
-# --- forces and work ----------------------------------------------------------------------------
+# --- forces and work -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("plant", MADE)
@@ -89,7 +89,7 @@ def test_forces_have_the_co_contraction_and_the_torque_that_were_asked_for(
     assert np.allclose(plant.torque(angles, p_a, p_b), np.broadcast_to(torques, a.shape), atol=1e-9)
 
 
-# --- feed-forward and reach ---------------------------------------------------------------------
+# --- feed-forward and reach ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("plant", MADE)
@@ -162,7 +162,7 @@ def test_more_co_contraction_makes_this_lever_softer() -> None:
     assert AntagonisticJoint().nominal.stiffness == pytest.approx(stiffness[1], abs=0.05)
 
 
-# --- hysteresis -------------------------------------------------------------------------------------
+# --- hysteresis ----------------------------------------------------------------------------------
 
 
 def test_loops_have_a_half_gap_of_a_tenth() -> None:
@@ -203,7 +203,7 @@ def test_the_joints_loop_is_symmetric_and_a_muscles_is_not() -> None:
 
 
 def test_friction_takes_at_most_the_hysteresis_of_the_data_sheet() -> None:
-    """3 % of the nominal length at constant force (fluidic_muscles, section 1.1), at any pressure."""
+    """3 % of the nominal length at constant force, at any pressure (fluidic_muscles, sec. 1.1)."""
     plant, plays = AntagonisticJoint.paper(), contraction_plays()
     lag = sum(w * t for w, t in zip(plays.weights, plays.thresholds, strict=True))
     pressures, h = np.linspace(0.5e5, 6.5e5, 13), 1e-5
@@ -222,7 +222,7 @@ def test_the_reduced_hysteresis_is_identified_on_the_plant_with_muscles() -> Non
     assert math.degrees(error) < 0.17
 
 
-# --- files, rows, bad values --------------------------------------------------------------------
+# --- files, rows, bad values ---------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", kinds())

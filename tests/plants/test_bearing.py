@@ -1,4 +1,4 @@
-"""What the muscles bear at rest, against what they do when simulated."""
+"""Static load check of the muscles against simulation."""
 
 from __future__ import annotations
 

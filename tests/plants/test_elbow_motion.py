@@ -42,7 +42,7 @@ def commands_for(plant: ElbowOrthosis, n: int, seed: int = 0) -> Array:
     return steps(n, 0.5e5, 5.5e5, 10, seed)
 
 
-# --- against differential equations written anew --------------------------------------------------
+# --- against differential equations written anew -------------------------------------------------
 
 
 class Model:
@@ -135,7 +135,7 @@ def test_pulses_follow_their_differential_equation() -> None:
 
 
 def open_spans(widths: Array, valve: OnOffValve) -> list[tuple[float, float]]:
-    """When a valve is open, from the widths of its pulses in cycles of 50 ms."""
+    """Intervals of an open valve, from the widths of its pulses in cycles of 50 ms."""
     late, after = valve.opening_time, valve.closing_time
     starts = 0.05 * np.arange(len(widths))
     merged: list[list[float]] = []
@@ -147,7 +147,7 @@ def open_spans(widths: Array, valve: OnOffValve) -> list[tuple[float, float]]:
     return [(a + late, b + after) for a, b in merged if b - a >= late]
 
 
-# --- convergence ----------------------------------------------------------------------------------
+# --- convergence ---------------------------------------------------------------------------------
 
 
 @slow
@@ -171,7 +171,7 @@ def test_the_integrator_is_fine_enough(hysteresis: str, valves: str) -> None:
     assert np.abs(run(plant.substeps)["torque"] - truth["torque"]).max() < 1e-3
 
 
-# --- air ------------------------------------------------------------------------------------------
+# --- air -----------------------------------------------------------------------------------------
 
 
 def test_shut_valves_keep_the_air_while_the_wearer_moves() -> None:
@@ -251,7 +251,7 @@ def test_regulators_reach_their_set_points_and_count_what_they_fill() -> None:
     assert rise.max() == pytest.approx(plant.regulator.slew_rate, rel=1e-6)
 
 
-# --- wearer, hysteresis, slack ------------------------------------------------------------------------
+# --- wearer, hysteresis, slack -------------------------------------------------------------------
 
 
 def test_an_orthosis_that_bears_itself_is_not_felt() -> None:
@@ -381,7 +381,7 @@ def test_stops_hold_the_elbow_in_its_range() -> None:
         assert low < made["angle"][-1] < high
 
 
-# --- bits -----------------------------------------------------------------------------------------
+# --- bits ----------------------------------------------------------------------------------------
 
 
 @slow

@@ -152,7 +152,7 @@ def test_names_and_rows_agree() -> None:
     assert column[K.HANDLE] == plant.wearer.handle
 
 
-# --- hysteresis ---------------------------------------------------------------------------------------
+# --- hysteresis ----------------------------------------------------------------------------------
 
 
 def forces_over_loop(plant: ElbowOrthosis, pressure: float) -> tuple[np.ndarray, np.ndarray]:
@@ -218,7 +218,7 @@ def test_of_plays_as_relays_the_largest_lag_is_the_same() -> None:
     assert ElbowHysteresis(wide).largest_lag == pytest.approx(lag, rel=1e-9)
 
 
-# --- bad values, files ----------------------------------------------------------------------------
+# --- bad values, files ---------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -110,7 +110,7 @@ def double_pole(response: np.ndarray) -> float:
     "start, end", [(0.0, 1.0), (0.0, 10.0), (10.0, 20.0), (20.0, 25.0), (-10.0, 10.0), (20.0, 10.0)]
 )
 def test_the_nominal_dynamics_are_two_poles_near_23(start: float, end: float) -> None:
-    """Without hysteresis and gravity, over the range of angles: within 3 rad/s, to 2 % of the step."""
+    """Without hysteresis and gravity, over the whole range: within 3 rad/s, to 2 % of the step."""
     plant = AntagonisticJoint.paper("none", link__gravity=0.0)
     commands = DEGREE * np.array([start] * 2 + [end] * 60)
     angles = simulate_joint(plant, commands)["angle"][1:]
@@ -131,7 +131,7 @@ def test_the_reduced_plant_has_the_published_poles() -> None:
 
 @pytest.mark.parametrize("kind", kinds())
 def test_how_far_the_reduced_plant_is_from_the_muscles(kind) -> None:  # type: ignore[no-untyped-def]
-    """Steps and sines within +-20 degrees: about 0.3 degrees RMS; without hysteresis over 1 degree."""
+    """Steps and sines within +-20 degrees: about 0.3 degrees RMS; over 1 without hysteresis."""
     t = PERIOD * np.arange(600)
     still = {"link__gravity": 0.0}
     whole, reduced, plain = (

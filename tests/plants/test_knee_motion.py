@@ -79,7 +79,8 @@ def test_the_brace_alone_follows_its_differential_equation() -> None:
     plant, u = KneeOrthosis.no_load("none"), steps(120)
     made = simulate_knee(plant, u, pressure=1e5)["angle"]
     x = float(plant.angle_at(plant.muscle.stiffness_ratio * 1e5))
-    truth = integrated(plant, u, {"x": x, "pressure": 1e5, "phase": 0.0, "hold": [0.0], "hold_rate": [0.0]})  # type: ignore[dict-item]  # fmt: skip
+    start = {"x": x, "pressure": 1e5, "phase": 0.0, "hold": [0.0], "hold_rate": [0.0]}
+    truth = integrated(plant, u, start)  # type: ignore[arg-type]
     assert np.abs(made - truth).max() < 1e-4
 
 

@@ -16,7 +16,7 @@ SUPPLY = VALVE.supply_pressure + ATMOSPHERE
 
 
 def opened(widths: list[float], h: float, gap: float = 0.05) -> list[tuple[float, float]]:
-    """When the valve is open [s]: starts and ends, pulses of ``widths`` every ``gap`` seconds."""
+    """Intervals of an open valve [s]: starts and ends, pulses of ``widths`` every ``gap`` s."""
     left, lift, state, spans = 0.0, 0.0, 0.0, list[tuple[float, float]]()
     steps = round(gap / h)
     for k in range(len(widths) * steps):

@@ -71,7 +71,7 @@ class Findings:
 
     @property
     def bent(self) -> bool:
-        """Whether the readings need a load law other than linear."""
+        """True if the readings need a load law other than linear."""
         return bends(self.laws)
 
     @property

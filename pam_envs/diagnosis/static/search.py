@@ -71,12 +71,12 @@ class Trial:
 
     @property
     def passes(self) -> bool:
-        """Whether the rule accepts it."""
+        """True if the rule accepts it."""
         return self.adjusted <= LEVEL and self.gain >= LEAST_GAIN and not self.loads_worse
 
     @property
     def excluded(self) -> bool:
-        """Whether the best form is significantly better."""
+        """True if the best form is significantly better."""
         return self.behind_interval[0] > 0.0
 
 

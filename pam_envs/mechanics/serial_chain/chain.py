@@ -54,7 +54,7 @@ class LinkForm:
         1e-3,
         100.0,
         "assumed",
-        "not published; about what two DMSP-10 a joint bear where fluidic_muscles's paths bend most, and "
+        "not published; about what two DMSP-10 a joint bear on the paths of fluidic_muscles, and "
         "less than the muscles and their fittings weigh",
     )
     centre: float = parameter(

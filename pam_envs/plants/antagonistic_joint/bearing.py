@@ -1,4 +1,4 @@
-"""Whether muscles bear the weights at the angles of a plan, without hysteresis and at rest."""
+"""Static load check: the weights that the muscles bear at the angles of a plan."""
 
 from __future__ import annotations
 

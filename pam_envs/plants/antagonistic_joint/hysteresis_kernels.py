@@ -18,7 +18,8 @@ MODEL_STATE = 0
 
 @kernel
 def peek(
-    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, at: int, lag: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, at: int,
+    lag: int,
     stick: int, operators: int, model: int, stacks: int, member: int, first: int, last: int,
 ) -> None:  # fmt: skip
     """Write the lags at inputs and their slopes; the states stay."""
@@ -31,7 +32,8 @@ def peek(
 
 @kernel
 def remember(
-    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, at: int, lag: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, at: int,
+    lag: int,
     operators: int, model: int, stacks: int, member: int, first: int, last: int,
 ) -> None:  # fmt: skip
     """Move the operators to their inputs and write their lags."""

@@ -203,7 +203,7 @@ def set_pressure(fixed: Any, j: int, contraction: float, force: float) -> tuple[
 
 @kernel
 def feed_forward(fixed: Any, j: int, angle: float, prestress: float) -> tuple[float, float, float]:
-    """Return the set-points [Pa] for an angle [rad] and a co-contraction [N]: fluidic_muscles, Fig. 4.
+    """Return setpoints [Pa] for an angle [rad] and a co-contraction [N]: fluidic_muscles, Fig. 4.
 
     The inverse of the law: the forces' mean is ``prestress`` and their torque 0. Where one muscle
     would need more than full pressure the co-contraction gives way. Hysteresis, gravity, loads and

@@ -215,7 +215,7 @@ class AntagonisticJoint(Plant):
         return pair_statics.pressures_for(self, angle, stress, torque)
 
     def torque(self, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
-        """Return the muscles' torque [N m] at an angle [rad] and pressures [Pa], hysteresis apart."""
+        """Return the torque [N m] at an angle [rad] and pressures [Pa], without hysteresis."""
         return pair_statics.pull(self, angle, pressure_a, pressure_b)
 
     def stiffness_at(self, angle: ArrayLike, prestress: ArrayLike | None = None) -> Array:

@@ -140,7 +140,8 @@ def swing(
         x_b, work[RATE_B][j], work[CURVE_B][j] = lever_of(fixed, j, middle, -1.0)
         rows[AT_A][j], rows[AT_A + 1][j] = x_a - straight[j], x_b - straight[j]
     peek(
-        rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, STICK_A, 2, MODEL, STACK_COUNT,
+        rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, STICK_A, 2, MODEL,
+        STACK_COUNT,
         MEMBER, 0, LANES,
     )  # fmt: skip
     for j in range(LANES):
@@ -165,7 +166,8 @@ def swing(
         angle[j] = angle[j] + du
         contract(rows, fixed, j, angle[j], AT_A, STRAIGHT)
     remember(
-        rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, 2, MODEL, STACK_COUNT, MEMBER,
+        rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, 2, MODEL, STACK_COUNT,
+        MEMBER,
         0, LANES,
     )  # fmt: skip
 
@@ -186,7 +188,8 @@ def follow(
     for j in range(LANES):
         rows[AT_A][j] = rows[COMMAND][j]
     remember(
-        rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, 1, MODEL, STACK_COUNT, MEMBER,
+        rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, 1, MODEL, STACK_COUNT,
+        MEMBER,
         0, LANES,
     )  # fmt: skip
     for j in range(LANES):
@@ -298,7 +301,7 @@ def begin_lane(
 
 @kernel
 def resting_torque(rows: Any, fixed: Any, j: int, angle: float) -> float:
-    """Return the torque at rest [N m] at an angle, with the hysteresis models' lags of that angle."""
+    """Return the torque at rest [N m] at an angle, with the lags of hysteresis at that angle."""
     torque, _ = load_torque(rows, fixed, j, angle)
     for side in range(2):
         sign = 1.0 - 2.0 * side
@@ -329,7 +332,8 @@ def rest_muscles(
     rows[ANGLE][j] = 0.5 * (low + high)
     contract(rows, fixed, j, rows[ANGLE][j], AT_A, STRAIGHT)
     remember(
-        rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, 2, MODEL, STACK_COUNT, MEMBER,
+        rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, 2, MODEL, STACK_COUNT,
+        MEMBER,
         j, j + 1,
     )  # fmt: skip
 
@@ -341,7 +345,8 @@ def rest_reduced(
     """Put a lane of the reduced plant where it comes to rest under its command."""
     rows[AT_A][j] = rows[COMMAND][j]
     remember(
-        rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, 1, MODEL, STACK_COUNT, MEMBER,
+        rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, 1, MODEL, STACK_COUNT,
+        MEMBER,
         j, j + 1,
     )  # fmt: skip
     target = rows[COMMAND][j] - fixed[K.LOOP_WIDTH][j] * rows[LAG_A][j]

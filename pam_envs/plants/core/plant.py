@@ -113,7 +113,7 @@ class Plant:
 
     @property
     def extended(self) -> bool:
-        """Whether an effect is on, so that the extended step is needed."""
+        """True if an effect is on, so that the extended step is needed."""
         return any(self.value(name) != neutral for name, neutral in self.neutral.items())
 
     def needs_effects(self, spread: ArrayLike = ()) -> bool:

@@ -234,7 +234,8 @@ def run(
 def call(
     loop: Loop, plant: Any, state: Sequence[Any], fixed: Array, drives: Array,
     flags: NDArray[np.int64], outputs: Array, substeps: int | None = None,
-    period: float | None = None, *, table: Array | None = None, begun: int = 0, before: bool = False, parallel: bool = False,
+    period: float | None = None, *, table: Array | None = None, begun: int = 0,
+    before: bool = False, parallel: bool = False,
     compiled: bool = COMPILED,
 ) -> None:  # fmt: skip
     """Run tiles that exist already; their state and the outputs change in place (:func:`run`).

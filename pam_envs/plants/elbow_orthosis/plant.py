@@ -210,7 +210,7 @@ class ElbowOrthosis(Plant):
         """Control periods in a cycle of the on/off valves."""
         return max(1, round(self.cycle / self.control_period))
 
-    # --- statics, without hysteresis ------------------------------------------------------------------
+    # --- statics, without hysteresis ------------------------------------------------------------
 
     def geometry(self, angle: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """Return the shapes [m2] of bundles a and b and their slopes [m] at an angle [rad]."""

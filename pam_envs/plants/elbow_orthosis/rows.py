@@ -44,7 +44,7 @@ from pam_envs.sensing.sensor import SENSOR
     AT,
     LAG,
 ) = range(27)
-"""``DRIVE``: torque of the intended motion; ``AT``: travel of the pulley, the hysteresis's input."""
+"""``DRIVE``: torque of the intended motion; ``AT``: travel of the pulley, the hysteresis input."""
 VALVES = 4
 """Fill and exhaust valve of bundle a, then of bundle b."""
 LEFT, LIFT, OPENED = 27, 27 + VALVES, 27 + 2 * VALVES

@@ -207,7 +207,8 @@ def advance(
             work[MIDDLE][j] = rows[ANGLE][j] + 0.5 * h * rows[VELOCITY][j]
             rows[AT][j] = travel_at(fixed, j, work[MIDDLE][j])
         remember(
-            rows, fixed, counts, table, hysteresis, elements, AT, LAG, 1, MODEL, STACK_COUNT, MEMBER,
+            rows, fixed, counts, table, hysteresis, elements, AT, LAG, 1, MODEL, STACK_COUNT,
+            MEMBER,
             0, LANES,
         )  # fmt: skip
         breathe(rows, fixed, counts, i, substeps, period, work)
@@ -301,7 +302,8 @@ def begin_lane(
         start_hysteresis(rows, counts, hysteresis, j)
         rows[AT][j] = travel_at(fixed, j, angle)
         remember(
-            rows, fixed, counts, table, hysteresis, elements, AT, LAG, 1, MODEL, STACK_COUNT, MEMBER,
+            rows, fixed, counts, table, hysteresis, elements, AT, LAG, 1, MODEL, STACK_COUNT,
+            MEMBER,
             j, j + 1,
         )  # fmt: skip
         if resting_torque(rows, fixed, j, angle) > 0.0:

@@ -142,7 +142,8 @@ def start_hysteresis(rows: Any, counts: Any, hysteresis: int, j: int) -> None:
 
 @routine
 def begin_lane(
-    rows: Any, fixed: Any, counts: Any, table: Any, gait: Any, hysteresis: int, elements: int, j: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, gait: Any, hysteresis: int, elements: int,
+    j: int,
     start_phase: float, pressure: float,
 ) -> None:  # fmt: skip
     """Bring one lane to rest at a pressure [Pa] after inflation from none, at a phase in turns.

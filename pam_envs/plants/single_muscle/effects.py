@@ -91,7 +91,8 @@ def effective_pressure(
         for j in range(first, last):
             most[j] = 0.0
         creep_step(
-            rows, fixed, EFFECTS_AT + S.creep, P.hysteresis_creep_1, P.hysteresis_creep_time_1, first,
+            rows, fixed, EFFECTS_AT + S.creep, P.hysteresis_creep_1, P.hysteresis_creep_time_1,
+            first,
             last, drive, width, most,
         )  # fmt: skip
         for j in range(first, last):
@@ -200,7 +201,8 @@ def begin_effects(rows: Any, fixed: Any, j: int) -> None:
         full,
     )
     begin_sensor(
-        rows, fixed, j, EFFECTS_AT + S.pressure_reading, EFFECTS_AT + S.pressure_ring, R.PRESSURE_SENSOR, rows[R.PRESSURE][j],
+        rows, fixed, j, EFFECTS_AT + S.pressure_reading, EFFECTS_AT + S.pressure_ring,
+        R.PRESSURE_SENSOR, rows[R.PRESSURE][j],
         fixed[R.MAX_PRESSURE][j],
     )  # fmt: skip
 
@@ -210,11 +212,13 @@ def sense_muscle(rows: Any, fixed: Any, j: int, step: int, period: float) -> Non
     """Write the undisturbed readings of lane ``j`` at a control period."""
     time, full = step * period, FULL_STRAIN * fixed[R.REST_LENGTH][j]
     sense(
-        rows, fixed, j, EFFECTS_AT + S.position_reading, EFFECTS_AT + S.position_ring, R.POSITION_SENSOR, rows[EFFECTS_AT + S.position][j],
+        rows, fixed, j, EFFECTS_AT + S.position_reading, EFFECTS_AT + S.position_ring,
+        R.POSITION_SENSOR, rows[EFFECTS_AT + S.position][j],
         full, step, time, period,
     )  # fmt: skip
     sense(
-        rows, fixed, j, EFFECTS_AT + S.pressure_reading, EFFECTS_AT + S.pressure_ring, R.PRESSURE_SENSOR, rows[R.PRESSURE][j],
+        rows, fixed, j, EFFECTS_AT + S.pressure_reading, EFFECTS_AT + S.pressure_ring,
+        R.PRESSURE_SENSOR, rows[R.PRESSURE][j],
         fixed[R.MAX_PRESSURE][j], step, time, period,
     )  # fmt: skip
 
@@ -348,7 +352,8 @@ def move(
         width[j] = h
     if stretches > 0:
         creep_step(
-            rows, fixed, EFFECTS_AT + S.stretch, P.muscle_creep_1, P.hysteresis_creep_time_1, 0, LANES,
+            rows, fixed, EFFECTS_AT + S.stretch, P.muscle_creep_1, P.hysteresis_creep_time_1, 0,
+            LANES,
             x, width, shown,
         )  # fmt: skip
     for j in range(LANES):
@@ -407,7 +412,8 @@ def advance_extended(
             if busy == 0:
                 continue
             air_step(
-                rows, fixed, EFFECTS_AT + S.air, R.REGULATOR, rows[R.PRESSURE], fixed[R.MAX_PRESSURE],
+                rows, fixed, EFFECTS_AT + S.air, R.REGULATOR, rows[R.PRESSURE],
+                fixed[R.MAX_PRESSURE],
                 fixed[R.TIME_CONSTANT], fixed[R.SLEW_RATE], newer if stage == 1 else older, width,
                 own, valve, lines,
             )  # fmt: skip

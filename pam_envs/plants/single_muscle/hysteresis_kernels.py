@@ -74,7 +74,8 @@ def effective_pressure(
         per_full[j] = 1.0 / full[j]
         inputs[j] = stretched(pressure[j], stretch[j], per_full[j])
     hysteresis_step(
-        inputs, output, rows, fixed, counts, table, elements, hysteresis, MODEL, STACK_COUNT, MEMBER,
+        inputs, output, rows, fixed, counts, table, elements, hysteresis, MODEL, STACK_COUNT,
+        MEMBER,
         first, last,
     )  # fmt: skip
     for j in range(first, last):

@@ -198,5 +198,5 @@ class SingleMuscle(Plant):
 
     @property
     def extended(self) -> bool:
-        """Whether an effect is on that a plain plant has not."""
+        """True if an effect is on that a plain plant has not."""
         return any(self.value(name) != neutral for name, neutral in NEUTRAL.items())

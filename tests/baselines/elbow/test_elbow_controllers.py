@@ -140,7 +140,7 @@ def test_friction_in_the_estimate_is_most_of_what_a_pid_leaves(hysteresis):
 
 
 def test_the_estimate_with_friction_is_the_torque_of_the_bundles():
-    """Where the nominal hysteresis is the true one and nothing is noisy."""
+    """With the true hysteresis as nominal model and without noise."""
     env = make_env(plant=quiet(), motion="sines", episode_seconds=3.0, normalize=False)
     view = make_elbow_signal_map(env.signals, env.action_signals, env.control_period)
     friction, action = make_elbow_friction(env.plant, known=True), np.array([1e5, 2e5], np.float32)

@@ -144,7 +144,7 @@ def browse(address: str, folder: Path) -> str:
 
 @pytest.fixture(scope="module")
 def told(built: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """What the driver saw in the browser while it clicked its way through the page."""
+    """Observations of the browser's driver after each click on the page."""
     copy = tmp_path_factory.mktemp("driven")
     shutil.copytree(built, copy, dirs_exist_ok=True)
     (copy / "data/traces/short_nominal--zero.js").unlink()

@@ -1,4 +1,4 @@
-"""fluidic_muscles, sections 3 and 4: figures of the joint's control, met or missed with a reason."""
+"""fluidic_muscles, sections 3 and 4: figures of the joint, met or missed with a reason."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MISSED = {
     "sine, 1 ms: error of the PI less that of model-following",
     "10 deg, rise, joint_mfc_mu_plain",
 }
-"""What does not reproduce, besides ratios."""
+"""Figures that do not reproduce, besides ratios."""
 
 
 def ratios() -> list[Figure]:

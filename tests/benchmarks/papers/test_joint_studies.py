@@ -69,7 +69,7 @@ def test_loops_are_looked_at_as_they_were_designed():
 
 
 def test_only_synthesised_loop_is_robust_and_fastest_loop_is_least_robust():
-    """What is fast on the nominal plant is not what is robust: model-following buys the latter."""
+    """Fast on the nominal plant is not robust: model-following gains robustness."""
     table = {row.name: row for row in joint_loops.table()}
     assert set(table) == set(studies.STEPPED)
     robust = {name for name, row in table.items() if row.mu <= 1.0}
@@ -82,7 +82,7 @@ def test_only_synthesised_loop_is_robust_and_fastest_loop_is_least_robust():
 
 
 def test_without_hysteresis_the_pi_alone_is_as_fast_as_model_following():
-    """What slows it is the hysteresis, so that the ratio is the hysteresis's."""
+    """Hysteresis slows the PI and thereby sets the ratio."""
     setting = Setting(width=0.0)
     pair = [step(name, setting).rise for name in ("joint_pi", "joint_mfc_mu")]
     assert pair[0] < pair[1]
@@ -102,7 +102,7 @@ class PresetRig(studies.ReducedRig):
 
 @pytest.mark.parametrize("name", ["joint_pi", "joint_mfc_mu"])
 def test_through_the_environment_a_step_is_what_it_is_in_the_studies(name):
-    """The same hysteresis behind both; the environment counts its angle on an encoder of its own."""
+    """Equal hysteresis in both; the environment quantises the angle with its encoder."""
     rig, size = PresetRig(), 10.0
     reference = size * studies.DEGREE * np.repeat([1.0, 0.0, 1.0], 300)
     angle = studies.run(studies.controller(name, rig), reference, rig).angle

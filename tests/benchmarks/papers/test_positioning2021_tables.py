@@ -1,4 +1,4 @@
-"""positioning2021: printed statistics, printed equations against their tables, and positioning errors.
+"""positioning2021: printed statistics, equations against their tables, positioning errors.
 
 Every figure is asserted to the digits it is given with: half a unit of the last one is allowed.
 """

@@ -187,7 +187,7 @@ def test_group_that_fails_is_one_line(monkeypatch):
 
 
 def test_uncalibrated_proxy_at_the_papers_pace():
-    """What remains of a fifth: Eq. (1) is near the demand, the low-pass is late, then the floor."""
+    """Share left of a fifth: with Eq. (1), with the delay of the low-pass, with the floor."""
     exact = gait.uncalibrated_change("walk", 5.0, exact=True, floor=0.0)
     late = gait.uncalibrated_change("walk", 5.0, floor=0.0)
     whole = gait.uncalibrated_change("walk", 5.0)

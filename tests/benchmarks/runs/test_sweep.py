@@ -53,7 +53,7 @@ sys.exit(bool(report.missing))
 
 @pytest.fixture(scope="module", autouse=True)
 def gate(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """What ``integral`` waits for while it is there, in all processes of these tests.
+    """File that ``integral`` waits for while it exists, in all processes of these tests.
 
     Their programs run so little that compiling it would take longer.
     """

@@ -80,7 +80,7 @@ def test_small_effect_between_repeats_counts_as_noise():
 
 
 def test_noise_of_motion_counts_as_noise():
-    """What is fast and not in holds is no change of the rig: every model leaves it."""
+    """Fast scatter outside holds is no change of the rig: every model leaves it as residual."""
     columns = arrays()
     for label in ("holds_a", "holds_b"):
         at = made().rows_of(label)

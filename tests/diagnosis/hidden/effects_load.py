@@ -24,7 +24,7 @@ def _wire_slack(record: np.ndarray, strength: float, shape: Shape) -> None:
 
 
 def _payload_error(record: np.ndarray, strength: float, shape: Shape) -> None:
-    """What hangs is not what is told: a tray [N], and scales that are wrong by a factor.
+    """Actual load different from the declared one: a tray [N], and scales with a gain error.
 
     The tray stands on a soft rest that a load presses down; without a load it only rubs on its
     guide. What the scales add is given at 30 N, over the tray.
