@@ -385,7 +385,7 @@ def show(
     if episode.failed:
         print(f"ended early: {episode.failure}")
     else:
-        for line in showing.told(showing.summary(episode, content), content):
+        for line in showing.score_lines(showing.summary(episode, content), content):
             print(line)
     if plot:
         said = "".join(f", {name} {value}" for name, value in kwargs.items())

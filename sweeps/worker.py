@@ -39,16 +39,16 @@ def do_in_cluster(act: Act, task: Task, key: str) -> Done:
     Compiled kernels, random numbers and caches of a process are for one thread.
     """
     with _one_at_a_time:
-        if wanted():
+        if is_needed():
             done = do(act, task, key)
-            if done.error is None or wanted():
+            if done.error is None or is_needed():
                 return done
     from distributed import Reschedule
 
     raise Reschedule  # should the result be needed after all, Dask assigns the task again
 
 
-def wanted() -> bool:
+def is_needed() -> bool:
     """Return whether the result of this thread's task is still needed.
 
     A Dask worker continues a task whose caller is gone. Long tasks ask here and end.

@@ -18,7 +18,7 @@ from agents.training.best import Best
 from agents.training.building import warm_up_steps
 from agents.training.evaluation import Score, evaluate, value_of
 from agents.training.record import Clock
-from sweeps.worker import wanted
+from sweeps.worker import is_needed
 
 PARTS, PASSES = 16, 10
 """Critic warm-up: number of parts that a batch is split into, and epochs per rollout."""
@@ -59,7 +59,7 @@ class Cancellation(RolloutCallback):
     """Stop a training of a Dask cluster whose result nobody waits for."""
 
     def _on_rollout_start(self) -> None:
-        if not wanted():
+        if not is_needed():
             raise RuntimeError("the sweep that asked for this training is gone")
 
 

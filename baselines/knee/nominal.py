@@ -44,7 +44,7 @@ class KneeNominal:
 
     @cached_property
     def _per_output(self) -> float:
-        """Stiffness [N/m] over the hysteresis's output."""
+        """Stiffness [N/m] over the hysteresis output."""
         muscle = self.plant.muscle
         return muscle.gain * (1.0 if self.plant.hysteresis.operator else muscle.stiffness_ratio)
 

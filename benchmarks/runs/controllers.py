@@ -177,8 +177,8 @@ def make(
     """
     maker = importlib.import_module(entrant.source).make_controller
     base = env.unwrapped
-    told = {"plant": model, "signals": base.signals, "action_signals": base.action_signals}
+    given = {"plant": model, "signals": base.signals, "action_signals": base.action_signals}
     if training_seed is not None:
-        told["training_seed"] = training_seed
-    made: Controller = maker(entrant.name, seed=seed, **told)
+        given["training_seed"] = training_seed
+    made: Controller = maker(entrant.name, seed=seed, **given)
     return made

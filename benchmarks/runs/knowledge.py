@@ -26,8 +26,8 @@ def knows_plant(entrant: Entrant, controller: Any, model: Any, env: Any) -> bool
     knows = (trained and entrant.kind == "learned") or model.digest() == base.plant.digest()
     if isinstance(card, Mapping):
         varied = (card.get("env_kwargs") or {}).get("randomize")
-        told = card.get("plants", [card.get("plant")])
-        knows = knows and not varied and base.plant.digest() in told
+        trained_on = card.get("plants", [card.get("plant")])
+        knows = knows and not varied and base.plant.digest() in trained_on
     return knows and not base.setup.drawn
 
 

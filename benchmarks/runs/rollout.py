@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.runs.controllers import ROOT, Controller
-from sweeps.worker import wanted
+from sweeps.worker import is_needed
 
 LONGEST = 300
 """Characters of a message that a row keeps."""
@@ -85,7 +85,7 @@ def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None)
     infos: list[tuple[float, ...]] = []
     observations, actions, seconds, models = [], [], [], []
     state, start, failure, clock = None, True, "", time.perf_counter
-    told = getattr(controller, "model_output", None)
+    model_output = getattr(controller, "model_output", None)
     over = False
     if watch:
         watch(env)
@@ -94,7 +94,7 @@ def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None)
             begin = clock()
             action, state = controller.predict(observation, state, start, True)
             spent = clock() - begin
-            followed = np.ravel(told(state)).tolist() if told else []
+            followed = np.ravel(model_output(state)).tolist() if model_output else []
         except Exception as error:
             failure = _sentence(error)
             break
@@ -183,7 +183,7 @@ def run_all(
 
 
 def _still_wanted() -> None:
-    if not wanted():
+    if not is_needed():
         raise RuntimeError("nobody waits for it any more")
 
 
@@ -261,14 +261,14 @@ def _run_rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> _Cour
     count = len(seeds)
     observation, report = batch.reset(seed=list(seeds))
     keys = tuple(report)
-    told = getattr(controller, "model_output", None)
+    model_output = getattr(controller, "model_output", None)
     infos, models, observations, actions = [], [], [], []
     state, start, running = None, np.ones(count, bool), np.ones(count, bool)
     lengths, failures = np.zeros(count, np.int64), [""] * count
     while running.any():
         with _asked():
             action, state = controller.predict(observation, state, start, True)
-            models.append(np.reshape(told(state) if told else [], (count, -1)))
+            models.append(np.reshape(model_output(state) if model_output else [], (count, -1)))
         if not _acceptable(action, batch):
             raise _NotAsRows
         after, _, terminated, truncated, report = batch.step(action)

@@ -139,8 +139,8 @@ def _check_complete(
     def place(cell: Cell) -> tuple[Any, ...]:
         return cell.split, cell.training_seed, cell.scenario.name
 
-    wanted = [place(cell) for cell in cells_of(entrant, track, found)]
-    if [(c["split"], c["training_seed"], c["scenario"]) for c in cells] != wanted:
+    expected = [place(cell) for cell in cells_of(entrant, track, found)]
+    if [(c["split"], c["training_seed"], c["scenario"]) for c in cells] != expected:
         raise ValueError(f"{entrant.name}: the cells are not those of {track.name}")
     others = sorted({str(cell["env"]) for cell in cells} - {track.env})
     if others:

@@ -125,12 +125,12 @@ def run(
     report = Report(swept=store.sweep() + sweep(options.out))
     before = set(store.quarantined())
     chosen = [(plan, {cell.key: cell for cell in plan.cells}) for plan in plans(pairs)]
-    wanted = {key: cell for _, cells in chosen for key, cell in cells.items()}
+    requested = {key: cell for _, cells in chosen for key, cell in cells.items()}
     if options.force:
-        for key in wanted:
+        for key in requested:
             store.path(key).unlink(missing_ok=True)
-    missing = {key: cell for key, cell in wanted.items() if store.load(key) is None}
-    report.found = len(wanted) - len(missing)
+    missing = {key: cell for key, cell in requested.items() if store.load(key) is None}
+    report.found = len(requested) - len(missing)
     making = _Rows(chosen, missing.keys(), store, options.out)
     errors, advance = dict[str, str](), start(len(missing))
     for key, error in _compute(missing.values(), store, cluster):
@@ -143,7 +143,7 @@ def run(
         report.missing += outcome.wrong
         errors = outcome.gone | errors
     report.computed = sum(key not in errors for key in missing)
-    report.missing += [f"{title(wanted[key])}: {text}" for key, text in errors.items()]
+    report.missing += [f"{title(requested[key])}: {text}" for key, text in errors.items()]
     report.quarantined = sorted(set(store.quarantined()) - before)
     return report
 

@@ -120,7 +120,7 @@ def summary(episode: rollout.Episode, content: Mapping[str, Any]) -> dict[str, f
     return metrics.score(signals, episode.period, settle, hold, {}, gate)
 
 
-def told(scores: Mapping[str, float], content: Mapping[str, Any]) -> list[str]:
+def score_lines(scores: Mapping[str, float], content: Mapping[str, Any]) -> list[str]:
     """Return a line for each score with its unit, SI; one that no number belongs to says so."""
     units = metrics.of_track(content)
     lines = []

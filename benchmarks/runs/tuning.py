@@ -205,8 +205,8 @@ class Course:
 
     def _run(self, cell: cells.Cell, env: Any, knobs: Knobs) -> list[dict[str, Any]]:
         model, base = model_of(self.track.env, cell.scenario, env), env.unwrapped
-        told = (model, base.signals, base.action_signals)
-        made = catalogue.make_controller(self.controller, *told, knobs=knobs)
+        given = (model, base.signals, base.action_signals)
+        made = catalogue.make_controller(self.controller, *given, knobs=knobs)
         episodes = cells.episodes_of(cells.Group((cell,)), env, made)
         return [
             cells.episode_record(cell, seed, episode)

@@ -122,9 +122,9 @@ def _check(stored: Record, cluster: engine.Cluster, verdict: Verdict) -> None:
         return
     found = audit.find(entrant, track)
     verdict.drifted += _other_audit(stored, entrant, track, found)
-    wanted = cells_of(entrant, track, found)
-    verdict.drifted += _other_episodes(stored, wanted)
-    _compare(stored, _run_again(entrant, track, found, wanted, cluster), verdict)
+    requested = cells_of(entrant, track, found)
+    verdict.drifted += _other_episodes(stored, requested)
+    _compare(stored, _run_again(entrant, track, found, requested, cluster), verdict)
 
 
 def _other_scenarios(stored: Record, track: ScenarioSet) -> list[str]:
@@ -161,14 +161,14 @@ def _other_audit(
     return []
 
 
-def _other_episodes(stored: Record, wanted: Sequence[Cell]) -> list[str]:
+def _other_episodes(stored: Record, requested: Sequence[Cell]) -> list[str]:
     """Return which episodes are missing or superfluous."""
     recorded = Counter(
         (e["split"], e["training_seed"], e["scenario"], e["seed"]) for e in stored["episodes"]
     )
     needed = Counter(
         (cell.split, cell.training_seed, cell.scenario.name, seed)
-        for cell in wanted
+        for cell in requested
         for seed in cell.seeds
     )
     found = []
@@ -187,12 +187,12 @@ def _run_again(
     entrant: Entrant,
     track: ScenarioSet,
     found: Audit | None,
-    wanted: Sequence[Cell],
+    requested: Sequence[Cell],
     cluster: engine.Cluster,
 ) -> dict[str, Any]:
-    keys = [cell.key for cell in wanted]
+    keys = [cell.key for cell in requested]
     records: dict[str, Any] = {}
-    for done in engine.run(cells.compute, cells.grouped(wanted), cluster):
+    for done in engine.run(cells.compute, cells.grouped(requested), cluster):
         if done.error is not None:
             raise ValueError(done.error)
         records |= done.value

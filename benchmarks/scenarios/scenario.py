@@ -131,14 +131,14 @@ class ScenarioSet:
             raise ValueError(
                 f"{name}: no metrics {sorted(unknown)}; choose from {', '.join(GROUPS)}"
             )
-        wanted = of_track(self.content)
+        expected = of_track(self.content)
         headline = headline_of(self.content)
-        if headline not in wanted:
-            raise ValueError(f"{name}: no headline {headline!r}; choose from {', '.join(wanted)}")
+        if headline not in expected:
+            raise ValueError(f"{name}: no headline {headline!r}; choose from {', '.join(expected)}")
         if "chain" in (self.content.get("metrics") or ()) and "tool_length" not in given:
             raise ValueError(f"{name}: the metrics of a chain need tool_length [m]")
-        if set(self.content["worst_case"]) != set(wanted):
-            raise ValueError(f"{name}: worst_case needs a value for each of {', '.join(wanted)}")
+        if set(self.content["worst_case"]) != set(expected):
+            raise ValueError(f"{name}: worst_case needs a value for each of {', '.join(expected)}")
         number = self.content["seeds"]
         if type(number) is not int or not 1 <= number <= MOST_SEEDS:
             raise ValueError(

@@ -154,7 +154,7 @@ def open_spans(widths: Array, valve: OnOffValve) -> list[tuple[float, float]]:
 @pytest.mark.parametrize("valves", MAKES)
 @pytest.mark.parametrize("hysteresis", kinds())
 def test_the_integrator_is_fine_enough(hysteresis: str, valves: str) -> None:
-    """Against sub-steps 25 and 100 times as many; a hysteresis's kinks cost some of the order."""
+    """Against 25 and 100 times as many sub-steps; kinks of the hysteresis reduce the order."""
     plant = ElbowOrthosis.paper(hysteresis, valves)  # type: ignore[arg-type]
     commands = commands_for(plant, 400)
 

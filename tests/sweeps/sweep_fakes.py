@@ -9,7 +9,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from sweeps.worker import wanted
+from sweeps.worker import is_needed
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def square(task: Number) -> int:
         time.sleep(0.3)
     if task.kind == "endless":
         until = time.monotonic() + 60.0
-        while wanted() and time.monotonic() < until:
+        while is_needed() and time.monotonic() < until:
             time.sleep(0.05)
         (Path(task.folder) / f"ended_{task.number}").write_text("")
     return task.number**2

@@ -16,7 +16,7 @@ from pam_envs.plants.antagonistic_joint.rows import EFFECT, STATE
 from pam_envs.plants.core.muscle_path import PATH_STATE, begin_path, path_step
 from pam_envs.plants.core.sensors import sensor_kernels
 
-EFFECTS_AT = 0  # placeholder: the row after the hysteresis's state
+EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
 FULL_SCALES = (0.5236, 6.5e5, 6.5e5)
 """Full scales of the sensors: rad, Pa, Pa."""
 

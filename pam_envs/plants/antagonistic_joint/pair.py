@@ -101,7 +101,7 @@ def terms_of(fixed: Any, j: int, contraction: float) -> tuple[float, float, floa
 
 @kernel
 def friction_of(fixed: Any, j: int, pressure: float) -> float:
-    """Return the friction over the hysteresis's lag [N]."""
+    """Return the friction over the hysteresis lag [N]."""
     return fixed[LOOP_WIDTH][j] * (fixed[FRICTION_BASE][j] + fixed[FRICTION_RATE][j] * pressure)
 
 
@@ -117,8 +117,8 @@ def pulled(
 ) -> tuple[float, float]:
     """Return the force of a muscle [N] and minus its derivative by contraction [N].
 
-    ``speed`` [1/s] is that of the contraction, ``lag`` the hysteresis's; the derivative is that of
-    the law alone. A slack muscle has neither force nor stiffness.
+    ``speed`` [1/s] is that of the contraction, ``lag`` that of the hysteresis; the derivative is
+    that of the law alone. A slack muscle has neither force nor stiffness.
     """
     area, passive, less, more = terms_of(fixed, j, contraction)
     gain = gain_of(fixed, j, side)

@@ -154,7 +154,7 @@ def simulate_joint(
     Parameters
     ----------
     plants : AntagonisticJoint or sequence of them
-        Of one hysteresis, of one make, and with the same sub-steps. A hysteresis's map is the
+        Of one hysteresis, of one make, and with the same sub-steps. A hysteresis map is the
         first's.
     commands : array_like, shape (T,) or (T, n)
         Set-points [rad] of the feed-forward, one a control period.

@@ -41,9 +41,9 @@ from pam_envs.sensing.sensor import SENSOR
     STICK_B,
     STRAIGHT,
 ) = range(25)
-"""``AT``: contraction beyond that of the straight joint (``STRAIGHT``), the hysteresis's input."""
+"""``AT``: contraction beyond that of the straight joint (``STRAIGHT``), the hysteresis input."""
 END = 25
-"""First row after the plant's state; the hysteresis's state follows."""
+"""First row after the plant's state; the hysteresis state follows."""
 
 MUSCLE_PARAMETERS = (
     "regulator.max_pressure",
@@ -162,7 +162,7 @@ STATE = row_blocks(
     stuck=1,
     sensors=sensor_rows(3),
 )
-"""State of the effects, counted from the first row after the hysteresis's."""
+"""State of the effects, counted from the first row after the hysteresis."""
 
 MODEL = EFFECT.end
 """First row of the hysteresis operator's numbers."""

@@ -227,7 +227,7 @@ def advance(
     table : array
         Of the hysteresis: ``AntagonisticJoint.hysteresis_tables()``.
     hysteresis, elements : int
-        First row of the hysteresis's state, and ``AntagonisticJoint.elements``.
+        First row of the hysteresis state, and ``AntagonisticJoint.elements``.
     substeps, period : int, float
         Sub-steps and duration [s] of the period.
     work : rows

@@ -17,7 +17,7 @@ from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.air import AIR, GIVES_A, NOW_A, WAS_A, count_used_air
 from pam_envs.plants.elbow_orthosis.rows import EFFECT, STATE
 
-EFFECTS_AT = 0  # placeholder: the row after the hysteresis's state
+EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
 FULL_SCALES = (2.1, 6e5, 6e5)
 """Full scales of the sensors: rad, Pa, Pa."""
 plain_breathe: Any = None  # placeholders: air of the plain plant

@@ -112,7 +112,7 @@ class ElbowOrthosis(Plant):
                 raise ValueError(f"{name}.muscles = {muscles:g} must be a whole number, 1 or more")
 
     def _check_range(self) -> None:
-        """Refuse a stroke that leaves the bundles no force, or the hysteresis's map."""
+        """Refuse a stroke that leaves the bundles no force, or the hysteresis map."""
         if self.pulley.lowest >= self.pulley.highest:
             raise ValueError(
                 f"pulley.lowest = {self.pulley.lowest:g} rad is not below pulley.highest = "

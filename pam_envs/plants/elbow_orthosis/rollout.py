@@ -162,7 +162,7 @@ def simulate_elbow(
     Parameters
     ----------
     plants : ElbowOrthosis or sequence of them
-        Of one hysteresis, of one make of valves, and with the same sub-steps. A hysteresis's map
+        Of one hysteresis, of one make of valves, and with the same sub-steps. A hysteresis map
         is the first's.
     commands : array_like, shape (T, 2) or (T, n, 2)
         For bundles a and b, one a control period: set-points [Pa]; of on/off valves pulse widths

@@ -50,7 +50,7 @@ VALVES = 4
 LEFT, LIFT, OPENED = 27, 27 + VALVES, 27 + 2 * VALVES
 """First rows of the valves' state: coil time left, lift, whether open."""
 END = 27 + 3 * VALVES
-"""First row after the plant's state; the hysteresis's state follows."""
+"""First row after the plant's state; the hysteresis state follows."""
 
 _BUNDLE = (
     "muscles",
@@ -172,7 +172,7 @@ STATE = row_blocks(
     stuck=1,
     sensors=sensor_rows(3),
 )
-"""State of the effects, counted from the first row after the hysteresis's."""
+"""State of the effects, counted from the first row after the hysteresis."""
 
 MODEL = EFFECT.end
 """First row of the hysteresis operator's numbers."""

@@ -191,7 +191,7 @@ def advance(
     table : array
         Of the hysteresis: ``ElbowOrthosis.hysteresis_tables()``.
     hysteresis, elements : int
-        First row of the hysteresis's state, and ``ElbowOrthosis.elements``.
+        First row of the hysteresis state, and ``ElbowOrthosis.elements``.
     substeps, period : int, float
         Sub-steps and duration [s] of the period.
     work : rows
@@ -272,7 +272,7 @@ def start_hysteresis(rows: Any, counts: Any, hysteresis: int, j: int) -> None:
 
 @kernel
 def resting_torque(rows: Any, fixed: Any, j: int, angle: float) -> float:
-    """Return the torque at rest [N m] at an angle, with the hysteresis's lag of that angle."""
+    """Return the torque at rest [N m] at an angle, with the hysteresis lag of that angle."""
     torque, _ = passive_torque(fixed, j, angle)
     for side in range(2):
         effective = rows[EFFECTIVE_A + side][j]

@@ -18,7 +18,7 @@ from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.rows import EFFECT, STATE
 from pam_envs.sensing.sensor import SENSOR
 
-EFFECTS_AT = 0  # placeholder: the row after the hysteresis's state
+EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
 plain_regulate: Any = None  # placeholder: the dynamics of the pressure of the plain plant
 
 MEASURED = (K.TENSION, K.ANGLE, K.PRESSURE, K.HEEL, K.GROUND_Z, K.COP, K.ANKLE)

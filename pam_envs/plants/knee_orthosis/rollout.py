@@ -141,7 +141,7 @@ def simulate_knee(
     ----------
     plants : KneeOrthosis or sequence of them
         Of one hysteresis, mounting, regulator, activity, and with the same sub-steps. A
-        hysteresis's operator is that of the first.
+        hysteresis operator is that of the first.
     set_points : array_like, shape (T,) or (T, n)
         Set-points [Pa], one a control period.
     phase : float

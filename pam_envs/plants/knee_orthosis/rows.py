@@ -55,7 +55,7 @@ from pam_envs.sensing.sensor import SENSOR
 MODE = 34
 """First row of the measured dynamics' modes."""
 END = MODE + MODES
-"""First row after the plant's state; the hysteresis's state follows."""
+"""First row after the plant's state; the hysteresis state follows."""
 
 # parameters, in the order of PARAMETERS below
 PARAMETERS = (
@@ -207,7 +207,7 @@ STATE = row_blocks(
     stuck=1,
     sensors=sensor_rows(len(SENSORS)),
 )
-"""State of the effects, counted from the first row after the hysteresis's."""
+"""State of the effects, counted from the first row after the hysteresis."""
 
 MODE_TABLE = EFFECT.end
 """First row of what the modes are made of."""

@@ -113,7 +113,7 @@ def advance(
     gait : array
         ``KneeOrthosis.gait_table()``.
     hysteresis, elements : int
-        First row of the hysteresis's state, and ``KneeOrthosis.elements``.
+        First row of the hysteresis state, and ``KneeOrthosis.elements``.
     substeps, period : int, float
         Sub-steps and duration [s] of the period.
     work : rows

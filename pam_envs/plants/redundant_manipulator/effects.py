@@ -15,7 +15,7 @@ from pam_envs.plants.core.sensors import sensor_kernels
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.rows import EFFECT, STATE
 
-EFFECTS_AT = 0  # placeholder: the row after the hysteresis's state
+EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
 FULL_ANGLE, FULL_PRESSURE = 0.5236, 6.5e5
 """Full scales of the sensors [rad, Pa]."""
 WAS = 0

@@ -71,7 +71,7 @@ PRESSURE, SET_POINT, FORCE, CONTRACTION, LAG, AT, STICK = range(
 PAYLOAD, SLACK, AIR, STRAIGHT, SHARE = range(24 * MOST_STAGES, 24 * MOST_STAGES + 5)
 """``SHARE`` is the payload over the links' common factor (see :func:`swing` of the kernels)."""
 END = SHARE + 1
-"""First row after the plant's state; the hysteresis's state follows."""
+"""First row after the plant's state; the hysteresis state follows."""
 
 PARAMETERS = (*MUSCLE_PARAMETERS, "arm.mass_factor", "arm.damping_factor")
 MASS_FACTOR, DAMPING_FACTOR = range(len(MUSCLE_PARAMETERS), len(PARAMETERS))
@@ -95,10 +95,10 @@ STATE = row_blocks(
     paths=2 * MOST_STAGES * PATH_STATE.end,
     sensors=sensor_rows(3 * MOST_STAGES),
 )
-"""State of the effects, counted from the first row after the hysteresis's."""
+"""State of the effects, counted from the first row after the hysteresis."""
 
 MODEL = EFFECT.end
-"""First row of the hysteresis's operator."""
+"""First row of the hysteresis operator."""
 JOINT_DAMPING = MODEL + NUMBERS
 """First row of the damping that each joint has beside ``link.damping`` [N m s/rad]."""
 CHAIN = JOINT_DAMPING + MOST_STAGES

@@ -210,7 +210,7 @@ def advance(
     table : array
         Of the hysteresis: ``RedundantManipulator.hysteresis_tables()``.
     hysteresis, elements : int
-        First row of the hysteresis's state, and ``RedundantManipulator.elements``.
+        First row of the hysteresis state, and ``RedundantManipulator.elements``.
     substeps, period : int, float
         Sub-steps and duration [s] of the period.
     work : rows

@@ -41,7 +41,7 @@ from pam_envs.pneumatics.regulator import (
 )
 from pam_envs.sensing.sensor import begin_sensor, sense
 
-EFFECTS_AT = 0  # placeholder: the row after the hysteresis's state
+EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
 plain_hysteresis: Any = None  # placeholder: one of the three hysteresis models
 
 FULL_STRAIN = 0.15
@@ -439,7 +439,7 @@ def advance_extended(
 def replacements(kind: str, first: int) -> dict[str, Any]:
     """Return the kernels of the extended plant for the placeholders of the plain one's.
 
-    ``first`` is the row after the hysteresis's state.
+    ``first`` is the row after the hysteresis state.
     """
     return {
         "EFFECTS_AT": first,

@@ -115,7 +115,7 @@ def replay_rows(plant: SingleMuscle, columns: Array, inputs: Inputs) -> Array:
     Parameters
     ----------
     plant : SingleMuscle
-        Gives the hysteresis's kind and Everett map.
+        Gives the hysteresis kind and Everett map.
     columns : array, shape (n, n_parameters)
         As :meth:`SingleMuscle.parameter_rows` lays them out.
     inputs : Inputs

@@ -180,7 +180,7 @@ def simulate_rows(
     Parameters
     ----------
     plant : SingleMuscle
-        Gives the hysteresis's kind, the Everett map and the sub-steps.
+        Gives the hysteresis kind, the Everett map and the sub-steps.
     parameters : array, shape (n, n_parameters)
         Columns as :meth:`SingleMuscle.parameter_rows` lays them out.
     set_points : array_like, shape (T,) or (T, n)

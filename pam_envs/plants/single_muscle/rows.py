@@ -154,7 +154,7 @@ STATE = row_blocks(
     pressure_reading=1,
     pressure_ring=N_HISTORY,
 )
-"""State of the effects, counted from the first row after the hysteresis's."""
+"""State of the effects, counted from the first row after the hysteresis."""
 N_EFFECTS = STATE.end
 
 

@@ -132,7 +132,7 @@ def test_training_that_nobody_waits_for_stops(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     answers = iter([True, True, False])
-    monkeypatch.setattr(callbacks, "wanted", lambda: next(answers))
+    monkeypatch.setattr(callbacks, "is_needed", lambda: next(answers))
     (training,) = sweep.trainings([CONFIG], (3,), tmp_path, "ppo")
     with pytest.raises(RuntimeError, match="the sweep that asked for this training is gone"):
         sweep.train(training)

@@ -89,7 +89,7 @@ def test_a_cell_that_nobody_waits_for_ends(
     scenario = track.scenarios()[0]
     cell = cells.Cell(find("low"), track, scenario, seeds=track.seeds[scenario.name])
     asked = iter([False])
-    monkeypatch.setattr(rollout, "wanted", lambda: next(asked))
+    monkeypatch.setattr(rollout, "is_needed", lambda: next(asked))
     with pytest.raises(RuntimeError, match="nobody waits"):
         cells.compute(cells.Group((cell,)))
-    assert worker.wanted()  # outside of a cluster somebody always does
+    assert worker.is_needed()  # outside of a cluster somebody always does

@@ -197,7 +197,7 @@ def test_a_fault_of_the_batch_is_raised_and_not_run_alone():
 def test_it_is_asked_before_each_run_whether_somebody_waits(controller, answers, monkeypatch):
     env_id = "PAM/MusclePositioning-v0"
     asked = iter([*[True] * answers, False])
-    monkeypatch.setattr(rollout, "wanted", lambda: next(asked))
+    monkeypatch.setattr(rollout, "is_needed", lambda: next(asked))
     with pytest.raises(RuntimeError, match="nobody waits"):
         rollout.run_all(
             partial(make_batch, env_id, SHORT), make_env(env_id, SHORT), controller, SEEDS
