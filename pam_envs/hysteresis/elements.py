@@ -100,37 +100,42 @@ def plays_step(
 
 @kernel
 def plays_lag(
-    x: Any, lag: Any, rows: Any, fixed: Any, counts: Any, table: Any, elements: int, at: int,
-    model: int, count: int, member: int, first: int, last: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, state: int, elements: int, x_at: int,
+    lag_at: int, operators: int, model: int, count: int, member: int, first: int, last: int,
 ) -> None:  # fmt: skip
-    """Advance the plays of a tile and write how far they lag behind, for a total slope of 1."""
-    for j in range(first, last):
-        lag[j] = 0.0
-    for k in range(elements):
-        threshold, weight = fixed[model + THRESHOLD + k], fixed[model + WEIGHT + k]
-        state = rows[at + k]
+    """Advance the plays and write how far they lag behind, for a total slope of 1."""
+    for m in range(operators):
+        x, lag = rows[x_at + m], rows[lag_at + m]
         for j in range(first, last):
-            w = play(x[j], threshold[j], state[j])
-            state[j] = w
-            lag[j] = lag[j] + weight[j] * (x[j] - w)
+            lag[j] = 0.0
+        for k in range(elements):
+            threshold, weight = fixed[model + THRESHOLD + k], fixed[model + WEIGHT + k]
+            position = rows[state + m * ELEMENTS + k]
+            for j in range(first, last):
+                w = play(x[j], threshold[j], position[j])
+                position[j] = w
+                lag[j] = lag[j] + weight[j] * (x[j] - w)
 
 
 @kernel
 def plays_peek(
-    x: Any, lag: Any, stick: Any, rows: Any, fixed: Any, counts: Any, table: Any, elements: int,
-    at: int, model: int, count: int, member: int, first: int, last: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, state: int, elements: int, x_at: int,
+    lag_at: int, stick_at: int, operators: int, model: int, count: int, member: int, first: int,
+    last: int,
 ) -> None:  # fmt: skip
-    """Write the lag at an input and its slope, the weight of the plays that do not move."""
-    for j in range(first, last):
-        lag[j] = 0.0
-        stick[j] = 0.0
-    for k in range(elements):
-        threshold, weight = fixed[model + THRESHOLD + k], fixed[model + WEIGHT + k]
-        state = rows[at + k]
+    """Write the lags at inputs and their slopes, the weight of the plays that do not move."""
+    for m in range(operators):
+        x, lag, stick = rows[x_at + m], rows[lag_at + m], rows[stick_at + m]
         for j in range(first, last):
-            w = play(x[j], threshold[j], state[j])
-            lag[j] = lag[j] + weight[j] * (x[j] - w)
-            stick[j] = stick[j] + (weight[j] if w == state[j] else 0.0)
+            lag[j] = 0.0
+            stick[j] = 0.0
+        for k in range(elements):
+            threshold, weight = fixed[model + THRESHOLD + k], fixed[model + WEIGHT + k]
+            position = rows[state + m * ELEMENTS + k]
+            for j in range(first, last):
+                w = play(x[j], threshold[j], position[j])
+                lag[j] = lag[j] + weight[j] * (x[j] - w)
+                stick[j] = stick[j] + (weight[j] if w == position[j] else 0.0)
 
 
 @entry

@@ -347,30 +347,39 @@ def relays_step(
 
 @kernel
 def relays_peek(
-    x: Any, lag: Any, stick: Any, rows: Any, fixed: Any, counts: Any, table: Any, elements: int,
-    at: int, model: int, count: int, member: int, first: int, last: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, state: int, elements: int, x_at: int,
+    lag_at: int, stick_at: int, operators: int, model: int, count: int, member: int, first: int,
+    last: int,
 ) -> None:  # fmt: skip
-    """Write the lag at an input, and its growth since the state was last moved."""
-    low, inverse_cell, high = fixed[model + LOW], fixed[model + INVERSE_CELL], fixed[model + HIGH]
-    present, output, turn = rows[at + PRESENT], rows[at + OUTPUT], rows[at + TURN]
-    turn_output, part = rows[at + TURN_OUTPUT], rows[at + PART]
-    stack, sums, points = rows[at : at + DEPTH], rows[at + DEPTH : at + 2 * DEPTH], counts[count]
-    members, leaving, branch = counts[member], scratch(2, LANES), scratch(3, LANES)
-    for j in range(first, last):
-        branch[0][j], branch[1][j], branch[2][j] = turn[j], turn_output[j], part[j]
-    for q in range(_list_leaving(x, rows, low, high, at, leaving, first, last)):
-        j = int(leaving[0][q])
-        held, now = _held(x[j], low[j], high[j]), points[j] - 1
-        stack[now][j], sums[now][j] = present[j], output[j]
-        _, branch[0][j], branch[1][j], branch[2][j] = _find_turn(
-            held, stack, sums, points, j, low[j]
+    """Write the lags at inputs, and their growth since the states were last moved."""
+    for m in range(operators):
+        at = state + m * STATE_ROWS
+        x, lag, stick = rows[x_at + m], rows[lag_at + m], rows[stick_at + m]
+        low, high, inverse_cell = (
+            fixed[model + LOW],
+            fixed[model + HIGH],
+            fixed[model + INVERSE_CELL],
         )
-    for j in range(first, last):
-        held, own = _held(x[j], low[j], high[j]), table[members[j]]
-        a, b = (held - low[j]) * inverse_cell[j], (branch[0][j] - low[j]) * inverse_cell[j]
-        found = branch[1][j] + branch[2][j] * everett(a, b, own)
-        lag[j] = x[j] - found
-        stick[j] = growth(x[j] - found - (present[j] - output[j]), x[j] - present[j])
+        present, output, turn = rows[at + PRESENT], rows[at + OUTPUT], rows[at + TURN]
+        turn_output, part = rows[at + TURN_OUTPUT], rows[at + PART]
+        stack, sums = rows[at : at + DEPTH], rows[at + DEPTH : at + 2 * DEPTH]
+        points = counts[count + m]
+        members, leaving, branch = counts[member], scratch(2, LANES), scratch(3, LANES)
+        for j in range(first, last):
+            branch[0][j], branch[1][j], branch[2][j] = turn[j], turn_output[j], part[j]
+        for q in range(_list_leaving(x, rows, low, high, at, leaving, first, last)):
+            j = int(leaving[0][q])
+            held, now = _held(x[j], low[j], high[j]), points[j] - 1
+            stack[now][j], sums[now][j] = present[j], output[j]
+            _, branch[0][j], branch[1][j], branch[2][j] = _find_turn(
+                held, stack, sums, points, j, low[j]
+            )
+        for j in range(first, last):
+            held, own = _held(x[j], low[j], high[j]), table[members[j]]
+            a, b = (held - low[j]) * inverse_cell[j], (branch[0][j] - low[j]) * inverse_cell[j]
+            found = branch[1][j] + branch[2][j] * everett(a, b, own)
+            lag[j] = x[j] - found
+            stick[j] = growth(x[j] - found - (present[j] - output[j]), x[j] - present[j])
 
 
 @kernel

@@ -39,39 +39,46 @@ MODEL_STATE = 0
 
 @kernel
 def lag_by_step(
-    x: Any, lag: Any, rows: Any, fixed: Any, counts: Any, table: Any, elements: int, at: int,
-    model: int, count: int, member: int, first: int, last: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, state: int, elements: int, x_at: int,
+    lag_at: int, operators: int, model: int, count: int, member: int, first: int, last: int,
 ) -> None:  # fmt: skip
-    """Advance the operator and write how far its output lags behind its input."""
-    hysteresis_step(
-        x, lag, rows, fixed, counts, table, elements, at, model, count, member, first, last
-    )
-    for j in range(first, last):
-        lag[j] = x[j] - lag[j]
+    """Advance the operators and write how far their outputs lag behind their inputs."""
+    for m in range(operators):
+        x, lag = rows[x_at + m], rows[lag_at + m]
+        hysteresis_step(
+            x, lag, rows, fixed, counts, table, elements, state + m * MODEL_STATE, model, count + m,
+            member, first, last,
+        )  # fmt: skip
+        for j in range(first, last):
+            lag[j] = x[j] - lag[j]
 
 
 @kernel
 def peek_by_step(
-    x: Any, lag: Any, stick: Any, rows: Any, fixed: Any, counts: Any, table: Any, elements: int,
-    at: int, model: int, count: int, member: int, first: int, last: int,
+    rows: Any, fixed: Any, counts: Any, table: Any, state: int, elements: int, x_at: int,
+    lag_at: int, stick_at: int, operators: int, model: int, count: int, member: int, first: int,
+    last: int,
 ) -> None:  # fmt: skip
-    """Write the lag at an input and restore the state; half of the friction counts as stuck."""
+    """Write the lags at inputs and restore the state; half of the friction counts as stuck."""
     saved = scratch(MODEL_STATE + 1, LANES)
-    for j in range(first, last):
-        saved[0][j] = counts[count][j]
-        stick[j] = 0.5
-    for k in range(MODEL_STATE):
+    for m in range(operators):
+        at = state + m * MODEL_STATE
+        x, lag, stick = rows[x_at + m], rows[lag_at + m], rows[stick_at + m]
         for j in range(first, last):
-            saved[k + 1][j] = rows[at + k][j]
-    hysteresis_step(
-        x, lag, rows, fixed, counts, table, elements, at, model, count, member, first, last
-    )
-    for j in range(first, last):
-        lag[j] = x[j] - lag[j]
-        counts[count][j] = int(saved[0][j])
-    for k in range(MODEL_STATE):
+            saved[0][j] = counts[count + m][j]
+            stick[j] = 0.5
+        for k in range(MODEL_STATE):
+            for j in range(first, last):
+                saved[k + 1][j] = rows[at + k][j]
+        hysteresis_step(
+            x, lag, rows, fixed, counts, table, elements, at, model, count + m, member, first, last
+        )
         for j in range(first, last):
-            rows[at + k][j] = saved[k + 1][j]
+            lag[j] = x[j] - lag[j]
+            counts[count + m][j] = int(saved[0][j])
+        for k in range(MODEL_STATE):
+            for j in range(first, last):
+                rows[at + k][j] = saved[k + 1][j]
 
 
 @kernel
@@ -117,10 +124,12 @@ class Kernels(NamedTuple):
     first, last : int
         Lanes.
 
-    ``lag`` writes ``x - output`` in place of the output; ``peek`` also, from 0 (all slips) to 1
-    (all sticks), the slope of the lag; ``scaled`` takes the factor on the hysteretic part, one a
-    lane, after ``y`` (a model that is used in no other way needs no ``step``); ``begin`` writes
-    the state at the beginning of one lane ``j``, after zeros.
+    ``lag`` and ``peek`` work on several operators, whose inputs and lags are rows of the plant from
+    ``x_at`` and ``lag_at`` and whose states and counts follow each other from ``state`` and
+    ``count``. They write ``x - output``; ``peek`` also writes the slope of the lag, from 0 (all
+    slips) to 1 (all sticks), into rows from ``stick_at``. ``scaled`` takes the factor on the
+    hysteretic part, one a lane, after ``y`` (a model that is used in no other way needs no
+    ``step``); ``begin`` writes the state at the beginning of one lane ``j``, after zeros.
     """
 
     step: Any = None

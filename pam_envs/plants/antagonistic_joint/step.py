@@ -23,7 +23,6 @@ from pam_envs.mechanics.antagonistic_lever import sine_and_cosine_of
 from pam_envs.mechanics.guide import turn
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.effects import effect_kernels
-from pam_envs.plants.antagonistic_joint.hysteresis_kernels import peek, remember
 from pam_envs.plants.antagonistic_joint.pair import (
     air_of,
     clear_hysteresis_models,
@@ -81,7 +80,9 @@ WAS_A, WAS_B, RATE_A, RATE_B, CURVE_A, CURVE_B = range(6)
 """Rows of scratch: pressures before the sub-step, geometry at its middle."""
 N_WORK = 6
 
-# placeholders, filled in for each of the two plants
+# placeholders, filled in for each of the two plants and each hysteresis
+hysteresis_lag: Any = None
+hysteresis_peek: Any = None
 move: Any = None
 rest: Any = None
 report: Any = None
@@ -139,7 +140,7 @@ def swing(
         x_a, work[RATE_A][j], work[CURVE_A][j] = lever_of(fixed, j, middle, 1.0)
         x_b, work[RATE_B][j], work[CURVE_B][j] = lever_of(fixed, j, middle, -1.0)
         rows[AT_A][j], rows[AT_A + 1][j] = x_a - straight[j], x_b - straight[j]
-    peek(
+    hysteresis_peek(
         rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, STICK_A, 2, MODEL,
         STACK_COUNT,
         MEMBER, 0, LANES,
@@ -165,7 +166,7 @@ def swing(
         )  # fmt: skip
         angle[j] = angle[j] + du
         contract(rows, fixed, j, angle[j], AT_A, STRAIGHT)
-    remember(
+    hysteresis_lag(
         rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, 2, MODEL, STACK_COUNT,
         MEMBER,
         0, LANES,
@@ -187,7 +188,7 @@ def follow(
     angle, velocity = rows[ANGLE], rows[VELOCITY]
     for j in range(LANES):
         rows[AT_A][j] = rows[COMMAND][j]
-    remember(
+    hysteresis_lag(
         rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, 1, MODEL, STACK_COUNT,
         MEMBER,
         0, LANES,
@@ -321,7 +322,7 @@ def rest_muscles(
     for _ in range(52):
         angle = 0.5 * (low + high)
         contract(rows, fixed, j, angle, AT_A, STRAIGHT)
-        peek(
+        hysteresis_peek(
             rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, STICK_A, 2, MODEL,
             STACK_COUNT, MEMBER, j, j + 1,
         )  # fmt: skip
@@ -331,7 +332,7 @@ def rest_muscles(
             high = angle
     rows[ANGLE][j] = 0.5 * (low + high)
     contract(rows, fixed, j, rows[ANGLE][j], AT_A, STRAIGHT)
-    remember(
+    hysteresis_lag(
         rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, 2, MODEL, STACK_COUNT,
         MEMBER,
         j, j + 1,
@@ -344,7 +345,7 @@ def rest_reduced(
 ) -> None:
     """Put a lane of the reduced plant where it comes to rest under its command."""
     rows[AT_A][j] = rows[COMMAND][j]
-    remember(
+    hysteresis_lag(
         rows, fixed, counts, table, hysteresis, elements, AT_A, LAG_A, 1, MODEL, STACK_COUNT,
         MEMBER,
         j, j + 1,

@@ -17,7 +17,6 @@ from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.mechanics.guide import turn
 from pam_envs.mechanics.leg import sine_and_cosine
 from pam_envs.mechanics.pulley import stop_torque
-from pam_envs.plants.antagonistic_joint.hysteresis_kernels import remember
 from pam_envs.plants.core.sensors import read_sensors
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.air import (
@@ -84,6 +83,7 @@ SOFTEST = 0.1
 """Least stiffness [N m/rad] that a sub-step reckons with."""
 
 # placeholders, filled in for each hysteresis and each make of valves
+hysteresis_lag: Any = None
 begin_period: Any = None
 breathe: Any = None
 settle: Any = None
@@ -206,7 +206,7 @@ def advance(
         for j in range(LANES):
             work[MIDDLE][j] = rows[ANGLE][j] + 0.5 * h * rows[VELOCITY][j]
             rows[AT][j] = travel_at(fixed, j, work[MIDDLE][j])
-        remember(
+        hysteresis_lag(
             rows, fixed, counts, table, hysteresis, elements, AT, LAG, 1, MODEL, STACK_COUNT,
             MEMBER,
             0, LANES,
@@ -216,7 +216,7 @@ def advance(
         settle(rows, fixed, work)
     for j in range(LANES):
         rows[AT][j] = travel_at(fixed, j, rows[ANGLE][j])
-    remember(
+    hysteresis_lag(
         rows, fixed, counts, table, hysteresis, elements, AT, LAG, 1, MODEL, STACK_COUNT, MEMBER,
         0, LANES,
     )  # fmt: skip
@@ -301,7 +301,7 @@ def begin_lane(
         angle = 0.5 * (low + high)
         start_hysteresis(rows, counts, hysteresis, j)
         rows[AT][j] = travel_at(fixed, j, angle)
-        remember(
+        hysteresis_lag(
             rows, fixed, counts, table, hysteresis, elements, AT, LAG, 1, MODEL, STACK_COUNT,
             MEMBER,
             j, j + 1,

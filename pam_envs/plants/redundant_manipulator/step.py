@@ -31,7 +31,6 @@ from pam_envs.mechanics.serial_chain.rows import (
     mass_row,
 )
 from pam_envs.mechanics.serial_chain.rows import work_rows as chain_work_rows
-from pam_envs.plants.antagonistic_joint.hysteresis_kernels import peek, remember
 from pam_envs.plants.antagonistic_joint.pair import (
     air_of,
     clear_hysteresis_models,
@@ -95,7 +94,10 @@ CHAIN_WORK = 6 * MOST_STAGES
 RESTING = 30
 """Steps to the pose at rest."""
 
-MODEL_STATE = 0  # a placeholder
+# placeholders, filled in for each hysteresis
+hysteresis_lag: Any = None
+hysteresis_peek: Any = None
+MODEL_STATE = 0
 EFFECTIVE, SENSED_ANGLE, SENSED_PRESSURE = PRESSURE, ANGLE, PRESSURE
 """Rows of effective pressures and readings; those of the extended plant replace them."""
 
@@ -171,7 +173,7 @@ def swing(
 ) -> None:
     """Move the arm by one sub-step."""
     foresee(rows, fixed, h, work)
-    peek(
+    hysteresis_peek(
         rows, fixed, counts, table, hysteresis, elements, AT, LAG, STICK, 2 * N_STAGES, MODEL,
         STACK_COUNT, MEMBER, 0, LANES,
     )  # fmt: skip
@@ -189,7 +191,7 @@ def swing(
     for k in range(N_STAGES):
         for j in range(LANES):
             contract(rows, fixed, j, rows[ANGLE + k][j], AT + 2 * k, STRAIGHT)
-    remember(
+    hysteresis_lag(
         rows, fixed, counts, table, hysteresis, elements, AT, LAG, 2 * N_STAGES, MODEL, STACK_COUNT,
         MEMBER, 0, LANES,
     )  # fmt: skip
@@ -303,7 +305,7 @@ def begin_lane(
     for k in range(N_STAGES):
         rows[CHANGE + k][j] = 0.0
         contract(rows, fixed, j, rows[ANGLE + k][j], AT + 2 * k, STRAIGHT)
-    remember(
+    hysteresis_lag(
         rows, fixed, counts, table, hysteresis, elements, AT, LAG, 2 * N_STAGES, MODEL, STACK_COUNT,
         MEMBER, j, j + 1,
     )  # fmt: skip
@@ -350,7 +352,7 @@ def settle(
     """Move joint ``k`` of a lane towards its rest against a weight's torque [N m]."""
     angle = rows[ANGLE + k][j]
     contract(rows, fixed, j, angle, AT + 2 * k, STRAIGHT)
-    peek(
+    hysteresis_peek(
         rows, fixed, counts, table, hysteresis + 2 * k * MODEL_STATE, elements, AT + 2 * k,
         LAG + 2 * k, STICK + 2 * k, 2, MODEL, STACK_COUNT + 2 * k, MEMBER, j, j + 1,
     )  # fmt: skip
