@@ -97,7 +97,7 @@ class PlayOperator(HysteresisModel):
     @property
     def largest_lag(self) -> float:
         """Distance of the output from the line after a long way in one direction."""
-        return float(np.dot(self.weights, self.thresholds))
+        return math.fsum(w * t for w, t in zip(self.weights, self.thresholds, strict=True))
 
     # --- the protocol ---------------------------------------------------------------------------
 
