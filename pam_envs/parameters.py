@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections import namedtuple
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache
 from itertools import accumulate
 from typing import Any, Literal
@@ -58,13 +58,34 @@ def parameter(
     high: float,
     provenance: Provenance,
     source: str,
-    *,
-    neutral: float | None = None,
-    spread: tuple[float, float] | None = None,
+    **options: Any,
 ) -> Any:
     """Return a dataclass field for a physical parameter (see :class:`Declaration`)."""
-    declaration = Declaration(unit, low, high, provenance, source, neutral, spread)
+    declaration = Declaration(unit, low, high, provenance, source, **options)
     return dataclasses.field(default=default, metadata={"declaration": declaration})
+
+
+def _of(provenance: Provenance) -> Callable[..., Any]:
+    def declare(
+        default: float, unit: str, low: float, high: float, source: str, **options: Any
+    ) -> Any:
+        """Return :func:`parameter` of this provenance."""
+        return parameter(default, unit, low, high, provenance, source, **options)
+
+    return declare
+
+
+published, derived, assumed, identified = (
+    _of("published"),
+    _of("derived"),
+    _of("assumed"),
+    _of("identified"),
+)
+
+
+def effect(unit: str, low: float, high: float, source: str) -> Any:
+    """Return an assumed :func:`parameter` that is 0, its neutral value, until identified."""
+    return assumed(0.0, unit, low, high, source, neutral=0.0)
 
 
 def declarations(component: Any) -> dict[str, Declaration]:

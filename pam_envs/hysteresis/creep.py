@@ -11,7 +11,7 @@ from typing import Any
 
 from pam_envs.kernels.arithmetic import count_on, decay
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, effect
 
 ELEMENTS = 4
 """Kelvin-Voigt elements."""
@@ -21,22 +21,14 @@ ELEMENTS = 4
 class CreepEffects:
     """Creep of the effective pressure, off unless a recording shows it."""
 
-    creep_1: float = parameter(
-        0.0, "1", -0.5, 2.0, "assumed", "first Kelvin-Voigt compliance", neutral=0.0
-    )
-    creep_2: float = parameter(
-        0.0, "1", -0.5, 2.0, "assumed", "second Kelvin-Voigt compliance", neutral=0.0
-    )
-    creep_3: float = parameter(
-        0.0, "1", -0.5, 2.0, "assumed", "third Kelvin-Voigt compliance", neutral=0.0
-    )
-    creep_4: float = parameter(
-        0.0, "1", -0.5, 2.0, "assumed", "fourth Kelvin-Voigt compliance", neutral=0.0
-    )
-    creep_time_1: float = parameter(0.4, "s", 0.02, 1e4, "assumed", "its time constant")
-    creep_time_2: float = parameter(2.5, "s", 0.02, 1e4, "assumed", "its time constant")
-    creep_time_3: float = parameter(15.0, "s", 0.02, 1e4, "assumed", "its time constant")
-    creep_time_4: float = parameter(90.0, "s", 0.02, 1e4, "assumed", "its time constant")
+    creep_1: float = effect("1", -0.5, 2.0, "first Kelvin-Voigt compliance")
+    creep_2: float = effect("1", -0.5, 2.0, "second Kelvin-Voigt compliance")
+    creep_3: float = effect("1", -0.5, 2.0, "third Kelvin-Voigt compliance")
+    creep_4: float = effect("1", -0.5, 2.0, "fourth Kelvin-Voigt compliance")
+    creep_time_1: float = assumed(0.4, "s", 0.02, 1e4, "its time constant")
+    creep_time_2: float = assumed(2.5, "s", 0.02, 1e4, "its time constant")
+    creep_time_3: float = assumed(15.0, "s", 0.02, 1e4, "its time constant")
+    creep_time_4: float = assumed(90.0, "s", 0.02, 1e4, "its time constant")
 
 
 @kernel

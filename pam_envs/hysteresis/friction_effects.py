@@ -8,43 +8,31 @@ from typing import ClassVar
 from pam_envs.hysteresis.creep import CreepEffects
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, effect
 
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionEffects:
     """Shape and pressure dependence of the friction, neutral unless a recording shows them."""
 
-    shape: float = parameter(
-        1.0, "1", 0.01, 100.0, "assumed", "slope of small loops over that of plays", neutral=1.0
-    )
-    pressure_slope: float = parameter(
-        0.0, "1", -2.0, 20.0, "assumed", "friction gained up to full pressure, linear", neutral=0.0
-    )
-    pressure_bend: float = parameter(
-        0.0, "1", -20.0, 20.0, "assumed", "friction gained with pressure squared", neutral=0.0
-    )
+    shape: float = assumed(1.0, "1", 0.01, 100.0, "slope of small loops over plays'", neutral=1.0)
+    pressure_slope: float = effect("1", -2.0, 20.0, "friction gained up to full pressure, linear")
+    pressure_bend: float = effect("1", -20.0, 20.0, "friction gained with pressure squared")
 
 
 @dataclass(frozen=True, kw_only=True)
 class FirstCycles:
     """Loss of force in the first cycles, none unless a recording shows it."""
 
-    first_loss: float = parameter(
-        0.0, "1", -0.9, 0.9, "assumed", "effective pressure missing at first", neutral=0.0
-    )
-    first_travel: float = parameter(
-        2e6, "Pa", 1e4, 1e9, "assumed", "pressure travel in which the first state fades"
-    )
+    first_loss: float = effect("1", -0.9, 0.9, "effective pressure missing at first")
+    first_travel: float = assumed(2e6, "Pa", 1e4, 1e9, "pressure travel of the transition")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Threshold:
     """Pressure below which the muscle exerts no force, none unless a recording shows it."""
 
-    threshold: float = parameter(
-        0.0, "Pa", 0.0, 3e5, "assumed", "pressure before the tube meets the braid", neutral=0.0
-    )
+    threshold: float = effect("Pa", 0.0, 3e5, "pressure before the tube meets the braid")
 
 
 @dataclass(frozen=True, kw_only=True)

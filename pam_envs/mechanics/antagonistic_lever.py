@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.arithmetic import sine_of_turns
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, derived
 
 _SIZE = "with it +-30 degrees take 0 to 25 % of a muscle of 150 mm (fluidic_muscles, section 2)"
 PER_TURN = 1.0 / (2.0 * math.pi)
@@ -35,11 +35,11 @@ Array = NDArray[np.float64]
 class AntagonisticLever:
     """Fixing points of the muscles of one stage; ``u`` is the lower plate, ``o`` the upper one."""
 
-    r_u: float = parameter(0.0362, "m", 0.005, 0.5, "derived", _SIZE)
-    r_o: float = parameter(0.0362, "m", 0.005, 0.5, "derived", _SIZE)
-    l_u: float = parameter(0.1, "m", 0.02, 1.0, "assumed", _SIZE)
-    l_o: float = parameter(0.1, "m", 0.02, 1.0, "assumed", _SIZE)
-    fittings: float = parameter(0.0619, "m", 0.0, 0.5, "derived", _SIZE)
+    r_u: float = derived(0.0362, "m", 0.005, 0.5, _SIZE)
+    r_o: float = derived(0.0362, "m", 0.005, 0.5, _SIZE)
+    l_u: float = assumed(0.1, "m", 0.02, 1.0, _SIZE)
+    l_o: float = assumed(0.1, "m", 0.02, 1.0, _SIZE)
+    fittings: float = derived(0.0619, "m", 0.0, 0.5, _SIZE)
 
     def length(self, angle: ArrayLike) -> Array:
         """Return the lengths of both muscles [m] at angles (...) [rad], shape (..., 2)."""

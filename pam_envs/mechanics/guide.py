@@ -8,22 +8,16 @@ from typing import Any, ClassVar
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import kernel
 from pam_envs.kernels.motion import damped_motion
-from pam_envs.parameters import parameter, parameter_rows
+from pam_envs.parameters import assumed, effect, parameter_rows
 
 
 @dataclass(frozen=True, kw_only=True)
 class GuideEffects:
     """Dry friction of the guide of a load, none unless a recording shows it."""
 
-    stick: float = parameter(
-        0.0, "N", 0.0, 200.0, "assumed", "force at which the guide breaks away", neutral=0.0
-    )
-    stick_kinetic: float = parameter(
-        0.5, "1", 0.0, 1.0, "assumed", "force while it slides, over that at which it breaks away"
-    )
-    stick_speed: float = parameter(
-        5e-3, "m/s", 1e-4, 1.0, "assumed", "speed at which friction falls to the kinetic one"
-    )
+    stick: float = effect("N", 0.0, 200.0, "force at which the guide breaks away")
+    stick_kinetic: float = assumed(0.5, "1", 0.0, 1.0, "sliding friction over breakaway friction")
+    stick_speed: float = assumed(5e-3, "m/s", 1e-4, 1.0, "Stribeck speed")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,15 +26,9 @@ class BearingEffects:
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (("stick", "stick_kinetic", "stick_speed"),)
 
-    stick: float = parameter(
-        0.0, "N m", 0.0, 50.0, "assumed", "torque at which the bearing breaks away", neutral=0.0
-    )
-    stick_kinetic: float = parameter(
-        0.5, "1", 0.0, 1.0, "assumed", "torque while it turns, over that at which it breaks away"
-    )
-    stick_speed: float = parameter(
-        0.05, "rad/s", 1e-3, 10.0, "assumed", "speed at which friction falls to the kinetic one"
-    )
+    stick: float = effect("N m", 0.0, 50.0, "torque at which the bearing breaks away")
+    stick_kinetic: float = assumed(0.5, "1", 0.0, 1.0, "sliding friction over breakaway friction")
+    stick_speed: float = assumed(0.05, "rad/s", 1e-3, 10.0, "Stribeck speed")
 
 
 GUIDE = parameter_rows(GuideEffects)

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from pam_envs.mechanics.guide import GuideEffects
 from pam_envs.mechanics.support import MountEffects, SupportEffects
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, effect, published
 
 
 @dataclass(frozen=True)
@@ -27,37 +27,13 @@ class HangingMass(MountEffects, SupportEffects, GuideEffects):
         ("ring_share", "ring_frequency", "ring_damping"),
     )
 
-    load: float = parameter(
-        2.55,
-        "kg",
-        0.0,
-        50.0,
-        "published",
-        "positioning2021: 0, 2.55 and 4.55 kg",
-        spread=(0.0, 4.55),
+    load: float = published(2.55, "kg", 0.0, 50.0, "of positioning2021", spread=(0.0, 4.55))
+    moving_mass: float = assumed(
+        0.25, "kg", 0.05, 5.0, "end fitting, rod and half of a 10 mm muscle", spread=(0.15, 0.5)
     )
-    moving_mass: float = parameter(
-        0.25,
-        "kg",
-        0.05,
-        5.0,
-        "assumed",
-        "end fitting, rod and half the muscle of a 10 mm size; not published",
-        spread=(0.15, 0.5),
-    )
-    damping: float = parameter(
-        250.0,
-        "N s/m",
-        10.0,
-        1e4,
-        "assumed",
-        "damping ratio 0.3 to 0.4 at 4.55 kg; published values for larger muscles are higher",
-        spread=(120.0, 450.0),
+    damping: float = assumed(
+        250.0, "N s/m", 10.0, 1e4, "damping ratio 0.3 to 0.4 at 4.55 kg", spread=(120.0, 450.0)
     )
     # effects, neutral unless a recording shows them
-    carried: float = parameter(
-        1.0, "1", 0.0, 1.0, "assumed", "share of the load that is accelerated", neutral=1.0
-    )
-    load_error: float = parameter(
-        0.0, "kg", -5.0, 5.0, "assumed", "what hangs beside the declared load", neutral=0.0
-    )
+    carried: float = assumed(1.0, "1", 0.0, 1.0, "accelerated share of the load", neutral=1.0)
+    load_error: float = effect("kg", -5.0, 5.0, "what hangs beside the declared load")

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from pam_envs.kernels.arithmetic import sine_of_turns
 from pam_envs.kernels.build import kernel
 from pam_envs.mechanics.guide import BearingEffects
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, derived
 
 _GEOMETRY = "reproduces 158 N at 2 bar and 22 cm with yeh2010's range of tension and stiffness"
 PER_TURN = 1.0 / (2.0 * math.pi)
@@ -35,34 +35,17 @@ class KneeLever(BearingEffects):
     ``mount_angle`` is the wire's angle at a straight knee: how the wearer straps the brace on.
     """
 
-    arm: float = parameter(0.14, "m", 0.05, 0.4, "assumed", f"L_b; {_GEOMETRY}")
-    fittings: float = parameter(0.0094, "m", 0.0, 0.1, "derived", f"L_a; {_GEOMETRY}")
-    stiffness: float = parameter(
-        30.0,
-        "N m/rad",
-        1.0,
-        1e3,
-        "assumed",
-        f"kappa; {_GEOMETRY}",
-        spread=(27.0, 33.0),
+    arm: float = assumed(0.14, "m", 0.05, 0.4, f"L_b; {_GEOMETRY}")
+    fittings: float = derived(0.0094, "m", 0.0, 0.1, f"L_a; {_GEOMETRY}")
+    stiffness: float = assumed(30.0, "N m/rad", 1.0, 1e3, _GEOMETRY, spread=(27.0, 33.0))
+    relaxed_angle: float = derived(
+        2.3422, "rad", 0.5, 3.1, "theta_0, at rest at 2 bar, 110 degrees"
     )
-    relaxed_angle: float = parameter(
-        2.3422, "rad", 0.5, 3.1, "derived", "theta_0 = 134.2 degrees: rest at 2 bar and 110 degrees"
+    mount_angle: float = assumed(
+        1.7453, "rad", 0.5, 3.0, "20 % of the torque of a slow stride then takes up to 3.7 bar"
     )
-    mount_angle: float = parameter(
-        1.7453,
-        "rad",
-        0.5,
-        3.0,
-        "assumed",
-        "100 degrees: 20 % of the torque of a slow stride then takes up to 3.7 bar of 4.5",
-    )
-    inertia: float = parameter(
-        0.02, "kg m2", 1e-3, 0.5, "assumed", "half a brace of 0.8 kg about the knee"
-    )
-    damping: float = parameter(
-        1.0, "N m s/rad", 0.05, 50.0, "assumed", "bearings, wire and muscle: damping ratio 0.5"
-    )
+    inertia: float = assumed(0.02, "kg m2", 1e-3, 0.5, "half a brace of 0.8 kg about the knee")
+    damping: float = assumed(1.0, "N m s/rad", 0.05, 50.0, "brace and muscle: damping ratio 0.5")
 
     def length(self, angle: ArrayLike) -> NDArray[np.float64]:
         """Return the muscle's length ``L`` [m] at an angle [rad], Eq. (4)."""

@@ -30,71 +30,41 @@ from pam_envs.constants import GRAVITY
 from pam_envs.kernels.arithmetic import sine_of_turns
 from pam_envs.kernels.build import kernel
 from pam_envs.mechanics.knee_lever import PER_TURN
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, derived, published
 
+_AIM = (
+    "height that the ground's force keeps pointing at while it brakes, at another pace; "
+    "least squares on the measured stride give 1.13 m; 0: the centre of pressure as measured"
+)
 _SCALED = "OpenSim segment masses, gait10dof18musc, scaled to the body mass"
-_WEARER = "of the order of measured knee impedance"
+_SWING = "wearer in swing; of the order of measured knee impedance"
+_STANCE = "gained at full body weight; of the order of measured knee impedance"
 
 
 @dataclass(frozen=True)
 class Leg:
     """Shank and foot of the wearer, and how he holds his knee."""
 
-    body_mass: float = parameter(
-        72.6, "kg", 20.0, 200.0, "published", "subject of the measured stride", spread=(60.0, 85.0)
-    )
-    mass: float = parameter(5.1, "kg", 1.0, 15.0, "derived", _SCALED)
-    inertia: float = parameter(0.49, "kg m2", 0.05, 2.0, "derived", f"about the knee; {_SCALED}")
-    centre: float = parameter(
-        0.263, "m", 0.05, 0.6, "derived", f"centre of mass below the knee; {_SCALED}"
-    )
-    shank: float = parameter(0.43, "m", 0.2, 0.7, "derived", "L_0, knee to ankle, same model")
-    thigh: float = parameter(0.41, "m", 0.2, 0.7, "derived", "hip to knee, same model")
-    ankle_height: float = parameter(
-        0.08, "m", 0.0, 0.2, "assumed", "ankle above the sole; a risen heel is left out"
-    )
-    aim_height: float = parameter(
-        1.0,
-        "m",
-        0.0,
-        2.0,
-        "assumed",
-        "height that the ground's force keeps pointing at while it brakes, at another pace; "
-        "least squares on the measured stride give 1.13 m; 0: the centre of pressure as measured",
-        neutral=0.0,
-        spread=(0.9, 1.15),
-    )
-    damping: float = parameter(
-        0.38, "N m s/rad", 0.0, 20.0, "derived", "passive knee, decay of pendulum tests, 0.35-0.42"
-    )
-    stiffness: float = parameter(
-        2.8, "N m/rad", 0.0, 100.0, "derived", "passive knee, period of pendulum tests"
-    )
-    hold_stiffness: float = parameter(
-        20.0, "N m/rad", 0.0, 500.0, "assumed", f"wearer in swing; {_WEARER}", spread=(12.0, 35.0)
-    )
-    hold_damping: float = parameter(
-        3.0, "N m s/rad", 0.0, 50.0, "assumed", f"wearer in swing; {_WEARER}"
-    )
-    stance_stiffness: float = parameter(
-        250.0,
-        "N m/rad",
-        0.0,
-        2e3,
-        "assumed",
-        f"gained at full body weight; {_WEARER}",
-        spread=(150.0, 350.0),
-    )
-    stance_damping: float = parameter(
-        12.0, "N m s/rad", 0.0, 200.0, "assumed", f"gained at full body weight; {_WEARER}"
-    )
-    habituation: float = parameter(
+    body_mass: float = published(72.6, "kg", 20.0, 200.0, "measured subject", spread=(60.0, 85.0))
+    mass: float = derived(5.1, "kg", 1.0, 15.0, _SCALED)
+    inertia: float = derived(0.49, "kg m2", 0.05, 2.0, f"about the knee; {_SCALED}")
+    centre: float = derived(0.263, "m", 0.05, 0.6, f"centre of mass below the knee; {_SCALED}")
+    shank: float = derived(0.43, "m", 0.2, 0.7, "L_0, knee to ankle, same model")
+    thigh: float = derived(0.41, "m", 0.2, 0.7, "hip to knee, same model")
+    ankle_height: float = assumed(0.08, "m", 0.0, 0.2, "ankle above the sole, heel on the ground")
+    aim_height: float = assumed(1.0, "m", 0.0, 2.0, _AIM, neutral=0.0, spread=(0.9, 1.15))
+    damping: float = derived(0.38, "N m s/rad", 0.0, 20.0, "passive knee, pendulum: 0.35-0.42")
+    stiffness: float = derived(2.8, "N m/rad", 0.0, 100.0, "passive knee, period of pendulum tests")
+    hold_stiffness: float = assumed(20.0, "N m/rad", 0.0, 500.0, _SWING, spread=(12.0, 35.0))
+    hold_damping: float = assumed(3.0, "N m s/rad", 0.0, 50.0, _SWING)
+    stance_stiffness: float = assumed(250.0, "N m/rad", 0.0, 2e3, _STANCE, spread=(150.0, 350.0))
+    stance_damping: float = assumed(12.0, "N m s/rad", 0.0, 200.0, _STANCE)
+    habituation: float = assumed(
         1.0,
         "1",
         0.0,
         1.0,
-        "assumed",
-        "share of the wire's torque past its relaxed angle that the wearer has learnt to bear",
+        "share of the wire's torque past its relaxed angle borne by the wearer",
         spread=(0.7, 1.0),
     )
 

@@ -8,13 +8,14 @@ range, where it is longest; beyond, stiff springs represent the mechanical stops
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, published
 
 Array = NDArray[np.float64]
 
@@ -23,21 +24,10 @@ Array = NDArray[np.float64]
 class Pulley:
     """Pulley of the elbow; the angle is its flexion, 0 with the forearm straight."""
 
-    radius: float = parameter(0.0315, "m", 5e-3, 0.2, "published", "chakarov2018, section 3")
-    lowest: float = parameter(
-        0.0, "rad", -1.0, 1.0, "assumed", "the stroke begins with the forearm straight"
-    )
-    highest: float = parameter(
-        2.0943951023931953,
-        "rad",
-        0.1,
-        3.0,
-        "published",
-        "120 degrees of stroke: chakarov2018, section 3",
-    )
-    stop_stiffness: float = parameter(
-        300.0, "N m/rad", 10.0, 1e5, "assumed", "20 N m press a stop in by 4 degrees"
-    )
+    radius: float = published(0.0315, "m", 5e-3, 0.2, "chakarov2018, section 3")
+    lowest: float = assumed(0.0, "rad", -1.0, 1.0, "the stroke begins with the forearm straight")
+    highest: float = published(math.radians(120.0), "rad", 0.1, 3.0, "chakarov2018, section 3")
+    stop_stiffness: float = assumed(300.0, "N m/rad", 10.0, 1e5, "4 degrees of give at 20 N m")
 
     @property
     def middle(self) -> float:

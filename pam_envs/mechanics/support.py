@@ -7,39 +7,23 @@ from typing import Any
 
 from pam_envs.kernels.build import kernel
 from pam_envs.kernels.motion import resonator_step
-from pam_envs.parameters import named_rows, parameter
+from pam_envs.parameters import assumed, effect, named_rows
 
 
 @dataclass(frozen=True, kw_only=True)
 class SupportEffects:
     """A support that gives way under the load, none unless a recording shows it."""
 
-    slack: float = parameter(
-        0.0,
-        "m",
-        0.0,
-        0.02,
-        "assumed",
-        "contraction over which the support lets the load go",
-        neutral=0.0,
-    )
+    slack: float = effect("m", 0.0, 0.02, "contraction over which the support lets the load go")
 
 
 @dataclass(frozen=True, kw_only=True)
 class MountEffects:
     """A mount that gives way, rigid unless a recording shows a resonance."""
 
-    ring_share: float = parameter(
-        0.0,
-        "1",
-        -1.0,
-        1.0,
-        "assumed",
-        "share of the motion behind a mount that gives or tilts",
-        neutral=0.0,
-    )
-    ring_frequency: float = parameter(7.0, "Hz", 0.5, 20.0, "assumed", "of the mount")
-    ring_damping: float = parameter(0.1, "1", 0.005, 2.0, "assumed", "damping ratio of the mount")
+    ring_share: float = effect("1", -1.0, 1.0, "share of the motion behind a compliant mount")
+    ring_frequency: float = assumed(7.0, "Hz", 0.5, 20.0, "of the mount")
+    ring_damping: float = assumed(0.1, "1", 0.005, 2.0, "damping ratio of the mount")
 
 
 MOUNT_STATE = named_rows("position", "rate")

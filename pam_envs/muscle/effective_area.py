@@ -24,7 +24,7 @@ from pam_envs.muscle.load_effects import LoadEffects
 from pam_envs.muscle.strands import StrandEffects
 from pam_envs.muscle.temperature import TemperatureEffects
 from pam_envs.muscle.viscosity import ViscosityEffects
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, effect, identified, published
 
 _FIT = "least squares on positioning2021, Tables 3-5"
 
@@ -48,31 +48,19 @@ class EffectiveAreaMuscle(
         ("viscosity", "viscosity_speed"),
     )
 
-    rest_length: float = parameter(
-        0.1, "m", 0.02, 2.0, "published", "positioning2021, Table 1: MAS-10-N-100"
-    )
-    diameter: float = parameter(
-        0.01, "m", 0.003, 0.1, "published", "positioning2021, Table 1: MAS-10-N-100"
-    )
-    braid_angle: float = parameter(
-        0.499, "rad", 0.2, 0.9, "assumed", "28.6 degrees, DMSP-10-250 (public model code)"
-    )
-    area: float = parameter(8.7e-4, "m2", 1e-5, 2e-2, "identified", _FIT)
-    area_taper: float = parameter(0.0, "1", 0.0, 6.0, "identified", _FIT, neutral=0.0)
-    braid_force: float = parameter(106.0, "N", 0.0, 5e3, "identified", _FIT)
-    braid_strain: float = parameter(0.0167, "1", 0.005, 0.2, "identified", _FIT)
-    stiffness: float = parameter(2250.0, "N", 0.0, 1e5, "identified", _FIT)
-    hardening: float = parameter(8600.0, "N", -1e7, 1e7, "identified", _FIT)
+    rest_length: float = published(0.1, "m", 0.02, 2.0, "positioning2021, Table 1: MAS-10-N-100")
+    diameter: float = published(0.01, "m", 0.003, 0.1, "positioning2021, Table 1: MAS-10-N-100")
+    braid_angle: float = assumed(0.499, "rad", 0.2, 0.9, "DMSP-10-250 (public model code)")
+    area: float = identified(8.7e-4, "m2", 1e-5, 2e-2, _FIT)
+    area_taper: float = identified(0.0, "1", 0.0, 6.0, _FIT, neutral=0.0)
+    braid_force: float = identified(106.0, "N", 0.0, 5e3, _FIT)
+    braid_strain: float = identified(0.0167, "1", 0.005, 0.2, _FIT)
+    stiffness: float = identified(2250.0, "N", 0.0, 1e5, _FIT)
+    hardening: float = identified(8600.0, "N", -1e7, 1e7, _FIT)
     # a static map that has to be finer; neutral in the plain law
-    area_curve: float = parameter(
-        0.0, "1", -60.0, 60.0, "assumed", "the area shrinks with strain squared too", neutral=0.0
-    )
-    softening: float = parameter(
-        0.0, "N", -1e6, 1e6, "assumed", "passive force over strain squared", neutral=0.0
-    )
-    stiffening: float = parameter(
-        0.0, "N", -1e8, 1e8, "assumed", "passive force over strain to the fourth", neutral=0.0
-    )
+    area_curve: float = effect("1", -60.0, 60.0, "the area shrinks with strain squared too")
+    softening: float = effect("N", -1e6, 1e6, "passive force over strain squared")
+    stiffening: float = effect("N", -1e8, 1e8, "passive force over strain to the fourth")
 
     def tension(self, drive: ArrayLike, strain: ArrayLike) -> NDArray[np.float64]:
         """Return the force [N] at effective pressure ``drive`` [Pa] and ``strain`` [1]."""

@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import entry, kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed
 
 Reading = Literal["uncalibrated", "A", "B"]
 READINGS: tuple[Reading, ...] = ("uncalibrated", "A", "B")
@@ -39,18 +39,10 @@ Array = NDArray[np.float64]
 class MuscleActivation:
     """From the torque that the wearer's muscles bear to their activation."""
 
-    largest_torque: float = parameter(
-        200.0, "N m", 20.0, 600.0, "assumed", "strongest extension of an adult's knee"
-    )
-    floor: float = parameter(
-        0.03, "1", 0.0, 0.3, "assumed", "co-contraction, 0.02 to 0.05", neutral=0.0
-    )
-    rise_time: float = parameter(
-        0.0125, "s", 0.001, 0.2, "assumed", "activation dynamics, 10 to 15 ms"
-    )
-    fall_time: float = parameter(
-        0.05, "s", 0.001, 0.5, "assumed", "activation dynamics, 40 to 60 ms"
-    )
+    largest_torque: float = assumed(200.0, "N m", 20.0, 600.0, "largest knee extension of an adult")
+    floor: float = assumed(0.03, "1", 0.0, 0.3, "co-contraction, 0.02 to 0.05", neutral=0.0)
+    rise_time: float = assumed(0.0125, "s", 0.001, 0.2, "activation dynamics, 10 to 15 ms")
+    fall_time: float = assumed(0.05, "s", 0.001, 0.5, "activation dynamics, 40 to 60 ms")
 
 
 @kernel

@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import kernel
 from pam_envs.muscle.temperature import TemperatureEffects
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, derived, identified, published
 
 _FIT = "least squares on the measured map of a DMSP-10-250 (data/dmsp10_force_map.csv)"
 FULL_PRESSURE = 6.5e5
@@ -47,56 +47,43 @@ class ForceMap(TemperatureEffects):
     muscle B ``gain (1 - imbalance)`` times.
     """
 
-    area: float = parameter(8.9128e-4, "m2", 1e-5, 1e-2, "identified", _FIT)
-    taper: float = parameter(3.0078, "1", 0.0, 10.0, "identified", _FIT)
-    threshold: float = parameter(36.325, "N", 0.0, 500.0, "identified", _FIT)
-    braid_force: float = parameter(148.50, "N", 0.0, 5e3, "identified", _FIT)
-    braid_strain: float = parameter(0.02139, "1", 0.005, 0.3, "identified", _FIT)
-    stiffness: float = parameter(148.33, "N", 0.0, 1e4, "identified", _FIT)
-    stretch: float = parameter(
-        1.0,
-        "1",
-        0.5,
-        2.0,
-        "identified",
-        "as measured: the force at 6.5 bar ends at 20.9 % contraction",
-        neutral=1.0,
+    area: float = identified(8.9128e-4, "m2", 1e-5, 1e-2, _FIT)
+    taper: float = identified(3.0078, "1", 0.0, 10.0, _FIT)
+    threshold: float = identified(36.325, "N", 0.0, 500.0, _FIT)
+    braid_force: float = identified(148.50, "N", 0.0, 5e3, _FIT)
+    braid_strain: float = identified(0.02139, "1", 0.005, 0.3, _FIT)
+    stiffness: float = identified(148.33, "N", 0.0, 1e4, _FIT)
+    stretch: float = identified(
+        1.0, "1", 0.5, 2.0, "1: no force beyond 20.9 % at 6.5 bar, as measured", neutral=1.0
     )
-    gain: float = parameter(
+    gain: float = assumed(
         1.0,
         "1",
         0.5,
         1.5,
-        "assumed",
-        "force of these specimens over that of the map; batches differ by up to 25 %",
+        "specimen over map; batches differ by 25 %",
         neutral=1.0,
         spread=(0.85, 1.15),
     )
-    imbalance: float = parameter(
+    imbalance: float = assumed(
         0.0,
         "1",
         -0.3,
         0.3,
-        "assumed",
-        "muscle A stronger and muscle B weaker by this share",
+        "share by which A is stronger and B weaker",
         neutral=0.0,
         spread=(-0.05, 0.05),
     )
-    viscosity: float = parameter(
+    viscosity: float = derived(
         1.2e-4,
         "m2 s",
         0.0,
         1e-2,
-        "derived",
-        "force over pressure and contraction rate; second pole at 23 rad/s at the nominal point",
+        "gives the second pole at 23 rad/s at the nominal point",
         spread=(0.8e-4, 1.8e-4),
     )
-    rest_length: float = parameter(
-        0.15, "m", 0.02, 2.0, "published", "DMSP-10-150N: fluidic_muscles, section 1.2"
-    )
-    diameter: float = parameter(
-        0.01, "m", 2e-3, 0.1, "published", "DMSP-10-150N: fluidic_muscles, section 1.2"
-    )
+    rest_length: float = published(0.15, "m", 0.02, 2.0, "fluidic_muscles, section 1.2")
+    diameter: float = published(0.01, "m", 2e-3, 0.1, "fluidic_muscles, section 1.2")
 
     def area_at(self, contraction: ArrayLike) -> NDArray[np.float64]:
         """Return the force over pressure [m2] at a contraction [1]."""

@@ -15,42 +15,27 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import kernel
 from pam_envs.muscle.temperature import TemperatureEffects
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, derived
 
 
 @dataclass(frozen=True)
 class GasSpring(TemperatureEffects):
     """The muscle of the orthosis."""
 
-    shortest_length: float = parameter(
-        0.17, "m", 0.02, 1.0, "assumed", "L_min: 5 cm below the nominal length of yeh2010"
+    shortest_length: float = assumed(0.17, "m", 0.02, 1.0, "L_min: 5 cm below yeh2010's nominal")
+    gain: float = assumed(
+        1.0, "1", 0.5, 1.5, "stiffness over that of the hysteresis", neutral=1.0, spread=(0.9, 1.1)
     )
-    gain: float = parameter(
-        1.0,
-        "1",
-        0.5,
-        1.5,
-        "assumed",
-        "stiffness of this specimen over that of its hysteresis",
-        neutral=1.0,
-        spread=(0.9, 1.1),
-    )
-    stiffness_ratio: float = parameter(
+    stiffness_ratio: float = derived(
         0.0158,
         "N/(m Pa)",
         1e-4,
         1.0,
-        "derived",
-        "alpha: 158 N at 2 bar and L_min + 5 cm (yeh2010, section 4.1)",
+        "alpha: 158 N at 2 bar (yeh2010, section 4.1)",
         spread=(0.0142, 0.0174),
     )
-    full_volume: float = parameter(
-        1.33e-4,
-        "m3",
-        1e-6,
-        1e-2,
-        "derived",
-        "at L_min, from Eq. (5) corrected: threads of 29.4 cm in 2.43 turns",
+    full_volume: float = derived(
+        1.33e-4, "m3", 1e-6, 1e-2, "Eq. (5) corrected, at L_min: 2.43 turns of 29.4 cm"
     )
 
     def tension(self, stiffness: ArrayLike, length: ArrayLike) -> NDArray[np.float64]:

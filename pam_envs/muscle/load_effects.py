@@ -6,25 +6,17 @@ import math
 from dataclasses import dataclass
 
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import effect
 
 
 @dataclass(frozen=True, kw_only=True)
 class LoadEffects:
     """Dependence of the static law on the load, none unless a recording shows it."""
 
-    load_curve: float = parameter(
-        0.0, "Pa/N2", -200.0, 200.0, "assumed", "pressure shift over load squared", neutral=0.0
-    )
-    load_stiffening: float = parameter(
-        0.0, "1/N", -0.015, 0.05, "assumed", "stiffness gained per newton of load", neutral=0.0
-    )
-    load_stiffening_2: float = parameter(
-        0.0, "1/N2", -2e-4, 1e-3, "assumed", "the same by load squared", neutral=0.0
-    )
-    load_stiffening_root: float = parameter(
-        0.0, "1/N^0.5", -0.1, 0.5, "assumed", "the same by the root of the load", neutral=0.0
-    )
+    load_curve: float = effect("Pa/N2", -200.0, 200.0, "pressure shift over load squared")
+    load_stiffening: float = effect("1/N", -0.015, 0.05, "stiffness gained per newton of load")
+    load_stiffening_2: float = effect("1/N2", -2e-4, 1e-3, "the same by load squared")
+    load_stiffening_root: float = effect("1/N^0.5", -0.1, 0.5, "the same by the root of the load")
 
 
 @kernel

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import kernel
 from pam_envs.muscle.temperature import TemperatureEffects
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, published
 
 Array = NDArray[np.float64]
 
@@ -42,32 +42,17 @@ _ENDS = (
 class QuadraticBundle(TemperatureEffects):
     """Muscles side by side, fed together and joined at both ends."""
 
-    muscles: float = parameter(3.0, "1", 1.0, 40.0, "published", "chakarov2018, section 3: 3 and 7")
-    nominal_length: float = parameter(
-        0.39, "m", 0.05, 2.0, "published", "L_n: chakarov2018, section 2"
-    )
-    largest_contraction: float = parameter(
-        0.28, "1", 0.05, 0.36, "assumed", _ENDS, spread=(0.27, 0.3)
-    )
-    passive_base: float = parameter(-39.0, "N/m2", -320.0, 5e3, "published", _FIT)
-    passive_each: float = parameter(321.0, "N/m2", 0.0, 5e3, "published", _FIT)
-    pressure_base: float = parameter(-2.1e-4, "N/(m2 Pa)", -4e-3, 0.1, "assumed", _READ)
-    pressure_each: float = parameter(4.41e-3, "N/(m2 Pa)", 1e-4, 0.1, "published", _FIT)
-    diameter: float = parameter(
-        0.016, "m", 2e-3, 0.1, "published", "largest diameter of the braid: chakarov2018, section 2"
-    )
-    line_volume: float = parameter(
-        1e-5, "m3", 0.0, 1e-2, "assumed", "of tube and fittings: 0.5 m of 5 mm bore"
-    )
-    gain: float = parameter(
-        1.0,
-        "1",
-        0.5,
-        1.5,
-        "assumed",
-        "force of these specimens over that of the law",
-        neutral=1.0,
-        spread=(0.9, 1.1),
+    muscles: float = published(3.0, "1", 1.0, 40.0, "chakarov2018, section 3: 3 and 7")
+    nominal_length: float = published(0.39, "m", 0.05, 2.0, "L_n: chakarov2018, section 2")
+    largest_contraction: float = assumed(0.28, "1", 0.05, 0.36, _ENDS, spread=(0.27, 0.3))
+    passive_base: float = published(-39.0, "N/m2", -320.0, 5e3, _FIT)
+    passive_each: float = published(321.0, "N/m2", 0.0, 5e3, _FIT)
+    pressure_base: float = assumed(-2.1e-4, "N/(m2 Pa)", -4e-3, 0.1, _READ)
+    pressure_each: float = published(4.41e-3, "N/(m2 Pa)", 1e-4, 0.1, _FIT)
+    diameter: float = published(0.016, "m", 2e-3, 0.1, "of the braid: chakarov2018, section 2")
+    line_volume: float = assumed(1e-5, "m3", 0.0, 1e-2, "of tube and fittings: 0.5 m of 5 mm bore")
+    gain: float = assumed(
+        1.0, "1", 0.5, 1.5, "force over that of the law", neutral=1.0, spread=(0.9, 1.1)
     )
 
     @property

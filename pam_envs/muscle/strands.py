@@ -7,7 +7,7 @@ from typing import Any
 
 from pam_envs.kernels.arithmetic import count_on
 from pam_envs.kernels.build import LANES, kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, effect
 
 BREAKS = (0.1, 0.3, 0.6, 1.0)
 """Strains at which strands break away, over that of the last one."""
@@ -18,21 +18,11 @@ STRANDS = len(BREAKS)
 class StrandEffects:
     """Friction of strands against each other, none unless a recording shows it."""
 
-    strand_1: float = parameter(
-        0.0, "N", 0.0, 500.0, "assumed", "friction of the first strands to break away", neutral=0.0
-    )
-    strand_2: float = parameter(
-        0.0, "N", 0.0, 500.0, "assumed", "friction of the second strands to break away", neutral=0.0
-    )
-    strand_3: float = parameter(
-        0.0, "N", 0.0, 500.0, "assumed", "friction of the third strands to break away", neutral=0.0
-    )
-    strand_4: float = parameter(
-        0.0, "N", 0.0, 500.0, "assumed", "friction of the last strands to break away", neutral=0.0
-    )
-    strand_break: float = parameter(
-        0.02, "1", 0.001, 0.3, "assumed", "strain at which the last strand slips"
-    )
+    strand_1: float = effect("N", 0.0, 500.0, "friction of the first strands to break away")
+    strand_2: float = effect("N", 0.0, 500.0, "friction of the second strands to break away")
+    strand_3: float = effect("N", 0.0, 500.0, "friction of the third strands to break away")
+    strand_4: float = effect("N", 0.0, 500.0, "friction of the last strands to break away")
+    strand_break: float = assumed(0.02, "1", 0.001, 0.3, "strain at which the last strand slips")
 
 
 @kernel

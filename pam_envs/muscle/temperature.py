@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from pam_envs.constants import ROOM_TEMPERATURE
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, effect
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,12 +16,8 @@ class TemperatureEffects:
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (("temperature", "temperature_gain"),)
 
-    temperature: float = parameter(
-        ROOM_TEMPERATURE, "K", 230.0, 400.0, "assumed", "of the muscle; the law is that of 293.15 K"
-    )
-    temperature_gain: float = parameter(
-        0.0, "1/K", -0.05, 0.05, "assumed", "effective pressure gained per kelvin", neutral=0.0
-    )
+    temperature: float = assumed(ROOM_TEMPERATURE, "K", 230.0, 400.0, "of the muscle")
+    temperature_gain: float = effect("1/K", -0.05, 0.05, "effective pressure gained per kelvin")
 
 
 @kernel

@@ -6,19 +6,15 @@ import math
 from dataclasses import dataclass
 
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, effect
 
 
 @dataclass(frozen=True, kw_only=True)
 class ViscosityEffects:
     """Damping at small speeds, none unless a recording shows it."""
 
-    viscosity: float = parameter(
-        0.0, "N s/m", 0.0, 1e5, "assumed", "damping at small speed beside the mass's", neutral=0.0
-    )
-    viscosity_speed: float = parameter(
-        0.02, "m/s", 1e-4, 10.0, "assumed", "speed at which that damping has fallen by 1 / sqrt(2)"
-    )
+    viscosity: float = effect("N s/m", 0.0, 1e5, "damping at small speed beside the mass's")
+    viscosity_speed: float = assumed(0.02, "m/s", 1e-4, 10.0, "speed that lowers it by 1 / sqrt(2)")
 
 
 @kernel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, published
 from pam_envs.pneumatics.regulator import DelayedEffects
 
 
@@ -12,25 +12,10 @@ from pam_envs.pneumatics.regulator import DelayedEffects
 class BundleRegulator(DelayedEffects):
     """A closed-loop pressure regulator in the place of the paper's valves."""
 
-    max_pressure: float = parameter(
-        6e5, "Pa", 1e4, 1.2e6, "published", "600 kPa at most: chakarov2018, section 2"
+    max_pressure: float = published(6e5, "Pa", 1e4, 1.2e6, "largest: chakarov2018, section 2")
+    time_constant: float = assumed(
+        0.05, "s", 0.002, 2.0, "of its class; see regulator.py", spread=(0.035, 0.12)
     )
-    time_constant: float = parameter(
-        0.05,
-        "s",
-        0.002,
-        2.0,
-        "assumed",
-        "of its class; see the regulator of positioning2021",
-        spread=(0.035, 0.12),
-    )
-    slew_rate: float = parameter(
-        1.5e6,
-        "Pa/s",
-        1e4,
-        1e9,
-        "assumed",
-        "some 200 l/min into the 0.23 l of seven muscles",
-        neutral=1e9,
-        spread=(0.8e6, 3e6),
+    slew_rate: float = assumed(
+        1.5e6, "Pa/s", 1e4, 1e9, "200 l/min into seven muscles", neutral=1e9, spread=(0.8e6, 3e6)
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, derived
 from pam_envs.pneumatics.regulator import DelayedEffects
 
 
@@ -12,18 +12,13 @@ from pam_envs.pneumatics.regulator import DelayedEffects
 class JointRegulator(DelayedEffects):
     """A proportional regulator for each muscle: a first-order lag with a limited rate."""
 
-    max_pressure: float = parameter(
-        6.5e5, "Pa", 1e4, 1.2e6, "assumed", "the highest pressure of the measured force map"
-    )
-    time_constant: float = parameter(
+    max_pressure: float = assumed(6.5e5, "Pa", 1e4, 1.2e6, "highest of the measured force map")
+    time_constant: float = derived(
         1.0 / 23.0,
         "s",
         0.002,
         2.0,
-        "derived",
-        "one of the two poles at 23 rad/s of fluidic_muscles, Fig. 12",
+        "one of two poles, fluidic_muscles, Fig. 12",
         spread=(0.03, 0.06),
     )
-    slew_rate: float = parameter(
-        1e9, "Pa/s", 1e4, 1e9, "assumed", "not published; no limit", neutral=1e9
-    )
+    slew_rate: float = assumed(1e9, "Pa/s", 1e4, 1e9, "not published; no limit", neutral=1e9)

@@ -7,21 +7,17 @@ from typing import Any
 
 from pam_envs.kernels.build import kernel
 from pam_envs.kernels.motion import TURN, resonator_step
-from pam_envs.parameters import named_rows, parameter, parameter_rows
+from pam_envs.parameters import assumed, effect, named_rows, parameter_rows
 
 
 @dataclass(frozen=True, kw_only=True)
 class LineEffects:
     """Line of a regulator; rigid unless a recording shows a resonance."""
 
-    ring_share: float = parameter(
-        0.0, "1", 0.0, 1.0, "assumed", "share of the pressure behind a line that rings", neutral=0.0
-    )
-    ring_flow: float = parameter(
-        0.0, "1", -2.0, 2.0, "assumed", "ringing that goes with the flow", neutral=0.0
-    )
-    ring_frequency: float = parameter(7.0, "Hz", 0.5, 20.0, "assumed", "of the line")
-    ring_damping: float = parameter(0.1, "1", 0.005, 2.0, "assumed", "damping ratio of the line")
+    ring_share: float = effect("1", 0.0, 1.0, "share of the pressure behind a line that rings")
+    ring_flow: float = effect("1", -2.0, 2.0, "ringing that goes with the flow")
+    ring_frequency: float = assumed(7.0, "Hz", 0.5, 20.0, "of the line")
+    ring_damping: float = assumed(0.1, "1", 0.005, 2.0, "damping ratio of the line")
 
 
 LINE = parameter_rows(LineEffects)

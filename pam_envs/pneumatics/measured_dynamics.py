@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 from pam_envs.kernels.arithmetic import decay, sine_of_turns
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, published
 from pam_envs.pneumatics.regulator import DelayedEffects
 
 NUMERATOR = ((1.0, 17.45, 75.79), (1.0, 7.39, 13.41))
@@ -37,21 +37,16 @@ class OrthosisRegulator(DelayedEffects):
     frequency response in its place.
     """
 
-    max_pressure: float = parameter(
-        4.5e5, "Pa", 1e4, 1.2e6, "published", "yeh2010, section 5.2: capacity of the muscle"
-    )
-    time_constant: float = parameter(
+    max_pressure: float = published(4.5e5, "Pa", 1e4, 1.2e6, "yeh2010, section 5.2: of the muscle")
+    time_constant: float = assumed(
         0.0425,
         "s",
         0.002,
         2.0,
-        "assumed",
-        "gives the published 2.07 % of the inverse alone at 0.1 Hz, with the hold of 10 ms",
+        "gives the published 2.07 % of the inverse alone",
         spread=(0.035, 0.1),
     )
-    slew_rate: float = parameter(
-        1e9, "Pa/s", 1e4, 1e9, "assumed", "not published; no limit", neutral=1e9
-    )
+    slew_rate: float = assumed(1e9, "Pa/s", 1e4, 1e9, "not published; no limit", neutral=1e9)
 
 
 def roots(factor: tuple[float, float, float]) -> tuple[complex, ...]:

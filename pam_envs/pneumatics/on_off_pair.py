@@ -18,16 +18,14 @@ from dataclasses import dataclass
 
 from pam_envs.constants import ATMOSPHERE, REFERENCE_DENSITY
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, derived, published
 
 _MAKER = (
     "maker's data sheet of the V100 series, standard V114, the valve that chakarov2018 names in "
     "section 4 and says no more of"
 )
-_RESTORED = (
-    ", read from a copy that has lost digits; restored so that the flow is the 8.4 l/min that it "
-    "states from 6 to 5 bar"
-)
+_LOST = "a digit is lost in the copy of the " + _MAKER
+_RESTORED = _LOST + "; restored so that the flow from 6 to 5 bar is the 8.4 l/min that it states"
 
 
 @dataclass(frozen=True)
@@ -37,47 +35,27 @@ class OnOffValve:
     It is small: open for a whole cycle it fills seven muscles by some 5 kPa.
     """
 
-    supply_pressure: float = parameter(
-        6e5,
-        "Pa",
-        5e4,
-        1.2e6,
-        "published",
-        "gauge, 6 bar: chakarov2018, section 2",
-        spread=(5e5, 6e5),
+    supply_pressure: float = published(
+        6e5, "Pa", 5e4, 1.2e6, "gauge, 6 bar: chakarov2018, section 2", spread=(5e5, 6e5)
     )
-    conductance: float = parameter(
+    conductance: float = derived(
         3.7e-10,
         "m3/(s Pa)",
         1e-12,
         1e-6,
-        "derived",
-        _MAKER + _RESTORED + ": C = 0.037 dm3/(s bar)",
+        _RESTORED + ": C = 0.037 dm3/(s bar)",
         spread=(3e-10, 4.4e-10),
     )
-    critical_ratio: float = parameter(
-        0.11, "1", 0.0, 0.9, "derived", _MAKER + _RESTORED + ": b = 0.11", spread=(0.08, 0.3)
+    critical_ratio: float = derived(
+        0.11, "1", 0.0, 0.9, _RESTORED + ": b = 0.11", spread=(0.08, 0.3)
     )
-    opening_time: float = parameter(
-        5e-3,
-        "s",
-        1e-4,
-        0.1,
-        "assumed",
-        "5 ms or less; the digit is lost in the copy of the " + _MAKER,
-        spread=(3e-3, 7e-3),
+    opening_time: float = assumed(
+        5e-3, "s", 1e-4, 0.1, "5 ms or less; " + _LOST, spread=(3e-3, 7e-3)
     )
-    closing_time: float = parameter(
-        4e-3, "s", 1e-4, 0.1, "published", _MAKER + ": 4 ms or less", spread=(2.5e-3, 6e-3)
+    closing_time: float = published(
+        4e-3, "s", 1e-4, 0.1, _MAKER + ": 4 ms or less", spread=(2.5e-3, 6e-3)
     )
-    frequency: float = parameter(
-        20.0,
-        "Hz",
-        1.0,
-        100.0,
-        "assumed",
-        "20 cycles a second at most; the first digit is lost in the copy of the " + _MAKER,
-    )
+    frequency: float = assumed(20.0, "Hz", 1.0, 100.0, "20 cycles a second at most; " + _LOST)
 
 
 @kernel

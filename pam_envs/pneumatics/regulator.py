@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 from pam_envs.constants import ATMOSPHERE
 from pam_envs.kernels.arithmetic import count_on, decay
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import named_rows, parameter, parameter_rows
+from pam_envs.parameters import assumed, effect, named_rows, parameter_rows, published
 from pam_envs.pneumatics.line import LINE_STATE, LineEffects
 from pam_envs.pneumatics.supply import AMPLE, SupplyEffects, supplied, supply_drop
 
@@ -29,42 +29,18 @@ UNCHOKED = 100.0
 class ValveEffects:
     """Effects of a regulator's valve, neutral unless a recording shows them."""
 
-    gain: float = parameter(
-        1.0, "1", 0.5, 1.5, "assumed", "pressure reached over set-point", neutral=1.0
+    gain: float = assumed(1.0, "1", 0.5, 1.5, "pressure reached over set-point", neutral=1.0)
+    slew_bend: float = effect("1", 0.0, 1.0, "from a sharp slew limit to a rounded one")
+    dead_band: float = effect("Pa", 0.0, 3e5, "error that the valve does not answer")
+    dead_close: float = assumed(1.0, "1", 0.0, 1.0, "closing error over dead_band")
+    overlap: float = effect("Pa", 0.0, 3e5, "error up to which the spool only leaks")
+    overlap_leak: float = assumed(0.01, "1", 1e-4, 1.0, "gain within the overlap over the full one")
+    exhaust_ratio: float = assumed(1.0, "1", 0.1, 20.0, "exhaust lag over filling lag", neutral=1.0)
+    exhaust_taper: float = assumed(0.0, "1", 0.0, 1.0, "loss of exhaust_ratio at full pressure")
+    exhaust_rate: float = assumed(
+        UNCHOKED, "1/s", 0.05, UNCHOKED, "choked exhaust over absolute pressure", neutral=UNCHOKED
     )
-    slew_bend: float = parameter(
-        0.0, "1", 0.0, 1.0, "assumed", "from a sharp slew limit to a rounded one", neutral=0.0
-    )
-    dead_band: float = parameter(
-        0.0, "Pa", 0.0, 3e5, "assumed", "error that the valve does not answer", neutral=0.0
-    )
-    dead_close: float = parameter(
-        1.0, "1", 0.0, 1.0, "assumed", "error at which the valve closes again, over dead_band"
-    )
-    overlap: float = parameter(
-        0.0, "Pa", 0.0, 3e5, "assumed", "error up to which the spool only leaks", neutral=0.0
-    )
-    overlap_leak: float = parameter(
-        0.01, "1", 1e-4, 1.0, "assumed", "gain within the overlap over that beyond it"
-    )
-    exhaust_ratio: float = parameter(
-        1.0, "1", 0.1, 20.0, "assumed", "lag when exhausting over lag when filling", neutral=1.0
-    )
-    exhaust_taper: float = parameter(
-        0.0, "1", 0.0, 1.0, "assumed", "how much of exhaust_ratio is gone at full pressure"
-    )
-    exhaust_rate: float = parameter(
-        UNCHOKED,
-        "1/s",
-        0.05,
-        UNCHOKED,
-        "assumed",
-        "fastest exhaust over absolute pressure (choked flow)",
-        neutral=UNCHOKED,
-    )
-    leak: float = parameter(
-        0.0, "1/s", 0.0, 10.0, "assumed", "pressure lost over pressure", neutral=0.0
-    )
+    leak: float = effect("1/s", 0.0, 10.0, "pressure lost over pressure")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +66,7 @@ class DelayedEffects(RegulatorEffects):
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (("dead_time",), *RegulatorEffects.effects)
 
-    dead_time: float = parameter(0.0, "s", 0.0, 0.11, "assumed", "of the set-point", neutral=0.0)
+    dead_time: float = effect("s", 0.0, 0.11, "of the set-point")
 
 
 @dataclass(frozen=True)
@@ -103,42 +79,17 @@ class Regulator(RegulatorEffects):
     defaults are assumed, within what two identified regulators of its class show.
     """
 
-    max_pressure: float = parameter(
-        6e5,
-        "Pa",
-        1e4,
-        1.2e6,
-        "published",
-        "positioning2021, section 3.2: MPPES-3-1/4-6-010, 0 to 6 bar",
+    max_pressure: float = published(
+        6e5, "Pa", 1e4, 1.2e6, "positioning2021, section 3.2: 0 to 6 bar"
     )
-    dead_time: float = parameter(
-        0.045,
-        "s",
-        0.0,
-        0.11,
-        "assumed",
-        "44 ms (DMSP-10-250 record, inflating), 45 ms (identified SMC ITV)",
-        neutral=0.0,
-        spread=(0.02, 0.1),
+    dead_time: float = assumed(
+        0.045, "s", 0.0, 0.11, "45 ms: DMSP-10-250 record, SMC ITV", neutral=0.0, spread=(0.02, 0.1)
     )
-    time_constant: float = parameter(
-        0.05,
-        "s",
-        0.002,
-        2.0,
-        "assumed",
-        "50 ms (DMSP-10-250 record, inflating), 83 ms (identified SMC ITV)",
-        spread=(0.035, 0.12),
+    time_constant: float = assumed(
+        0.05, "s", 0.002, 2.0, "DMSP-10-250 record; 83 ms: SMC ITV", spread=(0.035, 0.12)
     )
-    slew_rate: float = parameter(
-        6.8e5,
-        "Pa/s",
-        1e4,
-        1e9,
-        "assumed",
-        "6.8 bar/s (DMSP-10-250 record, raw step)",
-        neutral=1e9,
-        spread=(4e5, 1.2e6),
+    slew_rate: float = assumed(
+        6.8e5, "Pa/s", 1e4, 1e9, "DMSP-10-250 record, raw step", neutral=1e9, spread=(4e5, 1.2e6)
     )
 
 

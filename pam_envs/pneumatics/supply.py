@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from pam_envs.constants import ATMOSPHERE
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, effect
 
 AMPLE = 2e7
 """Supply pressure [Pa] that limits nothing."""
@@ -17,18 +17,10 @@ AMPLE = 2e7
 class SupplyEffects:
     """Supply of a regulator; without limit unless a recording shows one."""
 
-    supply_pressure: float = parameter(
-        AMPLE, "Pa", 5e4, AMPLE, "assumed", "of the reservoir at rest", neutral=AMPLE
-    )
-    supply_droop: float = parameter(
-        0.0, "1", 0.0, 5.0, "assumed", "supply pressure lost over pressure filled", neutral=0.0
-    )
-    supply_time: float = parameter(
-        0.01, "s", 0.001, 5.0, "assumed", "filling to the supply takes at full flow"
-    )
-    supply_recovery: float = parameter(
-        10.0, "s", 0.1, 1e3, "assumed", "filling the empty reservoir takes at full flow"
-    )
+    supply_pressure: float = assumed(AMPLE, "Pa", 5e4, AMPLE, "reservoir at rest", neutral=AMPLE)
+    supply_droop: float = effect("1", 0.0, 5.0, "supply pressure lost over pressure filled")
+    supply_time: float = assumed(0.01, "s", 0.001, 5.0, "filling time at full flow")
+    supply_recovery: float = assumed(10.0, "s", 0.1, 1e3, "filling time of the empty reservoir")
 
 
 @kernel

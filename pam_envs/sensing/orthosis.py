@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, effect
 from pam_envs.sensing.sensor import SensorEffects
 
 _SEEN = "not published; of the order seen on public rigs"
@@ -21,9 +21,9 @@ class TensionSensor(SensorEffects):
 
     quantity: ClassVar[tuple[str, float]] = ("N", 50.0)
 
-    noise: float = parameter(0.9, "N", 0.0, 100.0, "assumed", _SEEN, neutral=0.0)
-    resolution: float = parameter(0.68, "N", 0.0, 50.0, "assumed", _SEEN, neutral=0.0)
-    bias: float = parameter(0.0, "N", -200.0, 200.0, "assumed", _NONE, neutral=0.0)
+    noise: float = assumed(0.9, "N", 0.0, 100.0, _SEEN, neutral=0.0)
+    resolution: float = assumed(0.68, "N", 0.0, 50.0, _SEEN, neutral=0.0)
+    bias: float = effect("N", -200.0, 200.0, _NONE)
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class AngleSensor(SensorEffects):
 
     quantity: ClassVar[tuple[str, float]] = ("rad", 0.2)
 
-    noise: float = parameter(0.0017, "rad", 0.0, 0.2, "assumed", _SEEN, neutral=0.0)
-    resolution: float = parameter(0.0008, "rad", 0.0, 0.1, "assumed", _SEEN, neutral=0.0)
-    bias: float = parameter(0.0, "rad", -0.5, 0.5, "assumed", _NONE, neutral=0.0)
+    noise: float = assumed(0.0017, "rad", 0.0, 0.2, _SEEN, neutral=0.0)
+    resolution: float = assumed(0.0008, "rad", 0.0, 0.1, _SEEN, neutral=0.0)
+    bias: float = effect("rad", -0.5, 0.5, _NONE)
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,9 @@ class GaugeSensor(SensorEffects):
 
     quantity: ClassVar[tuple[str, float]] = ("Pa", 1e5)
 
-    noise: float = parameter(380.0, "Pa", 0.0, 1e5, "assumed", _SEEN, neutral=0.0)
-    resolution: float = parameter(770.0, "Pa", 0.0, 1e5, "assumed", _SEEN, neutral=0.0)
-    bias: float = parameter(0.0, "Pa", -1e5, 1e5, "assumed", _NONE, neutral=0.0)
+    noise: float = assumed(380.0, "Pa", 0.0, 1e5, _SEEN, neutral=0.0)
+    resolution: float = assumed(770.0, "Pa", 0.0, 1e5, _SEEN, neutral=0.0)
+    bias: float = effect("Pa", -1e5, 1e5, _NONE)
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,9 @@ class HeelSensor(SensorEffects):
 
     quantity: ClassVar[tuple[str, float]] = ("kg", 10.0)
 
-    noise: float = parameter(0.2, "kg", 0.0, 20.0, "assumed", _SEEN, neutral=0.0)
-    resolution: float = parameter(0.0, "kg", 0.0, 5.0, "assumed", _SEEN, neutral=0.0)
-    bias: float = parameter(0.0, "kg", -10.0, 10.0, "assumed", _NONE, neutral=0.0)
+    noise: float = assumed(0.2, "kg", 0.0, 20.0, _SEEN, neutral=0.0)
+    resolution: float = effect("kg", 0.0, 5.0, _SEEN)
+    bias: float = effect("kg", -10.0, 10.0, _NONE)
 
 
 @dataclass(frozen=True)
@@ -65,9 +65,9 @@ class GroundSensor(SensorEffects):
 
     quantity: ClassVar[tuple[str, float]] = ("N", 200.0)
 
-    noise: float = parameter(5.0, "N", 0.0, 200.0, "assumed", _SEEN, neutral=0.0)
-    resolution: float = parameter(0.0, "N", 0.0, 50.0, "assumed", _SEEN, neutral=0.0)
-    bias: float = parameter(0.0, "N", -200.0, 200.0, "assumed", _NONE, neutral=0.0)
+    noise: float = assumed(5.0, "N", 0.0, 200.0, _SEEN, neutral=0.0)
+    resolution: float = effect("N", 0.0, 50.0, _SEEN)
+    bias: float = effect("N", -200.0, 200.0, _NONE)
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,6 @@ class CopSensor(SensorEffects):
 
     quantity: ClassVar[tuple[str, float]] = ("m", 0.1)
 
-    noise: float = parameter(0.002, "m", 0.0, 0.1, "assumed", _SEEN, neutral=0.0)
-    resolution: float = parameter(0.0, "m", 0.0, 0.05, "assumed", _SEEN, neutral=0.0)
-    bias: float = parameter(0.0, "m", -0.1, 0.1, "assumed", _NONE, neutral=0.0)
+    noise: float = assumed(0.002, "m", 0.0, 0.1, _SEEN, neutral=0.0)
+    resolution: float = effect("m", 0.0, 0.05, _SEEN)
+    bias: float = effect("m", -0.1, 0.1, _NONE)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from pam_envs.kernels.arithmetic import decay, quantise
 from pam_envs.kernels.build import kernel, routine
 from pam_envs.kernels.history import N_HISTORY, note, noted
-from pam_envs.parameters import parameter, parameter_rows
+from pam_envs.parameters import assumed, effect, parameter_rows
 
 SLIDE = 0.2
 """Time [s] that a slipping clamp takes."""
@@ -36,15 +36,15 @@ class SensorEffects:
         ("slip", "slip_at"),
     )
 
-    drift: float = parameter(0.0, "{}/s", -1.0, 1.0, "assumed", "at the start", neutral=0.0)
-    drift_time: float = parameter(1e4, "s", 1.0, 1e4, "assumed", "time in which the drift settles")
-    ramp: float = parameter(0.0, "{}", -1.0, 1.0, "assumed", "drift that ends", neutral=0.0)
-    ramp_at: float = parameter(0.0, "s", 0.0, 1e6, "assumed", "its middle")
-    ramp_over: float = parameter(60.0, "s", 1.0, 1e6, "assumed", "its duration")
-    delay: float = parameter(0.0, "s", 0.0, 0.14, "assumed", "of the reading", neutral=0.0)
-    bow: float = parameter(0.0, "1", -0.5, 0.5, "assumed", "parabola over full scale", neutral=0.0)
-    slip: float = parameter(0.0, "{}", -1.0, 1.0, "assumed", "step of a clamp", neutral=0.0)
-    slip_at: float = parameter(0.0, "s", 0.0, 1e6, "assumed", "time of the slip")
+    drift: float = effect("{}/s", -1.0, 1.0, "at the start")
+    drift_time: float = assumed(1e4, "s", 1.0, 1e4, "time in which the drift settles")
+    ramp: float = effect("{}", -1.0, 1.0, "drift that ends")
+    ramp_at: float = assumed(0.0, "s", 0.0, 1e6, "its middle")
+    ramp_over: float = assumed(60.0, "s", 1.0, 1e6, "its duration")
+    delay: float = effect("s", 0.0, 0.14, "of the reading")
+    bow: float = effect("1", -0.5, 0.5, "parabola over full scale")
+    slip: float = effect("{}", -1.0, 1.0, "step of a clamp")
+    slip_at: float = assumed(0.0, "s", 0.0, 1e6, "time of the slip")
 
 
 @dataclass(frozen=True)
@@ -53,13 +53,9 @@ class PositionSensor(SensorEffects):
 
     quantity: ClassVar[tuple[str, float]] = ("m", 0.02)
 
-    noise: float = parameter(
-        3e-5, "m", 0.0, 1e-2, "assumed", "0.03 mm RMS; 0.02-0.05 mm seen", neutral=0.0
-    )
-    resolution: float = parameter(
-        1e-5, "m", 0.0, 1e-3, "assumed", "0.01 mm; 0.049 mm on one public rig", neutral=0.0
-    )
-    bias: float = parameter(0.0, "m", -0.05, 0.05, "assumed", "zeroed at rest", neutral=0.0)
+    noise: float = assumed(3e-5, "m", 0.0, 1e-2, "0.03 mm RMS; 0.02-0.05 mm seen", neutral=0.0)
+    resolution: float = assumed(1e-5, "m", 0.0, 1e-3, "0.049 mm on one public rig", neutral=0.0)
+    bias: float = effect("m", -0.05, 0.05, "zeroed at rest")
 
 
 @dataclass(frozen=True)
@@ -68,13 +64,9 @@ class PressureSensor(SensorEffects):
 
     quantity: ClassVar[tuple[str, float]] = ("Pa", 1e5)
 
-    noise: float = parameter(
-        800.0, "Pa", 0.0, 1e5, "assumed", "0.008 bar RMS; 0.4-8 kPa on public rigs", neutral=0.0
-    )
-    resolution: float = parameter(
-        450.0, "Pa", 0.0, 1e5, "assumed", "0.45 kPa on one public rig", neutral=0.0
-    )
-    bias: float = parameter(0.0, "Pa", -1e5, 1e5, "assumed", "zeroed at rest", neutral=0.0)
+    noise: float = assumed(800.0, "Pa", 0.0, 1e5, "RMS; 0.4-8 kPa on public rigs", neutral=0.0)
+    resolution: float = assumed(450.0, "Pa", 0.0, 1e5, "0.45 kPa on one public rig", neutral=0.0)
+    bias: float = effect("Pa", -1e5, 1e5, "zeroed at rest")
 
 
 SENSOR = parameter_rows(SensorEffects)

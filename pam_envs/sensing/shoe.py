@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pam_envs.constants import GRAVITY
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, effect, published
 
 HEEL_CELLS = 3.0
 """Load cells near the heel (yeh2010, section 4.2)."""
@@ -16,29 +16,17 @@ HEEL_CELLS = 3.0
 class Shoe:
     """A stiff sole on load cells; those of the heel tell stance from swing."""
 
-    heel: float = parameter(
-        -0.05, "m", -0.15, 0.05, "assumed", "heel cells, ahead of the ankle: behind it"
-    )
-    tip: float = parameter(
+    heel: float = assumed(-0.05, "m", -0.15, 0.05, "heel cells, ahead of the ankle: behind it")
+    tip: float = assumed(
         0.28,
         "m",
         0.1,
         0.4,
-        "assumed",
-        "tip of the stiff sole, ahead of the ankle; chosen so that a walking leg whose heel is "
-        "free bears less than half of the body weight (what swing is: yeh2010, section 2)",
+        "ahead of the ankle; a leg with its heel free bears under half of the body weight",
     )
-    threshold: float = parameter(
-        5.0, "kg", 0.1, 50.0, "published", "yeh2010, section 4.2: mean load of the heel cells"
-    )
-    flat_foot: float = parameter(
-        0.0,
-        "1",
-        0.0,
-        1.0,
-        "assumed",
-        "0: q_a is the shank's inclination; 1: the ankle's angle, as if the foot were flat",
-        neutral=0.0,
+    threshold: float = published(5.0, "kg", 0.1, 50.0, "yeh2010, section 4.2: mean heel load")
+    flat_foot: float = effect(
+        "1", 0.0, 1.0, "0: q_a is the shank's inclination; 1: the angle of the ankle"
     )
 
 

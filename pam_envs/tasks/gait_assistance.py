@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, derived
 from pam_envs.tasks.rewards import weight
 
 
@@ -20,30 +20,16 @@ class GaitAssistance:
     """
 
     tension_weight: float = weight(1.0, "reward per period of stance at an error of tension_scale")
-    tension_scale: float = parameter(
-        10.0, "N", 1e-3, 1e4, "assumed", "an error of 10 N in stance costs tension_weight"
-    )
+    tension_scale: float = assumed(10.0, "N", 1e-3, 1e4, "stance error that costs tension_weight")
     angle_weight: float = weight(1.0, "reward per period of swing at an error of angle_scale")
-    angle_scale: float = parameter(
-        0.0349, "rad", 1e-5, 3.0, "assumed", "an error of 2 degrees in swing costs angle_weight"
-    )
+    angle_scale: float = assumed(0.0349, "rad", 1e-5, 3.0, "swing error that costs angle_weight")
     over_weight: float = weight(0.2, "cost of over_scale more torque than the knee demands")
-    over_scale: float = parameter(
-        5.0, "N m", 1e-3, 1e3, "assumed", "over-assistance that costs over_weight"
-    )
+    over_scale: float = assumed(5.0, "N m", 1e-3, 1e3, "over-assistance that costs over_weight")
     effort_weight: float = weight(0.2, "cost of moving the set-point over its whole range")
-    soft_pressure: float = parameter(
-        4.45e5, "Pa", 0.0, 1e7, "derived", "just below the muscle's capacity of 4.5 bar, yeh2010"
-    )
-    soft_deviation: float = parameter(
-        0.1745, "rad", 0.0, 3.0, "assumed", "10 degrees off the wearer's path is uncomfortable"
-    )
-    highest_tension: float = parameter(
-        800.0, "N", 1.0, 1e5, "assumed", "above the tension at 4.5 bar; the strap would slip"
-    )
-    largest_deviation: float = parameter(
-        0.6981, "rad", 0.01, 3.0, "assumed", "40 degrees off the path: the wearer stumbles"
-    )
+    soft_pressure: float = derived(4.45e5, "Pa", 0.0, 1e7, "below the capacity of 4.5 bar, yeh2010")
+    soft_deviation: float = assumed(0.1745, "rad", 0.0, 3.0, "10 degrees off the path: discomfort")
+    highest_tension: float = assumed(800.0, "N", 1.0, 1e5, "the strap slips; beyond 4.5 bar")
+    largest_deviation: float = assumed(0.6981, "rad", 0.01, 3.0, "40 degrees off path: stumbling")
 
 
 @dataclass(frozen=True)
@@ -51,16 +37,10 @@ class BraceTracking:
     """Weights and limits of tracking with the brace alone."""
 
     tracking_weight: float = weight(1.0, "reward per control period at an error of error_scale")
-    error_scale: float = parameter(
-        0.02, "1", 1e-6, 10.0, "assumed", "an error of 2 % of the half-range costs tracking_weight"
-    )
+    error_scale: float = assumed(0.02, "1", 1e-6, 10.0, "error that costs tracking_weight")
     effort_weight: float = weight(0.2, "cost of moving the set-point over its whole range")
-    soft_pressure: float = parameter(
-        4.45e5, "Pa", 0.0, 1e7, "derived", "just below the muscle's capacity of 4.5 bar, yeh2010"
-    )
-    highest_tension: float = parameter(
-        600.0, "N", 1.0, 1e5, "assumed", "well above 355 N at the capacity, rigid rig"
-    )
+    soft_pressure: float = derived(4.45e5, "Pa", 0.0, 1e7, "below the capacity of 4.5 bar, yeh2010")
+    highest_tension: float = assumed(600.0, "N", 1.0, 1e5, "above 355 N at the capacity, rigid rig")
 
 
 @kernel

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed
 from pam_envs.tasks.rewards import weight
 
 
@@ -18,16 +18,10 @@ class JointTracking:
     """
 
     tracking_weight: float = weight(1.0, "reward per control period at an error of error_scale")
-    error_scale: float = parameter(
-        0.01745, "rad", 1e-5, 3.0, "assumed", "an error of 1 degree costs tracking_weight"
-    )
+    error_scale: float = assumed(0.01745, "rad", 1e-5, 3.0, "error that costs tracking_weight")
     effort_weight: float = weight(0.2, "cost of moving both pressures over their whole range")
-    soft_share: float = parameter(
-        0.95, "1", 0.1, 1.0, "assumed", "share of the joint limit above which the angle costs"
-    )
-    soft_pressure: float = parameter(
-        6.4e5, "Pa", 0.0, 1e7, "assumed", "just below the largest pressure of 6.5 bar"
-    )
+    soft_share: float = assumed(0.95, "1", 0.1, 1.0, "share of the joint limit without cost")
+    soft_pressure: float = assumed(6.4e5, "Pa", 0.0, 1e7, "below the largest pressure of 6.5 bar")
 
     def worst(self, largest_error: float) -> float:
         """Return the most that a control period can cost at an error of at most this [rad]."""
@@ -42,20 +36,12 @@ class PathTracking:
     """
 
     position_weight: float = weight(1.0, "reward per control period at position_scale")
-    position_scale: float = parameter(
-        0.02, "m", 1e-5, 10.0, "assumed", "the tool 2 cm off its path costs position_weight"
-    )
+    position_scale: float = assumed(0.02, "m", 1e-5, 10.0, "error that costs position_weight")
     pointing_weight: float = weight(0.5, "reward per control period at pointing_scale")
-    pointing_scale: float = parameter(
-        0.03491, "1", 1e-5, 3.0, "assumed", "a tool 2 degrees aside costs pointing_weight"
-    )
+    pointing_scale: float = assumed(0.03491, "1", 1e-5, 3.0, "2 degrees that cost pointing_weight")
     effort_weight: float = weight(0.2, "cost of moving all pressures over their whole range")
-    soft_share: float = parameter(
-        0.95, "1", 0.1, 1.0, "assumed", "share of the joint limit above which angles cost"
-    )
-    soft_pressure: float = parameter(
-        6.4e5, "Pa", 0.0, 1e7, "assumed", "just below the largest pressure of 6.5 bar"
-    )
+    soft_share: float = assumed(0.95, "1", 0.1, 1.0, "share of the joint limit without cost")
+    soft_pressure: float = assumed(6.4e5, "Pa", 0.0, 1e7, "below the largest pressure of 6.5 bar")
 
     def worst(self, reach: float) -> float:
         """Return the most that a control period can cost an arm of this length [m]."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed
 
 
 def weight(default: float, meaning: str) -> float:
     """Declare the weight of a reward term as a field of a task."""
-    return parameter(default, "1", 0.0, 1e3, "assumed", meaning)
+    return assumed(default, "1", 0.0, 1e3, meaning)
 
 
 @kernel

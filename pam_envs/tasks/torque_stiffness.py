@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from pam_envs.kernels.arithmetic import sine_of_turns
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed
 from pam_envs.tasks.rewards import weight
 
 OBJECTS = ("weight", "wall", "free", "mixed")
@@ -38,54 +38,26 @@ class TorqueStiffness:
     """
 
     torque_weight: float = weight(1.0, "reward per control period at an error of torque_scale")
-    torque_scale: float = parameter(
-        0.5, "N m", 1e-4, 1e3, "assumed", "an error of 0.5 N m costs torque_weight"
-    )
+    torque_scale: float = assumed(0.5, "N m", 1e-4, 1e3, "error that costs torque_weight")
     stiffness_weight: float = weight(
         0.2, "1 N m/rad costs as much as 0.2 N m, the torque error that it causes 0.2 rad away"
     )
-    stiffness_scale: float = parameter(
-        0.5, "N m/rad", 1e-4, 1e3, "assumed", "an error of 0.5 N m/rad costs stiffness_weight"
-    )
+    stiffness_scale: float = assumed(0.5, "N m/rad", 1e-4, 1e3, "error that costs stiffness_weight")
     effort_weight: float = weight(
         0.2, "cost of moving both set-points over their range, or of coils that are always on"
     )
-    soft_pressure: float = parameter(
-        5.9e5, "Pa", 0.0, 1e7, "assumed", "just below the supply of 600 kPa, chakarov2018"
-    )
-    lightest: float = parameter(
-        0.3, "kg", 0.0, 10.0, "assumed", "lightest weight that is drawn: a cup"
-    )
-    heaviest: float = parameter(
-        1.5, "kg", 0.0, 10.0, "assumed", "heaviest: 3 bundle muscles carry 2.2 kg at 60 degrees"
-    )
-    softest_free: float = parameter(
-        2.0, "N m/rad", 0.0, 50.0, "assumed", "near the least that pressures reach at no torque"
-    )
-    stiffest_free: float = parameter(
-        3.5, "N m/rad", 0.0, 50.0, "assumed", "free motion is to be soft"
-    )
-    softest_held: float = parameter(
-        3.0, "N m/rad", 0.0, 50.0, "assumed", "under a weight; at times less than can be reached"
-    )
-    stiffest_held: float = parameter(
-        5.0, "N m/rad", 0.0, 50.0, "assumed", "within reach under a weight but for straight arms"
-    )
-    nearest_wall: float = parameter(
-        0.8, "rad", 0.0, 3.0, "assumed", "bent by 46 degrees; straighter arms cannot be stiff"
-    )
-    farthest_wall: float = parameter(
-        1.3, "rad", 0.0, 3.0, "assumed", "bent by 74 degrees, so that reaches come to it"
-    )
-    softest_wall: float = parameter(
-        5.0, "N m/rad", 0.0, 50.0, "assumed", "twice the stiffness of free motion"
-    )
-    stiffest_wall: float = parameter(
-        7.0, "N m/rad", 0.0, 50.0, "assumed", "nearly the stiffest that the bundles can be there"
-    )
-    wall_depth: float = parameter(
-        0.05, "rad", 1e-3, 1.0, "assumed", "over which the stiffness grows to that of the wall"
-    )
+    soft_pressure: float = assumed(5.9e5, "Pa", 0.0, 1e7, "below the supply, chakarov2018")
+    lightest: float = assumed(0.3, "kg", 0.0, 10.0, "lightest weight drawn: a cup")
+    heaviest: float = assumed(1.5, "kg", 0.0, 10.0, "3 muscles carry 2.2 kg at 60 degrees")
+    softest_free: float = assumed(2.0, "N m/rad", 0.0, 50.0, "near the least feasible at no torque")
+    stiffest_free: float = assumed(3.5, "N m/rad", 0.0, 50.0, "free motion is to be soft")
+    softest_held: float = assumed(3.0, "N m/rad", 0.0, 50.0, "under a weight; at times infeasible")
+    stiffest_held: float = assumed(5.0, "N m/rad", 0.0, 50.0, "feasible unless the arm is straight")
+    nearest_wall: float = assumed(0.8, "rad", 0.0, 3.0, "46 degrees; straighter arms are softer")
+    farthest_wall: float = assumed(1.3, "rad", 0.0, 3.0, "74 degrees, within most reaches")
+    softest_wall: float = assumed(5.0, "N m/rad", 0.0, 50.0, "twice the stiffness of free motion")
+    stiffest_wall: float = assumed(7.0, "N m/rad", 0.0, 50.0, "nearly the largest feasible there")
+    wall_depth: float = assumed(0.05, "rad", 1e-3, 1.0, "depth at which the wall is stiff")
 
     def __post_init__(self) -> None:
         """Check that no range of the objects is reversed."""

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.constants import GRAVITY
 from pam_envs.mechanics.serial_chain.rows import GRAVITY_ROWS, LINK_ROWS
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed
 
 Array = NDArray[np.float64]
 
@@ -45,22 +45,12 @@ HEAVY = ("masses", "across", "along")
 class LinkForm:
     """A link of the arm of fluidic_muscles, as a solid cylinder, unless a chain says otherwise."""
 
-    length: float = parameter(
-        0.25, "m", 1e-3, 5.0, "assumed", "of fluidic_muscles's chain, as its figures suggest"
+    length: float = assumed(0.25, "m", 1e-3, 5.0, "fluidic_muscles, as its figures suggest")
+    mass: float = assumed(
+        0.1, "kg", 1e-3, 100.0, "not published; near the most that two DMSP-10 a joint can carry"
     )
-    mass: float = parameter(
-        0.1,
-        "kg",
-        1e-3,
-        100.0,
-        "assumed",
-        "not published; about what two DMSP-10 a joint bear on the paths of fluidic_muscles, and "
-        "less than the muscles and their fittings weigh",
-    )
-    centre: float = parameter(
-        0.5, "1", 0.0, 1.0, "assumed", "place of the mass, as a share of the length"
-    )
-    radius: float = parameter(0.05, "m", 1e-4, 1.0, "assumed", "of the cylinder")
+    centre: float = assumed(0.5, "1", 0.0, 1.0, "place of the mass, as a share of the length")
+    radius: float = assumed(0.05, "m", 1e-4, 1.0, "of the cylinder")
 
 
 FORM = LinkForm()

@@ -20,7 +20,7 @@ import numpy as np
 from pam_envs.hysteresis.friction_effects import DriveEffects
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.protocol import preset
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed
 from pam_envs.plants.core.operator_component import OperatorComponent
 
 WIDEST = 0.22
@@ -45,18 +45,11 @@ class JointHysteresis(DriveEffects, OperatorComponent):
     plant: the commanded angle [rad] into the angle at rest), with slope 1 and a virgin start.
     """
 
-    width: float = parameter(
-        1.0,
-        "1",
-        0.0,
-        2.0,
-        "assumed",
-        "friction over that of the preset",
-        neutral=0.0,
-        spread=(0.6, 1.4),
+    width: float = assumed(
+        1.0, "1", 0.0, 2.0, "friction over that of the preset", neutral=0.0, spread=(0.6, 1.4)
     )
-    base: float = parameter(100.0, "N", 0.0, 1e5, "assumed", _SHARE)
-    rate: float = parameter(1.7e-3, "N/Pa", 0.0, 1.0, "assumed", _SIZE)
+    base: float = assumed(100.0, "N", 0.0, 1e5, _SHARE)
+    rate: float = assumed(1.7e-3, "N/Pa", 0.0, 1.0, _SIZE)
 
 
 def contraction_plays() -> PlayOperator:

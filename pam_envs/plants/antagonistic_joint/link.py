@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pam_envs.constants import GRAVITY
 from pam_envs.mechanics.guide import BearingEffects
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed, derived, published
 
 _FORM = "a slender rod of 0.3 kg; the masses of fluidic_muscles's stages are not published"
 
@@ -19,22 +19,13 @@ class Stage:
     stretched muscle loses its lever arm.
     """
 
-    damping: float = parameter(
-        0.05, "N m s/rad", 0.0, 100.0, "assumed", "of the bearing", spread=(0.02, 0.1)
+    damping: float = assumed(0.05, "N m s/rad", 0.0, 100.0, "of the bearing", spread=(0.02, 0.1))
+    limit: float = published(
+        0.5235987755982988, "rad", 0.01, 0.6, "+-30 degrees: fluidic_muscles, section 2"
     )
-    limit: float = parameter(
-        0.5235987755982988,
-        "rad",
-        0.01,
-        0.6,
-        "published",
-        "+-30 degrees: fluidic_muscles, section 2",
-    )
-    stop: float = parameter(
-        0.6108652381980153, "rad", 0.02, 0.65, "assumed", "35 degrees, 5 before the toggle"
-    )
-    stop_stiffness: float = parameter(
-        500.0, "N m/rad", 10.0, 1e5, "assumed", "10 N m press it in by about a degree"
+    stop: float = assumed(0.6108652381980153, "rad", 0.02, 0.65, "35 degrees, 5 before the toggle")
+    stop_stiffness: float = assumed(
+        500.0, "N m/rad", 10.0, 1e5, "10 N m press it in by about a degree"
     )
 
 
@@ -42,22 +33,16 @@ class Stage:
 class Link(BearingEffects, Stage):
     """The link of a single stage, which hangs from the joint; a payload is fixed to its end."""
 
-    length: float = parameter(
-        0.25, "m", 0.02, 2.0, "assumed", "of fluidic_muscles's chain, as its figures suggest"
+    length: float = assumed(
+        0.25, "m", 0.02, 2.0, "of fluidic_muscles's chain, as its figures suggest"
     )
-    mass: float = parameter(0.3, "kg", 0.01, 20.0, "assumed", _FORM, spread=(0.2, 0.5))
-    centre: float = parameter(0.125, "m", 0.0, 2.0, "derived", _FORM)
-    gyration: float = parameter(
-        0.14433756729740646, "m", 0.01, 2.0, "derived", "0.25 m over the root of 3: " + _FORM
+    mass: float = assumed(0.3, "kg", 0.01, 20.0, _FORM, spread=(0.2, 0.5))
+    centre: float = derived(0.125, "m", 0.0, 2.0, _FORM)
+    gyration: float = derived(
+        0.14433756729740646, "m", 0.01, 2.0, "0.25 m over the root of 3: " + _FORM
     )
-    gravity: float = parameter(
-        GRAVITY,
-        "m/s2",
-        0.0,
-        20.0,
-        "published",
-        "standard gravity; 0 for a vertical axis",
-        neutral=0.0,
+    gravity: float = published(
+        GRAVITY, "m/s2", 0.0, 20.0, "standard gravity; 0 for a vertical axis", neutral=0.0
     )
 
     @property
@@ -74,21 +59,19 @@ class ArmFactors:
     :class:`~pam_envs.mechanics.serial_chain.chain.LinkForm` says, unless a chain is given.
     """
 
-    mass_factor: float = parameter(
+    mass_factor: float = assumed(
         1.0,
         "1",
         0.05,
         20.0,
-        "assumed",
         "of masses and inertias of all links; more than a tenth and path_3 is out of torque",
         spread=(0.9, 1.1),
     )
-    damping_factor: float = parameter(
+    damping_factor: float = assumed(
         1.0,
         "1",
         0.0,
         20.0,
-        "assumed",
         "of joint_damping, which makes up a ratio of a half with the straight arm rigid",
         spread=(0.7, 1.4),
     )
@@ -98,12 +81,11 @@ class ArmFactors:
 class StagePoint:
     """The co-contraction for which a stage is laid out."""
 
-    prestress: float = parameter(
+    prestress: float = assumed(
         50.0,
         "N",
         1.0,
         300.0,
-        "assumed",
         "mean force of the two muscles: enough that friction slackens none near 0",
         spread=(40.0, 70.0),
     )
@@ -113,9 +95,7 @@ class StagePoint:
 class NominalPoint(StagePoint):
     """The straight joint at its usual co-contraction, and the reduced plant about it."""
 
-    pole: float = parameter(
-        23.0, "rad/s", 1.0, 200.0, "published", "two real poles: fluidic_muscles, Fig. 12"
-    )
-    stiffness: float = parameter(
-        14.8, "N m/rad", 0.5, 500.0, "derived", "of the plant with muscles at this point"
+    pole: float = published(23.0, "rad/s", 1.0, 200.0, "two real poles: fluidic_muscles, Fig. 12")
+    stiffness: float = derived(
+        14.8, "N m/rad", 0.5, 500.0, "of the plant with muscles at this point"
     )

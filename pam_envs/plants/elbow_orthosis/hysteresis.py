@@ -31,7 +31,7 @@ from pam_envs.hysteresis.friction_effects import DriveEffects
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.hysteresis.protocol import preset
-from pam_envs.parameters import parameter
+from pam_envs.parameters import published
 from pam_envs.plants.antagonistic_joint.hysteresis import PLAYS
 from pam_envs.plants.core.operator_component import OperatorComponent
 
@@ -56,12 +56,11 @@ class ElbowHysteresis(DriveEffects, OperatorComponent):
     virgin start.
     """
 
-    loop: float = parameter(
+    loop: float = published(
         0.075,
         "1",
         0.0,
         0.4,
-        "published",
         "7.5 % between loading and unloading: chakarov2018, section 2",
         neutral=0.0,
         spread=(0.045, 0.12),

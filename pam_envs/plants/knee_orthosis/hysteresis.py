@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache
 from pam_envs.hysteresis.friction_effects import DriveEffects
 from pam_envs.hysteresis.modified_maxwell_slip import even_model
 from pam_envs.hysteresis.protocol import HysteresisModel, preset
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed
 from pam_envs.plants.core.operator_component import OperatorComponent
 
 FULL_PRESSURE = 4.5e5
@@ -27,8 +27,8 @@ class KneeHysteresis(DriveEffects, OperatorComponent):
     the stiffness is the line of :class:`~pam_envs.muscle.gas_spring.GasSpring`.
     """
 
-    width: float = parameter(
-        1.0, "1", 0.0, 1.2, "assumed", "loop width over that of the operator", spread=(0.6, 1.2)
+    width: float = assumed(
+        1.0, "1", 0.0, 1.2, "loop width over that of the operator", spread=(0.6, 1.2)
     )
 
     @cached_property

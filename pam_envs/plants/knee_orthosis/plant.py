@@ -33,7 +33,7 @@ from pam_envs.mechanics.knee_lever import KneeLever
 from pam_envs.mechanics.leg import Leg
 from pam_envs.muscle.emg import MuscleActivation
 from pam_envs.muscle.gas_spring import GasSpring
-from pam_envs.parameters import parameter
+from pam_envs.parameters import published
 from pam_envs.plants.core.plant import Plant, effects_of, neutral_of
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.hysteresis import KneeHysteresis, knee_hysteresis
@@ -66,21 +66,18 @@ STAIRS_MOUNT_ANGLE = 1.4835
 class Fixture:
     """Fixture that holds the muscle at its length."""
 
-    length: float = parameter(
-        0.22, "m", 0.05, 1.0, "published", "nominal length, yeh2010, section 4.1"
-    )
+    length: float = published(0.22, "m", 0.05, 1.0, "nominal length, yeh2010, section 4.1")
 
 
 @dataclass(frozen=True)
 class Stride:
     """The wearer's pace."""
 
-    time: float = parameter(
+    time: float = published(
         PAPER_STRIDE,
         "s",
         0.8,
         20.0,
-        "published",
         "5 s a stride, yeh2010, section 5.2; 1.224 s is the natural pace of the measured stride",
     )
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pam_envs.hysteresis.creep import CreepEffects
 from pam_envs.hysteresis.friction_effects import FirstCycles, FrictionEffects, Threshold
 from pam_envs.hysteresis.protocol import HysteresisModel, operator_of
-from pam_envs.parameters import parameter
+from pam_envs.parameters import effect, identified
 from pam_envs.plants.core.operator_component import OperatorComponent
 
 Kind: TypeAlias = str
@@ -35,28 +35,24 @@ class Hysteresis(Threshold, FirstCycles, CreepEffects, FrictionEffects, Operator
         ("threshold",),
     )
 
-    stretch: float = parameter(
+    stretch: float = identified(
         0.0,
         "1",
         -0.8,
         0.8,
-        "identified",
         "pressure-dependent friction; least squares on positioning2021, Tables 3-5",
         neutral=0.0,
     )
-    width_per_load: float = parameter(
+    width_per_load: float = identified(
         0.0,
         "1/kg",
         -0.2,
         0.2,
-        "identified",
         "load-dependent loop width; least squares on positioning2021, Tables 3-5",
         neutral=0.0,
     )
     # an effect of the first cycles that only this hysteresis has
-    first_width: float = parameter(
-        0.0, "1", -1.0, 10.0, "assumed", "extra loop width of the first travel", neutral=0.0
-    )
+    first_width: float = effect("1", -1.0, 10.0, "extra loop width of the first travel")
 
     def stretched(self, pressure: ArrayLike, full: float) -> NDArray[np.float64]:
         """Return ``pressure`` [Pa] on the scale on which the friction is uniform."""
