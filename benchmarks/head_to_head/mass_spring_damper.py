@@ -1,6 +1,6 @@
 """Mass-spring-damper with a known force, as a second diagnosable plant.
 
-:class:`MassSpringDamper` implements :class:`pam_envs.diagnosis.fit.plant_protocol.PlantFamily`.
+:class:`MassSpringDamper` implements :class:`pam_envs.diagnosis.fit.least_squares.PlantFamily`.
 With the causes below it is diagnosed as a muscle is, by one output instead of two.
 """
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -29,7 +30,6 @@ from pam_envs.diagnosis.experiment.plans import Means
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.calibrate import calibrate
 from pam_envs.diagnosis.fit.candidate import Candidate
-from pam_envs.diagnosis.fit.fit_errors import fit_failures_explained
 from pam_envs.diagnosis.fit.least_squares import Fit, Problem, column_of
 from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, identified, inputs_of, start_plant
 from pam_envs.diagnosis.fit.tolerance import (
@@ -46,13 +46,18 @@ from pam_envs.diagnosis.report.report import plain
 from pam_envs.diagnosis.report.summary import report_of
 from pam_envs.diagnosis.report.summary_causes import judged
 from pam_envs.diagnosis.report.traces import Traces
-from pam_envs.plants.single_muscle.plant import SingleMuscle
+from pam_envs.plants.single_muscle.plant import SingleMuscle, UnstableParameters
 
 UNDECLARED, BELIEVED = 1.15, 1.5
 """Noise over the estimate from repeats or holds: without a declaration, and the largest declared
 ratio that is accepted."""
 THOROUGH = 3
 """Number of open rivals that are fitted to the training data as thoroughly as the model."""
+ADVICE = (
+    "the recording cannot be used: no muscle of this size moves as recorded, and the fit ended in "
+    "a plant that cannot be simulated; check the units of contraction_mm, pressure_command_bar and "
+    "load_N, and rest length, diameter and largest pressure in RIG.yaml"
+)
 
 
 def diagnose(
@@ -145,6 +150,15 @@ def diagnose(
             traces=study.traces(),
             study=study,
         )
+
+
+@contextmanager
+def fit_failures_explained() -> Iterator[None]:
+    """Turn a fit that ends in a plant that cannot be simulated into an error on the data."""
+    try:
+        yield
+    except (UnstableParameters, np.linalg.LinAlgError) as error:
+        raise ValueError(ADVICE) from error
 
 
 def _noise(floor: ChannelFloor) -> float:

@@ -20,7 +20,7 @@ from pam_envs.diagnosis import Diagnosis, diagnose
 from pam_envs.diagnosis.audit.audit import undecidable
 from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.decide.isolability import ALIKE
-from pam_envs.diagnosis.fit.fit_errors import fit_failures_explained
+from pam_envs.diagnosis.diagnosis import fit_failures_explained
 from pam_envs.kernels.build import COMPILED
 from pam_envs.plants.single_muscle.plant import UnstableParameters
 from tests.diagnosis import hidden

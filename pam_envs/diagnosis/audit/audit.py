@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pam_envs.data.recording.recording import Recording, check_rig, repeat_rows
 from pam_envs.data.rig_file import Rig
 from pam_envs.data.tables import ContractionTable
 from pam_envs.diagnosis.audit import channels
-from pam_envs.diagnosis.audit.noise import Floor, holds, noise_floor
+from pam_envs.diagnosis.audit.noise import holds, noise_floor
 from pam_envs.diagnosis.audit.tables import audit_table
 from pam_envs.diagnosis.audit.units import wrong_units
 from pam_envs.diagnosis.cause import Cause
@@ -32,18 +31,10 @@ MANY_CYCLES = 5
 
 @dataclasses.dataclass(frozen=True)
 class Audit:
-    """Result of an audit.
+    """Result of an audit."""
 
-    Attributes
-    ----------
-    problems : tuple of str
-        Reasons against a diagnosis; empty if one can be made.
-    warnings : tuple of str
-        Limitations of the data.
-    """
-
-    problems: tuple[str, ...]
-    warnings: tuple[str, ...]
+    problems: tuple[str, ...]  # reasons against a diagnosis; empty if one can be made
+    warnings: tuple[str, ...]  # limitations of the data
 
 
 def audit(recording: Recording | ContractionTable, rig: Rig | None = None) -> Audit:
@@ -67,14 +58,22 @@ def audit(recording: Recording | ContractionTable, rig: Rig | None = None) -> Au
         return Audit(tuple(problems), recording.notes)
     floor = noise_floor(recording, rig)
     wrong, warnings = wrong_units(recording, rig)
-    problems = _empty_outputs(recording) + wrong
+    problems = [
+        f"{channels.UNITS[name][0]} holds one value in all rows; connect the sensor, or leave the "
+        "column out"
+        for name in _outputs(recording)
+        if np.ptp(getattr(recording, name)) == 0.0
+    ]
+    problems += wrong
     seen = recording if recording.raw is None else recording.raw
     for name in channels.UNITS:
         if getattr(seen, name) is not None:
             stuck, still = channels.stuck(seen, name) if name in _outputs(seen) else ([], [])
             problems += stuck
             warnings += still + channels.clipped(seen, name) + channels.spikes(seen, name)
-    noise = {name: _noise(floor, name) for name in _outputs(seen)}
+    # the noise to compare a resolution with, without the part due to rounding
+    found = {name: floor[name] for name in _outputs(seen)}
+    noise = {k: f.reading if f.declared is None else f.declared for k, f in found.items()}
     for name, rms in noise.items():
         warnings += channels.coarse(seen, name, rms)
     warnings += channels.copies(seen, noise)
@@ -100,66 +99,46 @@ def undecidable(
     dict of str to str
         Reason by name of the cause. Other causes may still not be excited.
     """
-    missing = {word: lack(recording, rig or Rig()) for word, lack in LACKS.items()}
-    reasons = {}
+    unmet, reasons = _unmet_needs(recording, rig or Rig()), {}
     for cause in catalogue() if causes is None else causes:
-        lacks = [missing[word] for word in cause.needs if missing[word]]
+        lacks = [unmet[word] for word in cause.needs if word in unmet]
         if lacks:
             reasons[cause.name] = lacks[0]
     return dict(sorted(reasons.items()))
 
 
-def _lack_of_column(values: NDArray[np.float64] | None, name: str) -> str:
-    return f"the {name} was not recorded" if values is None else ""
-
-
-def _lack_of_loads(recording: Recording, rig: Rig) -> str:
-    levels = load_levels(recording)
-    return f"the load was {levels[0]:.3g} N throughout" if len(levels) < 2 else ""
-
-
-def _lack_of_warmth(recording: Recording, rig: Rig) -> str:
-    if recording.temperature is None:
-        return "the temperature was not recorded"
-    span = float(np.ptp(recording.temperature))
-    return f"the temperature varied by only {span:.2g} K" if span < WARMING else ""
-
-
-def _lack_of_shutting(recording: Recording, rig: Rig) -> str:
-    if _longest_shut(recording) > SHUT_SECONDS:
-        return ""
-    return f"the valve was never shut for more than {SHUT_SECONDS:g} s (valve_closed in RIG.yaml)"
-
-
-def _lack_of_rest(recording: Recording, rig: Rig) -> str:
-    if rig.cycles_since_rest <= MANY_CYCLES:
-        return ""
-    return f"the muscle had already made {rig.cycles_since_rest} cycles since it rested"
-
-
-def _lack_of_weighing(recording: Recording, rig: Rig) -> str:
-    if LOAD in rig.tolerance:
-        return ""
-    return (
-        "no tolerance of the loads is declared; add tolerance: {mass.load: 0.02} to RIG.yaml if "
-        "they were weighed to 2 %"
-    )
-
-
-LACKS: dict[str, Callable[[Recording, Rig], str]] = {
-    "contraction": lambda r, _: _lack_of_column(r.contraction, "contraction"),
-    "pressure": lambda r, _: _lack_of_column(r.pressure, "pressure"),
-    "loads": _lack_of_loads,
-    "weighed": _lack_of_weighing,
-    "temperature": _lack_of_warmth,
-    "valve_closed": _lack_of_shutting,
-    "rest": _lack_of_rest,
-    "exhaust": lambda r, _: (
-        "" if _command_falls(r) else "the command never falls by more than 0.5 bar"
-    ),
-}
-"""Function for each need of a cause (:data:`pam_envs.diagnosis.cause.NEEDS`): the reason why a
-recording does not meet it, or an empty string."""
+def _unmet_needs(recording: Recording, rig: Rig) -> dict[str, str]:
+    """Return the needs of causes (:data:`NEEDS`) that a recording does not meet, and why."""
+    levels, kelvin = load_levels(recording), recording.temperature
+    span = 0.0 if kelvin is None else float(np.ptp(kelvin))
+    free = recording.command[~recording.valve_closed]
+    falls = np.any(np.maximum.accumulate(free) - free > 0.5 * BAR)
+    needs = {
+        "contraction": (recording.contraction is not None, "the contraction was not recorded"),
+        "pressure": (recording.pressure is not None, "the pressure was not recorded"),
+        "loads": (len(levels) > 1, f"the load was {levels[0]:.3g} N throughout"),
+        "weighed": (
+            LOAD in rig.tolerance,
+            "no tolerance of the loads is declared; add tolerance: {mass.load: 0.02} to RIG.yaml "
+            "if they were weighed to 2 %",
+        ),
+        "temperature": (
+            span >= WARMING,
+            "the temperature was not recorded"
+            if kelvin is None
+            else f"the temperature varied by only {span:.2g} K",
+        ),
+        "valve_closed": (
+            _longest_shut(recording) > SHUT_SECONDS,
+            f"the valve was never shut for more than {SHUT_SECONDS:g} s (valve_closed in RIG.yaml)",
+        ),
+        "rest": (
+            rig.cycles_since_rest <= MANY_CYCLES,
+            f"the muscle had already made {rig.cycles_since_rest} cycles since it rested",
+        ),
+        "exhaust": (falls, "the command never falls by more than 0.5 bar"),
+    }
+    return {word: reason for word, (met, reason) in needs.items() if not met}
 
 
 def load_levels(recording: Recording) -> list[float]:
@@ -174,21 +153,6 @@ def load_levels(recording: Recording) -> list[float]:
 def _outputs(recording: Recording) -> list[str]:
     pair = ("contraction", "pressure")
     return [name for name in pair if getattr(recording, name) is not None]
-
-
-def _empty_outputs(recording: Recording) -> list[str]:
-    return [
-        f"{channels.UNITS[name][0]} holds one value in all rows; connect the sensor, or leave the "
-        "column out"
-        for name in _outputs(recording)
-        if np.ptp(getattr(recording, name)) == 0.0
-    ]
-
-
-def _noise(floor: Floor, channel: str) -> float:
-    """Return the noise to compare a resolution with, without the part due to rounding."""
-    found = floor[channel]
-    return found.reading if found.declared is None else found.declared
 
 
 def _repeats(recording: Recording, rig: Rig) -> list[str]:
@@ -227,7 +191,11 @@ def _lacks(recording: Recording, rig: Rig) -> list[str]:
     ):
         if getattr(recording, field) is None:
             warnings.append(f"there is no column {column}: {loss}")
-    if not _rests(recording):
+    if not any(
+        len(rows) * recording.period >= REST_SECONDS - 1e-9
+        and recording.command[rows].max() <= REST_PRESSURE
+        for rows in holds(recording)
+    ):
         warnings.append(
             f"the command is never near 0 bar for {REST_SECONDS:g} s: the sensors' zeros cannot "
             "be checked; start each run with a rest"
@@ -254,20 +222,7 @@ def _not_used(recording: Recording, rig: Rig) -> list[str]:
     return warnings
 
 
-def _rests(recording: Recording) -> bool:
-    return any(
-        len(rows) * recording.period >= REST_SECONDS - 1e-9
-        and recording.command[rows].max() <= REST_PRESSURE
-        for rows in holds(recording)
-    )
-
-
 def _longest_shut(recording: Recording) -> float:
     shut = recording.valve_closed & ~recording.filled
     same = shut[1:] & shut[:-1] & ~recording.restart[1:]
     return max((b - a + 1 for a, b in channels.runs(same)), default=0) * recording.period
-
-
-def _command_falls(recording: Recording) -> bool:
-    free = recording.command[~recording.valve_closed]
-    return len(free) > 0 and bool(np.any(np.maximum.accumulate(free) - free > 0.5 * BAR))

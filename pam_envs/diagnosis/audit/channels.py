@@ -12,7 +12,7 @@ import numpy as np
 from pam_envs.data.recording.columns import rows_text, span_text
 from pam_envs.data.recording.recording import Recording
 from pam_envs.diagnosis.arrays import Array, Flags
-from pam_envs.diagnosis.audit.noise import resolution
+from pam_envs.diagnosis.audit.noise import half_width, resolution
 
 UNITS = {
     "contraction": ("contraction_mm", "mm", 1e-3),
@@ -128,9 +128,8 @@ def spikes(recording: Recording, channel: str) -> list[str]:
         return []
     here = values[2:-2]
     off = here - 0.5 * (values[1:-3] + values[3:-1])
-    low, high = np.quantile(off, [0.1587, 0.8413])
     floor = max(0.5 * resolution(values), 1e-4 * np.ptp(values))  # where there is no noise
-    limit = SPIKE * max(0.5 * (high - low), floor)
+    limit = SPIKE * max(half_width(off), floor)
     size = np.abs(off)
     apart = np.abs(values[3:-1] - values[1:-3])
     before = np.abs(values[1:-3] - values[:-4])
@@ -147,15 +146,7 @@ def spikes(recording: Recording, channel: str) -> list[str]:
 
 
 def copies(recording: Recording, noise: Mapping[str, float]) -> list[str]:
-    """Return a warning if a stretch of readings occurs twice: a copy, not a measurement.
-
-    Parameters
-    ----------
-    recording : Recording
-        Readings.
-    noise : mapping of str to float
-        RMS noise of each channel [SI]. Channels with a coarser resolution are not checked.
-    """
+    """Return a warning if a stretch of readings occurs twice: a copy, not a measurement."""
     fine = [
         values
         for values, rms in ((getattr(recording, name), rms) for name, rms in noise.items())

@@ -40,32 +40,13 @@ START = 2.0
 
 @dataclasses.dataclass(frozen=True)
 class ChannelFloor:
-    """Noise of one channel.
+    """Noise of one channel."""
 
-    Attributes
-    ----------
-    value : float
-        RMS noise of a sample [m] or [Pa].
-    reading : float
-        RMS noise of a single reading, above ``value`` if readings were averaged.
-    source : {"repeats", "holds", "innovations", "declared"}
-        Source of ``value``.
-    estimates : mapping of str to float
-        All available estimates, by source.
-    declared : float or None
-        Declared noise.
-    correlation_time : float or None
-        Lag at which the autocorrelation of the noise falls below 1/e [s].
-    warnings : tuple of str
-        Sentences on doubtful estimates.
-    """
-
-    value: float
-    reading: float
+    value: float  # RMS noise of a sample [m] or [Pa]
+    reading: float  # RMS noise of a single reading, above value if readings were averaged
     source: Source
-    estimates: Mapping[str, float]
+    estimates: Mapping[str, float]  # by source
     declared: float | None
-    correlation_time: float | None
     warnings: tuple[str, ...] = ()
 
 
@@ -73,47 +54,31 @@ class ChannelFloor:
 class Floor:
     """Noise of the recorded channels."""
 
-    contraction: ChannelFloor | None
-    pressure: ChannelFloor | None
+    channels: Mapping[str, ChannelFloor]
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings of all channels."""
-        both = (self.contraction, self.pressure)
-        return tuple(text for floor in both if floor is not None for text in floor.warnings)
+        return tuple(text for floor in self.channels.values() for text in floor.warnings)
 
     def __getitem__(self, channel: str) -> ChannelFloor:
         """Return the noise of a recorded channel."""
-        floor = {"contraction": self.contraction, "pressure": self.pressure}[channel]
-        if floor is None:
+        if channel not in self.channels:
             raise KeyError(f"{channel} was not recorded")
-        return floor
+        return self.channels[channel]
 
 
 def noise_floor(recording: Recording, rig: Rig | None = None) -> Floor:
-    """Estimate the noise of the measured outputs.
-
-    Parameters
-    ----------
-    recording : Recording
-        Readings.
-    rig : Rig, optional
-        Repeated segments and declared noise.
-
-    Returns
-    -------
-    Floor
-        In SI units.
-    """
+    """Estimate the noise of the measured outputs."""
     rig = rig or Rig()
     declared = {"contraction": rig.contraction_noise, "pressure": rig.pressure_noise}
-    floors = {
-        channel: None
-        if getattr(recording, channel) is None
-        else _channel(recording, rig, channel, declared[channel])
-        for channel in CHANNELS
-    }
-    return Floor(**floors)
+    return Floor(
+        {
+            channel: _channel(recording, rig, channel, declared[channel])
+            for channel in CHANNELS
+            if getattr(recording, channel) is not None
+        }
+    )
 
 
 def _channel(recording: Recording, rig: Rig, channel: str, declared: float | None) -> ChannelFloor:
@@ -130,9 +95,6 @@ def _channel(recording: Recording, rig: Rig, channel: str, declared: float | Non
     second = round(1.0 / recording.period)
     trust = Trust.of(differences, ends, second, found["innovations"])
     source = best(estimates, declared, trust)
-    time = _correlation_time(
-        differences if source == "repeats" else [detrended(e) for e in ends], recording.period
-    )
     rounding = float(resolution(values) / np.sqrt(12.0))  # not visible in a hold
     value = max(estimates.get(source, declared or 0.0), rounding)
     reading = _reading(recording, channel, estimates.get(source, 0.0))
@@ -140,7 +102,7 @@ def _channel(recording: Recording, rig: Rig, channel: str, declared: float | Non
         *_weak(channel, estimates, source, declared),
         *_misdeclared(channel, reading, source, declared, rounding),
     )
-    return ChannelFloor(value, reading, source, estimates, declared, time, warnings)
+    return ChannelFloor(value, reading, source, estimates, declared, warnings)
 
 
 def _reading(recording: Recording, channel: str, value: float) -> float:
@@ -218,8 +180,13 @@ def _differences(recording: Recording, rig: Rig, values: Array) -> list[Array]:
 def _without_offset(difference: Array) -> Array:
     """Return a difference less its median, if that is larger than slow noise would cause."""
     middle = float(np.median(difference))
-    low, high = np.quantile(difference, [0.1587, 0.8413])
-    return difference - middle if abs(middle) > 0.25 * (high - low) else difference
+    return difference - middle if abs(middle) > 0.5 * half_width(difference) else difference
+
+
+def half_width(values: Array) -> float:
+    """Return half the distance between the quantiles of one standard deviation."""
+    low, high = np.quantile(values, [0.1587, 0.8413])
+    return float(0.5 * (high - low))
 
 
 def _scatter(pieces: list[Array]) -> float:
@@ -227,8 +194,7 @@ def _scatter(pieces: list[Array]) -> float:
     if not pieces:
         return float("nan")
     joined = np.concatenate(pieces)
-    low, high = np.quantile(joined, [0.1587, 0.8413])
-    width = 0.5 * (high - low)
+    width = half_width(joined)
     if width > 0.0:
         joined = joined[np.abs(joined) <= 4.0 * width]
     return float(np.sqrt(np.mean(joined**2)))
@@ -341,20 +307,3 @@ def white_noise(recording: Recording, values: Array) -> float:
     quiet = whole[moved[whole] <= np.quantile(moved[whole], 1 / 3)]
     second = np.diff(values[windows[quiet]], 2, axis=1).ravel()
     return _scatter([second - np.median(second)]) / np.sqrt(6.0)
-
-
-def _correlation_time(pieces: list[Array], period: float) -> float | None:
-    """Return the lag [s] at which the autocorrelation falls below 1/e, interpolated."""
-    pieces = [p - p.mean() for p in pieces if len(p) >= 25]
-    if not pieces or not any(np.any(p) for p in pieces):
-        return None
-    longest = min(len(p) for p in pieces) // 2
-    power = sum(float(p @ p) for p in pieces) / sum(len(p) for p in pieces)
-    before = 1.0
-    for h in range(1, longest):
-        total = sum(float(p[h:] @ p[:-h]) for p in pieces)
-        now = total / sum(len(p) - h for p in pieces) / power
-        if now < np.exp(-1.0):
-            return float(period * (h - 1 + (before - np.exp(-1.0)) / (before - now)))
-        before = now
-    return period * longest

@@ -26,18 +26,10 @@ FAST = 1.15
 
 @dataclass(frozen=True)
 class Trust:
-    """Reliability of the noise estimates from repeats and holds.
+    """Reliability of the noise estimates from repeats and holds."""
 
-    Attributes
-    ----------
-    repeats : float
-        Relative standard deviation of the estimate from repeats.
-    fast : float
-        Ratio of the scatter of repeats to that of holds within a second.
-    """
-
-    repeats: float
-    fast: float
+    repeats: float  # relative standard deviation of the estimate from repeats
+    fast: float  # ratio of the scatter of repeats to that of holds within a second
 
     @classmethod
     def of(cls, differences: list[Array], ends: list[Array], second: int, white: float) -> Trust:

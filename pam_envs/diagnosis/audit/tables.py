@@ -19,22 +19,11 @@ TREND = 2.5
 
 @dataclasses.dataclass(frozen=True)
 class Trend:
-    """Drift of the contraction over the repeats at one load.
+    """Drift of the contraction over the repeats at one load."""
 
-    Attributes
-    ----------
-    slope : float
-        Drift per repeat [m].
-    t : float
-        Slope over its standard error, from the scatter of the readings.
-    t_means : float
-        The same from the means of the repeats, valid for common errors of the readings of a
-        repeat; NaN for fewer than three repeats.
-    """
-
-    slope: float
-    t: float
-    t_means: float
+    slope: float  # drift per repeat [m]
+    t: float  # slope over its standard error, from the scatter of the readings
+    t_means: float  # the same from the means of the repeats; NaN for fewer than three repeats
 
 
 def repeat_trend(table: ContractionTable, load: float) -> Trend:

@@ -42,32 +42,29 @@ def wrong_units(recording: Recording, rig: Rig) -> tuple[list[str], list[str]]:
     return problems + wrong, warnings + _suspicions(recording, rig)
 
 
-def _looks_like(value: float, expected: float) -> tuple[str, str] | None:
-    """Return unit and correction that bring ``value`` nearest to ``expected`` [bar], if near."""
-    distance = {
-        unit: abs(math.log(value / factor / expected)) for unit, (factor, _) in PRESSURES.items()
-    }
-    unit = min(distance, key=lambda name: distance[name])
-    return (unit, PRESSURES[unit][1]) if distance[unit] < math.log(2.5) else None
-
-
-def _advice(found: tuple[str, str] | None) -> str:
-    if found is None:
-        return "no muscle runs at this pressure; check its unit"
-    return f"it looks like {found[0]}: {found[1]}"
+def _advice(value: float, expected: float) -> str:
+    """Return the unit in which ``value`` is nearest to ``expected`` [bar], and its correction."""
+    if value > 0.0:
+        distance = {
+            unit: abs(math.log(value / number / expected))
+            for unit, (number, _) in PRESSURES.items()
+        }
+        unit = min(distance, key=lambda name: distance[name])
+        if distance[unit] < math.log(2.5):
+            return f"it looks like {unit}: {PRESSURES[unit][1]}"
+    return "no muscle runs at this pressure; check its unit"
 
 
 def _command(recording: Recording, rig: Rig) -> list[str]:
     highest = float(np.max(recording.command)) / BAR
     expected = USUAL if rig.max_pressure is None else rig.max_pressure / BAR
     if highest > HIGHEST:
-        advice = _advice(_looks_like(highest, expected))
-        return [f"pressure_command_bar goes up to {highest:.4g}; {advice}"]
+        return [f"pressure_command_bar goes up to {highest:.4g}; {_advice(highest, expected)}"]
     pressure = 0.0 if recording.pressure is None else float(np.max(recording.pressure)) / BAR
     if highest < 0.25 * pressure and 0.5 < pressure <= HIGHEST:
         return [
             f"pressure_command_bar never exceeds {highest:.3g} while the pressure goes to "
-            f"{pressure:.3g} bar; {_advice(_low(highest, pressure))}"
+            f"{pressure:.3g} bar; {_advice(highest, pressure)}"
         ]
     return []
 
@@ -81,17 +78,13 @@ def _pressure(recording: Recording) -> list[str]:
     highest = float(np.quantile(recording.pressure[free], 0.995)) / BAR
     command = float(np.quantile(recording.command[free], 0.995)) / BAR
     if highest > HIGHEST:
-        return [f"pressure_bar goes up to {highest:.4g}; {_advice(_looks_like(highest, command))}"]
+        return [f"pressure_bar goes up to {highest:.4g}; {_advice(highest, command)}"]
     if command > 1.0 and highest < 0.25 * command:
         return [
             f"pressure_bar never exceeds {highest:.3g} while the command goes to {command:.3g} "
-            f"bar; {_advice(_low(highest, command))}"
+            f"bar; {_advice(highest, command)}"
         ]
     return []
-
-
-def _low(value: float, expected: float) -> tuple[str, str] | None:
-    return _looks_like(value, expected) if value > 0.0 else None
 
 
 def _contraction(recording: Recording, rig: Rig) -> list[str]:

@@ -52,13 +52,7 @@ def causes_in(folder: str | Path) -> tuple[Cause, ...]:
 
 
 def by_name(name: str) -> Cause:
-    """Return one cause of the catalogue.
-
-    Raises
-    ------
-    ValueError
-        If there is none of that name.
-    """
+    """Return one cause of the catalogue."""
     for cause in catalogue():
         if cause.name == name:
             return cause
@@ -66,15 +60,7 @@ def by_name(name: str) -> Cause:
 
 
 def selected(given: Sequence[Cause | str] | None = None) -> tuple[Cause, ...]:
-    """Return the given causes, with names looked up; the whole catalogue by default.
-
-    Raises
-    ------
-    ValueError
-        If none is given, a name is unknown or a cause is given twice.
-    TypeError
-        If an element is neither a cause nor a name.
-    """
+    """Return the given causes, with names looked up; the whole catalogue by default."""
     if given is None:
         return catalogue()
     if isinstance(given, str):

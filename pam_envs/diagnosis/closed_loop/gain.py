@@ -45,31 +45,20 @@ class Rig(Protocol):
     @property
     def position(self) -> float:
         """True contraction [m]."""
-        ...
 
     def reset(self, seed: int | None = None) -> None:
         """Reset to rest without pressure and restart the noise."""
-        ...
 
     def step(self, set_point: float) -> tuple[float, float]:
         """Hold a setpoint [Pa] for a period; return contraction [m] and pressure [Pa] read."""
-        ...
 
 
 @dataclass(frozen=True)
 class Residuals:
-    """Residuals of the extended plant in held-out experiments.
+    """Residuals of the extended plant in held-out experiments."""
 
-    Attributes
-    ----------
-    contraction : ndarray, shape (n,)
-        Measured less simulated [m].
-    period : float
-        Sampling period [s].
-    """
-
-    contraction: Array
-    period: float
+    contraction: Array  # (n,): measured less simulated [m]
+    period: float  # sampling period [s]
 
     def resampled(self, seed: int, period: float, samples: int) -> Array:
         """Return randomly drawn pieces of ``SEGMENT`` seconds, concatenated, shape (samples,)."""
@@ -82,15 +71,7 @@ class Residuals:
 
 
 class ReplayedRig:
-    """A plant with held-out residuals added to reading and position.
-
-    Parameters
-    ----------
-    plant : SingleMuscle
-        Plant to step; its own sensor noise acts only without residuals.
-    residuals : Residuals, optional
-        Residuals, which contain the sensor noise.
-    """
+    """A plant with held-out residuals added to reading and position."""
 
     def __init__(self, plant: SingleMuscle, residuals: Residuals | None) -> None:
         self._stepper = PlantStepper(plant, plant.mass.load)
@@ -132,18 +113,7 @@ def reach(rig: Rig, full: float, period: float) -> float:
 def run(controller: Controller, rig: Rig, reference: Array, load: float, seed: int) -> Array:
     """Return the error [m] of the true position after each control period, shape (n,).
 
-    Parameters
-    ----------
-    controller : Controller
-        Controller to run.
-    rig : Rig
-        Where it runs.
-    reference : ndarray, shape (n + PREVIEW,)
-        Desired contraction [m].
-    load : float
-        Load [kg].
-    seed : int
-        Seed of the rig's noise.
+    The reference [m] has the shape (n + PREVIEW,), the load is in kg.
     """
     rig.reset(seed)
     controller.reset()
@@ -185,12 +155,6 @@ def prepared(plant: Any, load: float, kelvin: float | None) -> Any:
     return plant.replace(values)
 
 
-def shortest_reach(plants: list[Any], rig: Rig, full: float, period: float) -> float:
-    """Return the smallest stroke [m] among the plants and the rig."""
-    muscles = [PlantStepper(p, p.mass.load) for p in plants if isinstance(p, SingleMuscle)]
-    return min(reach(r, full, period) for r in (*muscles, rig))
-
-
 def closed_loop(
     before: SingleMuscle,
     after: SingleMuscle,
@@ -205,40 +169,22 @@ def closed_loop(
 ) -> dict[str, Any] | None:
     """Compare controllers designed on the plant before and on the extended plant.
 
-    Parameters
-    ----------
-    before, after : SingleMuscle
-        The refitted plant without and with the effects.
-    design : callable, optional
-        From a plant to a :class:`Controller`; default
-        :func:`~pam_envs.diagnosis.closed_loop.plant_inverse.design`.
-    rig : Rig, optional
-        Where the controllers run; default: the extended plant with ``residuals`` added.
-    oracle : SingleMuscle or Simulated, optional
-        True plant of the rig, for a third controller.
-    references : mapping of str to ndarray, shape (n + PREVIEW,), optional
-        Desired contractions [m], one sample a control period; default :func:`fixed_references`.
-    residuals : Residuals, optional
-        Residuals of the extended plant in held-out experiments.
-    load : float
-        Load of the runs [kg].
-    kelvin : float, optional
-        Temperature of the runs [K]; default: that of each plant.
-    seed : int
-        Seed of noise and bootstrap, the same for every controller.
+    ``design`` is :func:`pam_envs.diagnosis.closed_loop.plant_inverse.design` by default. The
+    controllers run on ``rig``, by default the extended plant with ``residuals`` of held-out
+    experiments added; ``oracle``, the true plant of the rig, gives a third controller. Load [kg]
+    and temperature [K] are those of the runs, ``references`` [m] have the shape (n + PREVIEW,).
 
-    Returns
-    -------
-    dict or None
-        As ``closed_loop`` in the report, with the errors on each of the ``references``. None if
-        the stroke under this load is less than ``LEAST_STROKE``.
+    Returns ``closed_loop`` of the report with the errors on each reference, or None if the stroke
+    under this load is less than ``LEAST_STROKE``.
     """
     make = default_design if design is None else design
     plants = [prepared(p, load, kelvin) for p in (before, after, oracle) if p is not None]
     where = ReplayedRig(plants[1], residuals) if rig is None else rig
     period = float(getattr(where, "period", PERIOD))
     if references is None:
-        top = shortest_reach(plants, where, plants[0].regulator.max_pressure, period)
+        full = plants[0].regulator.max_pressure
+        muscles = [PlantStepper(p, p.mass.load) for p in plants if isinstance(p, SingleMuscle)]
+        top = min(reach(r, full, period) for r in (*muscles, where))
         if top < LEAST_STROKE:
             return None
         references = fixed_references(top, period)
@@ -252,7 +198,8 @@ def closed_loop(
         ]
     )
     found = scores(squares, list(references), seed)
-    found["controller"] = "inverse by simulation with a PI loop" if design is None else _name(make)
+    name = str(getattr(make, "__name__", type(make).__name__)).replace("_", " ")
+    found["controller"] = "inverse by simulation with a PI loop" if design is None else name
     found["where"] = "the rig" if rig is not None else REPLAYED if residuals else NOISY
     return {**found, "text": sentence(found)}
 
@@ -261,21 +208,11 @@ REPLAYED = "the extended plant with held-out residuals added"
 NOISY = "the extended plant with its sensor noise"
 
 
-def _name(design: Design) -> str:
-    return str(getattr(design, "__name__", type(design).__name__)).replace("_", " ")
-
-
 def scores(squares: Array, names: list[str], seed: int) -> dict[str, Any]:
-    """Return errors and improvement with confidence intervals.
+    """Return errors and improvement with confidence intervals from a segment bootstrap.
 
-    Parameters
-    ----------
-    squares : ndarray, shape (2 or 3, references, segments)
-        Mean squares [m2] of before, after and the oracle.
-    names : list of str
-        Names of the references.
-    seed : int
-        Seed of the segment bootstrap, the same for each controller.
+    ``squares`` are mean squares [m2] of before, after and the oracle: (2 or 3, references,
+    segments).
     """
     flat = squares.reshape(len(squares), -1)
     rng = np.random.default_rng(seed)

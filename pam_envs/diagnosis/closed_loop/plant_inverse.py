@@ -16,7 +16,6 @@ Horizons, grid, disturbances and seeds are the same for every plant.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -59,7 +58,6 @@ class Batch(Protocol):
 
     def step(self, set_points: ArrayLike) -> tuple[Array, Array]:
         """Hold setpoints [Pa] for a period; return contractions [m] and pressures [Pa] read."""
-        ...
 
 
 class Simulated(Protocol):
@@ -82,26 +80,21 @@ class Simulated(Protocol):
     @property
     def position(self) -> float:
         """True contraction [m]."""
-        ...
 
     def reset(self, seed: int | None = None) -> None:
         """Reset to rest without pressure; without a seed it is free of noise."""
-        ...
 
     def step(self, set_point: float) -> tuple[float, float]:
         """Hold a setpoint [Pa] for a period; return contraction [m] and pressure [Pa] read."""
-        ...
 
     def try_ahead(self, set_points: ArrayLike, periods: int) -> Array:
         """Return future positions of copies [m], shape (periods, m).
 
         ``set_points`` [Pa] are held, shape (m,), or one a period, shape (periods, m).
         """
-        ...
 
     def batch(self, n: int) -> Batch:
         """Return ``n`` copies at rest, free of noise."""
-        ...
 
 
 class Controller(Protocol):
@@ -109,7 +102,6 @@ class Controller(Protocol):
 
     def reset(self) -> None:
         """Reset, with the plant at rest without pressure."""
-        ...
 
     def act(self, reference: Array, reading: float, pressure: float, load: float) -> float:
         """Return the setpoint [Pa] of the present period.
@@ -125,15 +117,10 @@ class Controller(Protocol):
         load : float
             Load [kg].
         """
-        ...
 
 
-def _fan() -> Array:
-    side = np.geomspace(SMALLEST, LARGEST, LEVELS)
-    return np.concatenate([-side[::-1], [0.0], side])
-
-
-FAN = _fan()
+_SIDE = np.geomspace(SMALLEST, LARGEST, LEVELS)
+FAN = np.concatenate([-_SIDE[::-1], [0.0], _SIDE])
 
 
 def crossing(slopes: Array, errors: Array, middle: int) -> float:
@@ -153,21 +140,10 @@ def crossing(slopes: Array, errors: Array, middle: int) -> float:
 
 
 class PlantInverse:
-    """Feedforward by inverse simulation.
+    """Feedforward by inverse simulation; :meth:`act` steps the internal plant.
 
-    Parameters
-    ----------
-    model : Simulated
-        Internal plant; it is stepped by :meth:`act`.
-    horizon : int
-        Periods after which a setpoint ramp meets the reference.
-    look : int
-        Periods over which the reference is kept within reach; none if at most ``horizon``.
-
-    Attributes
-    ----------
-    expected : float
-        Simulated contraction reading [m].
+    A setpoint ramp meets the reference after ``horizon`` periods; over ``look`` periods the
+    reference is kept within reach. ``expected`` is the simulated contraction reading [m].
     """
 
     def __init__(self, model: Simulated, horizon: int, look: int = 0) -> None:
@@ -211,20 +187,12 @@ class PlantInverse:
         return self.set_point
 
 
-@dataclass(frozen=True)
-class Gains:
-    """Gains of the feedback loop: ``proportional`` [Pa/m] and ``integral`` [Pa/(m s)]."""
-
-    proportional: float
-    integral: float
-
-
 class InversePi:
-    """Feedforward by inverse simulation with PI feedback."""
+    """Feedforward by inverse simulation with PI feedback, gains in Pa/m and Pa/(m s)."""
 
-    def __init__(self, inverse: PlantInverse, gains: Gains) -> None:
+    def __init__(self, inverse: PlantInverse, proportional: float, integral: float) -> None:
         self.inverse = inverse
-        self.gains = gains
+        self.proportional, self.integral = proportional, integral
         self.reset()
 
     def reset(self) -> None:
@@ -241,8 +209,8 @@ class InversePi:
             error,
             self._sum,
             forward,
-            self.gains.proportional,
-            self.gains.integral * model.period,
+            self.proportional,
+            self.integral * model.period,
             model.max_pressure,
         )
         return float(output)
@@ -353,13 +321,7 @@ def best_inverse(model: Simulated, reference: Array) -> tuple[PlantInverse, Arra
 
 
 def design(plant: SingleMuscle | Simulated) -> InversePi:
-    """Return the controller of a plant: feedforward by inverse simulation with PI feedback.
-
-    Parameters
-    ----------
-    plant : SingleMuscle or Simulated
-        Plant to control; ``mass.load`` and ``muscle.temperature`` are those of the runs.
-    """
+    """Return the controller of a plant: feedforward by inverse simulation with PI feedback."""
     model: Simulated = (
         PlantStepper(plant, plant.mass.load) if isinstance(plant, SingleMuscle) else plant
     )
@@ -370,4 +332,4 @@ def design(plant: SingleMuscle | Simulated) -> InversePi:
     grid = per_length * np.array([(p, i) for p in PROPORTIONAL for i in INTEGRAL])
     errors = errors_of(model, forward, expected, reference, grid)
     proportional, integral = grid[int(np.argmin(errors))]
-    return InversePi(inverse, Gains(float(proportional), float(integral)))
+    return InversePi(inverse, float(proportional), float(integral))

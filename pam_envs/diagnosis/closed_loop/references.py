@@ -34,20 +34,7 @@ def smooth_path(
 
 
 def fixed_references(top: float, period: float = PERIOD) -> dict[str, Array]:
-    """Return the references [m]: sines, a staircase with holds, random ramps and holds.
-
-    Parameters
-    ----------
-    top : float
-        Stroke [m]; after the initial rise references are between ``LOW`` and ``HIGH`` of it.
-    period : float
-        Control period [s].
-
-    Returns
-    -------
-    dict of str to ndarray, shape (n + PREVIEW,)
-        ``DURATION`` seconds each, and the preview at the end.
-    """
+    """Return the references [m]: sines, a staircase with holds, random ramps and holds."""
     t = np.arange(round(DURATION / period) + PREVIEW) * period
     turns = np.array([0.08, 0.21, 0.47, 0.83])
     sizes, phases = np.array([0.4, 0.3, 0.2, 0.1]), np.array([0.0, 1.1, 2.9, 4.6])

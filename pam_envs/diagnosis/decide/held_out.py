@@ -36,53 +36,25 @@ LEVEL = (0.025, 0.975)
 
 @dataclass(frozen=True)
 class Choice:
-    """Choice of the held-out data.
+    """Choice of the held-out data."""
 
-    Attributes
-    ----------
-    rows : ndarray of bool, shape (T,)
-        Held-out samples.
-    by : {"kinds", "blocks"}
-        Whole kinds of experiment, or interleaved blocks of time.
-    kinds : tuple of str
-        The held-out kinds; empty for blocks.
-    """
-
-    rows: NDArray[np.bool_]
-    by: str
-    kinds: tuple[str, ...] = ()
+    rows: NDArray[np.bool_]  # (T,): held-out samples
+    by: str  # {"kinds", "blocks"}: whole kinds of experiment, or interleaved blocks of time
+    kinds: tuple[str, ...] = ()  # the held-out kinds; empty for blocks
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Models fitted to the training samples, with their errors on the held-out samples.
-
-    Attributes
-    ----------
-    choice : Choice
-        Held-out data.
-    problem : Problem
-        With the other samples for training.
-    blocks : Blocks
-        Blocks that contain held-out samples.
-    seed : int
-        Seed of the block bootstrap.
-    base, model : Candidate
-        The base, and the base with the named causes.
-    rivals : list of Candidate or None
-        Rivals of the decision; None for one that held-out kinds of experiment cannot judge.
-    without : dict of str to Candidate
-        The model without each of its causes.
-    """
+    """Models fitted to the training samples, with their errors on the held-out samples."""
 
     choice: Choice
-    problem: Problem
-    blocks: Blocks
-    seed: int
+    problem: Problem  # with the other samples for training
+    blocks: Blocks  # those with held-out samples
+    seed: int  # of the block bootstrap
     base: Candidate
-    model: Candidate
-    rivals: list[Candidate | None] = field(default_factory=list)
-    without: dict[str, Candidate] = field(default_factory=dict)
+    model: Candidate  # the base with the named causes
+    rivals: list[Candidate | None] = field(default_factory=list)  # None: not judged by these data
+    without: dict[str, Candidate] = field(default_factory=dict)  # model without each of its causes
 
     @property
     def rows(self) -> NDArray[np.bool_]:
@@ -171,21 +143,6 @@ def hold_out(
     own parameters; model and close rivals also start from their previous fits, and the better fit
     to the training data counts. A rival with a cause that happens once cannot be judged on
     held-out kinds of experiment and is left to the interleaved blocks.
-
-    Parameters
-    ----------
-    problem, blocks : Problem, Blocks
-        Whole record.
-    choice : Choice
-        Held-out data.
-    base, model : Candidate
-        The base, and the base with the named causes.
-    rivals : sequence of Candidate
-        Models to compare with the model, which may be among them.
-    close : sequence of Candidate
-        Rivals that are fitted as thoroughly as the model.
-    seed : int
-        Seed of the block bootstrap.
     """
     rows, again = choice.rows, replace(problem, train=~choice.rows)
     part = _held_blocks(problem, blocks, rows)

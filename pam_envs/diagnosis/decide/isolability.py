@@ -10,8 +10,7 @@ import numpy as np
 from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.fit.candidate import initial_fits
-from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, column_of
-from pam_envs.diagnosis.fit.plant_protocol import PlantFamily
+from pam_envs.diagnosis.fit.least_squares import Fit, Free, PlantFamily, Problem, column_of
 
 DIRECTIONS = 1e-8
 """Relative size of the singular directions of the base's Jacobian that count."""
@@ -42,44 +41,21 @@ def projected(traces: Array, basis: Array) -> Array:
 
 @dataclass(frozen=True)
 class Isolability:
-    """Cosines between the effects of causes after a refit of the base.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Causes.
-    cosine : ndarray, shape (n, n)
-        Absolute cosines.
-    absorbed : ndarray, shape (n,)
-        Share of each effect's RMS absorbed by a refit of the base; NaN for an invisible effect.
-    reach : ndarray, shape (n,)
-        Largest size over the noise, on the channel where it is largest, at the starting points or
-        at the bounds.
-    """
+    """Cosines between the effects of causes after a refit of the base."""
 
     names: tuple[str, ...]
-    cosine: Array
-    absorbed: Array
-    reach: Array
+    cosine: Array  # (n, n): absolute values
+    absorbed: Array  # (n,): share of the RMS that a refit of the base absorbs; NaN if invisible
+    reach: Array  # (n,): largest size over the noise at the starting points or at the bounds
 
 
 @dataclass(frozen=True)
 class Shown:
-    """Effect of one parameter column relative to the base.
+    """Effect of one parameter column relative to the base."""
 
-    Attributes
-    ----------
-    left : ndarray, shape (m,)
-        Part that a refit of the base does not absorb.
-    size : float
-        RMS of that part over the noise, on the channel where it is largest.
-    raw : float
-        RMS before the refit over the noise.
-    """
-
-    left: Array
-    size: float
-    raw: float
+    left: Array  # (m,): part that a refit of the base does not absorb
+    size: float  # RMS of that part over the noise, on the channel where it is largest
+    raw: float  # RMS before the refit over the noise
 
     @property
     def absorbed(self) -> float:

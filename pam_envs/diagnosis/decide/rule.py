@@ -14,75 +14,40 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Rule:
-    """Thresholds of the decision.
+    """Thresholds of the decision."""
 
-    Attributes
-    ----------
-    version : str
-        Part of every report.
-    least_gain : float
-        Log mean-square gain on held-out blocks below which no cause is named.
-    least_total : float
-        The same, times the number of held-out blocks, for short recordings.
-    trial_penalty : float
-        Multiple-comparison penalty: loss of gain for each factor of e in the number of starting
-        values from which the best fit was selected.
-    flexible : float
-        Share of a residual explained by a flexible model above which it has structure.
-    peak : float
-        Height of a spectral peak over its neighbourhood above which a residual has structure.
-    excess : float
-        Held-out mean square over that of the noise floor above which a residual has structure.
-    explained : float
-        Unexplained if structure is left and less than this share of the excess was removed.
-    least_blocks : int
-        Number of held-out blocks with motion that a decision needs.
-    close, apart : float
-        A rival within this share of the best gain, or this far below it, is not excluded...
-    doubt : float
-        ... unless the difference is significant at this level (one-sided, block bootstrap).
-    second_gain : float
-        Least gain of a further cause...
-    second_share, second_enough, second_clear : float
-        ... which also needs this share of the first cause's gain, or this gain, or this share of
-        the gain of a model that leaves only noise; otherwise it corrects the form of the first.
-    hint : float
-        Share of the required gain that the first rounds of a further search must reach.
-    beam : int
-        Number of first causes from which a second is searched.
-    most : int
-        Largest number of named causes.
-    simpler, simpler_share : float
-        Gain, and share of the gain, that a cause must have over one that it contains.
-    folds : int
-        Folds of the cross-validation of close rivals.
-    draws : int
-        Bootstrap samples.
-    """
-
-    version: str = "2"
-    least_gain: float = 0.1
-    least_total: float = 2.4
-    trial_penalty: float = 0.01
+    version: str = "2"  # part of every report
+    least_gain: float = 0.1  # log mean-square gain on held-out blocks below which no cause is named
+    least_total: float = 2.4  # the same, times the number of held-out blocks, for short recordings
+    trial_penalty: float = (
+        0.01  # multiple-comparison penalty: gain lost for each factor e of trials
+    )
+    # structure of a residual: share explained by a flexible model, height of a spectral peak over
+    # its neighbourhood, held-out mean square over that of the noise floor
     flexible: float = 0.15
     peak: float = 30.0
     excess: float = 1.6
-    explained: float = 0.6
+    explained: float = 0.6  # removed share of the excess below which structure is unexplained
+    # a rival within this share of the best gain, or this far below it, is not excluded, unless the
+    # difference is significant at the level of doubt (one-sided, block bootstrap)
     close: float = 0.8
     apart: float = 0.1
-    least_blocks: int = 6
+    least_blocks: int = 6  # number of held-out blocks with motion that a decision needs
     doubt: float = 0.05
+    # a further cause needs a least gain, and this share of the first cause's gain, or this gain, or
+    # this share of the gain of a model that leaves only noise: otherwise it corrects the first form
     second_gain: float = 0.1
     second_share: float = 0.3
     second_enough: float = 0.6
     second_clear: float = 0.75
-    hint: float = 0.4
-    beam: int = 3
-    most: int = 3
+    hint: float = 0.4  # share of the required gain that a further search must reach at first
+    beam: int = 3  # number of first causes from which a second is searched
+    most: int = 3  # largest number of named causes
+    # gain, and share of the gain, that a cause must have over one that it contains
     simpler: float = 0.05
     simpler_share: float = 0.03
-    folds: int = 3
-    draws: int = 400
+    folds: int = 3  # folds of the cross-validation of close rivals
+    draws: int = 400  # bootstrap samples
 
 
 @dataclass(frozen=True)
@@ -121,17 +86,7 @@ def has_structure(left: dict[str, Any], rule: Rule) -> bool:
 
 
 def required_gain(first: float, possible: float, rule: Rule) -> float:
-    """Return the gain that a further cause needs.
-
-    Parameters
-    ----------
-    first : float
-        Gain of the first cause.
-    possible : float
-        Gain of a model that leaves only noise over the present model.
-    rule : Rule
-        Thresholds.
-    """
+    """Return the gain that a further cause needs."""
     ways = (rule.second_share * first, rule.second_enough, rule.second_clear * possible)
     return max(rule.second_gain, min(ways))
 

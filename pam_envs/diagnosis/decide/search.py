@@ -8,16 +8,22 @@ import numpy as np
 
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.fit.blocks import Blocks
-from pam_envs.diagnosis.fit.candidate import Candidate, complete_jacobian, initial_fits, polish
+from pam_envs.diagnosis.fit.candidate import (
+    Candidate,
+    best_by_name,
+    complete_jacobian,
+    initial_fits,
+    polish,
+)
 from pam_envs.diagnosis.fit.least_squares import (
     FEW_DAMPINGS,
     Fit,
+    PlantFamily,
     Problem,
     evaluate,
     improve,
     share,
 )
-from pam_envs.diagnosis.fit.plant_protocol import PlantFamily
 
 SCHEDULE = ((2, 8, 0.4), (2, 5, 0.6), (4, 4, 0.8))
 """Rounds with the base's Jacobian held; number of fits kept then, or their least share of the best
@@ -62,11 +68,7 @@ def search(
         _drop(fits, base.fit.cost, kept, share_kept)
         if least > 0.0 and np.log(base.fit.cost / min(f.cost for f in fits)) < least:
             return []
-    best: dict[str, Fit] = {}
-    for fit in fits:
-        name = fit.label[0].name
-        if name not in best or fit.cost < best[name].cost:
-            best[name] = fit
+    best = best_by_name((fit.label[0].name, fit) for fit in fits)
     ranked = sorted(best.values(), key=lambda f: f.cost)
     held_out = sorted(ranked, key=lambda f: -_gain(problem, blocks, base, f))
     selected = {f.label[0].name: f for f in (*ranked[:polished], *held_out[:polished])}

@@ -8,12 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.signal import lfilter, welch
 from scipy.stats import chi2
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.diagnosis.arrays import Array, Flags
 from pam_envs.diagnosis.fit.blocks import Blocks
 
 BINS = 12
@@ -64,7 +63,7 @@ class Regressors:
         }
         if temperature is not None:
             values["temperature"] = temperature
-        return cls(values, _features(time, command, x, p, load, temperature, values))
+        return cls(values, _features(command, x, values))
 
 
 def direction_of(pressure: Array) -> Array:
@@ -80,7 +79,7 @@ def direction_of(pressure: Array) -> Array:
     return out
 
 
-def turning_points(pressure: Array) -> NDArray[np.bool_]:
+def turning_points(pressure: Array) -> Flags:
     """Return the samples at which the pressure has reversed by at least :data:`CYCLE`."""
     turned = np.zeros(len(pressure), bool)
     top = bottom = pressure[0]
@@ -94,7 +93,7 @@ def turning_points(pressure: Array) -> NDArray[np.bool_]:
     return turned
 
 
-def since(marks: NDArray[np.bool_], period: float) -> Array:
+def since(marks: Flags, period: float) -> Array:
     """Return the time since the last mark [s]."""
     index = np.arange(len(marks))
     last = np.maximum.accumulate(np.where(marks, index, 0))
@@ -108,15 +107,9 @@ def low_pass(signal: Array, tau: float, period: float) -> Array:
     return np.asarray(filtered)
 
 
-def _features(
-    time: Array,
-    command: Array,
-    x: Array,
-    p: Array,
-    load: Array,
-    temperature: Array | None,
-    values: dict[str, Array],
-) -> Array:
+def _features(command: Array, x: Array, values: dict[str, Array]) -> Array:
+    time, load, p = values["time"], values["load"], values["pressure"]
+    temperature = values.get("temperature")
     period = float(time[1] - time[0])
     way = values["direction"]
     span = max(float(time[-1] - time[0]), 1e-9)
@@ -142,25 +135,27 @@ def _features(
     return np.array(rows)
 
 
-def flexible_r2(residual: Array, regressors: Regressors, blocks: Blocks) -> tuple[float, Array]:
+def _parts(good: Flags, blocks: Blocks) -> tuple[Flags, Flags] | None:
+    """Return training and held-out samples with readings, or None with too few of them."""
+    train, test = good & blocks.train, good & ~blocks.train
+    return None if train.sum() < 100 or test.sum() < 50 else (train, test)
+
+
+def _explained(residual: Array, prediction: Array) -> float:
+    """Return the share of a residual that a prediction explains, at least 0."""
+    error, spread = np.mean((residual - prediction) ** 2), np.mean(residual**2)
+    return float(max(0.0, 1.0 - float(error) / max(float(spread), 1e-30)))
+
+
+def flexible_r2(residual: Array, regressors: Regressors, blocks: Blocks) -> float:
     """Return the share of a residual that ridge regression explains on held-out blocks.
 
-    Parameters
-    ----------
-    residual : ndarray, shape (T,)
-        NaN where there is no reading.
-
-    Returns
-    -------
-    r2 : float
-        At least 0.
-    prediction : ndarray, shape (T,)
-        Predicted residual.
+    The residual is NaN where there is no reading.
     """
-    good = np.isfinite(residual)
-    train, test = good & blocks.train, good & ~blocks.train
-    if train.sum() < 100 or test.sum() < 50:
-        return 0.0, np.zeros(len(residual))
+    parts = _parts(np.isfinite(residual), blocks)
+    if parts is None:
+        return 0.0
+    train, test = parts
     a = regressors.features.T
     mean, scale = a[train].mean(axis=0), a[train].std(axis=0) + 1e-9
     a = (a - mean) / scale
@@ -169,26 +164,22 @@ def flexible_r2(residual: Array, regressors: Regressors, blocks: Blocks) -> tupl
     ridge = 1e-3 * train.sum()
     weights = np.linalg.solve(inner + ridge * np.eye(len(inner)), outer)
     prediction = a @ weights + residual[train].mean()
-    error = residual[test] - prediction[test]
-    spread = float(np.mean(residual[test] ** 2))
-    return float(max(0.0, 1.0 - float(np.mean(error**2)) / max(spread, 1e-30))), prediction
+    return _explained(residual[test], prediction[test])
 
 
 def binned_r2(residual: Array, variable: Array, blocks: Blocks) -> float:
     """Return the share of a residual explained by its means over bins of a variable, at least 0."""
     good = np.isfinite(residual) & np.isfinite(variable)
-    train, test = good & blocks.train, good & ~blocks.train
-    if train.sum() < 100 or test.sum() < 50 or np.ptp(variable[good]) == 0.0:
+    parts = _parts(good, blocks)
+    if parts is None or np.ptp(variable[good]) == 0.0:
         return 0.0
+    train, test = parts
     edges = np.unique(np.quantile(variable[train], np.linspace(0.0, 1.0, BINS + 1)[1:-1]))
     at = np.searchsorted(edges, variable)
     n = len(edges) + 1
     counts = np.bincount(at[train], minlength=n)
     means = np.bincount(at[train], residual[train], minlength=n) / np.maximum(counts, 1)
-    error = residual[test] - means[at[test]]
-    return float(
-        max(0.0, 1.0 - float(np.mean(error**2)) / max(float(np.mean(residual[test] ** 2)), 1e-30))
-    )
+    return _explained(residual[test], means[at[test]])
 
 
 def spectral_peak(
@@ -196,15 +187,8 @@ def spectral_peak(
 ) -> tuple[float, float]:
     """Return frequency [Hz] and relative height of the sharpest spectral peak.
 
-    Parameters
-    ----------
-    residual : ndarray, shape (T,)
-        NaN where there is no reading.
-    period : float
-        Sampling period [s].
-    motion : ndarray, shape (T,), optional
-        Motion whose own spectral peaks are ignored: sines of an experiment leave lines in every
-        residual, an external vibration does not depend on them.
+    Peaks of ``motion`` are ignored: sines of an experiment leave lines in every residual, an
+    external vibration does not depend on them.
     """
     frequency, heights = _heights(residual, period)
     usable = frequency > LOWEST_PEAK

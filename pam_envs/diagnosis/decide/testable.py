@@ -10,8 +10,7 @@ from pam_envs.diagnosis.audit.audit import undecidable
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.decide.isolability import Isolability, isolability, lookalikes
 from pam_envs.diagnosis.fit.blocks import BLOCK_SECONDS, EVERY
-from pam_envs.diagnosis.fit.least_squares import Fit, Problem
-from pam_envs.diagnosis.fit.plant_protocol import PlantFamily
+from pam_envs.diagnosis.fit.least_squares import Fit, PlantFamily, Problem
 
 SHORT = "The recording is too short to decide anything"
 """Beginning of the warning on a short recording."""

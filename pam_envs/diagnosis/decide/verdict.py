@@ -26,8 +26,7 @@ from pam_envs.diagnosis.decide.search import search
 from pam_envs.diagnosis.decide.structure import Regressors, flexible_r2, spectral_peak
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import Candidate, without_each_cause
-from pam_envs.diagnosis.fit.least_squares import Problem, column_of
-from pam_envs.diagnosis.fit.plant_protocol import PlantFamily
+from pam_envs.diagnosis.fit.least_squares import PlantFamily, Problem, column_of
 
 Models = tuple[Candidate, list[Candidate]]
 """The best model with some number of causes, and its rivals, best first."""
@@ -38,47 +37,23 @@ KEPT = 12
 
 @dataclass(frozen=True)
 class Level:
-    """The best model with some number of causes.
-
-    Attributes
-    ----------
-    model : Candidate
-        The best.
-    rivals : list of Candidate
-        All models with as many causes, best first.
-    left : dict
-        Remaining structure of the residual, see :func:`remaining_structure`.
-    """
+    """The best model with some number of causes."""
 
     model: Candidate
-    rivals: list[Candidate]
-    left: dict[str, Any]
+    rivals: list[Candidate]  # all models with as many causes, best first
+    left: dict[str, Any]  # see remaining_structure
 
 
 @dataclass
 class Decision:
-    """A verdict and its evidence.
+    """A verdict and its evidence."""
 
-    Attributes
-    ----------
-    verdict : {"adequate", "named", "ambiguous", "unexplained", "insufficient"}
-        One word.
-    model : Candidate
-        The base with the named causes.
-    rivals, open_rivals : list of Candidate
-        Other fitted models, best first; those that are not excluded.
-    structure : dict
-        Remaining structure before and after.
-    evidence : dict
-        Input of the rule, in plain types: see :meth:`Ladder.evidence`.
-    """
-
-    verdict: str
-    model: Candidate
-    rivals: list[Candidate] = field(default_factory=list)
-    open_rivals: list[Candidate] = field(default_factory=list)
-    structure: dict[str, Any] = field(default_factory=dict)
-    evidence: dict[str, Any] = field(default_factory=dict)
+    verdict: str  # "adequate", "named", "ambiguous", "unexplained" or "insufficient"
+    model: Candidate  # the base with the named causes
+    rivals: list[Candidate] = field(default_factory=list)  # best first
+    open_rivals: list[Candidate] = field(default_factory=list)  # those that are not excluded
+    structure: dict[str, Any] = field(default_factory=dict)  # remaining structure before and after
+    evidence: dict[str, Any] = field(default_factory=dict)  # see Ladder.evidence
 
 
 def remaining_structure(
@@ -93,7 +68,7 @@ def remaining_structure(
             r2.append(0.0)
             peaks.append((0.0, 0.0))
             continue
-        share, _ = flexible_r2(np.where(np.isfinite(reading), row, np.nan), regressors, blocks)
+        share = flexible_r2(np.where(np.isfinite(reading), row, np.nan), regressors, blocks)
         r2.append(share)
         rest -= float(np.log(1.0 - min(share, 0.999)))
         peaks.append(spectral_peak(row, period, regressors.values["pressure"]))
@@ -105,23 +80,7 @@ def remaining_structure(
 
 @dataclass(frozen=True)
 class Ladder:
-    """Forward selection of causes on one base.
-
-    Attributes
-    ----------
-    problem, family, blocks : Problem, PlantFamily, Blocks
-        Data and plant.
-    base : Candidate
-        The refitted plant.
-    causes : sequence of Cause
-        Candidates.
-    regressors : Regressors
-        Variables of the residual's structure.
-    rule : Rule
-        Numbers of the decision.
-    seed : int
-        Seed of the bootstrap.
-    """
+    """Forward selection of causes on one base."""
 
     problem: Problem
     family: PlantFamily
@@ -211,7 +170,9 @@ class Ladder:
                     "gain": self.gain(level.model),
                     "added": self.gain(level.model, before),
                     "possible": possible_gain(self.blocks, before),
-                    "unsure": self.p_value(before, level.model, level),
+                    "unsure": p_value(
+                        self.problem, self.blocks, before, level.model, len(level.rivals)
+                    ),
                     "left": level.left,
                     "rivals": [
                         self.row(self.blocks, self.base, rival, level.model, draws)
@@ -220,10 +181,6 @@ class Ladder:
                 }
             )
         return {"blocks": int(self.blocks.held_out.sum()), "levels": made}
-
-    def p_value(self, before: Candidate, after: Candidate, level: Level) -> float:
-        """Return the p-value of the last added cause, corrected for the rivals tried."""
-        return p_value(self.problem, self.blocks, before, after, len(level.rivals))
 
     def row(
         self,
@@ -269,7 +226,7 @@ class Ladder:
             "crossed": len(rows),
             "gain": rows[0]["gain"],
             "added": penalised_gain(every, before, order[0], self.rule),
-            "unsure": self.p_value(smaller, best, level),
+            "unsure": p_value(self.problem, self.blocks, smaller, best, len(level.rivals)),
         }
         if best is not level.model:
             found["left"] = self.level(best, []).left

@@ -16,7 +16,7 @@ from pam_envs.constants import GRAVITY, ROOM_TEMPERATURE
 from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.experiment.plans import PERIOD, Means, Plan, plans
-from pam_envs.diagnosis.fit.least_squares import Fit, column_of
+from pam_envs.diagnosis.fit.least_squares import Fit, column_of, shifted
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.replay import LONGEST_STEP, Inputs, replay_rows
 
@@ -28,21 +28,11 @@ RANK = 1e-6
 
 @dataclass(frozen=True)
 class Rival:
-    """A fitted model with its sensitivity to its own parameters.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Names of its causes.
-    column : ndarray, shape (p,)
-        Its parameters.
-    nearby : ndarray, shape (k, p)
-        The same with one parameter of its causes perturbed in each row.
-    """
+    """A fitted model with its sensitivity to its own parameters."""
 
     names: tuple[str, ...]
-    column: Array
-    nearby: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    column: Array  # (p,)
+    nearby: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (k, p): one parameter moved
 
     @property
     def label(self) -> str:
@@ -59,35 +49,19 @@ class Rival:
 
 def rival_of(names: tuple[str, ...], fit: Fit, base: int, tie: Callable[[Array], None]) -> Rival:
     """Return the rival of a fit, whose own parameters follow the first ``base`` ones."""
-    places = np.tile(fit.z, (1 + len(fit.z) - base, 1))
-    for row, k in enumerate(range(base, len(fit.z)), 1):
-        free = fit.frees[k]
-        up = fit.z[k] + free.step < free.span[1]
-        places[row, k] += free.step if up else -free.step
+    places = [fit.z, *(shifted(fit, k)[0] for k in range(base, len(fit.z)))]
     columns = np.array([column_of(fit, z) for z in places])
     tie(columns)
     return Rival(names, columns[0], columns[1:])
 
 
-@dataclass(frozen=True)
-class Sensors:
-    """Sensors of an experiment.
+def _over_noise(outputs: Array, noise: Array) -> Array:
+    """Return outputs (channels, T, n) over the noise, shape (n, channels * T).
 
-    Attributes
-    ----------
-    noise : ndarray, shape (channels,)
-        RMS noise [SI]; infinite for a channel without a sensor.
+    Means are removed: a constant offset disappears when the sensors are zeroed again.
     """
-
-    noise: Array
-
-    def shown(self, outputs: Array) -> Array:
-        """Return outputs (channels, T, n) over the noise, shape (n, channels * T).
-
-        Means are removed: a constant offset disappears when the sensors are zeroed again.
-        """
-        flat = (outputs - outputs.mean(axis=1, keepdims=True)) / self.noise[:, None, None]
-        return np.asarray(flat.transpose(2, 0, 1).reshape(outputs.shape[2], -1))
+    flat = (outputs - outputs.mean(axis=1, keepdims=True)) / noise[:, None, None]
+    return np.asarray(flat.transpose(2, 0, 1).reshape(outputs.shape[2], -1))
 
 
 def inputs_of(plan: Plan, longest_step: float = LONGEST_STEP) -> Inputs:
@@ -108,28 +82,16 @@ def inputs_of(plan: Plan, longest_step: float = LONGEST_STEP) -> Inputs:
 
 
 def separations(
-    plant: SingleMuscle, rivals: Sequence[Rival], inputs: Inputs, sensors: Sensors
+    plant: SingleMuscle, rivals: Sequence[Rival], inputs: Inputs, noise: Array
 ) -> list[float]:
     """Return the separation of the first rival from each other one in an experiment.
 
-    Parameters
-    ----------
-    plant : SingleMuscle
-        Plant of the same structure as the rivals.
-    rivals : sequence of Rival
-        Fitted models.
-    inputs : Inputs
-        Inputs of the experiment.
-    sensors : Sensors
-        Sensors and their noise.
-
-    Returns
-    -------
-    list of float
-        Mean squares in noise variances, summed over the outputs: the difference that remains after
-        one of the two is refitted to the other, the smaller of both directions.
+    Mean squares in noise variances, summed over the outputs: the difference that remains after one
+    of the two is refitted to the other, the smaller of both directions. ``noise`` (channels,) is
+    the RMS noise of the sensors [SI], infinite for a channel without a sensor.
     """
-    found = sensors.shown(replay_rows(plant, np.vstack([r.columns for r in rivals]), inputs))
+    columns = np.vstack([r.columns for r in rivals])
+    found = _over_noise(replay_rows(plant, columns, inputs), noise)
     samples, traces, at = len(inputs.command), [], 0
     for rival in rivals:
         n = 1 + len(rival.nearby)
@@ -166,28 +128,10 @@ def propose(
     """Return the experiment that best separates a model from all its rivals, for the report.
 
     The experiment with the largest separation from the nearest rival.
-
-    Parameters
-    ----------
-    plant : SingleMuscle
-        Plant of the same structure as the rivals.
-    first : Rival
-        The best model.
-    seconds : sequence of Rival
-        Rivals that are not excluded.
-    noise : ndarray, shape (channels,)
-        RMS noise of the sensors [SI]; infinite without a sensor.
-    means : Means
-        Capabilities of the rig.
-    causes : sequence of Cause
-        Causes with the sensors that would measure them directly.
-    longest_step : float
-        Longest step of the simulation [s].
     """
     rivals = (first, *seconds)
     scored = [
-        (separations(plant, rivals, inputs_of(p, longest_step), Sensors(noise)), p)
-        for p in plans(means)
+        (separations(plant, rivals, inputs_of(p, longest_step), noise), p) for p in plans(means)
     ]
     apart, plan = max(scored, key=lambda pair: min(pair[0]))
     least = min(apart)

@@ -25,24 +25,12 @@ STAIRS = tuple(v / 10.0 for v in (*range(1, 10), *range(8, 0, -1)))
 
 @dataclass(frozen=True)
 class Means:
-    """Capabilities of a rig.
+    """Capabilities of a rig."""
 
-    Attributes
-    ----------
-    full : float
-        Largest setpoint [Pa].
-    loads : tuple of float
-        Available loads [N], ascending.
-    shut : bool
-        Whether the valve can be closed.
-    warm : bool
-        Whether the muscle's temperature is measured.
-    """
-
-    full: float
-    loads: tuple[float, ...]
-    shut: bool
-    warm: bool
+    full: float  # largest setpoint [Pa]
+    loads: tuple[float, ...]  # available loads [N], ascending
+    shut: bool  # the valve can be closed
+    warm: bool  # the muscle's temperature is measured
 
     @classmethod
     def of(cls, recording: Recording, rig: Rig) -> Means:
@@ -62,25 +50,13 @@ class Means:
 
 @dataclass(frozen=True)
 class Piece:
-    """A ramp or sine of an experiment.
+    """A ramp or sine of an experiment."""
 
-    Attributes
-    ----------
-    seconds : float
-        Duration [s].
-    start, end : float
-        Setpoints over the largest one; for a sine the lowest and the highest.
-    hertz : float
-        Frequency of a sine [Hz]; 0 for a ramp.
-    shut : bool
-        Whether the valve is closed, so that no setpoint acts.
-    """
-
-    seconds: float
-    start: float
-    end: float
-    hertz: float = 0.0
-    shut: bool = False
+    seconds: float  # duration [s]
+    start: float  # setpoint over the largest one; the lowest of a sine
+    end: float  # setpoint over the largest one; the highest of a sine
+    hertz: float = 0.0  # frequency of a sine [Hz]; 0 for a ramp
+    shut: bool = False  # with the valve closed no setpoint acts
 
     @property
     def samples(self) -> int:
@@ -102,28 +78,14 @@ class Piece:
 
 @dataclass(frozen=True)
 class Plan:
-    """An experiment.
-
-    Attributes
-    ----------
-    name, description : str
-        Name, and instruction in words.
-    pieces : tuple of Piece
-        Command, repeated for each load.
-    loads : tuple of float
-        Loads in turn [N].
-    full : float
-        Largest setpoint [Pa].
-    warmer : float
-        Temperature rise of the muscle until the middle of the experiment [K].
-    """
+    """An experiment."""
 
     name: str
     description: str
-    pieces: tuple[Piece, ...]
-    loads: tuple[float, ...]
-    full: float
-    warmer: float = 0.0
+    pieces: tuple[Piece, ...]  # repeated for each load
+    loads: tuple[float, ...]  # in turn [N]
+    full: float  # largest setpoint [Pa]
+    warmer: float = 0.0  # temperature rise of the muscle until the middle of the experiment [K]
 
     @property
     def command(self) -> Array:

@@ -17,21 +17,11 @@ EVERY = 3
 
 @dataclass(frozen=True)
 class Blocks:
-    """Blocks of time.
+    """Blocks of time."""
 
-    Attributes
-    ----------
-    of : ndarray of int, shape (T,)
-        Block of each sample.
-    held_out : ndarray of bool, shape (n,)
-        Blocks that are excluded from fits.
-    counts : ndarray, shape (channels, n)
-        Number of readings in each block.
-    """
-
-    of: NDArray[np.int64]
-    held_out: NDArray[np.bool_]
-    counts: Array
+    of: NDArray[np.int64]  # (T,): block of each sample
+    held_out: NDArray[np.bool_]  # (n,): blocks that are excluded from fits
+    counts: Array  # (channels, n): number of readings in each block
 
     @classmethod
     def make(cls, time: Array, measured: Array) -> Blocks:

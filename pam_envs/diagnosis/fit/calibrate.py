@@ -31,19 +31,8 @@ def calibrate(
     The regulator is fitted first, to the pressure alone; then the static map and the friction by a
     regression of the force balance; then all parameters by simulation. If that fit is far from the
     readings, a second one starts from the given plant, and the better of the two is kept.
-
-    Parameters
-    ----------
-    family : MuscleFamily
-        Plant and inputs.
-    measured : ndarray, shape (channels, T)
-        Readings; NaN where there is none.
-    noise : ndarray, shape (channels,)
-        Standard deviation of their noise.
-    blocks : Blocks
-        Blocks of the record.
-    time : ndarray, shape (T,)
-        Time [s].
+    ``measured`` (channels, T) is NaN where there is no reading, ``noise`` (channels,) its standard
+    deviation.
     """
     problem = Problem(family.simulate, measured, noise, blocks.train, time, family.tie)
     frees, column = family.base(), family.column
@@ -56,21 +45,11 @@ def calibrate(
             family = family.finer(FINE_STEP)
             problem = dataclasses.replace(problem, simulate=family.simulate)
     tried = [frees]
-    operator = family.plant.hysteresis.model
-    if np.isfinite(measured[0]).any() and operator.kind == PlayOperator.kind:
-        law = balance(
-            _from_rest(family, measured[0]),
-            family.simulate(column[None])[1, :, 0],
-            family.inputs.load,
-            family.inputs.period,
-            family.plant.muscle.rest_length,
-            family.plant.muscle.braid_strain,
-            operator.thresholds,  # type: ignore[attr-defined]
-            np.isfinite(measured[0]),
-        )
-        tried = (
-            [start_at_guess(frees, found | law), frees] if law else [start_at_guess(frees, found)]
-        )
+    plays = family.plant.hysteresis.model.kind == PlayOperator.kind
+    if np.isfinite(measured[0]).any() and plays:
+        law = balance(family, measured[0], family.simulate(column[None])[1, :, 0])
+        guess = start_at_guess(frees, found | law)
+        tried = [guess, frees] if law else [guess]
     best = fit_base(problem, blocks, column, tried[0], ROUNDS)
     for start in tried[1:]:
         if best.fit.cost < FAR * problem.seen:
@@ -80,20 +59,13 @@ def calibrate(
     return family, problem, best
 
 
-def _from_rest(family: MuscleFamily, contraction: Array) -> Array:
-    """Return contractions relative to the unloaded rest length."""
-    first = float(family.inputs.load[0])
-    below = float(family.plant._absolute(np.zeros(1), np.array([first]))[0]) if first > 0 else 0.0
-    return contraction + below
-
-
 def _regulator(problem: Problem, family: MuscleFamily) -> Fit:
     """Return the fit of the regulator's gain and lag to the pressure."""
     frees = tuple(f for f in family.base() if f.name in PRESSURE)
     alone = problem.measured.copy()
     alone[0] = np.nan
     only = dataclasses.replace(problem, measured=alone)
-    fit = Fit(frees, np.array([f.inner(f.start) for f in frees]), family.column)
+    fit = Fit.at_start(frees, family.column)
     evaluate(only, [fit])
     improve(only, [fit], GUESS_ROUNDS, 1e-4)
     return fit

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,7 @@ from pam_envs.diagnosis.fit.least_squares import (
     FEW_DAMPINGS,
     Fit,
     Free,
+    PlantFamily,
     Problem,
     Shared,
     differentiate,
@@ -22,7 +23,6 @@ from pam_envs.diagnosis.fit.least_squares import (
     improve,
     share,
 )
-from pam_envs.diagnosis.fit.plant_protocol import PlantFamily
 
 POLISH = 6
 """Largest number of rounds with the full Jacobian."""
@@ -107,7 +107,7 @@ def fit_base(
     problem: Problem, blocks: Blocks, column: Array, frees: tuple[Free, ...], rounds: int = 25
 ) -> Candidate:
     """Fit the base parameters of a plant."""
-    fit = Fit(frees, np.array([f.inner(f.start) for f in frees]), column)
+    fit = Fit.at_start(frees, column)
     evaluate(problem, [fit])
     improve(problem, [fit], rounds, 1e-5)
     differentiate(problem, [fit])
@@ -116,10 +116,19 @@ def fit_base(
 
 def refit(problem: Problem, blocks: Blocks, candidate: Candidate, rounds: int = 6) -> Candidate:
     """Return a candidate refitted to other training samples."""
-    fit = replace(candidate.fit, done=False, damping=1.0, shared=None, begins={})
+    fit = restarted(candidate.fit, shared=None)
     evaluate(problem, [fit])
     improve(problem, [fit], rounds, 1e-5)
     return Candidate(candidate.causes, fit, blocks.errors(problem.rows(fit.residual)))
+
+
+def best_by_name(fits: Iterable[tuple[str, Fit]]) -> dict[str, Fit]:
+    """Return the fit of the least cost for each name."""
+    best: dict[str, Fit] = {}
+    for name, fit in fits:
+        if name not in best or fit.cost < best[name].cost:
+            best[name] = fit
+    return best
 
 
 def restarted(fit: Fit, **changes: Any) -> Fit:
@@ -139,7 +148,7 @@ def without_each_cause(
         frees, z = tuple(model.fit.frees[k] for k in kept), model.fit.z[kept]
         of_base = np.concatenate([base.fit.z, z[len(base.fit.z) :]])
         for start in (z, of_base):
-            fits.append(restarted(replace(model.fit, frees=frees, z=start.copy()), shared=None))
+            fits.append(restarted(model.fit, frees=frees, z=start.copy(), shared=None))
             labels.append(removed.name)
     complete_jacobian(problem, base.fit)
     shared = share(problem, base.fit)
@@ -147,10 +156,7 @@ def without_each_cause(
         fit.shared = shared
     evaluate(problem, fits)
     improve(problem, fits, FEW_ROUNDS, 1e-4, FEW_DAMPINGS)
-    best: dict[str, Fit] = {}
-    for name, fit in zip(labels, fits, strict=True):
-        if name not in best or fit.cost < best[name].cost:
-            best[name] = fit
+    best = best_by_name(zip(labels, fits, strict=True))
     polish(problem, list(best.values()))
     return {
         name: Candidate(

@@ -10,12 +10,12 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import lsq_linear
 
 from pam_envs.constants import GRAVITY
 from pam_envs.diagnosis.arrays import Array
+from pam_envs.diagnosis.fit.single_muscle import MuscleFamily
 from pam_envs.hysteresis.elements import move_plays, simulate_plays
 
 SLOW = 0.008
@@ -35,48 +35,28 @@ def play_gaps(pressure: Array, thresholds: tuple[float, ...]) -> Array:
     return gaps
 
 
-def balance(
-    contraction: Array,
-    pressure: Array,
-    load: Array,
-    period: float,
-    rest_length: float,
-    braid_strain: float,
-    thresholds: tuple[float, ...],
-    usable: NDArray[np.bool_],
-) -> dict[str, float] | None:
-    """Return coefficients of the static law and play weights, or None with too few slow samples.
+def balance(family: MuscleFamily, contraction: Array, pressure: Array) -> dict[str, float]:
+    """Return coefficients of the static law and play weights; none with too few slow samples.
 
-    Parameters
-    ----------
-    contraction : ndarray, shape (T,)
-        Relative to the unloaded rest length [m].
-    pressure : ndarray, shape (T,)
-        Pressure [Pa].
-    load : ndarray, shape (T,)
-        Load [kg].
-    period : float
-        Sampling period [s].
-    rest_length : float
-        Unloaded rest length [m].
-    braid_strain : float
-        Strain constant of the braid force [1].
-    thresholds : tuple of float
-        Thresholds of the play operators [Pa].
-    usable : ndarray of bool, shape (T,)
-        Samples with readings.
+    ``contraction`` are readings [m], NaN where there is none, ``pressure`` is simulated [Pa], both
+    of shape (T,).
     """
+    plant, load, period = family.plant, family.inputs.load, family.inputs.period
+    usable = np.isfinite(contraction)
+    below = plant._absolute(np.zeros(1), load[:1])[0] if load[0] > 0 else 0.0
+    contraction = contraction + float(below)  # relative to the unloaded rest length
     window = max(3, round(0.1 / period))
     smooth = uniform_filter1d(np.nan_to_num(contraction), window)
     pace = np.abs(np.gradient(smooth, period))
     rows = np.flatnonzero(usable & (uniform_filter1d(pace, window) < SLOW))
     if len(rows) < 200:
-        return None
+        return {}
     rows = rows[:: max(1, len(rows) // MOST)]
-    e, p = smooth[rows] / rest_length, pressure[rows]
+    e, p = smooth[rows] / plant.muscle.rest_length, pressure[rows]
+    thresholds: tuple[float, ...] = plant.hysteresis.model.thresholds  # type: ignore[attr-defined]
     gaps = play_gaps(pressure, thresholds)[:, rows]
     force = load[rows] * GRAVITY
-    bend = -np.expm1(-e / braid_strain)
+    bend = -np.expm1(-e / plant.muscle.braid_strain)
     passive = [-bend, -e, -(e**2), -(e**3), -(e**4)]
     taper = np.zeros(len(rows))
     found: dict[str, float] = {}

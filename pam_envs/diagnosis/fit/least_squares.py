@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,34 +33,16 @@ WORST = 1e4
 
 @dataclass(frozen=True)
 class Free:
-    """A free parameter of a fit.
-
-    Attributes
-    ----------
-    name : str
-        Dotted name.
-    place : int
-        Index in the column.
-    low, high : float
-        Bounds, in its unit.
-    scale : float
-        Size of a meaningful change, in its unit; not used on a logarithmic scale.
-    log : bool
-        Fitted on a logarithmic scale.
-    start : float
-        Starting value.
-    prior : float
-        Standard deviation of a weak prior about ``start``, in internal units (infinite: none).
-    """
+    """A free parameter of a fit, in its own unit."""
 
     name: str
-    place: int
+    place: int  # index in the column
     low: float
     high: float
-    scale: float
+    scale: float  # size of a meaningful change; not used on a logarithmic scale
     log: bool = False
     start: float = 0.0
-    prior: float = np.inf
+    prior: float = np.inf  # standard deviation of a weak prior about start, in internal units
 
     def inner(self, value: float) -> float:
         """Return the internal coordinate of a value."""
@@ -82,63 +64,51 @@ class Free:
         return 0.01 if self.log else 0.02
 
 
-@dataclass(frozen=True)
-class Shared:
-    """Jacobian by the leading parameters that several fits have in common.
+class PlantFamily(Protocol):
+    """Interface of a plant with fixed inputs that can be diagnosed.
 
-    Attributes
-    ----------
-    slopes : ndarray, shape (n, m)
-        Derivatives on the training samples.
-    gram : ndarray, shape (n, n)
-        ``slopes @ slopes.T``.
+    A plant whose parameters depend on one another also gives :attr:`Problem.tie`.
     """
 
-    slopes: Array
-    gram: Array
+    @property
+    def column(self) -> Array:
+        """Parameters of the plain plant, shape (p,)."""
+
+    def simulate(self, columns: Array) -> Array:
+        """Return sensor readings for parameter columns (n, p), shape (channels, T, n)."""
+
+    def free(self, name: str, **changes: Any) -> Free:
+        """Return the fit settings of a parameter: place, bounds, scale, start."""
+
+
+@dataclass(frozen=True)
+class Shared:
+    """Jacobian by the leading parameters that several fits have in common."""
+
+    slopes: Array  # (n, m): derivatives on the training samples
+    gram: Array  # (n, n): ``slopes @ slopes.T``
 
 
 @dataclass
 class Fit:
-    """State of a fit.
+    """State of a fit."""
 
-    Attributes
-    ----------
-    frees : tuple of Free
-        Free parameters, those of the base first.
-    z : ndarray, shape (n,)
-        Internal coordinates.
-    column : ndarray
-        All other parameters.
-    cost : float
-        Sum of squared weighted residuals on the training samples, priors included.
-    residual : ndarray, shape (m,)
-        Weighted residuals, simulation minus measurement, in the problem's order.
-    slopes : ndarray, shape (k, m)
-        Derivatives of the residuals by the last k coordinates.
-    shared : Shared or None
-        Derivatives by the coordinates before them.
-    damping : float
-        Factor on the dampings of the next round.
-    done : bool
-        Whether the fit has converged or was stopped.
-    label : object
-        Cause and form of the fit.
-    begins : dict
-        Starting points of further causes, by form.
-    """
+    frees: tuple[Free, ...]  # those of the base first
+    z: Array  # (n,): internal coordinates
+    column: Array  # all other parameters
+    cost: float = np.inf  # sum of squares of the training residuals, priors included
+    residual: Array = field(default_factory=lambda: np.zeros(0))  # (m,): simulated less measured
+    slopes: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (k, m): by the last k of z
+    shared: Shared | None = None  # derivatives by the coordinates before them
+    damping: float = 1.0  # factor on the dampings of the next round
+    done: bool = False  # whether the fit has converged or was stopped
+    label: Any = None  # cause and form of the fit
+    begins: dict[Any, Any] = field(default_factory=dict, repr=False)  # starting points by form
 
-    frees: tuple[Free, ...]
-    z: Array
-    column: Array
-    cost: float = np.inf
-    residual: Array = field(default_factory=lambda: np.zeros(0))
-    slopes: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    shared: Shared | None = None
-    damping: float = 1.0
-    done: bool = False
-    label: Any = None
-    begins: dict[Any, Any] = field(default_factory=dict, repr=False)
+    @classmethod
+    def at_start(cls, frees: tuple[Free, ...], column: Array) -> Fit:
+        """Return a fit at the starting values of its parameters."""
+        return cls(frees, np.array([f.inner(f.start) for f in frees]), column)
 
     @property
     def held(self) -> int:
@@ -155,29 +125,14 @@ class Problem:
     """Data and simulation shared by fits.
 
     The weighted residuals of all channels form one vector, the training samples first.
-
-    Attributes
-    ----------
-    simulate : callable
-        From columns (n, p) to outputs (channels, T, n).
-    measured : ndarray, shape (channels, T)
-        Readings; NaN where there is none.
-    noise : ndarray, shape (channels,)
-        Standard deviation of each channel's noise.
-    train : ndarray of bool, shape (T,)
-        Training samples.
-    time : ndarray, shape (T,)
-        Time [s].
-    tie : callable
-        Completes, in place, columns whose parameters depend on one another.
     """
 
-    simulate: Callable[[Array], Array]
-    measured: Array
-    noise: Array
-    train: NDArray[np.bool_]
-    time: Array
-    tie: Callable[[Array], None] = lambda columns: None
+    simulate: Callable[[Array], Array]  # from columns (n, p) to outputs (channels, T, n)
+    measured: Array  # (channels, T): readings; NaN where there is none
+    noise: Array  # (channels,): standard deviation of each channel's noise
+    train: NDArray[np.bool_]  # (T,): training samples
+    time: Array  # (T,) [s]
+    tie: Callable[[Array], None] = lambda columns: None  # completes columns in place
 
     @cached_property
     def order(self) -> NDArray[np.int64]:
@@ -243,7 +198,7 @@ def evaluate(problem: Problem, fits: Sequence[Fit]) -> None:
         fit.cost = _cost(problem, fit, fit.z, residual)
 
 
-def _shifted(fit: Fit, k: int) -> tuple[Array, float]:
+def shifted(fit: Fit, k: int) -> tuple[Array, float]:
     """Return coordinates with the ``k``-th shifted within its bounds, and the shift."""
     z, high = fit.z.copy(), fit.frees[k].span[1]
     step = fit.frees[k].step
@@ -258,7 +213,7 @@ def differentiate(problem: Problem, fits: Sequence[Fit]) -> None:
     columns, steps = [], []
     for fit in fits:
         for k in range(fit.held, len(fit.frees)):
-            z, step = _shifted(fit, k)
+            z, step = shifted(fit, k)
             columns.append(column_of(fit, z))
             steps.append(step)
     if not columns:
@@ -338,21 +293,7 @@ def improve(
     tolerance: float,
     dampings: Sequence[float] = DAMPINGS,
 ) -> None:
-    """Improve fits by damped Gauss-Newton steps, all fits side by side.
-
-    Parameters
-    ----------
-    problem : Problem
-        Data and simulation.
-    fits : sequence of Fit
-        Evaluated fits; changed in place.
-    rounds : int
-        Largest number of steps.
-    tolerance : float
-        Relative decrease of the cost below which a fit is done.
-    dampings : sequence of float
-        Levenberg-Marquardt dampings tried in each round.
-    """
+    """Improve fits by damped Gauss-Newton steps, all fits side by side."""
     for _ in range(rounds):
         active = [f for f in fits if not f.done]
         if not active:

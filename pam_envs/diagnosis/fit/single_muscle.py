@@ -70,15 +70,7 @@ def declared(plant: SingleMuscle, name: str) -> Any:
 
 @dataclass(frozen=True)
 class MuscleFamily:
-    """Single muscle with the inputs of a recording.
-
-    Attributes
-    ----------
-    plant : SingleMuscle
-        Plant whose parameters are fitted.
-    inputs : Inputs
-        Recorded inputs.
-    """
+    """Single muscle with the inputs of a recording."""
 
     plant: SingleMuscle
     inputs: Inputs

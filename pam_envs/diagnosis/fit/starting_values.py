@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pam_envs.diagnosis.fit.least_squares import Fit, Problem, column_of
-from pam_envs.diagnosis.fit.plant_protocol import PlantFamily
+from pam_envs.diagnosis.fit.least_squares import Fit, PlantFamily, Problem, column_of
 
 Starts = Sequence[tuple[float, ...]]
 

@@ -7,16 +7,14 @@ one that is significantly larger is an error of the payload.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pam_envs.diagnosis.fit.blocks import Blocks
-from pam_envs.diagnosis.fit.candidate import Candidate, complete_jacobian, refit
+from pam_envs.diagnosis.fit.candidate import Candidate, complete_jacobian, refit, restarted
 from pam_envs.diagnosis.fit.intervals import spans
-from pam_envs.diagnosis.fit.least_squares import Fit, Problem
-from pam_envs.diagnosis.fit.plant_protocol import PlantFamily
+from pam_envs.diagnosis.fit.least_squares import PlantFamily, Problem
 from pam_envs.diagnosis.fit.single_muscle import BASE
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.wording import near
@@ -51,30 +49,12 @@ def load_error_limit(loads: ArrayLike, tolerance: float) -> float:
 
 
 def may_be_within(interval: tuple[float, float], loads: ArrayLike, tolerance: float) -> bool:
-    """Return whether an error of the load may be within its tolerance.
+    """Return whether an error of the load, by its interval [kg], may be within its tolerance.
 
-    Parameters
-    ----------
-    interval : tuple of float
-        95 % interval of the fitted error [kg].
-    loads : array_like
-        Applied loads [kg]; zero loads have no error.
-    tolerance : float
-        Declared relative error of each load.
-
-    Returns
-    -------
-    bool
-        False if the whole interval is outside the tolerance of one of the loads.
+    False if the whole interval is outside the tolerance of one of the loads [kg] above zero.
     """
     limit, (low, high) = load_error_limit(loads, tolerance), sorted(interval)
     return bool(low <= limit and high >= -limit)
-
-
-def load_error_interval(problem: Problem, blocks: Blocks, fit: Fit) -> tuple[float, float]:
-    """Return the 95 % interval of the load error [kg]; infinite on the side of a bound."""
-    low, high = spans(problem, blocks, fit)[LOAD_ERROR]["interval"]
-    return (-np.inf if low is None else low), (np.inf if high is None else high)
 
 
 def may_be_load(
@@ -88,7 +68,9 @@ def may_be_load(
         return IMITATES_PAYLOAD_ERROR in model.names
     if PAYLOAD_ERROR not in model.names:
         return False
-    return may_be_within(load_error_interval(problem, blocks, model.fit), loads, known)
+    low, high = spans(problem, blocks, model.fit)[LOAD_ERROR]["interval"]
+    interval = (-np.inf if low is None else low, np.inf if high is None else high)
+    return may_be_within(interval, loads, known)
 
 
 def refit_load(
@@ -96,13 +78,8 @@ def refit_load(
 ) -> Candidate:
     """Return the base refitted together with the error of the load, within a limit [kg]."""
     free = family.free(LOAD_ERROR, low=-limit, high=limit, scale=limit, start=0.0, prior=np.inf)
-    fit = replace(
-        base.fit,
-        frees=(*base.fit.frees, free),
-        z=np.append(base.fit.z, 0.0),
-        slopes=np.zeros((0, 0)),
-        shared=None,
-        begins={},
+    fit = restarted(
+        base.fit, frees=(*base.fit.frees, free), z=np.append(base.fit.z, 0.0), shared=None
     )
     found = refit(problem, blocks, Candidate((), fit, base.errors))
     complete_jacobian(problem, found.fit)

@@ -126,7 +126,7 @@ def _structure(study: Any, candidate: Candidate) -> dict[str, Any]:
         made[c] = {
             "ljung_box_p": ljung_box(residual),
             "r2": {n: binned_r2(residual, v, study.blocks) for n, v in values.items()},
-            "flexible_r2": flexible_r2(residual, study.regressors, study.blocks)[0],
+            "flexible_r2": flexible_r2(residual, study.regressors, study.blocks),
             "peak": {"frequency_hz": frequency, "ratio": ratio},
         }
     return made

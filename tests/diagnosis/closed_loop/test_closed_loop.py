@@ -18,7 +18,6 @@ from pam_envs.diagnosis.closed_loop.gain import (
 from pam_envs.diagnosis.closed_loop.plant_inverse import (
     AUTHORITY,
     PREVIEW,
-    Gains,
     InversePi,
     PlantInverse,
     correction,
@@ -176,11 +175,11 @@ def test_plant_inverse_tracks_reference(cause: str) -> None:
 def test_feedback_corrects_model_error() -> None:
     plant, rig = muscle(), PlantStepper(muscle(**{"regulator.gain": 0.9}), LOAD)
     controller = design(plant)
-    silent = InversePi(controller.inverse, Gains(0.0, 0.0))
+    silent = InversePi(controller.inverse, 0.0, 0.0)
     reference = short(stroke(rig))["sines"]
     errors = [run(c, rig, reference, LOAD, 0)[200:] for c in (silent, controller)]
     assert np.mean(errors[1] ** 2) < 0.1**2 * np.mean(errors[0] ** 2)
-    assert controller.gains.integral > 0.0
+    assert controller.integral > 0.0
 
 
 def test_integral_stops_at_setpoint_limit() -> None:

@@ -10,7 +10,6 @@ from pam_envs.diagnosis.causes import by_name, catalogue
 from pam_envs.diagnosis.experiment.experiment import (
     ENOUGH,
     Rival,
-    Sensors,
     inputs_of,
     propose,
     rival_of,
@@ -126,8 +125,8 @@ def test_segments_are_what_is_run():
 def test_missing_sensor_gives_no_separation():
     plain, bowed = rival("plain"), rival("sensor_nonlinearity", pressure__bow=0.05)
     inputs = inputs_of(plans(ABLE)[0])
-    (both,) = separations(PLANT, (plain, bowed), inputs, Sensors(NOISE))
-    (blind,) = separations(PLANT, (plain, bowed), inputs, Sensors(np.array([5e-5, np.inf])))
+    (both,) = separations(PLANT, (plain, bowed), inputs, NOISE)
+    (blind,) = separations(PLANT, (plain, bowed), inputs, np.array([5e-5, np.inf]))
     assert both > ENOUGH
     assert blind == 0.0
     assert not proposed(plain, bowed, noise=np.array([5e-5, np.inf]))["enough"]
@@ -140,7 +139,7 @@ def test_refittable_difference_is_no_separation():
     more = rival("leak", {"regulator.leak": 0.0102}, regulator__leak=0.0101)
     fixed = rival("leak", regulator__leak=0.0101)
     plan = next(p for p in plans(ABLE) if p.name == "valve_shut")
-    loud = Sensors(1e-3 * NOISE)
+    loud = 1e-3 * NOISE
     (stiff,) = separations(
         PLANT, (rival("leak", regulator__leak=0.01), fixed), inputs_of(plan), loud
     )
@@ -177,7 +176,7 @@ def test_nearest_rival_decides():
     assert both["between"] == ["leak", "creep", "dead_time"]
     plan = next(p for p in plans(ABLE) if p.name == both["name"])
     assert both["separation"] == pytest.approx(
-        min(separations(PLANT, (leak, creep, late), inputs_of(plan), Sensors(NOISE)))
+        min(separations(PLANT, (leak, creep, late), inputs_of(plan), NOISE))
     )
 
 
