@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
-from benchmarks.runs import controllers, rows
+from benchmarks.runs import controllers, rows, runner
 from benchmarks.scenarios import scenario as scenarios
+from benchmarks.scoring.metrics import shown
 from pam_envs.envs.registration import full_id
 from sweeps.command_line import run_cli
 from sweeps.progress import progress
+
+Computing = Annotated[runner.Computing, arg(name="")]
+Options = Annotated[runner.Options, arg(name="")]
+COMPUTING, OPTIONS = runner.Computing(), runner.Options()
 
 
 def _choose(names: tuple[str, ...], known: dict[str, Any], what: str) -> list[Any]:
@@ -39,39 +43,26 @@ def run(
     env: str = "",
     controller: tuple[str, ...] = (),
     track: tuple[str, ...] = (),
-    jobs: int = os.cpu_count() or 1,
-    force: bool = False,
-    out: Path = rows.RESULTS,
-    cells: Path | None = None,
-    backend: Literal["loky", "dask"] = "loky",
-    address: str = "",
     dry_run: bool = False,
+    options: Options = OPTIONS,
 ) -> int:
-    """Score controllers over the scenario files, one JSON a row; an interrupted run goes on.
+    """Score controllers over the scenario files, one JSON a row; an interrupted run resumes.
 
     Args:
         env: Id of an environment; all by default.
         controller: Names of controllers; all by default.
         track: Names of scenario files, or paths of such files; all files by default.
-        jobs: Processes of this machine.
-        force: Compute again what is there already.
-        out: Folder of the rows.
-        cells: Folder of the cells, the checkpoint.
-        backend: Processes of this machine, or a running Dask cluster.
-        address: Of the Dask scheduler, like tcp://host:8786.
         dry_run: List the cells and whether they are there, and stop.
     """
-    from benchmarks.runs import console, runner
+    from benchmarks import console
 
-    folder = runner.CELLS if cells is None else cells
-    options = runner.Options(jobs, force, out, folder, backend, address)
     chosen = _choose(controller, controllers.available(), "controller")
     pairs = runner.pairs_of(chosen, _tracks(env, track))
     if not pairs:
         names = ", ".join(entrant.name for entrant in chosen)
         raise ValueError(
-            f"none of {names} runs in {env or 'these tracks'}; those of an environment stand in "
-            "benchmarks/LEADERBOARD.md"
+            f"none of {names} runs in {env or 'these tracks'}; the controllers of an environment "
+            "are listed in benchmarks/LEADERBOARD.md"
         )
     if dry_run:
         planned = list(runner.planned(pairs, options))
@@ -79,7 +70,7 @@ def run(
             print(f"{'there ' if there else 'to run'}  {runner.title(cell)}")
         print(f"{len(planned)} cells, {sum(not there for _, there in planned)} to run")
         return 0
-    print(f"looking at {len(pairs)} rows: what they need, and what is there", file=sys.stderr)
+    print(f"checking the cells of {len(pairs)} rows", file=sys.stderr)
     with progress("cells") as start:
         report = runner.run(pairs, options, start)
     return console.run(report)
@@ -87,12 +78,8 @@ def run(
 
 def audit(
     track: Positional[tuple[str, ...]] = (),
-    jobs: int = os.cpu_count() or 1,
     all: bool = False,
-    out: Path = rows.RESULTS,
-    cells: Path | None = None,
-    backend: Literal["loky", "dask"] = "loky",
-    address: str = "",
+    options: Options = OPTIONS,
 ) -> int:
     """Draw a round of seeds for all controllers of a track, and score them on it.
 
@@ -100,25 +87,19 @@ def audit(
 
     Args:
         track: Names of scenario files.
-        jobs: Processes of this machine.
         all: Every track.
-        out: Folder of the rows.
-        cells: Folder of the cells, the checkpoint.
-        backend: Processes of this machine, or a running Dask cluster.
-        address: Of the Dask scheduler, like tcp://host:8786.
     """
+    from benchmarks import console
     from benchmarks.identity import audit as auditing
-    from benchmarks.runs import console, runner
 
     if bool(track) == all:
         raise ValueError("name tracks, or give --all")
     tracks = _choose(track, scenarios.available(), "track")
-    folder = runner.CELLS if cells is None else cells
-    options = runner.Options(jobs, False, out, folder, backend, address)
     pairs = runner.pairs_of(controllers.available().values(), tracks)
     for chosen in tracks:
         drawn = auditing.draw(chosen, [entrant for entrant, other in pairs if other is chosen])
-        print(f"{chosen.name}: {console.round_in_words(drawn)}", flush=True)
+        count, salt = len(drawn.entrants), f"salt {drawn.salt} of {drawn.drawn}"
+        print(f"{chosen.name}: round {drawn.number}, {count} controllers, {salt}", flush=True)
     with progress("cells") as start:
         report = runner.run(pairs, options, start)
     return console.run(report)
@@ -132,10 +113,8 @@ def cite(row: Positional[tuple[str, ...]]) -> int:
     """
     from benchmarks.board.cite import bibtex
 
-    if not row:
-        raise ValueError("name a row, for example positioning_nominal--inverse")
-    for name in row:
-        print(bibtex(rows.load(_row_path(name))))
+    for path in _row_paths(row):
+        print(bibtex(rows.load(path)))
     return 0
 
 
@@ -150,10 +129,7 @@ def show_row(row: Positional[tuple[str, ...]], json: bool = False) -> int:
 
     from benchmarks.board.row_text import row_text
 
-    if not row:
-        raise ValueError("name a row, for example positioning_nominal--inverse")
-    for name in row:
-        held = rows.load(_row_path(name))
+    for held in map(rows.load, _row_paths(row)):
         print(dumps(held, indent=1, sort_keys=True) if json else row_text(held))
     return 0
 
@@ -188,10 +164,8 @@ def site(results: Path = rows.RESULTS, out: Path | None = None) -> int:
 
 def verify(
     row: Positional[tuple[str, ...]] = (),
-    jobs: int = os.cpu_count() or 1,
     all: bool = False,
-    backend: Literal["loky", "dask"] = "loky",
-    address: str = "",
+    options: Computing = COMPUTING,
 ) -> int:
     """Compute rows again and compare; exit code 1 if one has drifted.
 
@@ -200,18 +174,15 @@ def verify(
 
     Args:
         row: Files or names of rows.
-        jobs: Processes of this machine.
         all: Every row of benchmarks/results.
-        backend: Processes of this machine, or a running Dask cluster.
-        address: Of the Dask scheduler, like tcp://host:8786.
     """
-    from benchmarks.runs import console, verified
+    from benchmarks import console
+    from benchmarks.runs import verified
     from benchmarks.runs import verify as checking
-    from sweeps.engine import Cluster
 
     verdicts = []
     for path in _row_paths(row, all):
-        found = checking.verify(path, Cluster(jobs, backend, address))
+        found = checking.verify(path, options.cluster)
         verified.note(path, found.checksum if found.holds else "", found.mode)
         console.verdict(found)
         verdicts.append(found)
@@ -242,15 +213,14 @@ def void(row: Positional[tuple[str, ...]] = (), all: bool = False) -> int:
     return 1 if count else 0
 
 
-def _row_paths(names: tuple[str, ...], all: bool) -> list[Path]:
+def _row_paths(names: tuple[str, ...], all: bool = False) -> list[Path]:
     paths = [_row_path(name) for name in names] + (rows.files() if all else [])
     if not paths:
-        raise ValueError("name a row, or give --all")
+        raise ValueError("name a row, for example positioning_nominal--inverse, or give --all")
     return paths
 
 
 def _row_path(name: str) -> Path:
-    """Return the file of a row by its path or its name."""
     given = Path(name)
     path = given if given.is_file() else rows.path_of(name)
     if not path.is_file():
@@ -267,7 +237,7 @@ def tune(
     write: bool = False,
     storage: Path | None = None,
 ) -> int:
-    """Search the free numbers of a paper's controller on tuning seeds; interrupted, it goes on.
+    """Search the free numbers of a paper's controller on tuning seeds; it can be resumed.
 
     Args:
         controller: Name of a controller with knobs.
@@ -275,7 +245,7 @@ def tune(
         trials: Settings to try, those of earlier calls counted in.
         seed: Of the sampler.
         episodes: Of each trial at least.
-        write: Put what is found into baselines/core/tuned.yaml, which the catalogue reads.
+        write: Write the result into baselines/core/tuned.yaml, which the catalogue reads.
         storage: SQLite file of the trials, runs/tuning.db by default.
     """
     from baselines.core import tuned
@@ -307,12 +277,7 @@ def papers(json: Path | None = None) -> int:
     print(table(figures))
     if json:
         write_record(json, {"figures": [figure.record() for figure in figures]})
-    return 0 if all_pass(figures) else 1
-
-
-def all_pass(figures: list[Any]) -> bool:
-    """Return whether no figure is out of tolerance (one that cannot be computed is no failure)."""
-    return all(figure.passed is not False for figure in figures)
+    return 1 if any(figure.passed is False for figure in figures) else 0
 
 
 def speed(
@@ -351,9 +316,9 @@ def show(
     plot: Path | None = None,
     video: Path | None = None,
 ) -> int:
-    """Run one episode and draw it: reference, output, set-points, pressure, loop.
+    """Run one episode and draw it: reference, output, setpoints, pressure, loop.
 
-    What is not given is as the environment has it.
+    Arguments that are not given have the environment's defaults.
 
     Args:
         env: Id of the environment.
@@ -390,7 +355,9 @@ def show(
     if plot:
         said = "".join(f", {name} {value}" for name, value in kwargs.items())
         title = f"{controller} in {env_id}{said}, seed {seed}"
-        showing.draw(episode, set_points, title, plot, rows.shown(content))
+        figure = showing.episode_figure(episode.signals, set_points, title, shown(content))
+        plot.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(plot, dpi=150)
         print(plot)
     if video:
         print(video)
@@ -406,16 +373,14 @@ def diagnosis(
     limit: int | None = None,
     loops: int = 0,
     next: bool = False,
-    jobs: int = os.cpu_count() or 1,
     force: bool = False,
     retell: bool = False,
     timed: bool = False,
     cells: Path | None = None,
     out: Path | None = None,
-    backend: Literal["loky", "dask"] = "loky",
-    address: str = "",
+    computing: Computing = COMPUTING,
 ) -> int:
-    """Diagnose rigs that hide an effect and score what is found; an interrupted run goes on.
+    """Diagnose rigs that hide an effect and score the findings; an interrupted run resumes.
 
     Args:
         chosen: Set of cases.
@@ -426,15 +391,12 @@ def diagnosis(
         limit: Most cases.
         loops: Cases of every cause that are run in closed loop on the hidden rig.
         next: Carry out the experiments that are proposed.
-        jobs: Processes.
         force: Compute again what is there already.
         retell: Run nothing; judge what earlier runs recorded by the present rule.
         timed: Also time whole reports of ten minutes at 50 Hz on two cores, afterwards.
         cells: Folder of the records, the checkpoint.
         out: Folder of the page, of its numbers and of its figure. By default benchmarks/results for
             the whole of the final set, otherwise beside the records.
-        backend: Processes of this machine, or a running Dask cluster.
-        address: Of the Dask scheduler, like tcp://host:8786.
     """
     from benchmarks.diagnosis import report as telling
     from benchmarks.diagnosis import run as running
@@ -443,10 +405,9 @@ def diagnosis(
     from pam_envs.diagnosis.static.diagnosis import diagnose_readings
 
     folder = running.FOLDER if cells is None else cells
-    cluster = (backend, address)
-    options = running.Options(
-        chosen, offset, fraction, kind, name, limit, loops, next, jobs, force, folder, *cluster
-    )
+    cases = (chosen, offset, fraction, kind, name, limit, loops, next)
+    where = (computing.jobs, force, folder, computing.backend, computing.address)
+    options = running.Options(*cases, *where)
     if retell:
         records = running.retold(options)
         print(f"{len(records)} records judged anew")
@@ -494,7 +455,7 @@ def main(arguments: list[str] | None = None) -> int:
     ask = tyro.extras.subcommand_cli_from_dict
     return run_cli(
         lambda: ask(COMMANDS, prog="python -m benchmarks", args=arguments),
-        "interrupted; what was done is kept: the same command goes on",
+        "interrupted; completed work is kept: the same command resumes",
     )
 
 

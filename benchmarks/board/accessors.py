@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from benchmarks.runs import rows
 from benchmarks.runs.cells import AUDIT, PUBLIC
-from benchmarks.runs.rows import Row, episodes_of, scores_of, shown
+from benchmarks.runs.rows import Row, episodes_of, scores_of
 from benchmarks.scenarios.scenario import ScenarioSet
 from benchmarks.scoring import statistics
-from benchmarks.scoring.metrics import headline_of
+from benchmarks.scoring.metrics import headline_of, shown
 from benchmarks.scoring.statistics import Array, Interval
 
 LISTED_SEEDS = 5
@@ -22,16 +24,9 @@ VERIFIED = "verified"
 
 @dataclass(frozen=True)
 class Scores:
-    """One metric of a row.
+    """One metric of a row: a table with a row a training seed and a column an episode.
 
-    Attributes
-    ----------
-    table : (runs, n) array
-        A row a training seed (one for a classical controller), a column an episode.
-    pairs : tuple of (scenario, seed)
-        Of each column, ascending.
-    runs : tuple of int or None
-        Training seed of each row, ascending.
+    ``pairs`` are scenario and seed of each column, ``runs`` the training seeds, both ascending.
     """
 
     table: Array
@@ -59,19 +54,24 @@ def track_of(row: Mapping[str, Any]) -> str:
     return str(row["scenarios"]["name"])
 
 
-def factor_of(row: Mapping[str, Any]) -> float:
-    """Return the factor from SI with which the row's headline is shown."""
-    return shown(content_of(row))[1]
+def env_of(row: Mapping[str, Any]) -> str:
+    """Return the id of the row's environment."""
+    return str(row["env"]["id"])
+
+
+def unit_of(row: Mapping[str, Any]) -> tuple[str, float]:
+    """Return the unit in which the row's headline is shown, and its factor from SI."""
+    return shown(content_of(row))
+
+
+def is_classical(row: Mapping[str, Any]) -> bool:
+    """Return whether nothing of the row's controller is learned."""
+    return bool(row["controller"]["kind"] == "classical")
 
 
 def is_audited(row: Mapping[str, Any]) -> bool:
     """Return whether the row is in the audit round of its track."""
     return row["audit"] is not None
-
-
-def round_of(row: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the audit round of a row: number, salt, day and its entrants' names."""
-    return dict(row["audit"])
 
 
 def published_split(row: Mapping[str, Any]) -> str:
@@ -81,27 +81,18 @@ def published_split(row: Mapping[str, Any]) -> str:
 
 def training_seeds(row: Mapping[str, Any]) -> int:
     """Return the number of training seeds, 0 for a classical controller."""
-    if row["controller"]["kind"] == "classical":
+    if is_classical(row):
         return 0
     return len({episode.get("training_seed") for episode in episodes_of(row)})
 
 
 def is_listed(row: Mapping[str, Any]) -> bool:
     """Return whether the row has enough training seeds for a rank."""
-    return row["controller"]["kind"] == "classical" or training_seeds(row) >= LISTED_SEEDS
+    return is_classical(row) or training_seeds(row) >= LISTED_SEEDS
 
 
 def scores(row: Mapping[str, Any], metric: str = "", split: str = "") -> Scores:
-    """Return a metric of the episodes of a row: a table of training seeds by paired episodes.
-
-    Parameters
-    ----------
-    row : Row
-    metric : str
-        The headline if none is named.
-    split : str
-        The published one if none is named.
-    """
+    """Return a metric of a row: by default its headline over the published episodes."""
     episodes = episodes_of(row, split or published_split(row))
     values = scores_of(episodes, metric or headline_of(content_of(row)))
     runs = [episode["training_seed"] for episode in episodes]
@@ -144,11 +135,6 @@ def gap(row: Mapping[str, Any]) -> Interval | None:
     return statistics.difference_of_splits(audit.table, audit.strata, public.table, public.strata)
 
 
-def artefacts_audited(row: Mapping[str, Any]) -> int:
-    """Return the number of artefacts of this name in the rounds of the track, 0 without a round."""
-    return int(row["audit"]["entry"]) if is_audited(row) else 0
-
-
 def is_worse_unseen(row: Mapping[str, Any]) -> bool:
     """Return whether the audit mean exceeds the public one by more than its interval."""
     found = gap(row)
@@ -159,11 +145,6 @@ def failures_of(row: Mapping[str, Any], split: str = "") -> tuple[int, int]:
     """Return the number of failed episodes among the published ones, and the number of all."""
     episodes = episodes_of(row, split or published_split(row))
     return sum(bool(episode["failed"]) for episode in episodes), len(episodes)
-
-
-def is_verified(row: Mapping[str, Any]) -> bool:
-    """Return whether the row was reproduced, to the last bit or within tolerance."""
-    return bool(row.get(VERIFIED))
 
 
 def verified_words(row: Mapping[str, Any]) -> str:
@@ -179,21 +160,15 @@ JUMPING = ("steps", "staircase")
 """References with jumps, whose edges may dominate the mean error of a track."""
 
 
-def references_of(row: Mapping[str, Any]) -> dict[str, str]:
-    """Return the family of the reference of each scenario, empty where it has no name."""
-    made = ScenarioSet(content_of(row)).scenarios()
-    return {scenario.name: str(scenario.kwargs.get("reference", "")) for scenario in made}
-
-
 def smooth(row: Mapping[str, Any]) -> Interval | None:
     """Return the headline over smooth references, ``None`` where none or all of them are."""
-    families = references_of(row)
-    kept = {name for name, family in families.items() if family not in JUMPING}
-    if len(kept) in (0, len(families)):
+    made = ScenarioSet(content_of(row)).scenarios()
+    kept = {s.name for s in made if str(s.kwargs.get("reference", "")) not in JUMPING}
+    if len(kept) in (0, len(made)):
         return None
     found = scores(row)
-    columns = [k for k, scenario in enumerate(found.strata) if scenario in kept]
-    return statistics.of_table(found.table[:, columns], [found.strata[k] for k in columns])
+    chosen = np.array([scenario in kept for scenario in found.strata])
+    return statistics.of_table(found.table[:, chosen], np.array(found.strata)[chosen])
 
 
 def by_setting(row: Mapping[str, Any]) -> dict[tuple[str, str], float]:
@@ -222,17 +197,8 @@ def common_split(first: Row, second: Row) -> str | None:
 class Cost:
     """Cost of tuning and training a controller.
 
-    Attributes
-    ----------
-    tuning : str
-        Method of tuning.
-    trials : int or None
-        Settings tried; None if not counted.
-    steps, seconds : float or None
-        Of one training seed, the mean over the seeds [1], [s].
-    hardware : str
-    command : str
-        Trains the first seed again.
+    ``trials`` are settings tried, None if not counted; ``steps`` and ``seconds`` are the mean over
+    the training seeds [1], [s]; ``command`` trains the first seed again.
     """
 
     tuning: str
@@ -247,17 +213,12 @@ def cost_of(row: Mapping[str, Any]) -> Cost:
     """Return the cost of tuning and training a controller, as stated in its row."""
     tuning = row["controller"]["tuning"]
     records = row["controller"].get("training") or []
+
+    def average(name: str) -> float | None:
+        known = [float(record[name]) for record in records if record.get(name) is not None]
+        return sum(known) / len(known) if known else None
+
     hardware = dict.fromkeys(str(r["hardware"]) for r in records if r.get("hardware"))
-    return Cost(
-        tuning=str(tuning["how"]),
-        trials=tuning["trials"],
-        steps=_average(records, "steps"),
-        seconds=_average(records, "seconds"),
-        hardware=", ".join(hardware),
-        command=next((str(r["command"]) for r in records if r.get("command")), ""),
-    )
-
-
-def _average(records: Sequence[Mapping[str, Any]], name: str) -> float | None:
-    known = [float(record[name]) for record in records if record.get(name) is not None]
-    return sum(known) / len(known) if known else None
+    command = next((str(r["command"]) for r in records if r.get("command")), "")
+    measured = (average("steps"), average("seconds"), ", ".join(hardware))
+    return Cost(str(tuning["how"]), tuning["trials"], *measured, command)

@@ -10,7 +10,6 @@ import yaml
 from benchmarks.board import accessors as views
 from benchmarks.board.format import bounded
 from benchmarks.runs.provenance import ROOT
-from benchmarks.runs.rows import shown
 from benchmarks.runs.store import CHECKSUM
 from pam_envs import citations
 
@@ -21,58 +20,31 @@ Fields = Mapping[str, Any]
 
 
 def bibtex(row: Mapping[str, Any]) -> str:
-    """Return the BibTeX of a row.
-
-    Parameters
-    ----------
-    row : mapping
-        Of :func:`benchmarks.runs.rows.load`.
-
-    Raises
-    ------
-    ValueError
-        If a method has no entry in ``references.bib``.
-    """
+    """Return the BibTeX of a row; raise ValueError if a method is not in ``references.bib``."""
     sources = citations.entry_texts(methods(str(row["controller"]["citation"])))
     parts = [_row_entry(row), package(), *sources]
     return "\n".join(parts)
 
 
 def methods(citation: str) -> list[str]:
-    """Return the keys of the methods in a citation, in its order.
+    """Return the keys of the methods in a citation of keys or titles, in its order.
 
-    Parameters
-    ----------
-    citation : str
-        Keys of ``references.bib``, or titles of its entries.
-
-    Raises
-    ------
-    ValueError
-        If a part names no entry.
+    A part that names no entry of ``references.bib`` is a ValueError.
     """
     keys = []
     for part in filter(None, citation.split(SEPARATOR)):
-        found = [key for key in citations.entries() if _titled(key, part)]
+        found = [
+            key
+            for key in citations.entries()
+            if citations.fields(key)["title"].casefold() in part.casefold()
+        ]
         keys += found or citations.named_in(part) or [part]
     citations.entry_texts(keys)
     return list(dict.fromkeys(keys))
 
 
-def _titled(key: str, text: str) -> bool:
-    """Return whether a text holds the title of an entry, in any case of letters."""
-    return citations.fields(key)["title"].casefold() in text.casefold()
-
-
 def entry(key: str, fields: Fields) -> str:
-    """Return one BibTeX entry.
-
-    Parameters
-    ----------
-    key : str
-    fields : mapping
-        ``type`` and the fields in their order. Capital letters of a title are kept.
-    """
+    """Return one BibTeX entry, capital letters of its title kept; ``fields`` has its ``type``."""
     lines = [f"@{fields['type']}{{{key},"]
     for name, value in fields.items():
         if name != "type":
@@ -113,7 +85,7 @@ AUTHORS = "The pam-envs authors"
 def _row_entry(row: Mapping[str, Any]) -> str:
     """Return the entry of the row: what it scored, on what, and what runs it again."""
     env, about, found = row["env"], row["controller"], row["audit"]
-    unit, factor = shown(row["scenarios"]["content"])
+    unit, factor = views.unit_of(row)
     score = bounded(views.interval(row), factor)
     split = views.published_split(row)
     said = [

@@ -27,7 +27,6 @@ class Claim:
 
     Attributes
     ----------
-    row, paper : Row
     split : str
         Split of the episodes: the audit's if both are in the round.
     probability : Interval
@@ -41,7 +40,7 @@ class Claim:
     gain : Interval
         Relative reduction of the mean against the paper controller, paired by episode.
     remarks : tuple of str
-        Remarks beside the verdict: the numbers of settings that were tried for each side.
+        Beside the verdict: the numbers of settings that were tried for each side.
     """
 
     row: Row
@@ -57,7 +56,7 @@ class Claim:
 
 def is_paper(row: Row) -> bool:
     """Return whether a row is of a paper's method or a textbook rule: classical, with a source."""
-    return row["controller"]["kind"] == "classical" and bool(row["controller"]["citation"])
+    return views.is_classical(row) and bool(row["controller"]["citation"])
 
 
 def best_paper(rows: Sequence[Row]) -> Row | None:
@@ -88,11 +87,7 @@ def _ratio(row: Row, paper: Row, metric: str, split: str) -> float:
 def claim(row: Row, paper: Row, doubts: Sequence[str] = ()) -> Claim | None:
     """Return the claim of a row, ``None`` if the two have not run the same episodes.
 
-    Parameters
-    ----------
-    row, paper : Row
-    doubts : sequence of str
-        Objections to every claim of the track.
+    ``doubts`` are objections to every claim of the track.
     """
     split, probability = views.common_split(row, paper), standings.improvement(row, paper)
     if split is None or probability is None:
@@ -141,7 +136,7 @@ def _doubts(row: Row, paper: Row, probability: Interval, gained: Interval, split
             f"knows the plant ({mine}) that differs from the model of {views.name_of(paper)}"
         )
     seeds = views.training_seeds(row)
-    if row["controller"]["kind"] != "classical" and seeds < CLAIM_SEEDS:
+    if not views.is_classical(row) and seeds < CLAIM_SEEDS:
         doubts.append(f"{seeds} training seed{'s' * (seeds != 1)}, a claim needs {CLAIM_SEEDS}")
     (failed, total), (failed_too, of) = (views.failures_of(r, split) for r in (row, paper))
     if failed / total > failed_too / of:
@@ -159,17 +154,14 @@ def learned_claims(rows: Sequence[Row]) -> list[Claim]:
     if paper is None:
         return []
     doubts = _doubts_of_track(rows, paper)
-    learned = [row for row in standings.ordered(rows) if row["controller"]["kind"] != "classical"]
+    learned = [row for row in standings.ordered(rows) if not views.is_classical(row)]
     made = [claim(row, paper, doubts) for row in learned]
     order = (BETTER, DEARER, NOT_SHOWN)
-    return sorted(
-        (entry for entry in made if entry is not None),
-        key=lambda entry: (
-            order.index(entry.verdict),
-            entry.split != AUDIT,
-            -entry.probability.value,
-        ),
-    )
+
+    def rank(entry: Claim) -> tuple[int, bool, float]:
+        return order.index(entry.verdict), entry.split != AUDIT, -entry.probability.value
+
+    return sorted((entry for entry in made if entry is not None), key=rank)
 
 
 def _doubts_of_track(rows: Sequence[Row], paper: Row) -> list[str]:

@@ -8,6 +8,8 @@ import numpy as np
 
 from benchmarks.scoring.statistics import Interval
 
+Table = tuple[list[str], list[list[str]]]
+"""Heading and lines."""
 WIDTH = 150
 """Characters of a table's line at most; a wider table is split."""
 LEFT = {
@@ -39,13 +41,9 @@ def signed(interval: Interval | None, factor: float = 1.0) -> str:
     """Return a difference with its sign and interval, or a dash."""
     if interval is None or not np.isfinite(interval.value):
         return "-"
-    value, low, high = (_signed(factor * x) for x in (interval.value, interval.low, interval.high))
+    numbers = [number(factor * x) for x in (interval.value, interval.low, interval.high)]
+    value, low, high = (x if x.startswith("-") or x == "0" else f"+{x}" for x in numbers)
     return f"{value} [{low}, {high}]"
-
-
-def _signed(value: float) -> str:
-    text = number(value)
-    return text if text.startswith("-") or text == "0" else f"+{text}"
 
 
 def chance(interval: Interval | None) -> str:
@@ -88,7 +86,10 @@ def tables(heading: Sequence[str], lines: Sequence[Sequence[str]]) -> list[str]:
     Each part repeats the columns up to the controller's (at least the first).
     """
     fixed = heading.index("controller") + 1 if "controller" in heading else 1
-    widths = [max(map(_width, column)) + 3 for column in zip(heading, *lines, strict=True)]
+    widths = [
+        3 + max(len(part) for cell in column for part in cell.split("<br>"))
+        for column in zip(heading, *lines, strict=True)
+    ]
     parts: list[list[int]] = [[]]
     for k in range(fixed, len(heading)):
         used = sum(widths[:fixed]) + sum(widths[i] for i in parts[-1])
@@ -101,11 +102,6 @@ def tables(heading: Sequence[str], lines: Sequence[Sequence[str]]) -> list[str]:
         made += [""] * bool(made)
         made += table([heading[k] for k in chosen], [[line[k] for k in chosen] for line in lines])
     return made
-
-
-def _width(cell: str) -> int:
-    """Return the number of characters of the longest line of a cell."""
-    return max(map(len, cell.split("<br>")))
 
 
 def _line(cells: Sequence[str]) -> str:

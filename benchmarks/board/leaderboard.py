@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from benchmarks.board import accessors as views
 from benchmarks.board import plots, standings
 from benchmarks.board.environment_page import page_text
 from benchmarks.board.format import number, table
 from benchmarks.board.summary import board_text
-from benchmarks.board.words import short_env
+from benchmarks.board.words import Cells, by_controller, short_env
 from benchmarks.identity import audit
 from benchmarks.runs import rows, verified
 from benchmarks.runs.rows import Row
@@ -23,24 +22,16 @@ PAGES = "leaderboard"
 
 
 def load(folder: Path) -> list[Row]:
-    """Return the rows of a folder with their verifications and their place in the last round.
-
-    Raises
-    ------
-    ValueError
-        If there is no such folder, or a row of it is refused.
-    """
+    """Return the rows of a folder with their verifications and their place in the last round."""
     if not folder.is_dir():
         raise ValueError(f"{folder}: no such folder of rows; run `python -m benchmarks run` first")
     found = verified.read(folder)
-    return [_in_round(row, verified.of(row, found)) for row in rows.load_all(folder)]
-
-
-def _in_round(row: Row, verification: Mapping[str, Any] | None) -> Row:
-    """Return a row with its verification; without an audit if it is not of the last round."""
-    last = audit.last(views.track_of(row)) if audit.in_last_round(row) else None
-    held = {**row["audit"], "entrants": last.entrants} if last else None
-    return {**row, "audit": held, views.VERIFIED: verification}
+    loaded = []
+    for row in rows.load_all(folder):  # without an audit if it is not of the last round
+        last = audit.last(views.track_of(row)) if audit.in_last_round(row) else None
+        held = {**row["audit"], "entrants": last.entrants} if last else None
+        loaded.append({**row, "audit": held, views.VERIFIED: verified.of(row, found)})
+    return loaded
 
 
 def files(all_rows: Sequence[Row]) -> dict[str, str]:
@@ -84,13 +75,12 @@ def times_text(all_rows: Sequence[Row]) -> str:
         "the first 100 answers in two episodes. Machines and loads differ.",
         "",
     ]
-    heading = ["controller", "median [us]", "p99 [us]", "machine", "date"]
+    columns: Cells = {
+        "median [us]": lambda row: number(row["volatile"]["predict_us"]["median"]),
+        "p99 [us]": lambda row: number(row["volatile"]["predict_us"]["p99"]),
+        "machine": lambda row: row["volatile"]["machine"],
+        "date": lambda row: row["volatile"]["date"],
+    }
     for name, ordered in standings.tracks(all_rows).items():
-        lines += [f"## {name}", "", *table(heading, [_times(row) for row in ordered]), ""]
+        lines += [f"## {name}", "", *table(*by_controller(ordered, columns)), ""]
     return "\n".join(lines).rstrip() + "\n"
-
-
-def _times(row: Row) -> list[str]:
-    volatile = row["volatile"]
-    times = (number(volatile["predict_us"][name]) for name in ("median", "p99"))
-    return [f"`{views.name_of(row)}`", *times, volatile["machine"], volatile["date"]]

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.board import accessors as views
-from benchmarks.board import profiles, standings
-from benchmarks.runs.rows import Row, shown
+from benchmarks.board import standings
+from benchmarks.runs.rows import Row
+from benchmarks.scoring import statistics
 
 _FIXED: dict[str, Any] = {
     "svg.hashsalt": "benchmarks",
@@ -19,23 +20,18 @@ _FIXED: dict[str, Any] = {
     "font.family": ["DejaVu Sans"],
     "font.size": 8.0,
 }
-
-
+POINTS = 60
+"""Errors at which a performance profile is drawn."""
 MARKS = {"classical": "o", "residual": "D", "learned": "s"}
 DRAWN = 8
 """Number of classical controllers that are drawn, the best of a track, with all learned ones."""
 
 
 def track_figure(ordered: Sequence[Row]) -> str:
-    """Return an SVG of a track: error against effort, and performance profiles.
+    """Return an SVG of a track, its rows best first: error against effort, performance profiles.
 
     Of the rows that are compared with each other, on their common episodes. Equal rows give equal
     bytes.
-
-    Parameters
-    ----------
-    ordered : sequence of rows
-        Of one track, best first.
     """
     import matplotlib
     from matplotlib.figure import Figure
@@ -63,28 +59,23 @@ def _rounded(path: re.Match[str]) -> str:
 def drawn_rows(ordered: Sequence[Row]) -> list[Row]:
     """Return the rows of a track that are drawn, best first."""
     inside = standings.ordered(standings.listing(ordered).inside)
-    best = [r["row"] for r in inside if r["controller"]["kind"] == "classical"][:DRAWN]
-    return [r for r in inside if r["controller"]["kind"] != "classical" or r["row"] in best]
+    best = [row["row"] for row in inside if views.is_classical(row)][:DRAWN]
+    return [row for row in inside if not views.is_classical(row) or row["row"] in best]
 
 
 def _style(number: int, row: Row) -> dict[str, Any]:
-    learned = row["controller"]["kind"] != "classical"
-    return {"color": f"C{number % 10}", "linestyle": "--" if learned else "-"}
+    return {"color": f"C{number % 10}", "linestyle": "-" if views.is_classical(row) else "--"}
 
 
 def _draw_effort(axes: Any, drawn: Sequence[Row]) -> None:
-    unit, factor = shown(drawn[0]["scenarios"]["content"])
+    unit, factor = views.unit_of(drawn[0])
     for number, row in enumerate(drawn):
         head = views.interval(row)
         x, y = 1e-5 * views.mean_of(row, "pressure_travel"), factor * head.value
         bounds = factor * np.array([[head.value - head.low], [head.high - head.value]])
         mark = MARKS.get(row["controller"]["kind"], "s")
-        style = {
-            "fmt": mark,
-            "markersize": 5,
-            "linewidth": 1,
-            "color": _style(number, row)["color"],
-        }
+        color = _style(number, row)["color"]
+        style = {"fmt": mark, "markersize": 5, "linewidth": 1, "color": color}
         axes.errorbar(x, y, np.maximum(bounds, 0.0), **style)
     _plain_log(axes.yaxis)
     axes.set_xlabel("pressure travel [bar/s]")
@@ -92,10 +83,16 @@ def _draw_effort(axes: Any, drawn: Sequence[Row]) -> None:
 
 
 def _draw_profiles(axes: Any, drawn: Sequence[Row]) -> None:
-    unit, factor = shown(drawn[0]["scenarios"]["content"])
-    errors = profiles.thresholds(drawn)
-    for number, row in enumerate(drawn):
-        shares, band = profiles.profile(row, errors)
+    unit, factor = views.unit_of(drawn[0])
+    scores = [views.scores(row) for row in drawn]
+    values = np.concatenate([found.table.ravel() for found in scores])
+    positive = values[np.isfinite(values) & (values > 0.0)]
+    errors = np.ones(1)
+    if len(positive):
+        errors = np.geomspace(positive.min(), positive.max(), POINTS)
+    for number, (row, found) in enumerate(zip(drawn, scores, strict=True)):
+        shares = statistics.performance_profile(found.table, errors)
+        band = statistics.profile_band(found.table, found.strata, errors)
         label, style = row["controller"]["name"], _style(number, row)
         axes.plot(factor * errors, 100.0 * shares, linewidth=1.1, label=label, **style)
         bounds = {"facecolor": style["color"], "alpha": 0.12, "linewidth": 0.0}

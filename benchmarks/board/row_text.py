@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from benchmarks.board import accessors as views
-from benchmarks.board.columns import columns_of, with_costs
 from benchmarks.board.environment_page import kind_of
 from benchmarks.board.format import bounded, number
 from benchmarks.board.words import about
 from benchmarks.runs.cells import AUDIT, PUBLIC
-from benchmarks.runs.rows import Row, shown
+from benchmarks.runs.rows import Row
+from benchmarks.scoring.metrics import columns_of
 
 
 def row_text(row: Row) -> str:
-    """Return a row in words: origin, headline of each split, every metric, every setting.
-
-    Parameters
-    ----------
-    row : Row
-        Of :func:`benchmarks.runs.rows.load`.
-    """
+    """Return a row in words: origin, headline of each split, every metric, every setting."""
     controller, content = row["controller"], views.content_of(row)
-    unit, factor = shown(content)
+    unit, factor = views.unit_of(row)
     splits = [split for split in (PUBLIC, AUDIT) if views.pairs_of(row, split)]
     lines = [
         str(row["row"]),
@@ -33,7 +27,7 @@ def row_text(row: Row) -> str:
         score = bounded(views.interval(row, split=split), factor)
         lines.append(f"{split} RMS: {score} {unit}; {failed} of {total} episodes failed")
     lines.append(f"metrics ({' and '.join(splits)} episodes):")
-    for metric, title, scale in with_costs(columns_of(content)):
+    for metric, title, scale in columns_of(content):
         means = (number(scale * views.mean_of(row, metric, split)) for split in splits)
         lines.append(f"  {title:44s} {'  '.join(f'{mean:>9s}' for mean in means)}")
     for (axis, point), value in views.by_setting(row).items():

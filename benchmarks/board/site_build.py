@@ -19,24 +19,9 @@ _OWNED = ("data/*.js", "data/traces/*.js", "figures/*.svg", "rows/*.json")
 
 
 def build(results: Path = rows.RESULTS, out: Path = OUT) -> list[Path]:
-    """Write the site from the rows of a folder; equal rows give equal bytes.
+    """Write the site from the rows of a folder, in place of an earlier build; return its files.
 
-    Parameters
-    ----------
-    results : Path
-        Folder of the rows.
-    out : Path
-        Folder of the site; files of an earlier build are replaced.
-
-    Returns
-    -------
-    list of Path
-        Written files, ``index.html`` first.
-
-    Raises
-    ------
-    ValueError
-        If there is no such folder, or a row of it is refused.
+    ``index.html`` comes first; equal rows give equal bytes.
     """
     all_rows = leaderboard.load(results)
     texts = page(all_rows)

@@ -11,13 +11,13 @@ from benchmarks.board import accessors as views
 from benchmarks.board import cite, claims, standings, words
 from benchmarks.board import summary as board_summary
 from benchmarks.board.claims import Claim
-from benchmarks.board.columns import Column, columns_of, with_costs
 from benchmarks.board.format import percent
 from benchmarks.board.standings import Changes, Listing, Track
 from benchmarks.runs.cells import PUBLIC
-from benchmarks.runs.rows import Row, shown
+from benchmarks.runs.rows import Row
 from benchmarks.runs.store import CHECKSUM
-from benchmarks.scoring.metrics import COSTS
+from benchmarks.scoring.group import Column
+from benchmarks.scoring.metrics import COSTS, columns_of
 from benchmarks.scoring.statistics import Interval
 
 GROUPS = {
@@ -29,13 +29,7 @@ GROUPS = {
 
 
 def board(rows: Sequence[Row]) -> dict[str, Any]:
-    """Return the content of the site without the trajectories.
-
-    Parameters
-    ----------
-    rows : sequence of rows
-        In any order.
-    """
+    """Return the content of the site without the trajectories, from rows in any order."""
     tracks = standings.tracks(rows)
     changes = standings.changes(standings.ranked(tracks))
     kinds = {views.name_of(row): row["controller"]["kind"] for row in rows}
@@ -61,13 +55,13 @@ def _numbers(interval: Interval | None, factor: float = 1.0) -> list[float | Non
 def _track(name: str, ordered: Track) -> dict[str, Any]:
     first, listing = ordered[0], standings.listing(ordered)
     content = views.content_of(first)
-    unit, factor = shown(content)
-    columns = with_costs(columns_of(content))
+    unit, factor = views.unit_of(first)
+    columns = columns_of(content)
     paper = claims.best_paper(ordered)
     return {
         "name": name,
         "title": str(content["title"]),
-        "env": str(first["env"]["id"]),
+        "env": views.env_of(first),
         "about": words.about(first).replace("`", ""),
         "round": words.round_words(listing),
         "split": listing.split,
@@ -106,7 +100,7 @@ def _rows(
 
 
 def _row(row: Row, columns: Sequence[Column], against: Claim | None) -> dict[str, Any]:
-    controller, factor = row["controller"], views.factor_of(row)
+    controller, factor = row["controller"], views.unit_of(row)[1]
     times = row["volatile"].get("predict_us") or {}
     split = views.published_split(row)
     return {
@@ -166,12 +160,12 @@ def _origin(row: Row) -> dict[str, Any]:
 
 
 def _audit_words(row: Row) -> str:
-    if not views.is_audited(row):
+    found = row["audit"]
+    if found is None:
         return ""
-    found = views.round_of(row)
     return (
         f"round {found['round']}, drawn {found['drawn']}, salt {found['salt']}; artefact number "
-        f"{views.artefacts_audited(row)} of this name in the rounds of this track"
+        f"{found['entry']} of this name in the rounds of this track"
     )
 
 

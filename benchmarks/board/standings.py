@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,15 +18,7 @@ Track = list[Row]
 
 @dataclass(frozen=True)
 class Place:
-    """Place of a row in a ranking.
-
-    Attributes
-    ----------
-    first : int
-        Place of the first row of its group, from 1.
-    shared : bool
-        Whether others share it.
-    """
+    """Place of a row in a ranking, from 1, and whether others share it."""
 
     first: int
     shared: bool
@@ -72,8 +64,12 @@ def tracks(rows: Sequence[Row]) -> dict[str, Track]:
     grouped: dict[str, Track] = {}
     for row in rows:
         grouped.setdefault(views.track_of(row), []).append(row)
-    names = sorted(grouped, key=lambda n: (_family(grouped[n][0]), "nominal" not in n, n))
-    return {name: ordered(grouped[name]) for name in names}
+
+    def order(name: str) -> tuple[bool, str, bool, str]:  # positioning first
+        env = views.env_of(grouped[name][0])
+        return "Positioning" not in env, env, "nominal" not in name, name
+
+    return {name: ordered(grouped[name]) for name in sorted(grouped, key=order)}
 
 
 def ranked(by_track: Mapping[str, Track]) -> dict[str, Track]:
@@ -85,14 +81,8 @@ def by_env(by_track: Mapping[str, Track]) -> dict[str, dict[str, Track]]:
     """Return the tracks of each environment, by its id."""
     grouped: dict[str, dict[str, Track]] = {}
     for name, rows in by_track.items():
-        grouped.setdefault(str(rows[0]["env"]["id"]), {})[name] = rows
+        grouped.setdefault(views.env_of(rows[0]), {})[name] = rows
     return grouped
-
-
-def _family(row: Row) -> str:
-    """Return the key by which environments are sorted: positioning first."""
-    env = str(row["env"]["id"])
-    return "" if "Positioning" in env else env
 
 
 def ordered(rows: Sequence[Row]) -> Track:
@@ -100,12 +90,12 @@ def ordered(rows: Sequence[Row]) -> Track:
 
     Rows of the audit round by its episodes; after them the others, by the public ones.
     """
-    return sorted(rows, key=_order)
 
+    def order(row: Row) -> tuple[bool, float, str]:
+        mean = views.mean_of(row)
+        return not views.is_audited(row), np.inf if np.isnan(mean) else mean, views.name_of(row)
 
-def _order(row: Row) -> tuple[bool, float, str]:
-    mean = views.mean_of(row)
-    return not views.is_audited(row), np.inf if np.isnan(mean) else mean, views.name_of(row)
+    return sorted(rows, key=order)
 
 
 def listing(rows: Sequence[Row]) -> Listing:
@@ -114,7 +104,7 @@ def listing(rows: Sequence[Row]) -> Listing:
     audited = [row for row in best_first if views.is_audited(row)]
     inside = audited or best_first
     present = {views.name_of(row) for row in inside}
-    entrants = views.round_of(audited[0])["entrants"] if audited else ()
+    entrants = audited[0]["audit"]["entrants"] if audited else ()
     return Listing(
         ranked=[row for row in inside if views.is_listed(row)],
         few=[row for row in inside if not views.is_listed(row)],
@@ -129,20 +119,20 @@ def difference(first: Row, second: Row) -> Interval | None:
     Over the audit episodes where both have them, else over the public ones; ``None`` if they have
     not run the same.
     """
-    split = views.common_split(first, second)
-    if split is None:
-        return None
-    a, b = (views.scores(row, split=split) for row in (first, second))
-    return statistics.difference_of_tables(a.table, b.table, a.strata)
+    return _compared(statistics.difference_of_tables, first, second)
 
 
 def improvement(first: Row, second: Row) -> Interval | None:
     """Return the probability that ``first`` has the lower headline, by paired episodes."""
+    return _compared(statistics.probability_of_improvement, first, second)
+
+
+def _compared(compare: Callable[..., Interval], first: Row, second: Row) -> Interval | None:
     split = views.common_split(first, second)
     if split is None:
         return None
     a, b = (views.scores(row, split=split) for row in (first, second))
-    return statistics.probability_of_improvement(a.table, b.table, a.strata)
+    return compare(a.table, b.table, a.strata)
 
 
 def ranks(best_first: Sequence[Row]) -> list[Place]:
@@ -175,17 +165,9 @@ def _tied(row: Row, leader: Row) -> bool:
 class Changes:
     """Ranks of the controllers that have run in all tracks of an environment.
 
-    Attributes
-    ----------
-    env : str
-    tracks : tuple of str
-        The nominal one first.
-    splits : tuple of str
-        Split of the episodes of each track.
-    places : mapping from controller to a place a track
-        In the order of the first track.
-    agreement : tuple of float
-        Kendall's tau of each track's means with those of the first, 1 for the same order.
+    ``tracks`` has the nominal one first, ``splits`` the split of each one's episodes, ``places``
+    a place a track for each controller in the order of the first track, and ``agreement``
+    Kendall's tau of each track's means with those of the first, 1 for the same order.
     """
 
     env: str
@@ -198,15 +180,12 @@ class Changes:
 def changes(by_track: Mapping[str, Sequence[Row]]) -> list[Changes]:
     """Return the rank changes between the tracks of each environment with several tracks.
 
-    Parameters
-    ----------
-    by_track : mapping from track to rows
-        The rows that are ranked, best first, tracks in the order of :func:`tracks`.
+    Rows are the ranked ones, best first, tracks in the order of :func:`tracks`.
     """
     families: dict[str, list[str]] = {}
     for name, rows in by_track.items():
         if rows:
-            families.setdefault(str(rows[0]["env"]["id"]), []).append(name)
+            families.setdefault(views.env_of(rows[0]), []).append(name)
     return [_changes(env, names, by_track) for env, names in families.items() if len(names) > 1]
 
 
@@ -219,13 +198,12 @@ def _changes(env: str, names: list[str], by_track: Mapping[str, Sequence[Row]]) 
     order = [views.name_of(row) for row in kept[names[0]]]
     means = {n: {views.name_of(r): views.mean_of(r) for r in rows} for n, rows in kept.items()}
     first = [means[names[0]][c] for c in order]
-    agreement = [_tau(first, [means[n][c] for c in order]) for n in names]
+    agreement = [
+        float(stats.kendalltau(first, [means[n][c] for c in order]).statistic)
+        if len(order) > 1
+        else float("nan")
+        for n in names
+    ]
     places = {c: tuple(placed[n][c] for n in names) for c in order}
     splits = tuple(views.published_split(by_track[n][0]) for n in names)
     return Changes(env, tuple(names), splits, places, tuple(agreement))
-
-
-def _tau(first: Sequence[float], second: Sequence[float]) -> float:
-    if len(first) < 2:
-        return float("nan")
-    return float(stats.kendalltau(first, second).statistic)

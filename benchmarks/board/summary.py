@@ -36,14 +36,7 @@ order.
 
 @dataclass(frozen=True)
 class Winner:
-    """The best paper controller of a track and the learned controller nearest to a claim.
-
-    Attributes
-    ----------
-    env, track : str
-    paper : Row or None
-    claim : Claim or None
-    """
+    """The best paper controller of a track and the learned controller nearest to a claim."""
 
     env: str
     track: str
@@ -68,25 +61,16 @@ class Winner:
 def nominal(tracks: Tracks) -> dict[str, Winner]:
     """Return the leaders of each environment's nominal track (of all tracks if none is nominal)."""
     chosen = {name: rows for name, rows in tracks.items() if "nominal" in name} or dict(tracks)
-    return {name: _winner(name, rows) for name, rows in chosen.items()}
-
-
-def _winner(track: str, rows: Sequence[Row]) -> Winner:
-    made = claims.learned_claims(rows)
-    env = str(rows[0]["env"]["id"])
-    return Winner(env, track, claims.best_paper(rows), made[0] if made else None)
+    found = {}
+    for name, rows in chosen.items():
+        made = claims.learned_claims(rows)
+        nearest = made[0] if made else None
+        found[name] = Winner(views.env_of(rows[0]), name, claims.best_paper(rows), nearest)
+    return found
 
 
 def board_text(all_rows: Sequence[Row], pages: Mapping[str, str] | None = None) -> str:
-    """Return LEADERBOARD.md.
-
-    Parameters
-    ----------
-    all_rows : sequence of rows
-        In any order.
-    pages : mapping from environment to path, optional
-        Of its page, relative to the board.
-    """
+    """Return LEADERBOARD.md; ``pages`` are the environments' paths relative to it."""
     tracks = standings.tracks(all_rows)
     if not tracks:
         return f"{INTRODUCTION}\n{NO_ROWS}\n"
@@ -168,7 +152,7 @@ def _environments(tracks: Tracks, pages: Mapping[str, str]) -> list[str]:
 
 def verified_words(all_rows: Sequence[Row]) -> str:
     """Return how many rows were reproduced, to the last bit or within tolerance, and when."""
-    found = [row[views.VERIFIED] for row in all_rows if views.is_verified(row)]
+    found = [row[views.VERIFIED] for row in all_rows if row.get(views.VERIFIED)]
     when = f", last on {max(entry['date'] for entry in found)}" if found else ""
     elsewhere = sum(entry["mode"] == "elsewhere" for entry in found)
     how = f", {elsewhere} of them within tolerance on another machine" if elsewhere else ""
@@ -180,8 +164,7 @@ def _budgets(rows: Sequence[Row]) -> str:
     entries = {views.name_of(row): row for row in sorted(rows, key=lambda row: row["row"])}
     trials: dict[bool, list[int | None]] = {}
     for row in entries.values():
-        learned = row["controller"]["kind"] != "classical"
-        trials.setdefault(learned, []).append(views.cost_of(row).trials)
+        trials.setdefault(not views.is_classical(row), []).append(views.cost_of(row).trials)
     if len(trials) < 2:
         return ""
     most = {learned: max(count or 0 for count in counts) for learned, counts in trials.items()}

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from benchmarks.board import accessors as views
 from benchmarks.board.claims import Claim
-from benchmarks.board.format import bounded, number
+from benchmarks.board.format import Table, bounded, number
 from benchmarks.board.standings import Changes, Listing
 from benchmarks.runs.cells import AUDIT, PUBLIC
-from benchmarks.runs.rows import Row, shown
+from benchmarks.runs.rows import Row
 from benchmarks.scoring.metrics import headline_of
+
+Cells = dict[str, Callable[[Row], str]]
+"""Columns of a table by their headings, each a function of a row."""
+
+
+def by_controller(rows: Sequence[Row], columns: Cells) -> Table:
+    """Return a table with a line for each row, the controller's name first."""
+    lines = [[f"`{views.name_of(row)}`", *(cell(row) for cell in columns.values())] for row in rows]
+    return ["controller", *columns], lines
 
 
 def short_env(env: str) -> str:
@@ -21,7 +30,7 @@ def short_env(env: str) -> str:
 def about(row: Row) -> str:
     """Return a sentence on the track of a row: environment, scenarios, scoring."""
     content, scenarios = views.content_of(row), len(row["plants"])
-    unit, factor = shown(content)
+    unit, factor = views.unit_of(row)
     public = len(views.pairs_of(row, PUBLIC))
     return (
         f"`{row['env']['id']}`, scenarios `{views.track_of(row)}` version {content['version']} "
@@ -36,7 +45,7 @@ def round_words(listing: Listing) -> str:
     first = listing.inside[0]
     if not views.is_audited(first):
         return "Self-reported: no audit round yet, all scores are of the public episodes."
-    found, total = views.round_of(first), len(listing.inside) + len(listing.outside)
+    found, total = first["audit"], len(listing.inside) + len(listing.outside)
     episodes = len(views.pairs_of(first, AUDIT))
     words = (
         f"Audit round {found['round']}, drawn {found['drawn']}: {episodes} episodes with seeds "
@@ -51,7 +60,7 @@ def score_words(row: Row | None, split: str) -> str:
     """Return the score of a row over the episodes of a split, with its interval and unit."""
     if row is None:
         return "-"
-    unit, factor = shown(views.content_of(row))
+    unit, factor = views.unit_of(row)
     return f"{bounded(views.interval(row, split=split), factor)} {unit}"
 
 
@@ -73,6 +82,10 @@ def change_cells(found: Changes, k: int) -> list[str]:
     Environment, track, leaders, their places in the first track, largest fall, largest rise,
     Kendall's tau, episodes.
     """
+
+    def move(name: str) -> str:
+        return f"`{name}` {found.places[name][0]} → {found.places[name][k]}"
+
     moves = {name: places[0].first - places[k].first for name, places in found.places.items()}
     leaders = [name for name, places in found.places.items() if places[k].first == 1]
     fall, rise = min(moves, key=lambda n: moves[n]), max(moves, key=lambda n: moves[n])
@@ -81,16 +94,11 @@ def change_cells(found: Changes, k: int) -> list[str]:
         short_name(found.tracks[k], found.tracks),
         ", ".join(f"`{name}`" for name in leaders),
         ", ".join(str(found.places[name][0]) for name in leaders),
-        _move(found, fall, k) if moves[fall] < 0 else "-",
-        _move(found, rise, k) if moves[rise] > 0 else "-",
+        move(fall) if moves[fall] < 0 else "-",
+        move(rise) if moves[rise] > 0 else "-",
         f"{found.agreement[k]:.2f}",
         " / ".join(dict.fromkeys((found.splits[0], found.splits[k]))),
     ]
-
-
-def _move(found: Changes, name: str, k: int) -> str:
-    places = found.places[name]
-    return f"`{name}` {places[0]} → {places[k]}"
 
 
 def short_name(track: str, tracks: Sequence[str]) -> str:

@@ -26,8 +26,6 @@ class Artefact:
     ----------
     files : tuple of mapping
         Name, sha256, bytes and training_seed of each policy file.
-    knobs : mapping of float
-        Numbers that a search found.
     answers : tuple of ndarray, shape (n, n_actions)
         Of the controller in each setting of the task, in action ranges; of a residual policy those
         of the controller that it corrects, and none of a policy alone.

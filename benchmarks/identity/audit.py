@@ -43,23 +43,10 @@ PER_SCENARIO = 2
 
 @dataclass(frozen=True)
 class Round:
-    """One salt for all controllers of a track.
+    """One salt for all controllers of a track: the seeds are derived from ``frozen`` and ``salt``.
 
-    Attributes
-    ----------
-    track : str
-    number : int
-        From 1 in each track.
-    task : mapping
-        Record of the task's identity.
-    entrants : mapping of mapping
-        Record of each controller's artefact by name.
-    frozen : str
-        Digest of task and artefacts from which the seeds are derived.
-    salt, drawn : str
-        ``drawn`` is the day.
-    commit : str
-        Commit of the checkout in which the salt was drawn; a note.
+    ``task`` and ``entrants`` are the frozen identities of the task and of each controller,
+    ``frozen`` their digest; rounds are numbered from 1 in each track; the commit is a note.
     """
 
     track: str
@@ -89,17 +76,9 @@ class Round:
 
 @dataclass(frozen=True)
 class Audit:
-    """Place of a controller in the last round of a track.
+    """Place of a controller in the last round of a track: its artefact there and its seeds.
 
-    Attributes
-    ----------
-    round : Round
-    artefact : str
-        Digest of the controller's artefact in that round.
-    entry : int
-        Number of different artefacts that the controller's name has had in the track's rounds.
-    seeds : mapping of tuple
-        Seeds of each scenario.
+    ``entry`` counts the different artefacts of the controller's name in the track's rounds.
     """
 
     round: Round
@@ -126,13 +105,7 @@ def seed_of(frozen: str, salt: str, scenario: str, number: int) -> int:
 
 
 def rounds(file: Path | None = None) -> list[Round]:
-    """Return the rounds in the order of their drawing; none where there is no file.
-
-    Raises
-    ------
-    ValueError
-        If the file is damaged, or the rounds of a track are not numbered one after another.
-    """
+    """Return the rounds in the order of their drawing; none where there is no file."""
     path = FILE if file is None else file
     if not path.exists():
         return []
@@ -198,13 +171,7 @@ def in_last_round(row: Mapping[str, Any]) -> bool:
 
 
 def draw(track: ScenarioSet, entrants: Sequence[Entrant]) -> Round:
-    """Draw a round of a track and add it to the file; the last one stays if nothing has changed.
-
-    Raises
-    ------
-    ValueError
-        If policies are not of different training seeds.
-    """
+    """Draw a round of a track and add it to the file; the last one stays if nothing has changed."""
     with FileLock(FILE.with_name(f".{FILE.name}.lock")):
         for entrant in entrants:
             trainings.check_files(entrant)

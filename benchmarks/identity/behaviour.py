@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from baselines.core.recorded_answers import answers
 from benchmarks.identity.hashing import arrays_digest
 from benchmarks.runs import rollout
-from benchmarks.scoring.episodes import scores_of
+from benchmarks.scoring.metrics import scores_of
 
 SEED = 1
 HOLD = 25
@@ -50,15 +50,9 @@ class FixedActions:
         self.middle = (space.high + space.low) / 2
         self.half = (space.high - space.low) / 2
 
-    def predict(
-        self,
-        observation: Any,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = True,
-    ) -> tuple[Array, int]:
+    def predict(self, observation: Any, state: Any = None, *_: Any) -> tuple[Array, int]:
         """Return the action of the present control period, and the number of the next one."""
-        period = 0 if state is None or episode_start else state
+        period = 0 if state is None else state
         action = self.middle + SHARE * self.half * self._levels(period // HOLD)
         return action.astype(np.float32), period + 1
 
@@ -76,14 +70,9 @@ class FixedActions:
 class Behaviour:
     """Behaviour of a scenario under fixed actions.
 
-    Attributes
-    ----------
-    trajectory : str
-        Hash of observations and physical signals; reward terms do not count.
-    scores : mapping of str
-        Metrics of that episode, and of the same one if it had failed, to ten digits.
-    observations : tuple of ndarray, shape (n, n_signals)
-        Consecutive observations from the start of each part.
+    ``trajectory`` is the hash of observations and physical signals, without reward terms;
+    ``scores`` are the metrics of that episode, and of the same one if it had failed, to ten
+    digits; ``observations`` are consecutive ones from the start of each part.
     """
 
     trajectory: str
@@ -92,16 +81,7 @@ class Behaviour:
 
 
 def of_environment(env: Any, content: Mapping[str, Any], rests: bool) -> Behaviour:
-    """Return the behaviour of an environment in one episode.
-
-    Parameters
-    ----------
-    env : gymnasium.Env
-    content : mapping
-        Of the scenario file that scores it.
-    rests : bool
-        Whether the reference rests, so that a steady-state error is scored.
-    """
+    """Return the behaviour of an environment in one episode, scored by its scenario file."""
     episode = rollout.run(env, FixedActions(env.action_space), SEED)
     signals = [v for name, v in episode.signals.items() if not name.startswith(("reward", "model"))]
     found = scores_of(episode, content, rests)
@@ -121,20 +101,9 @@ def _sequences(observations: Any) -> Sequences:
 
 
 def of_controller(controller: Any, observations: Sequences, space: Any) -> Array:
-    """Return a controller's answers to observations, as shares of the action range.
+    """Return answers as shares of the action range, (n, n_actions), from a new start in each part.
 
-    Parameters
-    ----------
-    controller : Controller
-    observations : sequence of ndarray, shape (n, n_signals)
-        The controller starts anew with each.
-    space : gymnasium.spaces.Box
-        Of the actions.
-
-    Returns
-    -------
-    ndarray, shape (n, n_actions)
-        Fewer rows where the controller raised an error.
+    There are fewer rows where the controller raised an error.
     """
     span = space.high - space.low
     found = []

@@ -13,13 +13,7 @@ import numpy as np
 
 
 def plain(value: Any) -> Any:
-    """Return ``value`` in JSON's own types: NaN and infinities become ``None``.
-
-    Raises
-    ------
-    TypeError
-        If there is something that JSON has no form for.
-    """
+    """Return ``value`` in JSON's own types: NaN and infinities become ``None``."""
     if value is None or isinstance(value, (bool, str)):
         return value
     if isinstance(value, (int, np.integer)):
@@ -61,14 +55,7 @@ SOURCES = {".py", ".yaml", ".yml", ".csv", ".json", ".npz", ".onnx", ".safetenso
 
 
 def sources_digest(paths: Iterable[Path], kinds: Collection[str] = SOURCES) -> str:
-    """Return the SHA-256 of files and of folders' code and data by relative name, 16 digits.
-
-    Parameters
-    ----------
-    paths : iterable of Path
-    kinds : collection of str
-        Suffixes of the files that count.
-    """
+    """Return the SHA-256 of files and of folders' code and data by relative name, 16 digits."""
     state = hashlib.sha256()
     for root in paths:
         files = sorted(root.rglob("*")) if root.is_dir() else [root]

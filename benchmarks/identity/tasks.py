@@ -17,16 +17,9 @@ from benchmarks.scenarios.scenario_env import make_env, model_of
 
 @dataclass(frozen=True)
 class Setting:
-    """Inputs from which the controllers of a track are built.
+    """Nominal plant and named signals from which the controllers of a track are built.
 
-    Attributes
-    ----------
-    model : object
-        Nominal plant.
-    env : gymnasium.Env
-        Only its named signals are used.
-    observations : sequence of ndarray, shape (n, n_signals)
-        Observations whose answers identify a controller.
+    Their answers to ``observations``, each of shape (n, n_signals), identify them.
     """
 
     model: Any
@@ -36,18 +29,9 @@ class Setting:
 
 @dataclass(frozen=True)
 class Identity:
-    """Parts of a task's identity.
+    """Digests by scenario: of the plant's and the model's parameters, trajectory and scores.
 
-    Attributes
-    ----------
-    scenarios : str
-        Digest of the scenario file's content.
-    plants, models : mapping of str
-        Digest of the parameters of each scenario's plant, and of its nominal model.
-    trajectories : mapping of str
-        Hash of each scenario's trajectory under fixed actions.
-    scores : mapping of str
-        Digest of each scenario's scores of that trajectory.
+    The trajectory is that of fixed actions; ``scenarios`` is the digest of the file's content.
     """
 
     scenarios: str
@@ -82,16 +66,7 @@ class Identity:
 
 @dataclass(frozen=True)
 class Task:
-    """Track with its environments built once.
-
-    Attributes
-    ----------
-    env : dict
-        Id and version of the environment.
-    identity : Identity
-    settings : tuple of Setting
-        Each nominal model and set of signals once.
-    """
+    """Track with its environments built once, and each nominal model and set of signals once."""
 
     env: dict[str, Any]
     identity: Identity
@@ -142,13 +117,7 @@ def versions(env: str) -> list[str]:
 
 
 def check_version(env: str, row: str) -> None:
-    """Raise unless this checkout has the version of an environment that a row is of.
-
-    Raises
-    ------
-    ValueError
-        Naming both versions.
-    """
+    """Raise unless this checkout has the version of an environment that a row is of."""
     there = versions(env)
     if env not in there:
         here = ", ".join(there) or "no such environment"

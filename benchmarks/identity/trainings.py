@@ -55,13 +55,7 @@ def card_record(controller: Any) -> dict[str, Any]:
 
 
 def check_files(entrant: Entrant) -> None:
-    """Raise unless the policy files are of seeds 0, 1, 2, ... and all different.
-
-    Raises
-    ------
-    ValueError
-        With the remedy.
-    """
+    """Raise ValueError unless the files are of seeds 0, 1, 2, ... and all different."""
     seeds = [seed for seed, _ in entrant.files]
     if seeds != list(range(len(seeds))):
         raise ValueError(
@@ -79,19 +73,7 @@ def check_files(entrant: Entrant) -> None:
 
 
 def check_cells(entrant: Entrant, cells: Sequence[Mapping[str, Any]]) -> None:
-    """Raise unless the policies that were run are of different seeds of one training.
-
-    Parameters
-    ----------
-    entrant : Entrant
-    cells : sequence of mapping
-        The records of a row's cells.
-
-    Raises
-    ------
-    ValueError
-        Naming the seeds.
-    """
+    """Raise ValueError unless a row's cells are of different seeds of one training."""
     check_files(entrant)
     if not entrant.files:
         return

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 import pam_envs  # noqa: F401  registers the ids
 from benchmarks.runs import rollout
-from benchmarks.scoring import knee as metrics_knee
-from benchmarks.scoring.errors import rms
+from benchmarks.scoring.group import rms
+from benchmarks.scoring.groups import knee as metrics_knee
 from pam_envs.plants.knee_orthosis.plant import Activity, Dynamics, KneeOrthosis, Mounting
 from pam_envs.references.gait import PAPER_STRIDE
 

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.identity import artefacts, trainings
 from benchmarks.identity.audit import Audit
@@ -22,7 +21,7 @@ from benchmarks.runs import controllers, knowledge, provenance, rollout, traces
 from benchmarks.runs.controllers import Entrant
 from benchmarks.scenarios.scenario import Scenario, ScenarioSet
 from benchmarks.scenarios.scenario_env import make_batch, make_env, model_of, plant_digests
-from benchmarks.scoring.episodes import scores_of
+from benchmarks.scoring.metrics import scores_of
 
 SCHEMA = 3
 PUBLIC, AUDIT = "public", "audit"
@@ -34,18 +33,8 @@ PROBED_STEPS = 250
 class Cell:
     """One controller in one scenario.
 
-    Attributes
-    ----------
-    entrant : Entrant
-    track : ScenarioSet
-        The file that the scenario is from.
-    scenario : Scenario
-    training_seed : int, optional
-        Which policy of a learned controller.
-    split : {"public", "audit"}
-    seeds : tuple of int
-    probe : bool
-        Whether the use of the preview is measured here.
+    ``training_seed`` chooses the policy of a learned controller; where ``probe`` is true the use of
+    the preview is measured.
     """
 
     entrant: Entrant
@@ -95,12 +84,7 @@ class Cell:
 def cells_of(entrant: Entrant, track: ScenarioSet, found: Audit | None = None) -> list[Cell]:
     """Return the cells of a row, public ones first, by training seed and scenario.
 
-    Parameters
-    ----------
-    entrant : Entrant
-    track : ScenarioSet
-    found : Audit, optional
-        Adds its episodes.
+    An audit adds its episodes.
     """
     scenarios, public = track.scenarios(), track.seeds
     probed = next((s.name for s in scenarios if not s.rests), scenarios[0].name)
@@ -117,13 +101,7 @@ def cells_of(entrant: Entrant, track: ScenarioSet, found: Audit | None = None) -
 
 @dataclass(frozen=True)
 class Group:
-    """Cells that differ in their seeds alone.
-
-    Attributes
-    ----------
-    cells : tuple of Cell
-        One or more.
-    """
+    """Cells, one or more, that differ in their seeds alone."""
 
     cells: tuple[Cell, ...]
 
@@ -147,7 +125,7 @@ def compute(group: Group) -> dict[str, dict[str, Any]]:
     entrant, track = first.entrant, first.track
     env = make_env(track.env, first.scenario.kwargs)
     model = model_of(track.env, first.scenario, env)
-    controller = _controller(first, model, env)
+    controller = controllers.make(entrant, model, env, training_seed=first.training_seed)
     said: dict[str, Any] = {
         "schema": SCHEMA,
         "env": track.env,
@@ -157,8 +135,7 @@ def compute(group: Group) -> dict[str, dict[str, Any]]:
         "training_seed": first.training_seed,
         "plant_digest": env.unwrapped.plant.digest(),
         "model_digest": model.digest(),
-        "knows_plant": knowledge.knows_plant(entrant, controller, model, env),
-        "trained_on_plant": knowledge.trained_on_plant(controller, model, env),
+        **knowledge.of_plant(entrant, controller, model, env),
     }
     if entrant.files:
         said["card"] = trainings.card_record(controller)
@@ -171,8 +148,12 @@ def compute(group: Group) -> dict[str, dict[str, Any]]:
         record["episodes"] = [episode_record(cell, seed, episode) for seed, episode in numbered]
         if cell.first:
             record |= _kept(cell, env, controller, cell.seeds[0], own[0])
-        spent = np.concatenate([episode.seconds for episode in own])
-        record["volatile"] = {**provenance.occasion(), "predict_us": _times(spent)}
+        micro = 1e6 * np.concatenate([episode.seconds for episode in own])
+        times = (np.median(micro), np.percentile(micro, 99)) if len(micro) else (None, None)
+        record["volatile"] = {
+            **provenance.occasion(),
+            "predict_us": dict(zip(("median", "p99"), times, strict=True)),
+        }
         records[cell.key] = record
     env.close()
     return records
@@ -186,37 +167,18 @@ def episodes_of(group: Group, env: Any, controller: Any) -> list[rollout.Episode
     return rollout.run_all(batches, env, controller, seeds)
 
 
-def _controller(cell: Cell, model: Any, env: Any) -> controllers.Controller:
-    return controllers.make(cell.entrant, model, env, training_seed=cell.training_seed)
-
-
 def _kept(
     cell: Cell, env: Any, controller: Any, seed: int, episode: rollout.Episode
 ) -> dict[str, Any]:
     """Return the parts of a record from one episode: its picture, and the use of the preview."""
     kept: dict[str, Any] = {}
     if cell.drawn and len(episode.actions):
-        content = cell.track.content
-        made = traces.of_episode(
-            cell.scenario.name, seed, episode.signals, content, cell.training_seed
-        )
-        kept["traces"] = [made]
+        where = (cell.scenario.name, seed, episode.signals, cell.track.content)
+        kept["traces"] = [traces.of_episode(*where, cell.training_seed)]
     if cell.probe:
-        kept["preview_used"] = _preview_seconds(env, controller, episode)
+        part = replace(episode, observations=episode.observations[:PROBED_STEPS])
+        kept["preview_used"] = rollout.preview_used(part, controller, env.unwrapped.signals)
     return kept
-
-
-def _times(seconds: NDArray[Any]) -> dict[str, float | None]:
-    """Return median and 99th percentile of the time of an answer, in microseconds."""
-    if not len(seconds):
-        return {"median": None, "p99": None}
-    micro = 1e6 * seconds
-    return {"median": float(np.median(micro)), "p99": float(np.percentile(micro, 99))}
-
-
-def _preview_seconds(env: Any, controller: Any, episode: rollout.Episode) -> float:
-    part = rollout.Episode(**{**vars(episode), "observations": episode.observations[:PROBED_STEPS]})
-    return rollout.preview_used(part, controller, env.unwrapped.signals)
 
 
 def episode_record(cell: Cell, seed: int, episode: rollout.Episode) -> dict[str, Any]:

@@ -28,11 +28,6 @@ def beyond_rounding(before: Row, after: Row) -> list[str]:
     """Return a line for everything in which two rows differ by more than machines do.
 
     Every episode is compared, not their mean: free episodes would allow any interval.
-
-    Parameters
-    ----------
-    before, after : mapping
-        As recorded and as computed again, in plain types.
     """
     found = differences(_exact(before), _exact(after))
     found += differences(_frames(before), _frames(after), "episodes")
@@ -83,13 +78,7 @@ def differences(
 ) -> list[str]:
     """Return a line for every leaf in which two plain values differ, with both values.
 
-    Parameters
-    ----------
-    old, new : plain values
-    where : str
-        Name of the values.
-    tolerance, slack : float
-        Relative and absolute difference of numbers that is none.
+    ``tolerance`` and ``slack`` are the relative and absolute difference that is none.
     """
     return list(_differences(old, new, where, tolerance, slack))
 

@@ -14,11 +14,7 @@ class Controller(Protocol):
     """Policy predictor, in the terms of stable-baselines3."""
 
     def predict(
-        self,
-        observation: Any,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = True,
+        self, observation: Any, state: Any, episode_start: Any, deterministic: bool, /
     ) -> tuple[Any, Any]:
         """Return the action for an observation, and the controller's next state."""
         ...
@@ -33,8 +29,8 @@ class Entrant:
 
     Attributes
     ----------
-    name, summary, knowledge, citation : str
-        ``knowledge`` is "nothing", "tables", "nominal model" or "true model".
+    knowledge : str
+        "nothing", "tables", "nominal model" or "true model".
     envs : tuple of str
         Ids that it runs in; empty means any.
     kind : {"classical", "learned", "residual"}
@@ -42,12 +38,9 @@ class Entrant:
     source : str
         Module whose ``make_controller`` builds it.
     files : tuple of (int, Path)
-        Training seed and policy file (relative to the checkout), ascending; none for a controller
-        that is not trained.
+        Training seed and policy file (relative to the checkout), ascending.
     trials : int or None
         Number of settings tried to choose its numbers; None if unknown.
-    tuning : str
-        Method of that choice.
     author : str
         Author in the form of BibTeX; empty for the authors of this package.
     tuned : str
@@ -134,13 +127,7 @@ def _movable(path: Path) -> Path:
 
 
 def available() -> dict[str, Entrant]:
-    """Return all controllers by name.
-
-    Raises
-    ------
-    ValueError
-        If two sources use one name.
-    """
+    """Return all controllers by name; raise ValueError if two sources use one name."""
     merged: dict[str, Entrant] = {}
     for source in SOURCES:
         for name, entrant in _entrants(*source).items():
@@ -151,7 +138,7 @@ def available() -> dict[str, Entrant]:
 
 
 def find(name: str) -> Entrant:
-    """Return a controller by name, or raise naming the nearest ones."""
+    """Return a controller by name; raise ValueError naming the known ones."""
     known = available()
     if name not in known:
         raise ValueError(f"no controller named {name!r}; there are: {', '.join(sorted(known))}")
@@ -161,19 +148,9 @@ def find(name: str) -> Entrant:
 def make(
     entrant: Entrant, model: Any, env: Any, seed: int = 0, training_seed: int | None = None
 ) -> Controller:
-    """Return a controller built from a nominal plant and the named signals.
+    """Return a controller built from a nominal plant and the named signals of ``env``.
 
-    Parameters
-    ----------
-    entrant : Entrant
-    model : object
-        Nominal model of the controller.
-    env : gymnasium.Env
-        Only its named signals are used, never its plant.
-    seed : int
-        For controllers that draw.
-    training_seed : int, optional
-        Which of the policies of a learned controller.
+    ``seed`` is for controllers that draw; ``training_seed`` chooses the policy of a learned one.
     """
     maker = importlib.import_module(entrant.source).make_controller
     base = env.unwrapped

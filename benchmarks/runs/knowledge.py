@@ -14,48 +14,27 @@ TRAINED = "nominal model, trained on the plant"
 """Label of a policy that was trained on the simulated plant; others know a nominal model."""
 
 
-def knows_plant(entrant: Entrant, controller: Any, model: Any, env: Any) -> bool:
-    """Return whether a controller's model is the simulated plant.
+def of_plant(entrant: Entrant, controller: Any, model: Any, env: Any) -> dict[str, bool]:
+    """Return whether a controller's model is the simulated plant, and whether it was trained on it.
 
     A policy knows the plants of its training, named on its card; a residual one is built from the
-    nominal model as well.
+    nominal model as well. ``trained_on_plant`` is true of a policy only where its nominal model is
+    another plant. With drawn plants it means that the training drew them as well, or was on the
+    plant that they are drawn around where the model is another.
     """
-    base = env.unwrapped
-    card = getattr(controller, "card", None)
-    trained = isinstance(card, Mapping)
-    knows = (trained and entrant.kind == "learned") or model.digest() == base.plant.digest()
-    if isinstance(card, Mapping):
-        varied = (card.get("env_kwargs") or {}).get("randomize")
-        trained_on = card.get("plants", [card.get("plant")])
-        knows = knows and not varied and base.plant.digest() in trained_on
-    return knows and not base.setup.drawn
-
-
-def trained_on_plant(controller: Any, model: Any, env: Any) -> bool:
-    """Return whether a policy was trained on the simulated plant, and its nominal model is another.
-
-    With drawn plants this is a policy whose training drew them as well, or was on the plant that
-    they are drawn around where the model is another.
-    """
-    card = getattr(controller, "card", None)
+    base, card = env.unwrapped, getattr(controller, "card", None)
+    plant, drawn = base.plant.digest(), base.setup.drawn
+    same = model.digest() == plant
     if not isinstance(card, Mapping):
-        return False
-    base = env.unwrapped
-    varied = (card.get("env_kwargs") or {}).get("randomize")
-    met = base.plant.digest() in card.get("plants", [card.get("plant")])
-    return bool((varied and base.setup.drawn) or (met and model.digest() != base.plant.digest()))
+        return {"knows_plant": same and not drawn, "trained_on_plant": False}
+    varied = bool((card.get("env_kwargs") or {}).get("randomize"))
+    met = plant in card.get("plants", [card.get("plant")])
+    knows = (entrant.kind == "learned" or same) and met and not varied and not drawn
+    return {"knows_plant": knows, "trained_on_plant": (varied and drawn) or (met and not same)}
 
 
 def label(claimed: str, cells: Sequence[Mapping[str, Any]]) -> str:
-    """Return the label of a controller's knowledge in a track.
-
-    Parameters
-    ----------
-    claimed : str
-        By its catalogue.
-    cells : sequence of mapping
-        Records with ``knows_plant`` and ``trained_on_plant``.
-    """
+    """Return the label of a controller's knowledge in a track, ``claimed`` by its catalogue."""
     if claimed in IGNORANT:
         return claimed
     if all(cell["knows_plant"] for cell in cells):

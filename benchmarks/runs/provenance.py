@@ -60,13 +60,7 @@ def commit() -> str:
 
 
 def changed(folder: Path = ROOT) -> list[str]:
-    """Return the files of code and scenarios that differ from the last commit.
-
-    Raises
-    ------
-    OSError, subprocess.SubprocessError
-        If the folder is not a git checkout, or there is no git.
-    """
+    """Return the files of code and scenarios that differ from the last commit of a checkout."""
     said = git("status", "--porcelain", "--untracked-files=all", "--", *CODE, folder=folder)
     return [line[2:].strip() for line in said.splitlines()]
 

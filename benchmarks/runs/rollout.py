@@ -6,7 +6,7 @@ import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -32,20 +32,16 @@ class Episode:
     Attributes
     ----------
     signals : mapping of (n,) array
-        Every entry of ``info``, SI; and ``model/0``, ``model/1``, ... where the controller has a
-        model to follow: the outputs of that model.
-    observations : (n, n_obs) array
-        Inputs of the controller.
-    actions : (n, n_act) array
-        Its outputs.
+        Every entry of ``info``, SI; and the outputs of the model that the controller follows, if
+        it has one: ``model/0``, ``model/1``, ...
+    observations, actions : (n, n_obs), (n, n_act) array
     seconds : (m,) array
         Times that answers to one observation took [s], not of all steps where episodes ran as
         rows of a batch.
-    period : float
-        Control period [s].
+    period : float [s]
+        Control period.
     failure : str
-        Reason of an early end, the message of the error if a controller raised one; empty
-        otherwise.
+        Reason of an early end, the message of the error if a controller raised one; else empty.
     """
 
     signals: Mapping[str, Array]
@@ -64,21 +60,9 @@ class Episode:
 def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None) -> Episode:
     """Run one episode and record it; nothing is wrapped, filtered or scaled on the way.
 
-    Parameters
-    ----------
-    env : gymnasium.Env
-        With the package's named signals and ``info``.
-    controller : Controller
-    seed : int
-        Of the environment's reset.
-    watch : callable, optional
-        Called with the environment after the reset and after each step (for a video).
-
-    Raises
-    ------
-    Exception
-        Whatever the environment raises of an action that it has to take: an error of the project's
-        own, and no result. What the controller raises is one.
+    ``watch`` is called with the environment after the reset and after each step (for a video). An
+    error of the controller ends the episode as failed; an error that the environment raises of an
+    action that it has to take is an error of ours, and raised.
     """
     observation, first = env.reset(seed=seed)
     keys = tuple(first)
@@ -113,7 +97,7 @@ def run(env: Any, controller: Controller, seed: int, watch: Watch | None = None)
         models.append(followed)
         observation, over = after, terminated or truncated
         if terminated:
-            failure = f"a limit ended the episode at {info['time']:g} s"
+            failure = _ended(info["time"])
         if watch:
             watch(env)
     table = np.array(infos, np.float64).reshape(-1, len(keys))
@@ -146,7 +130,7 @@ def run_all(
     A row of a batch is the single environment to the last bit, and a row of a controller should be.
     This is checked: the first answers in the first and the last row are computed again, alone.
     If one differs, each episode is a batch of its own. If the controller takes no batch, or raises
-    an error, the episodes are run one by one.
+    an error, the episodes are run one by one. A cancelled run raises RuntimeError.
 
     Parameters
     ----------
@@ -154,21 +138,11 @@ def run_all(
         From a number of rows to the batched environment.
     env : gymnasium.Env
         The same environment alone.
-    controller : Controller
-    seeds : sequence of int
-        Of the environment's resets.
-
-    Raises
-    ------
-    RuntimeError
-        If the run was cancelled.
-    Exception
-        Whatever the environment raises of an action that it has to take; see :func:`run`.
     """
     for groups in ([list(seeds)], [[seed] for seed in seeds]):
         made: list[Episode] = []
         for group in groups:
-            _still_wanted()
+            _check_needed()
             try:
                 made += _rows(make(len(group)), controller, group)
             except _NotAsRows:  # the single run reports the error
@@ -177,78 +151,22 @@ def run_all(
             return made
     episodes = []
     for seed in seeds:
-        _still_wanted()
+        _check_needed()
         episodes.append(run(env, controller, seed))
     return episodes
 
 
-def _still_wanted() -> None:
+def _check_needed() -> None:
     if not is_needed():
-        raise RuntimeError("nobody waits for it any more")
+        raise RuntimeError("cancelled: no run needs this result any more")
 
 
 class _NotAsRows(Exception):
     """The controller takes no batch, or its rows differ from single episodes."""
 
 
-def _rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> list[Episode]:
-    """Return the episodes as rows of a batch; raise where they differ from single ones."""
-    course = _run_rows(batch, controller, seeds)
-    batch.close()
-    seconds: list[Array] = []
-    for row in sorted({0, len(seeds) - 1}):
-        first = min(REPLAYED, int(course.lengths[row]))
-        with _asked():
-            alone, spent = _timed(controller, course.observations[:first, row])
-        together = course.actions[:first, row]
-        if alone.dtype != together.dtype or not np.array_equal(alone, together, equal_nan=True):
-            raise _NotAsRows
-        seconds.append(spent)
-    spent = np.concatenate(seconds)
-    period = float(batch.control_period)
-    return [course.episode(row, spent, period) for row in range(len(seeds))]
-
-
-@dataclass(frozen=True)
-class _Course:
-    """Record of a batch over n steps, until its last row ended.
-
-    Attributes
-    ----------
-    keys : tuple of str
-        Of ``info``.
-    infos : (n, n_keys, n_rows) array
-    models : (n, n_rows, n_outputs) array
-    observations : (n, n_rows, n_obs) array
-    actions : (n, n_rows, n_act) array
-    lengths : (n_rows,) array
-        Steps of each row's first episode.
-    failures : list of str
-    """
-
-    keys: tuple[str, ...]
-    infos: Array
-    models: Array
-    observations: NDArray[Any]
-    actions: NDArray[Any]
-    lengths: NDArray[np.int64]
-    failures: list[str]
-
-    def episode(self, row: int, seconds: Array, period: float) -> Episode:
-        """Return the first episode of a row."""
-        n = int(self.lengths[row])
-        return Episode(
-            signals=_named(self.keys, self.infos[:n, :, row], self.models[:n, row]),
-            observations=self.observations[:n, row].copy(),
-            actions=self.actions[:n, row].copy(),
-            seconds=seconds,
-            period=period,
-            failure=self.failures[row],
-        )
-
-
 @contextmanager
-def _asked() -> Iterator[None]:
+def _batch_refused() -> Iterator[None]:
     """Treat any error of a controller as a refusal of batches."""
     try:
         yield
@@ -256,8 +174,23 @@ def _asked() -> Iterator[None]:
         raise _NotAsRows from error
 
 
-def _run_rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> _Course:
-    """Step until every row has ended once."""
+def _rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> list[Episode]:
+    """Return the episodes as rows of a batch; raise where they differ from single ones."""
+    episodes = _run_rows(batch, controller, seeds)
+    batch.close()
+    seconds: list[Array] = []
+    for row in sorted({0, len(seeds) - 1}):
+        with _batch_refused():
+            alone, spent = _timed(controller, episodes[row].observations[:REPLAYED])
+        together = episodes[row].actions[:REPLAYED]
+        if alone.dtype != together.dtype or not np.array_equal(alone, together, equal_nan=True):
+            raise _NotAsRows
+        seconds.append(spent)
+    return [replace(episode, seconds=np.concatenate(seconds)) for episode in episodes]
+
+
+def _run_rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> list[Episode]:
+    """Step until every row has ended once; return the first episode of each, without times."""
     count = len(seeds)
     observation, report = batch.reset(seed=list(seeds))
     keys = tuple(report)
@@ -266,7 +199,7 @@ def _run_rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> _Cour
     state, start, running = None, np.ones(count, bool), np.ones(count, bool)
     lengths, failures = np.zeros(count, np.int64), [""] * count
     while running.any():
-        with _asked():
+        with _batch_refused():
             action, state = controller.predict(observation, state, start, True)
             models.append(np.reshape(model_output(state) if model_output else [], (count, -1)))
         if not _acceptable(action, batch):
@@ -281,18 +214,24 @@ def _run_rows(batch: Any, controller: Controller, seeds: Sequence[int]) -> _Cour
         actions.append(action)
         lengths[running] += 1
         for row in np.flatnonzero(running & terminated):
-            end = table[keys.index("time"), row]
-            failures[row] = f"a limit ended the episode at {end:g} s"
+            failures[row] = _ended(table[keys.index("time"), row])
         observation, running = after, running & ~start
-    return _Course(
-        keys,
-        np.array(infos),
-        np.array(models),
-        np.array(observations),
-        np.array(actions),
-        lengths,
-        failures,
-    )
+    signals, followed, seen, given = map(np.array, (infos, models, observations, actions))
+    return [
+        Episode(
+            signals=_named(keys, signals[:n, :, row], followed[:n, row]),
+            observations=seen[:n, row].copy(),
+            actions=given[:n, row].copy(),
+            seconds=np.zeros(0),
+            period=float(batch.control_period),
+            failure=failures[row],
+        )
+        for row, n in enumerate(lengths)
+    ]
+
+
+def _ended(seconds: float) -> str:
+    return f"a limit ended the episode at {seconds:g} s"
 
 
 def _acceptable(action: Any, env: Any) -> bool:
@@ -314,28 +253,21 @@ def _sentence(error: Exception) -> str:
 def preview_used(episode: Episode, controller: Controller, signals: Any) -> float:
     """Return the preview horizon that a controller uses [s], measured by its answers.
 
-    The episode's observations are shown to it again with the last samples replaced by the
-    present reference. The first replacement that changes an action marks the last sample in use.
-
-    Parameters
-    ----------
-    episode : Episode
-        An episode of this controller.
-    controller : Controller
-    signals : Signals
-        Of the observation; the preview of a signal ``reference`` is ``reference_1``, ...
+    The observations of one of its episodes are shown to it again with the last samples replaced by
+    the present reference. The first replacement that changes an action marks the last sample in
+    use. The preview of a signal ``reference`` is ``reference_1``, ...
     """
     ahead = _previewed({signal.name: signal.index for signal in signals})
     if not ahead or not len(episode.observations):
         return 0.0
     seconds = {signal.index: signal.ahead for signal in signals}
-    plain = _answers(controller, episode.observations)
+    plain, _ = _timed(controller, episode.observations)
     for first in range(len(ahead), 0, -1):
         masked = episode.observations.copy()
         for number in range(first, len(ahead) + 1):
             for column, present in ahead[number]:
                 masked[:, column] = masked[:, present]
-        if not np.array_equal(_answers(controller, masked), plain, equal_nan=True):
+        if not np.array_equal(_timed(controller, masked)[0], plain, equal_nan=True):
             return round(max(seconds[column] for column, _ in ahead[first]), 9)
     return 0.0
 
@@ -348,10 +280,6 @@ def _previewed(index: Mapping[str, int]) -> dict[int, list[tuple[int, int]]]:
         if number.isdigit() and base in index:
             found.setdefault(int(number), []).append((column, index[base]))
     return found
-
-
-def _answers(controller: Controller, observations: NDArray[Any]) -> NDArray[Any]:
-    return _timed(controller, observations)[0]
 
 
 def _timed(controller: Controller, observations: NDArray[Any]) -> tuple[NDArray[Any], Array]:

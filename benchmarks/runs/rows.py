@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,46 +12,26 @@ import numpy as np
 from benchmarks.identity import artefacts, tasks, trainings
 from benchmarks.identity.audit import Audit
 from benchmarks.runs import knowledge, provenance
-from benchmarks.runs.cells import PUBLIC, Cell, cells_of
+from benchmarks.runs.cells import PUBLIC, cells_of
 from benchmarks.runs.controllers import Entrant
 from benchmarks.runs.store import read_record, write_record
 from benchmarks.scenarios import scenario as scenarios
 from benchmarks.scenarios.scenario import ScenarioSet
-from benchmarks.scoring import statistics
-from benchmarks.scoring.metrics import METRICS, headline_of
+from benchmarks.scoring.metrics import headline_of
 
 SCHEMA = 4
 RESULTS = Path(__file__).parents[1] / "results"
-KEYS: dict[str, tuple[str, ...]] = {
-    "row": (),
-    "env": ("id", "version"),
-    "task": (),
-    "controller": ("name", "kind", "artefact"),
-    "scenarios": ("name", "version", "digest", "content"),
-    "plants": (),
-    "models": (),
-    "seeds": (),
-    "training_seeds": (),
-    "made_with": (),
-    "episodes": (),
-    "audit": (),
-    "traces": (),
-    "volatile": (),
-}
+KEYS = (
+    *("row", "env", "task", "controller", "scenarios", "plants", "models", "seeds"),
+    *("training_seeds", "made_with", "episodes", "audit", "traces", "volatile"),
+    *("env.id", "env.version", "controller.name", "controller.kind", "controller.artefact"),
+    *("scenarios.name", "scenarios.version", "scenarios.digest", "scenarios.content"),
+)
 """Entries of a row, and their entries that other modules read."""
 _NAME = re.compile(r"[A-Za-z0-9_]+")
 
 Row = dict[str, Any]
-SHOWN: dict[str, Any] = {"unit": "mm", "factor": 1e3}
-"""Unit of errors unless the scenario file names one."""
-
-
-def shown(content: Mapping[str, Any]) -> tuple[str, float]:
-    """Return the unit in which errors are shown, and its factor from SI."""
-    how = content.get("shown") or SHOWN
-    return str(how["unit"]), float(how["factor"])
-
-
+Record = Mapping[str, Any]
 SUFFIX = ".json.xz"
 """Of a row's file."""
 
@@ -77,23 +57,10 @@ def files(folder: Path = RESULTS) -> list[Path]:
     return sorted(folder.glob(f"*/*{SUFFIX}"))
 
 
-Record = Mapping[str, Any]
-
-
 def assemble(
     entrant: Entrant, track: ScenarioSet, cells: Sequence[Record], found: Audit | None = None
 ) -> Row:
-    """Return the row of a controller from its cells, in the order of :func:`cells.cells_of`.
-
-    Parameters
-    ----------
-    entrant : Entrant
-    track : ScenarioSet
-    cells : sequence of mapping
-        The record of every cell; none may be missing, none of another environment.
-    found : Audit, optional
-        With which the cells were listed.
-    """
+    """Return the row of a controller from the records of :func:`cells.cells_of` in its order."""
     task = tasks.of(track)
     identity = task.identity
     _check_complete(entrant, track, cells, found)
@@ -126,7 +93,10 @@ def assemble(
         "traces": [trace for cell in public for trace in cell.get("traces", ())],
         "volatile": {
             **provenance.occasion(),
-            "predict_us": _median_times([cell["volatile"]["predict_us"] for cell in cells]),
+            "predict_us": {
+                name: _median([cell["volatile"]["predict_us"][name] for cell in cells])
+                for name in ("median", "p99")
+            },
         },
     }
 
@@ -135,11 +105,10 @@ def _check_complete(
     entrant: Entrant, track: ScenarioSet, cells: Sequence[Record], found: Audit | None
 ) -> None:
     """Raise unless the records are those of the row's cells."""
-
-    def place(cell: Cell) -> tuple[Any, ...]:
-        return cell.split, cell.training_seed, cell.scenario.name
-
-    expected = [place(cell) for cell in cells_of(entrant, track, found)]
+    expected = [
+        (cell.split, cell.training_seed, cell.scenario.name)
+        for cell in cells_of(entrant, track, found)
+    ]
     if [(c["split"], c["training_seed"], c["scenario"]) for c in cells] != expected:
         raise ValueError(f"{entrant.name}: the cells are not those of {track.name}")
     others = sorted({str(cell["env"]) for cell in cells} - {track.env})
@@ -164,6 +133,7 @@ def _check_plants(entrant: Entrant, built: tasks.Identity, cells: Sequence[Recor
 def _controller(
     entrant: Entrant, track: ScenarioSet, cells: Sequence[Record], found: Audit | None
 ) -> dict[str, Any]:
+    """Return the controller's entry of a row from the records of its public cells."""
     made = artefacts.of(entrant, track)
     return {
         "name": entrant.name,
@@ -184,60 +154,20 @@ def _controller(
     }
 
 
-def failures(episodes: Sequence[Record]) -> int:
-    """Return how many episodes a limit or an error ended."""
-    return sum(bool(episode["failed"]) for episode in episodes)
-
-
 def episodes_of(row: Record, split: str = PUBLIC) -> list[Record]:
     """Return the public or the audit episodes of a row."""
     return [episode for episode in row["episodes"] if episode["split"] == split]
 
 
-def _median_times(times: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:
-    known = [time["median"] for time in times if time["median"] is not None]
-    high = [time["p99"] for time in times if time["p99"] is not None]
-    return {
-        "median": float(np.median(known)) if known else None,
-        "p99": float(np.median(high)) if high else None,
-    }
+def _median(times: Sequence[float | None]) -> float | None:
+    known = [time for time in times if time is not None]
+    return float(np.median(known)) if known else None
 
 
 def scores_of(episodes: Sequence[Mapping[str, Any]], metric: str) -> np.ndarray[Any, Any]:
     """Return one metric of all episodes; NaN if it does not apply."""
     values = [episode["scores"][metric] for episode in episodes]
     return np.array([np.nan if value is None else value for value in values], float)
-
-
-def aggregate(
-    episodes: Sequence[Mapping[str, Any]], metrics: Iterable[str] = METRICS
-) -> dict[str, Any]:
-    """Return mean and interquartile mean of every metric with their intervals.
-
-    The mean leads: an interquartile mean would drop failures. An episode in which a metric does
-    not apply to one training seed counts for none.
-    """
-    strata = [episode["scenario"] for episode in episodes]
-    runs = [episode["training_seed"] for episode in episodes]
-    pairs = [(episode["scenario"], episode["seed"]) for episode in episodes]
-    table: dict[str, Any] = {}
-    for metric in metrics:
-        values = scores_of(episodes, metric)
-        middle, inner = (
-            statistics.bootstrap(values, strata, statistic, runs=runs, pairs=pairs)
-            for statistic in (statistics.mean, statistics.interquartile_mean)
-        )
-        applies, _ = statistics.crossed(np.isfinite(values), runs, pairs)
-        table[metric] = {
-            "mean": middle.value,
-            "low": middle.low,
-            "high": middle.high,
-            "iqm": inner.value,
-            "iqm_low": inner.low,
-            "iqm_high": inner.high,
-            "episodes": int(applies.all(axis=0).sum()) * len(applies),
-        }
-    return table
 
 
 def breakdown(track: ScenarioSet, episodes: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -260,32 +190,25 @@ def save(row: Row, folder: Path = RESULTS) -> Path:
 
 
 def load(path: Path) -> Row:
-    """Return a row of this schema whose checksum matches.
-
-    Raises
-    ------
-    ValueError
-        If the file is damaged, altered, of another schema, or not named as what it holds.
-    """
+    """Return a row; raise ValueError if it is damaged, of another schema, or wrongly named."""
     row = read_record(path)
     check_schema(row, path)
     return row
 
 
 def check_schema(row: Record, path: Path) -> None:
-    """Raise unless a record is a row as this version writes it, and named as its file.
-
-    Names become names of files and commands, so that nothing but plain ones may be in them.
-    """
+    """Raise unless a record is a row of this schema, named as its file by plain names."""
     again = f"run it again: {command(name_of(path))}"
     if row.get("schema") != SCHEMA:
         raise ValueError(
             f"{path}: not a row of schema {SCHEMA}, but of {row.get('schema')!r}; {again}"
         )
-    missing = [key for key in KEYS if key not in row]
-    for key, inner in KEYS.items():
-        held = row.get(key)
-        missing += [f"{key}.{name}" for name in inner if name not in _mapping(held)]
+    missing = []
+    for key in KEYS:
+        outer, _, inner = key.partition(".")
+        held = row if not inner else row.get(outer)
+        if not isinstance(held, Mapping) or (inner or outer) not in held:
+            missing.append(key)
     if missing:
         raise ValueError(f"{path}: a row without {', '.join(missing)}; {again}")
     track, controller = str(row["scenarios"]["name"]), str(row["controller"]["name"])
@@ -300,10 +223,6 @@ def check_schema(row: Record, path: Path) -> None:
         raise ValueError(
             f"{path}: this checkout has no track {track!r}; check out the row's commit"
         )
-
-
-def _mapping(value: Any) -> Mapping[str, Any]:
-    return value if isinstance(value, Mapping) else {}
 
 
 def command(name: str) -> str:
@@ -329,13 +248,7 @@ def load_all(folder: Path = RESULTS) -> list[Row]:
 
 
 def check_together(found: Sequence[Record]) -> None:
-    """Raise unless the rows of each track are of one environment and one task.
-
-    Raises
-    ------
-    ValueError
-        Naming the difference and a row of each, or a row that is there twice.
-    """
+    """Raise unless the rows of each track are of one environment and one task, and none twice."""
     first: dict[str, Record] = {}
     names: set[str] = set()
     for row in found:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 from benchmarks.identity import audit, tasks
 from benchmarks.identity.audit import Audit
@@ -24,29 +26,22 @@ Pair = tuple[Entrant, ScenarioSet]
 
 @dataclass(frozen=True)
 class Plan:
-    """Plan of a row.
-
-    Attributes
-    ----------
-    entrant : Entrant
-    track : ScenarioSet
-    found : Audit, optional
-        If the present controller is in the last round of the track.
-    """
+    """Row to write: its cells by key, and its audit if the controller is in the last round."""
 
     entrant: Entrant
     track: ScenarioSet
     found: Audit | None
-
-    @property
-    def cells(self) -> list[Cell]:
-        """All cells of the row."""
-        return cells_of(self.entrant, self.track, self.found)
+    cells: dict[str, Cell]
 
 
 def plans(pairs: Iterable[Pair]) -> list[Plan]:
     """Return the plans of rows."""
-    return [Plan(*pair, audit.find(*pair)) for pair in pairs]
+    made = []
+    for entrant, track in pairs:
+        found = audit.find(entrant, track)
+        cells = {cell.key: cell for cell in cells_of(entrant, track, found)}
+        made.append(Plan(entrant, track, found, cells))
+    return made
 
 
 @dataclass
@@ -76,29 +71,15 @@ class Report:
 
 
 @dataclass(frozen=True)
-class Options:
-    """Options of a run.
+class Computing:
+    """Processes that compute."""
 
-    Attributes
-    ----------
-    jobs : int
-        Processes; 1 computes in this one.
-    force : bool
-        Compute cells that are there already.
-    out, cells : Path
-        Folders of rows and of cells.
-    backend : {"loky", "dask"}
-        Processes of this machine, or an existing Dask cluster at ``address``.
-    address : str
-        Of the Dask scheduler.
-    """
-
-    jobs: int = 2
-    force: bool = False
-    out: Path = rows.RESULTS
-    cells: Path = CELLS
-    backend: str = "loky"
+    jobs: int = os.cpu_count() or 1
+    """Processes of this machine; 1 computes in the calling one."""
+    backend: Literal["loky", "dask"] = "loky"
+    """Processes of this machine, or a running Dask cluster."""
     address: str = ""
+    """Of the Dask scheduler, like tcp://host:8786."""
 
     @property
     def cluster(self) -> engine.Cluster:
@@ -106,43 +87,72 @@ class Options:
         return engine.Cluster(self.jobs, self.backend, self.address)
 
 
+@dataclass(frozen=True)
+class Options(Computing):
+    """Options of a run."""
+
+    force: bool = False
+    """Compute again what is there already."""
+    out: Path = rows.RESULTS
+    """Folder of the rows."""
+    cells: Path = CELLS
+    """Folder of the cells, the checkpoint."""
+
+
 def run(
     pairs: Sequence[Pair],
     options: Options,
     start: Callable[[int], Advance] = lambda total: lambda: None,
 ) -> Report:
-    """Compute the missing cells of rows and write each complete row.
+    """Compute the missing cells of rows, and write each row as soon as its last cell is done.
 
-    Parameters
-    ----------
-    pairs : sequence of (Entrant, ScenarioSet)
-        One row each.
-    options : Options
-    start : callable
-        Called with the number of cells to compute; returns the callback after each of them.
+    ``start`` is called with the number of cells to compute; it returns the callback after each.
     """
-    cluster, store = options.cluster, Store(options.cells)
+    store, cluster = Store(options.cells), options.cluster
     report = Report(swept=store.sweep() + sweep(options.out))
     before = set(store.quarantined())
-    chosen = [(plan, {cell.key: cell for cell in plan.cells}) for plan in plans(pairs)]
-    requested = {key: cell for _, cells in chosen for key, cell in cells.items()}
+    chosen = plans(pairs)
+    requested = {key: cell for plan in chosen for key, cell in plan.cells.items()}
     if options.force:
         for key in requested:
             store.path(key).unlink(missing_ok=True)
     missing = {key: cell for key, cell in requested.items() if store.load(key) is None}
     report.found = len(requested) - len(missing)
-    making = _Rows(chosen, missing.keys(), store, options.out)
-    errors, advance = dict[str, str](), start(len(missing))
+    errors, failed = dict[str, str](), dict[int, str]()
+    written = dict[int, Path]()
+
+    def finish(place: int) -> None:
+        """Write a row if its cells are all there."""
+        plan = chosen[place]
+        loaded = {key: store.load(key) for key in plan.cells}
+        for key in (key for key, record in loaded.items() if record is None):
+            errors.setdefault(key, "its file has been removed meanwhile; run it again")
+        records = [record for record in loaded.values() if record is not None]
+        if len(records) < len(loaded):
+            return
+        try:
+            row = rows.assemble(plan.entrant, plan.track, records, plan.found)
+            written[place] = rows.save(row, options.out)
+        except ValueError as error:
+            failed[place] = f"{rows.row_name(plan.track.name, plan.entrant.name)}: {error}"
+
+    lacking = [missing.keys() & plan.cells.keys() for plan in chosen]
+    advance = start(len(missing))
+    for place, keys in enumerate(lacking):
+        if not keys:
+            finish(place)
     for key, error in _compute(missing.values(), store, cluster):
         if error is not None:
             errors[key] = error
         advance()
-        making.done(key)
-    for _, outcome in sorted(making.outcomes.items()):
-        report.rows += outcome.rows
-        report.missing += outcome.wrong
-        errors = outcome.gone | errors
+        for place, keys in enumerate(lacking):
+            if key in keys:
+                keys.remove(key)
+                if not keys:
+                    finish(place)
+    report.rows = [written[place] for place in sorted(written)]
     report.computed = sum(key not in errors for key in missing)
+    report.missing = [failed[place] for place in sorted(failed)]
     report.missing += [f"{title(requested[key])}: {text}" for key, text in errors.items()]
     report.quarantined = sorted(set(store.quarantined()) - before)
     return report
@@ -151,67 +161,8 @@ def run(
 def planned(pairs: Sequence[Pair], options: Options) -> Iterator[tuple[Cell, bool]]:
     """Return the cells of rows, and whether each is there already; nothing is changed."""
     store = Store(options.cells)
-    for cell in (cell for plan in plans(pairs) for cell in plan.cells):
-        yield cell, not options.force and store.sound(cell.key)
-
-
-@dataclass(frozen=True)
-class _Outcome:
-    """Outcome of a row: its file, or an error, or the cells that are gone."""
-
-    rows: tuple[Path, ...] = ()
-    wrong: tuple[str, ...] = ()
-    gone: dict[str, str] = field(default_factory=dict)
-
-
-class _Rows:
-    """Rows in the making: each is written as soon as its last cell is done.
-
-    Parameters
-    ----------
-    chosen : sequence of (Plan, mapping)
-        Each row with its cells by key.
-    missing : set of str
-        Keys of the cells that are not there yet.
-    store : Store
-    out : Path
-    """
-
-    def __init__(
-        self,
-        chosen: Sequence[tuple[Plan, Mapping[str, Cell]]],
-        missing: Set[str],
-        store: Store,
-        out: Path,
-    ) -> None:
-        self.chosen, self.store, self.out = chosen, store, out
-        self.lacking = [missing & cells.keys() for _, cells in chosen]
-        whole = (place for place, keys in enumerate(self.lacking) if not keys)
-        self.outcomes = {place: self._finish(place) for place in whole}
-
-    def done(self, key: str) -> None:
-        """Take note of a cell that was computed, or could not be."""
-        for place, keys in enumerate(self.lacking):
-            if key in keys:
-                keys.remove(key)
-                if not keys:
-                    self.outcomes[place] = self._finish(place)
-
-    def _finish(self, place: int) -> _Outcome:
-        """Write a row if its cells are all there."""
-        plan, cells = self.chosen[place]
-        loaded = {key: self.store.load(key) for key in cells}
-        gone = [key for key, record in loaded.items() if record is None]
-        if gone:
-            why = "its file has been removed meanwhile; run it again"
-            return _Outcome(gone=dict.fromkeys(gone, why))
-        records = [record for record in loaded.values() if record is not None]
-        try:
-            row = rows.assemble(plan.entrant, plan.track, records, plan.found)
-            return _Outcome(rows=(rows.save(row, self.out),))
-        except ValueError as error:
-            name = rows.row_name(plan.track.name, plan.entrant.name)
-            return _Outcome(wrong=(f"{name}: {error}",))
+    for key, cell in ((k, cell) for plan in plans(pairs) for k, cell in plan.cells.items()):
+        yield cell, not options.force and store.sound(key)
 
 
 def title(cell: Cell) -> str:

@@ -21,23 +21,16 @@ def play(
     seed: int,
     video: Path | None = None,
 ) -> tuple[rollout.Episode, Any]:
-    """Run one episode, and film it if a path is given.
-
-    Returns
-    -------
-    Episode and mapping of (n,) array
-        The recording, and the commanded setpoints by name, SI.
-
-    Raises
-    ------
-    ValueError
-        If the controller is not for the environment, or that lacks an argument.
-    """
+    """Return a recorded episode and its setpoints by name, SI; film it if a path is given."""
     entrant = controllers.find(controller)
     if not entrant.runs_in(env_id):
         raise ValueError(f"{controller} is for {', '.join(entrant.envs)}, not for {env_id}")
     filmed = {"render_mode": "rgb_array"} if video else {}
-    env = _made(env_id, {**kwargs, **filmed})
+    try:
+        env = make_env(env_id, {**kwargs, **filmed})
+    except (TypeError, ValueError) as error:  # without Gymnasium's addition to the message
+        said = str(error).partition(" was raised from the environment creator")[0]
+        raise ValueError(f"{env_id}: {said}") from error
     made = controllers.make(entrant, env.unwrapped.plant, env)
     film = Film(video, env) if video else None
     try:
@@ -50,21 +43,6 @@ def play(
     return episode, set_points
 
 
-def _made(env_id: str, kwargs: Mapping[str, Any]) -> Any:
-    """Return the environment; messages on its arguments are without Gymnasium's addition.
-
-    Raises
-    ------
-    ValueError
-        If an argument is unknown or out of its bounds.
-    """
-    try:
-        return make_env(env_id, kwargs)
-    except (TypeError, ValueError) as error:
-        said = str(error).partition(" was raised from the environment creator")[0]
-        raise ValueError(f"{env_id}: {said}") from error
-
-
 def _set_points(env: Any, actions: NDArray[Any]) -> dict[str, NDArray[np.float64]]:
     """Return each commanded setpoint, within its range, SI."""
     space, signals = env.action_space, env.unwrapped.action_signals
@@ -73,7 +51,7 @@ def _set_points(env: Any, actions: NDArray[Any]) -> dict[str, NDArray[np.float64
 
 
 class Film:
-    """Writes a frame of the environment every few steps, at the speed of life."""
+    """Film of an environment in real time, a frame every few steps."""
 
     def __init__(self, path: Path, env: Any) -> None:
         import imageio_ffmpeg  # type: ignore[import-untyped]
@@ -85,7 +63,7 @@ class Film:
         self._fps = 1.0 / (self._every * env.unwrapped.control_period)
 
     def __call__(self, env: Any) -> None:
-        """Take the present picture, if it is time for one."""
+        """Write a frame if one is due."""
         if self._step % self._every == 0:
             self._write(env.render())
         self._step += 1
@@ -105,19 +83,14 @@ class Film:
 
 
 def summary(episode: rollout.Episode, content: Mapping[str, Any]) -> dict[str, float]:
-    """Return the scores of an episode that need no scale of a scenario file.
+    """Return the common scores of an episode, without the scales of costs.
 
-    Parameters
-    ----------
-    episode : Episode
-    content : mapping
-        Of the scenario file whose sensor and gate count. An episode that is shorter than twice its
-        settling window is scored in its second half.
+    An episode that is shorter than twice its settling window is scored in its second half.
     """
-    signals = {**episode.signals, "sensed": episode.signals[content["sensed"]]}
-    settle = min(float(content["settle_seconds"]), 0.5 * float(signals["time"][-1]))
-    gate, hold = content.get("gate") or (), float(content["hold_seconds"])
-    return metrics.score(signals, episode.period, settle, hold, {}, gate)
+    last = float(episode.signals["time"][-1])
+    settle = min(float(content["settle_seconds"]), 0.5 * last)
+    common = {"settle_seconds": settle, "cost_scales": {}, "metrics": ()}
+    return metrics.score(episode.signals, episode.period, {**content, **common})
 
 
 def score_lines(scores: Mapping[str, float], content: Mapping[str, Any]) -> list[str]:
@@ -126,22 +99,9 @@ def score_lines(scores: Mapping[str, float], content: Mapping[str, Any]) -> list
     lines = []
     for name, value in scores.items():
         unit = "" if units[name] == "1" else f" {units[name]}"
-        said = "does not apply" if np.isnan(value) else f"{value:.6g}{unit}"
-        lines.append(f"{name:20s} {said}")
+        text = "does not apply" if np.isnan(value) else f"{value:.6g}{unit}"
+        lines.append(f"{name:20s} {text}")
     return lines
-
-
-def draw(
-    episode: rollout.Episode,
-    set_points: Mapping[str, Any],
-    title: str,
-    path: Path,
-    shown: tuple[str, float],
-) -> None:
-    """Write the figure of an episode, its output in a unit of that factor from SI."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure = episode_figure(episode.signals, set_points, title, shown)
-    figure.savefig(path, dpi=150)
 
 
 def episode_figure(
@@ -152,17 +112,8 @@ def episode_figure(
 ) -> Any:
     """Return a figure of an episode: tracking, error, setpoints and output over pressure.
 
-    The last is left out if the pressure of a single muscle is not recorded.
-
-    Parameters
-    ----------
-    signals : mapping of (n,) array
-        Recorded ``info``, SI.
-    set_points : mapping of (n,) array
-        By name, SI: pressures, or angles.
-    title : str
-    shown : tuple of str and float
-        Unit of the output, and its factor from SI.
+    The last is left out if the pressure of a single muscle is not recorded. ``shown`` is the unit
+    of the output and its factor from SI; ``set_points`` are pressures, or angles, by name.
     """
     from matplotlib.figure import Figure
 
@@ -192,12 +143,12 @@ def episode_figure(
 
 
 def _draw_inputs(axes: Any, signals: Mapping[str, Any], set_points: Mapping[str, Any]) -> None:
-    """Draw set-points, and of a single muscle its pressure and drive."""
+    """Draw setpoints, and of a single muscle its pressure and drive."""
     angles = all(name.startswith("angle") for name in set_points)
     unit, factor = ("deg", np.rad2deg(1.0)) if angles else ("bar", 1e-5)
     single = {"color": "0.6"} if len(set_points) == 1 else {}
     for name, asked in set_points.items():
-        label = "set-point" if single else name.replace("_set_point", "")
+        label = "setpoint" if single else name.replace("_set_point", "")
         axes.plot(signals["time"], factor * asked, linewidth=0.8, label=label, **single)
     for name, color, width in (("pressure", "#009e73", 1.5), ("drive", "#cc79a7", 0.8)):
         if f"state/{name}" in signals:

@@ -63,7 +63,7 @@ def seal(record: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def write_record(path: Path, record: Mapping[str, Any]) -> None:
-    """Write a record as JSON with its checksum; see :func:`write_json`."""
+    """Write a record with its checksum; see :func:`write_json`."""
     write_json(path, seal(record))
 
 
@@ -78,13 +78,7 @@ def write_json(path: Path, record: Mapping[str, Any]) -> None:
 
 
 def read_json(path: Path) -> Any:
-    """Return the content of a JSON file, compressed or not; its checksum is not verified.
-
-    Raises
-    ------
-    ValueError
-        If the file is not JSON.
-    """
+    """Return the content of a JSON file, compressed or not; its checksum is not verified."""
     content = path.read_bytes()
     try:
         if path.suffix != COMPRESSED:
@@ -97,13 +91,7 @@ def read_json(path: Path) -> Any:
 
 
 def columns(episodes: Any) -> Any:
-    """Return episodes as columns, or as they are where their keys differ.
-
-    Parameters
-    ----------
-    episodes : list of dict
-        Each with ``scores``, a mapping from metric to number.
-    """
+    """Return episodes as columns, or unchanged where their keys differ."""
     if not _alike(episodes) or not _alike([episode.get(SCORES) for episode in episodes]):
         return episodes
     found = {key: [episode[key] for episode in episodes] for key in episodes[0] if key != SCORES}
@@ -143,13 +131,7 @@ def fault(record: Any) -> str | None:
 
 
 def read_record(path: Path) -> dict[str, Any]:
-    """Return a record whose checksum matches.
-
-    Raises
-    ------
-    ValueError
-        If the file is not JSON, or its checksum does not match.
-    """
+    """Return a record; raise ValueError if it is not JSON or its checksum does not match."""
     record = read_json(path)
     wrong = fault(record)
     if wrong:

@@ -1,20 +1,17 @@
 """Search the knobs of a paper's controller, the numbers that it leaves free, on tuning seeds.
 
-The settings of learned controllers are searched for; so that classical ones have the same chance,
-this gives them as many trials, by the same sampler, on the same seeds
-(:mod:`agents.search.tune`, :mod:`agents.settings.seeds`). The episodes are those of an
-environment's nominal track but for their seeds, which no score is ever taken from, and they are
-scored by the same code.
+Classical controllers get as many trials as learned ones, by the same sampler, on the same seeds
+(:mod:`agents.search.tune`, :mod:`agents.settings.seeds`), which no score is ever taken from. The
+episodes are those of an environment's nominal track but for the seeds.
 
 The objective is the track's headline, a failed episode at the worst case, averaged over episodes
 and geometrically over kinds of reference, whose errors may differ a hundredfold. A trial that
-exceeds what the controller as published needs counts as worse than that one: a higher mean over all
-episodes, more failures, or more than 1.1 times a cost, which is what learned controllers are held
-to. The first trial has all knobs at 1. So what is found is never worse where it was looked at.
+exceeds the controller as published counts as worse than it: a higher mean over all episodes, more
+failures, or more than 1.1 times a cost, as for learned controllers. The first trial has all knobs
+at 1, so the result is never worse on the tuning seeds.
 
-What a trial proposes depends on the finished trials and the seed alone: a search that was
-interrupted goes on with the same command, the same way. One process at a time works on a search;
-those of several controllers may run side by side.
+A trial's proposal depends on the finished trials and the seed alone, so that an interrupted search
+is resumed by the same command. One process at a time works on a search.
 """
 
 from __future__ import annotations
@@ -64,22 +61,10 @@ DIGITS = 4
 
 @dataclass(frozen=True)
 class Job:
-    """A search.
+    """A search; its storage, an SQLite file, may hold searches of other controllers.
 
-    Attributes
-    ----------
-    controller : str
-        By its name in the catalogue, one with knobs.
-    env : str
-        Id of the environment.
-    trials : int
-        Settings to try, those of earlier calls counted in.
-    seed : int
-        Of the sampler.
-    episodes : int
-        Of each trial, rounded up to as many for each scenario.
-    storage : Path
-        SQLite file; searches of other controllers may be in it.
+    ``trials`` are settings to try, those of earlier calls counted in; ``episodes`` are those of
+    each trial, rounded up to as many for each scenario; ``seed`` is that of the sampler.
     """
 
     controller: str
@@ -103,21 +88,9 @@ class Job:
 
 
 def job_of(controller: str, env: str = "", **how: Any) -> Job:
-    """Return a search, its arguments checked.
+    """Return a search, its arguments checked; ``how`` is the rest of :class:`Job`.
 
-    Parameters
-    ----------
-    controller : str
-    env : str
-        Id of the environment, or its last part; optional if there is only one.
-    **how
-        The rest of :class:`Job`.
-
-    Raises
-    ------
-    ValueError
-        If there is no such controller, it has no knobs, the environment is not one of its own, or
-        a number is out of its bounds.
+    The environment may be given by the last part of its id, or left out if there is only one.
     """
     entry = catalogue.PUBLISHED.get(controller)
     if entry is None or not entry.knobs:
@@ -155,16 +128,8 @@ def nominal_track(env: str) -> ScenarioSet:
 class Measured:
     """Result of a controller in the tuning episodes.
 
-    Attributes
-    ----------
-    error : float
-        The headline, geometric mean over kinds of reference of the mean over their episodes [SI].
-    mean : float
-        The headline's mean over all episodes [SI].
-    failures : int
-        Episodes that ended before their time.
-    costs : mapping of float
-        Means over all episodes of the costs that the track has.
+    ``error`` is the headline's geometric mean over kinds of reference, ``mean`` its mean over all
+    episodes [SI]; ``costs`` are means over all episodes.
     """
 
     error: float
@@ -174,16 +139,7 @@ class Measured:
 
 
 class Course:
-    """The tuning episodes of a controller in a track.
-
-    Parameters
-    ----------
-    controller : str
-        By its name in the catalogue.
-    track : ScenarioSet
-    episodes : int
-        Rounded up to as many for each scenario.
-    """
+    """The tuning episodes of a controller in a track, as many for each scenario."""
 
     def __init__(self, controller: str, track: ScenarioSet, episodes: int = EPISODES) -> None:
         entrant = controllers.find(controller)
@@ -199,19 +155,15 @@ class Course:
         """Run all episodes with the controller's knobs at these factors."""
         kinds: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
         for cell, env in zip(self.cells, self.envs, strict=True):
-            kind = str(cell.scenario.kwargs.get("reference", ""))
-            kinds[kind] += self._run(cell, env, knobs)
+            model, base = model_of(self.track.env, cell.scenario, env), env.unwrapped
+            given = (model, base.signals, base.action_signals)
+            made = catalogue.make_controller(self.controller, *given, knobs=knobs)
+            episodes = cells.episodes_of(cells.Group((cell,)), env, made)
+            kinds[str(cell.scenario.kwargs.get("reference", ""))] += [
+                cells.episode_record(cell, seed, episode)
+                for seed, episode in zip(cell.seeds, episodes, strict=True)
+            ]
         return measured(kinds, self.track)
-
-    def _run(self, cell: cells.Cell, env: Any, knobs: Knobs) -> list[dict[str, Any]]:
-        model, base = model_of(self.track.env, cell.scenario, env), env.unwrapped
-        given = (model, base.signals, base.action_signals)
-        made = catalogue.make_controller(self.controller, *given, knobs=knobs)
-        episodes = cells.episodes_of(cells.Group((cell,)), env, made)
-        return [
-            cells.episode_record(cell, seed, episode)
-            for seed, episode in zip(cell.seeds, episodes, strict=True)
-        ]
 
 
 def seeds_of(track: ScenarioSet, episodes: int) -> dict[str, tuple[int, ...]]:
@@ -256,16 +208,12 @@ def worth(found: Measured, untuned: Measured) -> float:
 def search(job: Job, measure: Callable[[Knobs], Measured], start: Start | None = None) -> Tuned:
     """Try settings until ``job.trials`` are done; return the best.
 
-    Parameters
-    ----------
-    job : Job
-    measure : callable
-        From knobs to their result; :meth:`Course.measure`.
-    start : callable, optional
-        Of a progress bar.
+    ``measure`` is :meth:`Course.measure`.
     """
     study = open_study(job)
-    untuned = _untuned(study, measure)
+    if UNTUNED not in study.user_attrs:  # the published controller, measured once in a search
+        study.set_user_attr(UNTUNED, dataclasses.asdict(measure({})))
+    untuned = Measured(**study.user_attrs[UNTUNED])
     advance: Callable[[], None] = start(job.trials) if start else lambda: None
     for _ in _finished(study)[: job.trials]:
         advance()
@@ -299,20 +247,12 @@ def open_study(job: Job) -> optuna.Study:
 
 def _task(job: Job) -> str:
     """Return the digest of track, bounds and code, without the results of searches."""
-    folders = [[controllers.ROOT / "baselines"], [controllers.ROOT / "pam_envs"]]
     code = [
-        sources_digest(folder, kinds)
-        for folder, kinds in zip(folders, (SOURCES - {tuned.FILE.suffix}, SOURCES), strict=True)
+        sources_digest([controllers.ROOT / "baselines"], SOURCES - {tuned.FILE.suffix}),
+        sources_digest([controllers.ROOT / "pam_envs"], SOURCES),
     ]
     bounds = {name: list(ends) for name, ends in job.bounds.items()}
     return digest([nominal_track(job.env).content, bounds, code])
-
-
-def _untuned(study: optuna.Study, measure: Callable[[Knobs], Measured]) -> Measured:
-    """Return the result of the published controller, measured once in a search."""
-    if UNTUNED not in study.user_attrs:
-        study.set_user_attr(UNTUNED, dataclasses.asdict(measure({})))
-    return Measured(**study.user_attrs[UNTUNED])
 
 
 def _finished(study: optuna.Study) -> list[optuna.trial.FrozenTrial]:

@@ -22,13 +22,7 @@ Found = Mapping[str, Mapping[str, Any]]
 
 
 def read(folder: Path) -> Found:
-    """Return the verifications of a folder of rows; none where there is no such file.
-
-    Raises
-    ------
-    ValueError
-        If the file is damaged.
-    """
+    """Return the verifications of a folder of rows; none where there is no such file."""
     path = folder / FILE
     try:
         return dict(json.loads(path.read_text(encoding="utf-8")))
@@ -45,17 +39,9 @@ def of(row: Mapping[str, Any], found: Found) -> Mapping[str, Any] | None:
 
 
 def note(path: Path, checksum: str, mode: str) -> None:
-    """Note that a row was reproduced, or remove its note where it was not.
+    """Note that a row was reproduced, or remove its note where it was not (no ``checksum``).
 
     A row that was once reproduced to the last bit keeps that mode.
-
-    Parameters
-    ----------
-    path : Path
-        File of the row.
-    checksum : str
-        Of the row that was verified; empty where it was not reproduced.
-    mode : {"bits", "elsewhere"}
     """
     folder, name = path.parents[1], rows.name_of(path)
     with FileLock(folder / f".{FILE}.lock"):

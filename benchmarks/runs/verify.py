@@ -38,9 +38,8 @@ class Verdict:
 
     Attributes
     ----------
-    row : str
     mode : {"bits", "elsewhere"}
-        Whether it was compared to the last bit, or within the rounding of another machine.
+        Compared to the last bit, or within the rounding of another machine.
     drifted : list of str
         Every field that differs, with both values; empty if the row is reproduced.
     notes : list of str
@@ -81,14 +80,7 @@ def void(row: Record) -> list[str]:
 
 
 def verify(path: Path, cluster: engine.Cluster | None = None) -> Verdict:
-    """Compute the row of a file again and compare.
-
-    Parameters
-    ----------
-    path : Path
-    cluster : Cluster, optional
-        Where to compute; in this process by default.
-    """
+    """Compute the row of a file again, by default in this process, and compare."""
     verdict = Verdict(rows.name_of(path))
     try:
         stored = read_json(path)

@@ -24,45 +24,13 @@ from benchmarks.identity.hashing import digest, plain
 from benchmarks.scoring.metrics import GROUPS, headline_of, of_track
 
 FOLDER = Path(__file__).parent
-_KEYS = {
-    "schema",
-    "name",
-    "version",
-    "title",
-    "env",
-    "seeds",
-    "settle_seconds",
-    "hold_seconds",
-    "sensed",
-    "rests",
-    "cost_scales",
-    "worst_case",
-    "kwargs",
-    "grid",
-    "per_reference",
-    "model",
-    "metrics",
-    "gate",
-    "half_range",
-    "headline",
-    "tool_length",
-    "activity",
-    "unit",
-    "shown",
+_REQUIRED = {
+    *("schema", "name", "version", "title", "env", "seeds", "settle_seconds", "hold_seconds"),
+    *("sensed", "rests", "cost_scales", "worst_case"),
 }
 _OPTIONAL = {
-    "kwargs",
-    "grid",
-    "per_reference",
-    "model",
-    "metrics",
-    "gate",
-    "half_range",
-    "headline",
-    "tool_length",
-    "activity",
-    "unit",
-    "shown",
+    *("kwargs", "grid", "per_reference", "model", "metrics", "gate", "half_range", "headline"),
+    *("unit", "shown", *(key for group in GROUPS.values() for key in group.needs)),
 }
 MOST_SEEDS = 1000
 PUBLIC_SEEDS = 899_999
@@ -96,8 +64,7 @@ class Scenario:
 
 def public_seeds(name: str, number: int) -> tuple[int, ...]:
     """Return the public seeds of a scenario: a function of its name, all different."""
-    different = dict.fromkeys(itertools.islice(_drawn(name), 2 * number))
-    return tuple(different)[:number]
+    return tuple(dict.fromkeys(itertools.islice(_drawn(name), 2 * number)))[:number]
 
 
 def _drawn(name: str) -> Iterator[int]:
@@ -108,42 +75,38 @@ def _drawn(name: str) -> Iterator[int]:
 
 @dataclass(frozen=True)
 class ScenarioSet:
-    """The content of a scenario file.
-
-    Attributes
-    ----------
-    content : mapping
-        The file as plain data, kept with every row.
-    """
+    """The content of a scenario file as plain data, which is kept with every row."""
 
     content: Mapping[str, Any]
 
     def __post_init__(self) -> None:
         """Check the keys and the values that the scores rest on."""
-        given, name = set(self.content), self.content.get("name", "the scenario file")
-        if given - _KEYS or _KEYS - given - _OPTIONAL:
-            raise ValueError(
-                f"{name}: unknown keys {sorted(given - _KEYS)}, "
-                f"missing keys {sorted(_KEYS - given - _OPTIONAL)}"
-            )
-        unknown = set(self.content.get("metrics") or ()) - set(GROUPS)
-        if unknown:
-            raise ValueError(
-                f"{name}: no metrics {sorted(unknown)}; choose from {', '.join(GROUPS)}"
-            )
-        expected = of_track(self.content)
-        headline = headline_of(self.content)
-        if headline not in expected:
-            raise ValueError(f"{name}: no headline {headline!r}; choose from {', '.join(expected)}")
-        if "chain" in (self.content.get("metrics") or ()) and "tool_length" not in given:
-            raise ValueError(f"{name}: the metrics of a chain need tool_length [m]")
-        if set(self.content["worst_case"]) != set(expected):
-            raise ValueError(f"{name}: worst_case needs a value for each of {', '.join(expected)}")
+        given, asked = set(self.content), tuple(self.content.get("metrics") or ())
+        unknown, missing = given - _REQUIRED - _OPTIONAL, _REQUIRED - given
+        self._refuse_if(
+            unknown | missing, f"unknown keys {sorted(unknown)}, missing keys {sorted(missing)}"
+        )
+        other = sorted(set(asked) - set(GROUPS))
+        self._refuse_if(other, f"no metrics {other}; choose from {', '.join(GROUPS)}")
+        for name in asked:
+            lacking = sorted(set(GROUPS[name].needs) - given)
+            self._refuse_if(lacking, f"the metrics {name} need {', '.join(lacking)}")
+        headline, expected = headline_of(self.content), of_track(self.content)
+        known = ", ".join(expected)
+        self._refuse_if(headline not in expected, f"no headline {headline!r}; choose from {known}")
+        self._refuse_if(
+            set(self.content["worst_case"]) != set(expected),
+            f"worst_case needs a value for each of {known}",
+        )
         number = self.content["seeds"]
-        if type(number) is not int or not 1 <= number <= MOST_SEEDS:
-            raise ValueError(
-                f"{name}: seeds must be their number, from 1 to {MOST_SEEDS}, got {number!r}"
-            )
+        self._refuse_if(
+            type(number) is not int or not 1 <= number <= MOST_SEEDS,
+            f"seeds must be their number, from 1 to {MOST_SEEDS}, got {number!r}",
+        )
+
+    def _refuse_if(self, wrong: object, why: str) -> None:
+        if wrong:
+            raise ValueError(f"{self.content.get('name', 'the scenario file')}: {why}")
 
     @property
     def name(self) -> str:
@@ -206,13 +169,7 @@ def identifying(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def load(path: Path) -> ScenarioSet:
-    """Return the scenarios of a file.
-
-    Raises
-    ------
-    ValueError
-        If the file is not a mapping, or a key is unknown or missing.
-    """
+    """Return the scenarios of a file; raise ValueError where one of its entries is wrong."""
     content = yaml.safe_load(path.read_text())
     if not isinstance(content, dict) or content.get("schema") != 1:
         raise ValueError(f"{path}: not a scenario file of schema 1")
@@ -233,16 +190,11 @@ def add(path: Path) -> ScenarioSet:
     return made
 
 
-def names(folder: Path | None = None) -> tuple[str, ...]:
-    """Return the names of the scenario files of a folder, by default of the checkout."""
-    found = {path.stem for path in (folder or FOLDER).glob("*.yaml")}
-    return tuple(sorted(found | (set() if folder else set(_ADDED))))
+def names() -> tuple[str, ...]:
+    """Return the names of all scenario files, those of the checkout and those that were added."""
+    return tuple(sorted({path.stem for path in FOLDER.glob("*.yaml")} | set(_ADDED)))
 
 
-def available(folder: Path | None = None) -> dict[str, ScenarioSet]:
+def available() -> dict[str, ScenarioSet]:
     """Return all scenario files by name."""
-    added = {} if folder else _ADDED
-    return {
-        name: added[name] if name in added else load((folder or FOLDER) / f"{name}.yaml")
-        for name in names(folder)
-    }
+    return {name: _ADDED.get(name) or load(FOLDER / f"{name}.yaml") for name in names()}

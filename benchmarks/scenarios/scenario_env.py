@@ -23,13 +23,7 @@ _PLANT = re.compile(r"[A-Za-z0-9_]+\.yaml")
 
 
 def make_env(env: str, kwargs: Mapping[str, Any]) -> Any:
-    """Return the single environment of a scenario; a plant is the name of a file in ``PLANTS``.
-
-    Raises
-    ------
-    ValueError
-        If no environment has that id, or the plant is not the mere name of a file.
-    """
+    """Return the single environment of a scenario; a plant is the name of a file in ``PLANTS``."""
     return gym.make(_checked(env), disable_env_checker=True, **_arguments(kwargs))
 
 
@@ -59,13 +53,7 @@ def _arguments(kwargs: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def plant_file(name: str) -> Path:
-    """Return the file of a plant that a scenario names.
-
-    Raises
-    ------
-    ValueError
-        If there may be a folder in the name.
-    """
+    """Return the file of a plant that a scenario names; refuse a name that may hold a folder."""
     if not _PLANT.fullmatch(name):
         raise ValueError(f"plant {name!r} is not the mere name of a file, like arm.yaml")
     return PLANTS / name

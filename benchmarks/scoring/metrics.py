@@ -1,4 +1,4 @@
-"""Metrics as pure functions of recorded signals.
+"""Metrics of an episode as pure functions of recorded signals, by the rules of a scenario file.
 
 All arrays have one entry per control period and are in SI. The headline compares the true output
 with the external reference; what a sensor saw is scored beside it and never instead of it.
@@ -6,18 +6,15 @@ with the external reference; what a sensor saw is scored beside it and never ins
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import importlib
+import pkgutil
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from benchmarks.scoring import elbow as metrics_elbow
-from benchmarks.scoring import joint as metrics_joint
-from benchmarks.scoring import knee as metrics_knee
-from benchmarks.scoring.errors import rms
-
-Array = NDArray[np.float64]
+from benchmarks.scoring import groups
+from benchmarks.scoring.group import EFFORT, Array, Column, Group, Mask, Record, rms
 
 METRICS: dict[str, str] = {
     "rms_error": "m",
@@ -29,15 +26,13 @@ METRICS: dict[str, str] = {
     "air_use": "kg/s",
     "constraint_cost": "1",
 }
-"""The scored quantities and their units, the usual headline first. Less is better for all."""
-
+"""The common metrics and their units, the usual headline first. Less is better for all."""
 HEADLINE = "rms_error"
-GROUPS: dict[str, dict[str, str]] = {
-    "range": metrics_knee.RANGE,
-    "gait": metrics_knee.GAIT,
-    "elbow": metrics_elbow.ELBOW,
-    "joint": metrics_joint.JOINT,
-    "chain": metrics_joint.CHAIN,
+GROUPS: dict[str, Group] = {
+    value.name: value
+    for module in pkgutil.iter_modules(groups.__path__, f"{groups.__name__}.")
+    for value in vars(importlib.import_module(module.name)).values()
+    if isinstance(value, Group)
 }
 """Additional groups of metrics by the names in scenario files."""
 
@@ -46,20 +41,26 @@ COST_RATIO = 1.1
 COST_FLOOR = {"constraint_cost": 1e-3}
 """Costs that count as none: a thousandth of a scale at all times."""
 COSTS = {
-    "emg_ratio": "EMG ratio",
+    **{metric: name for group in GROUPS.values() for metric, name in group.costs.items()},
     "pressure_travel": "pressure travel",
     "air_use": "air",
     "constraint_cost": "constraint cost",
 }
 """Metrics that count as the costs of a lower error, where a track has them."""
+_CONSTRAINT: Column = ("constraint_cost", "constraint cost", 1.0)
+
+
+def groups_of(content: Mapping[str, Any]) -> list[Group]:
+    """Return the additional groups of metrics of a track, from the content of its file."""
+    return [GROUPS[name] for name in content.get("metrics") or ()]
 
 
 def of_track(content: Mapping[str, Any]) -> dict[str, str]:
     """Return the metrics and units of a track from the content of its scenario file."""
     unit = content.get("unit", "m")
     units = METRICS | {name: unit for name, own in METRICS.items() if own == "m"}
-    for group in content.get("metrics") or ():
-        units = units | GROUPS[group]
+    for group in groups_of(content):
+        units = {**units, **group.units}
     return units
 
 
@@ -68,20 +69,32 @@ def headline_of(content: Mapping[str, Any]) -> str:
     return str(content.get("headline", HEADLINE))
 
 
+def shown(content: Mapping[str, Any]) -> tuple[str, float]:
+    """Return the unit in which errors are shown, and its factor from SI; mm by default."""
+    how = content.get("shown") or {"unit": "mm", "factor": 1e3}
+    return str(how["unit"]), float(how["factor"])
+
+
+def columns_of(content: Mapping[str, Any]) -> tuple[Column, ...]:
+    """Return the columns after the headline: those of the last group, and the constraint cost."""
+    unit, factor = shown(content)
+    errors: tuple[Column, ...] = (
+        ("p95_error", f"p95 [{unit}]", factor),
+        ("max_error", f"max [{unit}]", factor),
+        ("steady_state_error", f"steady [{unit}]", factor),
+        ("sensed_rms_error", f"sensed RMS [{unit}]", factor),
+    )
+    own = groups_of(content)
+    return (*(own[-1].columns(errors) if own else (*errors, *EFFORT)), _CONSTRAINT)
+
+
 def percentile_95(error: Array) -> float:
     """Return the value that 95 % of the errors' sizes do not exceed, shape (n,)."""
     return float(np.percentile(np.abs(error), 95.0))
 
 
-def settled(reference: Array, hold: int) -> NDArray[np.bool_]:
-    """Return the mask of samples at which a reference has rested for ``hold`` samples, shape (n,).
-
-    Parameters
-    ----------
-    reference : (n,) array
-    hold : int
-        Samples that must have passed since the last change.
-    """
+def settled(reference: Array, hold: int) -> Mask:
+    """Return the mask of samples at which a reference has rested for ``hold`` samples, (n,)."""
     n = len(reference)
     moved = np.zeros(n, bool)
     moved[0] = True
@@ -91,14 +104,7 @@ def settled(reference: Array, hold: int) -> NDArray[np.bool_]:
 
 
 def steady_state_error(error: Array, reference: Array, hold: int) -> float:
-    """Return the mean size of the error where the reference has rested, NaN if it never does.
-
-    Parameters
-    ----------
-    error, reference : (n,) array
-    hold : int
-        Samples that the reference must have rested before the error counts as steady.
-    """
+    """Return the mean size of the error where the reference has rested, NaN if it never does."""
     still = settled(reference, hold)
     return float(np.mean(np.abs(error[still]))) if still.any() else float("nan")
 
@@ -107,113 +113,100 @@ def constraint_cost(costs: Mapping[str, Array], scales: Mapping[str, float]) -> 
     """Return the mean over time of all excesses over soft limits, each divided by its scale.
 
     1 means: one scale (say 1 mm) over one soft limit, all the time.
-
-    Parameters
-    ----------
-    costs : mapping of (n,) array
-        Excess over each soft limit.
-    scales : mapping of float
-        Unit of each, in the same SI unit.
     """
     return float(sum(np.mean(costs[name]) / scales[name] for name in scales))
 
 
 def score(
-    signals: Mapping[str, Array],
-    period: float,
-    settle_seconds: float,
-    hold_seconds: float,
-    cost_scales: Mapping[str, float],
-    gate: Sequence[str] = (),
-    groups: Sequence[str] = (),
-    activity: str = "",
-    half_range: float | None = None,
-    tool_length: float | None = None,
+    signals: Mapping[str, Array], period: float, content: Mapping[str, Any]
 ) -> dict[str, float]:
     """Return every metric of one finished episode.
 
     Parameters
     ----------
     signals : mapping of (n,) array
-        Recorded ``info`` of the steps 1 to n by its keys, and what the sensor gave as ``sensed``.
+        Recorded ``info`` of the steps 1 to n by its keys, SI.
     period : float [s]
         Control period.
-    settle_seconds : float [s]
-        Start of the scored window. The constraint cost is of the whole episode.
-    hold_seconds : float [s]
-        How long the reference must have rested for a steady-state error.
-    cost_scales : mapping of float
-        Scale of each soft-limit cost.
-    gate : sequence of str
-        Signals that are all 1 where the output is tracked; everywhere if none is given.
-    groups : sequence of str
-        Of ``GROUPS``.
-    activity : str
-        Of a gait.
-    half_range : float, optional
-        What an error in percent refers to; half of what the reference went through if not given.
-    tool_length : float, optional
-        Of a chain's tool, see ``metrics_joint`` [m].
+    content : mapping
+        Of the scenario file: ``sensed`` signal, ``settle_seconds`` before the scored window (the
+        constraint cost is of the whole episode), ``hold_seconds`` of rest before a steady-state
+        error, ``cost_scales``, ``gate`` (signals that are all 1 where the output is tracked), and
+        the entries that its groups of ``metrics`` need.
 
     Raises
     ------
     ValueError
         If nothing is left after the settling window, or of what is tracked.
     """
-    time = np.asarray(signals["time"])
-    window = time > settle_seconds + 0.5 * period
+    time, settle = np.asarray(signals["time"]), float(content["settle_seconds"])
+    window = time > settle + 0.5 * period
     if not window.any():
         raise ValueError(
             f"the episode ends at {time[-1]:g} s, inside the settling window of "
-            f"{settle_seconds:g} s; lengthen the episode or shorten the window"
+            f"{settle:g} s; lengthen the episode or shorten the window"
         )
-    tracked = window.copy()
+    tracked, gate = window.copy(), content.get("gate") or ()
     for name in gate:
         tracked &= np.asarray(signals[name]) > 0.5
-    reference = np.asarray(signals["reference"])[tracked]
-    error = np.asarray(signals["output"])[tracked] - reference
-    sensed = np.asarray(signals["sensed"])[tracked] - reference
-    if not len(error):
+    if not tracked.any():
         raise ValueError(
             f"{' and '.join(gate)} are never 1 together: lengthen the episode or choose"
             " another gate"
         )
-    seconds, hold = float(window.sum()) * period, round(hold_seconds / period)
-    path = metrics_joint.way(signals)[tracked] if "chain" in groups else reference
+    reference = np.asarray(signals["reference"])[tracked]
+    error = np.asarray(signals["output"])[tracked] - reference
+    own, record = groups_of(content), Record(signals, window, tracked, period, content)
+    paths = [group.path(signals)[tracked] for group in own if group.path]
+    hold = round(float(content["hold_seconds"]) / period)
     scores = {
         "rms_error": rms(error),
         "p95_error": percentile_95(error),
         "max_error": float(np.abs(error).max()),
-        "steady_state_error": steady_state_error(error, path, hold),
-        "sensed_rms_error": rms(sensed),
-        "pressure_travel": float(np.sum(signals["effort/pressure_travel"][window])) / seconds,
-        "air_use": float(np.sum(signals["effort/air"][window])) / seconds,
-        "constraint_cost": constraint_cost(signals, cost_scales),
+        "steady_state_error": steady_state_error(error, paths[0] if paths else reference, hold),
+        "sensed_rms_error": rms(np.asarray(signals[content["sensed"]])[tracked] - reference),
+        "pressure_travel": record.rate("effort/pressure_travel"),
+        "air_use": record.rate("effort/air"),
+        "constraint_cost": constraint_cost(signals, content["cost_scales"]),
     }
-    if "range" in groups:
-        scores |= metrics_knee.of_range(signals, window, tracked, half_range)
-    if "gait" in groups:
-        scores |= metrics_knee.of_gait(signals, window, tracked, period, activity)
-    if "elbow" in groups:
-        scores |= metrics_elbow.of_elbow(signals, window, period)
-    if "joint" in groups:
-        scores |= metrics_joint.of_joint(signals, window)
-    if "chain" in groups:
-        if tool_length is None:
-            raise ValueError("a chain's score needs tool_length [m] in its scenario file")
-        scores |= metrics_joint.of_chain(signals, window, tool_length)
+    for group in own:
+        scores |= group.score(record)
     return scores
 
 
 def worst_of(scores: Mapping[str, float], worst: Mapping[str, float]) -> dict[str, float]:
-    """Return the scores of an episode that a limit ended: the worst case, or worse if it was.
+    """Return the scores of an episode that ended early: the worst case, or worse if it was.
 
-    Parameters
-    ----------
-    scores : mapping of float
-        What could be measured until the end (may be empty or NaN).
-    worst : mapping of float
-        The stated worst-case value of each metric.
+    ``scores`` has what could be measured until the end; it may be empty or NaN.
     """
     measured = {name: scores.get(name, float("nan")) for name in worst}
     return {name: float(np.fmax(value, measured[name])) for name, value in worst.items()}
+
+
+def scores_of(
+    episode: Any, content: Mapping[str, Any], rests: bool, failed: bool | None = None
+) -> dict[str, float]:
+    """Return the scores of an episode; one that did not reach its end gets the worst case.
+
+    Parameters
+    ----------
+    episode : benchmarks.runs.rollout.Episode
+    content : mapping
+        Of the scenario file.
+    rests : bool
+        Whether the reference rests; otherwise the steady-state error is NaN.
+    failed : bool, optional
+        Whether it counts as failed; by default whether it did.
+    """
+    scores: dict[str, float] = {}
+    try:
+        if len(episode.actions) or not episode.failed:
+            scores = score(episode.signals, episode.period, content)
+    except ValueError:
+        if not episode.failed:
+            raise
+    if episode.failed if failed is None else failed:
+        scores = worst_of(scores, content["worst_case"])
+    if not rests:
+        scores["steady_state_error"] = float("nan")
+    return scores

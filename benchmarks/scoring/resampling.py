@@ -6,76 +6,64 @@ sqrt((n - 1) / n), a tenth for five seeds (rao1988, p. 231).
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+Indices = NDArray[np.int64]
 
-def resample_indices(strata: ArrayLike, resamples: int, seed: int) -> NDArray[np.int64]:
-    """Return row numbers of stratified resamples, shape (resamples, n - number of strata).
 
-    Parameters
-    ----------
-    strata : (n,) array
-        Label of each sample's stratum. A stratum of one sample keeps it in every resample.
-    resamples : int
-    seed : int
+def resample_indices(strata: ArrayLike, resamples: int, seed: int) -> Indices:
+    """Return indices of stratified resamples, shape (resamples, n - number of strata).
+
+    ``strata`` are the labels of n samples. A stratum of one sample keeps it in every resample.
     """
-    return _indices(tuple(np.asarray(strata).tolist()), resamples, seed)
+    return _drawn(_within, tuple(np.asarray(strata).tolist()), resamples, seed)
 
 
-@lru_cache(maxsize=32)  # all rows of a track ask for the same
-def _indices(strata: tuple[Hashable, ...], resamples: int, seed: int) -> NDArray[np.int64]:
+def draw_clusters(strata: ArrayLike, resamples: int, seed: int) -> Indices:
+    """Return indices of resamples of whole strata and of the samples within each drawn one.
+
+    ``strata`` are the labels of n samples, all strata of one size; shape (resamples, m).
+    """
+    return _drawn(_clusters, tuple(np.asarray(strata).tolist()), resamples, seed)
+
+
+Draw = Callable[[list[Indices], np.random.Generator, int], Indices]
+
+
+@lru_cache(maxsize=40)  # all rows of a track ask for the same
+def _drawn(draw: Draw, strata: tuple[Hashable, ...], resamples: int, seed: int) -> Indices:
     members: dict[Hashable, list[int]] = {}
     for place, label in enumerate(strata):
         members.setdefault(label, []).append(place)
     generator = np.random.Generator(np.random.PCG64(seed))
-    parts = []
-    for rows in map(np.array, members.values()):
-        draws = max(1, len(rows) - 1)
-        parts.append(rows[generator.integers(0, len(rows), (resamples, draws))])
-    drawn = np.concatenate(parts, axis=1)
+    drawn = draw([np.array(rows) for rows in members.values()], generator, resamples)
     drawn.setflags(write=False)
     return drawn
 
 
-def draw_clusters(strata: ArrayLike, resamples: int, seed: int) -> NDArray[np.int64]:
-    """Return row numbers of resamples of whole strata, and of the samples within each drawn one.
-
-    Parameters
-    ----------
-    strata : (n,) array
-        Label of each sample's stratum; all of one size.
-    resamples : int
-    seed : int
-
-    Returns
-    -------
-    (resamples, m) array
-    """
-    return _clusters(tuple(np.asarray(strata).tolist()), resamples, seed)
+def _within(members: list[Indices], generator: np.random.Generator, resamples: int) -> Indices:
+    parts = [
+        rows[generator.integers(0, len(rows), (resamples, max(1, len(rows) - 1)))]
+        for rows in members
+    ]
+    return np.concatenate(parts, axis=1)
 
 
-@lru_cache(maxsize=8)
-def _clusters(strata: tuple[Hashable, ...], resamples: int, seed: int) -> NDArray[np.int64]:
-    members: dict[Hashable, list[int]] = {}
-    for place, label in enumerate(strata):
-        members.setdefault(label, []).append(place)
-    sizes = {len(group) for group in members.values()}
+def _clusters(members: list[Indices], generator: np.random.Generator, resamples: int) -> Indices:
+    sizes = {len(rows) for rows in members}
     if len(sizes) != 1:
         raise ValueError(f"strata of {sorted(sizes)} samples: run all of them with the same seeds")
-    rows, size = np.array(list(members.values())), sizes.pop()
-    generator = np.random.Generator(np.random.PCG64(seed))
+    rows, size = np.array(members), sizes.pop()
     chosen = generator.integers(0, len(rows), (resamples, max(1, len(rows) - 1)))
     within = generator.integers(0, size, (*chosen.shape, max(1, size - 1)))
-    drawn = np.asarray(rows[chosen[..., None], within].reshape(resamples, -1))
-    drawn.setflags(write=False)
-    return drawn
+    return np.asarray(rows[chosen[..., None], within].reshape(resamples, -1))
 
 
-def counts(draws: NDArray[np.int64], size: int) -> NDArray[np.float64]:
+def counts(draws: Indices, size: int) -> NDArray[np.float64]:
     """Return the number of draws of each of ``size``, shape (resamples, size)."""
     table = np.zeros((len(draws), size))
     np.add.at(table, (np.arange(len(draws))[:, None], draws), 1.0)

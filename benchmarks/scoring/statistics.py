@@ -4,6 +4,9 @@ Interquartile mean, probability of improvement and performance profile are those
 al., "Deep reinforcement learning at the edge of the statistical precipice", NeurIPS 34 (2021):
 runs are training seeds, tasks are paired episodes, and less is better.
 
+A table of scores has a row a training seed (one for a classical controller) and a column an
+episode, shape (runs, n); ``strata`` are the scenarios of its columns, shape (n,).
+
 Episodes are drawn again within their scenario (stratified), with a fixed seed, so that the same
 scores give the same interval to the last bit. Training seeds are drawn as wholes, since one policy
 answers in all scenarios. Episodes of two scenarios have to be independent, so no seed may be in
@@ -12,7 +15,7 @@ both. :mod:`benchmarks.scoring.resampling` draws the resamples.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -51,37 +54,30 @@ def mean(samples: Array) -> Array:
 
 
 def interquartile_mean(samples: Array) -> Array:
-    """Return the mean of the middle half over the last axis, shape (..., n) to (...).
+    """Return the mean of the middle half over the last axis, (..., n) to (...).
 
     A quarter of n, rounded down, is left out at either end. A resample of s strata has n - s
-    episodes, so that with few episodes a stratum the middle that it keeps is another share: of two
-    scenarios with five episodes each, 4 of 8 where the estimate keeps 6 of 10.
+    episodes, so that with few of them it keeps another share: of two scenarios with five episodes
+    each, 4 of 8 where the estimate keeps 6 of 10.
     """
     return np.asarray(stats.trim_mean(samples, 0.25, axis=-1))
 
 
 def crossed(
-    samples: ArrayLike, runs: Sequence[Hashable], pairs: Sequence[Hashable]
+    samples: ArrayLike, runs: Sequence[Any], pairs: Sequence[Any]
 ) -> tuple[Array, list[Any]]:
     """Return samples as a table of runs by pairs, and the pairs; both in ascending order.
 
-    Parameters
-    ----------
-    samples : (n,) array
-    runs, pairs : sequence of n
-        Training seed and paired episode of each sample. Every run must have every pair once.
-
-    Returns
-    -------
-    (number of runs, number of pairs) array, list
+    ``runs`` and ``pairs`` are the training seed and the paired episode of each of n samples.
 
     Raises
     ------
     ValueError
         If an episode of a run is missing or there twice.
     """
-    rows = _places(runs)
-    columns = _places(pairs)
+    rows, columns = (
+        {label: k for k, label in enumerate(sorted(set(labels)))} for labels in (runs, pairs)
+    )
     values = np.asarray(samples, float)
     table = np.empty((len(rows), len(columns)))
     filled = np.zeros(table.shape, int)
@@ -96,10 +92,6 @@ def crossed(
     return table, list(columns)
 
 
-def _places(labels: Sequence[Any]) -> dict[Any, int]:
-    return {label: k for k, label in enumerate(sorted(set(labels)))}
-
-
 def resampled(
     table: Array,
     strata: ArrayLike,
@@ -108,20 +100,10 @@ def resampled(
     seed: int,
     run_seed: int | None = None,
 ) -> Array:
-    """Return a statistic of resamples of a table: of its runs, and of episodes within strata.
+    """Return a statistic of resamples of a table's runs, and of its episodes within strata.
 
-    Parameters
-    ----------
-    table : (runs, n) array
-    strata : (n,) array
-        Of the columns. With one run the draws are those of the columns alone.
-    run_seed : int, optional
-        Of the draws of runs, ``seed + 1`` if not given. Tables of the same runs that share it are
-        resampled with the same runs.
-
-    Returns
-    -------
-    (resamples,) array
+    With one run the draws are those of the columns alone. Tables of the same runs that share
+    ``run_seed`` (``seed + 1`` by default) are resampled with the same runs.
     """
     columns = resample_indices(strata, resamples, seed)
     if len(table) == 1:
@@ -137,48 +119,6 @@ def resampled(
     return np.concatenate(parts)
 
 
-def bootstrap(
-    samples: ArrayLike,
-    strata: ArrayLike,
-    statistic: Statistic = mean,
-    *,
-    runs: Sequence[Hashable] | None = None,
-    pairs: Sequence[Hashable] | None = None,
-    resamples: int = RESAMPLES,
-    seed: int = BOOTSTRAP_SEED,
-) -> Interval:
-    """Return a statistic with its percentile bootstrap interval, stratified.
-
-    Parameters
-    ----------
-    samples : (n,) array
-        One number per episode; NaN entries (not applicable) are left out.
-    strata : (n,) array
-        Scenario of each episode. All strata must have the same number of episodes for the
-        statistic of the resamples to weigh them as the samples do.
-    statistic : callable
-        From (..., n) to (...).
-    runs, pairs : sequence of n, optional
-        Training seed of each episode, and what is the same of one episode in all of them: then
-        the order of the episodes does not matter. Both or none.
-
-    Returns
-    -------
-    Interval
-        NaN throughout if no sample applies.
-    """
-    if (runs is None) != (pairs is None):
-        raise ValueError("samples of training seeds need `runs` and `pairs` to say which belong")
-    labels = np.asarray(strata)
-    if runs is None or pairs is None:
-        table = np.asarray(samples, float)[None, :]
-    else:
-        table, order = crossed(samples, runs, pairs)
-        of_pair = dict(zip(pairs, labels.tolist(), strict=True))
-        labels = np.array([of_pair[pair] for pair in order])
-    return of_table(table, labels, statistic, resamples=resamples, seed=seed)
-
-
 def applying(table: Array) -> NDArray[np.bool_]:
     """Return the mask of episodes in which a metric applies in every run, shape (n,)."""
     return np.asarray(np.isfinite(table).all(axis=0))
@@ -190,27 +130,17 @@ def of_table(
     statistic: Statistic = mean,
     *,
     resamples: int = RESAMPLES,
-    seed: int = BOOTSTRAP_SEED,
 ) -> Interval:
-    """Return a statistic of a table of runs by episodes with its interval.
+    """Return a statistic of a table with its interval, NaN throughout if no episode applies.
 
-    Parameters
-    ----------
-    table : (runs, n) array
-        NaN where an episode does not apply, which leaves it out in all runs.
-    strata : (n,) array
-        Scenario of each column.
-
-    Returns
-    -------
-    Interval
-        NaN throughout if no episode applies.
+    A NaN leaves its episode out in all runs. All strata must have the same number of episodes for
+    the statistic of the resamples to weigh them as the samples do.
     """
     counts = applying(table)
     kept = table[:, counts]
     if not kept.size:
         return NOTHING
-    drawn = resampled(kept, np.asarray(strata)[counts], statistic, resamples, seed)
+    drawn = resampled(kept, np.asarray(strata)[counts], statistic, resamples, BOOTSTRAP_SEED)
     return between(float(statistic(kept.ravel())), drawn)
 
 
@@ -220,92 +150,51 @@ def between(value: float, drawn: Array) -> Interval:
     return Interval(value, float(low), float(high))
 
 
-def difference_of_tables(
-    first: Array,
-    second: Array,
-    strata: ArrayLike,
-    *,
-    resamples: int = RESAMPLES,
-    seed: int = BOOTSTRAP_SEED,
-) -> Interval:
-    """Return the mean of ``first - second`` with its interval, paired by episode.
+def _run_counts(table: Array, resamples: int, number: int = 0) -> Array:
+    """Return how often each run of the number-th table is drawn, shape (resamples, runs)."""
+    seed = BOOTSTRAP_SEED + 1 + number
+    return counts(resample_indices(np.zeros(len(table)), resamples, seed), len(table))
 
-    Parameters
-    ----------
-    first, second : (runs, n) array
-        Scores of two controllers, a row a training seed (one row for a classical controller) and
-        a column an episode that both have run.
-    strata : (n,) array
-        Scenario of each column.
-    """
+
+def difference_of_tables(first: Array, second: Array, strata: ArrayLike) -> Interval:
+    """Return the mean of ``first - second`` with its interval, paired by episode."""
     if len(first) == len(second) == 1:
-        return of_table(first - second, strata, resamples=resamples, seed=seed)
-    columns = resample_indices(strata, resamples, seed)
+        return of_table(first - second, strata)
+    columns = resample_indices(strata, RESAMPLES, BOOTSTRAP_SEED)
     averages = []
     for number, table in enumerate((first, second)):
-        rows = resample_indices(np.zeros(len(table)), resamples, seed + 1 + number)
-        shares = counts(rows, len(table)) / rows.shape[1]
-        averages.append(np.einsum("rt,tk->rk", shares, table))
+        drawn = _run_counts(table, RESAMPLES, number)
+        averages.append(np.einsum("rt,tk->rk", drawn / drawn[0].sum(), table))
     drawn = np.take_along_axis(averages[0] - averages[1], columns, axis=1).mean(axis=1)
     return between(float(np.mean(first.mean(axis=0) - second.mean(axis=0))), drawn)
 
 
 def difference_of_splits(
-    first: Array,
-    first_strata: ArrayLike,
-    second: Array,
-    second_strata: ArrayLike,
-    *,
-    resamples: int = RESAMPLES,
-    seed: int = BOOTSTRAP_SEED,
+    first: Array, first_strata: ArrayLike, second: Array, second_strata: ArrayLike
 ) -> Interval:
     """Return the difference of the means of the same runs over two sets of episodes.
 
-    Runs are paired, so that the scatter between policies cancels; episodes are not.
-
-    Parameters
-    ----------
-    first, second : (runs, n), (runs, m) array
-        A row a training seed, in the same order in both.
-    first_strata, second_strata : (n,), (m,) array
-        Scenario of each column.
+    Runs, in the same order in both, are paired, so that the scatter between policies cancels;
+    episodes are not.
     """
-    drawn = [
-        resampled(table, strata, mean, resamples, own, seed + 1)
-        for table, strata, own in ((first, first_strata, seed), (second, second_strata, seed + 2))
-    ]
-    return between(float(first.mean() - second.mean()), drawn[0] - drawn[1])
+    seed = BOOTSTRAP_SEED
+    drawn = resampled(first, first_strata, mean, RESAMPLES, seed, seed + 1)
+    drawn = drawn - resampled(second, second_strata, mean, RESAMPLES, seed + 2, seed + 1)
+    return between(float(first.mean() - second.mean()), drawn)
 
 
-def probability_of_improvement(
-    first: ArrayLike,
-    second: ArrayLike,
-    strata: ArrayLike,
-    *,
-    resamples: int = RESAMPLES,
-    seed: int = BOOTSTRAP_SEED,
-) -> Interval:
+def probability_of_improvement(first: ArrayLike, second: ArrayLike, strata: ArrayLike) -> Interval:
     """Return the probability that a run of ``first`` is below one of ``second``, paired.
 
     The share of pairs of runs in which the first is below, ties half (the Mann-Whitney statistic
     over the product of the numbers of runs), averaged over episodes. Drawn again are the training
     seeds of both, scenarios, and seeds within scenarios.
-
-    Parameters
-    ----------
-    first, second : (runs, n) array
-        A row a training seed (one for a classical controller), a column an episode.
-    strata : (n,) array
-        Scenario of each column.
     """
     a, b = np.atleast_2d(np.asarray(first, float)), np.atleast_2d(np.asarray(second, float))
     below = (a[:, None] < b[None]) + 0.5 * (a[:, None] == b[None])
-    columns = draw_clusters(strata, resamples, seed)
+    columns = draw_clusters(strata, RESAMPLES, BOOTSTRAP_SEED)
     # counts and halves: every sum is exact, so that its order does not matter
-    ours, theirs = (
-        counts(resample_indices(np.zeros(len(table)), resamples, seed + 1 + number), len(table))
-        for number, table in enumerate((a, b))
-    )
+    ours, theirs = (_run_counts(table, RESAMPLES, number) for number, table in enumerate((a, b)))
     hits = np.einsum("ra,rb,abk->rk", ours, theirs, below, optimize=True)
     total = ours[0].sum() * theirs[0].sum() * columns.shape[1]
     drawn = np.take_along_axis(hits, columns, axis=1).sum(axis=1) / total
@@ -313,47 +202,18 @@ def probability_of_improvement(
 
 
 def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Array:
-    """Return the share of scores that are at most each threshold.
-
-    Parameters
-    ----------
-    scores : (runs, n) array
-        A row a training seed, a column an episode.
-    thresholds : (m,) array
-
-    Returns
-    -------
-    (m,) array
-    """
+    """Return the share of scores that are at most each of m thresholds, shape (m,)."""
     ordered = np.sort(np.asarray(scores, float).ravel())
     return np.searchsorted(ordered, np.asarray(thresholds, float), side="right") / len(ordered)
 
 
 def profile_band(
-    scores: Array,
-    strata: ArrayLike,
-    thresholds: ArrayLike,
-    *,
-    resamples: int = 1000,
-    seed: int = BOOTSTRAP_SEED,
+    scores: Array, strata: ArrayLike, thresholds: ArrayLike, *, resamples: int = 1000
 ) -> Array:
-    """Return the pointwise 95 % band of a performance profile.
-
-    Parameters
-    ----------
-    scores : (runs, n) array
-    strata : (n,) array
-        Scenario of each column.
-    thresholds : (m,) array
-
-    Returns
-    -------
-    (2, m) array
-        Lower and upper bounds.
-    """
+    """Return lower and upper bounds of the pointwise 95 % band of a profile, shape (2, m)."""
     below = (scores[:, :, None] <= np.asarray(thresholds, float)).astype(float)
-    columns = counts(resample_indices(strata, resamples, seed), scores.shape[1])
-    rows = counts(resample_indices(np.zeros(len(scores)), resamples, seed + 1), len(scores))
+    columns = counts(resample_indices(strata, resamples, BOOTSTRAP_SEED), scores.shape[1])
+    rows = _run_counts(scores, resamples)
     hits = np.zeros((resamples, below.shape[2]))
     for weights, of_run in zip(rows.T, below, strict=True):
         hits += weights[:, None] * (columns @ of_run)

@@ -10,7 +10,7 @@ from baselines.knee.design import BANDWIDTHS, design, make_loop
 from baselines.knee.identification import FREQUENCIES, frequency_response, identify
 from baselines.linear.bumpless import BumplessGains, certificate
 from baselines.linear.ltr import plant_system
-from benchmarks.scoring.knee import landings
+from benchmarks.scoring.groups.knee import landings
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from tests.baselines.conftest import built
 from tests.baselines.knee.knee_runs import make_knee, quiet, run, walked

@@ -13,11 +13,10 @@ import pytest
 
 from benchmarks.board import accessors as views
 from benchmarks.board import claims, format, leaderboard, plots, standings, summary
-from benchmarks.board.columns import columns_of, with_costs
 from benchmarks.board.format import duration, number, table
 from benchmarks.identity import audit
 from benchmarks.runs import rows
-from benchmarks.scoring.metrics import of_track
+from benchmarks.scoring.metrics import columns_of, of_track
 
 BOARD, PAGE = leaderboard.BOARD.name, "leaderboard/MusclePositioning.md"
 
@@ -149,7 +148,7 @@ def test_row_of_an_older_round_is_self_reported(
     monkeypatch.setattr(audit, "last", lambda track: last)
     monkeypatch.setattr(audit, "in_last_round", lambda row: row["controller"]["name"] == "pid")
     pid, zero = leaderboard.load(tmp_path)
-    assert views.round_of(pid)["entrants"] == last.entrants
+    assert pid["audit"]["entrants"] == last.entrants
     assert not views.is_audited(zero)
     assert [views.name_of(r) for r in standings.listing([pid, zero]).outside] == ["zero"]
 
@@ -222,7 +221,7 @@ def test_all_learned_and_only_the_best_classical_controllers_are_drawn() -> None
 
 def test_every_cost_of_a_claim_is_a_column() -> None:
     for metrics in ([], ["range"], ["range", "gait"]):
-        columns = with_costs(columns_of({"metrics": metrics}))
+        columns = columns_of({"metrics": metrics})
         wanted = set(claims.COSTS) & set(of_track({"metrics": metrics}))
         assert wanted <= {metric for metric, _, _ in columns}
 

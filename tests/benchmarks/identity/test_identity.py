@@ -23,7 +23,8 @@ from benchmarks.runs.controllers import find
 from benchmarks.runs.provenance import ROOT
 from benchmarks.scenarios import scenario_env
 from benchmarks.scenarios.scenario import ScenarioSet, available
-from benchmarks.scoring import knee, metrics
+from benchmarks.scoring import metrics
+from benchmarks.scoring.groups import knee
 
 SHORT = {"episode_seconds": 1.5}
 NAMES = ("positioning_nominal", "knee_walk_nominal")

@@ -91,16 +91,21 @@ class Policy:
 
 
 def test_policy_that_met_an_undeclared_plant_was_trained_on_it() -> None:
-    name = "PAM/MusclePositioning-v0"
+    name, ppo = "PAM/MusclePositioning-v0", find("ppo")
     env, drawn = make_env(name, {"hysteresis": "preisach"}), make_env(name, {"randomize": True})
-    plant, told = env.unwrapped.plant, drawn.unwrapped.plant
-    both = Policy([plant.digest(), told.digest()])
-    assert knowledge.trained_on_plant(both, told, env)
-    assert not knowledge.trained_on_plant(both, plant, env)
-    assert not knowledge.trained_on_plant(Policy([told.digest()]), told, env)
-    assert not knowledge.trained_on_plant(object(), told, env)
-    assert not knowledge.trained_on_plant(both, told, drawn)
-    assert knowledge.trained_on_plant(Policy([told.digest()], randomize=True), told, drawn)
+    plant, nominal = env.unwrapped.plant, drawn.unwrapped.plant
+    both = Policy([plant.digest(), nominal.digest()])
+    other = Policy([nominal.digest()])
+
+    def trained(controller: object, model: Any, env: Any) -> bool:
+        return knowledge.of_plant(ppo, controller, model, env)["trained_on_plant"]
+
+    assert trained(both, nominal, env)
+    assert not trained(both, plant, env)
+    assert not trained(other, nominal, env)
+    assert not trained(object(), nominal, env)
+    assert not trained(both, nominal, drawn)
+    assert trained(Policy([nominal.digest()], randomize=True), nominal, drawn)
     env.close()
     drawn.close()
 

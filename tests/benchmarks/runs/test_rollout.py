@@ -198,7 +198,7 @@ def test_it_is_asked_before_each_run_whether_somebody_waits(controller, answers,
     env_id = "PAM/MusclePositioning-v0"
     asked = iter([*[True] * answers, False])
     monkeypatch.setattr(rollout, "is_needed", lambda: next(asked))
-    with pytest.raises(RuntimeError, match="nobody waits"):
+    with pytest.raises(RuntimeError, match="cancelled"):
         rollout.run_all(
             partial(make_batch, env_id, SHORT), make_env(env_id, SHORT), controller, SEEDS
         )

@@ -8,8 +8,8 @@ import pytest
 
 from benchmarks.__main__ import main
 from benchmarks.runs.controllers import available
-from benchmarks.runs.rows import shown
 from benchmarks.scenarios import scenario as scenarios
+from benchmarks.scoring.metrics import shown
 
 TRACKS = {track.env: track for track in scenarios.available().values()}
 CLASSICAL = [(n, made) for n, made in available().items() if made.kind == "classical"]

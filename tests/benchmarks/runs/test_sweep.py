@@ -226,7 +226,7 @@ def test_exit_codes(
     with monkeypatch.context() as patch:
         patch.setattr(rows, "assemble", interrupted)
         assert ask() == 130
-        assert "the same command goes on" in capsys.readouterr().err
+        assert "the same command resumes" in capsys.readouterr().err
     assert ask() == 0
     assert "0 cells computed, 2 were there already" in capsys.readouterr().out
 

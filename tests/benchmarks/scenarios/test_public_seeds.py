@@ -62,7 +62,7 @@ def covered(seeds: dict[str, tuple[int, ...]], trials: int = 150) -> float:
     for _ in range(trials):
         common = random.normal(size=place.max() + 1)[place]
         values = 10.0 + common + random.normal(size=len(place))
-        found = statistics.bootstrap(values, strata, resamples=500)
+        found = statistics.of_table(values[None], strata, resamples=500)
         held += found.low <= 10.0 <= found.high
     return held / trials
 

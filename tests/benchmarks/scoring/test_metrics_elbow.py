@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.board.columns import columns_of
 from benchmarks.scenarios.scenario import available
 from benchmarks.scoring import metrics
-from benchmarks.scoring.elbow import ELBOW, NEAR
+from benchmarks.scoring.groups.elbow import NEAR
+from benchmarks.scoring.groups.elbow import UNITS as ELBOW
 
 PERIOD, N = 0.01, 400
 TIME = PERIOD * np.arange(1, N + 1)
@@ -44,9 +44,16 @@ def score(**changes: Any) -> dict[str, float]:
     record = signals(
         **{f"state/{k}" if k in ELBOW or k in OWN else k: v for k, v in changes.items()}
     )
-    return metrics.score(record, PERIOD, 0.0, 0.5, {"cost/pressure": 1e5}, groups=("elbow",))
+    return metrics.score(record, PERIOD, CONTENT)
 
 
+CONTENT = {
+    "settle_seconds": 0.0,
+    "hold_seconds": 0.5,
+    "sensed": "sensed",
+    "cost_scales": {"cost/pressure": 1e5},
+    "metrics": ["elbow"],
+}
 OWN = ("stiffness", "felt", "object", "slack", "torque_clipped", "stiffness_clipped")
 
 
@@ -83,5 +90,5 @@ def test_tracks_have_a_worst_case_of_every_metric_and_columns_of_theirs(name: st
     content = available()[name].content
     wanted = set(metrics.of_track(content))
     assert set(content["worst_case"]) == wanted
-    assert {column for column, *_ in columns_of(content)} <= wanted
+    assert {column for column, *_ in metrics.columns_of(content)} <= wanted
     assert metrics.headline_of(content) == "impedance_rms"

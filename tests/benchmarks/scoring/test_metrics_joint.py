@@ -11,12 +11,11 @@ import pytest
 
 import pam_envs  # noqa: F401 (registers)
 from benchmarks.board import standings
-from benchmarks.board.columns import columns_of
 from benchmarks.runs import rollout, rows
 from benchmarks.scenarios.scenario import ScenarioSet, available
 from benchmarks.scenarios.scenario_env import make_env
-from benchmarks.scoring import joint as metrics_joint
 from benchmarks.scoring import metrics
+from benchmarks.scoring.groups import joint as metrics_joint
 
 PERIOD = 0.01
 N = 1000
@@ -47,8 +46,15 @@ def chain(**changes: Any) -> dict[str, np.ndarray]:
 
 
 def score(record: dict[str, np.ndarray], group: str) -> dict[str, float]:
-    costs = {"cost/angle": 0.01}
-    return metrics.score(record, PERIOD, 2.0, 0.5, costs, groups=(group,), tool_length=0.25)
+    content = {
+        "settle_seconds": 2.0,
+        "hold_seconds": 0.5,
+        "sensed": "sensed",
+        "cost_scales": {"cost/angle": 0.01},
+        "metrics": [group],
+        "tool_length": 0.25,
+    }
+    return metrics.score(record, PERIOD, content)
 
 
 def test_percent_error_is_relative_to_half_range() -> None:
@@ -121,7 +127,7 @@ def test_steady_state_error_of_tip_is_scored_where_its_path_rests() -> None:
     scores = score(record, "chain")
     assert scores["max_error"] == 0.02
     assert scores["steady_state_error"] == pytest.approx((1e-3 * 451 + 0.02 * 50) / 501, rel=0.02)
-    still = metrics_joint.way(record)
+    still = metrics_joint.path_length(record)
     assert np.all(np.diff(still)[:298] == 0.0) and np.all(np.diff(still)[500:] == 0.0)
     assert still[-1] == pytest.approx(2.0)
 
@@ -197,7 +203,7 @@ def test_tracks_name_signals_that_there_are(name: str) -> None:
     assert track.content["sensed"] in keys
     assert set(track.content["cost_scales"]) <= set(keys)
     wanted = metrics.of_track(track.content)
-    assert {metric for metric, _, _ in columns_of(track.content)} <= set(wanted)
+    assert {metric for metric, _, _ in metrics.columns_of(track.content)} <= set(wanted)
     assert wanted["rms_error"] == wanted[metrics.headline_of(track.content)]
     assert wanted["rms_error"] == track.content["unit"]
     assert {f"state/{k}" for k in metrics_joint.POSITION} <= set(keys) or track.env == JOINT

@@ -11,8 +11,8 @@ import pytest
 from baselines.trivial import Constant
 from benchmarks.runs import rollout, rows
 from benchmarks.scenarios.scenario import ScenarioSet, available
-from benchmarks.scoring import knee as metrics_knee
 from benchmarks.scoring import metrics
+from benchmarks.scoring.groups import knee as metrics_knee
 
 PERIOD = 0.01
 N = 1000
@@ -53,8 +53,16 @@ def signals(**changes: Any) -> dict[str, np.ndarray]:
 
 
 def score(record: dict[str, np.ndarray], **how: Any) -> dict[str, float]:
-    how = {"gate": GATE, "groups": ("range", "gait"), "activity": "walk"} | how
-    return metrics.score(record, PERIOD, 0.0, 0.5, {"cost/pressure": 1e5}, **how)
+    content = {
+        "settle_seconds": 0.0,
+        "hold_seconds": 0.5,
+        "sensed": "sensed",
+        "cost_scales": {"cost/pressure": 1e5},
+        "metrics": ["range", "gait"],
+        "gate": GATE,
+        "activity": "walk",
+    }
+    return metrics.score(record, PERIOD, content | how)
 
 
 def test_perfect_record_has_no_error_and_the_ratios_that_were_put_in() -> None:
@@ -173,7 +181,7 @@ def test_units_follow_the_track() -> None:
 
 def test_unknown_metric_group_or_missing_worst_case_is_refused() -> None:
     content = dict(available()["knee_walk_nominal"].content)
-    with pytest.raises(ValueError, match="choose from range, gait"):
+    with pytest.raises(ValueError, match="choose from elbow, joint, chain, range, gait"):
         ScenarioSet(content | {"metrics": ["stride"]})
     with pytest.raises(ValueError, match=r"worst_case needs a value for each of .*switch_error"):
         ScenarioSet(content | {"worst_case": {"rms_error": 1.0}})

@@ -61,49 +61,49 @@ def test_performance_profile_by_hand() -> None:
     assert found.tolist() == [0.0, 0.25, 0.75, 0.75, 1.0]
 
 
+def interval(samples: np.ndarray, strata: object, **how: int) -> statistics.Interval:
+    """Return the mean of one run's episodes with its interval."""
+    return statistics.of_table(np.asarray(samples, float)[None], strata, **how)
+
+
+def test_interval_is_that_of_students_t_within_strata() -> None:
+    sample, strata = np.random.default_rng(0).normal(3.0, 1.0, 400), np.zeros(400, int)
+    exact = stats.t.interval(0.95, 399, sample.mean(), stats.sem(sample))
+    found = interval(sample, strata)
+    assert found.value == pytest.approx(sample.mean())
+    assert (found.low, found.high) == pytest.approx(exact, abs=0.02)
+    assert interval(sample, strata) == found
+    # strata of their own level: the interval is that of the scatter within them
+    levels = np.repeat([0.0, 100.0], 200)
+    split = interval(sample + levels, np.repeat([0, 1], 200))
+    assert split.high - split.low < 0.3
+
+
 def test_training_seeds_widen_an_interval_as_their_scatter_says() -> None:
     # seeds differ by normal offsets, episodes do not: the interval is that of the mean of ten seeds
-    random = np.random.default_rng(1)
-    offsets = random.normal(0.0, 1.0, 10)
-    runs = np.repeat(np.arange(10), 6).tolist()
-    pairs = [(k // 3, k % 3) for k in range(6)] * 10
-    samples = np.repeat(offsets, 6)
-    strata = [scenario for scenario, _ in pairs]
-    found = statistics.bootstrap(samples, strata, runs=runs, pairs=pairs)
+    offsets = np.random.default_rng(1).normal(0.0, 1.0, 10)
+    table, strata = np.repeat(offsets[:, None], 6, axis=1), [0, 0, 0, 1, 1, 1]
+    found = statistics.of_table(table, strata)
     assert found.value == pytest.approx(offsets.mean())
-    wanted = 1.96 * offsets.std(ddof=1) / np.sqrt(10)
-    assert 0.5 * (found.high - found.low) == pytest.approx(wanted, rel=0.06)
-    blind = statistics.bootstrap(samples, strata)
+    width = 1.96 * offsets.std(ddof=1) / np.sqrt(10)
+    assert 0.5 * (found.high - found.low) == pytest.approx(width, rel=0.06)
+    blind = interval(table.ravel(), strata * 10)
     assert blind.high - blind.low < 0.5 * (found.high - found.low)
 
 
-def test_one_training_seed_gives_the_bits_of_none() -> None:
-    values, strata = np.random.default_rng(2).normal(size=12), [0, 1, 2] * 4
-    pairs = list(enumerate(strata))
-    plain = statistics.bootstrap(values, strata)
-    assert statistics.bootstrap(values, strata, runs=[0] * 12, pairs=pairs) == plain
-
-
 def test_episode_order_does_not_affect_training_seeds() -> None:
-    random = np.random.default_rng(3)
-    runs = np.repeat([4, 5, 6], 4)
+    runs = np.repeat([4, 5, 6], 4).tolist()
     pairs = [("a", 1), ("a", 2), ("b", 1), ("b", 2)] * 3
-    values = random.normal(size=12)
-    table, order = statistics.crossed(values, runs.tolist(), pairs)
-    assert table.tolist() == values.reshape(3, 4).tolist()
-    assert order == pairs[:4]
-    strata = [scenario for scenario, _ in pairs]
-    found = statistics.bootstrap(values, strata, runs=runs.tolist(), pairs=pairs)
-    turned = {"runs": runs.tolist()[::-1], "pairs": pairs[::-1]}
-    assert statistics.bootstrap(values[::-1], strata[::-1], **turned) == found
+    values = np.random.default_rng(3).normal(size=12)
+    for turn in (1, -1):
+        table, order = statistics.crossed(values[::turn], runs[::turn], pairs[::turn])
+        assert table.tolist() == values.reshape(3, 4).tolist()
+        assert order == pairs[:4]
 
 
 def test_training_seed_with_missing_episode_is_refused() -> None:
-    runs, pairs = [0, 0, 1], ["a", "b", "a"]
     with pytest.raises(ValueError, match="every training seed must be run in every episode"):
-        statistics.bootstrap(np.ones(3), ["s"] * 3, runs=runs, pairs=pairs)
-    with pytest.raises(ValueError, match="need `runs` and `pairs`"):
-        statistics.bootstrap(np.ones(3), ["s"] * 3, runs=runs)
+        statistics.crossed(np.ones(3), [0, 0, 1], ["a", "b", "a"])
 
 
 def test_paired_differences_see_what_overlapping_intervals_hide() -> None:
@@ -112,7 +112,7 @@ def test_paired_differences_see_what_overlapping_intervals_hide() -> None:
     hardness = random.uniform(1.0, 10.0, (1, 20))
     strata = [0] * 20
     first, second = hardness, hardness + 0.1 + 0.01 * random.normal(size=(1, 20))
-    alone = [statistics.bootstrap(table[0], strata) for table in (first, second)]
+    alone = [interval(table[0], strata) for table in (first, second)]
     assert alone[1].low < alone[0].high
     found = statistics.difference_of_tables(second, first, strata)
     assert found.low > 0.09
@@ -151,7 +151,7 @@ def covered(random: np.random.Generator, common: float) -> bool:
     shared = random.normal(size=(1, 5)) * np.sqrt(common)
     own = random.normal(size=(30, 5)) * np.sqrt(1.0 - common)
     strata = np.repeat(np.arange(30), 5)
-    found = statistics.bootstrap((levels + shared + own).ravel(), strata, resamples=400)
+    found = interval((levels + shared + own).ravel(), strata, resamples=400)
     return found.low <= 0.0 <= found.high
 
 

@@ -19,7 +19,7 @@ from gymnasium.utils.env_checker import check_env
 
 import pam_envs
 from benchmarks.__main__ import run
-from benchmarks.runs import controllers, rows
+from benchmarks.runs import controllers, rows, runner
 from benchmarks.scenarios import scenario
 from pam_envs.envs.rendering.scene import view_of
 from pam_envs.kernels.build import COMPILED
@@ -89,7 +89,8 @@ def test_harness_scores_its_scenario_file(
     out, cells = tmp_path / "rows", tmp_path / "cells"
     out.mkdir()
     track = (str(family / "spring_muscle.yaml"),)
-    assert run(controller=("zero",), track=track, jobs=1, out=out, cells=cells) == 0
+    options = runner.Options(jobs=1, out=out, cells=cells)
+    assert run(controller=("zero",), track=track, options=options) == 0
     (path,) = rows.files(out)
     row = rows.load(path)
     assert {e["scenario"] for e in row["episodes"]} == {"steps", "sines"}

@@ -10,7 +10,7 @@ import pytest
 
 import pam_envs  # noqa: F401 (registers)
 from baselines.core.catalogue import make_controller
-from benchmarks.scoring.elbow import NEAR
+from benchmarks.scoring.groups.elbow import NEAR
 from pam_envs.constants import GRAVITY
 from pam_envs.envs.elbow.env import model_row
 from pam_envs.envs.elbow.program import estimate, pressures_for, within_reach

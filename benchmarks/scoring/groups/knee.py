@@ -1,30 +1,30 @@
-"""Metrics of the knee brace and of a gait, in addition to the common ones.
+"""Metrics of the knee brace and of a gait.
 
-Which of these a track has is written in its scenario file (``metrics: [range, gait]``). A gait is
-scored by phase: the tension where the heel bears weight, the angle where it does not, each where
-the sensors and the truth agree. In the few periods in which noise has the sensed phase differ from
-the true one, the references are those of the wrong phase, which nothing should follow: they count
-for neither. All arrays have one entry per control period and are in SI.
+A gait is scored by phase: the tension in stance, the angle in swing. Periods in which the sensed
+phase differs from the true one, by noise, count for neither.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.scoring.errors import rms
+from benchmarks.scoring.group import (
+    DEGREES,
+    EFFORT,
+    RMS_PERCENT,
+    Array,
+    Column,
+    Group,
+    Mask,
+    Record,
+    rms,
+)
 from pam_envs.muscle.emg import EmgProxy, Reading, calibration, emg_proxy
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-RANGE: dict[str, str] = {"rms_percent": "%", "saturated_time": "1"}
-"""Error over half the range of the reference (of a gait a fixed one that its track names, since
-the reference follows the sensed angle, so that two controllers do not share it), and share of time
-that the muscle's true pressure is above the soft limit just below its capacity."""
-GAIT: dict[str, str] = {
+GAIT_UNITS = {
     "angle_rms": "rad",
     "angle_rms_percent": "%",
     "switch_error": "N",
@@ -41,21 +41,38 @@ GAIT: dict[str, str] = {
     "emg_extensors_ratio_fitted_a": "1",
     "emg_extensors_ratio_fitted_b": "1",
 }
-"""Of a gait. Ratios are of the RMS with the orthosis over that without. ``emg_ratio`` is
-uncalibrated and predicted; the *fitted* ones have one constant an activity that was chosen to give
-the paper's reductions. In all three what the flexors do more than without the orthosis is added to
-the extensors, so that in walking a valve that is simply open does not win; those *of extensors*
-leave it out, as the paper's electrodes did. Reading B punishes it least: it takes the demand to be
-all of Eq. (1), twice that of A, and activity to grow as the square of torque, so that a small
-torque held against for long costs next to nothing. Open at 4.5 bar the walk has 1.14, by A 1.66, by
-B 0.77; on stairs, where the knee asks for more than the muscle has, all three fall below 1."""
+"""Ratios are of the RMS with the orthosis over that without. ``emg_ratio`` is uncalibrated and
+predicted; the *fitted* ones have one constant an activity, chosen to give the paper's reductions.
+In all three the flexors' additional activity is added to the extensors, so that in walking a valve
+that is simply open is no reduction; those *of extensors* leave it out, as the paper's electrodes
+did. Reading B takes the demand to be all of Eq. (1), twice that of A, and activity to grow as the
+square of torque, so that a small torque held against for long costs little. Open at 4.5 bar the
+walk has 1.14, by A 1.66, by B 0.77; on stairs, where the knee asks for more than the muscle has,
+all three fall below 1."""
+_SATURATED: Column = ("saturated_time", "true pressure at capacity [%]", 100.0)
+GAIT_COLUMNS: tuple[Column, ...] = (
+    RMS_PERCENT,
+    ("angle_rms", "swing: angle RMS [deg]", DEGREES),
+    ("switch_error", "error at the switch [N]", 1.0),
+    ("switch_excess", "excess after it [N]", 1.0),
+    ("pressure_jump", "jump of pressure [bar]", 1e-5),
+    ("torque_rms", "assistance RMS, as desired [N m]", 1.0),
+    ("torque_ideal_rms", "of the true demand [N m]", 1.0),
+    ("emg_ratio", "EMG ratio", 1.0),
+    ("emg_extensors_ratio", "of extensors", 1.0),
+    ("emg_flexors_ratio", "of flexors", 1.0),
+    ("emg_ratio_fitted_a", "fitted, A", 1.0),
+    ("emg_ratio_fitted_b", "fitted, B", 1.0),
+    *EFFORT,
+    _SATURATED,
+)
 
 JUMP_SECONDS = 0.5
 """Window after a switch to stance for the error of the tension."""
 BRIEF_SECONDS = 0.1
 """After a switch, in which the pressure's largest change is its jump."""
 SWING_SECONDS = 0.3
-"""Swing before a switch that makes it one: a heel that is lifted chatters."""
+"""Shortest swing before a landing: a heel that is lifted chatters."""
 
 
 def half_range(reference: Array) -> float:
@@ -65,83 +82,64 @@ def half_range(reference: Array) -> float:
 
 
 def landings(stance: Array, period: float) -> NDArray[np.int64]:
-    """Return the first samples of stance after a swing that was one.
-
-    Parameters
-    ----------
-    stance : (n,) array
-        1 in stance, as the controller sees it.
-    period : float [s]
-    """
+    """Return the first samples of stance after a swing; ``stance`` is 1 as the controller sees."""
     before = round(SWING_SECONDS / period)
     rises = np.flatnonzero(np.diff(stance) > 0.0) + 1
     return np.array([k for k in rises if k >= before and not stance[k - before : k].any()], int)
 
 
-def largest_after(signal: Array, starts: NDArray[np.int64], samples: int) -> float:
-    """Return the mean over starts of the largest size of a signal from there on, NaN of none."""
-    sizes = [np.abs(signal[k : k + samples]).max() for k in starts if k + samples <= len(signal)]
+def _mean_after(
+    size: Callable[[int], float], starts: NDArray[np.int64], samples: int, signal: Array
+) -> float:
+    """Return the mean of a size over the starts that ``samples`` follow, NaN of none."""
+    sizes = [size(k) for k in starts if k + samples <= len(signal)]
     return float(np.mean(sizes)) if sizes else float("nan")
 
 
-def excess_after(signal: Array, starts: NDArray[np.int64], samples: int) -> float:
-    """Return the mean over starts of how far a signal's size rises above that at the start.
+def largest_after(signal: Array, starts: NDArray[np.int64], samples: int) -> float:
+    """Return the mean over starts of the largest size of a signal from there on, NaN of none."""
+    return _mean_after(lambda k: np.abs(signal[k : k + samples]).max(), starts, samples, signal)
 
-    The error at the start is what the other controller left behind; the excess is the transient of
+
+def excess_after(signal: Array, starts: NDArray[np.int64], samples: int) -> float:
+    """Return the mean over starts of the rise of a signal's size above that at the start.
+
+    The error at the start is that of the other phase's controller; the excess is the transient of
     the one that takes over. NaN of no starts.
     """
-    rises = [
-        np.abs(signal[k : k + samples]).max() - abs(signal[k])
-        for k in starts
-        if k + samples <= len(signal)
-    ]
-    return float(np.mean(rises)) if rises else float("nan")
+    return _mean_after(
+        lambda k: np.abs(signal[k : k + samples]).max() - abs(signal[k]), starts, samples, signal
+    )
 
 
 def pressure_jump(pressure: Array, starts: NDArray[np.int64], samples: int) -> float:
     """Return the mean over starts of the largest change of pressure [Pa] from there on."""
-    sizes = [
-        np.abs(pressure[k : k + samples] - pressure[k - 1]).max()
-        for k in starts
-        if k + samples <= len(pressure)
-    ]
-    return float(np.mean(sizes)) if sizes else float("nan")
+    return _mean_after(
+        lambda k: np.abs(pressure[k : k + samples] - pressure[k - 1]).max(),
+        starts,
+        samples,
+        pressure,
+    )
 
 
-def of_range(
-    signals: Mapping[str, Array], window: Mask, gate: Mask, fixed: float | None = None
-) -> dict[str, float]:
-    """Return the metrics of ``RANGE``.
+def of_range(record: Record) -> dict[str, float]:
+    """Return the error over half the reference's range, and the share of time at the capacity.
 
-    Parameters
-    ----------
-    signals : mapping of (n,) array
-    window : (n,) array of bool
-        After settling.
-    gate : (n,) array of bool
-        Where the tension is tracked as well.
-    fixed : float, optional
-        Half-range that the error refers to; that of the reference if not given.
+    Of a gait the half-range is a constant of its track, since its reference follows the sensed
+    angle and two controllers do not share it.
     """
-    reference = signals["reference"][gate]
-    error = signals["output"][gate] - reference
+    reference = record.signals["reference"][record.tracked]
+    error = record.signals["output"][record.tracked] - reference
+    half = record.content.get("half_range") or half_range(reference)
     return {
-        "rms_percent": 100.0 * rms(error) / (fixed or half_range(reference)),
-        "saturated_time": float(np.mean(signals["cost/pressure"][window] > 0.0)),
+        "rms_percent": 100.0 * rms(error) / half,
+        "saturated_time": float(np.mean(record.signals["cost/pressure"][record.window] > 0.0)),
     }
 
 
-def of_gait(
-    signals: Mapping[str, Array], window: Mask, gate: Mask, period: float, activity: str
-) -> dict[str, float]:
-    """Return the metrics of ``GAIT``; the other parameters are those of :func:`of_range`.
-
-    Parameters
-    ----------
-    period : float [s]
-    activity : {"walk", "stairs_up", "stairs_down"}
-        Whose constants the fitted readings take.
-    """
+def of_gait(record: Record) -> dict[str, float]:
+    """Return the metrics of ``GAIT_UNITS``."""
+    signals, window, period = record.signals, record.window, record.period
     swing = window & (signals["state/stance"] < 0.5) & (signals["sensor/stance"] < 0.5)
     path = signals["state/angle_reference"][swing]
     off = rms(signals["state/angle"][swing] - path)
@@ -155,10 +153,10 @@ def of_gait(
         "switch_error": largest_after(error, starts, 1),
         "switch_excess": excess_after(error, starts, round(JUMP_SECONDS / period)),
         "pressure_jump": pressure_jump(signals["state/pressure"][window], starts, brief),
-        "torque_rms": rms((torque - signals["state/torque_reference"])[gate]),
-        "torque_ideal_rms": rms((torque - signals["state/torque_ideal"])[gate]),
+        "torque_rms": rms((torque - signals["state/torque_reference"])[record.tracked]),
+        "torque_ideal_rms": rms((torque - signals["state/torque_ideal"])[record.tracked]),
         "over_assistance": float(np.mean(signals["effort/over_assistance"][window])),
-        **emg(signals, window, period, activity),
+        **emg(signals, window, period, record.content["activity"]),
     }
 
 
@@ -201,3 +199,19 @@ def _more(proxy: EmgProxy) -> Array:
 def _ratio(helped: Array, alone: Array) -> float:
     """Return a ratio of two RMS, NaN where there is none."""
     return rms(helped) / rms(alone) if rms(alone) > 0.0 else float("nan")
+
+
+RANGE = Group(
+    "range",
+    {"rms_percent": "%", "saturated_time": "1"},
+    of_range,
+    lambda errors: (RMS_PERCENT, *errors[:2], errors[3], *EFFORT, _SATURATED),
+)
+GAIT = Group(
+    "gait",
+    GAIT_UNITS,
+    of_gait,
+    lambda errors: GAIT_COLUMNS,
+    needs=("activity",),
+    costs={"emg_ratio": "EMG ratio"},
+)

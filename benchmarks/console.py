@@ -6,19 +6,20 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.identity.audit import Round
+from benchmarks.board import accessors as views
 from benchmarks.runs import rows, verified
 from benchmarks.runs.cells import AUDIT, PUBLIC
 from benchmarks.runs.runner import Report
 from benchmarks.runs.verify import Verdict
-from benchmarks.scoring.metrics import headline_of
+from benchmarks.scoring.metrics import shown
 
 LINES = 40
 """Fields of a row that are listed at most."""
+HOLDS, NEARLY, DRIFTED = "reproduced", "reproduced within tolerance", "DRIFTED"
 
 
 def run(report: Report) -> int:
-    """Print what a run did, and return the exit code: 1 if something is missing."""
+    """Print the report of a run, and return the exit code: 1 if something is missing."""
     print(f"{report.computed} cells computed, {report.found} were there already")
     for name in report.quarantined:
         print(f"corrupt, set aside and computed again: {name}")
@@ -34,35 +35,21 @@ def run(report: Report) -> int:
 def _score(path: Path) -> str:
     """Return the headline of a row in words, and its audit's where there is one."""
     row = rows.load(path)
-    content = row["scenarios"]["content"]
-    headline, (unit, factor) = headline_of(content), rows.shown(content)
+    unit, factor = shown(views.content_of(row))
 
-    def means(split: str) -> dict[str, float]:
-        scores = rows.aggregate(rows.episodes_of(row, split), [headline])[headline]
-        return {name: factor * scores[name] for name in ("mean", "low", "high")}
+    def words(split: str) -> str:
+        found = views.interval(row, split=split)
+        value, low, high = (factor * x for x in (found.value, found.low, found.high))
+        return f"{value:.3f} {unit} [{low:.3f}, {high:.3f}]"
 
-    def words(scores: dict[str, float]) -> str:
-        return f"{scores['mean']:.3f} {unit} [{scores['low']:.3f}, {scores['high']:.3f}]"
-
-    public = means(PUBLIC)
-    said = f"{row['row']}: RMS {words(public)}"
-    if failed := rows.failures(rows.episodes_of(row)):
-        said += f", {failed} of {len(rows.episodes_of(row))} episodes failed"
-    if row["audit"]:
-        unseen = means(AUDIT)
-        said += f"; audit {words(unseen)}, gap {unseen['mean'] - public['mean']:+.3f}"
+    said = f"{row['row']}: RMS {words(PUBLIC)}"
+    failed, total = views.failures_of(row, PUBLIC)
+    if failed:
+        said += f", {failed} of {total} episodes failed"
+    if views.is_audited(row):
+        gap = factor * (views.mean_of(row, split=AUDIT) - views.mean_of(row, split=PUBLIC))
+        said += f"; audit {words(AUDIT)}, gap {gap:+.3f}"
     return said
-
-
-def round_in_words(found: Round) -> str:
-    """Return number, size, salt and day of a round."""
-    return (
-        f"round {found.number}, {len(found.entrants)} controllers, salt {found.salt} of "
-        f"{found.drawn}"
-    )
-
-
-HOLDS, NEARLY, DRIFTED = "reproduced", "reproduced within tolerance", "DRIFTED"
 
 
 def outcome(found: Verdict) -> str:

@@ -1,0 +1,85 @@
+"""Group of metrics that a scenario file asks for by name: values, units and table columns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Column = tuple[str, str, float]
+"""Metric, heading and factor from SI."""
+
+DEGREES = float(np.degrees(1.0))
+EFFORT: tuple[Column, ...] = (
+    ("pressure_travel", "pressure travel [bar/s]", 1e-5),
+    ("air_use", "air [mg/s]", 1e6),
+)
+RMS_PERCENT: Column = ("rms_percent", "RMS [% of half-range]", 1.0)
+OUT_OF_REACH: Column = ("saturated_time", "out of reach [%]", 100.0)
+
+
+@dataclass(frozen=True)
+class Record:
+    """Recorded signals of one episode, (n,) arrays in SI, and the samples that are scored.
+
+    Attributes
+    ----------
+    window, tracked : (n,) array of bool
+        After settling; and where the output is tracked as well.
+    period : float [s]
+    content : mapping
+        Of the scenario file.
+    """
+
+    signals: Mapping[str, Array]
+    window: Mask
+    tracked: Mask
+    period: float
+    content: Mapping[str, Any]
+
+    def rate(self, signal: str) -> float:
+        """Return the sum of a signal over the window per second."""
+        total = np.sum(np.asarray(self.signals[signal])[self.window])
+        return float(total) / (float(self.window.sum()) * self.period)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Metrics beside the common ones, less is better for all.
+
+    Attributes
+    ----------
+    name : str
+        As in a scenario file: ``metrics: [gait]``.
+    units : mapping of str
+        SI unit of each metric.
+    score : callable
+        From a record to the value of each metric.
+    columns : callable
+        From the columns of the common errors (p95, max, steady, sensed) to all after the headline.
+    needs : tuple of str
+        Entries that the scenario file must have.
+    costs : mapping of str
+        Metrics that count as the cost of a lower error, with their names.
+    path : callable, optional
+        From signals to the (n,) array that rests where a steady-state error is scored; the
+        reference by default.
+    """
+
+    name: str
+    units: Mapping[str, str]
+    score: Callable[[Record], dict[str, float]]
+    columns: Callable[[tuple[Column, ...]], tuple[Column, ...]]
+    needs: tuple[str, ...] = ()
+    costs: Mapping[str, str] = field(default_factory=dict)
+    path: Callable[[Mapping[str, Array]], Array] | None = None
+
+
+def rms(error: Array) -> float:
+    """Return the root mean square of an error of any shape, NaN of none."""
+    return float(np.sqrt(np.mean(np.square(error)))) if error.size else float("nan")

@@ -1,0 +1,1 @@
+"""Metric groups of the plants' families; every ``Group`` in a module here is found by its name."""
