@@ -20,10 +20,14 @@ from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.causes import selected
 from pam_envs.diagnosis.closed_loop import gain as loops
 from pam_envs.diagnosis.decide.held_out import HeldOut, choose, compared, hold_out, interleaved
-from pam_envs.diagnosis.decide.isolability import Isolability
+from pam_envs.diagnosis.decide.isolability import (
+    Isolability,
+    not_testable,
+    shortness_warning,
+    too_few_testable,
+)
 from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.decide.structure import Regressors
-from pam_envs.diagnosis.decide.testable import not_testable, shortness_warning, too_few_testable
 from pam_envs.diagnosis.decide.verdict import Decision, decide, effect_traces
 from pam_envs.diagnosis.experiment.experiment import propose, rival_of
 from pam_envs.diagnosis.experiment.plans import Means
@@ -126,17 +130,18 @@ def diagnose(
         step("refitting the plant")
         start = plant if plant is not None else start_plant(sheet)
         study = Study.begin(recording, sheet, start, floor)
+        study.rule, study.seed = rule, seed
         step("isolability of causes")
-        study.find_testable(asked, recording, sheet)
+        study.find_testable(asked)
         step("fitting rival causes")
-        study.decide(rule, seed)
-        study.recheck_loads(rule, seed)
+        study.decide()
+        study.recheck_loads()
         step("held-out experiments")
-        study.hold_out(seed)
+        study.hold_out()
         step("next experiment, closed loop")
-        study.experiment(sheet)
+        study.experiment()
         if closed_loop:
-            study.close_loop(design, simulated, oracle, seed)
+            study.close_loop(design, simulated, oracle)
         warnings = (study.short, *checked.warnings, *floor.warnings)
         report = report_of(study, rule, tuple(filter(None, warnings)))
         report = plain({**report, "runtime_s": clock.perf_counter() - started})
@@ -145,8 +150,8 @@ def diagnose(
             text=report["text"],
             causes=tuple(c["name"] for c in report["causes"]),
             report=report,
-            base=study.identified(study.base, rule),
-            plant=study.identified(study.model, rule),
+            base=study.identified(study.base),
+            plant=study.identified(study.model),
             traces=study.traces(),
             study=study,
         )
@@ -185,6 +190,8 @@ class Study:
     blocks: Blocks
     base: Candidate
     regressors: Regressors
+    rule: Rule = field(default_factory=Rule)
+    seed: int = 0
     causes: list[Cause] = field(default_factory=list)
     not_testable: dict[str, str] = field(default_factory=dict)
     isolability: Isolability | None = None
@@ -236,10 +243,10 @@ class Study:
         """Return the plant of a candidate."""
         return self.family.plant_of(self.column(candidate.fit))
 
-    def identified(self, candidate: Candidate, rule: Rule) -> SingleMuscle:
+    def identified(self, candidate: Candidate) -> SingleMuscle:
         """Return the plant of a candidate with the provenance of its fitted parameters."""
         digest = self.recording.digest[:12]
-        source = f"pam-envs diagnose, recording {digest}, rule {rule.version}"
+        source = f"pam-envs diagnose, recording {digest}, rule {self.rule.version}"
         return identified(self.plant_of(candidate), candidate.fit.frees, source)
 
     def column(self, fit: Fit) -> Array:
@@ -252,14 +259,14 @@ class Study:
         """Return the simulated readings of a candidate, shape (channels, T)."""
         return self.family.simulate(self.column(candidate.fit)[None])[:, :, 0]
 
-    def find_testable(self, causes: Sequence[Cause], recording: Recording, sheet: Rig) -> None:
+    def find_testable(self, causes: Sequence[Cause]) -> None:
         """Keep the causes that the recording can show."""
         self.isolability, self.not_testable = not_testable(
-            self.problem, self.family, self.base.fit, causes, recording, sheet
+            self.problem, self.family, self.base.fit, causes, self.recording, self.sheet
         )
         self.causes = [c for c in causes if c.name not in self.not_testable]
 
-    def recheck_loads(self, rule: Rule, seed: int) -> None:
+    def recheck_loads(self) -> None:
         """Repeat the decision with loads refitted within their tolerance if they may explain it."""
         if self.decision is None:
             return
@@ -270,14 +277,14 @@ class Study:
         if at_stake and np.isfinite(limit):
             self.base = refit_load(self.problem, self.blocks, self.family, self.base, limit)
             self.causes = [c for c in self.causes if c.name != PAYLOAD_ERROR]
-            self.decide(rule, seed)
+            self.decide()
 
-    def decide(self, rule: Rule, seed: int) -> None:
+    def decide(self) -> None:
         """Compare rival causes."""
         moving = np.bincount(self.blocks.of, np.abs(np.diff(self.recording.command, prepend=0.0)))
         moved = int(np.sum(self.blocks.held_out & (moving > 0.0)))
-        if moved < rule.least_blocks:
-            self.short = shortness_warning(moved, rule.least_blocks)
+        if moved < self.rule.least_blocks:
+            self.short = shortness_warning(moved, self.rule.least_blocks)
         if self.short or too_few_testable(
             len(self.causes), len(self.causes) + len(self.not_testable)
         ):
@@ -290,16 +297,16 @@ class Study:
             self.base,
             self.causes,
             self.regressors,
-            rule,
-            seed,
+            self.rule,
+            self.seed,
         )
 
-    def hold_out(self, seed: int) -> None:
+    def hold_out(self) -> None:
         """Fit base, model and rivals without the held-out data."""
         assert self.decision is not None
         once = any(c.once for c, _ in self.model.causes)
         choice = interleaved(self.blocks) if once else choose(self.recording, self.blocks)
-        self.compared = compared(self.problem, self.blocks, self.base, self.model, seed)
+        self.compared = compared(self.problem, self.blocks, self.base, self.model, self.seed)
         self.held = hold_out(
             self.problem,
             self.blocks,
@@ -308,10 +315,10 @@ class Study:
             self.model,
             [rival for rival, _ in judged(self.decision)],
             self.decision.open_rivals[:THOROUGH],
-            seed,
+            self.seed,
         )
 
-    def experiment(self, sheet: Rig) -> None:
+    def experiment(self) -> None:
         """Propose the experiment that separates the open rivals."""
         decision = self.decision
         if decision is None or decision.verdict != "ambiguous" or not decision.open_rivals:
@@ -326,14 +333,12 @@ class Study:
             first,
             others,
             np.where(measured, self.problem.noise, np.inf),
-            Means.of(self.recording, sheet),
+            Means.of(self.recording, self.sheet),
             self.causes,
             self.family.inputs.longest_step,
         )
 
-    def close_loop(
-        self, design: Callable[..., Any] | None, simulated: Any, oracle: Any, seed: int
-    ) -> None:
+    def close_loop(self, design: Callable[..., Any] | None, simulated: Any, oracle: Any) -> None:
         """Compare controllers designed on the base and on the extended plant."""
         self.loop_reason = self._no_loop()
         if self.loop_reason is not None:
@@ -346,6 +351,9 @@ class Study:
             residuals = loops.Residuals(np.ascontiguousarray(left), self.recording.period)
         loads = self.recording.load[self.recording.load > 0.0]
         load = float(np.median(loads)) / GRAVITY if len(loads) else 0.0
+        celsius, kelvin = self.recording.temperature, None
+        if celsius is not None:  # the temperature furthest from 20 deg C
+            kelvin = float(celsius[np.argmax(np.abs(celsius - 20.0))]) + CELSIUS
         self.loop = loops.closed_loop(
             self.plant_of(self.base),
             self.plant_of(self.model),
@@ -354,8 +362,8 @@ class Study:
             oracle=oracle,
             residuals=residuals,
             load=load,
-            kelvin=self._far_from_room(),
-            seed=seed,
+            kelvin=kelvin,
+            seed=self.seed,
         )
         if self.loop is None:
             self.loop_reason = f"under {load:.3g} kg the stroke is too short for a reference"
@@ -369,13 +377,6 @@ class Study:
             names = ", ".join(cause.name for cause in causes)
             return f"a controller cannot compensate {names}"
         return None
-
-    def _far_from_room(self) -> float | None:
-        """Return the recorded temperature [K] furthest from 20 deg C."""
-        celsius = self.recording.temperature
-        if celsius is None:
-            return None
-        return float(celsius[np.argmax(np.abs(celsius - 20.0))]) + CELSIUS
 
     def traces(self) -> Traces:
         """Return the time series of the report's figures."""

@@ -1,1 +1,1 @@
-"""audit."""
+"""Audit of recordings and tables, and their noise floor."""

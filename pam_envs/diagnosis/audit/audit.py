@@ -19,12 +19,10 @@ from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.fit.tolerance import LOAD, unknown_names, unused_tolerances
 
 BAR = 1e5
-LOAD_STEP = 0.5
-"""Largest difference of loads of one level [N]."""
+LOAD_STEP = 0.5  # largest difference of loads of one level [N]
 REST_PRESSURE = 0.1e5
 REST_SECONDS = 2.0
-WARMING = 1.0
-"""Least variation of the temperature [K] that shows its effect."""
+WARMING = 1.0  # least variation of the temperature [K] that shows its effect
 SHUT_SECONDS = 2.0
 MANY_CYCLES = 5
 

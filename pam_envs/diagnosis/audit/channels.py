@@ -22,19 +22,15 @@ UNITS = {
 }
 """Column, unit and the unit in SI, by field of a recording."""
 STILL_SECONDS = 2.0
-ANSWER_SECONDS = 1.0
-"""Time in which a reading may lag behind the command [s]."""
-STILL_COMMAND = 0.5e5
-"""Change of the command [Pa] above which a constant reading may be stuck."""
+ANSWER_SECONDS = 1.0  # time in which a reading may lag behind the command [s]
+STILL_COMMAND = 0.5e5  # change of the command [Pa] above which a constant reading may be stuck
 TURNING = 1.5e5
 """Reversal of the command [Pa] below which a contraction may be constant due to friction."""
 CLIPPED_ROWS = 20
 SPIKE = 10.0
 COPIED_ROWS = 50
-COPIED_CHANGES = 0.5
-"""Least share of samples of a copied stretch that differ from the previous one."""
-COARSE = 2.0
-"""Ratio of resolution to RMS noise above which rounding hides the noise."""
+COPIED_CHANGES = 0.5  # least share of samples of a copied stretch that differ from the previous one
+COARSE = 2.0  # ratio of resolution to RMS noise above which rounding hides the noise
 
 
 def runs(same: Flags) -> Iterator[tuple[int, int]]:

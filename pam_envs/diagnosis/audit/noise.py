@@ -12,6 +12,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 
 import numpy as np
+from scipy.linalg import toeplitz
 from scipy.optimize import nnls
 
 from pam_envs.data.recording.recording import Recording, repeat_rows
@@ -21,21 +22,13 @@ from pam_envs.diagnosis.audit.repeats import DISAGREE, Source, Trust, best, detr
 
 CHANNELS = {"contraction": ("mm", MM), "pressure": ("bar", BAR)}
 """Measured outputs with unit and scale of display."""
-SETTLING = 1.5
-"""Time after a change of the command that is not used [s]."""
-SHORTEST = 1.0
-LONGEST = 10.0
-"""Shortest and longest used end of a hold [s]."""
-WINDOWS = (1.0, 1.5, 2.5, 5.0, 10.0)
-"""Lengths of the windows at the ends of holds [s]."""
-CORRELATIONS = (0.1, 0.2, 0.4, 0.7, 1.2, 2.0)
-"""Candidate correlation times of coloured noise [s]."""
-TOLERANCE = 1.1
-"""Misfit over the smallest one up to which a correlation time is used."""
-SAME = 10.0
-"""Largest difference of commands of one hold [Pa]."""
-START = 2.0
-"""Time at the start of a repeat that previous motion may influence [s]."""
+SETTLING = 1.5  # time after a change of the command that is not used [s]
+SHORTEST, LONGEST = 1.0, 10.0  # used end of a hold [s]
+WINDOWS = (1.0, 1.5, 2.5, 5.0, 10.0)  # lengths of the windows at the ends of holds [s]
+CORRELATIONS = (0.1, 0.2, 0.4, 0.7, 1.2, 2.0)  # candidate correlation times of coloured noise [s]
+TOLERANCE = 1.1  # misfit over the smallest one up to which a correlation time is used
+SAME = 10.0  # largest difference of commands of one hold [Pa]
+START = 2.0  # time at the start of a repeat that previous motion may influence [s]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -97,22 +90,16 @@ def _channel(recording: Recording, rig: Rig, channel: str, declared: float | Non
     source = best(estimates, declared, trust)
     rounding = float(resolution(values) / np.sqrt(12.0))  # not visible in a hold
     value = max(estimates.get(source, declared or 0.0), rounding)
-    reading = _reading(recording, channel, estimates.get(source, 0.0))
+    reading = estimates.get(source, 0.0)
+    if recording.raw is not None:  # averaging only reduces the white part
+        more = white_noise(recording.raw, getattr(recording.raw, channel)) ** 2
+        less = white_noise(recording, values) ** 2
+        reading = float(np.sqrt(reading**2 + max(0.0, more - less)))
     warnings = (
         *_weak(channel, estimates, source, declared),
         *_misdeclared(channel, reading, source, declared, rounding),
     )
     return ChannelFloor(value, reading, source, estimates, declared, warnings)
-
-
-def _reading(recording: Recording, channel: str, value: float) -> float:
-    """Return the noise before averaging, which only reduces the white part."""
-    raw = recording.raw
-    if raw is None:
-        return value
-    less = white_noise(recording, getattr(recording, channel)) ** 2
-    more = white_noise(raw, getattr(raw, channel)) ** 2
-    return float(np.sqrt(value**2 + max(0.0, more - less)))
 
 
 def resolution(values: Array) -> float:
@@ -172,15 +159,11 @@ def _differences(recording: Recording, rig: Rig, values: Array) -> list[Array]:
         for i, one in enumerate(group):
             for other in group[:i]:
                 difference = (values[one] - values[other])[skipped:]
+                middle = float(np.median(difference))
+                large = abs(middle) > 0.5 * half_width(difference)  # than slow noise would cause
                 if np.ptp(difference) > 0.0:  # otherwise a copy
-                    found.append(_without_offset(difference))
+                    found.append(difference - middle if large else difference)
     return found
-
-
-def _without_offset(difference: Array) -> Array:
-    """Return a difference less its median, if that is larger than slow noise would cause."""
-    middle = float(np.median(difference))
-    return difference - middle if abs(middle) > 0.5 * half_width(difference) else difference
 
 
 def half_width(values: Array) -> float:
@@ -249,7 +232,9 @@ def _coloured(ends: list[Array], period: float) -> float:
     white = np.concatenate([_expected(np.eye(n), lags[n]) for n in windows])
     fits = []
     for time in CORRELATIONS:
-        slow = np.concatenate([_expected(_first_order(n, period / time), lags[n]) for n in windows])
+        slow = np.concatenate(
+            [_expected(toeplitz(np.exp(-period / time * np.arange(n))), lags[n]) for n in windows]
+        )
         sides = np.column_stack([white, slow]) * weights[:, None]
         parts, misfit = nnls(sides, seen * weights)
         fits.append((misfit, float(np.sqrt(parts.sum()))))
@@ -271,10 +256,6 @@ def _windows(ends: list[Array], period: float) -> dict[int, list[Array]]:
 def _autocovariance(pieces: list[Array], lags: Indices) -> Array:
     n = len(pieces[0])
     return np.array([np.mean([p[: n - h] @ p[h:] / (n - h) for p in pieces]) for h in lags])
-
-
-def _first_order(n: int, step: float) -> Array:
-    return np.asarray(np.exp(-step * np.abs(np.subtract.outer(np.arange(n), np.arange(n)))))
 
 
 def _expected(covariance: Array, lags: Indices) -> Array:

@@ -12,16 +12,11 @@ from pam_envs.diagnosis.arrays import Array
 
 Source = Literal["repeats", "holds", "innovations", "declared"]
 
-DISAGREE = 1.5
-"""Ratio above which two estimates of one noise disagree."""
-SURELY = 2.5
-"""Standard deviations beyond which repeats differ by more than noise..."""
-LEAST_EXCESS = 0.1
-"""... with at least this relative excess."""
-GUESSED = 0.5
-"""Relative standard deviation of the slow part of the noise of holds."""
-FAST = 1.15
-"""Ratio of the scatter within a second above which the excess is noise of motion."""
+DISAGREE = 1.5  # ratio above which two estimates of one noise disagree
+SURELY = 2.5  # standard deviations beyond which repeats differ by more than noise
+LEAST_EXCESS = 0.1  # least relative excess of such repeats
+GUESSED = 0.5  # relative standard deviation of the slow part of the noise of holds
+FAST = 1.15  # ratio of the scatter within a second above which the excess is noise of motion
 
 
 @dataclass(frozen=True)

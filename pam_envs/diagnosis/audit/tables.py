@@ -13,8 +13,13 @@ from pam_envs.diagnosis.arrays import Array
 
 MM = 1e-3
 SIGNIFICANT = 0.05
-TREND = 2.5
-"""Absolute t value above which a trend over the repeats is reported."""
+TREND = 2.5  # absolute t value above which a trend over the repeats is reported
+FEW_LOADS = {
+    1: "there is one load: causes that act with the load cannot be decided",
+    2: "there are two loads: whether an effect is in proportion to the load is not known",
+    3: "there are three loads: a quadratic load law cannot be separated from a dead zone; measure "
+    "at least five",
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,7 +64,7 @@ def scatter_homogeneity(table: ContractionTable) -> float:
 
 def audit_table(table: ContractionTable) -> list[str]:
     """Return warnings on a table of settled readings."""
-    warnings = _loads(table)
+    warnings = [FEW_LOADS[n]] if (n := len(table.loads)) in FEW_LOADS else []
     if not one_path(table):
         return [
             *warnings,
@@ -71,9 +76,20 @@ def audit_table(table: ContractionTable) -> list[str]:
     if not several:
         return [*warnings, "every reading was taken once: the noise floor is not known"]
     for load in several:
-        warnings += _drifts(table, load)
-    if len(several) == len(table.loads) > 1:
-        warnings += _unequal(table)
+        trend = repeat_trend(table, load)
+        means = "" if np.isnan(trend.t_means) else f", {trend.t_means:.1f} from the repeats' means"
+        if abs(trend.t) >= TREND:
+            warnings.append(
+                f"the readings at {load:g} kg drift by {trend.slope / MM:+.3f} mm a repeat "
+                f"(t = {trend.t:.1f}{means}): the muscle was not yet cycled in, or the zero moved"
+            )
+    if len(several) == len(table.loads) > 1 and (p := scatter_homogeneity(table)) < SIGNIFICANT:
+        sizes = ", ".join(
+            f"{scatter(table, load) / MM:.3f} mm at {load:g} kg" for load in table.loads
+        )
+        warnings.append(
+            f"the repeats scatter differently between loads (Levene p = {p:.2g}): {sizes}"
+        )
     return warnings
 
 
@@ -82,20 +98,6 @@ def _deviations(table: ContractionTable, load: float) -> Array:
     _, contraction = table.cycles(load)
     cells = contraction[np.any(contraction != 0.0, axis=1)]
     return np.asarray(cells - cells.mean(axis=1, keepdims=True))
-
-
-def _loads(table: ContractionTable) -> list[str]:
-    n = len(table.loads)
-    if n == 1:
-        return ["there is one load: causes that act with the load cannot be decided"]
-    if n == 2:
-        return ["there are two loads: whether an effect is in proportion to the load is not known"]
-    if n == 3:
-        return [
-            "there are three loads: a quadratic load law cannot be separated from a dead zone; "
-            "measure at least five"
-        ]
-    return []
 
 
 def _copied(table: ContractionTable, load: float) -> list[str]:
@@ -108,22 +110,3 @@ def _copied(table: ContractionTable, load: float) -> list[str]:
         for j in range(i)
         if np.array_equal(contraction[:, i], contraction[:, j])
     ]
-
-
-def _drifts(table: ContractionTable, load: float) -> list[str]:
-    trend = repeat_trend(table, load)
-    if abs(trend.t) < TREND:
-        return []
-    means = "" if np.isnan(trend.t_means) else f", {trend.t_means:.1f} from the repeats' means"
-    return [
-        f"the readings at {load:g} kg drift by {trend.slope / MM:+.3f} mm a repeat "
-        f"(t = {trend.t:.1f}{means}): the muscle was not yet cycled in, or the zero moved"
-    ]
-
-
-def _unequal(table: ContractionTable) -> list[str]:
-    p = scatter_homogeneity(table)
-    if p >= SIGNIFICANT:
-        return []
-    sizes = ", ".join(f"{scatter(table, load) / MM:.3f} mm at {load:g} kg" for load in table.loads)
-    return [f"the repeats scatter differently between loads (Levene p = {p:.2g}): {sizes}"]

@@ -21,16 +21,13 @@ PRESSURES = {
 }
 """Other units of pressure: number of units in a bar, and the correction."""
 HIGHEST = 15.0
-USUAL = 6.0
-"""Usual gauge pressure of muscles [bar]."""
-LARGEST_SHARE = 0.4
-"""Largest contraction of a muscle over its rest length."""
+USUAL = 6.0  # usual gauge pressure of muscles [bar]
+LARGEST_SHARE = 0.4  # largest contraction of a muscle over its rest length
 SMALLEST_STROKE, SMALLEST_SHARE = 0.5e-3, 0.002
 """Smallest stroke of a muscle [m], and over its rest length, over a wide range..."""
 WIDE, WIDE_SHARE = 3.0 * BAR, 0.6
 """... of pressures: its width [Pa], and over the regulator's range."""
-FOLLOWS = 0.5
-"""Correlation with the command above which a contraction follows it."""
+FOLLOWS = 0.5  # correlation with the command above which a contraction follows it
 
 
 def wrong_units(recording: Recording, rig: Rig) -> tuple[list[str], list[str]]:

@@ -1,1 +1,1 @@
-"""closed_loop."""
+"""Comparison of controllers before and after the extension of a plant."""

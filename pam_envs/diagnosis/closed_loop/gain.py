@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.causes import catalogue
-from pam_envs.diagnosis.closed_loop.plant_inverse import PREVIEW, Controller, Simulated
+from pam_envs.diagnosis.closed_loop.plant_inverse import PREVIEW, Controller, Rig, Simulated
 from pam_envs.diagnosis.closed_loop.plant_inverse import design as default_design
 from pam_envs.diagnosis.closed_loop.references import DURATION, fixed_references
 from pam_envs.plants.core.stepper import PERIOD, PlantStepper
@@ -27,30 +27,13 @@ Design = Callable[[Any], Controller]
 COMPENSABLE: tuple[str, ...] = tuple(cause.name for cause in catalogue() if cause.compensable)
 """Shipped causes that a controller can compensate."""
 
-SETTLING = 2.0
-"""Time at the start of a reference that is not scored [s]."""
-SEGMENT = 2.0
-"""Length of the bootstrap blocks, and of the pieces of a resampled residual [s]."""
+SETTLING = 2.0  # time at the start of a reference that is not scored [s]
+SEGMENT = 2.0  # length of the bootstrap blocks, and of the pieces of a resampled residual [s]
 DRAWS = 2000
 LEVEL = 0.95
 LEAST_STROKE = 1e-3
-LEAST_GAP = 0.05
-"""Relative gap to the oracle below which the recovered share is not reported."""
+LEAST_GAP = 0.05  # relative gap to the oracle below which the recovered share is not reported
 MM = 1e3
-
-
-class Rig(Protocol):
-    """A rig, or a simulation of one, on which controllers run."""
-
-    @property
-    def position(self) -> float:
-        """True contraction [m]."""
-
-    def reset(self, seed: int | None = None) -> None:
-        """Reset to rest without pressure and restart the noise."""
-
-    def step(self, set_point: float) -> tuple[float, float]:
-        """Hold a setpoint [Pa] for a period; return contraction [m] and pressure [Pa] read."""
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,7 @@ from pam_envs.diagnosis.arrays import Array
 from pam_envs.plants.core.stepper import PlantStepper
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
-PREVIEW = 60
-"""Preview of the reference [samples], with the present one."""
+PREVIEW = 60  # preview of the reference [samples], with the present one
 LEVELS = 15
 SMALLEST, LARGEST = 5e-5, 1.0
 """Slopes of the fan [full pressures a period], geometric on both sides of the last slope."""
@@ -34,8 +33,7 @@ HORIZONS = (2, 3, 5, 8)
 """Candidate horizons: periods after the dead time at which a ramp meets the reference."""
 REACHES = (10, 28)
 """Periods after it in which the reference is kept within reach, with the second horizon."""
-SLIGHT = 2e-5
-"""Distance out of reach that needs no early start [m]."""
+SLIGHT = 2e-5  # distance out of reach that needs no early start [m]
 PROPORTIONAL = (0.0, 0.25, 0.6, 1.0)
 INTEGRAL = (0.0, 0.5, 1.0, 2.0, 3.5, 6.0, 10.0, 16.0)
 """Grid of the gains over full pressure per stroke: [1] and [1/s]."""
@@ -43,12 +41,10 @@ MISTAKES = ((1.2, 2), (0.85, 0), (1.0, 5))
 """Model errors while the loop is tuned: factor on the setpoint, delay [periods]."""
 DISTURBANCE = 0.02
 """Amplitude of the pressure disturbance while the loop is tuned, over the full pressure."""
-AUTHORITY = 0.4
-"""Largest contribution of the integral over the full pressure."""
+AUTHORITY = 0.4  # largest contribution of the integral over the full pressure
 TUNING_TIME = 9.0
 TUNING_SEED = 20_220_613
-SHORTEST = 1e-6
-"""Least stroke for the scale of the gains [m]."""
+SHORTEST = 1e-6  # least stroke for the scale of the gains [m]
 
 
 class Batch(Protocol):
@@ -60,32 +56,26 @@ class Batch(Protocol):
         """Hold setpoints [Pa] for a period; return contractions [m] and pressures [Pa] read."""
 
 
-class Simulated(Protocol):
-    """A plant that a controller can simulate; see :class:`PlantStepper`.
-
-    Attributes
-    ----------
-    period : float
-        Control period [s].
-    max_pressure : float
-        Largest setpoint [Pa].
-    noise : float
-        RMS noise of the contraction reading [m].
-    """
-
-    period: float
-    max_pressure: float
-    noise: float
+class Rig(Protocol):
+    """A rig, or a simulation of one, on which controllers run."""
 
     @property
     def position(self) -> float:
         """True contraction [m]."""
 
     def reset(self, seed: int | None = None) -> None:
-        """Reset to rest without pressure; without a seed it is free of noise."""
+        """Reset to rest without pressure and restart the noise; none without a seed."""
 
     def step(self, set_point: float) -> tuple[float, float]:
         """Hold a setpoint [Pa] for a period; return contraction [m] and pressure [Pa] read."""
+
+
+class Simulated(Rig, Protocol):
+    """A plant that a controller can simulate; see :class:`PlantStepper`."""
+
+    period: float  # control period [s]
+    max_pressure: float  # largest setpoint [Pa]
+    noise: float  # RMS noise of the contraction reading [m]
 
     def try_ahead(self, set_points: ArrayLike, periods: int) -> Array:
         """Return future positions of copies [m], shape (periods, m).

@@ -15,10 +15,8 @@ from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.closed_loop.plant_inverse import PREVIEW
 from pam_envs.plants.core.stepper import PERIOD
 
-DURATION = 24.0
-"""Duration of each reference [s]."""
-LOW, HIGH = 0.15, 0.85
-"""Range of the references over the stroke."""
+DURATION = 24.0  # duration of each reference [s]
+LOW, HIGH = 0.15, 0.85  # range of the references over the stroke
 SEED = 20_030_113
 
 

@@ -1,1 +1,1 @@
-"""decide."""
+"""Search over causes, their comparison and the verdict."""

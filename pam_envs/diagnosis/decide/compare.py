@@ -6,16 +6,15 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtr
 
+from pam_envs.diagnosis.arrays import Indices
 from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import Candidate, refit
 from pam_envs.diagnosis.fit.least_squares import Problem
 
-CROSS_ROUNDS = 4
-"""Rounds of a fit to other blocks."""
+CROSS_ROUNDS = 4  # rounds of a fit to other blocks
 PERFECT = 0.93
 """Mean square over the noise variance of a perfect model, if the noise is slightly overrated."""
 
@@ -105,9 +104,7 @@ def p_value(
     return float(min(1.0, max(looked, 1) * likely))
 
 
-def share_ahead(
-    blocks: Blocks, rival: Candidate, best: Candidate, draws: NDArray[np.int64]
-) -> float:
+def share_ahead(blocks: Blocks, rival: Candidate, best: Candidate, draws: Indices) -> float:
     """Return the share of bootstrap samples of the blocks in which a rival beats the best."""
     return float(np.mean(blocks.gains(rival.errors, best.errors, draws) <= 0.0))
 

@@ -9,10 +9,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pam_envs.data.recording.recording import Recording
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.diagnosis.arrays import Array, Flags, Indices
 from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import (
     Candidate,
@@ -24,12 +23,9 @@ from pam_envs.diagnosis.fit.candidate import (
 )
 from pam_envs.diagnosis.fit.least_squares import FEW_DAMPINGS, Problem, evaluate, improve, share
 
-SHARE = (0.15, 0.4)
-"""Least and largest share of a record that is held out."""
-LEAST_BLOCKS = 8
-"""Number of held-out blocks that a confidence interval needs."""
-ROUNDS = 3
-"""Rounds of a rival's fit to the training data."""
+SHARE = (0.15, 0.4)  # least and largest share of a record that is held out
+LEAST_BLOCKS = 8  # number of held-out blocks that a confidence interval needs
+ROUNDS = 3  # rounds of a rival's fit to the training data
 DRAWS = 400
 LEVEL = (0.025, 0.975)
 
@@ -38,7 +34,7 @@ LEVEL = (0.025, 0.975)
 class Choice:
     """Choice of the held-out data."""
 
-    rows: NDArray[np.bool_]  # (T,): held-out samples
+    rows: Flags  # (T,): held-out samples
     by: str  # {"kinds", "blocks"}: whole kinds of experiment, or interleaved blocks of time
     kinds: tuple[str, ...] = ()  # the held-out kinds; empty for blocks
 
@@ -57,12 +53,12 @@ class HeldOut:
     without: dict[str, Candidate] = field(default_factory=dict)  # model without each of its causes
 
     @property
-    def rows(self) -> NDArray[np.bool_]:
+    def rows(self) -> Flags:
         """Held-out samples, shape (T,)."""
         return self.choice.rows
 
     @cached_property
-    def draws(self) -> NDArray[np.int64]:
+    def draws(self) -> Indices:
         """Count of each block in the bootstrap samples."""
         return self.blocks.draws(DRAWS, self.seed)
 
@@ -120,7 +116,7 @@ def compared(
     return HeldOut(interleaved(blocks), problem, part, seed, base, model)
 
 
-def _held_blocks(problem: Problem, blocks: Blocks, rows: NDArray[np.bool_]) -> Blocks:
+def _held_blocks(problem: Problem, blocks: Blocks, rows: Flags) -> Blocks:
     """Return the blocks with their counts of some samples."""
     some, n = np.isfinite(problem.measured) & rows, len(blocks.held_out)
     counts = np.stack([np.bincount(blocks.of, s, minlength=n) for s in some])
@@ -185,7 +181,10 @@ def _side_by_side(
         return []
     complete_jacobian(problem, base.fit)
     shared = share(problem, base.fit)
-    fits = [restarted(c.fit, z=starting_point_from(base, c), shared=shared) for c in candidates]
+    fits = []
+    for c in candidates:
+        start = np.concatenate([base.fit.z, c.fit.z[len(base.fit.z) :]])
+        fits.append(restarted(c.fit, z=start, shared=shared))
     evaluate(problem, fits)
     improve(problem, fits, ROUNDS, 1e-4, FEW_DAMPINGS)
     return [replace(c, fit=fit) for c, fit in zip(candidates, fits, strict=True)]
@@ -197,8 +196,3 @@ def _thoroughly(problem: Problem, blocks: Blocks, base: Candidate, model: Candid
     if here.fit.cost < there.fit.cost:
         polish(problem, [here.fit])
     return min(there, here, key=lambda c: c.fit.cost)
-
-
-def starting_point_from(base: Candidate, candidate: Candidate) -> Array:
-    """Return the starting point of a candidate on another base."""
-    return np.concatenate([base.fit.z, candidate.fit.z[len(base.fit.z) :]])

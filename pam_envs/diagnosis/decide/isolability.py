@@ -1,4 +1,4 @@
-"""Isolability of causes in a recording, computed from simulations before any residual is used."""
+"""Isolability and testability of causes, simulated before any residual is used."""
 
 from __future__ import annotations
 
@@ -7,21 +7,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pam_envs.data.recording.recording import Recording
+from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis.arrays import Array
+from pam_envs.diagnosis.audit.audit import undecidable
 from pam_envs.diagnosis.cause import Cause
+from pam_envs.diagnosis.fit.blocks import BLOCK_SECONDS, EVERY
 from pam_envs.diagnosis.fit.candidate import initial_fits
 from pam_envs.diagnosis.fit.least_squares import Fit, Free, PlantFamily, Problem, column_of
 
-DIRECTIONS = 1e-8
-"""Relative size of the singular directions of the base's Jacobian that count."""
-TOGETHER = 96
-"""Number of columns simulated in one replay."""
-NO_TRACE = 1e-3
-"""Size over the noise below which an effect is invisible."""
+DIRECTIONS = 1e-8  # relative size of the singular directions of the base's Jacobian that count
+TOGETHER = 96  # number of columns simulated in one replay
+NO_TRACE = 1e-3  # size over the noise below which an effect is invisible
 FAR, FAR_LOG = 30.0, 6.0
 """Factor, and power for logarithmic ones, of the largest tried value over the starting value."""
-ALIKE = 0.9
-"""Cosine above which two causes can only be separated by a further sensor."""
+ALIKE = 0.9  # cosine above which two causes can only be separated by a further sensor
+SHORT = "The recording is too short to decide anything"
+"""Beginning of the warning on a short recording."""
+LEAST_SIZE = 1.0  # size over the noise that a testable cause must reach within its bounds
+LEAST_TESTABLE, LEAST_SHARE = 5, 0.5
+"""Least number of testable causes, or least share of the requested ones, for a decision."""
 
 
 def base_subspace(base: Fit) -> Array:
@@ -148,3 +153,55 @@ def size_over_noise(trace: Array, problem: Problem) -> float:
     rows = problem.rows(trace)
     sizes = [float(np.sqrt(np.mean(r[g] ** 2))) for r, g in zip(rows, good, strict=True) if g.any()]
     return max(sizes, default=0.0)
+
+
+def not_testable(
+    problem: Problem,
+    family: PlantFamily,
+    base: Fit,
+    causes: Sequence[Cause],
+    recording: Recording,
+    sheet: Rig,
+) -> tuple[Isolability, dict[str, str]]:
+    """Return the isolability of the causes, and the reason for each that is not testable."""
+    reasons = undecidable(recording, sheet, causes)
+    present = {f.name for f in base.frees}
+    for cause in causes:
+        if all(any(t.name in present for t in form.terms) for form in cause.forms):
+            reasons[cause.name] = "it is a parameter of the plant already: see calibration"
+    left = [c for c in causes if c.name not in reasons]
+    found = isolability(problem, family, base, left)
+    reasons |= _too_small(found, left)
+    if recording.pressure is None:
+        for name, other in lookalikes(found, left).items():
+            reasons.setdefault(name, f"cannot be separated from {other} without pressure_bar")
+    return found, {c.name: reasons[c.name] for c in causes if c.name in reasons}
+
+
+def _too_small(found: Isolability, causes: Sequence[Cause]) -> dict[str, str]:
+    reach = dict(zip(found.names, found.reach, strict=True))
+    return {
+        cause.name: (
+            f"within its bounds it shows at most {reach.get(cause.name, 0.0):.2g} times the noise "
+            "here, once the plant is refitted"
+        )
+        for cause in causes
+        # the time of an event is searched in the residual
+        if not (cause.once and cause.forms[0].search is not None)
+        and reach.get(cause.name, 0.0) < LEAST_SIZE
+    }
+
+
+def too_few_testable(testable: int, asked: int) -> bool:
+    """Return whether too few causes are testable for a decision."""
+    few = testable < LEAST_TESTABLE and testable < LEAST_SHARE * asked
+    return testable == 0 or few
+
+
+def shortness_warning(moved: int, least: int) -> str:
+    """Return the warning on a recording with too little motion."""
+    return (
+        f"{SHORT}: the command moves in {moved} of the {BLOCK_SECONDS:g} s blocks that are held "
+        f"out, and {least} are needed; record at least {EVERY * least * BLOCK_SECONDS:.0f} s of "
+        "varied motion."
+    )

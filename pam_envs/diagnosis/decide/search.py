@@ -28,10 +28,8 @@ from pam_envs.diagnosis.fit.least_squares import (
 SCHEDULE = ((2, 8, 0.4), (2, 5, 0.6), (4, 4, 0.8))
 """Rounds with the base's Jacobian held; number of fits kept then, or their least share of the best
 gain."""
-FIRST_SIGHT = 0.3
-"""Share of a required gain that the first round of a search must reach."""
-POLISHED = 3
-"""Number of the best rivals that are polished."""
+FIRST_SIGHT = 0.3  # share of a required gain that the first round of a search must reach
+POLISHED = 3  # number of the best rivals that are polished
 
 
 def search(

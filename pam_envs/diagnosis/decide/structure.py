@@ -17,17 +17,14 @@ from pam_envs.diagnosis.fit.blocks import Blocks
 
 BINS = 12
 LAGS = 20
-FILTERS = (0.05, 0.2, 1.0, 5.0, 20.0, 60.0)
-"""Time constants [s] of the flexible model's filters."""
-LOWEST_PEAK = 0.15
-"""Lowest frequency of a spectral peak [Hz]."""
+FILTERS = (0.05, 0.2, 1.0, 5.0, 20.0, 60.0)  # time constants [s] of the flexible model's filters
+LOWEST_PEAK = 0.15  # lowest frequency of a spectral peak [Hz]
 WINDOW, NEAR, LEAST_WINDOWS = 80.0, 12, 4
 """Longest window [s] of a spectrum, bins on either side of a peak's neighbourhood, and least number
 of windows: a spectrum without averaging has peaks of noise."""
 MOVED = 6.0
 """Height of a peak in the spectrum of the motion above which it is due to the experiment."""
-CYCLE = 5e4
-"""Least reversal of the pressure that counts [Pa]."""
+CYCLE = 5e4  # least reversal of the pressure that counts [Pa]
 
 
 @dataclass(frozen=True)

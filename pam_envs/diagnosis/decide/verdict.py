@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.diagnosis.arrays import Array, Indices
 from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.decide.compare import (
     cross_validate,
@@ -31,8 +30,7 @@ from pam_envs.diagnosis.fit.least_squares import PlantFamily, Problem, column_of
 Models = tuple[Candidate, list[Candidate]]
 """The best model with some number of causes, and its rivals, best first."""
 
-KEPT = 12
-"""Number of rivals of a level that are judged."""
+KEPT = 12  # number of rivals of a level that are judged
 
 
 @dataclass(frozen=True)
@@ -188,7 +186,7 @@ class Ladder:
         base: Candidate,
         rival: Candidate,
         best: Candidate,
-        draws: NDArray[np.int64],
+        draws: Indices,
     ) -> dict[str, Any]:
         """Return the evidence on one rival."""
         return {

@@ -1,1 +1,1 @@
-"""experiment."""
+"""Design of the next experiment."""

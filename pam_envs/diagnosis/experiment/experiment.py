@@ -7,7 +7,7 @@ refit of either one's own parameters to the new data cannot remove.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,8 +22,7 @@ from pam_envs.plants.single_muscle.replay import LONGEST_STEP, Inputs, replay_ro
 
 ENOUGH = 1.0
 """Least mean squared difference of the rivals, in noise variances, of a useful experiment."""
-RANK = 1e-6
-"""Relative size of the directions of a rival's parameters that count."""
+RANK = 1e-6  # relative size of the directions of a rival's parameters that count
 
 
 @dataclass(frozen=True)
@@ -31,20 +30,12 @@ class Rival:
     """A fitted model with its sensitivity to its own parameters."""
 
     names: tuple[str, ...]
-    column: Array  # (p,)
-    nearby: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (k, p): one parameter moved
+    columns: Array  # (1 + k, p): its parameters, then with one of those of its causes perturbed
 
     @property
     def label(self) -> str:
         """Name in the report."""
         return "+".join(self.names)
-
-    @property
-    def columns(self) -> Array:
-        """Parameters and perturbed parameters, shape (1 + k, p)."""
-        return (
-            np.vstack([self.column[None], self.nearby]) if len(self.nearby) else self.column[None]
-        )
 
 
 def rival_of(names: tuple[str, ...], fit: Fit, base: int, tie: Callable[[Array], None]) -> Rival:
@@ -52,7 +43,7 @@ def rival_of(names: tuple[str, ...], fit: Fit, base: int, tie: Callable[[Array],
     places = [fit.z, *(shifted(fit, k)[0] for k in range(base, len(fit.z)))]
     columns = np.array([column_of(fit, z) for z in places])
     tie(columns)
-    return Rival(names, columns[0], columns[1:])
+    return Rival(names, columns)
 
 
 def _over_noise(outputs: Array, noise: Array) -> Array:
@@ -94,9 +85,9 @@ def separations(
     found = _over_noise(replay_rows(plant, columns, inputs), noise)
     samples, traces, at = len(inputs.command), [], 0
     for rival in rivals:
-        n = 1 + len(rival.nearby)
-        traces.append((found[at], found[at + 1 : at + n] - found[at]))
-        at += n
+        end = at + len(rival.columns)
+        traces.append((found[at], found[at + 1 : end] - found[at]))
+        at = end
     (here, moves), *others = traces
     return [
         min(_left(here - there, own) for own in (moves, theirs)) / samples

@@ -18,8 +18,7 @@ from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.audit.audit import load_levels
 
 PERIOD = 0.02
-WARMER = 10.0
-"""Temperature rise of a warmed muscle [K]."""
+WARMER = 10.0  # temperature rise of a warmed muscle [K]
 STAIRS = tuple(v / 10.0 for v in (*range(1, 10), *range(8, 0, -1)))
 
 

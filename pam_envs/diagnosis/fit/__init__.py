@@ -1,1 +1,1 @@
-"""fit."""
+"""Fits of plants by simulation."""

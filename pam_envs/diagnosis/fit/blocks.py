@@ -5,22 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.diagnosis.arrays import Array, Flags, Indices
 
-BLOCK_SECONDS = 4.0
-"""Length of the interleaved blocks [s]."""
-EVERY = 3
-"""Period of the held-out blocks: every third one."""
+BLOCK_SECONDS = 4.0  # length of the interleaved blocks [s]
+EVERY = 3  # period of the held-out blocks: every third one
 
 
 @dataclass(frozen=True)
 class Blocks:
     """Blocks of time."""
 
-    of: NDArray[np.int64]  # (T,): block of each sample
-    held_out: NDArray[np.bool_]  # (n,): blocks that are excluded from fits
+    of: Indices  # (T,): block of each sample
+    held_out: Flags  # (n,): blocks that are excluded from fits
     counts: Array  # (channels, n): number of readings in each block
 
     @classmethod
@@ -34,7 +31,7 @@ class Blocks:
         return cls(of, np.arange(n) % EVERY == EVERY - 1, counts.astype(np.float64))
 
     @property
-    def train(self) -> NDArray[np.bool_]:
+    def train(self) -> Flags:
         """Training samples, shape (T,)."""
         return ~self.held_out[self.of]
 
@@ -43,19 +40,19 @@ class Blocks:
         n = len(self.held_out)
         return np.stack([np.bincount(self.of, r * r, minlength=n) for r in rows])
 
-    def means(self, errors: Array, selected: NDArray[np.bool_] | None = None) -> Array:
+    def means(self, errors: Array, selected: Flags | None = None) -> Array:
         """Return the mean square by channel over some blocks (default: those held out)."""
         use = self.held_out if selected is None else selected
         counts = self.counts[:, use].sum(axis=1)
         return errors[:, use].sum(axis=1) / np.maximum(counts, 1)
 
-    def gain(self, before: Array, after: Array, selected: NDArray[np.bool_] | None = None) -> float:
+    def gain(self, before: Array, after: Array, selected: Flags | None = None) -> float:
         """Return the sum over channels of ``ln(MSE_before / MSE_after)``."""
         some = self.counts.sum(axis=1) > 0
         a, b = self.means(before, selected)[some], self.means(after, selected)[some]
         return float(np.sum(np.log(np.maximum(a, 1e-12) / np.maximum(b, 1e-12))))
 
-    def draws(self, number: int, seed: int) -> NDArray[np.int64]:
+    def draws(self, number: int, seed: int) -> Indices:
         """Return the count of each block in bootstrap samples, shape (number, n)."""
         rng = np.random.default_rng(seed)
         places = np.flatnonzero(self.held_out)
@@ -64,7 +61,7 @@ class Blocks:
             drawn[k] = np.bincount(rng.choice(places, len(places)), minlength=drawn.shape[1])
         return drawn
 
-    def gains(self, before: Array, after: Array, draws: NDArray[np.int64]) -> Array:
+    def gains(self, before: Array, after: Array, draws: Indices) -> Array:
         """Return the gain in each bootstrap sample, shape (number,)."""
         some = self.counts.sum(axis=1) > 0
         a, b = before[some] @ draws.T, after[some] @ draws.T

@@ -24,12 +24,9 @@ from pam_envs.diagnosis.fit.least_squares import (
     share,
 )
 
-POLISH = 6
-"""Largest number of rounds with the full Jacobian."""
-FEW_ROUNDS = 3
-"""Rounds of a model without one of its causes."""
-POLISHED_ENOUGH = 1e-3
-"""Relative decrease of the cost below which polishing ends."""
+POLISH = 6  # largest number of rounds with the full Jacobian
+FEW_ROUNDS = 3  # rounds of a model without one of its causes
+POLISHED_ENOUGH = 1e-3  # relative decrease of the cost below which polishing ends
 
 
 @dataclass(frozen=True)

@@ -14,21 +14,16 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pam_envs.diagnosis.arrays import Array
+from pam_envs.diagnosis.arrays import Array, Flags, Indices
 
 DAMPINGS = (1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
 """Levenberg-Marquardt dampings tried side by side, each in a lane of the replay."""
 FEW_DAMPINGS = (1e-6, 1e-3, 0.3)
-LEAST_DAMPING = 1e-9
-"""Regularisation of the normal equations."""
-STALLED = 1e3
-"""Factor on all dampings after a round without improvement."""
-REACH_LOG, REACH = 1.0, 30.0
-"""Longest steps in internal coordinates."""
-WORST = 1e4
-"""Largest weighted residual, also of a diverged simulation."""
+LEAST_DAMPING = 1e-9  # regularisation of the normal equations
+STALLED = 1e3  # factor on all dampings after a round without improvement
+REACH_LOG, REACH = 1.0, 30.0  # longest steps in internal coordinates
+WORST = 1e4  # largest weighted residual, also of a diverged simulation
 
 
 @dataclass(frozen=True)
@@ -130,12 +125,12 @@ class Problem:
     simulate: Callable[[Array], Array]  # from columns (n, p) to outputs (channels, T, n)
     measured: Array  # (channels, T): readings; NaN where there is none
     noise: Array  # (channels,): standard deviation of each channel's noise
-    train: NDArray[np.bool_]  # (T,): training samples
+    train: Flags  # (T,): training samples
     time: Array  # (T,) [s]
     tie: Callable[[Array], None] = lambda columns: None  # completes columns in place
 
     @cached_property
-    def order(self) -> NDArray[np.int64]:
+    def order(self) -> Indices:
         """Index into the flattened (channels, T) of each entry of a residual vector."""
         mask = np.tile(self.train, len(self.measured))
         return np.concatenate([np.flatnonzero(mask), np.flatnonzero(~mask)])

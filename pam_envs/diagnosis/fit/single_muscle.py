@@ -21,45 +21,31 @@ from pam_envs.plants.single_muscle.replay import CHANNELS, Inputs, replay_rows
 THRESHOLDS = (3e3, 7e3, 1.2e4, 1.8e4, 2.5e4, 3.3e4, 4.2e4, 5.2e4, 6.3e4, 7.6e4, 9.1e4, 1.1e5)
 """Thresholds [Pa] of the base's play operators."""
 LEAST_LINEAR = 0.02
-STATIC = (
-    "muscle.area",
-    "muscle.area_taper",
-    "muscle.area_curve",
-    "muscle.braid_force",
-    "muscle.stiffness",
-    "muscle.softening",
-    "muscle.hardening",
-    "muscle.stiffening",
-)
-BASE = ("regulator.gain", "regulator.time_constant", *STATIC, "mass.moving_mass", "mass.damping")
-LOGARITHMIC = (
-    "regulator.time_constant",
-    "muscle.area",
-    "mass.moving_mass",
-    "mass.damping",
-)
-PRIORS = {
-    "muscle.area_taper": 60.0,
-    "muscle.area_curve": 60.0,
-    "muscle.softening": 60.0,
-    "muscle.hardening": 60.0,
-    "muscle.stiffening": 60.0,
-    "muscle.braid_force": 60.0,
-    "muscle.stiffness": 60.0,
-    "mass.moving_mass": 0.7,
-    "mass.damping": 1.0,
+SETTINGS: dict[str, dict[str, Any]] = {
+    "regulator.gain": {"scale": 0.01},
+    "regulator.time_constant": {"log": True, "prior": 1.5},
+    "muscle.area": {"log": True, "prior": 1.5},
+    "muscle.area_taper": {"scale": 0.1, "prior": 60.0},
+    "muscle.area_curve": {"scale": 0.5, "prior": 60.0},
+    "muscle.braid_force": {"scale": 5.0, "prior": 60.0},
+    "muscle.stiffness": {"scale": 100.0, "prior": 60.0},
+    "muscle.softening": {"scale": 500.0, "prior": 60.0},
+    "muscle.hardening": {"scale": 2e3, "prior": 60.0},
+    "muscle.stiffening": {"scale": 1e4, "prior": 60.0},
+    "mass.moving_mass": {"log": True, "prior": 0.7},
+    "mass.damping": {"log": True, "prior": 1.0},
 }
-SCALES = {
-    "muscle.braid_force": 5.0,
-    "muscle.stiffness": 100.0,
-    "regulator.gain": 0.01,
-    "muscle.area_taper": 0.1,
-    "muscle.area_curve": 0.5,
-    "muscle.softening": 500.0,
-    "muscle.hardening": 2e3,
-    "muscle.stiffening": 1e4,
-    "hysteresis.weight": 0.02,
+"""Base parameters with the settings of their fits that differ from the declarations."""
+BASE = tuple(SETTINGS)
+PLAIN_NEUTRAL = {
+    "regulator.dead_time": 0.0,
+    "regulator.slew_rate": 1e9,
+    "hysteresis.stretch": 0.0,
+    "hysteresis.width_per_load": 0.0,
 }
+"""Effects of the plain step, which :data:`NEUTRAL` does not list."""
+SWITCHED_OFF = {k: v for k, v in (NEUTRAL | PLAIN_NEUTRAL).items() if k != "mass.carried"}
+"""Neutral values of all effects; the rig declares the other parameter."""
 
 
 def declared(plant: SingleMuscle, name: str) -> Any:
@@ -107,36 +93,22 @@ class MuscleFamily:
         """Return the fit settings of a parameter; ``changes`` override its declaration."""
         if name.startswith("hysteresis.weight["):
             k = int(name.removeprefix("hysteresis.weight[")[:-1])
+            weight = dict(low=0.0, high=1.0, scale=0.02, prior=25.0)
             start = float(self.column[R.WEIGHT + k])
-            made = dict(
-                low=0.0, high=1.0, scale=SCALES["hysteresis.weight"], start=start, prior=25.0
-            )
-            return Free(name, R.WEIGHT + k, **{**made, **changes})
-        d = declared(self.plant, name)
-        value = self.plant.value(name)
-        log = name in LOGARITHMIC
-        made = dict(
-            low=d.low,
-            high=d.high,
-            log=log,
-            start=value,
-            scale=SCALES.get(name, max(abs(value), 0.01 * (d.high - d.low)) * 0.1),
-            prior=PRIORS.get(name, 1.5 if log else np.inf),
-        )
-        return Free(name, R.place(name), **{**made, **changes})
+            return Free(name, R.WEIGHT + k, **{**weight, "start": start, **changes})
+        d, value = declared(self.plant, name), self.plant.value(name)
+        made = dict(low=d.low, high=d.high, start=value)
+        made["scale"] = max(abs(value), 0.01 * (d.high - d.low)) * 0.1
+        return Free(name, R.place(name), **{**made, **SETTINGS.get(name, {}), **changes})
 
     def base(self) -> tuple[Free, ...]:
         """Return the base parameters, with those of effects that the plant already has."""
         names = [*BASE, *(f"hysteresis.weight[{k}]" for k in range(self.plant.elements))]
         present = [
             name
-            for name, neutral in NEUTRAL.items()
-            if name not in names and self.plant.value(name) != neutral and name not in DECLARED
+            for name, off in SWITCHED_OFF.items()
+            if name not in names and self.plant.value(name) != off
         ]
-        for name, neutral in OLD_NEUTRAL.items():
-            if self.plant.value(name) != neutral:
-                present.append(name)
-        present = [name for name in present if name not in names]
         return tuple(self.free(name) for name in (*names, *present))
 
     def plant_of(self, column: Array) -> SingleMuscle:
@@ -159,14 +131,6 @@ class MuscleFamily:
 
 FINER = (6, 8, 12, 20, 40)
 """Numbers of sub-steps tried for a fitted plant that is unstable with those of the given plant."""
-DECLARED = ("mass.carried",)
-OLD_NEUTRAL = {
-    "regulator.dead_time": 0.0,
-    "regulator.slew_rate": 1e9,
-    "hysteresis.stretch": 0.0,
-    "hysteresis.width_per_load": 0.0,
-}
-"""Effects with plain parameters, which the extended step does not list as neutral."""
 
 
 def start_plant(rig: Any) -> SingleMuscle:
@@ -174,10 +138,7 @@ def start_plant(rig: Any) -> SingleMuscle:
     stock = SingleMuscle.mas10("maxwell_slip")
     weights = np.full(len(THRESHOLDS), 0.7 / len(THRESHOLDS))
     values: dict[str, Any] = {
-        "regulator.dead_time": 0.0,
-        "regulator.slew_rate": 1e9,
-        "hysteresis.stretch": 0.0,
-        "hysteresis.width_per_load": 0.0,
+        **PLAIN_NEUTRAL,
         "hysteresis.operator": PlayOperator(THRESHOLDS, tuple(weights), 1.0 - float(weights.sum())),
         "mass.load": 0.0,
         "muscle.area_taper": 1.0,

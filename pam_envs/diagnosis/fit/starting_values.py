@@ -16,12 +16,9 @@ from pam_envs.diagnosis.fit.least_squares import Fit, PlantFamily, Problem, colu
 
 Starts = Sequence[tuple[float, ...]]
 
-EARLIEST = 0.03
-"""Share of a record at either end without candidates for a step: there it is a bias."""
-SLOW = (30.0, 120.0)
-"""Starting values of the duration of a slow drift [s]."""
-APART = 0.02
-"""Least distance of two candidates, as a share of the record."""
+EARLIEST = 0.03  # share of a record at either end without candidates for a step: there it is a bias
+SLOW = (30.0, 120.0)  # starting values of the duration of a slow drift [s]
+APART = 0.02  # least distance of two candidates, as a share of the record
 CANDIDATES = 2
 
 

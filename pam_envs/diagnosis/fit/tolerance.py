@@ -19,12 +19,10 @@ from pam_envs.diagnosis.fit.single_muscle import BASE
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.wording import near
 
-LOAD = "mass.load"
-"""The declared parameter whose error is a cause."""
+LOAD = "mass.load"  # the declared parameter whose error is a cause
 LOAD_ERROR = "mass.load_error"
 PAYLOAD_ERROR, IMITATES_PAYLOAD_ERROR = "payload_error", "load_dependent_compliance"
-UNWEIGHED = 0.5
-"""Relative error of a load without a declared tolerance."""
+UNWEIGHED = 0.5  # relative error of a load without a declared tolerance
 
 
 def unknown_names(tolerance: Iterable[str]) -> list[str]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from pam_envs.diagnosis.decide.isolability import SHORT
 from pam_envs.diagnosis.decide.rule import Rule
-from pam_envs.diagnosis.decide.testable import SHORT
 from pam_envs.diagnosis.fit.blocks import BLOCK_SECONDS
 from pam_envs.diagnosis.report.page_parts import enumeration
 

@@ -11,8 +11,15 @@ from pam_envs.data.recording.recording import Recording, Rig
 from pam_envs.diagnosis.audit.noise import noise_floor
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.causes import by_name, catalogue
-from pam_envs.diagnosis.decide.isolability import Isolability, ends, isolability, lookalikes
-from pam_envs.diagnosis.decide.testable import LEAST_SIZE, not_testable, too_few_testable
+from pam_envs.diagnosis.decide.isolability import (
+    LEAST_SIZE,
+    Isolability,
+    ends,
+    isolability,
+    lookalikes,
+    not_testable,
+    too_few_testable,
+)
 from pam_envs.diagnosis.diagnosis import Study
 from pam_envs.diagnosis.fit.candidate import initial_fits
 from pam_envs.diagnosis.fit.single_muscle import start_plant

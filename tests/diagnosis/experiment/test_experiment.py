@@ -46,8 +46,7 @@ def rival(name: str, *nearby: dict, **values: float) -> Rival:
     """Return a plant with some parameters, and those that move a little as its own."""
     here = {key.replace("__", "."): value for key, value in values.items()}
     plants = [PLANT.replace({**here, **more}) for more in ({}, *nearby)]
-    columns = np.array([p.parameter_rows() for p in plants])
-    return Rival((name,), columns[0], columns[1:])
+    return Rival((name,), np.array([p.parameter_rows() for p in plants]))
 
 
 def proposed(first: Rival, *others: Rival, noise=NOISE, means=ABLE):
@@ -203,7 +202,7 @@ def test_rival_has_perturbed_own_parameters():
     fit = Fit((base, *own), np.array([f.inner(f.start) for f in (base, *own)]), family.column)
     found = rival_of(("leak", "wire_slack"), fit, 1, family.tie)
     assert found.label == "leak+wire_slack"
-    moved = found.nearby - found.column
+    moved = found.columns[1:] - found.columns[0]
     assert [np.flatnonzero(row).tolist() for row in moved] == [[f.place] for f in own]
     assert moved[0, own[0].place] == pytest.approx(0.02 * 0.005)
     assert moved[1, own[1].place] == pytest.approx(-0.02 * 1e-4)

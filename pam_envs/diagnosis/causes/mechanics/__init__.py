@@ -1,1 +1,1 @@
-"""mechanics."""
+"""Causes in guide, mount, wire and payload."""

@@ -5,27 +5,19 @@ no tray, so that the unloaded curve fits. It is testable for loads with a declar
 error significantly beyond the tolerance is an error of the payload, a smaller one is refitted.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
 CAUSE = Cause(
     name="payload_error",
     title="an error of the payload",
     forms=(Form("tray", (Term("mass.load_error", (0.1, -0.1), scale=0.05),)),),
-    signature=(
-        "every loaded segment has the error of one further weight, equal at all loads; "
-        "segments without a load fit"
-    ),
+    signature="the error of one further weight at every load alike; segments without a load fit",
     neighbours=("load_dependent_compliance",),
     experiment=(
         "The same slow triangle under five loads, one of them none: a tray shifts all loads by one "
         "weight and not the empty hook, compliance grows with the load. Or weigh the load."
     ),
-    source=(
-        "Assumed: trays and hooks of rigs weigh up to a few hundred grams; a change of "
-        "the mass separates it from a gain of the static map."
-    ),
+    source="Assumed: trays and hooks of rigs weigh up to a few hundred grams.",
     needs=("contraction", "loads", "weighed"),
     settled="needs loads declared with a tolerance",
     sensor="scales",

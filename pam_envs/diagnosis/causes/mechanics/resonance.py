@@ -5,8 +5,6 @@ position sensor stands on a soft bracket. A share of the pressure, or of the pos
 through a lightly damped second-order system of a few hertz.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.fit.starting_values import grid
 
@@ -33,10 +31,7 @@ CAUSE = Cause(
         Form("line", _ring("regulator", 0.0, _FLOW), grid(_SHARES, _HERTZ, _DAMPINGS, _FLOWS)),
         Form("mount", _ring("mass", -0.8), grid(_TILTS, _HERTZ, _TILT_DAMPINGS)),
     ),
-    signature=(
-        "a decaying oscillation of one frequency after every step, whatever its size; a peak in "
-        "the spectrum that is absent in holds"
-    ),
+    signature="a decaying oscillation of one frequency after every step, absent in holds",
     contains=("sensor_delay", "dead_time"),
     neighbours=("dead_time", "viscous_loss"),
     experiment=(

@@ -5,8 +5,6 @@ The load is at rest until the force exceeds the breakaway force and then jumps t
 with the kinetic friction. Weak sticking resembles a loss that depends on direction.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.fit.starting_values import grid
 
@@ -28,19 +26,13 @@ CAUSE = Cause(
             search=grid(_BREAKS, _HOLDS, _SPEEDS, best=5),
         ),
     ),
-    signature=(
-        "in slow motion the contraction stops and jumps; the error is a saw-tooth with the "
-        "sign of the direction, whatever the speed"
-    ),
+    signature="a saw-tooth with the sign of the direction: slow motion stops and jumps",
     neighbours=("viscous_loss", "hysteresis_drive", "hysteresis_shape", "valve_dead_band"),
     experiment=(
         "A very slow triangle, 10 s or more for each way: stick-slip gives stairs, other "
         "causes a line; the pressure is smooth, unlike with a dead band of the valve."
     ),
-    source=(
-        "Armstrong-Hélouvry, Dupont and Canudas de Wit 1994, Automatica 30(7); sizes are assumed, "
-        "within what guides of small rigs show."
-    ),
+    source="armstrong1994; sizes are assumed, within what guides of small rigs show.",
     needs=("contraction",),
     sensor="a position sensor of higher resolution, or a load cell between muscle and load",
     # not compensable: below the breakaway force nothing moves, and noise decides where it sticks

@@ -1,1 +1,1 @@
-"""muscle."""
+"""Causes in the muscle."""

@@ -6,8 +6,6 @@ fixed time constants from 0.4 to 90 s approximate any such law. Either the effec
 creeps, and with it the force, or the length, as in a fitting or a coating.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
 _ELEMENTS = (1, 2, 3, 4)
@@ -25,10 +23,7 @@ CAUSE = Cause(
             tuple(Term(f"muscle.creep_{k}", (0.01,), low=-0.02, scale=0.01) for k in _ELEMENTS),
         ),
     ),
-    signature=(
-        "in holds the contraction continues along the logarithm of the time since the step, with "
-        "the sign of the step, while the pressure is constant"
-    ),
+    signature="in holds at constant pressure the contraction continues with the logarithm of time",
     neighbours=(
         "leak",
         "sensor_bias",

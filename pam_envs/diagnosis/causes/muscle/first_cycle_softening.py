@@ -5,8 +5,6 @@ long rest; strands that adhere to one another come loose. The first travel of th
 has wider loops and less effective pressure, and both decay with the travel.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
 CAUSE = Cause(
@@ -22,19 +20,13 @@ CAUSE = Cause(
             ),
         ),
     ),
-    signature=(
-        "the first cycles contract less and have wider loops than later ones; the error decays "
-        "with the travel, not with time"
-    ),
+    signature="the first cycles contract less, with wider loops; it decays with travel, not time",
     neighbours=("creep", "sensor_drift", "temperature"),
     experiment=(
         "Rest overnight, then cycle; rest for an hour without cycling, then cycle again: softening "
         "depends on the travel, creep and drift on time, heat on the duty."
     ),
-    source=(
-        "Mullins 1969, Rubber Chemistry and Technology 42; an open wrist-robot project: loops of "
-        "80 kPa in the first cycle, 53 kPa in the second."
-    ),
+    source="mullins1969; an open wrist-robot project: a first loop of 80 kPa, a second of 53.",
     needs=("contraction", "rest"),
     once=True,
     settled="cycles before the table are unknown; see the warnings for a drift",

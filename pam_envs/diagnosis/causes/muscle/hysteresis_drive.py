@@ -5,8 +5,6 @@ them slide in a blocked muscle too, where they are at rest. The plant has four M
 the length, which break away one after the other and act against the motion.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
 CAUSE = Cause(
@@ -40,8 +38,8 @@ CAUSE = Cause(
     ),
     source=(
         "Public isometric pulse tests of 10 and 20 mm Festo muscles: hardly any loop at full "
-        "length, 6 to 13 N at 4 to 9 % contraction whatever the force; Vo-Minh et al. 2011, "
-        "IEEE/ASME Transactions on Mechatronics 16(1): Maxwell-slip elements in the length."
+        "length, 6 to 13 N at 4 to 9 % contraction; vominh2011: Maxwell-slip elements in the "
+        "length."
     ),
     needs=("contraction",),
     settled="whole cycles do not separate length-driven from pressure-driven friction",

@@ -6,18 +6,13 @@ differently from those that have just reversed. The plant weakens or strengthens
 largest value by the difference to that value.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
 CAUSE = Cause(
     name="hysteresis_shape",
     title="the shape of minor loops",
     forms=(Form("inner loops", (Term("hysteresis.shape", (2.0, 0.5), log=True),)),),
-    signature=(
-        "the error starts at reversals and vanishes when the loop is fully slipped: large loops "
-        "fit, small reversals do not"
-    ),
+    signature="the error starts at reversals and vanishes at full slip: only large loops fit",
     neighbours=("hysteresis_drive", "pressure_dependent_friction", "stick_slip"),
     experiment=(
         "Small triangles about half the pressure after a full cycle, once more after a small one, "

@@ -5,8 +5,6 @@ and compliant fittings, so that a load costs more pressure (a shift with its squ
 another stiffness (passive force times a polynomial in the root of the load).
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
 CAUSE = Cause(
@@ -34,9 +32,8 @@ CAUSE = Cause(
         "cannot separate a square law from a dead zone."
     ),
     source=(
-        "Readings of a MAS-10-N-100 (Applied Sciences 2021, 11(21), 9855, Tables 3 to 5): the load "
-        "enters as a shift of the pressure, 0.079 bar a kilogram, growing faster than in "
-        "proportion."
+        "positioning2021, Tables 3 to 5: the load enters as a shift of the pressure, 0.079 bar a "
+        "kilogram, growing faster than in proportion."
     ),
     needs=("contraction", "loads"),
     sensor="a load cell between muscle and load",

@@ -4,17 +4,13 @@ A load stretches the braid, changes its angle and the force between its strands,
 friction. The plant scales the hysteretic part in proportion to the load.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
 CAUSE = Cause(
     name="load_dependent_hysteresis",
     title="hysteresis that changes with load",
     forms=(Form("linear", (Term("hysteresis.width_per_load", (-0.01, 0.02), scale=0.01),)),),
-    signature=(
-        "the error has the sign of the direction at small loads and the opposite one at large loads"
-    ),
+    signature="the sign of the direction at small loads and the opposite one at large loads",
     neighbours=("load_dependent_compliance", "pressure_dependent_friction", "hysteresis_drive"),
     experiment=(
         "The same slow triangle under five loads: a changing width opens or closes the loop about "
@@ -22,8 +18,8 @@ CAUSE = Cause(
         "until it is in the model."
     ),
     source=(
-        "Readings of a MAS-10-N-100 (Applied Sciences 2021, 11(21), 9855, Tables 3 to 5): widest "
-        "loops of 3.3, 2.8 and 2.4 mm at 0, 2.55 and 4.55 kg, 5.6 % less width a kilogram."
+        "positioning2021, Tables 3 to 5: widest loops of 3.3, 2.8 and 2.4 mm at 0, 2.55 and 4.55 "
+        "kg, 5.6 % less width a kilogram."
     ),
     needs=("contraction", "loads"),
     sensor="a load cell between muscle and load",

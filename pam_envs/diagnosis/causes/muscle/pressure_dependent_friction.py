@@ -5,8 +5,6 @@ less the effect of the load. In the plant the hysteresis acts on a stretched pre
 uniform friction, so that the width of the loop changes along the range.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
 CAUSE = Cause(
@@ -22,19 +20,15 @@ CAUSE = Cause(
             ),
         ),
     ),
-    signature=(
-        "the error has the sign of the direction at low pressures and the opposite one at high "
-        "pressures"
-    ),
+    signature="the sign of the direction at low pressures and the opposite one at high pressures",
     neighbours=("hysteresis_drive", "hysteresis_shape", "load_dependent_hysteresis", "sensor_bias"),
     experiment=(
         "Small loops of the same size at three mean pressures, under two loads: with pressure the "
         "width changes at either load, with load at every pressure, a wrong shape changes neither."
     ),
     source=(
-        "Tondu and Lopez 2000, IEEE Control Systems Magazine 20(2): friction between threads goes "
-        "with the force between them; an open wrist-robot project: 0.5 N and 15 N/MPa; least "
-        "squares on readings of a MAS-10-N-100 (Applied Sciences 2021, 11(21), 9855)."
+        "tondu2000: friction between threads goes with the force between them; an open wrist-robot "
+        "project: 0.5 N and 15 N/MPa; least squares on positioning2021."
     ),
     needs=("contraction",),
     sensor="a load cell between muscle and load",

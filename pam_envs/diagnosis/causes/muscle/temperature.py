@@ -5,24 +5,19 @@ decrease with it, and cycling heats the muscle. The effective pressure changes b
 kelvin away from 20 degrees Celsius.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
 CAUSE = Cause(
     name="temperature",
     title="the effect of temperature",
     forms=(Form("gain", (Term("muscle.temperature_gain", (0.002, -0.002), scale=0.001),)),),
-    signature=("the error of the contraction is proportional to temperature times pressure"),
+    signature="the error of the contraction is proportional to temperature times pressure",
     neighbours=("creep", "sensor_drift", "first_cycle_softening", "load_dependent_compliance"),
     experiment=(
         "Repeat a staircase while the muscle is warmed, and again when it has cooled: only "
         "heat returns to the same curve; without warming, rest as long instead of cycling."
     ),
-    source=(
-        "Treloar, The Physics of Rubber Elasticity: the modulus of rubber is "
-        "proportional to absolute temperature; the size for a muscle is assumed."
-    ),
+    source="treloar1975 for the modulus of rubber; the size for a muscle is assumed.",
     needs=("contraction", "temperature"),
     settled="no temperature was recorded",
     sensor="a thermocouple on the muscle",

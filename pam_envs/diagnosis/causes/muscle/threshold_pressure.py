@@ -5,18 +5,13 @@ straightens first. In the plant pressures below the threshold have no effect, an
 subtracted above it.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
 CAUSE = Cause(
     name="threshold_pressure",
     title="the threshold pressure of the muscle",
     forms=(Form("hard", (Term("hysteresis.threshold", (5e3,), scale=2e3),)),),
-    signature=(
-        "at low pressures the contraction starts late, with a kink, at the same pressure under "
-        "every load; above it the curve fits"
-    ),
+    signature="the contraction starts late, with a kink, at the same pressure under every load",
     neighbours=("sensor_bias", "wire_slack", "valve_dead_band"),
     experiment=(
         "Slow ramps from rest, against the measured pressure and under several loads: slack "
@@ -24,9 +19,8 @@ CAUSE = Cause(
         "constant."
     ),
     source=(
-        "Public isometric pulse tests of 10 mm Festo muscles: about 50 kPa at full length; Martens "
-        "and Boblan 2017, Actuators 6(4), 33: force maps of 10 and 20 mm muscles, which start at "
-        "135 kPa at 5 % contraction."
+        "Public isometric pulse tests of 10 mm Festo muscles: about 50 kPa at full length; "
+        "martens2017: force maps that start at 135 kPa at 5 % contraction."
     ),
     needs=("contraction",),
     sensor="a load cell at a blocked length, at low pressure",

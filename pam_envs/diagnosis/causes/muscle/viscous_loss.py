@@ -5,8 +5,6 @@ plant has a further damping that decreases with speed from its value at rest, so
 slow motion and leaves fast motion to the damping of the base.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
 CAUSE = Cause(
@@ -21,19 +19,13 @@ CAUSE = Cause(
             ),
         ),
     ),
-    signature=(
-        "the error of the contraction has the sign of the velocity, grows with speed and "
-        "vanishes in a hold"
-    ),
+    signature="an error with the sign of the velocity that grows with speed and vanishes in a hold",
     neighbours=("stick_slip", "hysteresis_drive", "sensor_delay", "creep", "resonance"),
     experiment=(
         "A sine at 0.2, 0.5, 1 and 2 Hz, and ramps at two rates: what viscous loss adds to the "
         "loop shrinks with the rate, what friction adds does not; in a hold only friction is left."
     ),
-    source=(
-        "Reynolds et al. 2003, Annals of Biomedical Engineering 31: damping of a large muscle, "
-        "smaller in relaxation; sizes for 10 mm muscles are assumed."
-    ),
+    source="reynolds2003: a large muscle, less damped in relaxation; other sizes are assumed.",
     needs=("contraction",),
     sensor="a load cell between muscle and load",
     compensable=True,

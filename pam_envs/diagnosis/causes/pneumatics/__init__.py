@@ -1,1 +1,1 @@
-"""pneumatics."""
+"""Causes in regulator, valve and supply."""

@@ -5,18 +5,13 @@ along the tube. The whole response is delayed, in pressure and contraction alike
 corner of a step instead, so that the two are separable at a sufficient sampling rate.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
 CAUSE = Cause(
     name="dead_time",
     title="the dead time of the regulator",
     forms=(Form("delay", (Term("regulator.dead_time", (0.01, 0.04), scale=0.01),)),),
-    signature=(
-        "the error follows the rate of the command, in pressure and contraction, and is one sharp "
-        "peak at the start of a step"
-    ),
+    signature="one sharp peak at the start of a step, in pressure and contraction alike",
     neighbours=(
         "sensor_delay",
         "slew_limit",

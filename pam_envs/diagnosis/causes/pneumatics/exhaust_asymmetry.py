@@ -5,8 +5,6 @@ the valve and a silencer. The lag may differ, or the flow may be choked, so that
 pressure falls by at most a fixed share per second.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
 CAUSE = Cause(

@@ -4,8 +4,6 @@ A fully open valve passes a limited flow, so that large steps follow a straight 
 round off. Small steps do not reach the limit and follow the lag alone.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
 CAUSE = Cause(
@@ -20,20 +18,14 @@ CAUSE = Cause(
             ),
         ),
     ),
-    signature=(
-        "large steps are late and small ones are not: the time to 63 % grows with the size of the "
-        "step; the error is a triangle after each large step"
-    ),
+    signature="a triangle after each large step: the time to 63 % grows with the size of the step",
     neighbours=("dead_time", "supply_droop", "exhaust_asymmetry"),
     experiment=(
         "Steps of three sizes, up and down: a limited rate delays by the size of the step and is "
         "the same every time, a drooping supply is slower near the top and after heavy use, a slow "
         "exhaust acts only downwards."
     ),
-    source=(
-        "A public record of a DMSP-10-250 on a pressure regulator: 6.8 bar/s in a raw step, not an "
-        "exponential; ISO 6358 for the flow through a valve."
-    ),
+    source="A public record of a DMSP-10-250: 6.8 bar/s in a raw step; ISO 6358 for the flow.",
     sensor="a fast pressure sensor at the muscle",
     compensable=True,
 )

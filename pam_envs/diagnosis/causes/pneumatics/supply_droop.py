@@ -6,8 +6,6 @@ there is no effect. In the plant filling passes a throat from a supply that fall
 amount and recovers through an orifice.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.fit.starting_values import grid
 
@@ -29,20 +27,14 @@ CAUSE = Cause(
             search=grid(_SUPPLIES, _DROOPS, _TIMES, _RECOVERIES),
         ),
     ),
-    signature=(
-        "peaks of the pressure are clipped or late near the top, more so after heavy "
-        "use; deflation fits"
-    ),
+    signature="peaks of the pressure are clipped or late, more so after heavy use; deflation fits",
     neighbours=("slew_limit", "exhaust_asymmetry"),
     experiment=(
         "Fill to the top again and again, then once after a rest: a droop grows with the number of "
         "fillings and vanishes after the rest, a limited rate is the same every time and at every "
         "level."
     ),
-    source=(
-        "A public record of a DMSP-10-250 on a pressure regulator: peaks of 5.65 falling to 5.11 "
-        "bar over four cycles at the same command."
-    ),
+    source="A public record of a DMSP-10-250: peaks fall from 5.65 to 5.11 bar in four cycles.",
     sensor="a pressure sensor before the valve",
     compensable=True,
 )

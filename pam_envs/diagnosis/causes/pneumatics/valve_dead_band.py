@@ -7,8 +7,6 @@ overlap, and leaks within it. A switching valve may stay open until the error is
 parameter is the error at which it closes over that at which it opens.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.fit.starting_values import grid
 
@@ -36,10 +34,7 @@ CAUSE = Cause(
             search=grid(_OPENS, _CLOSES),
         ),
     ),
-    signature=(
-        "the settled pressure misses the command by the same amount, with the sign of the last "
-        "step; smaller commands have no effect"
-    ),
+    signature="settled pressures miss the command by one amount, with the sign of the last step",
     neighbours=("leak", "dead_time", "stick_slip", "threshold_pressure"),
     experiment=(
         "Sines of the command at 1 Hz with decreasing amplitudes and approach one level from both "

@@ -1,1 +1,1 @@
-"""sensing."""
+"""Causes in the sensors."""

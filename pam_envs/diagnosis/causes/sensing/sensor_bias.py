@@ -5,9 +5,13 @@ reading by the same amount at all pressures and loads. An amplifier that was jus
 some seconds to reach its bias. Only the reading is affected.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
+
+
+def _warming_up(name: str, sensor: str, size: float) -> Form:
+    end = Term(f"{sensor}.drift_time", (2.0,), low=1.0, high=8.0, log=True, amount=False)
+    return Form(name, (Term(f"{sensor}.drift", (size,), scale=size), end))
+
 
 CAUSE = Cause(
     name="sensor_bias",
@@ -20,20 +24,8 @@ CAUSE = Cause(
                 Term("pressure.bias", (1e3,), scale=1e3),
             ),
         ),
-        Form(
-            "warming up",
-            (
-                Term("position.drift", (1e-4,), scale=1e-4),
-                Term("position.drift_time", (2.0,), low=1.0, high=8.0, log=True, amount=False),
-            ),
-        ),
-        Form(
-            "warming up, pressure",
-            (
-                Term("pressure.drift", (1e3,), scale=1e3),
-                Term("pressure.drift_time", (2.0,), low=1.0, high=8.0, log=True, amount=False),
-            ),
-        ),
+        _warming_up("warming up", "position", 1e-4),
+        _warming_up("warming up, pressure", "pressure", 1e3),
     ),
     signature="the same error at all times, at rest without pressure too",
     neighbours=(
@@ -48,10 +40,7 @@ CAUSE = Cause(
         "Rest without pressure at the start and at the end: a bias is equal both times, a drift "
         "and a slip appear later, a threshold and a nonlinear sensor only under pressure."
     ),
-    source=(
-        "A public record of a DMSP-10-250 on a pressure regulator: the pressure reads 0.3 bar off "
-        "at rest."
-    ),
+    source="A public record of a DMSP-10-250: the pressure reads 0.3 bar off at rest.",
     settled="contractions count from each load's own rest length: a bias is gone",
     sensor="zeroing the sensors at rest without pressure",
     # not compensable: the loop follows the reading

@@ -5,52 +5,33 @@ The error depends on time alone, not on the muscle: it settles exponentially, or
 moments and then is constant.
 """
 
-from __future__ import annotations
+from collections.abc import Callable
 
 from pam_envs.diagnosis.cause import Cause, Form, Term
-from pam_envs.diagnosis.fit.starting_values import pressure_ramp_starts, ramp_starts
+from pam_envs.diagnosis.fit.starting_values import Starts, pressure_ramp_starts, ramp_starts
+
+
+def _settling(sensor: str, size: float, time: float) -> Form:
+    end = Term(f"{sensor}.drift_time", (time,), low=10.0, log=True, amount=False)
+    return Form(sensor, (Term(f"{sensor}.drift", (size,), scale=size), end))
+
+
+def _ramp(name: str, sensor: str, size: float, search: Callable[..., Starts]) -> Form:
+    start = Term(f"{sensor}.ramp_at", (100.0,), scale=20.0, amount=False)
+    duration = Term(f"{sensor}.ramp_over", (60.0,), low=15.0, log=True, amount=False)
+    return Form(name, (Term(f"{sensor}.ramp", (size,), scale=size), start, duration), search)
+
 
 CAUSE = Cause(
     name="sensor_drift",
     title="a drifting sensor",
     forms=(
-        Form(
-            "position",
-            (
-                Term("position.drift", (1e-6,), scale=1e-6),
-                Term("position.drift_time", (60.0,), low=10.0, log=True, amount=False),
-            ),
-        ),
-        Form(
-            "ramp",
-            (
-                Term("position.ramp", (1e-4,), scale=1e-4),
-                Term("position.ramp_at", (100.0,), scale=20.0, amount=False),
-                Term("position.ramp_over", (60.0,), low=15.0, log=True, amount=False),
-            ),
-            search=ramp_starts,
-        ),
-        Form(
-            "pressure",
-            (
-                Term("pressure.drift", (10.0,), scale=10.0),
-                Term("pressure.drift_time", (1000.0,), low=10.0, log=True, amount=False),
-            ),
-        ),
-        Form(
-            "pressure ramp",
-            (
-                Term("pressure.ramp", (1e3,), scale=1e3),
-                Term("pressure.ramp_at", (100.0,), scale=20.0, amount=False),
-                Term("pressure.ramp_over", (60.0,), low=15.0, log=True, amount=False),
-            ),
-            search=pressure_ramp_starts,
-        ),
+        _settling("position", 1e-6, 60.0),
+        _ramp("ramp", "position", 1e-4, ramp_starts),
+        _settling("pressure", 10.0, 1000.0),
+        _ramp("pressure ramp", "pressure", 1e3, pressure_ramp_starts),
     ),
-    signature=(
-        "a slow function of the time since the start, the same at rest and under pressure, on one "
-        "output only"
-    ),
+    signature="a slow function of time, equal at rest and under pressure, on one output only",
     contains=("sensor_bias", "slip_step"),
     neighbours=(
         "sensor_bias",
@@ -65,10 +46,7 @@ CAUSE = Cause(
         "Return to rest without pressure at the end: a drift has moved the zero, heat "
         "and softening have not; after a rest creep and softening restart, a drift continues."
     ),
-    source=(
-        "Assumed; the published readings of a MAS-10-N-100 (Applied Sciences 2021, 11(21), 9855, "
-        "Table 3) rise by 0.03 mm a repeat at no load."
-    ),
+    source="Assumed; readings of positioning2021, Table 3, rise by 0.03 mm a repeat unloaded.",
     sensor="a second position sensor of another kind",
     # not compensable: the loop follows the reading
 )

@@ -5,8 +5,6 @@ between them. The error is a parabola that vanishes at zero and at full scale. I
 from a static law of the same bend, unless that law acts at several loads.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 
 CAUSE = Cause(
@@ -16,20 +14,14 @@ CAUSE = Cause(
         Form("position", (Term("position.bow", (0.01, -0.01), scale=0.01),)),
         Form("pressure", (Term("pressure.bow", (0.01, -0.01), scale=0.01),)),
     ),
-    signature=(
-        "a smooth function of the reading alone, independent of load, direction, rate and time; "
-        "for the pressure, a curved error of settled readings"
-    ),
+    signature="a smooth function of the reading alone, whatever load, direction, rate and time",
     neighbours=("sensor_bias", "sensor_drift"),
     experiment=(
         "Measure the same staircase against a second sensor or gauge blocks: only this "
         "separates a nonlinear position reading from the muscle's own curve. A nonlinear pressure "
         "reading is visible against the command."
     ),
-    source=(
-        "Data sheets of proportional regulators with sensors of their own: linearity within 1 % of "
-        "full scale."
-    ),
+    source="Data sheets of proportional regulators: linearity within 1 % of full scale.",
     settled="the static law absorbs it exactly",
     sensor="a second sensor of another kind, or gauge blocks",
     # not compensable: the recording is read through the same sensor

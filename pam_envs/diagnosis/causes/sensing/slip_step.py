@@ -4,8 +4,6 @@ A sleeve, a knot or a sensor's clamp moves under load by a fraction of a millime
 From then on the position reading is off by a constant; before, it is correct.
 """
 
-from __future__ import annotations
-
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.fit.starting_values import step_starts
 
@@ -22,10 +20,7 @@ CAUSE = Cause(
             search=step_starts,
         ),
     ),
-    signature=(
-        "one step of the contraction within a second, absent in the pressure; a constant error "
-        "after it"
-    ),
+    signature="one step of the contraction within a second, absent in the pressure, then constant",
     neighbours=("sensor_bias", "sensor_drift", "creep"),
     experiment=(
         "Compare the zero before and after, and repeat the segment of the step: a step stays and "
