@@ -1,9 +1,10 @@
-"""Suggestions at the end of messages about unknown names."""
+"""Suggestions at the end of messages about unknown names, and the name of this package."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from importlib import metadata
 
 
 def near(word: str, known: Iterable[str], otherwise: str = "") -> str:
@@ -23,3 +24,11 @@ def near(word: str, known: Iterable[str], otherwise: str = "") -> str:
     if close:
         return f"; did you mean {close[0]!r}?"
     return otherwise or f"; known: {', '.join(choices)}"
+
+
+def package() -> str:
+    """Return name and version of the package, for reports."""
+    try:
+        return f"pam-envs {metadata.version('pam-envs')}"
+    except metadata.PackageNotFoundError:
+        return "pam-envs"

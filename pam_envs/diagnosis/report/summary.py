@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from pam_envs.diagnosis.decide.structure import binned_r2, flexible_r2, ljung_bo
 from pam_envs.diagnosis.fit.candidate import Candidate
 from pam_envs.diagnosis.report.summary_causes import SCALE, UNITS, calibration, causes, rivals, seen
 from pam_envs.diagnosis.report.summary_text import sentence
+from pam_envs.wording import package
 
 
 def report_of(study: Any, rule: Rule, warnings: tuple[str, ...]) -> dict[str, Any]:
@@ -50,19 +50,12 @@ def report_of(study: Any, rule: Rule, warnings: tuple[str, ...]) -> dict[str, An
             "rig": {"source": study.sheet.source, "digest": study.sheet.digest},
             "plant_before": study.start.digest(),
             "plant_after": study.plant_of(study.model).digest(),
-            "package": _package(),
+            "package": package(),
             "seed": held.seed,
         },
     }
     report["text"] = sentence(report, rule)
     return report
-
-
-def _package() -> str:
-    try:
-        return f"pam-envs {version('pam-envs')}"
-    except PackageNotFoundError:
-        return "pam-envs"
 
 
 def _floors(study: Any) -> dict[str, Any]:

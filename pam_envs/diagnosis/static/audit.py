@@ -7,10 +7,10 @@ their neighbours for a model fitted to all other pressures, at several loads ali
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pam_envs.data.tables import BAR, MM, ContractionTable
 from pam_envs.diagnosis.arrays import Array
@@ -32,20 +32,10 @@ POOR_FIT = 1.3
 
 @dataclass(frozen=True)
 class SetPoint:
-    """A pressure with outlying readings at several loads.
+    """A pressure [bar], reached by deflation if ``falling``, with outliers at several loads [kg].
 
-    Attributes
-    ----------
-    pressure : float
-        Pressure [bar].
-    falling : bool
-        Whether it was reached by deflation.
-    loads : tuple of float
-        Loads with outliers [kg].
-    missed : tuple of float
-        Reading less prediction from all other pressures, at these loads [mm].
-    others : tuple of float
-        The same at the other loads [mm].
+    ``missed`` is reading less prediction from all other pressures at these loads [mm], ``others``
+    the same at the other loads.
     """
 
     pressure: float
@@ -61,18 +51,14 @@ class SetPoint:
         where = " and ".join(f"{load:g}" for load in self.loads)
         size = " and ".join(f"{abs(miss):.2f}" for miss in self.missed)
         side = "low" if self.missed[0] < 0.0 else "high"
-        rest = f", the other loads by {_listed(self.others)} mm" if self.others else ""
-        why = "a missed setpoint, which repeats cannot show"
-        if not self.others:
-            why += ", or an effect that all models lack"
+        others = " and ".join(f"{value:+.2f}" for value in self.others)
+        rest = f", the other loads by {others} mm" if others else ""
+        more = "" if others else ", or an effect that all models lack"
         return (
             f"at {self.pressure:g} bar {way} the readings at {where} kg are {size} mm {side} of "
-            f"what all other pressures predict{rest}: probably {why}; measure this pressure again"
+            f"what all other pressures predict{rest}: probably a missed setpoint, which repeats "
+            f"cannot show{more}; measure this pressure again"
         )
-
-
-def _listed(values: Sequence[float]) -> str:
-    return " and ".join(f"{value:+.2f}" for value in values)
 
 
 def missed_set_points(study: Study, model: Model) -> tuple[SetPoint, ...]:
@@ -87,8 +73,10 @@ def missed_set_points(study: Study, model: Model) -> tuple[SetPoint, ...]:
         if len(keys) < FEWEST_STEPS:
             break
         here = np.array([(cells.falling == f) & np.isclose(cells.pressure, p) for f, p in keys])
-        missed = _left_out(study, model, kept, here)
-        worst = _worst(study, keys, here, missed)
+        data = np.broadcast_to(cells.mean, here.shape)
+        fitted = fit(cells, model.terms, data, kept * ~here, [model.fit.theta[0]])
+        missed = (cells.mean - fitted.predict(cells)) * cells.millimetres
+        worst = _worst(study, keys, np.where(here & (kept > 0.0), missed, np.nan))
         if worst is None:
             break
         at, point = worst
@@ -97,17 +85,8 @@ def missed_set_points(study: Study, model: Model) -> tuple[SetPoint, ...]:
     return tuple(found)
 
 
-def _left_out(study: Study, model: Model, kept: Array, here: NDArray[np.bool_]) -> Array:
-    """Return reading less prediction [mm] of held-out pressures, shape (keys, C), else NaN."""
-    cells = study.cells
-    data = np.broadcast_to(cells.mean, here.shape)
-    fitted = fit(cells, model.terms, data, kept * ~here, [model.fit.theta[0]])
-    missed = (cells.mean - fitted.predict(cells)) * cells.millimetres
-    return np.asarray(np.where(here & (kept > 0.0), missed, np.nan))
-
-
 def _worst(
-    study: Study, keys: Sequence[tuple[bool, float]], here: NDArray[np.bool_], missed: Array
+    study: Study, keys: Sequence[tuple[bool, float]], missed: Array
 ) -> tuple[int, SetPoint] | None:
     """Return the worst outlying pressure, at two loads or the only one, if any."""
     cells, size = study.cells, np.full(missed.shape, np.nan)
@@ -146,17 +125,8 @@ def _worst(
     return found
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A published curve: contraction [mm] over pressure [bar], highest power first."""
-
-    load: float
-    inflating: bool
-    coefficients: tuple[float, ...]
-
-
 def audit_polynomials(
-    table: ContractionTable, curves: Mapping[str, Curve | tuple[float, bool, Sequence[float]]]
+    table: ContractionTable, curves: Mapping[str, tuple[float, bool, Sequence[float]]]
 ) -> dict[str, object]:
     """Compare published polynomials with the readings that they describe.
 
@@ -164,7 +134,7 @@ def audit_polynomials(
     ----------
     table : ContractionTable
         Readings.
-    curves : mapping of str to Curve or (load [kg], inflating, coefficients)
+    curves : mapping of str to (load [kg], inflating, coefficients)
         Contraction [mm] over pressure [bar], highest power first, by the name of the equation.
 
     Returns
@@ -179,77 +149,66 @@ def audit_polynomials(
     ValueError
         If the table lacks the load of a curve.
     """
-    named = {name: _curve(curve) for name, curve in curves.items()}
-    places = [(load, way) for load in table.loads for way in (True, False)]
-    equations = [_equation(table, name, curve, places) for name, curve in named.items()]
-    for equation in equations:
-        equation["copy_of"] = _copied(equation, equations)
-    return {
-        "equations": equations,
-        "discrepancies": [text for text in map(_discrepancy, equations) if text],
-    }
-
-
-def _curve(curve: Curve | tuple[float, bool, Sequence[float]]) -> Curve:
-    return curve if isinstance(curve, Curve) else Curve(curve[0], curve[1], tuple(curve[2]))
-
-
-def _mean_branch(table: ContractionTable, load: float, inflating: bool) -> tuple[Array, Array]:
-    pressure, values = table.branch(load, inflating)
-    return pressure / BAR, values.mean(axis=1) / MM
-
-
-def _missed(
-    table: ContractionTable, coefficients: Sequence[float], place: tuple[float, bool]
-) -> float:
-    pressure, mean = _mean_branch(table, *place)
-    return float(np.sqrt(np.mean(np.square(np.polyval(coefficients, pressure) - mean))))
+    equations = [_equation(table, name, *curve) for name, curve in curves.items()]
+    for equation in equations:  # the one with the same coefficients that fits its readings better
+        equation["copy_of"] = next(
+            (
+                other["name"]
+                for other in equations
+                if other["coefficients"] == equation["coefficients"]
+                and _ratio(other) < _ratio(equation)
+            ),
+            None,
+        )
+    texts = [text for text in map(_discrepancy, equations) if text]
+    return {"equations": equations, "discrepancies": texts}
 
 
 def _equation(
-    table: ContractionTable, name: str, curve: Curve, places: Sequence[tuple[float, bool]]
-) -> dict[str, object]:
-    place = (curve.load, curve.inflating)
-    errors = {other: _missed(table, curve.coefficients, other) for other in places}
-    refit = np.polyfit(*_mean_branch(table, *place), len(curve.coefficients) - 1)
+    table: ContractionTable, name: str, load: float, inflating: bool, coefficients: Sequence[float]
+) -> dict[str, Any]:
+    def mean(place: tuple[float, bool]) -> tuple[Array, Array]:
+        pressure, values = table.branch(*place)
+        return pressure / BAR, values.mean(axis=1) / MM
+
+    def error(coefficients: Any, place: tuple[float, bool]) -> float:
+        pressure, values = mean(place)
+        return float(np.sqrt(np.mean(np.square(np.polyval(coefficients, pressure) - values))))
+
+    own = (load, inflating)
+    errors = {
+        (other, way): error(coefficients, (other, way))
+        for other in table.loads
+        for way in (True, False)
+    }
     best = min(errors, key=lambda other: errors[other])
     return {
         "name": name,
-        **asdict(curve),
-        "rms": _missed(table, curve.coefficients, place),
-        "refit": _missed(table, refit.tolist(), place),
+        "load": load,
+        "inflating": inflating,
+        "coefficients": tuple(coefficients),
+        "rms": error(coefficients, own),
+        "refit": error(np.polyfit(*mean(own), len(coefficients) - 1), own),
         "best": {"load": best[0], "inflating": best[1], "rms": errors[best]},
     }
 
 
-def _copied(equation: dict[str, object], others: Sequence[dict[str, object]]) -> str | None:
-    """Return the equation with the same coefficients that fits its own readings better."""
-    for other in others:
-        same = other["coefficients"] == equation["coefficients"]
-        if same and other is not equation and _ratio(other) < _ratio(equation):
-            return str(other["name"])
-    return None
+def _ratio(equation: Mapping[str, Any]) -> float:
+    return float(equation["rms"] / max(equation["refit"], 1e-9))
 
 
-def _ratio(equation: Mapping[str, object]) -> float:
-    return float(equation["rms"]) / max(float(equation["refit"]), 1e-9)  # type: ignore[arg-type]
-
-
-def _discrepancy(equation: Mapping[str, object]) -> str | None:
+def _discrepancy(equation: Mapping[str, Any]) -> str | None:
     way = "inflating" if equation["inflating"] else "deflating"
-    claim = f"{equation['load']:g} kg {way}"
-    best = equation["best"]
-    assert isinstance(best, dict)
-    missed = f"misses the readings at {claim} by {equation['rms']:.2f} mm RMS"
+    missed = f"misses the readings at {equation['load']:g} kg {way} by {equation['rms']:.2f} mm RMS"
+    best, refit = equation["best"], f"a refit by {equation['refit']:.2f} mm"
     if equation["copy_of"]:
         return (
             f"equation {equation['name']} is a copy of {equation['copy_of']}: it {missed}, those "
-            f"at {best['load']:g} kg by {best['rms']:.2f} mm, and a refit by "
-            f"{equation['refit']:.2f} mm"
+            f"at {best['load']:g} kg by {best['rms']:.2f} mm, and {refit}"
         )
     if _ratio(equation) > POOR_FIT:
         return (
-            f"equation {equation['name']} {missed}, a refit by {equation['refit']:.2f} mm: it was "
-            "fitted to other readings, or its coefficients are truncated"
+            f"equation {equation['name']} {missed}, {refit}: it was fitted to other readings, or "
+            "its coefficients are truncated"
         )
     return None

@@ -7,10 +7,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pam_envs.data.tables import LOAD_TOLERANCE, MM, ContractionTable
-from pam_envs.diagnosis.arrays import Array, Flags
+from pam_envs.diagnosis.arrays import Array, Flags, Indices
 
 THRESHOLDS = (1 / 24, 1 / 16, 1 / 12, 1 / 8, 3 / 16)
 """Thresholds of the play operators over the highest pressure."""
@@ -20,28 +19,12 @@ BLOCK = 4
 
 @dataclass(frozen=True)
 class Cells:
-    """Cells of a table: one load and one step of a path each, with all repeats.
+    """Cells of a table, shape (C,): one load and one step of a path each, with all repeats.
 
-    Attributes
-    ----------
-    load, pressure, mean : ndarray, shape (C,)
-        Load, pressure and mean contraction over their largest values.
-    falling : ndarray of bool, shape (C,)
-        Whether the pressure was reached by deflation.
-    used : ndarray of bool, shape (C,)
-        False for readings that are zero by definition.
-    group : ndarray of int, shape (C,)
-        Index into ``loads``.
-    path : ndarray of int, shape (C,)
-        Number of the pressure path, which starts at rest.
-    block : ndarray of int, shape (C,)
-        Block of neighbouring cells with dependent errors; -1 if not used.
-    readings : ndarray, shape (R, C)
-        Repeats; NaN if there are fewer.
-    loads : tuple of float
-        Loads [kg].
-    scale : tuple of float
-        Largest load [kg], pressure [Pa] and contraction [m].
+    Load, pressure and mean contraction are relative to ``scale``, the largest load [kg], pressure
+    [Pa] and contraction [m]. Not ``used`` are readings that are zero by definition. A ``block``
+    (-1 if not used) contains neighbouring cells with dependent errors. ``group`` is an index into
+    ``loads`` [kg]; ``readings``, shape (R, C), are NaN where there are fewer repeats.
     """
 
     load: Array
@@ -49,15 +32,15 @@ class Cells:
     mean: Array
     falling: Flags
     used: Flags
-    group: NDArray[np.int64]
-    path: NDArray[np.int64]
-    block: NDArray[np.int64]
+    group: Indices
+    path: Indices
+    block: Indices
     readings: Array
     loads: tuple[float, ...]
     scale: tuple[float, float, float]
 
     @cached_property
-    def order(self) -> NDArray[np.int64]:
+    def order(self) -> Indices:
         """Cells by step and path, shape (steps, paths); a shorter path repeats its last cell."""
         rows = [np.flatnonzero(self.path == k) for k in range(int(self.path[-1]) + 1)]
         longest = max(len(row) for row in rows)
@@ -69,7 +52,7 @@ class Cells:
         return stops(self.pressure[None], self.order)
 
     @property
-    def counts(self) -> NDArray[np.int64]:
+    def counts(self) -> Indices:
         """Number of readings in each cell, shape (C,)."""
         return np.asarray(np.isfinite(self.readings).sum(axis=0))
 
@@ -79,20 +62,7 @@ class Cells:
         return self.scale[2] / MM
 
 
-def _paths(table: ContractionTable) -> dict[tuple[float, bytes], list[NDArray[np.int64]]]:
-    """Return the rows of every cycle, grouped by load and pressure path."""
-    found: dict[tuple[float, bytes], list[NDArray[np.int64]]] = {}
-    for load in table.loads:
-        for repeat in table.repeats(load):
-            rows = np.flatnonzero(
-                (np.abs(table.load_kg - load) < LOAD_TOLERANCE) & (table.repeat == repeat)
-            )
-            key = (load, table.pressure_pa[rows].tobytes())
-            found.setdefault(key, []).append(rows)
-    return found
-
-
-def _blocks(path: NDArray[np.int64], falling: Flags, used: Flags) -> NDArray[np.int64]:
+def _blocks(path: Indices, falling: Flags, used: Flags) -> Indices:
     """Return the block of each cell: at most ``BLOCK`` used cells of one branch; -1 if unused."""
     block, last, size = np.full(len(path), -1), -1, 0
     before: tuple[int, bool] | None = None
@@ -106,39 +76,40 @@ def _blocks(path: NDArray[np.int64], falling: Flags, used: Flags) -> NDArray[np.
 
 def cells_of(table: ContractionTable) -> Cells:
     """Return the cells of a table, load by load and path by path, in the order of the readings."""
-    cycles = _paths(table)
+    cycles: dict[tuple[float, bytes], list[Indices]] = {}
+    for load in table.loads:
+        for repeat in table.repeats(load):
+            here = (np.abs(table.load_kg - load) < LOAD_TOLERANCE) & (table.repeat == repeat)
+            rows = np.flatnonzero(here)
+            cycles.setdefault((load, table.pressure_pa[rows].tobytes()), []).append(rows)
     most = max(len(rows) for rows in cycles.values())
     largest = max(float(np.abs(table.contraction_m).max()), 1e-12)
     scale = (max(table.loads) or 1.0, float(table.pressure_pa.max()) or 1.0, largest)
-    parts: list[tuple[NDArray[Any], ...]] = []
-    for number, ((load, _), rows) in enumerate(cycles.items()):
-        values = np.full((most, len(rows[0])), np.nan)
-        values[: len(rows)] = table.contraction_m[np.array(rows)] / largest
-        used = np.ones(values.shape[1], bool)
+    parts: list[dict[str, Any]] = []
+    for number, ((load, _), repeats) in enumerate(cycles.items()):
+        n, first = len(repeats[0]), repeats[0]
+        values = np.full((most, n), np.nan)
+        values[: len(repeats)] = table.contraction_m[np.array(repeats)] / largest
+        used = np.ones(n, bool)
         used[0] = bool(np.nanmax(np.abs(values[:, 0])) > 0.0)
-        ones = np.ones(values.shape[1])
         parts.append(
-            (
-                ones * load / scale[0],
-                table.pressure_pa[rows[0]] / scale[1],
-                np.nanmean(values, axis=0),
-                ~table.inflating[rows[0]],
-                used,
-                (ones * table.loads.index(load)).astype(np.int64),
-                (ones * number).astype(np.int64),
-                values,
-            )
+            {
+                "load": np.ones(n) * load / scale[0],
+                "pressure": table.pressure_pa[first] / scale[1],
+                "mean": np.nanmean(values, axis=0),
+                "falling": ~table.inflating[first],
+                "used": used,
+                "group": np.full(n, table.loads.index(load)),
+                "path": np.full(n, number),
+                "readings": values,
+            }
         )
-    names = ("load", "pressure", "mean", "falling", "used", "group", "path", "readings")
-    columns: dict[str, Any] = {
-        name: np.concatenate(column, axis=-1)
-        for name, column in zip(names, zip(*parts, strict=True), strict=True)
-    }
+    columns: dict[str, Any] = {k: np.concatenate([p[k] for p in parts], -1) for k in parts[0]}
     block = _blocks(columns["path"], columns["falling"], columns["used"])
     return Cells(**columns, block=block, loads=table.loads, scale=scale)
 
 
-def stops(pressure: Array, order: NDArray[np.int64]) -> Array:
+def stops(pressure: Array, order: Indices) -> Array:
     """Return the lag of play operators behind the pressure from rest, shape (plays, L, C).
 
     ``order`` is :attr:`Cells.order`; the pressure has the shape (L, C).

@@ -34,16 +34,10 @@ REFIT_GOOD = 1e-5
 class Lanes:
     """Data sets of every model, fitted side by side: all data, then each fold left out.
 
-    Attributes
-    ----------
-    kind : str
-        Kind of the first folds: "repeats", or "pressures" with one repeat.
-    data, weight : ndarray, shape (1 + F + G, C)
-        Means of the training data, and the root of the number of readings of each.
-    target : ndarray, shape (F, C)
-        Held-out readings; NaN elsewhere.
-    loads : int
-        Number G of loads held out in turn; 0 with fewer than three loads.
+    ``data`` are means of the training data and ``weight`` the roots of their numbers of readings,
+    shape (1 + F + G, C); ``target``, shape (F, C), are the held-out readings of the first F folds
+    ("repeats", or "pressures" with one repeat), NaN elsewhere. Then G ``loads`` are held out in
+    turn, none of fewer than three.
     """
 
     kind: str
@@ -56,9 +50,7 @@ class Lanes:
 def lanes_of(cells: Cells) -> Lanes:
     """Return the data sets of a table."""
     mean, root = cells.mean, np.sqrt(cells.counts) * cells.used
-    kind, data, weight, target = _repeat_folds(cells)
-    if not len(data):
-        kind, data, weight, target = _pressure_folds(cells, root)
+    kind, data, weight, target = _folds(cells, root)
     groups = range(len(cells.loads)) if len(cells.loads) >= 3 else range(0)
     without = np.array([root * (cells.group != g) for g in groups]).reshape(-1, len(mean))
     return Lanes(
@@ -70,21 +62,14 @@ def lanes_of(cells: Cells) -> Lanes:
     )
 
 
-Folds = tuple[str, Array, Array, Array]
-
-
-def _repeat_folds(cells: Cells) -> Folds:
-    rows = range(len(cells.readings)) if np.all(cells.counts[cells.used] > 1) else range(0)
-    data, weight, target = [], [], []
-    for row in rows:
-        kept = np.delete(cells.readings, row, axis=0)
-        data.append(np.nanmean(kept, axis=0))
-        weight.append(np.sqrt(np.isfinite(kept).sum(axis=0)) * cells.used)
-        target.append(np.where(cells.used, cells.readings[row], np.nan))
-    return "repeats", np.array(data), np.array(weight), np.array(target)
-
-
-def _pressure_folds(cells: Cells, root: Array) -> Folds:
+def _folds(cells: Cells, root: Array) -> tuple[str, Array, Array, Array]:
+    """Return kind, data, weights and targets of the held-out repeats, or cells without repeats."""
+    if np.all(cells.counts[cells.used] > 1):
+        rows = range(len(cells.readings))
+        kept = [np.delete(cells.readings, row, axis=0) for row in rows]
+        data = np.array([np.nanmean(k, axis=0) for k in kept])
+        weight = np.array([np.sqrt(np.isfinite(k).sum(axis=0)) * cells.used for k in kept])
+        return "repeats", data, weight, np.where(cells.used, cells.readings, np.nan)
     place = np.cumsum(cells.used) % PRESSURE_FOLDS
     out = np.array([(place == k) & cells.used for k in range(PRESSURE_FOLDS)])
     data = np.broadcast_to(cells.mean, out.shape)
@@ -237,10 +222,10 @@ def load_cut(study: Study, before: Model, after: Model) -> tuple[float, Interval
 
 def slopes(study: Study, model: Model) -> Array:
     """Return the weighted Jacobian of the fit to all data, shape (C, n)."""
-    theta = model.fit.theta[:1]
-    numbers = model.fit.numbers
-    at = predict(study.cells, {n.name: theta[:, [i]] for i, n in enumerate(numbers)})
-    return np.asarray(jacobian(study.cells, numbers, theta, at)[0] * study.lanes.weight[0][:, None])
+    fitted = model.fit
+    at = predict(study.cells, fitted.values())
+    found = jacobian(study.cells, fitted.numbers, fitted.theta[:1], at)
+    return np.asarray(found[0] * study.lanes.weight[0][:, None])
 
 
 def beyond(base: Array, columns: Array) -> Array:
@@ -265,8 +250,7 @@ def p_value(study: Study, parent: Model, child: Model) -> float:
     from blocks (cluster-robust, for dependent neighbours) and from cells (for blocks that agree by
     chance); the larger of both p-values.
     """
-    old = {n.name for n in parent.fit.numbers}
-    names = [n.name for n in child.fit.numbers]
+    old, names = set(parent.fit.names), child.fit.names
     steep = slopes(study, child)
     fresh = [i for i, name in enumerate(names) if name not in old]
     rest = [i for i, name in enumerate(names) if name in old]

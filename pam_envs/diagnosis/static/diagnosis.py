@@ -13,13 +13,13 @@ import time
 from typing import Any
 
 from pam_envs.data.tables import ContractionTable
-from pam_envs.diagnosis.static.audit import Curve, audit_polynomials
+from pam_envs.diagnosis.static.audit import audit_polynomials
 from pam_envs.diagnosis.static.cells import cells_of
 from pam_envs.diagnosis.static.compare import Study
 from pam_envs.diagnosis.static.findings import find
 from pam_envs.diagnosis.static.report import report
 
-__all__ = ["Curve", "audit_polynomials", "diagnose_readings"]
+__all__ = ["audit_polynomials", "diagnose_readings"]
 
 
 def diagnose_readings(table: ContractionTable, *, seed: int = 0) -> dict[str, Any]:

@@ -12,11 +12,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.static.cells import Cells
-from pam_envs.diagnosis.static.models import Number, Term, Values, lags_of, numbers_of, predict
+from pam_envs.diagnosis.static.models import Number, Term, lags_of, numbers_of, predict
 
 MOST_WEIGHT = 0.98
 """Largest sum of the play weights: the muscle follows a reversal a little."""
@@ -29,17 +28,7 @@ GOOD = 1e-7
 
 @dataclass(frozen=True)
 class Fit:
-    """Fitted lanes of one model.
-
-    Attributes
-    ----------
-    terms : tuple of Term
-        Terms that extend the base.
-    theta : ndarray, shape (L, n)
-        Parameters in relative units.
-    cost : ndarray, shape (L,)
-        Weighted sums of squares in relative units.
-    """
+    """Fitted lanes of one model: relative parameters (L, n), weighted sums of squares (L,)."""
 
     terms: tuple[Term, ...]
     theta: Array
@@ -50,6 +39,15 @@ class Fit:
         """Parameters in the order of ``theta``."""
         return numbers_of(self.terms)
 
+    @property
+    def names(self) -> list[str]:
+        """Names of the parameters."""
+        return [number.name for number in self.numbers]
+
+    def values(self) -> dict[str, Array]:
+        """Return the fit to all data (the first lane)."""
+        return _named(self.numbers, self.theta[:1])
+
     def first(self, n: int) -> Fit:
         """Return the first ``n`` lanes."""
         return Fit(self.terms, self.theta[:n], self.cost[:n])
@@ -59,7 +57,7 @@ class Fit:
         return predict(cells, _named(self.numbers, self.theta))
 
 
-def _named(numbers: Sequence[Number], theta: Array) -> Values:
+def _named(numbers: Sequence[Number], theta: Array) -> dict[str, Array]:
     return {number.name: theta[:, [i]] for i, number in enumerate(numbers)}
 
 
@@ -86,25 +84,14 @@ def jacobian(cells: Cells, numbers: Sequence[Number], theta: Array, at: Array) -
 
 def _moved_lags(cells: Cells, numbers: Sequence[Number], theta: Array, moved: Array) -> Array:
     """Return the play lags of perturbed parameters, of which only "bend" changes them."""
-    if "bend" not in [number.name for number in numbers]:
+    names = [number.name for number in numbers]
+    if "bend" not in names:
         return cells.lags
     lanes, n = theta.shape
     lags = np.repeat(lags_of(cells, _named(numbers, theta)), n, axis=1)
-    own = [number.name for number in numbers].index("bend") + n * np.arange(lanes)
+    own = names.index("bend") + n * np.arange(lanes)
     lags[:, own] = lags_of(cells, _named(numbers, moved[own]))
     return lags
-
-
-def _steps(slopes: Array, miss: Array, damping: Array, shut: NDArray[np.bool_]) -> Array:
-    """Return damped Gauss-Newton steps with active bounds held."""
-    slopes = np.where(shut[:, None, :], 0.0, slopes)
-    normal = np.einsum("lci,lcj->lij", slopes, slopes)
-    n = normal.shape[-1]
-    diagonal = np.einsum("lii->li", normal)
-    normal[:, range(n), range(n)] += damping[:, None] * diagonal + 1e-12 + shut
-    return np.asarray(-np.linalg.solve(normal, np.einsum("lci,lc->li", slopes, miss)[..., None]))[
-        ..., 0
-    ]
 
 
 def improve(
@@ -115,27 +102,11 @@ def improve(
     weight: Array,
     good: float = GOOD,
 ) -> tuple[Array, Array]:
-    """Fit every lane from its starting values by the Levenberg-Marquardt method.
+    """Fit every lane from starting values (L, n) by the Levenberg-Marquardt method.
 
-    Parameters
-    ----------
-    cells : Cells
-        Cells of the table.
-    numbers : sequence of Number
-        Parameters.
-    theta : ndarray, shape (L, n)
-        Starting values.
-    data, weight : ndarray, shape (L, C)
-        Data, and the square root of the weight of each cell.
-    good : float
-        Tolerance, see :data:`GOOD`.
-
-    Returns
-    -------
-    theta : ndarray, shape (L, n)
-        Fitted parameters.
-    cost : ndarray, shape (L,)
-        Sums of squares, never above those of the start.
+    ``data`` and ``weight`` (the square root of the weight of each cell) have the shape (L, C),
+    ``good`` is a tolerance as :data:`GOOD`. Returns parameters and sums of squares, which are never
+    above those of the start.
     """
     sizes = np.array([n.size for n in numbers])
     low, high = np.array([n.low for n in numbers]), np.array([n.high for n in numbers])
@@ -151,42 +122,29 @@ def improve(
         miss = weight[go] * (made[go] - data[go])
         pull = np.einsum("lci,lc->li", slopes, miss)
         shut = ((theta[go] <= low) & (pull > 0)) | ((theta[go] >= high) & (pull < 0))
-        tried = _allowed(numbers, theta[go] + sizes * _steps(slopes, miss, damping[go], shut))
+        slopes = np.where(shut[:, None, :], 0.0, slopes)  # active bounds are held
+        normal = np.einsum("lci,lcj->lij", slopes, slopes)
+        n, diagonal = len(numbers), np.einsum("lii->li", normal)
+        normal[:, range(n), range(n)] += damping[go, None] * diagonal + 1e-12 + shut
+        step = -np.linalg.solve(normal, np.einsum("lci,lc->li", slopes, miss)[..., None])[..., 0]
+        tried = _allowed(numbers, theta[go] + sizes * step)
         found = predict(cells, _named(numbers, tried), made[go])
         after = np.square(weight[go] * (found - data[go])).sum(axis=1)
         better = after < cost[go]
         small = (cost[go] - after) < good * cost[go] + 1e-18
         quiet[go] = np.where(better & ~small, 0, np.where(better, quiet[go] + 1, quiet[go]))
-        damping[go] *= np.where(better, 0.2, 8.0)
-        damping[go] = np.maximum(damping[go], 1e-9)
+        damping[go] = np.maximum(damping[go] * np.where(better, 0.2, 8.0), 1e-9)
         won = go[better]
         theta[won], made[won], cost[won] = tried[better], found[better], after[better]
     return theta, cost
 
 
 def fit(
-    cells: Cells,
-    terms: Sequence[Term],
-    data: Array,
-    weight: Array,
-    starts: Sequence[Array],
+    cells: Cells, terms: Sequence[Term], data: Array, weight: Array, starts: Sequence[Array]
 ) -> Fit:
-    """Fit a model to the data of each lane, with the best of several starts.
-
-    Parameters
-    ----------
-    cells : Cells
-        Cells of the table.
-    terms : sequence of Term
-        Terms that extend the base.
-    data, weight : ndarray, shape (L, C)
-        Data, and the square root of the weight of each cell.
-    starts : sequence of ndarray, shape (n,) or (L, n)
-        Starting values.
-    """
-    numbers, lanes = numbers_of(terms), len(data)
+    """Fit a model to the data of each lane (L, C), with the best of several starts (n,), (L, n)."""
+    numbers, lanes, times = numbers_of(terms), len(data), len(starts)
     begin = np.concatenate([np.broadcast_to(s, (lanes, len(numbers))) for s in starts])
-    times = len(starts)
     theta, cost = improve(
         cells, numbers, begin, np.tile(data, (times, 1)), np.tile(weight, (times, 1))
     )
@@ -200,18 +158,8 @@ def base_starts() -> list[Array]:
     middle = np.array([n.neutral for n in numbers_of(())])
     made = [middle]
     for force, length, friction in ((0.05, 0.1, 0.5), (0.4, 0.3, 1.0), (0.2, 0.05, 0.3)):
-        other = middle.copy()
-        other[:2], other[4:] = (force, length), middle[4:] * friction
-        made.append(other)
+        made.append(np.concatenate([(force, length), middle[2:4], middle[4:] * friction]))
     return made
-
-
-def widened(parent: Fit, terms: Sequence[Term]) -> Array:
-    """Return the parent's parameters for a model with more terms, whose parameters are neutral."""
-    known = dict(zip([n.name for n in parent.numbers], parent.theta.T, strict=True))
-    lanes = len(parent.theta)
-    columns = [known.get(n.name, np.full(lanes, n.neutral)) for n in numbers_of(terms)]
-    return np.stack(columns, axis=1)
 
 
 def extend(
@@ -224,17 +172,13 @@ def extend(
     RuntimeError
         If the fit is worse than that of a parent: the optimiser failed.
     """
-    starts = []
+    starts, numbers = [], numbers_of(terms)
     for parent in parents:
-        start = widened(parent, terms)
-        old = {n.name for n in parent.numbers}
-        starts.append(start)
-        for sign in (1.0, -1.0):
-            moved = start.copy()
-            for i, number in enumerate(numbers_of(terms)):
-                if number.name not in old:
-                    moved[:, i] += sign * number.size
-            starts.append(moved)
+        known = dict(zip(parent.names, parent.theta.T, strict=True))
+        fresh = np.array([0.0 if n.name in known else n.size for n in numbers])
+        columns = [known.get(n.name, np.full(len(parent.theta), n.neutral)) for n in numbers]
+        start = np.stack(columns, axis=1)
+        starts += [start, start + fresh, start - fresh]
     made = fit(cells, terms, data, weight, starts)
     check_nested(parents, made)
     return made

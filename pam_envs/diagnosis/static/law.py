@@ -36,20 +36,9 @@ GRID = 24
 class Law:
     """A load law other than linear, common to all effects of the load.
 
-    Attributes
-    ----------
-    term : Term
-        Term of the law.
-    model : Model
-        The named causes with the law.
-    value, interval : float, tuple
-        Its parameter in its own unit, and 95 % interval.
-    p : float
-        p-value against the linear law.
-    left_load : float
-        Mean error on held-out loads [mm].
-    post_hoc : bool
-        Whether its parameter was fitted to the held-out loads.
+    ``value`` and its 95 % interval are those of its parameter in its own unit, ``p`` is the p-value
+    against the linear law, ``left_load`` the mean error on held-out loads [mm]. It is ``post_hoc``
+    if its parameter was fitted to the held-out loads.
     """
 
     term: Term
@@ -71,7 +60,7 @@ def load_laws(study: Study, model: Model) -> tuple[Law, ...]:
 
 def _law(study: Study, model: Model, term: Term) -> Law:
     free = study.extended([model], (*model.terms, term))
-    scale = units(term.numbers[0], study.cells.scale)
+    scale = units(term.number, study.cells.scale)
     draws = parameter_draws(study, free)
     (low, high), value = intervals(draws[:, -1:])[0], float(free.fit.theta[0, -1])
     seen = len(study.cells.loads) < LOADS_FOR_A_LAW
@@ -89,10 +78,10 @@ def _law(study: Study, model: Model, term: Term) -> Law:
 
 def _fixed(study: Study, model: Model, free: Model, term: Term, value: float) -> Model:
     """Return the model with the law's parameter fixed at its fit to all data."""
-    number = replace(term.numbers[0], neutral=value, low=value, high=value)
+    number = replace(term.number, neutral=value, low=value, high=value)
     start = free.fit.theta.copy()
     start[:, -1] = value
-    return study.refitted((*model.terms, replace(term, numbers=(number,))), start)
+    return study.refitted((*model.terms, replace(term, number=number)), start)
 
 
 def separated(study: Study, laws: Sequence[Law]) -> bool:
@@ -105,19 +94,11 @@ def separated(study: Study, laws: Sequence[Law]) -> bool:
 
 @dataclass(frozen=True)
 class NextLoads:
-    """Separation of two models at other loads.
+    """Separation of two models at other loads [kg], shape (GRID,).
 
-    Attributes
-    ----------
-    loads : ndarray, shape (GRID,)
-        Loads [kg].
-    separation : ndarray, shape (GRID,)
-        Mean square difference of the models over a cycle, in variances of a cell's mean with the
-        table's number of repeats.
-    apart : ndarray, shape (GRID,)
-        Root mean square difference [mm].
-    best : tuple of float
-        Loads [kg] to measure next, best first.
+    ``separation`` is the mean square difference over a cycle in variances of a cell's mean with the
+    table's number of repeats, ``apart`` the root mean square difference [mm]; ``best`` are the
+    loads [kg] to measure next, best first.
     """
 
     loads: Array

@@ -5,11 +5,10 @@ end, which converts the effective pressure to contraction,
 
     c (1 - exp(-x / x0)) + k1 x + k3 x^3 = p - sum(weights * stop_i(p)).
 
-It is independent of the load. A *term* adds one or two parameters with a neutral value, so that
-every model with a term contains the model without it. Pressures, contractions and loads are
-relative to the largest of the table; :func:`units` gives the scales.
-
-All cells of a table are computed at once for many parameter sets (lanes).
+It is independent of the load. A *term* adds one parameter with a neutral value, so that every model
+with a term contains the model without it. Pressures, contractions and loads are relative to the
+largest of the table; :func:`units` gives the scales. All cells of a table are computed at once for
+many parameter sets (lanes).
 """
 
 from __future__ import annotations
@@ -33,18 +32,8 @@ CREEP_READINGS = 4.0
 class Number:
     """A parameter of a model, relative to the largest values of the table.
 
-    Attributes
-    ----------
-    name : str
-        Name.
-    neutral : float
-        Value without effect (a plausible one for parameters of the base).
-    low, high : float
-        Bounds.
-    size : float
-        Size of a meaningful change, for finite differences and starting values.
-    unit : str
-        Display unit: ``bar``, ``mm``, ``1``, or one of these with ``/kg``, ``/mm``, ``/mm3``.
+    ``neutral`` is the value without effect (a plausible one in the base), ``size`` a meaningful
+    change, for finite differences and starting values; ``unit`` is the display unit.
     """
 
     name: str
@@ -57,28 +46,12 @@ class Number:
 
 @dataclass(frozen=True)
 class Term:
-    """One form of a cause.
-
-    Attributes
-    ----------
-    cause : str
-        Name of the cause.
-    form : str
-        Name of the form.
-    title : str
-        A short sentence.
-    numbers : tuple of Number
-        Its parameters.
-    loads : int
-        Number of different loads that its fit needs.
-    both_ways : bool
-        Whether its fit needs readings at rising and falling pressure.
-    """
+    """One form of a cause; its fit needs so many ``loads``, and deflation if ``both_ways``."""
 
     cause: str
     form: str
     title: str
-    numbers: tuple[Number, ...]
+    number: Number
     loads: int = 1
     both_ways: bool = False
 
@@ -92,80 +65,75 @@ BASE = (
 )
 """Parameters of the load-blind base."""
 
+COMPLIANCE = "load_dependent_compliance"
 SHIFT = Term(
-    "load_dependent_compliance",
+    COMPLIANCE,
     "pressure shift",
     "The load acts as a pressure shift, with a zero common to all loads",
-    (Number("shift", 0.0, -1.0, 1.0, 0.05, "bar/kg"),),
-    2,
+    Number("shift", 0.0, -1.0, 1.0, 0.05, "bar/kg"),
+    loads=2,
 )
 SHIFT_ZEROED = Term(
-    "load_dependent_compliance",
+    COMPLIANCE,
     "pressure shift, zeroed at each load",
     "The load acts as a pressure shift, with the rest length of each load as its zero",
-    (Number("zeroed_shift", 0.0, -1.0, 1.0, 0.05, "bar/kg"),),
-    2,
+    Number("zeroed_shift", 0.0, -1.0, 1.0, 0.05, "bar/kg"),
+    loads=2,
 )
 STRETCH = Term(
-    "load_dependent_compliance",
+    COMPLIANCE,
     "stretch at rest",
     "The load lengthens the muscle equally at every pressure",
-    (Number("stretch", 0.0, -2.0, 2.0, 0.05, "mm/kg"),),
-    2,
+    Number("stretch", 0.0, -2.0, 2.0, 0.05, "mm/kg"),
+    loads=2,
 )
 STROKE = Term(
-    "load_dependent_compliance",
+    COMPLIANCE,
     "smaller stroke",
     "The contraction is divided by a factor that grows with the load",
-    (Number("stroke", 0.0, -0.4, 2.0, 0.05, "1/kg"),),
-    2,
+    Number("stroke", 0.0, -0.4, 2.0, 0.05, "1/kg"),
+    loads=2,
 )
 STIFFENING = Term(
-    "load_dependent_compliance",
+    COMPLIANCE,
     "stiffness growing with load",
     "The spring stiffens with the load",
-    (Number("stiffening", 0.0, -0.4, 2.0, 0.05, "1/kg"),),
-    2,
+    Number("stiffening", 0.0, -0.4, 2.0, 0.05, "1/kg"),
+    loads=2,
 )
 WIDTH = Term(
     "load_dependent_hysteresis",
     "width linear in load",
     "The hysteresis loop widens or narrows with the load",
-    (Number("width", 0.0, -0.95, 2.0, 0.1, "1/kg"),),
-    2,
-    True,
+    Number("width", 0.0, -0.95, 2.0, 0.1, "1/kg"),
+    loads=2,
+    both_ways=True,
 )
 FRICTION = Term(
     "pressure_dependent_friction",
     "bent pressure scale",
     "Friction changes along the pressure range, uniform on a bent pressure scale",
-    (Number("bend", 0.0, -0.8, 0.8, 0.1),),
+    Number("bend", 0.0, -0.8, 0.8, 0.1),
     both_ways=True,
 )
 CREEP = Term(
     "creep",
     "residual creep over readings",
     "A part of each step appears only in the next readings",
-    (Number("creep", 0.0, -0.5, 0.5, 0.02),),
+    Number("creep", 0.0, -0.5, 0.5, 0.02),
 )
 THRESHOLD = Term(
     "threshold_pressure",
     "soft threshold",
     "The first part of the pressure has no effect",
-    (Number("threshold", 0.0, 0.0, 0.3, 0.03, "bar"),),
+    Number("threshold", 0.0, 0.0, 0.3, 0.03, "bar"),
 )
 TERMS = (SHIFT, SHIFT_ZEROED, STRETCH, STROKE, STIFFENING, WIDTH, FRICTION, CREEP, THRESHOLD)
 """All forms of causes that a table of readings can show, the best established first."""
 
-EXPONENT = Term(
-    "load law", "power", "Effects grow with a power", (Number("exponent", 1.0, 0.3, 6.0, 0.3),), 3
-)
+EXPONENT = Term("load law", "power", "", Number("exponent", 1.0, 0.3, 6.0, 0.3), loads=3)
 DEAD_LOAD = Term(
-    "load law",
-    "dead zone",
-    "Effects start at some load",
-    (Number("dead_load", 0.0, 0.0, 0.95, 0.1, "kg"),),
-    3,
+    "load law", "dead zone", "", Number("dead_load", 0.0, 0.0, 0.95, 0.1, "kg"), loads=3
 )
 
 
@@ -175,7 +143,7 @@ Values = Mapping[str, Array]
 
 def numbers_of(terms: Sequence[Term]) -> tuple[Number, ...]:
     """Return the parameters of the base and of some terms."""
-    return (*BASE, *(n for term in terms for n in term.numbers))
+    return (*BASE, *(term.number for term in terms))
 
 
 def _bent(pressure: Array, bend: Array) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from importlib import metadata
 from typing import Any
 
 import numpy as np
@@ -19,12 +18,13 @@ from pam_envs.diagnosis.static.compare import (
     load_cut,
     pure_error,
 )
-from pam_envs.diagnosis.static.findings import Findings, verdict
+from pam_envs.diagnosis.static.findings import Findings
 from pam_envs.diagnosis.static.law import Law, separated
 from pam_envs.diagnosis.static.models import TERMS, Number, Term, predict, units
-from pam_envs.diagnosis.static.search import RULE, Pair, Stage, Trial
+from pam_envs.diagnosis.static.search import RULE, Stage, Trial
 from pam_envs.diagnosis.static.structure import isolability, structure
 from pam_envs.diagnosis.static.text import sentences
+from pam_envs.wording import package
 
 Json = dict[str, Any]
 
@@ -36,21 +36,19 @@ STATIC = (
 
 def report(f: Findings, seed: int) -> Json:
     """Return the report without ``runtime_s``."""
-    cells = f.study.cells
+    cells, models = f.study.cells, {"before": f.base, "after": f.model}
+    floor = {"value": f.floor, "unit": "mm", "from": "repeats" if np.isfinite(f.floor) else None}
     return {
         "schema": 1,
-        "verdict": verdict(f),
+        "verdict": f.verdict,
         "text": sentences(f),
         "causes": causes(f),
         "rivals": rivals(f),
-        "noise_floor": {"contraction": noise_floor(f), "pressure": None},
+        "noise_floor": {"contraction": floor, "pressure": None},
         "held_out": None,
         "error_before": error(f, f.base),
         "error_after": error(f, f.model),
-        "residual_structure": {
-            "before": structure(cells, f.base),
-            "after": structure(cells, f.model),
-        },
+        "residual_structure": {when: structure(cells, model) for when, model in models.items()},
         "isolability": isolability(f.study),
         "experiment": experiment(f),
         "closed_loop": None,
@@ -62,43 +60,55 @@ def report(f: Findings, seed: int) -> Json:
         "provenance": provenance(f.table, seed),
         "readings": {
             "ladder": [stage_of(stage) for stage in f.search.stages],
-            "pairs": [pair_of(pair) for pair in f.search.pairs],
+            "pairs": [
+                {
+                    "names": [term.cause for term in pair.terms],
+                    "p_alone": list(pair.alone),
+                    "p_beside": list(pair.beside),
+                    "masked": [term.cause for term in pair.masked],
+                }
+                for pair in f.search.pairs
+            ],
             "loads_left_out": loads_left_out(f),
             "load_laws": [load_law(law) for law in f.laws],
-            "lack_of_fit": {"before": misfit(f, f.base), "after": misfit(f, f.model)},
+            "lack_of_fit": {when: misfit(f, model) for when, model in models.items()},
             "set_points": [vars(point) for point in f.set_points],
             "curves": curves(f),
         },
     }
 
 
-def _value(value: float, unit: str, **more: Any) -> Json:
-    return {"value": value, "unit": unit, **more}
+def _value(value: float, unit: str = "mm") -> Json:
+    return {"value": value, "unit": unit}
 
 
 def _number(f: Findings, number: Number) -> Json:
     scale = units(number, f.study.cells.scale)
-    low, high = f.interval(number.name)
+    value, (low, high) = f.estimate(number.name)
     return {
         "name": number.name,
-        "value": f.value(number.name) * scale,
+        "value": value * scale,
         "unit": number.unit,
         "interval": [low * scale, high * scale],
         "neutral": number.neutral * scale,
     }
 
 
-def noise_floor(f: Findings) -> Json:
-    """Return the difference of a repeat from the mean of the others; NaN with one repeat."""
-    return _value(f.floor, "mm", **{"from": "repeats" if np.isfinite(f.floor) else None})
-
-
 def effect(f: Findings, term: Term) -> Array:
     """Return the contribution of a cause to the contraction of each cell [mm]."""
-    theta, cells = f.model.fit.theta[:1], f.study.cells
-    values = {n.name: theta[:, [i]] for i, n in enumerate(f.model.fit.numbers)}
-    without = {k: v for k, v in values.items() if k not in {n.name for n in term.numbers}}
+    values, cells = f.model.fit.values(), f.study.cells
+    without = {k: v for k, v in values.items() if k != term.number.name}
     return np.asarray((predict(cells, values) - predict(cells, without))[0] * cells.millimetres)
+
+
+def _form(trial: Trial) -> Json:
+    """Return a form with its gain."""
+    return {
+        "name": trial.term.cause,
+        "title": trial.term.title,
+        "form": trial.term.form,
+        "gain": {"value": trial.gain, "interval": list(trial.interval)},
+    }
 
 
 def causes(f: Findings) -> list[Json]:
@@ -107,22 +117,9 @@ def causes(f: Findings) -> list[Json]:
     made = []
     for trial in f.search.accepted:
         size = float(np.sqrt(np.mean(effect(f, trial.term)[f.study.cells.used] ** 2)))
-        made.append(
-            {
-                "name": trial.term.cause,
-                "title": trial.term.title,
-                "form": trial.term.form,
-                "parameters": [_number(f, number) for number in trial.term.numbers],
-                "gain": _gain(trial),
-                "effect": {"contraction": _value(size, "mm")},
-                "size": size / noise,
-            }
-        )
+        more = {"effect": {"contraction": _value(size)}, "size": size / noise}
+        made.append({**_form(trial), "parameters": [_number(f, trial.term.number)], **more})
     return made
-
-
-def _gain(trial: Trial) -> Json:
-    return {"value": trial.gain, "interval": list(trial.interval)}
 
 
 def rivals(f: Findings) -> list[Json]:
@@ -139,24 +136,18 @@ def rivals(f: Findings) -> list[Json]:
 
 
 def _rival(trial: Trial, chosen: bool) -> Json:
+    reasons = (
+        (chosen, "the best"),
+        (not trial.passes, "gains too little"),
+        (trial.excluded, "surely worse"),
+        (True, "not excluded"),
+    )
     return {
-        "name": trial.term.cause,
-        "title": trial.term.title,
-        "form": trial.term.form,
-        "gain": _gain(trial),
+        **_form(trial),
         "behind": {"value": trial.behind, "interval": list(trial.behind_interval)},
-        "why": _why(trial, chosen),
+        "why": next(reason for applies, reason in reasons if applies),
         "excluded": not chosen and (trial.excluded or not trial.passes),
     }
-
-
-def _why(trial: Trial, chosen: bool) -> str:
-    """Return the reason for which a form is kept or excluded."""
-    if chosen:
-        return "the best"
-    if not trial.passes:
-        return "gains too little"
-    return "surely worse" if trial.excluded else "not excluded"
 
 
 def error(f: Findings, model: Model) -> Json:
@@ -172,14 +163,16 @@ def error(f: Findings, model: Model) -> Json:
         "times_floor": model.held_out / f.floor,
         "kinds": kinds,
     }
-    return {"contraction": _value(model.held_out, "mm", **more), "pressure": None}
+    return {"contraction": {**_value(model.held_out), **more}, "pressure": None}
 
 
 def experiment(f: Findings) -> Json | None:
     """Return the loads to measure next if two models are not separated."""
     if f.next is None:
         return None
-    names = [law.term.form for law in f.laws] if f.bent else [t.term.cause for t in f.ties[0]]
+    names = (
+        [law.term.form for law in f.laws] if f.bent else [t.term.cause for t in f.search.ties[0]]
+    )
     at = int(np.argmax(f.next.apart))
     loads = " and ".join(f"{load:.1f} kg" for load in f.next.best)
     separation = float(f.next.separation[at])
@@ -253,7 +246,7 @@ def _zeros(f: Findings) -> str:
     accepted = {trial.term.form for trial in f.search.accepted}
     for stage in f.search.stages:
         for trial in stage.trials:
-            other = trial.term.numbers[0]
+            other = trial.term.number
             same = trial.term.cause == "load_dependent_compliance" and other.unit == "bar/kg"
             if same and trial.passes and not trial.excluded and trial.term.form not in accepted:
                 value = float(trial.model.fit.theta[0, -1]) * units(other, f.study.cells.scale)
@@ -273,16 +266,9 @@ def provenance(table: ContractionTable, seed: int) -> Json:
         "rig": None,
         "plant_before": None,
         "plant_after": None,
-        "package": _package(),
+        "package": package(),
         "seed": seed,
     }
-
-
-def _package() -> str:
-    try:
-        return f"pam-envs {metadata.version('pam-envs')}"
-    except metadata.PackageNotFoundError:
-        return "pam-envs, not installed"
 
 
 def stage_of(stage: Stage) -> Json:
@@ -298,7 +284,7 @@ def stage_of(stage: Stage) -> Json:
                 **_errors(trial.model),
                 "p": trial.p,
                 "p_adjusted": trial.adjusted,
-                "gain": _gain(trial),
+                "gain": {"value": trial.gain, "interval": list(trial.interval)},
                 "accepted": trial.passes,
                 "excluded": trial.excluded or not trial.passes,
             }
@@ -317,24 +303,14 @@ def _errors(model: Model) -> Json:
     }
 
 
-def pair_of(pair: Pair) -> Json:
-    """Return two causes fitted together, and those that are significant only together."""
-    return {
-        "names": [term.cause for term in pair.terms],
-        "p_alone": list(pair.alone),
-        "p_beside": list(pair.beside),
-        "masked": [term.cause for term in pair.masked],
-    }
-
-
 def loads_left_out(f: Findings) -> Json | None:
     """Return the decrease of the mean error on held-out loads by effects linear in load."""
     if not f.study.lanes.loads:
         return None
     cut, (low, high) = load_cut(f.study, f.base, f.model)
     return {
-        "before": _value(f.base.left_load, "mm"),
-        "after": _value(f.model.left_load, "mm"),
+        "before": _value(f.base.left_load),
+        "after": _value(f.model.left_load),
         "cut_percent": {"value": 100.0 * cut, "interval": [100.0 * low, 100.0 * high]},
     }
 
@@ -344,7 +320,7 @@ def load_law(law: Law) -> Json:
     return {
         "law": law.term.form,
         "value": law.value,
-        "unit": law.term.numbers[0].unit,
+        "unit": law.term.number.unit,
         "interval": list(law.interval),
         "p": law.p,
         **_errors(law.model),
@@ -355,7 +331,7 @@ def load_law(law: Law) -> Json:
 def misfit(f: Findings, model: Model) -> Json:
     """Return the lack of fit: F and p-value against the repeats, and its size."""
     ratio, p, size = lack_of_fit(f.study, model)
-    return {"F": ratio, "p": p, "size": _value(size, "mm")}
+    return {"F": ratio, "p": p, "size": _value(size)}
 
 
 def curves(f: Findings) -> Json:

@@ -9,7 +9,7 @@ Accepted causes are tested again beside later ones.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -36,22 +36,9 @@ MOST_CAUSES = 4
 class Trial:
     """A form added to a model.
 
-    Attributes
-    ----------
-    term : Term
-        The form.
-    model : Model
-        The model with it.
-    p : float
-        See :func:`p_value`, for this form alone.
-    tried : int
-        Number of forms of the stage.
-    gain, interval : float, tuple
-        Log ratio of held-out mean squares to the model without it, and its 95 % interval.
-    loads_worse : bool
-        Whether it predicts held-out loads worse.
-    behind, behind_interval : float, tuple
-        Gain of the stage's best form over this one, and its 95 % interval.
+    ``p`` is the p-value of this form alone (:func:`p_value`), one of those ``tried`` in a stage;
+    ``gain`` the log ratio of held-out mean squares to the model without it, ``behind`` that of the
+    stage's best form over this one, both with a 95 % interval.
     """
 
     term: Term
@@ -91,20 +78,9 @@ class Stage:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two causes fitted together.
-
-    Attributes
-    ----------
-    terms : tuple of Term
-        The two causes.
-    model : Model
-        The model with both.
-    alone, beside : tuple of float
-        p-value of each added to the base, and added to the other.
-    """
+    """Two causes fitted together: p-values of each added to the base, and added to the other."""
 
     terms: tuple[Term, Term]
-    model: Model
     alone: tuple[float, float]
     beside: tuple[float, float]
 
@@ -117,34 +93,33 @@ class Pair:
 
 @dataclass(frozen=True)
 class Search:
-    """Result of the search.
+    """Stages, the first on the base, every two causes in pairs, and the accepted model.
 
-    Attributes
-    ----------
-    stages : tuple of Stage
-        Stages, the first on the base.
-    pairs : tuple of Pair
-        Every two causes, each in its best form.
-    model : Model
-        The accepted model.
-    accepted : tuple of Trial
-        Accepted forms, in the order of evidence.
-    dropped : tuple of Term
-        Forms that are no longer significant beside later ones.
+    The ``accepted`` forms are in the order of evidence.
     """
 
     stages: tuple[Stage, ...]
     pairs: tuple[Pair, ...]
     model: Model
     accepted: tuple[Trial, ...]
-    dropped: tuple[Term, ...] = field(default=())
+
+    @property
+    def ties(self) -> list[tuple[Trial, Trial]]:
+        """Accepted forms, each with an equally good form of a cause that was not accepted."""
+        named = {trial.term.cause for trial in self.accepted}
+        return [
+            (chosen, trial)
+            for one in self.stages
+            if (chosen := one.chosen)
+            for trial in one.trials
+            if trial.passes and not trial.excluded and trial.term.cause not in named
+        ]
 
 
-def available(study: Study, terms: Sequence[Term] = TERMS) -> tuple[Term, ...]:
+def available(study: Study) -> tuple[Term, ...]:
     """Return the forms that can be fitted to the loads and branches of a table."""
-    cells = study.cells
-    one_way = not cells.falling.any()
-    return tuple(t for t in terms if t.loads <= len(cells.loads) and not (t.both_ways and one_way))
+    loads, one_way = len(study.cells.loads), not study.cells.falling.any()
+    return tuple(t for t in TERMS if t.loads <= loads and not (t.both_ways and one_way))
 
 
 def unexplained(study: Study, model: Model) -> bool:
@@ -155,33 +130,31 @@ def unexplained(study: Study, model: Model) -> bool:
     return p <= UNEXPLAINED
 
 
+def _trial(study: Study, term: Term, parent: Model, model: Model, p: float, tried: int) -> Trial:
+    """Return the trial of a model that extends its parent by a term."""
+    value, interval = gain(study, parent, model)
+    worse = model.left_load > WORSE_LOADS * parent.left_load
+    return Trial(term, model, p, tried, value, interval, worse)
+
+
 def stage(study: Study, parent: Model, terms: Sequence[Term], singles: Sequence[Model]) -> Stage:
     """Add forms to ``parent``; ``singles`` are models with one of them alone."""
     trials = []
     for term in terms:
         known = [s for s in singles if s.terms == (term,) and parent.terms]
         model = study.extended([parent, *known], (*parent.terms, term))
-        value, interval = gain(study, parent, model)
-        worse = model.left_load > WORSE_LOADS * parent.left_load
         p = p_value(study, parent, model)
-        trials.append(Trial(term, model, p, len(terms), value, interval, worse))
-    ranked = _ranked(study, trials)
-    return Stage(parent, ranked, _choice(study, ranked, terms))
-
-
-def _ranked(study: Study, trials: Sequence[Trial]) -> tuple[Trial, ...]:
-    """Return the trials, best first, each with its distance from the best."""
+        trials.append(_trial(study, term, parent, model, p, len(terms)))
     order = sorted(trials, key=lambda trial: (not trial.passes, -trial.gain))
-    best = order[0].model if order else None
-    made = []
-    for trial in order:
-        behind, interval = gain(study, trial.model, best) if best else (0.0, (0.0, 0.0))
-        values = {**vars(trial), "behind": behind, "behind_interval": interval}
-        made.append(Trial(**values))
-    return tuple(made)
+    behind = [gain(study, trial.model, order[0].model) for trial in order]
+    ranked = tuple(
+        replace(trial, behind=value, behind_interval=interval)
+        for trial, (value, interval) in zip(order, behind, strict=True)
+    )
+    return Stage(parent, ranked, _choice(ranked, terms))
 
 
-def _choice(study: Study, ranked: Sequence[Trial], terms: Sequence[Term]) -> Trial | None:
+def _choice(ranked: Sequence[Trial], terms: Sequence[Term]) -> Trial | None:
     """Return the best accepted form; of its cause, the best established one not excluded."""
     passing = [trial for trial in ranked if trial.passes]
     if not passing:
@@ -193,24 +166,25 @@ def _choice(study: Study, ranked: Sequence[Trial], terms: Sequence[Term]) -> Tri
 def search(study: Study) -> Search:
     """Search for causes until none is accepted."""
     terms = available(study)
-    stages = [stage(study, study.base, terms, ())] if terms else []
-    singles = [trial.model for trial in stages[0].trials] if stages else []
-    pairs = _pairs(study, stages[0]) if stages else ()
-    if not stages or not unexplained(study, study.base):
-        return Search(tuple(stages), pairs, study.base, ())
-    accepted = [stages[0].chosen] if stages[0].chosen else _hidden(study, pairs)
+    first = stage(study, study.base, terms, ())
+    stages, pairs = [first], _pairs(study, first)
+    if not unexplained(study, study.base):
+        return Search((first,), pairs, study.base, ())
+    accepted = [first.chosen] if first.chosen else _hidden(study, pairs)
     while accepted and len(accepted) < MOST_CAUSES and unexplained(study, accepted[-1].model):
-        parent = accepted[-1].model
         known = {trial.term.cause for trial in accepted}
         left = [term for term in terms if term.cause not in known]
         if not left:
             break
-        stages.append(stage(study, parent, left, singles))
+        singles = [trial.model for trial in first.trials]
+        stages.append(stage(study, accepted[-1].model, left, singles))
         chosen = stages[-1].chosen
         if chosen is None:
             break
         accepted.append(chosen)
-    return _retested(study, Search(tuple(stages), pairs, study.base, tuple(accepted)))
+    kept = _retested(study, accepted)
+    model = kept[-1].model if kept else study.base
+    return Search(tuple(stages), pairs, model, kept)
 
 
 def _pairs(study: Study, first: Stage) -> tuple[Pair, ...]:
@@ -224,7 +198,7 @@ def _pairs(study: Study, first: Stage) -> tuple[Pair, ...]:
     for one, other in combinations(best.values(), 2):
         model = study.extended([one.model, other.model], (one.term, other.term), 1)
         beside = p_value(study, other.model, model), p_value(study, one.model, model)
-        made.append(Pair((one.term, other.term), model, (one.p, other.p), beside))
+        made.append(Pair((one.term, other.term), (one.p, other.p), beside))
     return tuple(made)
 
 
@@ -236,34 +210,28 @@ def _hidden(study: Study, pairs: Sequence[Pair]) -> list[Trial]:
         if p * len(pairs) > LEVEL:
             continue
         model = study.extended([study.base], pair.terms)
-        value, interval = gain(study, study.base, model)
-        worse = model.left_load > WORSE_LOADS * study.base.left_load
-        both = [Trial(term, model, p, len(pairs), value, interval, worse) for term in pair.terms]
+        both = [_trial(study, t, study.base, model, p, len(pairs)) for t in pair.terms]
         made += [both] if both[0].passes else []
     return max(made, key=lambda both: both[0].gain, default=[])
 
 
-def _retested(study: Study, found: Search) -> Search:
-    """Drop accepted causes that are not significant beside the later ones."""
-    accepted, dropped = list(found.accepted), []
-    while len(accepted) > 1:
-        model = accepted[-1].model
-        judged = [(_without(study, model, trial.term), trial) for trial in accepted[:-1]]
-        tested = [(p_value(study, less, model), less, trial) for less, trial in judged]
-        p, less, trial = max(tested, key=lambda one: one[0])
-        if p <= LEVEL:
+def _retested(study: Study, accepted: Sequence[Trial]) -> tuple[Trial, ...]:
+    """Return the accepted causes that are significant beside the later ones."""
+    kept = list(accepted)
+    while len(kept) > 1:
+        model = kept[-1].model
+        smaller = [_without(study, model, trial.term) for trial in kept[:-1]]
+        p = [p_value(study, less, model) for less in smaller]
+        at = int(np.argmax(p))
+        if p[at] <= LEVEL:
             break
-        accepted.remove(trial)
-        dropped.append(trial.term)
-        accepted[-1] = Trial(**{**vars(accepted[-1]), "model": less})
-    model = accepted[-1].model if accepted else study.base
-    return Search(found.stages, found.pairs, model, tuple(accepted), tuple(dropped))
+        del kept[at]
+        kept[-1] = replace(kept[-1], model=smaller[at])
+    return tuple(kept)
 
 
 def _without(study: Study, model: Model, term: Term) -> Model:
     """Return the model refitted without a term."""
     rest = tuple(t for t in model.terms if t is not term)
-    names = [n.name for n in model.fit.numbers]
-    gone = {n.name for n in term.numbers}
-    kept = [i for i, name in enumerate(names) if name not in gone]
+    kept = [i for i, name in enumerate(model.fit.names) if name != term.number.name]
     return study.refitted(rest, model.fit.theta[:, kept])

@@ -107,13 +107,12 @@ def isolability(study: Study) -> Json:
     first = dict[str, Term]()
     for term in available(study):
         first.setdefault(term.cause, term)
-    fitted, weight = study.base.fit, study.lanes.weight[0]
-    values = {n.name: fitted.theta[:1, [i]] for i, n in enumerate(fitted.numbers)}
+    weight, values = study.lanes.weight[0], study.base.fit.values()
     at = predict(study.cells, values)
     columns = np.empty((len(weight), len(first)))
-    for i, term in enumerate(first.values()):
-        added = {n.name: np.array([[n.neutral + n.size]]) for n in term.numbers}
-        columns[:, i] = (predict(study.cells, values | added) - at)[0] * weight
+    for i, number in enumerate(term.number for term in first.values()):
+        moved = values | {number.name: np.array([[number.neutral + number.size]])}
+        columns[:, i] = (predict(study.cells, moved) - at)[0] * weight
     left = beyond(slopes(study, study.base), columns)
     size = np.linalg.norm(left, axis=0)
     absorbed = 1.0 - size / np.maximum(np.linalg.norm(columns, axis=0), 1e-30)

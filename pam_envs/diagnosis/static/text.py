@@ -5,32 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from pam_envs.diagnosis.static.compare import lack_of_fit
-from pam_envs.diagnosis.static.findings import FLOOR_REACHED, Findings, verdict
-from pam_envs.diagnosis.static.models import Term, units
+from pam_envs.diagnosis.static.findings import FLOOR_REACHED, Findings
+from pam_envs.diagnosis.static.models import Number, units
 from pam_envs.diagnosis.static.search import Trial
 
 
 def sentences(f: Findings) -> str:
     """Return the verdict in one to four sentences."""
-    word = verdict(f)
-    if word == "insufficient":
+    if f.verdict == "insufficient":
         cells, needed = int(f.study.cells.used.sum()), 2 * len(f.base.fit.numbers)
         return (
             f"The table has {cells} cells; a static law with hysteresis needs at least {needed} to "
             "be fitted and judged. Measure more pressures, up and down."
         )
-    if not f.search.accepted:
-        return _nothing(f, word == "adequate")
-    return " ".join(part for part in (_missed(f), _named(f), _loads(f), _left(f)) if part)
-
-
-def _nothing(f: Findings, adequate: bool) -> str:
-    text = _missed(f)
-    if adequate:
-        return f"{text} The load-blind model is adequate: the table shows no cause."
+    if f.search.accepted:
+        return " ".join(part for part in (_missed(f), _named(f), _loads(f), _left(f)) if part)
+    if f.verdict == "adequate":
+        return f"{_missed(f)} The load-blind model is adequate: the table shows no cause."
     _, _, size = lack_of_fit(f.study, f.base)
     much = f" of {size:.2f} mm" if np.isfinite(size) else ""
-    return f"{text} An error{much} beyond the repeats is left, which no known cause explains."
+    text = f"An error{much} beyond the repeats is left, which no known cause explains."
+    return f"{_missed(f)} {text}"
 
 
 def _missed(f: Findings) -> str:
@@ -43,7 +38,7 @@ def _missed(f: Findings) -> str:
 
 def _named(f: Findings) -> str:
     parts = [_cause(f, trial) for trial in f.search.accepted]
-    rivals = sorted({rival.term.cause for _, rival in f.ties})
+    rivals = sorted({rival.term.cause for _, rival in f.search.ties})
     text = f"Named: {'; '.join(parts)}."
     return f"{text} Not separated from {' and '.join(rivals)}." if rivals else text
 
@@ -51,15 +46,13 @@ def _named(f: Findings) -> str:
 def _cause(f: Findings, trial: Trial) -> str:
     masking = f.shown_by(trial.term)
     hidden = f" (significant only beside {masking})" if masking else ""
-    numbers = ", ".join(_number(f, trial.term, i) for i in range(len(trial.term.numbers)))
-    return f"{trial.term.cause} as {trial.term.form}, {numbers}{hidden}"
+    return f"{trial.term.cause} as {trial.term.form}, {_number(f, trial.term.number)}{hidden}"
 
 
-def _number(f: Findings, term: Term, i: int) -> str:
-    number = term.numbers[i]
+def _number(f: Findings, number: Number) -> str:
     scale = units(number, f.study.cells.scale)
-    low, high = (bound * scale for bound in f.interval(number.name))
-    value = f.value(number.name) * scale
+    value, (low, high) = f.estimate(number.name)
+    value, low, high = value * scale, low * scale, high * scale
     if number.unit == "1/kg":
         return f"{100 * value:+.1f} %/kg ({100 * low:+.1f} to {100 * high:+.1f})"
     unit = "" if number.unit == "1" else f" {number.unit}"

@@ -77,11 +77,11 @@ def test_linear_load_effects_reduce_held_out_load_error_by_30_percent(measured):
     assert both["load_left_out_mm"] <= 0.7 * before
 
 
-def test_zeroed_form_of_the_shift_is_told_as_an_equal(measured):
+def test_zeroed_form_of_the_shift_is_an_equal_rival(measured):
     forms = {r["form"]: r for r in measured["rivals"]}
     assert not forms["pressure shift, zeroed at each load"]["excluded"]
     assert forms["smaller stroke"]["excluded"]
-    assert any("0.115 bar/kg" in told for told in measured["warnings"])
+    assert any("0.115 bar/kg" in text for text in measured["warnings"])
 
 
 def test_shift_and_width_come_with_intervals(measured):
@@ -118,9 +118,9 @@ def test_exponent_is_post_hoc_and_not_separable_from_dead_zone(measured):
     assert power["load_left_out_mm"] == pytest.approx(0.22, abs=0.01)
     assert power["status"] == dead["status"] == "post hoc, not held out"
     assert power["cells_mm"] == pytest.approx(dead["cells_mm"], abs=1e-4)
-    told = " ".join(measured["warnings"])
-    assert "measure at least five" in told
-    assert "the readings do not separate them" in told
+    warnings = " ".join(measured["warnings"])
+    assert "measure at least five" in warnings
+    assert "the readings do not separate them" in warnings
     assert measured["experiment"]["between"] == ["power", "dead zone"]
     assert "1.5 kg and 3.6 kg" in measured["experiment"]["description"]
 
@@ -132,9 +132,9 @@ def test_noise_floor_is_not_reached(measured):
 
 
 def test_audit_finds_drift_unequal_scatter_and_missed_setpoint(measured):
-    told = " ".join(measured["warnings"])
-    assert "drift by +0.033 mm a repeat" in told
-    assert "scatter differently" in told
+    warnings = " ".join(measured["warnings"])
+    assert "drift by +0.033 mm a repeat" in warnings
+    assert "scatter differently" in warnings
     (point,) = measured["readings"]["set_points"]
     assert (point["pressure"], point["falling"]) == (5.5, False)
     assert point["loads"] == [0.0, 2.55]
@@ -188,7 +188,7 @@ def test_one_repeat_leaves_noise_floor_unknown_and_names_shift():
     assert found["noise_floor"]["contraction"]["value"] is None
     assert found["causes"][0]["name"] == COMPLIANCE
     assert "pressures, one held out" in found["error_after"]["contraction"]["kinds"]
-    assert any("noise floor is not known" in told for told in found["warnings"])
+    assert any("noise floor is not known" in text for text in found["warnings"])
 
 
 def test_copied_repeats_are_reported_and_give_no_noise_floor():
@@ -197,7 +197,7 @@ def test_copied_repeats_are_reported_and_give_no_noise_floor():
     columns["repeat"] = np.repeat([1, 2], len(one.repeat))
     found = diagnose_readings(dataclasses.replace(one, **columns))
     assert found["noise_floor"]["contraction"]["value"] is None
-    assert any("one is a copy" in told for told in found["warnings"])
+    assert any("one is a copy" in text for text in found["warnings"])
 
 
 def test_common_zero_is_named_stretch_at_rest():
@@ -264,12 +264,11 @@ def test_lags_are_those_of_play_operators_on_any_path():
 
 def test_every_term_is_neutral_at_its_neutral_value():
     study = Study(cells_of(table(pressures=PRESSURES[::2], repeats=2)))
-    fitted = study.base.fit
-    values = {n.name: fitted.theta[:1, [i]] for i, n in enumerate(fitted.numbers)}
+    values = study.base.fit.values()
     plain = predict(study.cells, values)
-    for term in TERMS:
-        added = {n.name: np.array([[n.neutral]]) for n in term.numbers}
-        np.testing.assert_allclose(predict(study.cells, values | added), plain, atol=1e-9)
+    for number in (term.number for term in TERMS):
+        neutral = values | {number.name: np.array([[number.neutral]])}
+        np.testing.assert_allclose(predict(study.cells, neutral), plain, atol=1e-9)
 
 
 def test_fit_worse_than_nested_model_is_refused():
@@ -280,4 +279,4 @@ def test_fit_worse_than_nested_model_is_refused():
 
 
 def test_units_lead_back_to_bar_and_kg():
-    assert units(SHIFT.numbers[0], (4.55, 6e5, 0.0151)) == pytest.approx(6.0 / 4.55)
+    assert units(SHIFT.number, (4.55, 6e5, 0.0151)) == pytest.approx(6.0 / 4.55)
