@@ -21,24 +21,9 @@ OF_REPORT = (structure, rivals, kinds, isolability)
 
 
 def draw(report: Mapping[str, Any], traces: Any) -> dict[str, Picture]:
-    """Draw the figures of a diagnosis.
+    """Draw the figures of a diagnosis, by name; ModuleNotFoundError without matplotlib.
 
-    Parameters
-    ----------
-    report : mapping
-        As in ``report.json``.
-    traces : Traces or None
-        Without them only figures of the report itself, and of its settled readings.
-
-    Returns
-    -------
-    dict
-        Name to picture, without empty ones.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        Without matplotlib.
+    Without ``traces`` only figures of the report itself, and of its settled readings.
     """
     view = None if traces is None else View.of(traces)
     with drawing():
@@ -46,6 +31,6 @@ def draw(report: Mapping[str, Any], traces: Any) -> dict[str, Picture]:
         if view is not None and view.channels and len(view.clock) > 1:
             made += [f(report, view) for f in OF_TRACES]
         elif (report.get("readings") or {}).get("curves"):
-            curves = Curves.of(report["readings"]["curves"])
+            curves = Curves(report["readings"]["curves"])
             made += [f(report, curves) for f in OF_READINGS]
     return {picture.name: picture for picture in made if picture is not None}

@@ -19,29 +19,18 @@ import numpy as np
 
 from pam_envs.diagnosis.arrays import Array
 
-WIDTH = 900.0
-LEFT, RIGHT = 62.0, 18.0
-"""Margins beside axes for ticks and labels."""
+WIDTH, LEFT, RIGHT = 900.0, 62.0, 18.0
+"""Width of a figure, and its margins for ticks and labels."""
+INSIDE = WIDTH - LEFT - RIGHT
 LEGEND = 36.0
 """Height of the legend at the top."""
 
 INK, MUTED, RULE, PAPER = "#1a1c20", "#646b75", "#dfe2e7", "#fefefe"
 MEASURED, BASE, EXTENDED, FLOOR = "#9aa1ab", "#d55e00", "#0072b2", "#009e73"
 HELD, RISING, FALLING, GREY = "#eef1f6", "#b8860b", "#6a4c93", "#b9bec6"
-VARIABLES = {
-    INK: "ink",
-    MUTED: "muted",
-    RULE: "rule",
-    PAPER: "paper",
-    MEASURED: "measured",
-    BASE: "base",
-    EXTENDED: "extended",
-    FLOOR: "floor",
-    HELD: "held",
-    RISING: "rising",
-    FALLING: "falling",
-    GREY: "grey",
-}
+_NAMES = "ink muted rule paper measured base extended floor held rising falling grey"
+_COLOURS = (INK, MUTED, RULE, PAPER, MEASURED, BASE, EXTENDED, FLOOR, HELD, RISING, FALLING, GREY)
+VARIABLES = dict(zip(_COLOURS, _NAMES.split(), strict=True))
 """Colours for colour-blind readers (after Okabe and Ito), with their names on the page."""
 
 STYLE = {
@@ -75,23 +64,13 @@ STYLE = {
     "legend.fontsize": 12.0,
 }
 DASHES = (0, (5, 3))
+Entry = tuple[str, str, dict[str, Any]]
+"""Kind ("line", "dot" or "area"), label and style in a legend."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure of the page.
-
-    Attributes
-    ----------
-    name : str
-        Unique on the page.
-    svg : str
-        An ``<svg>`` element without references to anything outside.
-    alt : str
-        Text alternative.
-    caption : str
-        Reading instruction.
-    """
+    """A figure of the page: unique name, ``<svg>`` element, text alternative and caption."""
 
     name: str
     svg: str
@@ -101,13 +80,7 @@ class Picture:
 
 @contextmanager
 def drawing() -> Iterator[None]:
-    """Configure matplotlib while drawing.
-
-    Raises
-    ------
-    ModuleNotFoundError
-        Without matplotlib.
-    """
+    """Configure matplotlib while drawing; ModuleNotFoundError without it."""
     import matplotlib
 
     with matplotlib.rc_context(STYLE), warnings.catch_warnings():
@@ -134,6 +107,23 @@ class Canvas:
         ax.locator_params(nbins=5)
         return ax
 
+    def row(
+        self, n: int, top: float, height: float, gap: float, slots: int = 0, own: bool = False
+    ) -> list[tuple[float, Any]]:
+        """Add ``n`` axes side by side; return the left edge of each, and the axes.
+
+        Only the first has labels on the left unless each has its ``own``; ``slots`` is the least
+        number of axes for which there is room.
+        """
+        slots, made = max(n, slots), []
+        width = (INSIDE - gap * (slots - 1)) / slots
+        for i in range(n):
+            left = LEFT + i * (width + gap)
+            ax = self.axes(left, top, width, height)
+            ax.tick_params(labelleft=own or i == 0)
+            made.append((left, ax))
+        return made
+
     def text(self, x: float, y: float, text: str, **style: Any) -> None:
         """Write with the baseline at y."""
         style = {"fontsize": 12.0, "color": INK, **style}
@@ -144,8 +134,8 @@ class Canvas:
         """Write the title of a panel."""
         self.text(x, y, text, fontweight="bold")
 
-    def legend(self, entries: Sequence[tuple[str, str, dict[str, Any]]], x: float = LEFT) -> None:
-        """Put a line of (kind, label, style) at the top; kind is "line", "dot" or "area"."""
+    def legend(self, entries: Sequence[Entry], x: float = LEFT) -> None:
+        """Put a line of entries at the top."""
         import matplotlib.lines
         import matplotlib.patches
 
@@ -154,7 +144,7 @@ class Canvas:
             if kind == "area":
                 handles.append(matplotlib.patches.Patch(linewidth=0, label=label, **style))
                 continue
-            shape = {"linestyle": "none", "marker": "o"} if kind == "dot" else {}
+            shape: dict[str, Any] = {"linestyle": "none", "marker": "o"} if kind == "dot" else {}
             handles.append(matplotlib.lines.Line2D([], [], label=label, **(shape | style)))
         if not handles:
             return
@@ -178,6 +168,14 @@ class Canvas:
         buffer = io.StringIO()
         FigureCanvasSVG(self.figure).print_svg(buffer, metadata={"Date": None})
         return Picture(name, for_page(buffer.getvalue(), name, alt, self.height), alt, caption)
+
+
+def legend_of(both: bool, alone: str, before: str, after: str, kind: str = "line") -> list[Entry]:
+    """Return the legend of the simulation before and after the extension, or ``alone``."""
+    labels = ((before if both else alone, BASE), (after, EXTENDED))[: 1 + both]
+    key = "facecolor" if kind == "area" else "color"
+    size = {"line": {"linewidth": 1.8}, "dot": {"markersize": 9.0}, "area": {}}[kind]
+    return [(kind, label, {key: colour, **size}) for label, colour in labels]
 
 
 def dots(ax: Any, x: Array, y: Array, colour: str) -> None:
@@ -228,6 +226,10 @@ def _tag(tag: str, name: str) -> str:
     return re.sub(r' d="[^"]*"', lambda found: _path(found[0]), tag)
 
 
+def _path(text: str) -> str:
+    return re.sub(r"\s+", " ", re.sub(r"(\.\d\d)\d+", r"\1", text))
+
+
 def _style(text: str) -> str:
     text = re.sub(r"font: (?:(\w+) )?([\d.]+)px [^;\"]*", _font, text)
     return re.sub(r"#[0-9a-f]{6}", lambda found: _colour(found[0]), text)
@@ -240,7 +242,3 @@ def _font(found: re.Match[str]) -> str:
 
 def _colour(value: str) -> str:
     return f"var(--{VARIABLES[value]})" if value in VARIABLES else value
-
-
-def _path(text: str) -> str:
-    return re.sub(r"\s+", " ", re.sub(r"(\.\d\d)\d+", r"\1", text))

@@ -9,14 +9,11 @@ from pam_envs.diagnosis.figures.canvas import (
     BASE,
     EXTENDED,
     FALLING,
-    LEFT,
     LEGEND,
     MEASURED,
     MUTED,
     PAPER,
-    RIGHT,
     RISING,
-    WIDTH,
     Canvas,
     Picture,
     dots,
@@ -36,18 +33,15 @@ def scatter(report: Report, view: View) -> Picture | None:
     drive = view.base.get("pressure", view.command)
     if drive is None or np.nanmax(drive) <= np.nanmin(drive):
         return None
-    gap, height, top = 20.0, 190.0, LEGEND + 16.0
-    width = (WIDTH - LEFT - RIGHT - gap) / 2.0
+    height, top = 190.0, LEGEND + 16.0
     canvas = Canvas(top + len(view.channels) * (height + 16.0) + 26.0)
     turn = tv.direction(drive)
     for j, channel in enumerate(view.channels):
-        shown = [view.residual(channel)]
-        if channel in view.extended:
-            shown.append(view.residual(channel, extended=True))
+        shown = view.residuals(channel)
         box = limits([np.nanpercentile(rest, [0.05, 99.95]) for rest in shown], 0.1)
-        for i, rest in enumerate(shown):
-            left = LEFT + i * (width + gap)
-            ax = canvas.axes(left, top + j * (height + 16.0), width, height)
+        panels = canvas.row(len(shown), top + j * (height + 16.0), height, 20.0, 2)
+        panels[0][1].set_ylabel(f"{channel} residual [{UNITS[channel][0]}]")
+        for i, (rest, (left, ax)) in enumerate(zip(shown, panels, strict=True)):
             for sign, colour in ((1, RISING), (-1, FALLING)):
                 rows = np.flatnonzero((turn == sign) & np.isfinite(rest))
                 some = tv.thin(rows, CLOUD)
@@ -57,9 +51,7 @@ def scatter(report: Report, view: View) -> Picture | None:
                 ax.plot(*mean, color=colour, linewidth=2.4, zorder=4)
             ax.set_ylim(box)
             ax.set_xlim(limits([drive], 0.02))
-            ax.tick_params(labelbottom=channel == view.channels[-1], labelleft=i == 0)
-            if i == 0:
-                ax.set_ylabel(f"{channel} residual [{UNITS[channel][0]}]")
+            ax.tick_params(labelbottom=channel == view.channels[-1])
             if j == 0 and len(shown) > 1:
                 canvas.title(left, top - 8.0, ("before", "after")[i])
             if channel == view.channels[-1]:
@@ -87,13 +79,12 @@ def loops(report: Report, view: View) -> Picture | None:
     spans = [] if drive is None else tv.loop_spans(view, drive, PANELS)
     if drive is None or not spans:
         return None
-    gap, height, top = 22.0, 270.0, LEGEND + 30.0
-    width = (WIDTH - LEFT - RIGHT - gap * (PANELS - 1)) / PANELS
+    height, top = 270.0, LEGEND + 30.0
     canvas = Canvas(top + height + 40.0)
     box = limits([side[output][s.rows] for side in (view.measured, view.base) for s in spans])
-    for i, span in enumerate(spans):
-        left = LEFT + i * (width + gap)
-        ax = canvas.axes(left, top, width, height)
+    panels = canvas.row(len(spans), top, height, 22.0, PANELS)
+    panels[0][1].set_ylabel(tv.unit_label(output))
+    for span, (left, ax) in zip(spans, panels, strict=True):
         rows = tv.along(drive, view.base[output], span, 900)
         for side, colour, wide in (
             (view.measured, MEASURED, 3.0),
@@ -105,12 +96,11 @@ def loops(report: Report, view: View) -> Picture | None:
                 style = {"color": colour, "linewidth": wide, "solid_joinstyle": "round"}
                 ax.plot(over[rows], side[output][rows], **style)
         ax.set_ylim(box)
-        ax.tick_params(labelleft=i == 0)
         ax.set_xlabel("pressure [bar]" if over_pressure else "commanded pressure [bar]")
-        if i == 0:
-            ax.set_ylabel(tv.unit_label(output))
         canvas.title(left, LEGEND + 8.0, short(span.name, 28))
-        canvas.text(left, LEGEND + 23.0, _note(view, span), color=MUTED, fontsize=11.0)
+        load = "" if view.load is None else f"{np.nanmean(view.load[span.rows]):.3g} N, "
+        note = load + ("held out" if span.held_out else "fitted")
+        canvas.text(left, LEGEND + 23.0, note, color=MUTED, fontsize=11.0)
     canvas.legend(model_legend(view))
     return canvas.picture(
         "loops",
@@ -118,10 +108,3 @@ def loops(report: Report, view: View) -> Picture | None:
         "Inflation is the lower side of a loop, deflation the upper one. A good model stays within "
         "the grey line of the measurement, in width and at the corners.",
     )
-
-
-def _note(view: View, span: tv.Span) -> str:
-    kind = "held out" if span.held_out else "fitted"
-    if view.load is None:
-        return kind
-    return f"{np.nanmean(view.load[span.rows]):.3g} N, {kind}"

@@ -15,15 +15,17 @@ from pam_envs.diagnosis.figures.canvas import (
     FLOOR,
     HELD,
     INK,
+    INSIDE,
     LEFT,
     LEGEND,
     MEASURED,
     MUTED,
     RIGHT,
     RULE,
-    WIDTH,
     Canvas,
+    Entry,
     Picture,
+    legend_of,
 )
 from pam_envs.diagnosis.figures.quantities import MINUS, TIMES, Report, floor, short
 from pam_envs.diagnosis.figures.traces import CHANNELS, View, limits
@@ -31,7 +33,6 @@ from pam_envs.diagnosis.figures.traces import CHANNELS, View, limits
 ROW = 14.0
 """Height of a row of segment names; gap between axes with a common time axis."""
 BOTTOM = 40.0
-INSIDE = WIDTH - LEFT - RIGHT
 
 
 def line(ax: Any, x: Array, y: Array, **style: Any) -> None:
@@ -48,26 +49,16 @@ def models(ax: Any, view: View, channel: str, rows: slice, wide: float = 3.0) ->
         line(ax, x, view.extended[channel][rows], color=EXTENDED)
 
 
-def model_legend(view: View) -> list[tuple[str, str, dict[str, Any]]]:
+def model_legend(view: View) -> list[Entry]:
     """Return the legend of measured and simulated lines."""
-    entries = [
-        ("line", "measured", {"color": MEASURED, "linewidth": 3.0}),
-        (
-            "line",
-            f"simulation{' before' if view.extended else ''}",
-            {"color": BASE, "linewidth": 1.8},
-        ),
-    ]
-    if view.extended:
-        entries.append(("line", "simulation after", {"color": EXTENDED, "linewidth": 1.8}))
-    return entries
+    models = legend_of(bool(view.extended), "simulation", "simulation before", "simulation after")
+    return [("line", "measured", {"color": MEASURED, "linewidth": 3.0}), *models]
 
 
-def held_out_legend(view: View) -> list[tuple[str, str, dict[str, Any]]]:
+def held_out_legend(view: View) -> list[Entry]:
     """Return the legend of the shading."""
-    return (
-        [("area", "held out", {"facecolor": HELD})] if any(s.held_out for s in view.spans) else []
-    )
+    shaded = any(s.held_out for s in view.spans)
+    return [("area", "held out", {"facecolor": HELD})] if shaded else []
 
 
 def places(view: View) -> list[tuple[float, int, str, bool]]:
@@ -170,21 +161,23 @@ def zoom(report: Report, view: View) -> Picture | None:
     spans = tv.one_of_each(view.spans, 3)
     if not spans:
         return None
-    gap, height, top = 48.0, 165.0, LEGEND + 14.0
-    width = (INSIDE - gap * (len(spans) - 1)) / len(spans)
+    height, top = 165.0, LEGEND + 14.0
     canvas = Canvas(top + len(view.channels) * (height + ROW) - ROW + BOTTOM)
-    error = view.residual(view.channels[0])
-    for i, span in enumerate(spans):
-        rows = tv.worst_window(view.clock, error, span, 20.0)
-        left = LEFT + i * (width + gap)
+    error = view.residuals(view.channels[0])[0]
+    windows = [tv.worst_window(view.clock, error, span, 20.0) for span in spans]
+    grid = [
+        canvas.row(len(spans), top + j * (height + ROW), height, 48.0, own=True)
+        for j in range(len(view.channels))
+    ]
+    width = (INSIDE - 48.0 * (len(spans) - 1)) / len(spans)
+    for (left, _), span in zip(grid[0], spans, strict=True):
         canvas.title(left, top - 6.0, short(span.name, int(width / 8.0)))
-        for j, channel in enumerate(view.channels):
-            ax = canvas.axes(left, top + j * (height + ROW), width, height)
+    for channel, row in zip(view.channels, grid, strict=True):
+        row[0][1].set_ylabel(tv.unit_label(channel))
+        for (_, ax), rows in zip(row, windows, strict=True):
             models(ax, view, channel, rows, 4.0)
             ax.margins(x=0.0, y=0.08)
             ax.tick_params(labelbottom=channel == view.channels[-1])
-            if i == 0:
-                ax.set_ylabel(tv.unit_label(channel))
             if channel == view.channels[-1]:
                 ax.set_xlabel("time [s]")
     canvas.legend(model_legend(view))
@@ -202,11 +195,9 @@ def residual(report: Report, view: View) -> Picture | None:
     banded = False
     for channel in view.channels:
         ax = strips.next(tv.unit_label(channel))
-        shown = [view.residual(channel)]
-        line(ax, view.clock, shown[0], color=BASE, linewidth=0.9)
-        if channel in view.extended:
-            shown.append(view.residual(channel, extended=True))
-            line(ax, view.clock, shown[1], color=EXTENDED, linewidth=0.9)
+        shown = view.residuals(channel)
+        for rest, colour in zip(shown, (BASE, EXTENDED), strict=False):
+            line(ax, view.clock, rest, color=colour, linewidth=0.9)
         noise = floor(report, channel)
         if noise:
             banded = True
@@ -214,10 +205,9 @@ def residual(report: Report, view: View) -> Picture | None:
             for edge in (-2.0 * noise, 2.0 * noise):
                 ax.axhline(edge, color=FLOOR, linewidth=1.4, zorder=4)
         ax.set_ylim(limits(shown))
-    side = "before" if view.extended else "simulated"
-    entries = [("line", f"measured {MINUS} {side}", {"color": BASE, "linewidth": 1.8})]
-    if view.extended:
-        entries.append(("line", f"measured {MINUS} after", {"color": EXTENDED, "linewidth": 1.8}))
+    word = f"measured {MINUS}"
+    both = bool(view.extended)
+    entries = legend_of(both, f"{word} simulated", f"{word} before", f"{word} after")
     if banded:
         entries.append(("line", f"±2 {TIMES} noise floor", {"color": FLOOR, "linewidth": 1.8}))
     strips.canvas.legend([*entries, *held_out_legend(view)])

@@ -23,7 +23,9 @@ from pam_envs.diagnosis.figures.canvas import (
     RULE,
     WIDTH,
     Canvas,
+    Entry,
     Picture,
+    legend_of,
 )
 from pam_envs.diagnosis.figures.quantities import (
     Report,
@@ -48,11 +50,8 @@ AGAINST = {
     "cycle": "cycle number",
 }
 MOST_RIVALS = 14
-NOISE_FLOOR: tuple[str, str, dict[str, Any]] = (
-    "line",
-    "noise floor",
-    {"color": FLOOR, "linewidth": 1.6, "linestyle": DASHES},
-)
+LIMIT = {"color": FLOOR, "linewidth": 1.6, "linestyle": DASHES}
+NOISE_FLOOR: Entry = ("line", "noise floor", LIMIT)
 
 
 class Columns:
@@ -102,8 +101,9 @@ def structure(report: Report) -> Picture | None:
         ax.set_xlabel("share of the residual's variance")
     for ax in panels.axes.values():
         ax.set_xlim(0.0, min(1.0, 1.08 * most))
-    legend = [("area", "before", {"facecolor": BASE}), ("area", "after", {"facecolor": EXTENDED})]
-    panels.canvas.legend(legend if both else [], panels.left)
+    panels.canvas.legend(
+        legend_of(True, "", "before", "after", "area") if both else [], panels.left
+    )
     return panels.canvas.picture(
         "structure",
         f"share of the residual of {' and '.join(channels)} that each variable explains",
@@ -141,7 +141,7 @@ def rivals(report: Report) -> Picture | None:
         highs.append(end[0])
     most = gain_to_floor(report)
     if most is not None:
-        ax.axvline(most, color=FLOOR, linewidth=1.6, linestyle=DASHES)
+        ax.axvline(most, **LIMIT)
         highs.append(most)
     ax.axvline(0.0, color=MUTED, linewidth=0.8)
     ax.spines["left"].set_visible(False)
@@ -197,12 +197,10 @@ def _rival_colour(rival: Report, named: set[Any]) -> str:
     return RISING if rival.get("why") == "not excluded" else GREY
 
 
-def _rival_legend(
-    entries: Sequence[Report], named: set[Any], most: float | None
-) -> list[tuple[str, str, dict[str, Any]]]:
+def _rival_legend(entries: Sequence[Report], named: set[Any], most: float | None) -> list[Entry]:
     labels = {EXTENDED: "named", RISING: "not excluded", GREY: "excluded: see the table"}
     present = {_rival_colour(r, named) for r in entries}
-    legend = [("area", labels[c], {"facecolor": c}) for c in labels if c in present]
+    legend: list[Entry] = [("area", labels[c], {"facecolor": c}) for c in labels if c in present]
     return legend if most is None else [*legend, NOISE_FLOOR]
 
 
@@ -224,13 +222,11 @@ def kinds(report: Report) -> Picture | None:
         ax.plot(new, panels.place, "o", color=EXTENDED, markersize=9, zorder=3)
         noise = floor(report, channel)
         if noise is not None:
-            ax.axvline(noise, color=FLOOR, linewidth=1.6, linestyle=DASHES)
+            ax.axvline(noise, **LIMIT)
         errors = np.array([*old, *new, noise or 0.0])
         ax.set_xlim(0.0, 1.08 * np.nanmax(errors) or 1.0)
         ax.set_xlabel(f"error [{UNITS[channel][0]} RMS]")
-    legend: list[tuple[str, str, dict[str, Any]]]
-    legend = [("dot", "before" if both else "error", {"color": BASE, "markersize": 9})]
-    legend += [("dot", "after", {"color": EXTENDED, "markersize": 9})] if both else []
+    legend = legend_of(both, "error", "before", "after", "dot")
     panels.canvas.legend([*legend, NOISE_FLOOR], panels.left)
     return panels.canvas.picture(
         "kinds",

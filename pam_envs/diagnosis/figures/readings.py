@@ -2,110 +2,84 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pam_envs.diagnosis.arrays import Array
-from pam_envs.diagnosis.figures import traces as tv
+from pam_envs.diagnosis.arrays import Array, Indices
 from pam_envs.diagnosis.figures.canvas import (
     BASE,
     EXTENDED,
     FLOOR,
-    LEFT,
     LEGEND,
     MEASURED,
     MUTED,
-    RIGHT,
-    WIDTH,
     Canvas,
+    Entry,
     Picture,
+    legend_of,
 )
 from pam_envs.diagnosis.figures.quantities import MINUS, TIMES, Report, changed, floor, short
-from pam_envs.diagnosis.figures.traces import limits
+from pam_envs.diagnosis.figures.traces import limits, thin
 
 PANELS = 4
 """Largest number of loads side by side."""
 DASHED = (0, (3, 2))
 TOP = LEGEND + 18.0
+DEFLATING: Entry = ("line", "deflating", {"color": MUTED, "linewidth": 1.5, "linestyle": DASHED})
 
 
-@dataclass(frozen=True)
 class Curves:
-    """``readings.curves`` of a report: cells in the order of the cycles, shape (C,)."""
+    """``readings.curves`` of a report [kg, bar, mm]: cells in the order of the cycles, (C,)."""
 
-    load: Array
-    pressure: Array
-    falling: NDArray[np.bool_]
-    path: NDArray[np.int64]
-    measured: Array
-    readings: Array
-    base: Array
-    extended: Array
-    effects: dict[str, Array]
-
-    @classmethod
-    def of(cls, found: Report) -> Curves:
-        """Read the curves of a report [kg, bar, mm]."""
-        return cls(
-            load=_array(found["load_kg"]),
-            pressure=_array(found["pressure_bar"]),
-            falling=np.array(found["deflating"], dtype=bool),
-            path=np.array(found["path"], dtype=np.int64),
-            measured=_array(found["measured_mm"]),
-            readings=np.atleast_2d(_array(found["readings_mm"])),
-            base=_array(found["base_mm"]),
-            extended=_array(found["extended_mm"]),
-            effects={name: _array(v) for name, v in (found.get("effects_mm") or {}).items()},
+    def __init__(self, found: Report) -> None:
+        keys = ("load_kg", "pressure_bar", "measured_mm", "base_mm", "extended_mm")
+        self.load, self.pressure, self.measured, self.base, self.extended = (
+            np.array(found[key], dtype=float) for key in keys
         )
+        self.falling, self.path = np.array(found["deflating"]), np.array(found["path"])
+        self.readings = np.atleast_2d(np.array(found["readings_mm"], dtype=float))
+        effects = found.get("effects_mm") or {}
+        self.effects = {name: np.array(v, dtype=float) for name, v in effects.items()}
 
     @property
     def loads(self) -> list[float]:
         """Loads with a panel [kg], with the extremes."""
         loads = np.unique(self.load)
-        return [float(v) for v in loads[tv.thin(np.arange(len(loads)), PANELS)]]
+        return [float(v) for v in loads[thin(np.arange(len(loads)), PANELS)]]
 
-    def branches(self, load: float) -> list[NDArray[np.int64]]:
-        """Return the rows of each branch of each cycle at a load, in order."""
+    def branches(self, load: float) -> Iterator[tuple[Indices, Any]]:
+        """Yield the rows and the line style of each branch of each cycle at a load, in order."""
         rows = np.flatnonzero(self.load == load)
-        if not len(rows):
-            return []
         turned = (np.diff(self.path[rows]) != 0) | (np.diff(self.falling[rows].astype(int)) != 0)
-        return np.split(rows, np.flatnonzero(turned) + 1)
+        for branch in np.split(rows, np.flatnonzero(turned) + 1):
+            yield branch, DASHED if self.falling[branch[0]] else "solid"
+
+    def draw(self, ax: Any, load: float, values: Array, **style: Any) -> None:
+        """Draw values over pressure at a load, dashed at deflation."""
+        for rows, dashes in self.branches(load):
+            ax.plot(self.pressure[rows], values[rows], linestyle=dashes, **style)
 
 
-def _array(values: Any) -> Array:
-    return np.array(values, dtype=float)
-
-
-class Panels:
-    """One panel for each load, with common limits."""
-
-    def __init__(self, names: Sequence[str], label: str, height: float) -> None:
-        gap = 20.0
-        width = (WIDTH - LEFT - RIGHT - gap * (len(names) - 1)) / max(len(names), 2)
-        self.canvas = Canvas(TOP + height + 40.0)
-        self.axes = []
-        for i, name in enumerate(names):
-            left = LEFT + i * (width + gap)
-            self.canvas.title(left, TOP - 8.0, short(name, int(width / 7.5)))
-            ax = self.canvas.axes(left, TOP, width, height)
-            ax.set_xlabel("pressure [bar]")
-            ax.tick_params(labelleft=i == 0)
-            if i == 0:
-                ax.set_ylabel(label)
-            self.axes.append(ax)
+def panels(names: Sequence[str], height: float) -> tuple[Canvas, list[Any]]:
+    """Return a canvas with one panel a name."""
+    canvas = Canvas(TOP + height + 40.0)
+    row = canvas.row(len(names), TOP, height, 20.0, 2)
+    for name, (left, ax) in zip(names, row, strict=True):
+        width = 72.0 * canvas.figure.get_figwidth() * ax.get_position().width
+        canvas.title(left, TOP - 8.0, short(name, int(width / 7.5)))
+        ax.set_xlabel("pressure [bar]")
+    row[0][1].set_ylabel("contraction [mm]")
+    return canvas, [ax for _, ax in row]
 
 
 def cycles(report: Report, curves: Curves) -> Picture:
     """Draw measured and simulated cycles, a panel for each load."""
-    panels = Panels([f"{load:g} kg" for load in curves.loads], "contraction [mm]", 300.0)
+    canvas, axes = panels([f"{load:g} kg" for load in curves.loads], 300.0)
     both = changed(report)
-    lines = [(curves.base, BASE)] + ([(curves.extended, EXTENDED)] if both else [])
-    for ax, load in zip(panels.axes, curves.loads, strict=True):
+    lines = [(curves.base, BASE), (curves.extended, EXTENDED)][: 1 + both]
+    for ax, load in zip(axes, curves.loads, strict=True):
         here = curves.load == load
         for row in curves.readings:
             ax.plot(curves.pressure[here], row[here], "o", color=MEASURED, markersize=4.5)
@@ -114,14 +88,9 @@ def cycles(report: Report, curves: Curves) -> Picture:
             for values, colour in lines:
                 ax.plot(curves.pressure[rows], values[rows], color=colour, linewidth=1.5)
         ax.set_ylim(limits([curves.readings, curves.base]))
-    legend: list[tuple[str, str, dict[str, Any]]] = [
-        ("dot", "readings", {"color": MEASURED, "markersize": 5}),
-        ("line", f"simulation{' before' if both else ''}", {"color": BASE, "linewidth": 1.8}),
-    ]
-    if both:
-        legend.append(("line", "simulation after", {"color": EXTENDED, "linewidth": 1.8}))
-    panels.canvas.legend(legend)
-    return panels.canvas.picture(
+    simulated = legend_of(both, "simulation", "simulation before", "simulation after")
+    canvas.legend([("dot", "readings", {"color": MEASURED, "markersize": 5}), *simulated])
+    return canvas.picture(
         "replay",
         f"contraction over pressure at {len(curves.loads)} loads, readings and simulation",
         "Inflation is the lower side of a loop, deflation the upper one; a good simulation passes "
@@ -131,28 +100,23 @@ def cycles(report: Report, curves: Curves) -> Picture:
 
 def left_over(report: Report, curves: Curves) -> Picture:
     """Draw the mean readings less the simulation over pressure, a panel for each load."""
-    panels = Panels([f"{load:g} kg" for load in curves.loads], "contraction [mm]", 210.0)
-    both = changed(report)
-    sides = [(curves.measured - curves.base, BASE)]
-    sides += [(curves.measured - curves.extended, EXTENDED)] if both else []
-    noise = floor(report, "contraction")
-    box = limits([rest for rest, _ in sides], 0.1)
-    for ax, load in zip(panels.axes, curves.loads, strict=True):
+    canvas, axes = panels([f"{load:g} kg" for load in curves.loads], 210.0)
+    both, noise = changed(report), floor(report, "contraction")
+    rests = [curves.measured - curves.base, curves.measured - curves.extended][: 1 + both]
+    box = limits(rests, 0.1)
+    for ax, load in zip(axes, curves.loads, strict=True):
         ax.axhline(0.0, color=MUTED, linewidth=0.8)
-        for edge in (-2.0, 2.0) if noise else ():
-            ax.axhline(edge * (noise or 0.0), color=FLOOR, linewidth=1.4)
-        for rest, colour in sides:
-            _branches(ax, curves, load, rest, colour)
+        for edge in (-2.0 * noise, 2.0 * noise) if noise else ():
+            ax.axhline(edge, color=FLOOR, linewidth=1.4)
+        for rest, colour in zip(rests, (BASE, EXTENDED), strict=False):
+            curves.draw(ax, load, rest, color=colour, linewidth=1.5, marker=".", markersize=5)
         ax.set_ylim(box)
-    word = "before" if both else "simulated"
-    legend = [("line", f"measured {MINUS} {word}", {"color": BASE, "linewidth": 1.8})]
-    if both:
-        legend.append(("line", f"measured {MINUS} after", {"color": EXTENDED, "linewidth": 1.8}))
-    legend.append(("line", "deflating", {"color": MUTED, "linewidth": 1.5, "linestyle": DASHED}))
+    word = f"measured {MINUS}"
+    legend = [*legend_of(both, f"{word} simulated", f"{word} before", f"{word} after"), DEFLATING]
     if noise:
         legend.append(("line", f"±2 {TIMES} noise floor", {"color": FLOOR, "linewidth": 1.8}))
-    panels.canvas.legend(legend)
-    return panels.canvas.picture(
+    canvas.legend(legend)
+    return canvas.picture(
         "residual",
         "residual of the mean readings over pressure, by load and direction",
         "An offset of a panel is an error of the load, a gap between full and dashed line an error "
@@ -160,43 +124,25 @@ def left_over(report: Report, curves: Curves) -> Picture:
     )
 
 
-def _branches(ax: Any, curves: Curves, load: float, values: Array, colour: str) -> None:
-    for rows in curves.branches(load):
-        ax.plot(
-            curves.pressure[rows],
-            values[rows],
-            color=colour,
-            linewidth=1.5,
-            linestyle=DASHED if curves.falling[rows[0]] else "solid",
-            marker=".",
-            markersize=5,
-        )
-
-
 def cell_effects(report: Report, curves: Curves) -> Picture | None:
     """Draw the contribution of each named cause over pressure, a line for each load."""
     causes = [c for c in report.get("causes") or [] if c["name"] in curves.effects][:3]
     if not causes:
         return None
-    names = [c["name"].replace("_", " ") for c in causes]
-    panels = Panels(names, "contraction [mm]", 220.0)
+    canvas, axes = panels([c["name"].replace("_", " ") for c in causes], 220.0)
     shown = [curves.effects[c["name"]] for c in causes]
-    shades = np.linspace(0.3, 1.0, len(curves.loads))
-    for ax, values in zip(panels.axes, shown, strict=True):
+    shades = dict(zip(curves.loads, np.linspace(0.3, 1.0, len(curves.loads)), strict=True))
+    for ax, values in zip(axes, shown, strict=True):
         ax.axhline(0.0, color=MUTED, linewidth=0.8)
-        for load, alpha in zip(curves.loads, shades, strict=True):
-            for rows in curves.branches(load):
-                dashes = DASHED if curves.falling[rows[0]] else "solid"
-                style = {"color": EXTENDED, "alpha": alpha, "linewidth": 1.8}
-                ax.plot(curves.pressure[rows], values[rows], linestyle=dashes, **style)
+        for load, alpha in shades.items():
+            curves.draw(ax, load, values, color=EXTENDED, alpha=alpha, linewidth=1.8)
         ax.set_ylim(limits(shown))
-    legend = [
+    legend: list[Entry] = [
         ("line", f"{load:g} kg", {"color": EXTENDED, "alpha": alpha, "linewidth": 2.2})
-        for load, alpha in zip(curves.loads, shades, strict=True)
+        for load, alpha in shades.items()
     ]
-    dashed = ("line", "deflating", {"color": MUTED, "linewidth": 1.5, "linestyle": DASHED})
-    panels.canvas.legend([*legend, dashed])
-    return panels.canvas.picture(
+    canvas.legend([*legend, DEFLATING])
+    return canvas.picture(
         "effects",
         "contribution over pressure of " + ", ".join(c["name"] for c in causes),
         "The extended simulation less the same simulation with this one cause switched off.",

@@ -33,20 +33,10 @@ class Span:
 
 @dataclass(frozen=True)
 class View:
-    """Time series in display units, all of shape (T,).
+    """Time series in display units (mm, bar, N, deg C), all of shape (T,), by channel.
 
-    Attributes
-    ----------
-    clock : ndarray
-        Time since the start without pauses between parts of a recording [s].
-    spans : tuple of Span
-        Segments in their order.
-    measured, base, extended : dict
-        Channel to readings or simulation [mm, bar]; ``extended`` is empty without an extension.
-    effects : dict
-        Name of a cause to channel to its contribution [mm, bar].
-    command, load, temperature : ndarray or None
-        [bar], [N], [deg C].
+    ``clock`` is the time since the start without pauses between parts of a recording [s];
+    ``effects`` are the contributions of causes; ``extended`` is empty without an extension.
     """
 
     clock: Array
@@ -69,10 +59,10 @@ class View:
         """End of the last row [s]."""
         return float(2.0 * self.clock[-1] - self.clock[-2])
 
-    def residual(self, channel: str, extended: bool = False) -> Array:
-        """Return measured less simulated [mm or bar]."""
-        model = self.extended if extended else self.base
-        return self.measured[channel] - model[channel]
+    def residuals(self, channel: str) -> list[Array]:
+        """Return measured less simulated [mm or bar], before and, if any, after the extension."""
+        models = [model for model in (self.base, self.extended) if channel in model]
+        return [self.measured[channel] - model[channel] for model in models]
 
     @classmethod
     def of(cls, traces: Any) -> View:
@@ -108,13 +98,7 @@ def _shown(outputs: Mapping[str, Any] | None) -> dict[str, Array]:
 
 
 def elapsed(time: Array) -> Array:
-    """Return the time since the start [s] without jumps between parts of a recording.
-
-    Parameters
-    ----------
-    time : ndarray, shape (T,)
-        Time [s], which may restart at a segment.
-    """
+    """Return the time since the start without jumps where the time [s] restarts at a segment."""
     if len(time) < 2:
         return np.zeros(len(time))
     steps = np.diff(time)
@@ -139,15 +123,7 @@ def spans_of(
 
 
 def envelope(x: Array, y: Array, points: int = 2400) -> tuple[Array, Array]:
-    """Return a thinned line that looks like ``y`` over ``x``: the extremes of every bin, in order.
-
-    Parameters
-    ----------
-    x, y : ndarray, shape (T,)
-        Points sorted by x.
-    points : int
-        Largest number of returned points.
-    """
+    """Return at most ``points`` points that look like ``y`` over ``x``: the extremes of bins."""
     width = -(-2 * len(y) // points)
     if width <= 2:
         return x, y
