@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pam_envs.diagnosis.figures import Picture, draw
-from pam_envs.diagnosis.figures.quantities import changed
+from pam_envs.diagnosis.figures.quantities import TIMES, changed
 from pam_envs.diagnosis.report.page_details import (
     DETAILS,
     held_out,
@@ -16,7 +16,7 @@ from pam_envs.diagnosis.report.page_details import (
     structure_table,
     why,
 )
-from pam_envs.diagnosis.report.page_parts import DASH, TIMES, enumeration, interval, number, words
+from pam_envs.diagnosis.report.page_parts import DASH, at, enumeration, number, spread, words
 
 CSS = Path(__file__).with_name("page.css")
 VERDICTS = {
@@ -26,9 +26,7 @@ VERDICTS = {
     "unexplained": "no candidate explains the model error",
     "insufficient": "the recording cannot decide",
 }
-NOTHING = {
-    "replay": "There are no traces to show.",
-    "residual": "There are no traces to show.",
+NOTHING = dict.fromkeys(("replay", "residual"), "There are no traces to show.") | {
     "loops": "There is no loop to show: it needs an output and a pressure or its command.",
     "rivals": "No rival was fitted.",
     "kinds": "No kind of segment was held out.",
@@ -39,36 +37,28 @@ Report = Mapping[str, Any]
 
 
 def page(report: Report, traces: Any) -> str:
-    """Return ``report.html``.
+    """Return ``report.html`` of a report as in ``report.json``, and its traces if any.
 
-    Parameters
-    ----------
-    report : mapping
-        As in ``report.json``: display units, None for unknown values.
-    traces : Traces or None
-        Time series of the figures [SI].
-
-    Raises
-    ------
-    ModuleNotFoundError
-        Without matplotlib.
+    Raises ModuleNotFoundError without matplotlib.
     """
     pictures = draw(report, traces)
+    parts = list(enumerate(_sections(report, pictures), start=1))
     sections = [
-        _section(i, name, title, body)
-        for i, (name, title, body) in enumerate(_sections(report, pictures), start=1)
+        f'<section id="{name}">\n<h2><span>{i}</span>{escape(title)}</h2>\n{body}\n</section>'
+        for i, (name, title, body) in parts
     ]
     links = "".join(
-        f'<a href="#{name}">{i}&ensp;{escape(title)}</a>'
-        for i, (name, title, _) in enumerate(_sections(report, {}), start=1)
+        f'<a href="#{name}">{i}&ensp;{escape(title)}</a>' for i, (name, title, _) in parts
     )
+    package = words(at(report, "provenance", "package") or "pam-envs")
     title = escape(f"Diagnosis: {headline(report)}")
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{title}</title>\n<style>\n{CSS.read_text(encoding='utf-8')}</style>\n"
         f"</head>\n<body>\n<header>\n{_head(report)}\n<nav>{links}</nav>\n</header>\n"
-        f"<main>\n{chr(10).join(sections)}\n{_foot(report)}\n</main>\n</body>\n</html>\n"
+        f"<main>\n{chr(10).join(sections)}\n<footer>Made by {escape(package)}. All numbers are in "
+        "report.json, the extended plant is in plant.yaml.</footer>\n</main>\n</body>\n</html>\n"
     )
 
 
@@ -95,7 +85,7 @@ def _title(cause: Report) -> str:
 
 def _head(report: Report) -> str:
     verdict = str(report["verdict"])
-    source = (report.get("provenance") or {}).get("recording")
+    source = at(report, "provenance", "recording")
     text = str(report.get("text") or "")
     kind = "lead" if len(text) < 320 else "lead long"
     next_step = ""
@@ -118,43 +108,31 @@ def _name(recording: Any) -> str:
 
 def _numbers(report: Report) -> str:
     both = changed(report)
-    heads = (
-        ("", "error before", "error after", "noise floor") if both else ("", "error", "noise floor")
-    )
-    cells = [f'<div class="head">{h}</div>' for h in heads]
+    heads = ["", "error before", "error after"] if both else ["", "error"]
+    cells = [f'<div class="head">{head}</div>' for head in (*heads, "noise floor")]
     for channel in ("contraction", "pressure"):
-        before = (report.get("error_before") or {}).get(channel)
-        after = (report.get("error_after") or {}).get(channel)
-        floor = (report.get("noise_floor") or {}).get(channel)
+        keys = ("error_before", "error_after", "noise_floor")
+        before, after, floor = (at(report, key, channel) for key in keys)
         if not before and not floor:
             continue
         cells.append(f'<div class="what">{channel}</div>')
-        cells.append(_big("before", before, _times(before)))
-        if both:
-            cells.append(_big("after", after, _times(after)))
+        for kind, error in (("before", before), ("after", after))[: 1 + both]:
+            times = at(error, "times_floor")
+            note = "" if times is None else f"{number(times)} {TIMES} the noise floor"
+            cells.append(_big(kind, error, note))
         cells.append(_big("noise", floor, f"from {floor['from']}" if floor else ""))
-    note = f'<p class="over">Root mean square {escape(held_out(report))}.</p>'
-    kind = "numbers" if both else "numbers two"
-    return f'<div class="{kind}">{"".join(cells)}</div>\n{note}' if len(cells) > len(heads) else ""
-
-
-def _times(error: Report | None) -> str:
-    if not error or error.get("times_floor") is None:
+    if len(cells) <= len(heads) + 1:
         return ""
-    return f"{number(error['times_floor'])} {TIMES} the noise floor"
+    note = f'<p class="over">Root mean square {escape(held_out(report))}.</p>'
+    return f'<div class="numbers{"" if both else " two"}">{"".join(cells)}</div>\n{note}'
 
 
 def _big(kind: str, value: Report | None, note: str) -> str:
     if not value or value.get("value") is None:
         return f'<div class="{kind}"><b>{DASH}</b></div>'
     unit = escape(str(value.get("unit") or ""))
-    spread = interval(value.get("interval"))
-    small = "".join(f"<small>{escape(s)}</small>" for s in (note, spread) if s)
+    small = "".join(f"<small>{escape(s)}</small>" for s in (note, spread(value)) if s)
     return f'<div class="{kind}"><b>{number(value["value"])} <i>{unit}</i></b>{small}</div>'
-
-
-def _section(i: int, name: str, title: str, body: str) -> str:
-    return f'<section id="{name}">\n<h2><span>{i}</span>{escape(title)}</h2>\n{body}\n</section>'
 
 
 def _sections(report: Report, pictures: Mapping[str, Picture]) -> Iterable[tuple[str, str, str]]:
@@ -181,12 +159,4 @@ def _figure(picture: Picture) -> str:
     return (
         f'<figure id="figure-{picture.name}">\n<div class="scroll">{picture.svg}</div>\n'
         f"<figcaption>{escape(picture.caption)}</figcaption>\n</figure>"
-    )
-
-
-def _foot(report: Report) -> str:
-    package = words((report.get("provenance") or {}).get("package") or "pam-envs")
-    return (
-        f"<footer>Made by {escape(package)}. All numbers are in report.json, the extended plant is "
-        "in plant.yaml.</footer>"
     )

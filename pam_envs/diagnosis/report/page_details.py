@@ -8,12 +8,13 @@ from typing import Any
 
 from pam_envs.diagnosis.figures.quantities import changed
 from pam_envs.diagnosis.report.page_parts import (
+    at,
     bullets,
     enumeration,
-    interval,
     number,
     paragraph,
     quantity,
+    spread,
     table,
     words,
 )
@@ -23,19 +24,18 @@ Report = Mapping[str, Any]
 
 def structure_table(report: Report) -> str:
     """Return the table of the structure of the residuals."""
-    rows = []
-    for side in ("before", "after") if changed(report) else ("before",):
-        for channel, found in ((report.get("residual_structure") or {}).get(side) or {}).items():
+    both, rows = changed(report), []
+    for side in ("before", "after")[: 1 + both]:
+        for channel, found in (at(report, "residual_structure", side) or {}).items():
             if not found:
                 continue
-            peak = found.get("peak") or {}
             rows.append(
                 (
-                    f"{channel}, {side}" if changed(report) else channel,
+                    f"{channel}, {side}" if both else channel,
                     number(found.get("ljung_box_p")),
                     number(found.get("flexible_r2")),
-                    quantity({"value": peak.get("frequency_hz"), "unit": "Hz"}),
-                    number(peak.get("ratio")),
+                    quantity({"value": at(found, "peak", "frequency_hz"), "unit": "Hz"}),
+                    number(at(found, "peak", "ratio")),
                 )
             )
     heads = ("residual", "whiteness p", "flexible model r²", "spectral peak", "over neighbours")
@@ -58,7 +58,7 @@ def why(report: Report) -> str:
     """Return the table of rivals with the reason of each decision."""
     rows = [
         (
-            r.get("title") or r["name"],
+            _title(r),
             r.get("form") or "",
             _gain(r.get("gain")),
             _gain(r.get("behind")),
@@ -70,27 +70,30 @@ def why(report: Report) -> str:
     return table(("rival", "form", "gain", "behind the best", "held out", ""), rows, (2, 3))
 
 
+FLAGS = {
+    "outside_tolerance": "outside its tolerance",
+    "at_bound": "at its bound",
+    "not_identified": "hardly identified",
+}
+
+
 def _flags(entry: Report) -> str:
     """Return the flags of a fitted parameter in words."""
-    return ", ".join(
-        text
-        for key, text in (
-            ("outside_tolerance", "outside its tolerance"),
-            ("at_bound", "at its bound"),
-            ("not_identified", "hardly identified"),
-        )
-        if entry.get(key)
-    )
+    return ", ".join(text for key, text in FLAGS.items() if entry.get(key))
+
+
+def _title(entry: Report) -> str:
+    return str(entry.get("title") or entry["name"])
 
 
 def parameters(report: Report) -> str:
     """Return the tables of the named causes."""
     rows = [
         (
-            c.get("title") or c["name"],
+            _title(c),
             p["name"],
             quantity(p),
-            interval(p.get("interval")),
+            spread(p),
             number(p.get("neutral")),
             _flags(p),
         )
@@ -101,11 +104,11 @@ def parameters(report: Report) -> str:
     body = table(heads, rows, (2, 3, 4), (1,), flags=5)
     sizes = [
         (
-            c.get("title") or c["name"],
+            _title(c),
             c.get("form") or "",
             _gain(c.get("gain")),
-            quantity((c.get("effect") or {}).get("contraction")),
-            quantity((c.get("effect") or {}).get("pressure")),
+            quantity(at(c, "effect", "contraction")),
+            quantity(at(c, "effect", "pressure")),
             number(c.get("size")),
         )
         for c in report.get("causes") or []
@@ -116,8 +119,7 @@ def parameters(report: Report) -> str:
 
 
 def _gain(gain: Report | None) -> str:
-    spread = interval((gain or {}).get("interval"))
-    return f"{number((gain or {}).get('value'))} {spread}".strip()
+    return f"{number(at(gain, 'value'))} {spread(gain)}".strip()
 
 
 def experiment(report: Report) -> str:
@@ -128,15 +130,13 @@ def experiment(report: Report) -> str:
     lines = [paragraph(str(found.get("description") or found.get("name") or ""))]
     between = " and ".join(str(b) for b in found.get("between") or [])
     apart = number(found.get("separation"))
-    if found.get("enough"):
-        lines.append(paragraph(f"It separates {between} by {apart} noise variances."))
-    else:
-        lines.append(
-            paragraph(
-                f"No experiment of the list is sufficient: it would separate {between} by only "
-                f"{apart} noise variances. Sensor: {found.get('sensor') or 'none is known'}."
-            )
+    text = f"It separates {between} by {apart} noise variances."
+    if not found.get("enough"):
+        text = (
+            f"No experiment of the list is sufficient: it would separate {between} by only "
+            f"{apart} noise variances. Sensor: {found.get('sensor') or 'none is known'}."
         )
+    lines.append(paragraph(text))
     segments = found.get("segments") or []
     if segments:
         lines.append(bullets([words(s) for s in segments]))
@@ -153,46 +153,39 @@ def closed_loop(report: Report) -> str:
         text = f"No controller was compared: {reason}." if reason else "No controller was compared."
         return "<h3>In closed loop</h3>\n" + paragraph(text)
     unit = found.get("unit") or "mm"
+    labels = {
+        "before": "designed on the plant before",
+        "after": "designed on the extended plant",
+        "oracle": "designed on the rig itself",
+    }
     rows = [
-        (
-            label,
-            quantity({**(found.get(key) or {}), "unit": unit}),
-            interval((found.get(key) or {}).get("interval")),
-        )
-        for key, label in (
-            ("before", "designed on the plant before"),
-            ("after", "designed on the extended plant"),
-            ("oracle", "designed on the rig itself"),
-        )
+        (label, quantity({**found[key], "unit": unit}), spread(found[key]))
+        for key, label in labels.items()
         if found.get(key)
     ]
     better = found.get("better_percent") or {}
     if better.get("value") is not None:
-        spread = interval(better.get("interval"))
-        rows.append(("better by", quantity({**better, "unit": "%"}), spread))
+        rows.append(("better by", quantity({**better, "unit": "%"}), spread(better)))
     if found.get("recovered") is not None:
         rows.append(("closed share of the gap", f"{number(100 * found['recovered'])} %", ""))
-    heads = (f"{found.get('controller', 'controller')}, run on {found.get('where', 'the plant')}",)
-    text = paragraph(str(found.get("text") or ""))
-    return (
-        "<h3>In closed loop</h3>\n" + text + table((*heads, "error", "95 % interval"), rows, (1, 2))
-    )
+    who = f"{found.get('controller', 'controller')}, run on {found.get('where', 'the plant')}"
+    body = table((who, "error", "95 % interval"), rows, (1, 2))
+    return "<h3>In closed loop</h3>\n" + paragraph(str(found.get("text") or "")) + body
 
 
 def calibration(report: Report) -> str:
     """Return the table of refitted parameters."""
-    rows = []
-    for entry in report.get("calibration") or []:
-        rows.append(
-            (
-                entry["name"],
-                entry.get("unit") or "",
-                number(entry.get("before")),
-                number(entry.get("after")),
-                interval(entry.get("interval")),
-                _flags(entry),
-            )
+    rows = [
+        (
+            entry["name"],
+            entry.get("unit") or "",
+            number(entry.get("before")),
+            number(entry.get("after")),
+            spread(entry),
+            _flags(entry),
         )
+        for entry in report.get("calibration") or []
+    ]
     heads = ("parameter", "unit", "before", "after", "95 % interval", "")
     body = table(heads, rows, (2, 3, 4), (0,), flags=5)
     return "<h3>Calibration</h3>\n" + (body or paragraph("Nothing was refitted."))
@@ -214,16 +207,16 @@ def warnings(report: Report) -> str:
     return "<h3>Warnings</h3>\n" + (bullets(found) if found else paragraph("None."))
 
 
+ERRORS = ("parameters", "cells_mm", "left_out_mm", "load_left_out_mm")
+
+
 def readings(report: Report) -> str:
     """Return the models and load laws of settled readings."""
     found = report.get("readings")
     if not found:
         return ""
     rows = [
-        (
-            ", ".join(step["model"]) or "load-blind",
-            *(number(step.get(key)) for key in ERRORS),
-        )
+        (", ".join(step["model"]) or "load-blind", *(number(step.get(key)) for key in ERRORS))
         for step in found.get("ladder") or []
     ]
     heads = ("model", "parameters", "fitted [mm]", "held out [mm]", "held-out load [mm]")
@@ -231,25 +224,21 @@ def readings(report: Report) -> str:
         (
             law["law"],
             quantity(law),
-            interval(law.get("interval")),
+            spread(law),
             number(law.get("load_left_out_mm")),
             law.get("status") or "",
         )
         for law in found.get("load_laws") or []
     ]
-    left = found.get("loads_left_out") or {}
     body = table(heads, rows, (1, 2, 3, 4))
-    if left.get("cut_percent"):
+    left, cut = found.get("loads_left_out"), at(found, "loads_left_out", "cut_percent")
+    if cut:
         body += paragraph(
             f"Error on a held-out load: {quantity(left['after'])} instead of "
-            f"{quantity(left['before'])}, {number(left['cut_percent']['value'])} % less "
-            f"{interval(left['cut_percent'].get('interval'))}."
+            f"{quantity(left['before'])}, {number(cut['value'])} % less {spread(cut)}."
         )
     law_heads = ("load law", "value", "95 % interval", "held-out load [mm]", "")
     return f"<h3>Models in steps</h3>\n{body}{table(law_heads, laws, (1, 2, 3))}"
-
-
-ERRORS = ("parameters", "cells_mm", "left_out_mm", "load_left_out_mm")
 
 
 DETAILS: Sequence[Callable[[Report], str]] = (

@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
-MINUS, DASH, TIMES = "\N{MINUS SIGN}", "\N{EN DASH}", "\N{MULTIPLICATION SIGN}"
+from pam_envs.diagnosis.figures.quantities import MINUS
+
+DASH = "\N{EN DASH}"
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -31,6 +33,18 @@ def interval(bounds: Sequence[float | None] | None) -> str:
     if not bounds or all(b is None for b in bounds):
         return ""
     return f"[{', '.join(number(b) for b in bounds)}]"
+
+
+def at(report: Any, *keys: str) -> Any:
+    """Return a nested value of a report, or None if a part of the path is missing."""
+    for key in keys:
+        report = (report or {}).get(key)
+    return report
+
+
+def spread(value: Any) -> str:
+    """Return the interval of a value, or an empty string."""
+    return interval(at(value, "interval"))
 
 
 def quantity(value: Any) -> str:
@@ -74,18 +88,10 @@ def table(
     codes: Sequence[int] = (),
     flags: int | None = None,
 ) -> str:
-    """Return a table, or an empty string without rows.
+    """Return a table of plain text, or an empty string without rows.
 
-    Parameters
-    ----------
-    heads : sequence of str
-        Titles of the columns; no head if all are empty.
-    rows : sequence of sequences of str
-        Cells in plain text.
-    numbers, codes : sequence of int
-        Columns of numbers, and of names of the code.
-    flags : int, optional
-        Column of warnings.
+    It has no head if all are empty; ``numbers`` and ``codes`` are columns of numbers and of names
+    of the code, ``flags`` is one of warnings.
     """
     if not rows:
         return ""

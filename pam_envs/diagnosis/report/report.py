@@ -50,19 +50,10 @@ of all others); further keys follow in their given order."""
 
 
 def plain(value: Any, key: str = "") -> Any:
-    """Return a value in plain JSON types: keys in order, numbers rounded, None if not finite.
+    """Return nested values in plain JSON types: keys in order, numbers rounded, None if not finite.
 
-    Parameters
-    ----------
-    value : Any
-        Nested mappings, sequences, arrays, numbers, strings, booleans and None.
-    key : str
-        Key of the value, which selects the order of its own keys.
-
-    Raises
-    ------
-    TypeError
-        For any other type.
+    ``key`` is the key of the value, which selects the order of its own keys. Raises TypeError for
+    any other type.
     """
     if isinstance(value, Mapping):
         first = ORDER.get(key, ORDER["*"])
@@ -131,42 +122,28 @@ def write_file(path: Path, text: str) -> None:
 
 
 def write(diagnosis: Any, folder: Path) -> None:
-    """Write a diagnosis into a folder.
+    """Write a diagnosis into a folder, which is created if it is missing.
 
     Everything is drawn before the first file is replaced, so that a folder contains one diagnosis,
     never parts of two. A plant file or page of an earlier diagnosis is removed if this one has
-    none: settled readings give no plant.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        With ``report``, ``traces`` (or None) and ``plant`` (the extended plant, or None).
-    folder : Path
-        Created if it is missing.
-
-    Raises
-    ------
-    ImportError
-        If matplotlib is missing: ``report.json`` and ``plant.yaml`` are written, the page is not.
+    none: settled readings give no plant. Without matplotlib ``report.json`` and ``plant.yaml`` are
+    written, the page is not, and ImportError is raised.
     """
     from pam_envs.diagnosis.report.page import page
 
-    folder = Path(folder)
     text = report_json(diagnosis.report)
-    missing: ImportError | None = None
-    html: str | None = None
+    html, missing = None, None
     try:
         html = page(json.loads(text), diagnosis.traces)
     except ImportError as error:
         missing = error
     folder.mkdir(parents=True, exist_ok=True)
-    if diagnosis.plant is None:
-        (folder / "plant.yaml").unlink(missing_ok=True)
-    else:
+    for name, made in (("plant.yaml", diagnosis.plant), ("report.html", html)):
+        if made is None:
+            (folder / name).unlink(missing_ok=True)
+    if diagnosis.plant is not None:
         diagnosis.plant.to_yaml(folder / "plant.yaml")
-    if html is None:
-        (folder / "report.html").unlink(missing_ok=True)
-    else:
+    if html is not None:
         write_file(folder / "report.html", html)
     write_file(folder / "report.json", text)
     if missing is not None:
