@@ -1,20 +1,19 @@
 """Identification of a muscle from quasi-static cycles of contraction against pressure.
 
-The tables of positioning2021 hold one inflation and deflation at each of three loads, five times
-over. They fix the static law and the shape of the major loop. They do not fix what a small reversal
-does (a documented prior fills that in: equal weight on every threshold), and hold nothing about
-time: lag, dead time, slew rate, damping, moving mass and sensors stay assumed.
+The tables of positioning2021 (inflation and deflation at three loads, five times) determine the
+static law and the shape of the major loop. Minor loops follow from a documented prior (equal weight
+on every threshold); lag, dead time, slew rate, damping, moving mass and sensors stay assumed.
 
 Maxwell-slip (play operators on the pressure) and static law are fitted together by least squares
 on the mean contractions and on the three published loop widths. The Preisach map is then fitted to
 the effective pressures that this static law needs for the same readings, so that switching the
-hysteresis changes the hysteresis and not the rig.
+hysteresis leaves the rest of the plant unchanged.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,17 +49,7 @@ _SOURCE = "identified on positioning2021, Tables 3-5"
 
 @dataclass(frozen=True)
 class Cycles:
-    """Mean inflation and deflation cycles.
-
-    Attributes
-    ----------
-    loads : array, shape (n,)
-        Loads [kg].
-    pressures : array, shape (T,)
-        Pressures in the order of the readings [Pa], the same at every load.
-    contractions : array, shape (n, T)
-        Mean contractions [m].
-    """
+    """Mean cycles: loads (n,) [kg], pressures (T,) [Pa] in order, mean contractions (n, T) [m]."""
 
     loads: Array
     pressures: Array
@@ -83,17 +72,7 @@ class Cycles:
 
 @dataclass(frozen=True)
 class CyclesFit:
-    """A plant fitted to cycles, and what it misses.
-
-    Attributes
-    ----------
-    plant : SingleMuscle
-        The plant.
-    residual : array, shape (n, T)
-        Model minus mean reading [m].
-    preisach : PreisachFit or None
-        What the record decides of the Everett map, for that hysteresis.
-    """
+    """A plant fitted to cycles, and its residual, model minus mean reading [m], shape (n, T)."""
 
     plant: SingleMuscle
     cycles: Cycles
@@ -124,7 +103,7 @@ def mean_cycles(table: ContractionTable, repeats: Any = None) -> Cycles:
 
 
 def quasi_static(plant: SingleMuscle, pressures: Array, load: float) -> Array:
-    """Return the contractions [m] of a virgin muscle led slowly through ``pressures`` [Pa]."""
+    """Return the contractions [m] of a virgin muscle along slow changes of pressure [Pa]."""
     full = plant.regulator.max_pressure
     operator = plant.hysteresis.at_load(load)
     drive = np.asarray(pressures, float)
@@ -167,25 +146,10 @@ def _residuals(theta: Array, cycles: Cycles, hysteresis: bool, prior: Array) -> 
 def fit_maxwell_slip(
     cycles: Cycles, hysteresis: bool = True, prior: Array | None = None, start: Array | None = None
 ) -> tuple[CyclesFit, Array]:
-    """Fit static law and play operators (or, without hysteresis, the static law alone).
+    """Fit static law and play operators, or, without hysteresis, the static law alone.
 
-    Parameters
-    ----------
-    cycles : Cycles
-        What to fit.
-    hysteresis : bool
-        False fits a muscle without hysteresis.
-    prior : array, shape (6,), optional
-        Shares of the thresholds to which the weights are drawn; equal by default.
-    start : array, optional
-        Where to begin.
-
-    Returns
-    -------
-    fit : CyclesFit
-        The plant and its residual.
-    theta : array
-        The fitted numbers, a start for neighbouring fits.
+    ``prior`` are the shares of the thresholds (6,) to which the weights are drawn, equal by
+    default. Returns the fit and its parameters, a start for neighbouring fits.
     """
     shares = np.full(6, 1 / 6) if prior is None else np.maximum(prior, 1e-3)
     begin = _START if start is None else start
@@ -274,7 +238,7 @@ def ensemble(
 
 
 def _member(plant: SingleMuscle) -> Mapping[str, Any]:
-    names = [f"muscle.{k}" for k in STATIC] + ["hysteresis.stretch", "hysteresis.width_per_load"]
+    names = [*(f"muscle.{k}" for k in STATIC), "hysteresis.stretch", "hysteresis.width_per_load"]
     values: dict[str, Any] = {name: plant.value(name) for name in names}
     if plant.hysteresis.operator is not None:
         values["hysteresis.operator"] = plant.hysteresis.operator
@@ -296,38 +260,33 @@ def identify_mas10(
     return plant, fit
 
 
-def leave_one_repeat_out(table: ContractionTable, hysteresis: Kind) -> float:
-    """Return the RMS error [m] on a repeat of plants fitted to the others."""
+def _left_out_rms(table: ContractionTable, model: Callable[[Cycles, Cycles], Array]) -> float:
+    """Return the RMS error [m] on a repeat of a model of the others, and of its cycles."""
     repeats, missed = np.unique(table.repeat), []
     for held in repeats:
-        fit = fit_cycles(mean_cycles(table, repeats[repeats != held]), hysteresis)
-        left = mean_cycles(table, [held])
-        missed.append((_model(fit.plant, left) - left.contractions)[:, 1:])
+        others, left = mean_cycles(table, repeats[repeats != held]), mean_cycles(table, [held])
+        missed.append((model(others, left) - left.contractions)[:, 1:])
     return float(np.sqrt(np.mean(np.square(missed))))
+
+
+def leave_one_repeat_out(table: ContractionTable, hysteresis: Kind) -> float:
+    """Return the RMS error [m] on a repeat of plants fitted to the others."""
+    return _left_out_rms(
+        table, lambda others, left: _model(fit_cycles(others, hysteresis).plant, left)
+    )
 
 
 def repeatability_floor(table: ContractionTable) -> float:
-    """Return the RMS difference [m] of a repeat from the mean of the others: the best there is."""
-    repeats, missed = np.unique(table.repeat), []
-    for held in repeats:
-        others = mean_cycles(table, repeats[repeats != held]).contractions
-        missed.append((others - mean_cycles(table, [held]).contractions)[:, 1:])
-    return float(np.sqrt(np.mean(np.square(missed))))
+    """Return the RMS difference [m] of a repeat from the mean of the others."""
+    return _left_out_rms(table, lambda others, left: others.contractions)
 
 
 @dataclass(frozen=True)
 class Identifiability:
     """Identifiability of a plant's parameters from the cycles.
 
-    Attributes
-    ----------
-    names : tuple of str
-        Names of the parameters.
-    rank : int
-        Independent combinations of them that the means fix to better than a fifth (one standard
-        deviation).
-    fixed : array
-        For each parameter, how much of it lies in those combinations: 0 (nothing) to 1.
+    ``rank`` is the number of independent combinations that the means determine to better than a
+    fifth (one standard deviation), ``fixed`` the share of each parameter in them, from 0 to 1.
     """
 
     names: tuple[str, ...]
@@ -336,7 +295,7 @@ class Identifiability:
 
 
 def identifiability(fit: CyclesFit, standard_error: float = 6.7e-5) -> Identifiability:
-    """Return which parameters of a Maxwell-slip fit the cycles fix (``standard_error`` in m)."""
+    """Return the identifiability of a Maxwell-slip fit (``standard_error`` in m)."""
     plant, base = fit.plant, _model(fit.plant, fit.cycles)
     operator: Any = plant.hysteresis.operator
     if plant.hysteresis.kind != PlayOperator.kind:

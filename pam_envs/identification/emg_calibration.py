@@ -1,8 +1,8 @@
 """Calibration of the two EMG readings to the three reductions of yeh2010.
 
-Run ``python -m pam_envs.identification.emg_calibration`` to write them anew. They are *fitted*, one
-a published figure, and predict nothing: what is assumed is an orthosis that delivers 20 % of
-Eq. (1) exactly and at once. They do not depend on the gait then: reading A needs a true demand of
+Run ``python -m pam_envs.identification.emg_calibration`` to write them. Each constant is *fitted*
+to one published figure and predicts nothing: an orthosis is assumed that delivers 20 % of Eq. (1)
+exactly and at once, independently of the gait. Reading A then needs a true demand of
 ``0.2 / reduction`` of Eq. (1), reading B a power ``log(1 - reduction) / log(0.8)``. Behind the
 eighth-order low-pass, 0.16 s late, and in stance alone, no constant of reading A would give the
 published -36 % for the walk of this package (-32 % at best).
@@ -10,12 +10,13 @@ published -36 % for the walk of this package (-32 % at best).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from pam_envs.constants import GRAVITY
 from pam_envs.mechanics.leg import centre_of_pressure
@@ -41,7 +42,7 @@ STRIDES = 3
 def stride_torques(
     activity: Activity, stride: float = PAPER_STRIDE, changes: Mapping[str, float] | None = None
 ) -> tuple[Array, Array]:
-    """Return Eq. (1) and the reference's assistance [N m] over one stride in its steady course.
+    """Return Eq. (1) and the reference's assistance [N m] over one stride in steady walking.
 
     The reference is 20 % of Eq. (1) behind the eighth-order low-pass while the heel is loaded, and
     never less than the wire gives past its relaxed angle, where a muscle cannot push.
@@ -60,8 +61,8 @@ def stride_torques(
     heel = [heel_load(f, r, *sole) for f, r in zip(vertical, cop, strict=True)]
     stance = np.array(heel) > shoe.threshold
     wire = -plant.lever.spring_torque(plant.lever.mount_angle + curves["knee"])
-    wanted = np.where(stance, filtered(ASSISTANCE_RATIO * torque), 0.0)
-    return np.asarray(torque)[-n:], np.maximum(wanted, wire)[-n:]
+    desired = np.where(stance, filtered(ASSISTANCE_RATIO * torque), 0.0)
+    return np.asarray(torque)[-n:], np.maximum(desired, wire)[-n:]
 
 
 def change(
@@ -69,14 +70,8 @@ def change(
 ) -> float:
     """Return the change of the proxy's RMS for a constant.
 
-    Parameters
-    ----------
-    activity : {"walk", "stairs_up", "stairs_down"}
-    reading : {"A", "B"}
-    constant : float
-    as_referred : bool
-        The assistance is the reference of :func:`stride_torques`, late and in stance alone, and
-        not 20 % of Eq. (1) at once.
+    With ``as_referred`` the assistance is the reference of :func:`stride_torques`, late and in
+    stance alone, instead of 20 % of Eq. (1) at once.
     """
     torque, late = stride_torques(activity)
     helped = late if as_referred else ASSISTANCE_RATIO * torque
@@ -84,28 +79,15 @@ def change(
     return emg_proxy(*two, PERIOD, reading=reading, constant=constant).change
 
 
-def root(of: Callable[[float], float], low: float, high: float) -> float:
-    """Return where a function changes its sign, to 1e-9, or raise where it does not."""
-    below = of(low) < 0.0
-    if below == (of(high) < 0.0):
-        raise ValueError(f"no constant between {low:g} and {high:g} gives the published reduction")
-    while high - low > 1e-9:
-        middle = 0.5 * (low + high)
-        if (of(middle) < 0.0) == below:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
-
-
 def fitted() -> dict[str, dict[Activity, float]]:
     """Return the constant of each reading and activity."""
     return {
         reading: {
             activity: round(
-                root(
-                    lambda c, a=activity, r=reading: change(a, r, c) - PUBLISHED[a],  # type: ignore[misc]
+                brentq(
+                    lambda c, a=activity, r=reading: change(a, r, c) - PUBLISHED[a],
                     *bounds,
+                    xtol=1e-9,
                 ),
                 4,
             )

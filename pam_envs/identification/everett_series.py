@@ -1,12 +1,11 @@
-"""The printed inverse (3.5) of fluidic_muscles: a sum over an inverted Everett map.
+"""Printed inverse (3.5) of fluidic_muscles: a sum over an inverted Everett map.
 
     u = u_min + sum_i G(F_(i+1), F_i) + G(f, F_k),   G(f_alpha, f_alphabeta) = u_alpha - u_beta
 
-with ``F_i`` the past extrema of the output. ``G`` is read from first-order curves, so that the sum
-is exact up to the first turn. After two turns the output at the last one is no longer on a
-first-order curve, and the sum is off, unless the map depends on ``alpha - beta`` alone. The exact
-inverse is the recursion ``E(u_next, u_turn) = f_next - f_turn`` of
-:meth:`~pam_envs.hysteresis.preisach.Preisach.inverse_step`; this one is here to be compared.
+with ``F_i`` the past extrema of the output. ``G`` is read from first-order curves: the sum is exact
+up to the first turn, and after two turns only for a map that depends on ``alpha - beta`` alone. The
+exact inverse is :meth:`~pam_envs.hysteresis.preisach.Preisach.inverse_step`; this one serves as a
+comparison.
 """
 
 from __future__ import annotations
@@ -25,15 +24,7 @@ Array = NDArray[np.float64]
 
 
 def series_inverse(model: Preisach, outputs: ArrayLike) -> Array:
-    """Return the inputs, shape (T,), that (3.5) gives for outputs of shape (T,).
-
-    Parameters
-    ----------
-    model : Preisach
-        Starts low.
-    outputs : array_like, shape (T,)
-        From ``start_output`` on.
-    """
+    """Return the inputs (T,) that (3.5) gives for outputs (T,) of a model that starts low."""
     if model.start != "low":
         raise ValueError(f"start is {model.start!r}; (3.5) counts from u_min: use start='low'")
     stack, found = [model.start_output], []
@@ -49,11 +40,9 @@ def _dominant(stack: list[float], f: float) -> list[float]:
     kept = list(stack)
     while len(kept) > 1:
         last, before = kept[-1], kept[-2]
-        onward = (f - last) * (last - before) >= 0.0
-        closed = len(kept) > 2 and (f - kept[-2]) * (kept[-2] - kept[-1]) >= 0.0
-        if onward:
+        if (f - last) * (last - before) >= 0.0:  # onward
             kept.pop()
-        elif closed:
+        elif len(kept) > 2 and (f - before) * (before - last) >= 0.0:  # a closed loop
             kept = kept[:-2]
         else:
             break

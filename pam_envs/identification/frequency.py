@@ -1,10 +1,9 @@
-"""A rational transfer function from a measured frequency response, by vector fitting.
+"""Rational transfer function of a measured frequency response, by vector fitting.
 
-The response is written in partial fractions whose poles are moved until a weighted linear
-least-squares problem is consistent with them: each round solves for the residues of the response
-and of a scaling function with the same poles, and takes the zeros of the latter as the new poles.
-Poles that come out unstable are mirrored, so that the fit is always stable. Partial fractions keep
-the problem well-conditioned where powers of ``s`` do not.
+Each round solves a weighted linear least-squares problem for the residues of the response and of a
+scaling function with the same poles, and takes the zeros of the latter as the new poles. Unstable
+poles are mirrored, so that the fit is always stable. Partial fractions keep the problem
+well-conditioned where powers of ``s`` do not.
 
 References
 ----------
@@ -137,36 +136,24 @@ def _start(w: Array, order: int) -> Complex:
     return np.array([*real, *pairs], complex)
 
 
+def _pairs(poles: Complex) -> NDArray[np.int64]:
+    """Return the index of the first pole of each conjugate pair; the second follows it."""
+    return np.flatnonzero(poles.imag > 0.0)
+
+
 def _basis(s: Complex, poles: Complex) -> Complex:
     """Return partial fractions with real coefficients, shape (m, n)."""
-    columns, k = [], 0
-    while k < len(poles):
-        p = poles[k]
-        one = 1.0 / (s - p)
-        if p.imag == 0.0:
-            columns.append(one)
-            k += 1
-        else:
-            other = 1.0 / (s - p.conjugate())
-            columns += [one + other, 1j * (one - other)]
-            k += 2
-    return np.stack(columns, axis=1)
+    columns, k = 1.0 / (s[:, None] - poles), _pairs(poles)
+    one, other = columns[:, k], columns[:, k + 1]
+    columns[:, k], columns[:, k + 1] = one + other, 1j * (one - other)
+    return np.asarray(columns)
 
 
 def _modal(poles: Complex, residues: Complex) -> tuple[Array, Array, Array]:
-    n = len(poles)
-    a, b, c = np.zeros((n, n)), np.zeros(n), np.zeros(n)
-    k = 0
-    while k < n:
-        p, r = poles[k], residues[k]
-        if p.imag == 0.0:
-            a[k, k], b[k], c[k] = p.real, 1.0, r.real
-            k += 1
-        else:
-            a[k : k + 2, k : k + 2] = [[p.real, p.imag], [-p.imag, p.real]]
-            b[k : k + 2], c[k : k + 2] = (2.0, 0.0), (r.real, r.imag)
-            k += 2
-    return a, b, c
+    a, c, k = np.diag(poles.real), residues.real.copy(), _pairs(poles)
+    a[k, k + 1], a[k + 1, k] = poles[k].imag, -poles[k].imag
+    c[k + 1] = residues[k].imag
+    return a, 1.0 + np.sign(poles.imag), c
 
 
 def _solve(columns: Complex, target: Complex, weights: Array) -> Array:
@@ -216,13 +203,7 @@ def _residues(
 ) -> Complex:
     numerators = _numerators(poles, relative_degree)
     found = numerators @ _solve(_basis(s, poles) @ numerators, values, weights)
-    residues, k = np.zeros(len(poles), complex), 0
-    while k < len(poles):
-        if poles[k].imag == 0.0:
-            residues[k] = found[k]
-            k += 1
-        else:
-            residues[k] = found[k] + 1j * found[k + 1]
-            residues[k + 1] = residues[k].conjugate()
-            k += 2
+    residues, k = np.asarray(found, complex), _pairs(poles)
+    residues[k] = found[k] + 1j * found[k + 1]
+    residues[k + 1] = residues[k].conjugate()
     return residues

@@ -1,6 +1,6 @@
 """Tables of :mod:`pam_envs.references.gait` from measured and synthetic strides.
 
-Run ``python -m pam_envs.identification.gait_tables`` to write them anew.
+Run ``python -m pam_envs.identification.gait_tables`` to write them.
 
 Angles pass through their Fourier series, so that accelerations are smooth, and are met exactly at
 the knots. Forces and centres of pressure are used as spline coefficients, which smooths them by

@@ -1,17 +1,14 @@
 """Play and Maxwell-slip models from measured loops, by non-negative least squares.
 
-With the thresholds on a fixed ladder, the output is linear in the weights, and the states of the
-plays follow from the input alone: the fit is a convex problem with one best value. Weights that
-may not be negative keep the model passive and invertible, and switch off the elements that the
-record does not need.
-
-A record fixes only so many weights: one loop of amplitude ``a`` says nothing about thresholds
-above ``a``, and nothing between two neighbours that begin to move within one sample. The rank of
-the regressors is handed back with the model and compared with the number of unknowns.
+With given thresholds the output is linear in the weights, and the states of the plays follow from
+the input alone: the fit is a convex problem. Non-negative weights keep the model passive and
+invertible. A loop of amplitude ``a`` does not determine weights of thresholds above ``a``, nor of
+two neighbours that begin to move within one sample: the rank of the regressors is returned.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,20 +22,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LoopFit:
-    """Identified model, and how much of it the record fixes.
+    """Identified model and its identifiability.
 
-    Parameters
+    Attributes
     ----------
     model : PlayOperator or MaxwellSlip
         The fitted model.
-    offset : float
-        Constant added to the model's output.
-    rms : float
-        Root mean square of the residuals, in the unit of the output.
-    rank : int
-        Rank of the regressors (line, elements, constant).
-    unknowns : int
-        Number of unknowns; more than ``rank`` means that other weights fit as well.
+    offset, rms : float
+        Constant added to its output, and RMS residual, in the unit of the output.
+    rank, unknowns : int
+        Rank of the regressors (line, elements, constant) and number of unknowns; more of these
+        mean that other weights fit as well.
     """
 
     model: PlayOperator | MaxwellSlip
@@ -49,7 +43,7 @@ class LoopFit:
 
     @property
     def determined(self) -> bool:
-        """True if the record fixes every unknown."""
+        """True if the record determines every unknown."""
         return self.rank == self.unknowns
 
 
@@ -67,25 +61,17 @@ def fit_play(
     x, y : array_like, shape (T,)
         Input and output, from a known state on.
     thresholds : array_like, shape (n,), optional
-        Ladder of thresholds, rising; ``elements`` even ones below half the input's span if not
-        given.
+        Rising thresholds; ``elements`` even ones below half the input's span by default.
     initial_state : array_like, shape (n,), optional
-        Play positions before the first sample; zeros, the virgin state, if not given.
+        Play positions before the first sample; zeros, the virgin state, by default.
     elements : int
-        Length of the default ladder.
-
-    Returns
-    -------
-    LoopFit
-        Its ``model`` is a :class:`PlayOperator` with weights and linear part at least 0.
+        Number of default thresholds.
     """
     inputs, outputs = measured(x, y)
     ladder = _ladder(inputs, thresholds, elements)
     probe = PlayOperator(ladder, (1.0,) * len(ladder), 1.0)
     plays = _positions(probe, inputs, initial_state)
-    values, offset, rms, rank = non_negative(np.column_stack([inputs, plays]), outputs)
-    model = PlayOperator(ladder, tuple(values[1:]), values[0])
-    return LoopFit(model, offset, rms, rank, len(values) + 1)
+    return _fit(inputs, plays, outputs, lambda w: PlayOperator(ladder, tuple(w[1:]), w[0]))
 
 
 def fit_maxwell_slip(
@@ -97,38 +83,28 @@ def fit_maxwell_slip(
 ) -> LoopFit:
     """Return the Maxwell-slip model, plus a constant, that is nearest to a record.
 
-    As :func:`fit_play`, for a length ``x`` and a ``force``: its ``model`` is a
-    :class:`MaxwellSlip`; ``initial_state`` are slip positions.
+    As :func:`fit_play`, for a length ``x``, a ``force`` and an ``initial_state`` of slip positions.
     """
     inputs, outputs = measured(x, force)
     ladder = _ladder(inputs, break_displacements, elements)
     probe = MaxwellSlip(1.0, (1.0,) * len(ladder), ladder)
     stops = inputs[:, None] - _positions(probe, inputs, initial_state)
-    values, offset, rms, rank = non_negative(np.column_stack([inputs, stops]), outputs)
-    model = MaxwellSlip(values[0], tuple(values[1:]), ladder)
-    return LoopFit(model, offset, rms, rank, len(values) + 1)
+    return _fit(inputs, stops, outputs, lambda w: MaxwellSlip(w[0], tuple(w[1:]), ladder))
+
+
+def _fit(
+    x: Array, elements: Array, y: Array, model: Callable[[Array], PlayOperator | MaxwellSlip]
+) -> LoopFit:
+    """Fit a line, elements (T, n) and a constant; ``model`` makes a model of slope and weights."""
+    values, offset, rms, rank = non_negative(np.column_stack([x, elements]), y)
+    return LoopFit(model(values), offset, rms, rank, len(values) + 1)
 
 
 def non_negative(columns: Array, y: Array) -> tuple[Array, float, float, int]:
-    """Fit ``y`` by a constant and by columns with weights that are not negative.
+    """Fit ``y`` (T,) by a constant of either sign and by columns (T, n) with weights of at least 0.
 
-    Parameters
-    ----------
-    columns : ndarray, shape (T, n)
-        Regressors.
-    y : ndarray, shape (T,)
-        What to fit.
-
-    Returns
-    -------
-    weights : ndarray, shape (n,)
-        Weights, at least 0; 0 for a column that does not vary.
-    offset : float
-        The constant, of either sign.
-    rms : float
-        Root mean square of the residuals.
-    rank : int
-        Rank of the columns together with the constant.
+    Returns the weights (0 for a column that does not vary), the constant, the RMS residual, and the
+    rank of the columns together with the constant.
     """
     middle, level = columns.mean(axis=0), float(y.mean())
     centred = columns - middle

@@ -1,19 +1,17 @@
-"""Hysteresis of a joint from a rig: Everett map, symmetry and congruency, with a verdict.
+"""Test of a rig's hysteresis: Everett map, symmetry, congruency and wiping out, with a verdict.
 
 fluidic_muscles (section 3.2) drives the joint along the ascending branch, turns at chosen
 set-points and lets it fall to negative saturation: first-order descending curves, which give the
 Everett map ``E(alpha, beta) = f_alpha - f_alphabeta`` (3.2). The printed rule for the other half,
 ``f_alphabeta = -f_betaalpha``, is wrong; it is ``E(beta, alpha) = -E(alpha, beta)``.
 
-The same test measures if a Preisach operator may be identified at all:
-
 - *symmetry*, ``mu(a, b) = mu(-b, -a)``: the descending branches are the ascending ones turned by
   half a turn. Two equal muscles against each other have it, a single muscle has not.
-- *congruency*: loops between the same two inputs are equal, whatever came before.
+- *congruency*: loops between the same two inputs are equal, whatever their history.
 - *wiping out*: a closed loop returns to where it began.
 
-The last two are necessary and sufficient (I. D. Mayergoyz, "Mathematical Models of Hysteresis",
-Springer 1991, section 1.2).
+The last two are necessary and sufficient for a Preisach operator (I. D. Mayergoyz, "Mathematical
+Models of Hysteresis", Springer 1991, section 1.2).
 """
 
 from __future__ import annotations
@@ -82,7 +80,7 @@ class JointHysteresis:
 
     @property
     def verdict(self) -> str:
-        """A sentence on what the hysteresis is and what to do about it."""
+        """Result in a sentence, with a remedy."""
         found = (
             f"symmetry {self.symmetry:.3f} (bound {SYMMETRY:g}), congruency {self.congruency:.3f}"
             f" (bound {CONGRUENCY:g}), wiping out {self.wiping_out:.3f} (bound {WIPING_OUT:g})"
@@ -102,20 +100,13 @@ class JointHysteresis:
 def measure_joint(rig: Rig, amplitude: float, levels: int = 21) -> JointHysteresis:
     """Return the hysteresis of a joint between ``-amplitude`` and ``amplitude`` [rad].
 
-    Parameters
-    ----------
-    rig : callable
-        From set-points [rad] to angles at rest [rad], each of shape (T,).
-    amplitude : float
-        [rad].
-    levels : int
-        Levels of the grid.
+    ``rig`` maps set-points [rad] to angles at rest [rad]; see :func:`measure_hysteresis`.
     """
     return measure_hysteresis(rig, -amplitude, amplitude, levels)
 
 
 def measure_hysteresis(rig: Rig, low: float, high: float, levels: int = 21) -> JointHysteresis:
-    """Return the hysteresis of a rig, in units of its input and output; see this module's page.
+    """Return the hysteresis of a rig, in units of its input and output.
 
     Parameters
     ----------
@@ -129,14 +120,15 @@ def measure_hysteresis(rig: Rig, low: float, high: float, levels: int = 21) -> J
     Raises
     ------
     ValueError
-        If the range is empty, or the rig answers with other than one finite number an input.
+        If the range is empty, or the rig does not return one finite number an input.
     """
     if not low < high or levels < 3:
         raise ValueError(
             f"low is {low}, high {high} and levels {levels}; low must be below high and levels at"
             " least 3: widen the range"
         )
-    sweep = _sweep(low, high, levels)
+    up = np.linspace(low, high, levels)  # the major loop, then the first-order curves
+    sweep = np.concatenate([up, up[-2::-1], curve_inputs(low, high, levels)[1:]])
     outputs = _answers(rig, sweep)
     curves = descending_curves(sweep, outputs)
     first = float(outputs[2 * (levels - 1)])
@@ -156,12 +148,6 @@ def symmetrised(model: Preisach) -> Preisach:
     mean = np.tril(0.5 * (weights + weights[::-1, ::-1].T))
     half = 0.5 * (model.high - model.low)
     return Preisach.from_weights(mean, -half, half, model.depth, "virgin")
-
-
-def _sweep(low: float, high: float, levels: int) -> Array:
-    """Return inputs up and down the major loop, then the first-order curves."""
-    up = np.linspace(low, high, levels)
-    return np.concatenate([up, up[-2::-1], curve_inputs(low, high, levels)[1:]])
 
 
 def _answers(rig: Rig, inputs: Array) -> Array:

@@ -1,8 +1,7 @@
 """One muscle of a joint under a constant load, the counterexample of the symmetry test.
 
-Against its twin a muscle's hysteresis is symmetric, since each muscle does on the way back what the
-other one did on the way there. Alone it is not: its friction grows with its pressure, and its
-contraction saturates as it rises.
+The hysteresis of two equal antagonists is symmetric. That of a single muscle is not: its friction
+grows with its pressure, and its contraction saturates as it rises.
 """
 
 from __future__ import annotations
@@ -24,15 +23,7 @@ LOWEST, HIGHEST = -0.1, 0.4
 
 @dataclass(frozen=True)
 class HangingMuscle:
-    """A muscle of a joint with its hysteresis, which lifts a load.
-
-    Attributes
-    ----------
-    plant : AntagonisticJoint
-        With muscles and a hysteresis.
-    load : float
-        [N].
-    """
+    """A muscle of a joint with its hysteresis, which lifts a load [N]."""
 
     plant: AntagonisticJoint
     load: float = 100.0

@@ -37,24 +37,14 @@ AMPLITUDES = (25.0, 20.0, 15.0, 10.0, 7.0, 5.0, 3.0)
 
 @dataclass(frozen=True)
 class MeasuredMap:
-    """Static forces of a DMSP-10-250, one entry a point, shape (n,).
-
-    Attributes
-    ----------
-    pressure : ndarray
-        [Pa].
-    contraction : ndarray
-        [1].
-    force : ndarray
-        [N]; 0 where the muscle is slack.
-    """
+    """Static forces of a DMSP-10-250 [Pa, 1, N], shape (n,); 0 N where the muscle is slack."""
 
     pressure: Array
     contraction: Array
     force: Array
 
     def residuals(self, law: ForceMap) -> Array:
-        """Return how far a law is off [N]; where the muscle is slack, by what it pulls."""
+        """Return the errors of a law [N]; its pull where the muscle is slack."""
         value = law.law(self.pressure, self.contraction)
         return np.where(self.force > 0.0, value - self.force, np.maximum(0.0, value))
 
@@ -98,21 +88,10 @@ def loop_commands(seed: int = 0, turns: int = 40) -> Array:
 def fit_angle_plays(
     plant: AntagonisticJoint, thresholds: ArrayLike = ANGLE_THRESHOLDS
 ) -> tuple[PlayOperator, float]:
-    """Return plays of total slope 1 that rest where a plant does, and the error left.
+    """Return plays of total slope 1 that rest where a plant with muscles does, and the error left.
 
-    Parameters
-    ----------
-    plant : AntagonisticJoint
-        The plant with muscles.
-    thresholds : array_like, shape (n,)
-        Of the plays [rad].
-
-    Returns
-    -------
-    operator : PlayOperator
-        From set-point [rad] to angle at rest [rad].
-    error : float
-        RMS over :func:`loop_commands` [rad].
+    The operator maps set-points [rad] to angles at rest [rad], with thresholds (n,) [rad]; the
+    error is the RMS over :func:`loop_commands` [rad].
     """
     commands = loop_commands()
     behind = commands - plant.rest_angles(commands)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pam_envs.data.tables import ContractionTable, load_contraction_table
+from pam_envs.data.tables import load_contraction_table
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.none import NoHysteresis
 from pam_envs.hysteresis.preisach import Preisach
@@ -30,26 +29,12 @@ STOCK = (PlayOperator.kind, Preisach.kind, NoHysteresis.kind)
 """Kinds of hysteresis that are identified on the tables."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Summary:
-    """Figures of one identified plant, in mm; ``rms`` and ``widths`` by load in kg."""
-
-    hysteresis: str
-    rms: dict[float, float]
-    rms_all: float
-    left_out: float
-    widths: dict[float, tuple[float, float, float]]
-    members: int
-    rank: str
-
-
 def minor_loops(plant: SingleMuscle, low: float = 2e5, high: float = 3e5) -> tuple[float, float]:
     """Return the congruency error of minor loops, in effective pressure and in contraction.
 
-    The same excursion of the pressure, met on the first inflation (which has just reached its
-    upper end) and after the highest pressure.
-    A Preisach operator's loops are congruent, a muscle's contraction loops are not: so a Preisach
-    map from pressure straight to contraction is an approximation for a single muscle.
+    The same excursion of the pressure, on the first inflation (which has just reached its upper
+    end) and after the highest pressure. A Preisach operator's loops are congruent, a muscle's
+    contraction loops are not.
     """
     operator, load = plant.hysteresis.at_load(plant.mass.load), plant.mass.load
     if operator is None:
@@ -65,30 +50,14 @@ def minor_loops(plant: SingleMuscle, low: float = 2e5, high: float = 3e5) -> tup
     return congruency_error(curves[0]), congruency_error(curves[1])
 
 
-def summarise(table: ContractionTable, plant: SingleMuscle, fit: cycles.CyclesFit) -> Summary:
-    """Return the figures of one fit."""
-    loads = [float(m) for m in fit.cycles.loads]
-    at, measured, model = fit.widths()
-    kind = plant.hysteresis.kind
+def _rank(fit: cycles.CyclesFit) -> str:
+    """Return the number of determined parameters in words."""
     if fit.preisach is not None:
-        rank = f"{fit.preisach.rank} of {fit.preisach.unknowns} relay weights"
-    elif kind == PlayOperator.kind:
+        return f"{fit.preisach.rank} of {fit.preisach.unknowns} relay weights"
+    if fit.plant.hysteresis.kind == PlayOperator.kind:
         found = cycles.identifiability(fit)
-        rank = f"{found.rank} of {len(found.names)} parameters"
-    else:
-        rank = f"{len(cycles.STATIC)} of {len(cycles.STATIC)} static parameters"
-    return Summary(
-        kind,
-        {m: 1e3 * fit.rms(m) for m in loads},
-        1e3 * fit.rms(),
-        1e3 * cycles.leave_one_repeat_out(table, kind),
-        {
-            m: (p / 1e5, 1e3 * a, 1e3 * b)
-            for m, p, a, b in zip(loads, at, measured, model, strict=True)
-        },
-        len(plant.ensemble) + 1,
-        rank,
-    )
+        return f"{found.rank} of {len(found.names)} parameters"
+    return f"{len(cycles.STATIC)} of {len(cycles.STATIC)} static parameters"
 
 
 def identify_all(
@@ -113,14 +82,17 @@ def identify_all(
         say(f"identifying with hysteresis {kind}")
         plant, fit = cycles.identify_mas10(table, kind, members if kind != NoHysteresis.kind else 0)
         fits[kind] = fit
-        s = summarise(table, plant, fit)
-        widths = ", ".join(f"{b:.2f} ({a:.2f} at {p:g} bar)" for p, a, b in s.widths.values())
-        cells = " | ".join(f"{v:.3f}" for v in s.rms.values())
-        lines.append(
-            f"| {kind} | {cells} | {s.rms_all:.3f} | {s.left_out:.3f} | {widths} | {s.rank} | "
-            f"{s.members} |"
+        rms, left_out = 1e3 * fit.rms(), 1e3 * cycles.leave_one_repeat_out(table, kind)
+        cells = " | ".join(f"{1e3 * fit.rms(float(load)):.3f}" for load in fit.cycles.loads)
+        widths = ", ".join(
+            f"{1e3 * model:.2f} ({1e3 * measured:.2f} at {pressure / 1e5:g} bar)"
+            for pressure, measured, model in zip(*fit.widths(), strict=True)
         )
-        notes = {"rms_mm": round(s.rms_all, 4), "left_out_repeat_mm": round(s.left_out, 4)}
+        lines.append(
+            f"| {kind} | {cells} | {rms:.3f} | {left_out:.3f} | {widths} | {_rank(fit)} | "
+            f"{len(plant.ensemble) + 1} |"
+        )
+        notes = {"rms_mm": round(rms, 4), "left_out_repeat_mm": round(left_out, 4)}
         plant_file.write(plant, folder / f"mas10_{kind}.yaml", notes)
         if fit.preisach is not None:
             inner, outer = minor_loops(plant)

@@ -1,4 +1,4 @@
-"""The modified Maxwell-slip model from vented loops, by a linear programme.
+"""Modified Maxwell-slip model from vented loops, by a linear programme.
 
 A loop rises from rest at pressure 0 to a peak and falls back. From its bottom every element is
 stretched to ``-r_m = -m delta``; at the stiffness ``x = 2 i delta`` on the way up, and after
@@ -17,9 +17,9 @@ equations (7) to (9) of the source the right-hand sides of the two branches are 
 second term of the sum repeats the first, and the two last constraints are missing;
 :func:`printed_programme` keeps the mixed right-hand sides to show what they give.
 
-A major loop does not fix every ``k``. The rank of the equations is handed back with the names of
-what they leave open. A loop that turns between two break points ties down a little more, in
-combinations that noise would drown: these do not count.
+A major loop does not determine every ``k``: the rank of the equations is returned with the names of
+the open ones. What a loop that turns between two break points adds is below the noise and does not
+count.
 
 References
 ----------
@@ -41,7 +41,6 @@ from scipy.optimize import linprog
 
 from pam_envs.hysteresis.modified_maxwell_slip import ModifiedMaxwellSlip
 from pam_envs.identification.hysteresis_loops import measured
-from pam_envs.identification.preisach_forc import PreisachFit, fit_preisach
 
 Array = NDArray[np.float64]
 Loop = tuple[ArrayLike, ArrayLike]
@@ -50,10 +49,10 @@ Form = Literal["corrected", "printed"]
 LEAST_SLOPE = 1e-3
 """Least slope of the spring over that of the line between the tips of the major loop."""
 WEAKEST = 1.2e-3
-"""Least singular value of the equations, over the largest, that counts as fixing something. What
-is smaller would amplify the noise of a record almost a thousandfold."""
+"""Least singular value of the equations, over the largest, that counts: smaller ones would amplify
+the noise of a record almost a thousandfold."""
 OPEN = 0.05
-"""Part of an element in a combination that is not fixed, from which on the element is open."""
+"""Least part of an open element in an undetermined combination."""
 AT_ZERO = 0.02
 """Part of the largest stiffness within which a loop's bottom counts as 0."""
 
@@ -64,23 +63,19 @@ class OpenParameters(UserWarning):
 
 @dataclass(frozen=True)
 class SlipFit:
-    """Identified model, and how much of it the loops fix.
+    """Identified model and its identifiability.
 
-    Parameters
+    Attributes
     ----------
     model : ModifiedMaxwellSlip
         Of all best models that with the least friction.
-    objective : float
-        Sum of the absolute errors at the break points [Pa].
-    relative_objective : float
-        The same in units of the largest pressure.
-    rank : int
-        Rank of the equations.
-    unknowns : int
-        ``2 N + 1``: ``k_1 .. k_N`` and ``g_0 .. g_N``.
+    objective, relative_objective : float
+        Sum of the absolute errors at the break points [Pa], and over the largest pressure.
+    rank, unknowns : int
+        Rank of the equations, and ``2 N + 1``: ``k_1 .. k_N`` and ``g_0 .. g_N``.
     open : tuple of str
-        Names of the elements' stiffnesses that other values would fit as well. ``k_N`` always is
-        one of them: the last element never slips, and acts as a part of the spring.
+        Names of the undetermined stiffnesses. ``k_N`` always is one of them: the last element never
+        slips, and acts as a part of the spring.
     """
 
     model: ModifiedMaxwellSlip
@@ -92,7 +87,7 @@ class SlipFit:
 
     @property
     def determined(self) -> bool:
-        """True if all is fixed but the split between ``k_N`` and the spring."""
+        """True if all but the split between ``k_N`` and the spring is determined."""
         return self.unknowns - self.rank <= 1
 
     @property
@@ -118,20 +113,16 @@ def fit_slip_programme(loops: Sequence[Loop], elements: int = 10) -> SlipFit:
     elements : int
         Number of elements ``N``.
 
-    Returns
-    -------
-    SlipFit
-
     Warns
     -----
     OpenParameters
-        If the loops leave more open than the split between the last element and the spring; the
-        message names the parameters.
+        If more than the split between the last element and the spring is undetermined; the message
+        names the parameters.
 
     Raises
     ------
     ValueError
-        If there is no loop, or one does not begin at rest, or the programme has no solution.
+        Without a loop, for one that does not begin at rest, or without a solution.
     """
     found = _solution(loops, elements, "corrected")
     rank, names = _fixed(found.rows, elements)
@@ -147,27 +138,12 @@ def fit_slip_programme(loops: Sequence[Loop], elements: int = 10) -> SlipFit:
 
 
 def printed_programme(loops: Sequence[Loop], elements: int = 10) -> tuple[float, Array]:
-    """Return what the equations give as they are printed.
+    """Return the relative objective and the spring (N + 1,) [Pa] of the equations as printed.
 
-    Returns
-    -------
-    relative_objective : float
-        Sum of the absolute errors in units of the largest pressure.
-    spring : ndarray, shape (N + 1,)
-        [Pa]; it does not rise, so that no model can be made of it.
+    The spring does not rise, so that no model can be made of it.
     """
     found = _solution(loops, elements, "printed")
     return found.objective / found.full, found.spring
-
-
-def fit_preisach_loops(loops: Sequence[Loop], levels: int = 17) -> PreisachFit:
-    """Return the Preisach operator of the same loops, run through one after the other."""
-    records = [measured(pressure, stiffness) for pressure, stiffness in loops]
-    if not records:
-        raise ValueError("loops is empty; give one major loop at least")
-    pressure = np.concatenate([record[0] for record in records])
-    stiffness = np.concatenate([record[1] for record in records])
-    return fit_preisach(pressure, stiffness, 0.0, float(pressure.max()), levels)
 
 
 @dataclass(frozen=True)
@@ -184,11 +160,11 @@ class _Grid:
         return np.asarray(0.5 * self.segment * np.arange(1, self.elements + 1))
 
     def changes(self, travel: float) -> Array:
-        """Return what each ``k`` is multiplied by after a travel from one turn."""
+        """Return the factor of each ``k`` after a travel from one turn."""
         return np.minimum(travel, 2.0 * self.breaks)
 
     def spring(self, x: float) -> Array:
-        """Return what each ``g`` is multiplied by at a stiffness."""
+        """Return the factor of each ``g`` at a stiffness."""
         knots = np.arange(self.elements + 1.0)
         return np.asarray(np.maximum(0.0, 1.0 - np.abs(x / self.segment - knots)))
 

@@ -1,15 +1,11 @@
 """Preisach operators from measurements.
 
 :func:`preisach_from_curves` reads the Everett map off first-order descending curves, one from
-every level of the grid: the textbook identification, which takes what it is given. It needs a
-dedicated test. :func:`fit_preisach` takes any record and solves for relay weights that are not
-negative; what the record leaves open is filled from a *prior density*.
-
-The prior is the density of ``alpha - beta`` alone (the map of a play operator: loops of one width
-all over the range) that fits the record best. It has one unknown a diagonal, which a single large
-loop fixes. The fit is drawn to it by a small penalty, so that cells that no excursion separated
-keep its proportions while those that the record fixes follow the record. How much is fixed is
-handed back: the rank, and for every cell the share that the data decide.
+every level of the grid: the textbook identification, which needs a dedicated test.
+:func:`fit_preisach` takes any record and solves for non-negative relay weights, drawn by a small
+penalty to a *prior density*: the density of ``alpha - beta`` alone (loops of one width all over the
+range, one unknown a diagonal) that fits the record best. Cells that the record does not determine
+keep its proportions. Rank and the share of each cell that the data determine are returned.
 
 References
 ----------
@@ -40,13 +36,8 @@ Curve = tuple[ArrayLike, ArrayLike]
 class CurveFit:
     """Operator read off first-order curves.
 
-    Parameters
-    ----------
-    model : Preisach
-        The operator.
-    clipped : float
-        Weight of the relays that came out negative and were set to 0, as a part of all weight:
-        0 for curves of a Preisach operator, and a measure of noise or misfit otherwise.
+    ``clipped`` is the share of relay weight that came out negative and was set to 0: 0 for curves
+    of a Preisach operator, and a measure of noise or misfit otherwise.
     """
 
     model: Preisach
@@ -55,23 +46,19 @@ class CurveFit:
 
 @dataclass(frozen=True)
 class PreisachFit:
-    """Operator fitted to a record, and how much of it the record fixes.
+    """Operator fitted to a record, and its identifiability.
 
-    Parameters
+    Attributes
     ----------
     model : Preisach
         The operator; its output includes the fitted constant (``start_output``) unless the start
         is virgin.
-    offset : float
-        The fitted constant: the output in the start state.
-    rms : float
-        Root mean square of the residuals, in the unit of the output.
-    rank : int
-        Rank of the regressors (one per cell, and the constant).
-    unknowns : int
-        Number of cells, plus 1.
+    offset, rms : float
+        The constant (output in the start state), and RMS residual, in the unit of the output.
+    rank, unknowns : int
+        Rank of the regressors (one per cell, and the constant), and number of cells plus 1.
     decided : ndarray, shape (n - 1, n - 1)
-        Share of each cell's weight that the record decides, from 0 (all prior) to 1.
+        Share of each cell's weight that the record determines, from 0 (all prior) to 1.
     prior : ndarray, shape (n - 1, n - 1)
         Relay weights of the prior.
     """
@@ -88,19 +75,7 @@ class PreisachFit:
 def curve_inputs(low: float, high: float, levels: int, points: int = 1) -> Array:
     """Return the input of a first-order test: from ``low`` up to each level in turn and back.
 
-    Parameters
-    ----------
-    low, high : float
-        Range of the input.
-    levels : int
-        Levels of the grid; there are ``levels - 1`` curves.
-    points : int
-        Samples per cell of the grid.
-
-    Returns
-    -------
-    ndarray
-        Input samples, beginning and ending at ``low``.
+    There are ``levels - 1`` curves, and ``points`` samples per cell of the grid.
     """
     fine = np.linspace(low, high, (levels - 1) * points + 1)
     legs = [fine[:1]]
@@ -136,10 +111,8 @@ def preisach_from_curves(
         one from every level of the grid above ``low``, in any order.
     low, high : float
         Range of the input.
-    levels : int
-        Levels of the grid.
-    depth : int
-        Extrema that the operator keeps.
+    levels, depth : int
+        Levels of the grid, and extrema that the operator keeps.
     start_output : float
         Output at ``low``.
 
@@ -204,18 +177,13 @@ def fit_preisach(
     levels : int
         Levels of the grid: ``levels (levels - 1) / 2`` unknown weights.
     depth : int
-        Extrema that the operator keeps.
+        Extrema that are kept.
     start : {"low", "virgin"}
         State before the first sample. A virgin start makes the weights symmetric, ``mu(a, b) =
         mu(-b, -a)``, and needs ``low = -high``.
     prior_weight : float
         Penalty on the distance from the prior, relative to the largest singular value of the
-        regressors. Above 0: smaller follows the record further into directions it hardly fixes.
-
-    Returns
-    -------
-    PreisachFit
-        Operator, residual, rank, and the share of every cell that the record decides.
+        regressors; above 0.
     """
     inputs, outputs = measured(x, y)
     if not prior_weight > 0.0:
@@ -269,25 +237,25 @@ def _drawn(columns: Array, y: Array, prior: Array, strength: float) -> Array:
 
 
 def congruency_error(loops: Sequence[Curve]) -> float:
-    """Return how far minor loops between the same two inputs are from being congruent.
+    """Return the error of congruency of minor loops between the same two inputs.
 
     Parameters
     ----------
     loops : sequence of (x, y) pairs
-        At least two records of the same closed excursion of the input, met in different
-        histories, each from the same turn on.
+        At least two records of the same closed excursion of the input, with different histories,
+        each from the same turn on.
 
     Returns
     -------
     float
-        Largest difference between two loops after moving their first points together, divided by
-        the largest height of a loop. 0 (to rounding) for a Preisach operator; creep, or a width
-        that depends on the level of the output, shows here.
+        Largest difference between two loops after moving their first points together, over the
+        largest height of a loop: 0 (to rounding) for a Preisach operator. Creep, or a width that
+        depends on the level of the output, increases it.
 
     Raises
     ------
     ValueError
-        If there are fewer than two loops, or they are not between the same inputs.
+        For fewer than two loops, or loops between different inputs.
     """
     records = [measured(x, y) for x, y in loops]
     if len(records) < 2:
@@ -308,6 +276,3 @@ def congruency_error(loops: Sequence[Curve]) -> float:
     height = max(float(np.ptp(shape)) for shape in shapes)
     spread = float(np.max(np.ptp(np.array(shapes), axis=0)))
     return spread / height if height > 0.0 else 0.0
-
-
-symmetry_error = maps.symmetry_error

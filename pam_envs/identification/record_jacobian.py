@@ -1,9 +1,7 @@
 """Jacobian of a simulated record by a plant's parameters.
 
 By forward differences, with every perturbed parameter set a lane of one rollout: a minute of
-record and twenty parameters take tens of milliseconds, where automatic differentiation of the same
-simulation takes many times longer. The fits of the diagnosis
-(:mod:`pam_envs.diagnosis.fit.least_squares`) work the same way.
+record and twenty parameters take tens of milliseconds.
 """
 
 from __future__ import annotations
@@ -36,16 +34,6 @@ def weights(plant: SingleMuscle) -> tuple[str, ...]:
     return tuple(f"hysteresis.weight[{k}]" for k in range(plant.elements))
 
 
-def _place(plant: SingleMuscle, name: str) -> int:
-    """Return the row of a parameter in the column that the kernels read."""
-    if name in R.PARAMETERS:
-        return R.PARAMETERS.index(name)
-    if name in weights(plant):
-        return R.WEIGHT + weights(plant).index(name)
-    known = ", ".join((*R.PARAMETERS, *weights(plant)))
-    raise ValueError(f"no parameter named {name!r}; there are: {known}")
-
-
 def scales(plant: SingleMuscle, names: Sequence[str]) -> Array:
     """Return the size of a meaningful change of each parameter."""
     sizes = []
@@ -65,23 +53,16 @@ def jacobian(
 ) -> tuple[Array, Array]:
     """Return the outputs of a plant over a record and their derivatives by parameters.
 
-    Parameters
-    ----------
-    plant : SingleMuscle
-        Starts at rest at no pressure.
-    set_points : array_like, shape (T,)
-        Set-points [Pa], one a control period.
-    names : sequence of str
-        Parameters, play weights (:func:`weights`) among them.
-
-    Returns
-    -------
-    outputs : array, shape (4, T)
-        As :func:`pam_envs.plants.single_muscle.rollout.simulate_rows`.
-    derivatives : array, shape (4, T, n)
-        In SI units of output per SI unit of parameter.
+    ``set_points`` (T,) [Pa] are those of a plant at rest at no pressure, one a control period, and
+    ``names`` parameters or play weights (:func:`weights`). The outputs, shape (4, T), are those of
+    :func:`pam_envs.plants.single_muscle.rollout.simulate_rows`, the derivatives (4, T, n) in SI.
     """
-    places = [_place(plant, name) for name in names]
+    known = (*R.PARAMETERS, *weights(plant))
+    rows = (*range(len(R.PARAMETERS)), *range(R.WEIGHT, R.WEIGHT + plant.elements))
+    for name in names:
+        if name not in known:
+            raise ValueError(f"no parameter named {name!r}; there are: {', '.join(known)}")
+    places = [rows[known.index(name)] for name in names]
     steps = _STEP * scales(plant, names)
     columns = np.tile(plant.parameter_rows(), (len(names) + 1, 1))
     columns[np.arange(1, len(names) + 1), places] += steps

@@ -46,26 +46,11 @@ def _node_weights(
 def relay_regressors(
     x: Array, low: float, high: float, levels: int, depth: int = 24, start: Start = "low"
 ) -> Array:
-    """Return what a unit weight in each cell adds to the output at each sample.
+    """Return the change of the output at each sample by a unit weight in each cell.
 
-    Parameters
-    ----------
-    x : ndarray, shape (T,)
-        Input from the start state on.
-    low, high : float
-        Range of the input.
-    levels : int
-        Levels of the grid.
-    depth : int
-        Extrema that are kept.
-    start : {"low", "virgin"}
-        State before the first sample.
-
-    Returns
-    -------
-    ndarray, shape (T, levels - 1, levels - 1)
-        The output of :class:`Preisach`, less that of its start, is the sum of this times its
-        weights: the share of the cell's relays that is up, counted from the start state.
+    It is the share of the cell's relays that is up, counted from the ``start`` state, shape
+    (T, levels - 1, levels - 1): the output of :class:`Preisach`, less that of its start, is its
+    sum with the weights. ``x`` is the input (T,) from the start state on.
     """
     blank = Preisach(low, high, np.zeros((levels, levels)), depth, start)  # type: ignore[arg-type]
     stack, sums, count = blank.initial_state((1,))

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pam_envs.hysteresis import MaxwellSlip, PlayOperator, Preisach
+from pam_envs.hysteresis import MaxwellSlip, PlayOperator, Preisach, symmetry_error
 from pam_envs.identification.hysteresis_loops import fit_maxwell_slip, fit_play
 from pam_envs.identification.preisach_forc import (
     congruency_error,
@@ -18,7 +18,6 @@ from pam_envs.identification.preisach_forc import (
     descending_curves,
     fit_preisach,
     preisach_from_curves,
-    symmetry_error,
 )
 from pam_envs.identification.relay_regressors import relay_regressors
 

@@ -10,7 +10,6 @@ import pytest
 from pam_envs.hysteresis.modified_maxwell_slip import ModifiedMaxwellSlip, even_model
 from pam_envs.identification.maxwell_slip_lp import (
     OpenParameters,
-    fit_preisach_loops,
     fit_slip_programme,
     printed_programme,
 )
@@ -149,13 +148,6 @@ def test_noisy_loops_give_a_valid_model_near_the_known_one():
     pressure, stiffness = loop(6)
     error = np.max(np.abs(found.model.simulate(pressure)[0] - stiffness))
     assert 1e-4 * FULL < error < 0.01 * FULL
-
-
-def test_preisach_fits_the_same_loops():
-    loops = [loop(10), loop(9), loop(4)]
-    found = fit_preisach_loops(loops)
-    assert found.rms < 5e-3 * FULL
-    assert found.rank < found.unknowns
 
 
 @pytest.mark.parametrize(
