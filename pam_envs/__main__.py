@@ -1,4 +1,4 @@
-"""The command line: ``pam-envs list``, ``render``, ``identify``, ``diagnose``."""
+"""Command line: ``pam-envs list``, ``render``, ``identify``, ``diagnose``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import itertools
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,7 +40,7 @@ class Render:
     """Film an environment under the inverse of its plant."""
 
     env: tyro.conf.Positional[str]
-    """Its id, with or without PAM/ and -v0."""
+    """Id, with or without PAM/ and -v0."""
     video: Path = Path("out.mp4")
     """Output file."""
     seconds: float = 10.0
@@ -90,7 +90,7 @@ class Diagnose:
 
 
 class Mistake(Exception):
-    """Something the user can mend; its text says how."""
+    """Mistake of the user, with its remedy."""
 
 
 def env_ids() -> list[str]:
@@ -99,7 +99,7 @@ def env_ids() -> list[str]:
 
 
 def env_id(given: str) -> str:
-    """Return the id that was meant, or say which are near."""
+    """Return the id of a name; Mistake with the nearest one if there is none."""
     known = env_ids()
     short = {name.removeprefix("PAM/").rsplit("-v", 1)[0].lower(): name for name in known}
     key = given.removeprefix("PAM/").rsplit("-v", 1)[0].lower()
@@ -112,7 +112,7 @@ def env_id(given: str) -> str:
     raise Mistake(f"no environment named {given!r}{hint} There are: {', '.join(known)}")
 
 
-def list_environments() -> None:
+def list_environments(options: List) -> None:
     """Print a table of the environments."""
     from rich.console import Console
     from rich.table import Table
@@ -131,7 +131,7 @@ def list_environments() -> None:
 
 
 def _names(signals: Signals) -> str:
-    """Return names and units, first and last of what each joint has, and how many are to come."""
+    """Return names and units, first and last of those of each joint, and the preview horizon."""
     coming, names = sum(s.ahead > 0.0 for s in signals), []
     now = [s for s in signals if s.ahead == 0.0]
     for _, alike in itertools.groupby(now, lambda s: (re.sub(r"\d+[ab]?", "#", s.name), s.unit)):
@@ -142,7 +142,7 @@ def _names(signals: Signals) -> str:
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Give a temporary name beside ``path`` and move it there when all went well."""
+    """Provide a temporary file beside ``path``, which replaces it on success."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
@@ -251,34 +251,28 @@ def _diagnose_readings(table: Any, options: Diagnose) -> None:
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line; return the exit code."""
     register_all()
+    commands = {
+        "list": List(),
+        "render": Render(env=tyro.MISSING),
+        "identify": Identify(),
+        "diagnose": Diagnose(recording=tyro.MISSING),
+    }
     chosen: Any = tyro.cli(
         tyro.extras.subcommand_type_from_defaults(
-            {
-                "list": List(),
-                "render": Render(env=tyro.MISSING),
-                "identify": Identify(),
-                "diagnose": Diagnose(recording=tyro.MISSING),
-            },
-            descriptions={
-                "list": List.__doc__ or "",
-                "render": Render.__doc__ or "",
-                "identify": Identify.__doc__ or "",
-                "diagnose": Diagnose.__doc__ or "",
-            },
+            commands, descriptions={name: one.__doc__ or "" for name, one in commands.items()}
         ),
         args=arguments,
         prog="pam-envs",
         description="Environments for the control of pneumatic artificial muscles.",
     )
+    actions: dict[type, Callable[[Any], None]] = {
+        List: list_environments,
+        Render: render,
+        Identify: identify,
+        Diagnose: diagnose,
+    }
     try:
-        if isinstance(chosen, List):
-            list_environments()
-        elif isinstance(chosen, Render):
-            render(chosen)
-        elif isinstance(chosen, Diagnose):
-            diagnose(chosen)
-        else:
-            identify(chosen)
+        actions[type(chosen)](chosen)
     except (Mistake, ValueError, OSError, ImportError) as error:
         print(f"pam-envs: {error}", file=sys.stderr)
         return 2

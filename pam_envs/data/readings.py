@@ -3,8 +3,8 @@
     load_kg,pressure_bar,direction,repeat,contraction_mm
     2.55,0.5,inflating,1,0.31
 
-The published table has stricter rules of its own (:mod:`pam_envs.data.tables`); here the repeats
-may go different ways, and a cycle may turn as often as it likes.
+The repeats may take different paths, and a cycle may reverse any number of times, unlike in the
+published table (:mod:`pam_envs.data.tables`).
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.data.recording.columns import Sheet, read_sheet, refuse, rows_text
-from pam_envs.data.rig_file import BAR, MM
-from pam_envs.data.tables import ContractionTable
+from pam_envs.data.tables import BAR, MM, ContractionTable, sorted_table
 
 Array = NDArray[np.float64]
 
@@ -45,25 +44,21 @@ def load_readings(path: str | Path) -> ContractionTable:
     Returns
     -------
     ContractionTable
-        In SI, sorted by load and repeat. Its ``cycle`` serves any table; ``cycles``, ``means`` and
-        ``branch`` only one where :func:`one_path` holds.
+        In SI, sorted by load and repeat; ``cycles``, ``means`` and ``branch`` need
+        :func:`one_path`.
 
     Raises
     ------
     RecordingError
-        With everything that is wrong, naming column, rows and remedy.
+        With all problems, naming column, rows and remedy.
     """
     sheet = read_sheet(path, READINGS, REQUIRED, "a table of readings")
     numbers = _numbers(sheet)
     inflating = _directions(sheet)
+    numbers["pressure_bar"] *= BAR
+    numbers["contraction_mm"] *= MM
+    table = sorted_table(numbers, inflating)
     order = np.lexsort((numbers["repeat"], numbers["load_kg"]))
-    table = ContractionTable(
-        load_kg=numbers["load_kg"][order],
-        inflating=inflating[order],
-        pressure_pa=BAR * numbers["pressure_bar"][order],
-        repeat=numbers["repeat"][order].astype(np.int64),
-        contraction_m=MM * numbers["contraction_mm"][order],
-    )
     _check_order(table, sheet.rows[order], sheet.where)
     return table
 

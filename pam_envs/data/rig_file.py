@@ -22,7 +22,7 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import yaml
 
@@ -35,8 +35,7 @@ BAR = 1e5
 MM = 1e-3
 
 
-@dataclasses.dataclass(frozen=True)
-class Bounds:
+class Bounds(NamedTuple):
     """Number of the file: its key, its unit in SI and its bounds."""
 
     key: str
@@ -54,24 +53,13 @@ NUMBERS = {
     "pressure_noise": Bounds("sensors.pressure_noise_bar", "bar", BAR, 1e-6, 1.0),
 }
 """Fields of :class:`Rig` that are numbers with a unit."""
-HISTORY = ("cycles_since_rest", "rezeroed")
 SECTIONS: dict[str, tuple[str, ...]] = {
     "muscle": ("rest_length_mm", "diameter_mm"),
     "regulator": ("max_pressure_bar",),
     "sensors": ("contraction_noise_mm", "pressure_noise_bar"),
-    "history": HISTORY,
+    "history": ("cycles_since_rest", "rezeroed"),
 }
-KEYS = (
-    "plant",
-    "muscle",
-    "regulator",
-    "load",
-    "sensors",
-    "history",
-    "repeats",
-    "valve_closed",
-    "tolerance",
-)
+KEYS = ("plant", *SECTIONS, "load", "repeats", "valve_closed", "tolerance")
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
@@ -155,30 +143,30 @@ class Rig:
             Naming the file, the key, its value and what to do.
         """
         where = f"rig file {path}"
-        data = _read(Path(path), where)
+        try:
+            data = yaml.load(Path(path).read_text(encoding="utf-8-sig"), Loader=_LOADER)
+        except OSError as error:
+            raise ValueError(f"{where} cannot be read: {error.strerror or error}") from error
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            raise ValueError(f"{where} is not YAML: {error}") from error
+        if not isinstance(data, Mapping):
+            raise ValueError(f"{where}: must hold a mapping with the keys {', '.join(KEYS)}")
         try:
             return cls(**_fields(data), source=str(path))
         except ValueError as error:
             raise ValueError(f"{where}: {error}") from None
 
 
-def _read(path: Path, where: str) -> Mapping[str, Any]:
-    try:
-        data = yaml.load(path.read_text(encoding="utf-8-sig"), Loader=_LOADER)
-    except OSError as error:
-        raise ValueError(f"{where} cannot be read: {error.strerror or error}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ValueError(f"{where} is not YAML: {error}") from error
-    if not isinstance(data, Mapping):
-        raise ValueError(f"{where}: must hold a mapping with the keys {', '.join(KEYS)}")
-    return data
-
-
 def _fields(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the arguments of :class:`Rig`, in SI."""
     _refuse_unknown(data, KEYS, "")
     sections = {name: _section(data.get(name), name, keys) for name, keys in SECTIONS.items()}
-    given: dict[str, Any] = {"plant": _word(data.get("plant"))}
+    plant = data.get("plant")
+    if not isinstance(plant, str) or not plant.strip():
+        raise ValueError(
+            f"plant is {plant!r}; name the plant's family, for example plant: single_muscle"
+        )
+    given: dict[str, Any] = {"plant": plant.strip()}
     for field, bounds in NUMBERS.items():
         section, _, key = bounds.key.partition(".")
         if sections[section].get(key) is not None:
@@ -210,14 +198,6 @@ def _section(value: Any, name: str, keys: tuple[str, ...]) -> Mapping[str, Any]:
         raise ValueError(f"{name} must be a mapping with the keys {', '.join(keys)}, got {value!r}")
     _refuse_unknown(value, keys, f"{name}.")
     return value
-
-
-def _word(value: Any) -> str:
-    if not isinstance(value, str) or not value.strip():
-        raise ValueError(
-            f"plant is {value!r}; name the plant's family, for example plant: single_muscle"
-        )
-    return value.strip()
 
 
 def _number(value: Any, key: str, unit: str) -> float:

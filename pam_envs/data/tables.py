@@ -2,8 +2,7 @@
 
 375 readings of a Festo MAS-10-N-100 (positioning2021, Tables 3 to 5): three hanging loads, five
 cycles each, one cycle 0 to 6 bar and back in steps of 0.5 bar, a minute of rest before each
-reading. A muscle remembers, so a reading means something only with those before it: the arrays
-keep the order in which a cycle was gone through.
+reading. Hysteresis makes a reading depend on those before it: the arrays keep their order.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Parser = Callable[[str], Any]
-"""Makes a value of a cell, or raises ``ValueError`` with a sentence on what is wrong with it."""
+"""Makes a value of a cell, or raises ``ValueError`` with a sentence."""
 N = TypeVar("N", int, float)
 
 BAR = 1e5
@@ -34,8 +33,8 @@ LOAD_TOLERANCE = 1e-6
 class ContractionTable:
     """Static contractions over pressure cycles under constant loads.
 
-    All arrays have one entry per reading, shape (n,), and are read-only. Readings stand load by
-    load, in a load repeat by repeat, in a repeat in the order of the cycle: pressure up, then down.
+    All arrays have one entry per reading, shape (n,), and are read-only, sorted by load and
+    repeat; a repeat is in the order of the cycle: pressure up, then down.
 
     Attributes
     ----------
@@ -73,26 +72,10 @@ class ContractionTable:
         return tuple(int(number) for number in np.unique(self.repeat[self._at(load)]))
 
     def cycle(self, load: float, repeat: int) -> tuple[Array, Array]:
-        """Return one cycle in the order it was gone through.
+        """Return the pressures [Pa] and contractions [m] of one cycle, shape (m,), in their order.
 
-        Parameters
-        ----------
-        load : float
-            One of :attr:`loads` [kg].
-        repeat : int
-            One of ``repeats(load)``.
-
-        Returns
-        -------
-        pressure : ndarray, shape (25,)
-            [Pa], 0 to 6 bar and back to 0 in the published tables.
-        contraction : ndarray, shape (25,)
-            [m].
-
-        Raises
-        ------
-        ValueError
-            If there is no such load or repeat.
+        In the published tables m is 25: 0 to 6 bar and back to 0. Raises ValueError if there is no
+        such load [kg] or repeat.
         """
         rows = self._at(load) & (self.repeat == repeat)
         if not rows.any():
@@ -102,56 +85,20 @@ class ContractionTable:
         return self.pressure_pa[rows], self.contraction_m[rows]
 
     def cycles(self, load: float) -> tuple[Array, Array]:
-        """Return all cycles at a load.
-
-        Parameters
-        ----------
-        load : float
-            One of :attr:`loads` [kg].
-
-        Returns
-        -------
-        pressure : ndarray, shape (25,)
-            Path [Pa], the same for all cycles.
-        contraction : ndarray, shape (25, n_repeats)
-            [m].
-        """
+        """Return the path [Pa], shape (m,), and all contractions [m] at a load, (m, n_repeats)."""
         cycles = [self.cycle(load, repeat) for repeat in self.repeats(load)]
         return cycles[0][0], np.column_stack([contraction for _, contraction in cycles])
 
     def means(self, load: float) -> tuple[Array, Array]:
-        """Return the pressure path [Pa] and the contraction [m] averaged over the repeats.
-
-        Parameters
-        ----------
-        load : float
-            One of :attr:`loads` [kg].
-
-        Returns
-        -------
-        pressure, contraction : ndarray, shape (25,)
-            In path order.
-        """
+        """Return the path [Pa] and the contraction [m] averaged over the repeats, shape (m,)."""
         pressure, contraction = self.cycles(load)
         return pressure, contraction.mean(axis=1)
 
     def branch(self, load: float, inflating: bool) -> tuple[Array, Array]:
-        """Return one branch of the loop, both its ends included.
+        """Return one branch of the loop at a load, both its ends included.
 
-        Parameters
-        ----------
-        load : float
-            One of :attr:`loads` [kg].
-        inflating : bool
-            True for the pressures up to the turning point, False for those from it: the turning
-            point is in both.
-
-        Returns
-        -------
-        pressure : ndarray, shape (13,)
-            [Pa], in path order: rising when inflating, falling otherwise.
-        contraction : ndarray, shape (13, n_repeats)
-            [m].
+        The pressures [Pa] up to the turning point (``inflating``), or from it, in path order, and
+        the contractions [m], shape (b, n_repeats).
         """
         pressure, contraction = self.cycles(load)
         top = int(np.argmax(pressure))
@@ -159,23 +106,14 @@ class ContractionTable:
         return pressure[part], contraction[part]
 
     def without_repeat(self, repeat: int) -> ContractionTable:
-        """Return the table less one repeat of every load, for judging a fit on that repeat.
-
-        Raises
-        ------
-        ValueError
-            If there is no such repeat, or no other.
-        """
+        """Return the table without one repeat of every load; ValueError without it or others."""
         kept = self.repeat != repeat
         if kept.all() or not kept.any():
             raise ValueError(
                 f"leaving out repeat {repeat!r} leaves {int(kept.sum())} of {kept.size} readings; "
                 f"choose one of several repeats, here {sorted(set(self.repeat.tolist()))}"
             )
-        columns = {
-            field.name: getattr(self, field.name)[kept] for field in dataclasses.fields(self)
-        }
-        return ContractionTable(**columns)
+        return ContractionTable(**{name: values[kept] for name, values in vars(self).items()})
 
     def _at(self, load: float) -> NDArray[np.bool_]:
         rows: NDArray[np.bool_] = np.abs(self.load_kg - load) < LOAD_TOLERANCE
@@ -186,15 +124,7 @@ class ContractionTable:
 
 
 def number(low: float, high: float, unit: float = 1.0) -> Parser:
-    """Return a parser of numbers within [low, high], both in the file's unit.
-
-    Parameters
-    ----------
-    low, high : float
-        Bounds of what the cell holds.
-    unit : float
-        The file's unit in SI, for example 1e5 for bar.
-    """
+    """Return a parser of numbers within [low, high], in the file's ``unit`` (1e5 Pa for bar)."""
     return lambda cell: unit * _within(_converted(cell, float, "a number"), low, high)
 
 
@@ -204,7 +134,7 @@ def whole_number(low: int, high: int) -> Parser:
 
 
 def one_of(*choices: str) -> Parser:
-    """Return a parser that lets only these words through."""
+    """Return a parser of one of these words."""
 
     def parse(cell: str) -> str:
         if cell not in choices:
@@ -226,20 +156,10 @@ COLUMNS: dict[str, Parser] = {
 
 
 def read_columns(source: Path | Traversable, columns: Mapping[str, Parser]) -> dict[str, list[Any]]:
-    """Read a CSV file whose every cell is checked.
+    """Read a CSV file whose every cell is checked, in the file's order.
 
-    Parameters
-    ----------
-    source : Path or Traversable
-        A file whose first row holds exactly the names of ``columns``, in their order.
-    columns : mapping of str to callable
-        What makes a value of each column's cells, see :func:`number`, :func:`whole_number` and
-        :func:`one_of`; it raises ``ValueError`` for a bad cell.
-
-    Returns
-    -------
-    dict of str to list
-        The values of each column, in the file's order.
+    The first row holds exactly the names of ``columns``, in their order; their parsers make the
+    values, see :func:`number`, :func:`whole_number` and :func:`one_of`.
 
     Raises
     ------
@@ -257,8 +177,7 @@ def read_columns(source: Path | Traversable, columns: Mapping[str, Parser]) -> d
     values: dict[str, list[Any]] = {name: [] for name in columns}
     for row, cells in enumerate(rows, 2):
         if cells:
-            for name, value in _values(cells, columns, f"{source}, row {row}").items():
-                values[name].append(value)
+            _add(values, cells, columns, f"{source}, row {row}")
     if not values[header[0]]:
         raise ValueError(f"{source} holds no readings; give at least one row below the header")
     return values
@@ -271,12 +190,8 @@ def load_contraction_table(path: str | Path | None = None) -> ContractionTable:
     ----------
     path : str or Path, optional
         A CSV file with the columns ``load_kg, direction, pressure_bar, repeat, contraction_mm``,
-        each cycle's rows in the order of its readings. Default: the published 375 readings.
-
-    Returns
-    -------
-    ContractionTable
-        In SI, whatever order the file's cycles are mixed in.
+        each cycle's rows in the order of its readings; cycles may be mixed. Default: the published
+        375 readings.
 
     Raises
     ------
@@ -285,22 +200,23 @@ def load_contraction_table(path: str | Path | None = None) -> ContractionTable:
         pressures do not rise and then fall, or differ from those of the load's other cycles.
     """
     source = resources.files(__package__) / "mas10_contraction.csv" if path is None else Path(path)
-    table = _in_cycle_order(read_columns(source, COLUMNS))
+    columns = {name: np.array(values) for name, values in read_columns(source, COLUMNS).items()}
+    table = sorted_table(columns, columns["direction"] == "inflation")
     _check_cycles(table, str(source))
     return table
 
 
-def _values(cells: list[str], columns: Mapping[str, Parser], where: str) -> dict[str, Any]:
-    """Return the values of one row by column."""
+def _add(
+    values: dict[str, list[Any]], cells: list[str], columns: Mapping[str, Parser], where: str
+) -> None:
+    """Add the values of one row to the columns."""
     if len(cells) != len(columns):
         raise ValueError(f"{where}: {len(columns)} cells are needed, got {len(cells)}: {cells!r}")
-    values = {}
     for (name, parse), cell in zip(columns.items(), cells, strict=True):
         try:
-            values[name] = parse(cell.strip())
+            values[name].append(parse(cell.strip()))
         except ValueError as error:
             raise ValueError(f"{where}, column {name}: {error}") from None
-    return values
 
 
 def _converted(cell: str, kind: Callable[[str], N], allowed: str) -> N:
@@ -316,15 +232,15 @@ def _within(value: N, low: float, high: float) -> N:
     return value
 
 
-def _in_cycle_order(columns: dict[str, list[Any]]) -> ContractionTable:
-    """Return the readings sorted by load and repeat; within a cycle the file's order stays."""
+def sorted_table(columns: Mapping[str, Array], inflating: NDArray[np.bool_]) -> ContractionTable:
+    """Return readings in SI sorted by load and repeat; within a cycle the given order stays."""
     order = np.lexsort((columns["repeat"], columns["load_kg"]))
     return ContractionTable(
-        load_kg=np.array(columns["load_kg"], dtype=np.float64)[order],
-        inflating=np.array(columns["direction"])[order] == "inflation",
-        pressure_pa=np.array(columns["pressure_bar"], dtype=np.float64)[order],
-        repeat=np.array(columns["repeat"], dtype=np.int64)[order],
-        contraction_m=np.array(columns["contraction_mm"], dtype=np.float64)[order],
+        load_kg=np.asarray(columns["load_kg"], np.float64)[order],
+        inflating=inflating[order],
+        pressure_pa=np.asarray(columns["pressure_bar"], np.float64)[order],
+        repeat=np.asarray(columns["repeat"], np.int64)[order],
+        contraction_m=np.asarray(columns["contraction_mm"], np.float64)[order],
     )
 
 
@@ -336,20 +252,15 @@ def _check_cycles(table: ContractionTable, name: str) -> None:
             rows = table._at(load) & (table.repeat == repeat)
             pressure, inflating = table.pressure_pa[rows], table.inflating[rows]
             where = f"{name}: load {load:g} kg, repeat {repeat}"
-            _check_path(pressure, inflating, where)
+            ways = np.where(inflating[1:], np.diff(pressure) > 0.0, np.diff(pressure) < 0.0)
+            if not inflating[0] or not ways.all() or np.any(np.diff(inflating.astype(int)) > 0):
+                raise ValueError(
+                    f"{where}: the pressures must rise along the inflation rows and then fall "
+                    "along the deflation rows; put the rows in the order of the readings, each "
+                    "pressure once a way"
+                )
             if not np.array_equal(pressure, path):
                 raise ValueError(
                     f"{where}: its pressures differ from those of the load's first repeat; "
                     "measure every repeat at the same pressures, in the same order"
                 )
-
-
-def _check_path(pressure: Array, inflating: NDArray[np.bool_], where: str) -> None:
-    rises = np.diff(pressure) > 0.0
-    falls = np.diff(pressure) < 0.0
-    good = inflating[0] and np.all(np.where(inflating[1:], rises, falls))
-    if not good or np.any(np.diff(inflating.astype(int)) > 0):
-        raise ValueError(
-            f"{where}: the pressures must rise along the inflation rows and then fall along the "
-            "deflation rows; put the rows in the order of the readings, each pressure once a way"
-        )

@@ -30,16 +30,10 @@ ON_GRID = 0.1
 
 @dataclasses.dataclass(frozen=True)
 class Clock:
-    """Timing that the column of time declares.
+    """Mean period [s] of the samples.
 
-    Attributes
-    ----------
-    period : float
-        Mean time from sample to sample [s].
-    restart : ndarray of bool, shape (n,)
-        Rows at which the muscle starts anew from rest.
-    gap : ndarray of bool, shape (n,)
-        Rows after which nothing was recorded for a while, the command held.
+    ``restart`` marks rows, shape (n,), at which the muscle starts anew from rest, ``gap`` those
+    after which nothing was recorded for a while, with the command held.
     """
 
     period: float
@@ -50,27 +44,10 @@ class Clock:
 def read_clock(
     time: Array, command: Array, segment: Indices, segments: Sequence[str], rows: Indices
 ) -> tuple[Clock | None, list[str]]:
-    """Check the time of a recording.
+    """Check time [s] and command [Pa] of a recording; return its clock, or None and the problems.
 
-    Parameters
-    ----------
-    time : ndarray, shape (n,)
-        [s].
-    command : ndarray, shape (n,)
-        [Pa].
-    segment : ndarray of int, shape (n,)
-        Index into ``segments``.
-    segments : sequence of str
-        Labels.
-    rows : ndarray of int, shape (n,)
-        Rows in the file, for messages.
-
-    Returns
-    -------
-    clock : Clock or None
-        None where there are problems.
-    problems : list of str
-        What is wrong, with rows and remedy.
+    All arrays have the shape (n,): ``segment`` is an index into the labels ``segments``, ``rows``
+    are those of the file. A problem is a sentence with rows and remedy.
     """
     step = np.diff(time)
     new = np.diff(segment) != 0
@@ -89,7 +66,7 @@ def read_clock(
 
 
 def _period(time: Array, inside: Array, restart: Flags) -> float:
-    """Return the mean step: the slope of time over the count of steps, with those that were lost.
+    """Return the mean step: the slope of time over the count of steps, lost ones included.
 
     The median alone would be 17 ms for samples at 60 Hz whose times are rounded to milliseconds.
     """
@@ -181,25 +158,12 @@ def _gaps(
 
 @dataclasses.dataclass(frozen=True)
 class Grid:
-    """Even steps, and which rows each is made of.
+    """Even steps of time [s], shape (m,), and the rows that each is made of.
 
-    Attributes
-    ----------
-    time : ndarray, shape (m,)
-        [s].
-    held : ndarray of int, shape (m,)
-        Row whose command (and label, and load) is in force.
-    left, right : ndarray of int, shape (m,)
-        Rows on both sides.
-    share : ndarray, shape (m,)
-        Weight of the right one.
-    restart : ndarray of bool, shape (m,)
-    filled : ndarray of bool, shape (m,)
-        Steps inside a gap.
-    missing : ndarray of int
-        Rows after which single samples were missing.
-    moved : bool
-        Whether samples were off the steps, so that values had to be interpolated.
+    ``held`` is the row whose command, label and load is in force, ``left`` and ``right`` are those
+    on both sides and ``share`` is the weight of the right one. ``filled`` are steps inside a gap,
+    ``missing`` rows after which single samples were missing; values were interpolated if samples
+    ``moved``.
     """
 
     time: Array
@@ -222,8 +186,8 @@ def make_grid(time: Array, clock: Clock) -> Grid:
     """Put the rows of a recording on even steps.
 
     A run (from one start at rest to the next) whose samples all lie near even steps keeps its
-    values as they are; else measured values are interpolated. A held value changes at the step
-    that is nearest, so that on average it is neither early nor late.
+    values; otherwise measured values are interpolated. A held value changes at the nearest step, so
+    that on average it is neither early nor late.
     """
     starts = np.flatnonzero(clock.restart).tolist()
     ends = [*starts[1:], len(time)]
@@ -266,15 +230,9 @@ def block_size(period: float) -> int:
 
 
 def block_means(values: Array, starts: Indices, size: int) -> Array:
-    """Return means over blocks centred on every ``size``-th sample of each run.
+    """Return means of values (n,) over blocks centred on every ``size``-th sample of each run.
 
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-    starts : ndarray of int
-        First sample of each run.
-    size : int
-        Samples from one block to the next.
+    ``starts`` are the first samples of the runs.
     """
     weights = np.ones(size) if size % 2 else np.r_[0.5, np.ones(size - 1), 0.5]
     pieces = []

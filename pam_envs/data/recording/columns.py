@@ -41,13 +41,7 @@ CONVERSIONS = {
 
 
 class RecordingError(ValueError):
-    """A file of measurements that cannot be used.
-
-    Attributes
-    ----------
-    problems : tuple of str
-        Each complaint, a sentence with rows and remedy.
-    """
+    """A file of measurements that cannot be used; each of ``problems`` has rows and remedy."""
 
     def __init__(self, where: str, problems: Iterable[str]) -> None:
         self.where = where
@@ -67,13 +61,7 @@ def refuse(where: str, *problems: str) -> NoReturn:
 
 
 def rows_text(rows: Iterable[int]) -> str:
-    """Return "row 4", or "rows 4, 5 and 9", or the first of many with their number.
-
-    Parameters
-    ----------
-    rows : iterable of int
-        Rows of a file; the header is row 1.
-    """
+    """Return "row 4", "rows 4, 5 and 9", or the first of many with their number."""
     numbers = [int(row) for row in rows]
     if len(numbers) == 1:
         return f"row {numbers[0]}"
@@ -89,16 +77,9 @@ def span_text(first: int, last: int) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class Sheet:
-    """The cells of a file.
+    """Cells of a file by column, without surrounding spaces; blank rows are left out.
 
-    Attributes
-    ----------
-    where : str
-        The file, for messages.
-    cells : mapping of str to list of str
-        By column, without the spaces around.
-    rows : ndarray of int
-        Row in the file of each line of cells; the header is row 1, and blank rows are left out.
+    ``where`` is the file, for messages, and ``rows`` are those of the cells; the header is row 1.
     """
 
     where: str
@@ -114,16 +95,9 @@ class Sheet:
         return cells
 
     def numbers(self, column: str) -> tuple[Array, NDArray[np.bool_], list[str]]:
-        """Return a column of numbers.
+        """Return a column in the file's unit, its empty cells, and the problems with others.
 
-        Returns
-        -------
-        values : ndarray, shape (n,)
-            In the file's unit, NaN where the cell is empty or wrong.
-        empty : ndarray of bool, shape (n,)
-            Where a cell is empty.
-        problems : list of str
-            What is wrong with the others.
+        Empty and wrong cells are NaN.
         """
         cells = self.cells[column]
         empty = np.array([not cell for cell in cells], dtype=bool)
@@ -136,49 +110,28 @@ class Sheet:
         wrong = ~np.isfinite(values) & ~empty
         wrong[words] = True
         values[wrong] = np.nan
-        return values, empty, self._complaints(column, wrong)
-
-    def _complaints(self, column: str, wrong: NDArray[np.bool_]) -> list[str]:
         at = np.flatnonzero(wrong)
         if not len(at):
-            return []
-        first = self.cells[column][at[0]]
+            return values, empty, []
+        first = cells[at[0]]
         hint = "write decimals with a point" if "," in first else "correct the cells"
-        return [
-            f"column {column} holds no number in {rows_text(self.rows[at])} "
-            f"(the first is {first!r}); {hint}"
-        ]
+        problem = f"column {column} holds no number in {rows_text(self.rows[at])}"
+        return values, empty, [f"{problem} (the first is {first!r}); {hint}"]
 
 
 def read_header(path: str | Path) -> tuple[str, ...]:
-    """Return the names of a file's columns.
-
-    Raises
-    ------
-    RecordingError
-        If the file cannot be read or holds nothing.
-    """
+    """Return the names of a file's columns; RecordingError if it cannot be read or is empty."""
     where = str(path)
     lines = _lines(Path(path), where)
     return tuple(cell.strip() for cell in next(csv.reader(lines[:1]), []))
 
 
 def read_sheet(path: str | Path, known: Sequence[str], required: Sequence[str], what: str) -> Sheet:
-    """Read a CSV file with some of the columns that are known, in any order.
+    """Read a CSV file with some of the ``known`` columns, in any order, and all ``required`` ones.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-    known, required : sequence of str
-        Names of columns, each ending in its unit if it has one.
-    what : str
-        What the file holds, for messages: "a recording".
-
-    Raises
-    ------
-    RecordingError
-        For columns that are unknown, doubled or missing, and rows of the wrong length.
+    Names end in their unit if there is one; ``what`` describes the file in messages ("a
+    recording"). Raises RecordingError for unknown, doubled or missing columns, and rows of the
+    wrong length.
     """
     where = str(path)
     lines = _lines(Path(path), where)
@@ -217,7 +170,7 @@ def _sheet(lines: list[str], header: tuple[str, ...], where: str) -> Sheet:
 
 
 def column_hint(name: str, known: Iterable[str]) -> str:
-    """Return how a column that is not known should be called, and in which unit it should be."""
+    """Return the likely name and unit of an unknown column."""
     columns = list(known)
     if not name:
         return f"; name it or take it out, known: {', '.join(columns)}"

@@ -92,7 +92,7 @@ class Recording:
     segments : tuple of str
         Labels, one experiment each, in the order of the recording.
     command : ndarray
-        Set-point of the pressure [Pa], in force from ``time[k]`` to ``time[k + 1]``.
+        Setpoint of the pressure [Pa], in force from ``time[k]`` to ``time[k + 1]``.
     pressure, contraction : ndarray or None
         Measured gauge pressure [Pa] and contraction [m].
     load : ndarray
@@ -111,12 +111,11 @@ class Recording:
     digest : str
         Hash of the contents.
     filled : ndarray of bool
-        Where nothing was recorded, between two segments under one command: the measured values
-        are interpolated there and say nothing.
+        Interpolated samples, where nothing was recorded between two segments under one command.
     row : ndarray of int
         Row of the file that a sample comes from (the header is row 1), for messages.
     notes : tuple of str
-        What had to be mended while reading.
+        Repairs made while reading.
     raw : Recording or None
         Before the averaging of a recording faster than 100 Hz.
     """
@@ -235,12 +234,12 @@ def load_recording(path: str | Path, rig: Rig | None = None) -> Recording:
     path : str or Path
         Columns as in ``docs/recording.md``, in any order.
     rig : Rig, optional
-        Says during which segments the valve is shut; the segments that it names must be there.
+        Names the segments with the valve shut, which must exist.
 
     Raises
     ------
     RecordingError
-        With everything that is wrong, naming column, rows and remedy.
+        With all problems, naming column, rows and remedy.
     """
     sheet = read_sheet(path, COLUMNS, REQUIRED, "a recording")
     _need_output(sheet)
@@ -258,7 +257,7 @@ def load_recording(path: str | Path, rig: Rig | None = None) -> Recording:
 
 
 def read_input(path: str | Path, rig: Rig | None = None) -> Recording | ContractionTable:
-    """Read a recording, or a table of settled readings, whichever its columns say it is."""
+    """Read a recording or a table of settled readings, according to its columns."""
     header = set(read_header(path))
     if header & set(READINGS) and not header & (set(COLUMNS) - set(READINGS)):
         return load_readings(path)
@@ -275,7 +274,7 @@ def _need_output(sheet: Sheet) -> None:
 
 
 def _columns(sheet: Sheet) -> tuple[dict[str, Array], list[str]]:
-    """Return the columns that are numbers, by field and in SI, and what was mended."""
+    """Return the columns that are numbers, by field and in SI, and the repairs."""
     columns, notes, problems = {}, [], []
     for name in [name for name in FIELDS if name in sheet.cells]:
         values, empty, wrong = sheet.numbers(name)

@@ -20,7 +20,7 @@ Indices = NDArray[np.int64]
 
 
 def check_rig(recording: Recording, rig: Rig) -> list[str]:
-    """Return what a rig says of segments that the recording does not bear out."""
+    """Return declared properties of segments that contradict the recording, as sentences."""
     named = [label for group in rig.repeats for label in group]
     lost = [label for label in (*named, *rig.valve_closed) if label not in recording.segments]
     if lost:
@@ -42,13 +42,9 @@ def check_rig(recording: Recording, rig: Rig) -> list[str]:
 
 
 def repeat_rows(recording: Recording, rig: Rig) -> list[list[Indices]]:
-    """Return the samples of the segments that repeat one another, cut to equal length.
+    """Return the samples of each group's segments, cut to equal length.
 
-    Returns
-    -------
-    list of list of ndarray
-        Group by group, segment by segment; in a group sample i of one was taken under the same
-        command as sample i of the others.
+    Sample i of a segment was taken under the same command as sample i of the others.
     """
     groups = []
     for group in rig.repeats:
