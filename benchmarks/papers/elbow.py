@@ -10,14 +10,16 @@ for comparison only. Hysteresis and sign change are inputs and therefore not jud
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from benchmarks.papers.published import BEFORE, UNKNOWN, Figure, Group, note
-
-Array = NDArray[np.float64]
+from benchmarks.papers.published import BEFORE, Figure, Group, note
+from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
+from pam_envs.muscle.quadratic_bundle import QuadraticBundle
+from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
+from pam_envs.pneumatics.on_off_pair import OnOffValve, filled
 
 SOURCE = "chakarov2018"
 FULL = 6e5
@@ -47,54 +49,35 @@ FIG_2 = {8.0: 66.7, 13.0: 47.3, 19.0: 26.4, 24.0: 11.0, 28.0: 0.0, 32.0: -9.9}
 """Contraction [%] of one muscle: force [N] at 500 kPa."""
 
 
-def expected(
-    name: str, where: str, unit: str, value: float, ours: float, tolerance: float, text: str
-) -> Figure:
-    """Return a figure that follows from the paper's equations and is not printed."""
-    return Figure(name, where, unit, UNKNOWN, ours, tolerance, text, expected=value)
-
-
-def bounded(name: str, where: str, unit: str, ours: float, text: str, **bounds: Any) -> Figure:
-    """Return a figure that is judged by ``at_least`` and ``at_most``, or reported."""
-    return Figure(name, where, unit, UNKNOWN, ours, None, text, **bounds)
-
-
-def orthosis(share: float = 0.28, **changes: Any) -> Any:
+def orthosis(share: float = 0.28) -> ElbowOrthosis:
     """Return the orthosis without hysteresis whose force ends at a share of the nominal length."""
-    from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
-
     ends: dict[str, Any] = {f"bundle_{b}__largest_contraction": share for b in "ab"}
-    return ElbowOrthosis.paper("none", **ends, **changes)
+    return ElbowOrthosis.paper("none", **ends)
 
 
-def bundle(muscles: int, share: float = 0.28) -> Any:
+def bundle(muscles: int, share: float = 0.28) -> QuadraticBundle:
     """Return one bundle."""
-    from pam_envs.muscle.quadratic_bundle import QuadraticBundle
-
     return QuadraticBundle(muscles=muscles, largest_contraction=share)
 
 
-def printed_bundle(muscles: int) -> Any:
+def printed_bundle(muscles: int) -> QuadraticBundle:
     """Return a bundle with the ``k1`` of Eq. (6) as printed, which no plant takes."""
     return dataclasses.replace(bundle(muscles, 0.33), pressure_base=-0.021)
 
 
-def stroke() -> list[Figure]:
+def stroke() -> Iterator[Figure]:
     """Stroke of the pulley, in length and as a share of the muscles."""
-    plant = orthosis()
-    where, length = f"{SOURCE}, section 3", plant.pulley.stroke
+    plant, where = orthosis(), f"{SOURCE}, section 3"
+    length = plant.pulley.stroke
     share = 100.0 * length / plant.bundle_a.nominal_length
-    return [
-        Figure("sum of the contractions", where, "m", 0.066, length, 5e-5, note("predicted")),
-        Figure("the same over the length", where, "%", 16.9, share, 0.05, note("predicted")),
-    ]
+    yield Figure("sum of the contractions", length, "m", where, 0.066, 5e-5, "predicted")
+    yield Figure("the same over the length", share, "%", where, 16.9, 0.05, "predicted")
 
 
-def torque_table() -> list[Figure]:
+def torque_table() -> Iterator[Figure]:
     """Torque and stiffness at the corners of the pressures, and where full pressures balance."""
     plant, q = orthosis(), np.radians(DEGREES)
     where, tag = f"{SOURCE}, section 3", note("predicted", "k1 read as -0.21 + 4.41 mus", BEFORE)
-    lines = list[Figure]()
     for name, unit, table, law, tolerance in (
         ("torque", "N m", TORQUES, plant.torque, 0.02),
         ("stiffness", "N m/rad", STIFFNESSES, plant.stiffness, 5e-3),
@@ -102,17 +85,20 @@ def torque_table() -> list[Figure]:
         for pressures, values in table.items():
             label = "/".join(f"{1e-3 * p:g}" for p in pressures)
             for degrees, value, ours in zip(DEGREES, values, law(q, *pressures), strict=True):
-                full_name = f"{name} at {label} kPa and {degrees:g} degrees"
-                lines.append(expected(full_name, where, unit, value, float(ours), tolerance, tag))
+                title = f"{name} at {label} kPa and {degrees:g} degrees"
+                more: dict[str, Any] = {"tolerance": tolerance, "note": tag, "expected": value}
+                yield Figure(title, float(ours), unit, where, **more)
+    title = "angle at which 600/600 kPa balance"
+    yield Figure(title, balance(plant), "degrees", where, note=tag, expected=107.0, tolerance=0.5)
+
+
+def balance(plant: ElbowOrthosis) -> float:
+    """Return the angle [degrees] at which full pressure in both bundles gives no torque."""
     fine = np.radians(np.linspace(90.0, 120.0, 3001))
-    zero = np.degrees(fine[np.argmin(np.abs(plant.torque(fine, FULL, FULL)))])
-    lines.append(
-        expected("angle at which 600/600 kPa balance", where, "degrees", 107.0, zero, 0.5, tag)
-    )
-    return lines
+    return float(np.degrees(fine[np.argmin(np.abs(plant.torque(fine, FULL, FULL)))]))
 
 
-def exactness() -> list[Figure]:
+def exactness() -> Iterator[Figure]:
     """Stiffness against finite differences, sign of the determinant, round trip of allocation."""
     plant, h, q = orthosis(), 1e-4, np.radians(np.linspace(0.0, 120.0, 121))
     where, tag = f"{SOURCE}, Eqs. (13) to (23)", note("predicted", "on the law that is not clipped")
@@ -124,32 +110,31 @@ def exactness() -> list[Figure]:
     drawn = np.random.default_rng(0).uniform(0.0, FULL, (2, len(q)))
     made = plant.allocate(q, plant.torque(q, *drawn), plant.stiffness(q, *drawn))
     trip = float(np.abs(np.array(made) - drawn).max()) / FULL
-    return [
-        bounded("stiffness less finite difference", where, "N m/rad", worst, tag, at_most=1e-6),
-        bounded("angles with a positive determinant", where, "%", positive, tag, at_least=100.0),
-        bounded("round trip of the pressures", where, "of full", trip, tag, at_most=1e-9),
-    ]
+    title = "stiffness less finite difference"
+    yield Figure(title, worst, "N m/rad", where, note=tag, at_most=1e-6)
+    title = "angles with a positive determinant"
+    yield Figure(title, positive, "%", where, note=tag, at_least=100.0)
+    yield Figure("round trip of the pressures", trip, "of full", where, note=tag, at_most=1e-9)
 
 
-def feasible_set() -> list[Figure]:
+def feasible_set() -> Iterator[Figure]:
     """Stiffness range without torque and area of the feasible set, with C_max = 0.33 and 0.28."""
-    wide, where, lines = orthosis(0.33), f"{SOURCE}, section 3", list[Figure]()
+    wide, where = orthosis(0.33), f"{SOURCE}, section 3"
     tag = note("predicted", "C_max = 0.33 L_n", BEFORE)
     for degrees, values in RANGES.items():
         ours = stiffness_range(wide, np.radians(degrees))
         for name, (value, rounded), made in zip(("softest", "stiffest"), values, ours, strict=True):
-            full_name = f"{name} without torque at {degrees:g} degrees"
-            bounds = {"at_least": value - rounded, "at_most": value + rounded}
-            lines.append(bounded(full_name, where, "N m/rad", made, tag, **bounds))
-    for share, bounds in ((0.33, {"at_least": 136.5, "at_most": 139.5}), (0.28, {})):
-        text = note("predicted", f"C_max = {share:g} L_n, at 60 degrees", BEFORE)
+            title = f"{name} without torque at {degrees:g} degrees"
+            ends: dict[str, Any] = {"at_least": value - rounded, "at_most": value + rounded}
+            yield Figure(title, made, "N m/rad", where, note=tag, **ends)
+    for share, least, most in ((0.33, 136.5, 139.5), (0.28, None, None)):
+        tag = note("predicted", f"C_max = {share:g} L_n, at 60 degrees", BEFORE)
         area = feasible_area(orthosis(share), np.radians(60.0))
-        full_name = "area of torque and stiffness within reach"
-        lines.append(bounded(full_name, where, "N2 m2/rad", area, text, **bounds))
-    return lines
+        title = "area of torque and stiffness within reach"
+        yield Figure(title, area, "N2 m2/rad", where, note=tag, at_least=least, at_most=most)
 
 
-def stiffness_range(plant: Any, angle: float) -> tuple[float, float]:
+def stiffness_range(plant: ElbowOrthosis, angle: float) -> tuple[float, float]:
     """Return the least and the largest stiffness [N m/rad] without torque at an angle [rad]."""
     shape_a, shape_b, slope_a, slope_b = plant.geometry(angle)
     (low_a, low_b), (high_a, high_b) = plant.coefficients(0.0, 0.0), plant.coefficients(FULL, FULL)
@@ -158,65 +143,58 @@ def stiffness_range(plant: Any, angle: float) -> tuple[float, float]:
     return float(per * ends[0]), float(per * ends[1])
 
 
-def feasible_area(plant: Any, angle: float) -> float:
+def feasible_area(plant: ElbowOrthosis, angle: float) -> float:
     """Return the area [N2 m2/rad] of the parallelogram of the four corners at an angle [rad]."""
     torque, stiffness = plant.corners(angle)
     side, up = torque - torque[0], stiffness - stiffness[0]
     return float(side[3] * up[1] - side[1] * up[3])
 
 
-def force_law() -> list[Figure]:
+def force_law() -> Iterator[Figure]:
     """Force of bundles with k1 as printed and as read, and where filling changes its sign."""
-    where, lines = f"{SOURCE}, Eq. (6)", list[Figure]()
-    for name, table, make in (
+    where = f"{SOURCE}, Eq. (6)"
+    for reading, table, make in (
         ("as printed", PRINTED, printed_bundle),
         ("as read", READ, lambda n: bundle(n, 0.33)),
     ):
-        tag = note("predicted", f"k1 {name}, C_max = 0.33 L_n, law not clipped", BEFORE)
+        tag = note("predicted", f"k1 {reading}, C_max = 0.33 L_n, law not clipped", BEFORE)
         for n, value in table.items():
+            name = f"force of {n} at 400 kPa and nominal length, k1 {reading}"
             ours = float(make(n).law(4e5, 0.0))
-            full_name = f"force of {n} at 400 kPa and nominal length, k1 {name}"
-            lines.append(expected(full_name, where, "N", value, ours, 0.5, tag))
-    one, where = bundle(1), f"{SOURCE}, Fig. 2"
+            yield Figure(name, ours, "N", where, note=tag, expected=value, tolerance=0.5)
+    one, drawn = bundle(1), f"{SOURCE}, Fig. 2"
     tag = note("predicted", "C_max = 0.28 L_n, law not clipped", BEFORE)
     for share, value in FIG_2.items():
+        name = f"force of one muscle at 500 kPa and {share:g} %"
         ours = float(one.law(5e5, 0.01 * share * one.nominal_length))
-        full_name = f"force of one muscle at 500 kPa and {share:g} %"
-        lines.append(expected(full_name, where, "N", value, ours, 0.05, tag))
-    text = note("an input (C_max)", "where filling to 500 kPa leaves the force as it is")
-    return [*lines, Figure("contraction of the sign change", where, "%", 28.0,
-                           100.0 * sign_change(one), None, text), *_ideal(one)]  # fmt: skip
+        yield Figure(name, ours, "N", drawn, note=tag, expected=value, tolerance=0.05)
+    tag = note("an input (C_max)", "where filling to 500 kPa leaves the force as it is")
+    name, change = "contraction of the sign change", 100.0 * sign_change(one)
+    yield Figure(name, change, "%", drawn, 28.0, note=tag)
+    cosine = np.sqrt(1.0 / 3.0) / (1.0 - one.largest_contraction)
+    area = 0.25 * np.pi * one.diameter**2 * (3.0 * cosine**2 - 1.0)
+    ideal = 1e3 * area / (one.nominal_length * one.reach)
+    tag = note("predicted", "braid whose force ends at 28 %, against 4.41 of Eq. (6)", BEFORE)
+    more: dict[str, Any] = {"note": tag, "expected": 4.39, "tolerance": 5e-3}
+    yield Figure("k1 of an ideal braid", ideal, "N/(m2 kPa)", where, **more)
 
 
-def sign_change(muscles: Any) -> float:
+def sign_change(muscles: QuadraticBundle) -> float:
     """Return the contraction, over the length, at which filling does not change the law's force."""
     shares = np.linspace(0.2, 0.36, 1601)
     c = shares * muscles.nominal_length
     return float(shares[np.argmin(np.abs(muscles.law(5e5, c) - muscles.law(0.0, c)))])
 
 
-def _ideal(one: Any) -> list[Figure]:
-    cosine = np.sqrt(1.0 / 3.0) / (1.0 - one.largest_contraction)
-    area = 0.25 * np.pi * one.diameter**2 * (3.0 * cosine**2 - 1.0)
-    ideal = 1e3 * area / (one.nominal_length * one.reach)
-    text = note("predicted", "braid whose force ends at 28 %, against 4.41 of Eq. (6)", BEFORE)
-    where = f"{SOURCE}, Eq. (6)"
-    return [expected("k1 of an ideal braid", where, "N/(m2 kPa)", 4.39, ideal, 5e-3, text)]
-
-
-def hysteresis() -> list[Figure]:
+def hysteresis() -> Iterator[Figure]:
     """Largest difference of loading and unloading over the force at nominal length."""
-    from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
-
-    where, lines = f"{SOURCE}, section 2", list[Figure]()
     for kind in ("maxwell_slip", "preisach"):
         plant = ElbowOrthosis.paper(kind)  # type: ignore[arg-type]
         for pressure in (0.0, 5e5):
-            text = note("an input (loop)", f"hysteresis {kind}, whole stroke of the orthosis")
-            name = f"hysteresis at {1e-3 * pressure:g} kPa"
+            tag = note("an input (loop)", f"hysteresis {kind}, whole stroke of the orthosis")
             ours = 100.0 * loop_share(plant, pressure)
-            lines.append(Figure(name, where, "%", 7.5, ours, None, text))
-    return lines
+            name = f"hysteresis at {1e-3 * pressure:g} kPa"
+            yield Figure(name, ours, "%", f"{SOURCE}, section 2", 7.5, note=tag)
 
 
 def loop_share(plant: Any, pressure: float) -> float:
@@ -232,31 +210,20 @@ def loop_share(plant: Any, pressure: float) -> float:
     return float(np.max(force[201:][::-1] - force[:201])) / float(muscles.law(pressure, 0.0))
 
 
-def small_motions() -> list[Figure]:
+def small_motions() -> Iterator[Figure]:
     """Stiffness over one degree, with sticking threads, beside that of the force law."""
-    where, lines = f"{SOURCE}, Eq. (22)", list[Figure]()
-    text = note("predicted", "from the angle of the last turn", "the law's is with no hysteresis")
+    tag = note("predicted", "from the angle of the last turn", "the law's is with no hysteresis")
     for kind in ("none", "maxwell_slip", "preisach"):
         name = f"stiffness over a degree at 200 kPa and 57 degrees, hysteresis {kind}"
         ours = stiffness_of_a_degree(kind, 2e5, np.radians(57.0))
-        lines.append(bounded(name, where, "N m/rad", ours, text))
-    return lines
+        yield Figure(name, ours, "N m/rad", f"{SOURCE}, Eq. (22)", note=tag)
 
 
 def stiffness_of_a_degree(kind: Any, pressure: float, angle: float) -> float:
-    """Return the torque over the angle [N m/rad] that a first degree back takes.
+    """Return the torque over the angle [N m/rad] of the first degree back after a bend.
 
-    Parameters
-    ----------
-    kind : {"none", "maxwell_slip", "preisach"}
-        Hysteresis.
-    pressure : float
-        In both bundles [Pa].
-    angle : float
-        At which a bend of half a radian turns [rad].
+    The bend of half a radian turns at ``angle`` [rad], with one ``pressure`` [Pa] in both bundles.
     """
-    from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
-
     plant = ElbowOrthosis.paper(kind)
     q = np.append(np.linspace(angle - 0.5, angle, 201), angle - np.radians(1.0))
     travel, operator = plant.pulley.travel(q), plant.hysteresis.operator
@@ -268,35 +235,24 @@ def stiffness_of_a_degree(kind: Any, pressure: float, angle: float) -> float:
     return float((torque[-2] - torque[-1]) / (q[-1] - q[-2]))
 
 
-def filling() -> list[Figure]:
+def filling() -> Iterator[Figure]:
     """Time to fill bundles through the valve named in the paper."""
-    where, lines = f"{SOURCE}, Fig. 2", list[Figure]()
-    text = note("predicted", "the figure's axis ends at 2 s; slower at high contraction, as stated")
+    tag = note("predicted", "the figure's axis ends at 2 s; slower at high contraction, as stated")
     for share in (8.0, 24.0):
         ours = time_to_pressure(bundle(1), 0.01 * share, 5e5, 4.5e5)
         name = f"time to 90 % of the force at 500 kPa and {share:g} %"
-        lines.append(bounded(name, where, "s", ours, text))
+        yield Figure(name, ours, "s", f"{SOURCE}, Fig. 2", note=tag)
     for n in (3, 7):
         ours = time_to_pressure(bundle(n), 0.084, FULL, 3e5)
         name = f"time from 0 to 300 kPa of {n} muscles, half-way in the stroke"
-        lines.append(bounded(name, f"{SOURCE}, section 4", "s", ours, note("predicted")))
-    return lines
+        yield Figure(name, ours, "s", f"{SOURCE}, section 4", note="predicted")
 
 
-def time_to_pressure(muscles: Any, share: float, supply: float, target: float) -> float:
-    """Return the time [s] in which one valve that stays open fills a bundle of a fixed length.
+def time_to_pressure(muscles: QuadraticBundle, share: float, supply: float, target: float) -> float:
+    """Return the time [s] in which one open valve fills a bundle to a target pressure [Pa].
 
-    Parameters
-    ----------
-    muscles : QuadraticBundle
-    share : float
-        Contraction over the nominal length.
-    supply, target : float
-        Pressures [Pa] of the supply and of the filled bundle.
+    The bundle's contraction over its nominal length stays ``share``; ``supply`` is in Pa.
     """
-    from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
-    from pam_envs.pneumatics.on_off_pair import OnOffValve, filled
-
     valve, supply, step = OnOffValve(), supply + ATMOSPHERE, 1e-3
     per_volume = PRESSURE_PER_DENSITY / float(muscles.volume(share * muscles.nominal_length))
     air, time = ATMOSPHERE / per_volume, valve.opening_time
@@ -325,7 +281,7 @@ def bundle_figure() -> Any:
     return canvas
 
 
-def _curve(ax: Any, muscles: Any, pressure: float, colour: str) -> None:
+def _curve(ax: Any, muscles: QuadraticBundle, pressure: float, colour: str) -> None:
     share = np.linspace(0.0, 0.32, 161)
     force, ends = muscles.law(pressure, share * muscles.nominal_length), share > 0.28
     ax.plot(100.0 * share[~ends], force[~ends], color=colour)

@@ -23,5 +23,5 @@ def all_figures() -> list[Figure]:
         except (ModuleNotFoundError, AttributeError) as error:
             title = (group.__doc__ or group.__name__).splitlines()[0].rstrip(".")
             note = f"not there: {error}"
-            figures.append(Figure(title, "", "", float("nan"), None, None, note))
+            figures.append(Figure(title, None, note=note))
     return figures

@@ -12,14 +12,18 @@ are reported beside them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from baselines.knee.published import printed_bumpless, printed_controller
+from baselines.linear.bumpless import make_bumpless
+from baselines.linear.systems import discrete
 from benchmarks.papers.knee import PERIOD, SOURCE
-from benchmarks.papers.published import BEFORE, UNKNOWN, Figure, Group, note
+from benchmarks.papers.published import BEFORE, Figure, Group, note
+from benchmarks.scoring.errors import rms
 from pam_envs.constants import GRAVITY
 from pam_envs.identification.emg_calibration import PUBLISHED, change, stride_torques
 from pam_envs.muscle.emg import MuscleActivation, Reading, calibration, emg_proxy
@@ -73,17 +77,8 @@ def uncalibrated_change(
 ) -> float:
     """Return the change of the EMG proxy's RMS where the assistance is delivered exactly.
 
-    Parameters
-    ----------
-    activity : {"walk", "stairs_up", "stairs_down"}
-    stride : float
-        Duration of a stride [s].
-    exact : bool
-        The assistance is 20 % of Eq. (1) at all times, without low-pass and phases.
-    floor : float
-        Co-contraction.
-    changes : mapping, optional
-        Parameters of the plant by name.
+    With ``exact`` it is 20 % of Eq. (1) at all times, without low-pass and phases; ``floor`` is the
+    co-contraction, ``changes`` are parameters of the plant, the stride's duration is in s.
     """
     made = stride_record(activity, stride, changes)
     late = stride_torques(activity, stride, changes)[1]
@@ -94,118 +89,92 @@ def uncalibrated_change(
     return emg_proxy(demand, assistance, PERIOD, muscle).change
 
 
-def estimator_error(
-    activity: Activity, stride: float, flat_foot: float = 0.0, added: tuple[str, ...] = ()
-) -> float:
-    """Return the RMS error [N m] of Eq. (1) in stance.
+def estimator_error(stride: float, flat_foot: int = 0, added: tuple[str, ...] = ()) -> float:
+    """Return the RMS error [N m] of Eq. (1) in the stance of a walk, stride in s.
 
-    Parameters
-    ----------
-    activity : {"walk", "stairs_up", "stairs_down"}
-    stride : float
-        Duration of a stride [s].
-    flat_foot : {0.0, 1.0}
-        1: the lean is the ankle's angle.
-    added : tuple of str
-        Of ``LEFT_OUT``: terms added to Eq. (1).
+    With ``flat_foot`` 1 the lean is the ankle's angle; terms of ``LEFT_OUT`` are added to Eq. (1).
     """
-    made = stride_record(activity, stride, {"shoe.flat_foot": flat_foot})
-    leg = KneeOrthosis.on_leg(activity).leg
+    made = stride_record("walk", stride, {"shoe.flat_foot": float(flat_foot)})
+    leg = KneeOrthosis.on_leg("walk").leg
     missing = {
         "horizontal force": -made["ground_x"]
         * (leg.ankle_height + leg.shank * np.cos(made["shank"])),
         "weight of the shank": -leg.mass * leg.centre * GRAVITY * np.sin(made["shank"]),
     }
     torque = made["estimate"] + sum(missing[name] for name in added)
-    error = (torque - made["demand"])[made["stance"] > 0.0]
-    return float(np.sqrt(np.mean(error**2)))
+    return rms((torque - made["demand"])[made["stance"] > 0.0])
 
 
-def emg_reductions() -> list[Figure]:
+def emg_reductions() -> Iterator[Figure]:
     """EMG proxy, uncalibrated and by the two readings that are fitted to the published figures."""
-    figures, where = list[Figure](), f"{SOURCE}, sections 5.2 and 5.3"
     for activity, name in NAMES.items():
-        published = 100.0 * PUBLISHED[activity]
-        plain = 100.0 * uncalibrated_change(activity, PAPER_STRIDE)
-        bare = 100.0 * uncalibrated_change(activity, PAPER_STRIDE, exact=True, floor=0.0)
-        why = (
-            f"20 % of Eq. (1) at all times and no co-contraction were {bare:.1f} %; the low-pass"
-            " (0.16 s late), the swing and co-contraction cost the rest; a proxy in proportion to"
-            " torque falls by the share that is borne, so that the published figure needs a reading"
-            " of its own"
-        )
-        text = note("predicted", f"preset {EXACT}{ASSUMED[activity]}", RMS_NORM, why)
-        title = f"EMG, {name}, 5 s a stride, "
-        figures.append(Figure(f"{title}uncalibrated", where, "%", published, plain, None, text))
-        for reading in READINGS:
-            figures += _calibrated(activity, reading, title)
-    return [*figures, _centre_as_measured(), *_natural_pace()]
-
-
-def _centre_as_measured() -> Figure:
-    """Return the walk's proxy without the assumption on the centre of pressure."""
-    bare = {"leg.aim_height": 0.0}
-    ours = 100.0 * uncalibrated_change("walk", PAPER_STRIDE, changes=bare)
-    text = note("predicted", f"preset {EXACT}, leg.aim_height 0", RMS_NORM,
-                "the centre of pressure as at natural pace: without the horizontal force the knee"
-                " then hardly has to be extended but at the end of stance, where the low-pass is"
-                " too late")  # fmt: skip
+        yield from _reductions(activity, f"EMG, {name}, 5 s a stride, ")
+    walk = partial(Figure, unit="%", source=f"{SOURCE}, section 5.2")
+    bare = 100.0 * uncalibrated_change("walk", PAPER_STRIDE, changes={"leg.aim_height": 0.0})
+    text = note(
+        "predicted",
+        f"preset {EXACT}, leg.aim_height 0",
+        RMS_NORM,
+        "the centre of pressure as at natural pace: without the horizontal force the knee then"
+        " hardly has to be extended but at the end of stance, where the low-pass is too late",
+    )
     name = "EMG, walking, 5 s a stride, uncalibrated, centre of pressure as measured"
-    where = f"{SOURCE}, section 5.2"
-    return Figure(name, where, "%", 100.0 * PUBLISHED["walk"], ours, None, text)
-
-
-def _calibrated(activity: Activity, reading: Reading, title: str) -> list[Figure]:
-    """Return a fitted reading, delivered at once and behind the low-pass."""
-    constant = calibration(activity, reading)
-    means = {
-        "A": f"true demand = {constant:g} of Eq. (1)",
-        "B": f"EMG = torque to the power {constant:g}",
-    }[reading]
-    name, where = f"{title}calibrated {reading}", f"{SOURCE}, section 5"
-    published = 100.0 * PUBLISHED[activity]
-    at_once = "preset 20 % of Eq. (1) delivered exactly and at once"
-    text = note("calibrated", at_once, RMS_NORM, f"{means}, fitted to this figure")
-    ours = 100.0 * change(activity, reading, constant)
-    fit = Figure(name, where, "%", published, ours, 0.1, text)
-    text = note("predicted", f"preset {EXACT}{ASSUMED[activity]}", RMS_NORM,
-                f"{means}, fitted to exact delivery; the low-pass is late")  # fmt: skip
-    ours = 100.0 * change(activity, reading, constant, as_referred=True)
-    return [fit, Figure(f"{name}, behind the low-pass", where, "%", published, ours, None, text)]
-
-
-def _natural_pace() -> list[Figure]:
-    """Return the figures at natural pace, for which the paper does not recommend Eq. (1)."""
-    where, unknown = f"{SOURCE}, section 5.2", float("nan")
-    text = note("predicted", f"preset {EXACT}", RMS_NORM,
-                "the paper: faster, Eq. (1) no longer is a good estimate")  # fmt: skip
+    yield walk(name, bare, published=100.0 * PUBLISHED["walk"], note=text)
+    why = "the paper: faster, Eq. (1) no longer is a good estimate"
+    text = note("predicted", f"preset {EXACT}", RMS_NORM, why)
     quick = 100.0 * uncalibrated_change("walk", NATURAL_STRIDE)
-    title = f"EMG, walking, {NATURAL_STRIDE:g} s a stride, uncalibrated"
-    figures = [Figure(title, where, "%", unknown, quick, None, text)]
-    return [*figures, *(f for t in (PAPER_STRIDE, NATURAL_STRIDE) for f in _estimator_errors(t))]
+    yield walk(f"EMG, walking, {NATURAL_STRIDE:g} s a stride, uncalibrated", quick, note=text)
+    for stride in (PAPER_STRIDE, NATURAL_STRIDE):
+        yield from _estimator_errors(stride)
 
 
-def _estimator_errors(stride: float) -> list[Figure]:
-    """Return the error of Eq. (1) by the source of the lean and by the added terms."""
-    where, figures = f"{SOURCE}, sections 2 and 5.2", list[Figure]()
+def _reductions(activity: Activity, title: str) -> Iterator[Figure]:
+    """Yield the uncalibrated reading, and the fitted ones at once and behind the low-pass."""
+    percent = partial(Figure, unit="%", published=100.0 * PUBLISHED[activity])
+    plain = 100.0 * uncalibrated_change(activity, PAPER_STRIDE)
+    bare = 100.0 * uncalibrated_change(activity, PAPER_STRIDE, exact=True, floor=0.0)
+    why = (
+        f"20 % of Eq. (1) at all times and no co-contraction were {bare:.1f} %; the low-pass"
+        " (0.16 s late), the swing and co-contraction cost the rest; a proxy in proportion to"
+        " torque falls by the share that is borne, so that the published figure needs a reading"
+        " of its own"
+    )
+    preset, where = f"preset {EXACT}{ASSUMED[activity]}", f"{SOURCE}, sections 5.2 and 5.3"
+    text = note("predicted", preset, RMS_NORM, why)
+    yield percent(f"{title}uncalibrated", plain, source=where, note=text)
+    percent = partial(percent, source=f"{SOURCE}, section 5")
+    for reading in READINGS:
+        constant = calibration(activity, reading)
+        means = {
+            "A": f"true demand = {constant:g} of Eq. (1)",
+            "B": f"EMG = torque to the power {constant:g}",
+        }[reading]
+        name = f"{title}calibrated {reading}"
+        at_once = "preset 20 % of Eq. (1) delivered exactly and at once"
+        text = note("calibrated", at_once, RMS_NORM, f"{means}, fitted to this figure")
+        ours = 100.0 * change(activity, reading, constant)
+        yield percent(name, ours, tolerance=0.1, note=text)
+        why = f"{means}, fitted to exact delivery; the low-pass is late"
+        late = 100.0 * change(activity, reading, constant, as_referred=True)
+        text = note("predicted", preset, RMS_NORM, why)
+        yield percent(f"{name}, behind the low-pass", late, note=text)
+
+
+def _estimator_errors(stride: float) -> Iterator[Figure]:
+    """Yield the error of Eq. (1) by the source of the lean and by the added terms."""
+    torque = partial(Figure, unit="N m", source=f"{SOURCE}, sections 2 and 5.2")
     tag = ("predicted", "preset full balance of the leg", "RMS in stance")
-    slow = stride == PAPER_STRIDE
+    why = "it leaves out the ground's horizontal force and the shank's weight and inertia"
+    title = f"error of Eq. (1), {stride:g} s a stride, "
     for flat, sensed in enumerate(LEANS):
-        judged = slow and not flat
-        why = "it leaves out the ground's horizontal force and the shank's weight and inertia"
+        judged = stride == PAPER_STRIDE and not flat
         more = (f"our target, the paper gives none; {LATE}",) if judged else ()
-        name = f"error of Eq. (1), {stride:g} s a stride, lean from {sensed}"
-        error = estimator_error("walk", stride, float(flat))
-        text = note(*tag, why, *more)
-        figures.append(
-            Figure(name, where, "N m", UNKNOWN, error, None, text,
-                   at_most=MOST_ERROR if judged else None)
-        )  # fmt: skip
+        most, text = MOST_ERROR if judged else None, note(*tag, why, *more)
+        error = estimator_error(stride, flat)
+        yield torque(f"{title}lean from {sensed}", error, note=text, at_most=most)
     for added in ((LEFT_OUT[0],), (LEFT_OUT[1],), LEFT_OUT):
-        name = f"error of Eq. (1), {stride:g} s a stride, with the {' and the '.join(added)}"
-        error = estimator_error("walk", stride, added=added)
-        figures.append(Figure(name, where, "N m", UNKNOWN, error, None, note(*tag)))
-    return figures
+        name = f"{title}with the {' and the '.join(added)}"
+        yield torque(name, estimator_error(stride, added=added), note=note(*tag))
 
 
 LATE = (
@@ -220,15 +189,8 @@ def linear_switch(mismatch: float, compensated: bool) -> tuple[float, float]:
     Before the switch the pressure is held at its nominal value and the controller runs off-line
     with a reference error of ``mismatch`` [N]; afterwards the reference is the true one.
 
-    Returns
-    -------
-    error, jump : float
-        Largest error of the tension [N], and jump of the pressure at the switch [kPa].
+    Returns the largest error of the tension [N], and the jump of the pressure at the switch [kPa].
     """
-    from baselines.knee.published import printed_bumpless, printed_controller
-    from baselines.linear.bumpless import make_bumpless
-    from baselines.linear.systems import discrete
-
     plant, gains = printed_bumpless()
     loop = make_bumpless(plant, printed_controller(), PERIOD, -200.0, 250.0, gains)
     loop = loop if compensated else loop.without()
@@ -246,26 +208,20 @@ def linear_switch(mismatch: float, compensated: bool) -> tuple[float, float]:
     return float(np.max(np.abs(measured[before:]))), abs(commands[before])
 
 
-def switching_transient() -> list[Figure]:
+def switching_transient() -> Iterator[Figure]:
     """Tension error and jump of the pressure after a switch, with and without bumpless transfer."""
-    where, figures = f"{SOURCE}, section 5.2", list[Figure]()
-    beforehand = {True: (11.4, 7.7), False: (46.0, 220.0)}
-    bounds: dict[bool, dict[str, Any]] = {True: {"at_most": 15.0}, False: {"at_least": 40.0}}
+    figure = partial(Figure, source=f"{SOURCE}, section 5.2")
     preset = f"preset as printed, mismatch {MISMATCH:g} N, linear plant, {SWING:g} s of swing"
-    for compensated, (error_then, jump_then) in beforehand.items():
-        name = f"{'with' if compensated else 'without'} bumpless transfer"
-        error, jump = linear_switch(MISMATCH, compensated)
+    for name, error_then, jump_then, least, most in (
+        ("with bumpless transfer", 11.4, 7.7, None, 15.0),
+        ("without bumpless transfer", 46.0, 220.0, 40.0, None),
+    ):
+        error, jump = linear_switch(MISMATCH, compensated=name.startswith("with "))
         text = note("predicted", preset, "largest after the switch", BEFORE, OTHER)
-        figures.append(
-            Figure(f"tension error {name}", where, "N", UNKNOWN, error, None, text,
-                   expected=error_then, **bounds[compensated])
-        )  # fmt: skip
+        bounded = partial(figure, at_least=least, at_most=most, note=text)
+        yield bounded(f"tension error {name}", error, "N", expected=error_then)
         text = note("predicted", preset, "at the switch", BEFORE, OTHER)
-        figures.append(
-            Figure(f"pressure jump {name}", where, "kPa", UNKNOWN, jump, None, text,
-                   expected=jump_then)
-        )  # fmt: skip
-    return figures
+        yield figure(f"pressure jump {name}", jump, "kPa", expected=jump_then, note=text)
 
 
 GROUPS: tuple[Group, ...] = (emg_reductions, switching_transient)

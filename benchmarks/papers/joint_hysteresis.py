@@ -1,7 +1,4 @@
-"""Hysteresis of a joint and its inverse: loop widths, symmetry, congruency.
-
-fluidic_muscles, section 3.
-"""
+"""Hysteresis of a joint and its inverse: loop widths, symmetry, congruency (fluidic_muscles, 3)."""
 
 from __future__ import annotations
 
@@ -27,14 +24,7 @@ def loop_path(
 ) -> tuple[Array, Array]:
     """Return desired and reached angles [rad]: a first rise, then down and up once.
 
-    Parameters
-    ----------
-    plant : object
-        With ``rest_angles``.
-    model : JointModel
-        Its hysteresis is inverted for the set-points.
-    amplitude : float
-        Of the desired angles [rad].
+    The hysteresis of the model is inverted for the set-points of the plant's ``rest_angles``.
     """
     up = np.linspace(-amplitude, amplitude, 81)
     desired = np.concatenate([np.linspace(0.0, amplitude, 41), up[::-1], up])
@@ -55,13 +45,8 @@ def loop_width(plant: Any, model: JointModel, amplitude: float = 20.0 * DEGREE) 
 def width_ratio(plant: Any, amplitude: float = 10.0 * DEGREE) -> float:
     """Return the loop's width with a line for the inverse, over that with the inverse.
 
-    Parameters
-    ----------
-    plant : object
-        With ``rest_angles``. If it is a Preisach operator itself, the ratio shows only the
-        resolution of the identified map.
-    amplitude : float
-        Of the desired angles [rad].
+    If the plant is a Preisach operator itself, the ratio shows only the resolution of the
+    identified map.
     """
     model = joint_model(plant)
     widths = [loop_width(plant, known, amplitude) for known in (model.narrowed(0.0), model)]

@@ -5,6 +5,11 @@ The plant is the paper's: a symmetric Preisach operator from set-point to ``w``,
 The paper prints no hysteresis; the assumed one has loops whose half-gap is 10 % of their amplitude
 at 10 and at 30 degrees, gain 1 between the tips of the largest loop, and 0.65 after a turn, the low
 end of the uncertain gain. A step follows a turn: up, back, and up again.
+
+The advantage of model-following over the PI alone depends on the hysteresis, on the size of the
+step and on a preceding turn; all combinations are evaluated, also on the plants of
+``PAM/AntagonisticJoint-v0`` without noise. There, *reduced* is the paper's plant with the
+hysteresis identified on the muscles; *paper* is the joint of two muscles that carries its link.
 """
 
 from __future__ import annotations
@@ -12,17 +17,24 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
+from itertools import product
 from typing import Any
 
+import gymnasium
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
-from baselines.core.catalogue import CONTROLLERS
+import pam_envs  # noqa: F401  registers the ids
+from baselines.core.catalogue import CONTROLLERS, make_controller
 from baselines.joint.model import POLE
 from baselines.linear.systems import discrete, double_lag
+from benchmarks.runs import rollout
+from benchmarks.scoring.errors import rms
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.parameters import Signal, Signals
+from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 
 Array = NDArray[np.float64]
 
@@ -31,20 +43,39 @@ PERIOD, FINE = 0.01, 1e-3
 DEGREE = np.pi / 180.0
 RANGE = 30.0 * DEGREE
 STEP = 10.0 * DEGREE
+HOLD = 3.0
+"""Seconds for which a step is held."""
 THRESHOLDS = (2.0, 5.0, 8.0, 35.0 / 3.0)
 """Half dead widths [deg] of plays of equal weight."""
 AFTER_TURN, TOTAL = 0.65, 1.1
 """Gain after a turn, the low end of the uncertain gain, and with all plays moving."""
+PLANTS = ("study", "reduced", "paper")
+SIZES = (5.0, 10.0, 15.0, 20.0)
+"""Of the steps [deg]."""
+CASES = tuple(product(PLANTS, SIZES, (True, False)))
+"""Plant, size [deg], and whether the step follows a turn."""
+STEPPED = (
+    "joint_pi",
+    "joint_pi_slow",
+    "joint_pid",
+    "joint_pid_smooth",
+    "joint_mfc_hinf",
+    "joint_mfc_mu",
+    "joint_mfc_mu_plain",
+    "joint_mfc_mu_wrong",
+)
+SIGNALS = Signals(
+    Signal(name, "rad", -RANGE, RANGE, k, normalized=False)
+    for k, name in enumerate(("angle", "set_point", "reference"))
+)
+ACTIONS = Signals([Signal("angle_set_point", "rad", -RANGE, RANGE, 0, normalized=False)])
 
 
 @cache
 def assumed_hysteresis(width: float = 1.0) -> Preisach:
     """Return the hysteresis of the reduced plant, from set-point [rad] to ``w`` [rad].
 
-    Parameters
-    ----------
-    width : float
-        Of the loops over the assumed ones; 0: no hysteresis.
+    ``width`` is that of the loops over the assumed ones; 0: no hysteresis.
     """
     weights = ((TOTAL - AFTER_TURN) / len(THRESHOLDS),) * len(THRESHOLDS)
     plays = PlayOperator(tuple(DEGREE * r for r in THRESHOLDS), weights, AFTER_TURN)
@@ -54,13 +85,7 @@ def assumed_hysteresis(width: float = 1.0) -> Preisach:
 
 @dataclass(frozen=True)
 class ReducedRig:
-    """The reduced plant, both as the simulated plant and as the model of the controllers.
-
-    Attributes
-    ----------
-    width : float
-        Width of the hysteresis loops relative to the assumed ones.
-    """
+    """The reduced plant, both as the simulated plant and as the model of the controllers."""
 
     width: float = 1.0
     stages: int = 1
@@ -81,24 +106,12 @@ class ReducedRig:
         return self.hysteresis.simulate(commands)[0]
 
 
-SIGNALS = Signals(
-    Signal(name, "rad", -RANGE, RANGE, k, normalized=False)
-    for k, name in enumerate(("angle", "set_point", "reference"))
-)
-ACTIONS = Signals([Signal("angle_set_point", "rad", -RANGE, RANGE, 0, normalized=False)])
-
-
 @dataclass(frozen=True)
 class Run:
-    """Record of a run.
+    """Record of a run: time [s] and angle [rad] every 1 ms, and once a period the set-point [rad].
 
-    Attributes
-    ----------
-    time, angle : ndarray
-        Every 1 ms [s], [rad].
-    set_point, model : ndarray, shape (T,)
-        [rad]; ``model``, the angle of the controller's model at the end of the period, is empty
-        where there is none.
+    ``model`` is the angle [rad] of the controller's model at the end of each period, empty if it
+    has none.
     """
 
     time: Array
@@ -115,14 +128,8 @@ def run(
 ) -> Run:
     """Run a controller on the reduced plant from rest at 0.
 
-    Parameters
-    ----------
-    controller : Controller
-    reference : ndarray, shape (T,)
-        [rad] at the control instants.
-    rig : ReducedRig
-    disturbance : callable, optional
-        Of the angle [rad], from times [s].
+    The reference [rad] has a value for each control instant; ``disturbance`` gives what is added to
+    the angle [rad] at times [s].
     """
     motion, hysteresis = discrete(double_lag(POLE), FINE, "zoh"), rig.hysteresis
     fine = round(rig.control_period / FINE)
@@ -151,17 +158,7 @@ def controller(name: str, rig: ReducedRig) -> Any:
 
 @dataclass(frozen=True)
 class StepFigures:
-    """Figures of a step response.
-
-    Attributes
-    ----------
-    rise : float
-        From 10 to 90 % [s].
-    overshoot : float
-        [%] of the step.
-    settling : float
-        To within 2 % for good [s].
-    """
+    """Rise from 10 to 90 % [s], overshoot [%], and settling to within 2 % for good [s]."""
 
     rise: float
     overshoot: float
@@ -186,32 +183,12 @@ def _reached(t: Array, y: Array, level: float) -> float:
     return float(t[k - 1] + (t[k] - t[k - 1]) * (level - y[k - 1]) / (y[k] - y[k - 1]))
 
 
-STEPPED = (
-    "joint_pi",
-    "joint_pi_slow",
-    "joint_pid",
-    "joint_pid_smooth",
-    "joint_mfc_hinf",
-    "joint_mfc_mu",
-    "joint_mfc_mu_plain",
-    "joint_mfc_mu_wrong",
-)
-
-
 @dataclass(frozen=True)
 class Setting:
-    """Circumstances of a step.
+    """Circumstances of a step of a size [rad] at a control period [s].
 
-    Attributes
-    ----------
-    width : float
-        Width of the hysteresis loops relative to the assumed ones; 0: no hysteresis.
-    size : float
-        Of the step [rad].
-    period : float
-        Control period [s].
-    turned : bool
-        Whether the step is the second of two, with one back in between; else the first.
+    ``width`` is that of the hysteresis loops over the assumed ones; a step is ``turned`` if it is
+    the second of two with one back in between.
     """
 
     width: float = 1.0
@@ -220,16 +197,11 @@ class Setting:
     turned: bool = True
 
 
-HOLD = 3.0
-"""Seconds for which a step is held."""
-
-
 @cache
 def step_run(name: str, setting: Setting = Setting()) -> Run:
     """Return the run of two steps and one back with a controller of the catalogue."""
     rig = ReducedRig(setting.width, control_period=setting.period)
-    held = round(HOLD / setting.period)
-    reference = setting.size * np.repeat([1.0, 0.0, 1.0], held)
+    reference = setting.size * np.repeat([1.0, 0.0, 1.0], round(HOLD / setting.period))
     return run(controller(name, rig), reference, rig)
 
 
@@ -242,66 +214,66 @@ def step(name: str, setting: Setting = Setting()) -> StepFigures:
     return step_figures(found.time[kept] - FINE * first, found.angle[kept] / setting.size)
 
 
-def rejection(name: str, width: float = 1.0, size: float = 2.0 * DEGREE) -> float:
-    """Return the time [s] after which a step added to the angle stays below 10 % of its size.
+def plant_run(joint: AntagonisticJoint, name: str, size: float) -> Array:
+    """Return the angles [rad] at 0, 10 ms, ... of two steps [deg] and one back, without noise."""
+    joint = joint.without_noise()
+    reference = size * DEGREE * np.repeat([1.0, 0.0, 1.0], round(HOLD / PERIOD))
+    env: Any = gymnasium.make(
+        "PAM/AntagonisticJoint-v0",
+        disable_env_checker=True,
+        plant=joint,
+        reference=reference,
+        start="straight",
+        episode_seconds=PERIOD * len(reference),
+    ).unwrapped
+    controller = make_controller(name, joint, env.signals, env.action_signals)
+    return np.concatenate([[0.0], rollout.run(env, controller, 0).signals["output"]])
 
-    Parameters
-    ----------
-    name : str
-        Of the controller.
-    width : float
-        Width of the hysteresis loops relative to the assumed ones.
-    size : float
-        [rad].
+
+@cache
+def _angles(plant: str, name: str, size: float) -> Array:
+    return plant_run(getattr(AntagonisticJoint, plant)(), name, size)
+
+
+def plant_step(plant: str, name: str, size: float, turned: bool) -> StepFigures:
+    """Return the figures of a step [deg] on one of ``PLANTS``, see :class:`Setting`.
+
+    Between the control instants of an environment the angle goes along a cubic spline.
     """
-    rig = ReducedRig(width)
+    if plant == "study":
+        return step(name, Setting(size=size * DEGREE, turned=turned))
+    angles = _angles(plant, name, size)
+    begin = 2.0 * HOLD if turned else 0.0
+    fine = FINE * np.arange(1.0, round(HOLD / FINE))
+    output = CubicSpline(PERIOD * np.arange(len(angles)), angles)(begin + fine)
+    return step_figures(fine, np.asarray(output) / (size * DEGREE))
 
-    def step_at_one(time: Array) -> Array:
-        return np.where(time >= 1.0 - 1e-9, size, 0.0)
 
-    found = run(controller(name, rig), np.zeros(300), rig, step_at_one)
+def rejection(name: str) -> float:
+    """Return the time [s] after which a step of 2 degrees on the angle stays below 10 % of it."""
+    rig, size = ReducedRig(), 2.0 * DEGREE
+    found = run(
+        controller(name, rig), np.zeros(300), rig, lambda t: np.where(t >= 1.0 - 1e-9, size, 0.0)
+    )
     left = np.flatnonzero(np.abs(found.angle) > 0.1 * size)
     return float(found.time[left[-1]] - 1.0)
 
 
-def tracking_error(
-    name: str,
-    frequency: float = 0.5,
-    amplitude: float = 20.0 * DEGREE,
-    period: float = PERIOD,
-) -> tuple[float, float]:
+def tracking_error(name: str, period: float = PERIOD) -> tuple[float, float]:
     """Return the RMS error of a sine [% of the amplitude], and to the model's output [deg].
 
-    The first cycle is left out. Without a model the second is not a number.
-
-    Parameters
-    ----------
-    name : str
-        Of the controller.
-    frequency : float
-        [Hz].
-    amplitude : float
-        [rad].
-    period : float
-        Control period [s].
+    The sine of 20 degrees and 0.5 Hz is sampled at the control period [s]; the first of three
+    cycles is left out. Without a model the second error is not a number.
     """
+    frequency, amplitude = 0.5, 20.0 * DEGREE
     rig = ReducedRig(control_period=period)
     periods = round(3.0 / (frequency * period))
     time = np.arange(periods + 1) * period
     reference = amplitude * np.sin(2.0 * np.pi * frequency * time)
     found = run(controller(name, rig), reference[:-1], rig)
-    reached, kept = found.angle[round(period / FINE) - 1 :: round(period / FINE)], periods // 3
-    error = (reached - reference[1:])[kept:]
-    size = 100.0 * float(np.sqrt(np.mean(error**2))) / amplitude
+    each, kept = round(period / FINE), slice(periods // 3, None)
+    reached = found.angle[each - 1 :: each]
+    size = 100.0 * rms((reached - reference[1:])[kept]) / amplitude
     if not found.model.size:
         return size, float("nan")
-    gap = (reached - found.model)[kept:]
-    return size, float(np.sqrt(np.mean(gap**2))) / DEGREE
-
-
-def half_gap(amplitude: float) -> float:
-    """Return half the largest loop width of the assumed hysteresis, over its amplitude [rad]."""
-    up = np.linspace(-amplitude, amplitude, 201)
-    path = np.concatenate([np.linspace(0.0, amplitude, 101), up[::-1], up])
-    output = assumed_hysteresis().simulate(path)[0]
-    return 0.5 * float(np.max(output[101:302][::-1] - output[302:])) / amplitude
+    return size, rms((reached - found.model)[kept]) / DEGREE

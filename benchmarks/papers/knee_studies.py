@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pam_envs  # noqa: F401  registers the ids
+from baselines.knee.inverse import make_knee_forward
+from baselines.knee.ltr import make_knee_ltr
 from benchmarks.runs import rollout
 from benchmarks.scoring.group import rms
 from benchmarks.scoring.groups import knee as metrics_knee
@@ -30,14 +32,11 @@ FREQUENCY = 0.1
 """[Hz]."""
 PRESET_FRICTION = 0.5e5
 """Pressure [Pa] that all elements of the preset's hysteresis hold together: its loop width."""
-WIDTHS = (0.0, 0.25e5, 0.5e5)
-"""Loop widths [Pa] of the ablation."""
 IDS: dict[Activity, str] = {
     "walk": "PAM/KneeWalk-v0",
     "stairs_up": "PAM/KneeStairsUp-v0",
     "stairs_down": "PAM/KneeStairsDown-v0",
 }
-Feedback = Literal["printed", "designed"]
 
 
 @dataclass(frozen=True)
@@ -47,16 +46,6 @@ class TensionErrors:
     feedback: float
     with_line: float
     with_inverse: float
-
-    @property
-    def gain(self) -> float:
-        """Error of the feedback alone over that with the inverse."""
-        return self.feedback / self.with_inverse
-
-    @property
-    def gain_over_line(self) -> float:
-        """Error with the straight line over that with the inverse: what the hysteresis costs."""
-        return self.with_line / self.with_inverse
 
 
 @dataclass(frozen=True)
@@ -71,25 +60,19 @@ class Switch:
         Error [N] in the first period of stance: what the swing's controller left behind.
     excess : float
         By how much [N] the largest error is above that: the transient of the one taking over.
-    pressure : float
-        Largest change of the pressure [Pa] in the first 0.1 s.
     command : float
         Largest change of the set-point [Pa] from one period to the next at the switch.
-    worst_tension : float
-        As ``tension``, the worst of the strides.
     """
 
     tension: float
     at_switch: float
     excess: float
-    pressure: float
     command: float
-    worst_tension: float
 
 
 def tension_errors(
     width: float = PRESET_FRICTION,
-    feedback: Feedback = "printed",
+    feedback: Literal["printed", "designed"] = "printed",
     mounting: Mounting = "rig",
     dynamics: Dynamics = "measured",
 ) -> TensionErrors:
@@ -109,39 +92,27 @@ def tension_errors(
     preset = {"rig": KneeOrthosis.rig, "no_load": KneeOrthosis.no_load}[mounting]
     plant = preset(dynamics=dynamics, hysteresis__width=width / PRESET_FRICTION).without_noise()
     kinds = ("nominal", "line", "inverse")
-    return TensionErrors(*(_tension_error(plant, feedback, kind) for kind in kinds))
-
-
-def _tension_error(plant: KneeOrthosis, feedback: Feedback, forward: Any) -> float:
-    from baselines.knee.ltr import make_knee_ltr
-
-    env = _brace("PAM/KneeTension-v0", plant)
     printed = feedback == "printed"
-    signals = (env.signals, env.action_signals)
-    return _error(env, make_knee_ltr(plant, *signals, forward=forward, printed=printed))
+    return TensionErrors(
+        *(_error("Tension", plant, make_knee_ltr, forward=k, printed=printed) for k in kinds)
+    )
 
 
 def stiffness_errors() -> tuple[float, float]:
     """Return the errors [%] of inverse and straight line in ``PAM/KneeStiffness-v0``."""
-    from baselines.knee.inverse import make_knee_forward
-
     plant = KneeOrthosis.rig().without_noise()
-    env = _brace("PAM/KneeStiffness-v0", plant)
-    signals = (env.signals, env.action_signals)
     inverse, line = (
-        _error(env, make_knee_forward(plant, *signals, kind=kind)) for kind in ("inverse", "line")
+        _error("Stiffness", plant, make_knee_forward, kind=kind) for kind in ("inverse", "line")
     )
     return inverse, line
 
 
-def _brace(env: str, plant: KneeOrthosis) -> Any:
-    seconds = DROPPED + CYCLES / FREQUENCY
+def _error(quantity: str, plant: KneeOrthosis, make: Any, **knobs: Any) -> float:
+    """Return the error [%] of a controller that tracks a sine with the brace's tension."""
     how: dict[str, Any] = {"start": "paper", "reference": "sine", "frequency": FREQUENCY}
-    made = gym.make(env, disable_env_checker=True, plant=plant, episode_seconds=seconds, **how)
-    return made.unwrapped
-
-
-def _error(env: Any, controller: Any) -> float:
+    how |= {"plant": plant, "episode_seconds": DROPPED + CYCLES / FREQUENCY}
+    env: Any = gym.make(f"PAM/Knee{quantity}-v0", disable_env_checker=True, **how).unwrapped
+    controller = make(plant, env.signals, env.action_signals, **knobs)
     signals = rollout.run(env, controller, 0).signals
     kept = signals["time"] > DROPPED + 1e-6
     reference = signals["reference"][kept]
@@ -156,9 +127,8 @@ def stride(
     bumpless: bool = True,
     preview: bool = False,
     pace: float = PAPER_STRIDE,
-    strides: int = 3,
 ) -> Mapping[str, NDArray[np.float64]]:
-    """Return the signals (SI) of strides with the paper's control system, at rest at heel contact.
+    """Return the signals (SI) of three strides with the paper's control system, at rest at contact.
 
     Parameters
     ----------
@@ -171,26 +141,22 @@ def stride(
         Whether the feed-forward looks one lag of the regulator ahead, as the paper's does not.
     pace : float
         Duration of a stride [s].
-    strides : int
-        How many.
 
     Returns
     -------
     mapping
         ``info`` of the environment by its keys, and ``set_point`` [Pa].
     """
-    from baselines.knee.ltr import make_knee_ltr
-
     plant = KneeOrthosis.on_leg(activity, stride=pace).without_noise()
-    env = gym.make(
+    env: Any = gym.make(
         IDS[activity],
         disable_env_checker=True,
         plant=plant,
         mismatch=mismatch,
         start="heel_contact",
-        episode_seconds=round((strides + 0.2) * pace, 2),
+        episode_seconds=round(3.2 * pace, 2),
     ).unwrapped
-    signals = (env.signals, env.action_signals)  # type: ignore[attr-defined]
+    signals = (env.signals, env.action_signals)
     controller = make_knee_ltr(plant, *signals, bumpless=bumpless, preview=preview)
     episode = rollout.run(env, controller, 0)
     command = signals[1]["pressure_set_point"].decode(episode.actions)
@@ -203,43 +169,30 @@ def switching(
     preview: bool = False,
     pace: float = PAPER_STRIDE,
 ) -> Switch:
-    """Return the transient after the switches to stance in ``PAM/KneeWalk-v0``.
+    """Return the transient after the switches to stance in ``PAM/KneeWalk-v0``, see :func:`stride`.
 
-    The parameters are those of :func:`stride`. A set-point of the last period of swing is compared
-    with the first that the tension's controller gives.
+    A set-point of the last period of swing is compared with the first that the tension's controller
+    gives.
     """
     signals, period = stride("walk", mismatch, bumpless, preview, pace), KneeOrthosis.control_period
     starts = metrics_knee.landings(signals["sensor/stance"], period)
     error = signals["output"] - signals["reference"]
-    seconds = (metrics_knee.JUMP_SECONDS, metrics_knee.BRIEF_SECONDS)
-    long, brief = (round(s / period) for s in seconds)
+    long = round(metrics_knee.JUMP_SECONDS / period)
     # signals of step k are recorded after it: its next setpoint has index k + 1
     jumps = [abs(signals["set_point"][k + 1] - signals["set_point"][k]) for k in starts]
-    peaks = [float(np.abs(error[k : k + long]).max()) for k in starts]
     return Switch(
-        tension=float(np.mean(peaks)),
+        tension=metrics_knee.largest_after(error, starts, long),
         at_switch=metrics_knee.largest_after(error, starts, 1),
         excess=metrics_knee.excess_after(error, starts, long),
-        pressure=metrics_knee.pressure_jump(signals["state/pressure"], starts, brief),
         command=float(np.mean(jumps)),
-        worst_tension=max(peaks),
     )
 
 
-def emg_ratios(activity: Activity = "walk", pace: float = PAPER_STRIDE) -> dict[str, float]:
+def emg_ratios(activity: Activity = "walk") -> dict[str, float]:
     """Return the EMG proxy's assisted over unassisted RMS in its readings, over whole strides.
 
-    Parameters
-    ----------
-    activity : {"walk", "stairs_up", "stairs_down"}
-    pace : float
-        Duration of a stride [s].
-
-    Returns
-    -------
-    dict
-        The ``emg_`` metrics of :data:`benchmarks.scoring.knee.GAIT`.
+    The names are those of the ``emg_`` metrics of :data:`benchmarks.scoring.knee.GAIT`.
     """
-    signals = stride(activity, pace=pace)
-    window = (signals["time"] > pace) & (signals["time"] < 3.0 * pace + 1e-6)
+    signals = stride(activity)
+    window = (signals["time"] > PAPER_STRIDE) & (signals["time"] < 3.0 * PAPER_STRIDE + 1e-6)
     return metrics_knee.emg(signals, window, KneeOrthosis.control_period, activity)

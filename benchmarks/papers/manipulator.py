@@ -8,6 +8,7 @@ drawn paths show the effect of the weight without any fit.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from baselines.manipulator.redundancy import Comparison, compare
-from benchmarks.papers.published import BEFORE, UNKNOWN, Figure, Group
+from benchmarks.papers.published import BEFORE, Figure, Group
 from pam_envs.envs.manipulator.paths import LEAP
 from pam_envs.mechanics.redundancy.resolution import LIMIT
 from pam_envs.mechanics.serial_chain.chain import SerialChain
@@ -58,37 +59,35 @@ def straight_poses(path: PathEnds) -> Array:
     return np.hstack([first[:3] + share * (last[:3] - first[:3]), turned / np.sin(whole)])
 
 
-def peaks() -> list[Figure]:
+def peaks() -> Iterator[Figure]:
     """Largest angle of a joint on each path, without and with the weight (2.1)."""
-    figures = []
     for path in PATHS:
         both = plans(path)
+        text = f"{OURS if path.calibrated else KNOWN}; straight line of the joints; {BEFORE}"
         for name, expected, plan, least, most in (
             ("unweighted", UNWEIGHTED, both.unweighted, 33.0, None),
             ("weighted", WEIGHTED, both.weighted, None, 30.0),
         ):
-            text = f"{OURS if path.calibrated else KNOWN}; straight line of the joints; {BEFORE}"
-            figures.append(
-                Figure(f"{path.name}, {name}: largest angle", SOURCE, "deg", UNKNOWN,
-                       float(np.rad2deg(plan.peak)), 0.005, text, expected[path.name],
-                       given=path.calibrated, at_least=least, at_most=most)
-            )  # fmt: skip
-    return figures
+            yield Figure(
+                f"{path.name}, {name}: largest angle",
+                float(np.rad2deg(plan.peak)),
+                "deg",
+                SOURCE,
+                tolerance=0.005,
+                note=text,
+                expected=expected[path.name],
+                given=path.calibrated,
+                at_least=least,
+                at_most=most,
+            )
 
 
 @dataclass(frozen=True)
 class HeldOut:
     """Statistics of freely drawn paths, as shares of all.
 
-    Attributes
-    ----------
-    paths : int
-    crossed, crossed_weighted : float
-        Paths on which a joint exceeds 30 degrees.
-    leapt, leapt_weighted : float
-        Paths on which the plan leaps between branches of solutions.
-    iterations : float
-        Largest of the medians of the weighted plans.
+    On a ``crossed`` path a joint exceeds 30 degrees, on a ``leapt`` one the plan leaps between
+    branches of solutions; ``iterations`` is the largest of the medians of the weighted plans.
     """
 
     paths: int
@@ -104,11 +103,6 @@ def held_out(number: int = HELD_OUT, seed: int = 0) -> HeldOut:
     """Return the statistics of freely drawn paths with both ends within 27 degrees a joint.
 
     Short and nearly straight paths are not drawn; no drawn path is left out.
-
-    Parameters
-    ----------
-    number, seed : int
-        Of the draws.
     """
     counts, most = np.zeros(4), 0.0
     for first, last in zip(*draw_ends(seed, number, arm().stages, LIMIT), strict=True):
@@ -122,72 +116,60 @@ def held_out(number: int = HELD_OUT, seed: int = 0) -> HeldOut:
     return HeldOut(number, crossed, crossed_weighted, leapt, leapt_weighted, most)
 
 
-def drawn_lines() -> list[Figure]:
+def drawn_lines() -> Iterator[Figure]:
     """Share of freely drawn paths on which joints exceed their limit or the plan leaps."""
     found = held_out()
     text = f"of {found.paths} freely drawn paths, none left out"
     leap = f"{text}; most do so along a hundred times as many poses: the branch of solutions ends"
-    return [
-        Figure("drawn paths, unweighted: past 30 degrees", SOURCE, "%", UNKNOWN,
-               100.0 * found.crossed, None, text),
-        Figure("drawn paths, weighted: past 30 degrees", SOURCE, "%", UNKNOWN,
-               100.0 * found.crossed_weighted, None, text, at_most=0.0),
-        Figure("drawn paths, unweighted: the plan leaps", SOURCE, "%", UNKNOWN,
-               100.0 * found.leapt, None, leap),
-        Figure("drawn paths, weighted: the plan leaps", SOURCE, "%", UNKNOWN,
-               100.0 * found.leapt_weighted, None, leap),
-        Figure("drawn paths, weighted: largest median of iterations", SOURCE, "1", UNKNOWN,
-               found.iterations, None, text, at_most=MOST_ITERATIONS),
-    ]  # fmt: skip
+    for name, share, words, most in (
+        ("unweighted: past 30 degrees", found.crossed, text, None),
+        ("weighted: past 30 degrees", found.crossed_weighted, text, 0.0),
+        ("unweighted: the plan leaps", found.leapt, leap, None),
+        ("weighted: the plan leaps", found.leapt_weighted, leap, None),
+    ):
+        yield Figure(f"drawn paths, {name}", 100.0 * share, "%", SOURCE, note=words, at_most=most)
+    name = "drawn paths, weighted: largest median of iterations"
+    yield Figure(name, found.iterations, "1", SOURCE, note=text, at_most=MOST_ITERATIONS)
 
 
-def other_reading() -> list[Figure]:
+def other_reading() -> Iterator[Figure]:
     """Largest angles of path_3 if its ends were those of a straight line of tip and direction."""
-    poses, start = straight_poses(PATHS[-1]), PATHS[-1].angles()[0]
-    both = compare(arm(), poses, start=start)
-    names = ("unweighted", "weighted")
+    path = PATHS[-1]
+    both = compare(arm(), straight_poses(path), start=path.angles()[0])
     text = "reported: the other reading of the two ends; it misses the figures"
-    return [
-        Figure(f"path_3 as a straight line of the tip, {name}", SOURCE, "deg", UNKNOWN,
-               float(np.rad2deg(plan.peak)), None, text, expected)
-        for name, expected, plan in zip(
-            names, (37.12, 27.77), (both.unweighted, both.weighted), strict=True
-        )
-    ]  # fmt: skip
+    for name, expected, plan in (
+        ("unweighted", UNWEIGHTED, both.unweighted),
+        ("weighted", WEIGHTED, both.weighted),
+    ):
+        title, peak = f"path_3 as a straight line of the tip, {name}", float(np.rad2deg(plan.peak))
+        yield Figure(title, peak, "deg", SOURCE, note=text, expected=expected[path.name])
 
 
-def prices() -> list[Figure]:
+def prices() -> Iterator[Figure]:
     """Growth of ``q'q`` by the weight, at the end of each path."""
-    text = f"{BEFORE}: 25 to 34 %"
-    return [
-        Figure(f"{path.name}: growth of q'q", SOURCE, "%", UNKNOWN,
-               100.0 * (plans(path).price - 1.0), None,
-               f"{OURS if path.calibrated else KNOWN}; {text}", at_least=25.0, at_most=34.0,
-               given=path.calibrated)
-        for path in PATHS
-    ]  # fmt: skip
+    for path in PATHS:
+        yield Figure(
+            f"{path.name}: growth of q'q",
+            100.0 * (plans(path).price - 1.0),
+            "%",
+            SOURCE,
+            note=f"{OURS if path.calibrated else KNOWN}; {BEFORE}: 25 to 34 %",
+            at_least=25.0,
+            at_most=34.0,
+            given=path.calibrated,
+        )
 
 
-def newton() -> list[Figure]:
+def newton() -> Iterator[Figure]:
     """Newton's method on the weighted plans: iterations, and errors left."""
-    figures = []
     for path in PATHS:
         plan, desired = plans(path).weighted, arm().pose(path.angles())
+        name, number = f"{path.name}: median iterations", float(np.median(plan.iterations))
+        text = "warm start, change below 1e-10 rad"
+        yield Figure(name, number, "1", SOURCE, note=text, at_most=MOST_ITERATIONS)
+        name = f"{path.name}: largest error of a pose"
         off = float(np.max(np.abs(arm().pose(plan.angles) - desired)))
-        figures += [
-            Figure(f"{path.name}: median iterations", SOURCE, "1", UNKNOWN,
-                   float(np.median(plan.iterations)), None,
-                   "warm start, change below 1e-10 rad", at_most=MOST_ITERATIONS),
-            Figure(f"{path.name}: largest error of a pose", SOURCE, "m", UNKNOWN, off, None,
-                   at_most=1e-12),
-        ]  # fmt: skip
-    return figures
+        yield Figure(name, off, "m", SOURCE, at_most=1e-12)
 
 
-GROUPS: tuple[Group, ...] = (
-    peaks,
-    drawn_lines,
-    other_reading,
-    prices,
-    newton,
-)
+GROUPS: tuple[Group, ...] = (peaks, drawn_lines, other_reading, prices, newton)

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from baselines.joint.model import joint_model
@@ -35,13 +36,7 @@ def spans(flags: Array, time: Array) -> list[tuple[float, float]]:
 
 
 def cut(signals: Signals, first: float, last: float) -> dict[str, Array]:
-    """Return a record from one time [s] to another, its clock set to 0 at its first heel contact.
-
-    Parameters
-    ----------
-    signals : mapping of (T,) arrays
-        Recorded ``info``.
-    """
+    """Return a record from one time [s] to another, its clock set to 0 at its first contact."""
     time = signals["time"]
     kept = (time > first - 1e-9) & (time < last + 1e-9)
     made = {name: values[kept] for name, values in signals.items()}
@@ -50,20 +45,11 @@ def cut(signals: Signals, first: float, last: float) -> dict[str, Array]:
     return made
 
 
-def stride_figure(records: Sequence[Signals], titles: Sequence[str], title: str) -> Any:
+def stride_figure(records: Sequence[Signals], titles: Sequence[str], title: str) -> Figure:
     """Return a figure with a column for each record: tension, angle, pressure, EMG proxy.
 
-    Parameters
-    ----------
-    records : sequence of mappings of (T,) arrays
-        Recorded ``info`` in SI, ``time`` 0 at a heel contact, and ``set_point`` [Pa].
-    titles : sequence of str
-        Of the columns.
-    title : str
-        Of the whole.
+    A record is ``info`` in SI, ``time`` 0 at a heel contact, and ``set_point`` [Pa].
     """
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=(11.0, 10.0), layout="constrained")
     grid = figure.subplots(4, len(records), sharex=True, sharey="row", squeeze=False)
     for column, (signals, name) in enumerate(zip(records, titles, strict=True)):
@@ -181,18 +167,11 @@ SHOWN_SECONDS = 1.2
 """Of the step in the picture."""
 
 
-def step_figure() -> Any:
+def step_figure() -> Figure:
     """Return a figure: a step after a turn, and the muscles' loop with and without the inverse."""
-    from matplotlib.figure import Figure
-
     figure = Figure(figsize=(11.0, 4.4), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=[1.5, 1.0])
-    _draw_steps(left)
+    ax, right = figure.subplots(1, 2, width_ratios=[1.5, 1.0])
     _draw_loops(right)
-    return figure
-
-
-def _draw_steps(ax: Any) -> None:
     begin, shown = round(2.0 * HOLD / FINE), round(SHOWN_SECONDS / FINE)
     time = np.arange(1, shown + 1) * FINE
     for name, (label, colour, style) in LINES.items():
@@ -200,15 +179,20 @@ def _draw_steps(ax: Any) -> None:
         text = f"{label}: rise {step(name).rise:.3f} s"
         ax.plot(time, angle, color=colour, linestyle=style, label=text)
     ax.axhline(STEP / DEGREE, color="0.25", linewidth=0.8, linestyle="--")
-    ax.set_xlabel("time since the step [s]")
-    ax.set_ylabel("angle [deg]")
-    ax.set_title(
+    title = (
         "10 degrees after a turn, controllers at 10 ms\nreduced plant: symmetric Preisach operator"
-        r" (assumed, loops of 10 %), then $23^2/(s+23)^2$",
-        fontsize=9,
+        r" (assumed, loops of 10 %), then $23^2/(s+23)^2$"
     )
+    _label(ax, "time since the step [s]", "angle [deg]", title, "lower right")
+    return figure
+
+
+def _label(ax: Any, across: str, up: str, title: str, legend: str) -> None:
+    ax.set_xlabel(across)
+    ax.set_ylabel(up)
+    ax.set_title(title, fontsize=9)
     ax.grid(True, linewidth=0.3)
-    ax.legend(loc="lower right", fontsize=8)
+    ax.legend(loc=legend, fontsize=8)
 
 
 def _draw_loops(ax: Any) -> None:
@@ -220,8 +204,5 @@ def _draw_loops(ax: Any) -> None:
     ):
         desired, reached = loop_path(joint, known, STEP)
         ax.plot(desired / DEGREE, reached / DEGREE, color=colour, label=label)
-    ax.set_xlabel("desired angle [deg]")
-    ax.set_ylabel("angle at rest [deg]")
-    ax.set_title("open loop at 10 degrees,\njoint of two muscles", fontsize=9)
-    ax.grid(True, linewidth=0.3)
-    ax.legend(loc="upper left", fontsize=8)
+    title = "open loop at 10 degrees,\njoint of two muscles"
+    _label(ax, "desired angle [deg]", "angle at rest [deg]", title, "upper left")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import importlib
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
+from baselines.positioning.contraction_errors import positioning_error_table
 from benchmarks.papers.published import Figure, Group
+from benchmarks.scenarios.scenario_env import make_env
+from pam_envs.data.tables import load_contraction_table
 
 Array = NDArray[np.float64]
 
@@ -22,53 +25,34 @@ SIMULATED = 0.3
 
 
 def loop_width(pressure: Array, contraction: Array) -> tuple[Array, Array]:
-    """Return pressures [Pa] and widths [m] of a loop that goes up and down the same pressures.
+    """Return pressures [Pa] and widths [m], shape (n,), of a loop up and down the same pressures.
 
-    Parameters
-    ----------
-    pressure, contraction : (2 n - 1,) array
-        In the order of the path, the turning point once.
+    Pressures and contractions, shape (2 n - 1,), are in the order of the path, the turning point
+    once.
     """
     n = len(pressure) // 2
     return pressure[: n + 1], contraction[::-1][: n + 1] - contraction[: n + 1]
 
 
-def measured_widths() -> list[Figure]:
+def measured_widths() -> Iterator[Figure]:
     """Largest width of the mean loops in the tables."""
-    from pam_envs.data.tables import load_contraction_table
-
-    table, figures = load_contraction_table(), list[Figure]()
+    table = load_contraction_table()
     for load, (width, where) in WIDTHS.items():
         pressure, widths = loop_width(*table.means(load))
         best = int(np.argmax(widths))
         name = f"tables, {load:g} kg: largest loop width"
-        figures += [
-            Figure(name, f"{SOURCE}, section 4", "mm", width, MM * float(widths[best]), 0.005),
-            Figure(f"{name}, at", SOURCE, "bar", where, BAR * float(pressure[best]), 1e-6),
-        ]
-    return figures
+        ours = (MM * float(widths[best]), BAR * float(pressure[best]))
+        yield Figure(name, ours[0], "mm", f"{SOURCE}, section 4", width, 0.005)
+        yield Figure(f"{name}, at", ours[1], "bar", SOURCE, where, 1e-6)
 
 
 def simulated_loop(hysteresis: str, load: float, hold_seconds: float = 3.0) -> tuple[Array, Array]:
     """Return the quasi-static loop of an identified plant, 0 to 6 bar and back by half a bar.
 
-    Parameters
-    ----------
-    hysteresis : {"maxwell_slip", "preisach"}
-    load : float [kg]
-    hold_seconds : float [s]
-        At each pressure; the state at its end is taken.
-
-    Returns
-    -------
-    pressure, contraction : (25,) array
-        [Pa] and [m], noise-free.
+    Pressures [Pa] and noise-free contractions [m], shape (25,), at the end of each hold [s].
     """
-    from benchmarks.scenarios.scenario_env import make_env
-
     up = np.arange(0.0, 6.01e5, 0.5e5)
     path = np.concatenate([up, up[-2::-1]])
-    steps = round(hold_seconds / 0.01)
     kwargs = {
         "hysteresis": hysteresis,
         "load": load,
@@ -80,23 +64,21 @@ def simulated_loop(hysteresis: str, load: float, hold_seconds: float = 3.0) -> t
     env.reset(seed=0)
     outputs = []
     for pressure in path:
-        for _ in range(steps):
+        for _ in range(round(hold_seconds / 0.01)):
             info = env.step(np.array([pressure]))[4]
         outputs.append(info["output"])
     env.close()
     return path, np.array(outputs)
 
 
-def simulated_widths() -> list[Figure]:
+def simulated_widths() -> Iterator[Figure]:
     """Loop width of the simulated plants where the measured loop is widest."""
-    figures = []
     for hysteresis in ("maxwell_slip", "preisach"):
         for load, (width, where) in WIDTHS.items():
             pressure, widths = loop_width(*simulated_loop(hysteresis, load))
             ours = MM * float(np.interp(where, BAR * pressure, widths))
             name = f"{hysteresis} plant, {load:g} kg: loop width at {where:g} bar"
-            figures.append(Figure(name, SOURCE, "mm", width, ours, SIMULATED))
-    return figures
+            yield Figure(name, ours, "mm", SOURCE, width, SIMULATED)
 
 
 POSITIONING: dict[str, tuple[float, float]] = {
@@ -112,21 +94,13 @@ POSITIONING: dict[str, tuple[float, float]] = {
 from the paper's tables by an independent program."""
 
 
-def positioning_errors() -> list[Figure]:
+def positioning_errors() -> Iterator[Figure]:
     """Positioning error of the polynomials and their refits on the tables' own repeats."""
-    module = importlib.import_module("baselines.positioning.contraction_errors")
-    table, figures = module.positioning_error_table(), list[Figure]()
+    table, where = positioning_error_table(), f"{SOURCE}, tables"
     for name, (rms, largest) in POSITIONING.items():
-        ours, where = table[name], f"{SOURCE}, tables"
-        figures += [
-            Figure(f"{name}: RMS positioning error", where, "mm", rms, MM * ours.rms, 6e-4),
-            Figure(f"{name}: largest error", where, "mm", largest, MM * ours.largest, 6e-4),
-        ]
-    return figures
+        ours = table[name]
+        yield Figure(f"{name}: RMS positioning error", MM * ours.rms, "mm", where, rms, 6e-4)
+        yield Figure(f"{name}: largest error", MM * ours.largest, "mm", where, largest, 6e-4)
 
 
-GROUPS: tuple[Group, ...] = (
-    measured_widths,
-    simulated_widths,
-    positioning_errors,
-)
+GROUPS: tuple[Group, ...] = (measured_widths, simulated_widths, positioning_errors)

@@ -2,48 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 BEFORE = "not in the paper: computed independently by another program"
 UNKNOWN = float("nan")
 """Published value of a figure that the paper does not print."""
-NEAR = 0.05
-"""Share of the expected value within which most figures of the joint are judged."""
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One published figure beside ours.
+    """One published figure beside ours; ``None`` of ours that could not be computed.
 
-    Attributes
-    ----------
-    name, source, unit : str
-    published : float
-        What the paper prints; NaN where it prints nothing.
-    ours : float or None
-        ``None`` if it cannot be computed; ``note`` says why.
-    tolerance : float or None
-        Largest absolute difference from ``expected``, or from ``published`` where nothing else is
-        expected; ``None`` if it is not judged so.
-    note : str
-    expected : float, optional
-        Computed from the paper's own equations by an independent program.
-    at_most, at_least : float, optional
-        Bounds on ours.
-    given : bool
-        Whether ours is an input, which is shown and never judged.
-    why : str
-        Reason of a known miss.
+    ``published`` is what the paper prints, ``expected`` what an independent program computed from
+    its equations. ``tolerance`` is the largest difference from ``expected``, or from ``published``
+    if nothing is expected. A ``given`` figure is an input, shown and never judged. ``why`` is the
+    reason of a known miss.
     """
 
     name: str
-    source: str
-    unit: str
-    published: float
     ours: float | None
-    tolerance: float | None
+    unit: str = ""
+    source: str = ""
+    published: float = UNKNOWN
+    tolerance: float | None = None
     note: str = ""
     expected: float | None = None
     at_most: float | None = None
@@ -97,7 +80,7 @@ class Figure:
         return {**asdict(self), "passed": self.passed}
 
 
-Group = Callable[[], list[Figure]]
+Group = Callable[[], Iterable[Figure]]
 """Computes some figures of a paper; its docstring is their title."""
 
 
@@ -106,39 +89,17 @@ def note(*words: str) -> str:
     return "; ".join(words)
 
 
-def near(
-    name: str,
-    where: str,
-    unit: str,
-    expected: float,
-    ours: float,
-    share: float | None = NEAR,
-    note: str = BEFORE,
-    why: str = "",
-) -> Figure:
-    """Return a figure judged within a share of the expected value; reported if that is None."""
-    tolerance = None if share is None else share * abs(expected)
-    return Figure(name, where, unit, UNKNOWN, ours, tolerance, note, expected, why=why)
-
-
 def table(figures: Sequence[Figure]) -> str:
     """Return the figures as aligned text."""
-    lines = [("figure", "published", "expected", "ours", "unit", "judged by", "", "note")]
-    for figure in figures:
-        known = figure.published == figure.published
-        lines.append(
-            (
-                figure.name,
-                f"{figure.published:.4g}" if known else "",
-                "" if figure.expected is None else f"{figure.expected:.4g}",
-                "-" if figure.ours is None else f"{figure.ours:.4g}",
-                figure.unit,
-                figure.judged_by,
-                figure.verdict,
-                figure.remark,
-            )
-        )
-    widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
+    lines: list[tuple[str, ...]] = [
+        ("figure", "published", "expected", "ours", "unit", "judged by", "", "note")
+    ]
+    for f in figures:
+        values = (None if f.published != f.published else f.published, f.expected)
+        known = ["" if value is None else f"{value:.4g}" for value in values]
+        ours = "-" if f.ours is None else f"{f.ours:.4g}"
+        lines.append((f.name, *known, ours, f.unit, f.judged_by, f.verdict, f.remark))
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join(
         "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
         for line in lines

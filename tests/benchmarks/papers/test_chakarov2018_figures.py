@@ -18,7 +18,7 @@ INPUTS = (figures.filling, figures.hysteresis, figures.small_motions)
 
 @pytest.mark.parametrize("group", figures.GROUPS, ids=lambda group: group.__name__)
 def test_every_figure_is_met_or_named_here(group: Callable[[], list[Figure]]) -> None:
-    made = group()
+    made = list(group())
     assert made
     assert {f.name for f in made if f.passed is False} <= MISSED
     assert all(f.verdict == "MISSED" for f in made if f.name in MISSED)

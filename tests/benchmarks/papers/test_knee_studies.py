@@ -7,12 +7,6 @@ import pytest
 from benchmarks.papers import knee_studies as studies
 
 
-def test_inverse_and_straight_line_of_the_stiffness() -> None:
-    inverse, line = studies.stiffness_errors()
-    assert 1.5 < inverse < 2.3
-    assert 10.5 < line < 11.5
-
-
 @pytest.mark.parametrize(
     ("width", "feedback", "line", "over_line"),
     [(0.0, 5.06, 0.95, 1.0), (0.25e5, 5.20, 1.31, 1.3), (0.5e5, 5.37, 1.69, 1.6)],
@@ -22,10 +16,10 @@ def test_printed_feedback_with_two_feed_forwards(
 ) -> None:
     errors = studies.tension_errors(width)
     assert errors.with_inverse < 1.33
-    assert errors.gain > 3.5
+    assert errors.feedback / errors.with_inverse > 3.5
     assert errors.feedback == pytest.approx(feedback, abs=0.2)
     assert errors.with_line == pytest.approx(line, abs=0.2)
-    assert errors.gain_over_line == pytest.approx(over_line, abs=0.1)
+    assert errors.with_line / errors.with_inverse == pytest.approx(over_line, abs=0.1)
 
 
 def test_designed_feedback_does_no_worse_than_the_printed_one() -> None:
@@ -42,22 +36,14 @@ def test_switch_with_and_without_bumpless_transfer() -> None:
 
 
 @pytest.mark.parametrize(
-    ("activity", "extensors", "with_flexors", "fitted_a", "fitted_b"),
+    ("activity", "expected"),
     [
-        ("walk", 0.884, 1.004, 0.754, 0.733),
-        ("stairs_up", 0.821, 0.886, 0.689, 0.693),
-        ("stairs_down", 0.800, 0.850, 0.729, 0.731),
+        ("walk", (0.884, 1.004, 0.754, 0.733)),
+        ("stairs_up", (0.821, 0.886, 0.689, 0.693)),
+        ("stairs_down", (0.800, 0.850, 0.729, 0.731)),
     ],
 )
-def test_emg_as_delivered_in_the_environment(
-    activity: studies.Activity,
-    extensors: float,
-    with_flexors: float,
-    fitted_a: float,
-    fitted_b: float,
-) -> None:
+def test_emg_as_delivered_in_the_environment(activity, expected) -> None:
     ratios = studies.emg_ratios(activity)
-    assert ratios["emg_extensors_ratio"] == pytest.approx(extensors, abs=0.01)
-    assert ratios["emg_ratio"] == pytest.approx(with_flexors, abs=0.01)
-    assert ratios["emg_extensors_ratio_fitted_a"] == pytest.approx(fitted_a, abs=0.01)
-    assert ratios["emg_extensors_ratio_fitted_b"] == pytest.approx(fitted_b, abs=0.01)
+    names = ("extensors_ratio", "ratio", "extensors_ratio_fitted_a", "extensors_ratio_fitted_b")
+    assert [ratios[f"emg_{name}"] for name in names] == pytest.approx(expected, abs=0.01)
