@@ -400,7 +400,7 @@ def diagnosis(
     """
     from benchmarks.diagnosis import report as telling
     from benchmarks.diagnosis import run as running
-    from benchmarks.speed.diagnosis import whole_reports
+    from benchmarks.speed.diagnosis import timed as reports_timed
     from pam_envs.data.tables import load_contraction_table
     from pam_envs.diagnosis.static.diagnosis import diagnose_readings
 
@@ -425,7 +425,7 @@ def diagnosis(
     place = out or (rows.RESULTS if official else folder / "pages" / chosen)
     beside = {
         "tables": diagnose_readings(load_contraction_table()),
-        "whole_report_s": whole_reports() if timed else (),
+        "whole_report_s": reports_timed()[1] if timed else (),
     }
     arguments = options.arguments + " --timed" * timed
     for path in telling.write(report.records, place, arguments, **beside):

@@ -24,6 +24,7 @@ from pam_envs.diagnosis.fit.single_muscle import MuscleFamily, inputs_of, start_
 from tests.diagnosis import hidden
 
 Array = NDArray[np.float64]
+Effects = list[tuple[hidden.Effect, float]]
 
 NOISE = np.array([hidden.CONTRACTION_NOISE_MM * MM, hidden.PRESSURE_NOISE_BAR * BAR])
 """RMS noise of the sensors [m], [Pa]."""
@@ -54,10 +55,9 @@ class Case:
     ----------
     kind : {"single", "weak", "loud", "clean", "decoy", "pair", "unknown", "idle", "brief"}
         ``loud`` is a single effect under three times the noise with the same absolute size;
-        ``idle`` a clean rig without motion, which cannot be decided; ``brief`` a short recording
-        of a clean rig.
-    seed : int
-        Seed of all random draws.
+        ``idle`` a
+        clean rig without motion, which cannot be decided; ``brief`` a short recording of a clean
+        rig.
     names : tuple of str
         Effects to hide.
     sizes : tuple of float
@@ -91,18 +91,10 @@ class Case:
 
 @dataclass(frozen=True)
 class Truth:
-    """One hidden effect.
+    """One hidden effect with its solved amplitude.
 
-    Attributes
-    ----------
-    effect : Effect
-        Effect with its shape.
-    amplitude : float
-        Solved amplitude.
-    size, raw : float
-        Size after and before the refit of the base, over the usual noise.
-    trace : ndarray, shape (2, T)
-        Contribution to the outputs beside the other effects [m], [Pa].
+    ``size`` and ``raw`` are its size after and before the refit of the base, over the usual noise;
+    ``trace`` its contribution to the outputs beside the other effects [m], [Pa], shape (2, T).
     """
 
     effect: hidden.Effect
@@ -121,18 +113,9 @@ class Truth:
 class Ground:
     """A clean rig under a campaign, with the subspace that a refit of the plant spans.
 
-    Attributes
-    ----------
-    base : hidden.Base
-        Constants of the rig.
-    campaign : hidden.Campaign
-        Inputs.
-    clean : ndarray, shape (2, T)
-        Outputs without effect and noise [m], [Pa].
-    basis : ndarray
-        Orthonormal basis of the changes that a refit can make.
-    order : ndarray of int
-        Order of a flattened trace in ``basis``.
+    ``clean`` are its outputs without effect and noise [m], [Pa], shape (2, T). ``basis`` is
+    orthonormal
+    and spans the changes that a refit can make; ``order`` is that of a flattened trace in it.
     """
 
     base: hidden.Base
@@ -155,30 +138,18 @@ class Ground:
 
 @dataclass(frozen=True)
 class Made:
-    """A generated case: input of the diagnosis, and the hidden truth.
-
-    Attributes
-    ----------
-    recording : Recording
-        Recording of the rig.
-    sheet : Rig
-        Rig file.
-    ground : Ground
-        The clean rig.
-    truths : tuple of Truth
-        Hidden effects in the order of the case.
-    outputs : ndarray, shape (2, T)
-        Outputs with the effects and without noise [m], [Pa].
-    noise : ndarray, shape (2,)
-        RMS noise of the sensors [m], [Pa].
-    """
+    """A generated case: input of the diagnosis, and the hidden truth; RMS noise [m], [Pa]."""
 
     recording: Recording
     sheet: Rig
     ground: Ground
     truths: tuple[Truth, ...]
-    outputs: Array
     noise: Array
+
+    @property
+    def effects(self) -> Effects:
+        """Hidden effects with their amplitudes."""
+        return [(truth.effect, truth.amplitude) for truth in self.truths]
 
 
 def loudest(rows: Array) -> float:
@@ -186,11 +157,9 @@ def loudest(rows: Array) -> float:
     return float(np.sqrt((rows**2).mean(axis=1)).max())
 
 
-def outputs_of(
-    base: hidden.Base, effects: Sequence[tuple[hidden.Effect, float]], campaign: hidden.Campaign
-) -> Array:
+def outputs_of(base: hidden.Base, effects: Effects, campaign: hidden.Campaign) -> Array:
     """Return the outputs of a rig without noise, shape (2, T) [m], [Pa]."""
-    run = hidden.simulate(base, list(effects), campaign)
+    run = hidden.simulate(base, effects, campaign)
     return np.stack([run["contraction_mm"] * MM, run["pressure_bar"] * BAR])
 
 
@@ -292,16 +261,10 @@ def _campaign(case: Case) -> hidden.Campaign:
 
 
 def make(case: Case) -> Made:
-    """Draw a case.
-
-    Raises
-    ------
-    ValueError
-        If no drawn rig has effects of the target sizes.
-    """
+    """Draw a case; a ValueError if no drawn rig has effects of the target sizes."""
     drawn = next(filter(None, (_draw(case, k) for k in range(DRAWS))), None)
     if drawn is None:
-        raise ValueError(f"{case.title}: on none of {DRAWS} drawn rigs can the effect be so large")
+        raise ValueError(f"{case.title}: the effect is too small on all of {DRAWS} drawn rigs")
     ground, found = drawn
     effects = [(effect, amplitude) for effect, amplitude, _ in found]
     outputs = outputs_of(ground.base, effects, ground.campaign)
@@ -314,7 +277,6 @@ def make(case: Case) -> Made:
         sheet,
         ground,
         tuple(_truths(ground, found, outputs)),
-        outputs,
         case.noise * NOISE,
     )
 
@@ -332,25 +294,15 @@ def _truths(
         yield Truth(effect, amplitude, ground.size(alone), raw, trace)
 
 
-@dataclass(frozen=True)
-class Counts:
-    """Number of cases of each kind of a set, for each cause or in total."""
-
-    single: int
-    weak: int
-    clean: int
-    decoy: int
-    pair: int
-    unknown: int
-    idle: int
-    brief: int
-    loud: int
-
-
-SMALL = Counts(single=1, weak=0, clean=3, decoy=2, pair=2, unknown=2, idle=1, brief=1, loud=0)
-FULL = Counts(
-    single=40, weak=20, clean=200, decoy=100, pair=100, unknown=60, idle=20, brief=60, loud=6
-)
+SMALL: dict[str, int] = {
+    **{"single": 1, "weak": 0, "clean": 3, "decoy": 2, "pair": 2},
+    **{"unknown": 2, "idle": 1, "brief": 1, "loud": 0},
+}
+FULL: dict[str, int] = {
+    **{"single": 40, "weak": 20, "clean": 200, "decoy": 100, "pair": 100},
+    **{"unknown": 60, "idle": 20, "brief": 60, "loud": 6},
+}
+"""Number of cases of each kind of a set, for each cause or in total."""
 
 
 def first_seed(selected: str, offset: int = 0) -> int:
@@ -367,47 +319,43 @@ def sizes_in(low: float, high: float, number: int, rng: np.random.Generator) -> 
 
 
 def cases(selected: str = "small", offset: int = 0) -> list[Case]:
-    """Return the cases of a set.
-
-    Parameters
-    ----------
-    chosen : {"small", "tune", "final"}
-        Name of the set.
-    offset : int
-        Another offset gives freshly drawn cases.
-    """
+    """Return the cases of the set "small", "tune" or "final"; another offset draws other cases."""
     counts = SMALL if selected == "small" else FULL
     unknown = hidden.FINAL_UNKNOWN if selected == "final" else hidden.TUNING_UNKNOWN
     start = first_seed(selected, offset)
     rng = np.random.default_rng(start)
-    made = list(_specified(counts, unknown, rng))
-    numbered = [replace(case, seed=start + i) for i, case in enumerate(made)]
-    return numbered + [
-        replace(case, kind="loud", noise=LOUDER)
+    numbered = [
+        replace(case, seed=start + i) for i, case in enumerate(_specified(counts, unknown, rng))
+    ]
+    loud = [
+        case
         for name in hidden.EFFECTS
         for case in [
             case
             for case in numbered
             if case.kind == "single" and case.names == (name,) and case.sizes[0] >= LOUDER
-        ][: counts.loud]
+        ][: counts["loud"]]
     ]
+    return numbered + [replace(case, kind="loud", noise=LOUDER) for case in loud]
 
 
-def _specified(counts: Counts, unknown: Sequence[str], rng: np.random.Generator) -> Iterator[Case]:
+def _specified(
+    counts: dict[str, int], unknown: Sequence[str], rng: np.random.Generator
+) -> Iterator[Case]:
     """Yield the cases of a set without their seeds."""
     for name in hidden.EFFECTS:
-        for size in sizes_in(*LARGE, counts.single, rng):
+        for size in sizes_in(*LARGE, counts["single"], rng):
             yield Case("single", 0, (name,), (float(size),))
-        for size in sizes_in(*WEAK, counts.weak, rng):
+        for size in sizes_in(*WEAK, counts["weak"], rng):
             yield Case("weak", 0, (name,), (float(size),))
-    yield from [Case("clean", 0)] * counts.clean
-    yield from [Case("decoy", 0)] * counts.decoy
+    yield from [Case("clean", 0)] * counts["clean"]
+    yield from [Case("decoy", 0)] * counts["decoy"]
     pairs = list(combinations(hidden.EFFECTS, 2))
-    both = zip(*(sizes_in(*LARGE, counts.pair, rng) for _ in range(2)), strict=True)
+    both = zip(*(sizes_in(*LARGE, counts["pair"], rng) for _ in range(2)), strict=True)
     for k, (one, two) in zip(rng.permutation(len(pairs)), both, strict=False):
         yield Case("pair", 0, pairs[k], (float(one), float(two)))
-    for i, size in enumerate(sizes_in(*LARGE, counts.unknown, rng)):
+    for i, size in enumerate(sizes_in(*LARGE, counts["unknown"], rng)):
         yield Case("unknown", 0, (unknown[i % len(unknown)],), (float(size),))
-    yield from [Case("idle", 0, campaign="idle")] * counts.idle
-    for i in range(counts.brief):
+    yield from [Case("idle", 0, campaign="idle")] * counts["idle"]
+    for i in range(counts["brief"]):
         yield Case("brief", 0, campaign="short", seconds=BRIEF[i % len(BRIEF)])

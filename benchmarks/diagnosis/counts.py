@@ -7,7 +7,7 @@ Pure functions of the records. Shares have exact (Clopper-Pearson) 95 % confiden
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -24,8 +24,13 @@ BINS = ((0.1, 0.3), (0.3, 1.0), (1.0, 2.0), (2.0, 5.0))
 CURVE = (0.1, 0.2, 0.35, 0.6, 1.0, 1.5, 2.2, 3.3, 5.0)
 """Edges of the detection curve."""
 HELD_OUT = 1.1
+WITHOUT_CAUSE = {
+    **dict.fromkeys(("clean", "decoy", "brief"), "adequate"),
+    **{"idle": "insufficient", "unknown": "unexplained"},
+}
+"""Correct verdict on rigs that hide nothing of the catalogue, by kind."""
 GAP = 0.15
-WORSE = 0.05
+WORSE = 1.05
 LEVEL = 0.95
 
 Numbers = dict[str, Any]
@@ -73,6 +78,11 @@ class Answer:
         return self.names[0] if self.claims else self.verdict
 
     @property
+    def failed(self) -> bool:
+        """True if the run failed."""
+        return self.verdict == "failed"
+
+    @property
     def right_first(self) -> bool:
         """True if the first cause is a hidden one."""
         return self.first in self.truth
@@ -90,9 +100,8 @@ class Answer:
     @property
     def wrong(self) -> bool:
         """True if an absent cause is named without ambiguity."""
-        return self.verdict == "failed" or (
-            self.verdict == "named" and bool(set(self.names) - set(self.truth))
-        )
+        absent = bool(set(self.names) - set(self.truth))
+        return self.failed or (self.verdict == "named" and absent)
 
     @property
     def extra(self) -> bool:
@@ -111,13 +120,14 @@ class Answer:
 
     def right_answer(self, verdict: str, names: Iterable[str]) -> bool:
         """Return whether another verdict on the same rig is correct."""
-        if self.kind in ("clean", "decoy", "brief"):
-            return verdict == "adequate"
-        if self.kind == "idle":
-            return verdict == "insufficient"
-        if self.kind == "unknown":
-            return verdict == "unexplained"
+        if self.kind in WITHOUT_CAUSE:
+            return verdict == WITHOUT_CAUSE[self.kind]
         return verdict == "named" and set(names) == set(self.truth)
+
+    @property
+    def right(self) -> bool:
+        """True if the verdict is the correct one."""
+        return self.right_answer(self.verdict, self.names)
 
     @property
     def held_out(self) -> float | None:
@@ -134,6 +144,32 @@ class Answer:
         """RMS error of the first effect's trace over its RMS."""
         found = self.traces.get(self.truth[0])
         return found and found["error"]
+
+
+SHARES: dict[str, tuple[str, Callable[[Answer], bool]]] = {
+    "right_first": ("single", lambda one: one.right_first),
+    "exact": ("single", lambda one: one.exact),
+    "wrong": ("single weak", lambda one: one.wrong),
+    "wrong_first": ("single weak", lambda one: one.wrong and not one.extra),
+    "extra": ("single", lambda one: one.extra or one.failed),
+    "extra_weak": ("weak", lambda one: one.extra or one.failed),
+    "loud": ("loud", lambda one: one.right_first),
+    "loud_exact": ("loud", lambda one: one.exact),
+    "loud_wrong": ("loud", lambda one: one.wrong),
+    "false_alarms": ("clean decoy", lambda one: one.alarm),
+    "false_alarms_clean": ("clean", lambda one: one.alarm),
+    "false_alarms_decoy": ("decoy", lambda one: one.alarm),
+    "false_alarms_brief": ("brief", lambda one: one.alarm),
+    "false_names": ("clean decoy", lambda one: one.claims or one.failed),
+    "unknown": ("unknown", lambda one: one.right),
+    "idle": ("idle", lambda one: one.right),
+    "pair": ("pair", lambda one: one.both),
+    "pair_exact": ("pair", lambda one: one.exact),
+    "pair_one": ("pair", lambda one: one.right_first and len(one.names) == 1),
+    "pair_wrong": ("pair", lambda one: one.wrong),
+    "pair_first": ("pair", lambda one: one.right_first),
+}
+"""Shares of the page: kinds of cases, and what is counted."""
 
 
 def exact_interval(count: int, n: int, level: float = LEVEL) -> list[float]:
@@ -174,47 +210,27 @@ def spread(values: Iterable[float | None]) -> Numbers:
     return {"n": len(known), **dict(zip(names, found, strict=True))}
 
 
-def without_truth(by_kind: Mapping[str, list[Answer]]) -> Numbers:
-    """Return the statistics of rigs without an effect of the catalogue."""
-    clean, decoy = by_kind.get("clean", []), by_kind.get("decoy", [])
-    unknown, idle = by_kind.get("unknown", []), by_kind.get("idle", [])
-    brief = by_kind.get("brief", [])
-    named = sorted({one.truth[0] for one in unknown})
+def shares(by_kind: Mapping[str, list[Answer]]) -> Numbers:
+    """Return all of :data:`SHARES`."""
     return {
-        "false_alarms": share(one.alarm for one in clean + decoy),
-        "false_alarms_clean": share(one.alarm for one in clean),
-        "false_alarms_decoy": share(one.alarm for one in decoy),
-        "false_names": share(one.claims or one.verdict == "failed" for one in clean + decoy),
-        "alarms": dict(Counter(one.first for one in clean + decoy if one.alarm).most_common()),
-        "false_alarms_brief": share(one.alarm for one in brief),
-        "brief": dict(Counter(one.first for one in brief).most_common()),
-        "unknown": share(one.verdict == "unexplained" for one in unknown),
-        "idle": share(one.verdict == "insufficient" for one in idle),
-        "unknown_by_kind": {
-            name: {
-                **share(o.verdict == "unexplained" for o in unknown if o.truth == (name,)),
-                "others": dict(
-                    Counter(
-                        o.first
-                        for o in unknown
-                        if o.truth == (name,) and o.verdict != "unexplained"
-                    ).most_common()
-                ),
-            }
-            for name in named
-        },
+        name: share(mark(one) for kind in kinds.split() for one in by_kind[kind])
+        for name, (kinds, mark) in SHARES.items()
     }
 
 
-def of_pairs(pairs: Sequence[Answer]) -> Numbers:
-    """Return the statistics of rigs with two hidden effects."""
-    return {
-        "pair": share(one.both for one in pairs),
-        "pair_exact": share(one.exact for one in pairs),
-        "pair_one": share(one.claims and len(one.names) == 1 and one.right_first for one in pairs),
-        "pair_wrong": share(one.wrong for one in pairs),
-        "pair_first": share(one.right_first for one in pairs),
-    }
+def firsts(answers: Iterable[Answer]) -> dict[str, int]:
+    """Return how often each first cause, or verdict without one, is given."""
+    return dict(Counter(one.first for one in answers).most_common())
+
+
+def unknown_by_kind(unknown: Sequence[Answer]) -> Numbers:
+    """Return the answers to each effect outside the catalogue."""
+    made = {}
+    for name in sorted({one.truth[0] for one in unknown}):
+        ones = [one for one in unknown if one.truth == (name,)]
+        others = firsts(one for one in ones if not one.right)
+        made[name] = {**share(one.right for one in ones), "others": others}
+    return made
 
 
 def _bin(size: float) -> str:
@@ -266,17 +282,16 @@ def curve(alone: Sequence[Answer]) -> list[Numbers]:
     made = []
     for low, high in pairwise(CURVE):
         ones = [one for one in alone if low <= one.size < high]
-        made.append(
-            {
-                "low": low,
-                "high": high,
-                "detected": share(one.alarm and one.verdict != "failed" for one in ones),
-                "right_first": share(one.right_first for one in ones),
-                "exact": share(one.exact for one in ones),
-                "wrong": share(one.wrong for one in ones),
-            }
-        )
+        marks = {mark: share(getattr(o, mark) for o in ones) for mark in ("right_first", "exact")}
+        detected = share(one.alarm and not one.failed for one in ones)
+        wrong = share(one.wrong for one in ones)
+        made.append({"low": low, "high": high, "detected": detected, **marks, "wrong": wrong})
     return made
+
+
+def held_out_share(ones: Iterable[Answer]) -> Numbers:
+    """Return the share of named cases with a held-out error near the noise floor."""
+    return share((one.held_out or np.inf) <= HELD_OUT for one in ones if one.verdict == "named")
 
 
 def of_cause(name: str, single: Sequence[Answer], weak: Sequence[Answer]) -> Numbers:
@@ -291,20 +306,18 @@ def of_cause(name: str, single: Sequence[Answer], weak: Sequence[Answer]) -> Num
         "weak_right_first": share(one.right_first for one in small),
         "raw": spread(t["raw"] / t["size"] for o in ones for t in o.record.get("truths", ())),
         "trace": spread(one.trace_error for one in ones if one.right_first),
-        "held_out": share(
-            (one.held_out or np.inf) <= HELD_OUT for one in ones if one.verdict == "named"
-        ),
+        "held_out": held_out_share(ones),
         "recovery": recovery(ones + small),
     }
 
 
 def least_right(single: Sequence[Answer]) -> Numbers:
     """Return the cause with the smallest share of correct first names."""
-    made = []
-    for name in EFFECTS:
-        found = share(one.right_first for one in single if one.truth == (name,))
-        if found["n"]:
-            made.append({"name": name, **found})
+    by_cause = [
+        {"name": name, **share(one.right_first for one in single if one.truth == (name,))}
+        for name in EFFECTS
+    ]
+    made = [found for found in by_cause if found["n"]]
     return min(made, key=lambda found: found["value"], default={"name": None, **share(())})
 
 
@@ -348,34 +361,29 @@ def following(answers: Sequence[Answer]) -> Numbers:
 
 def closed_loops(answers: Sequence[Answer]) -> Numbers:
     """Return the closed-loop improvement by the extended plants on the hidden rigs."""
-    ran = [one for one in answers if one.record.get("loop")]
-    failed = [one for one in ran if one.record["loop"].get("failure")]
-    loops = [(one.truth[0], one.record["loop"]) for one in ran if one not in failed]
-    wide = [(name, loop) for name, loop in loops if loop["gap"] >= GAP]
+    ran = [(one.truth[0], one.record["loop"]) for one in answers if one.record.get("loop")]
+    loops = [(name, loop) for name, loop in ran if not loop.get("failure")]
+    failed = [True] * (len(ran) - len(loops))
+
+    def of(name: str | None) -> Numbers:
+        some = [loop for other, loop in loops if name in (None, other)]
+        wide = [loop for loop in some if loop["gap"] >= GAP]
+        return {
+            "n": len(some),
+            "gap": len(wide),
+            "recovered": spread(loop["recovered"] for loop in wide),
+            "better_percent": spread(loop["better_percent"]["value"] for loop in some),
+        }
+
+    worse = [(loop["gap"], loop["after_mm"] > WORSE * loop["before_mm"]) for _, loop in loops]
     return {
+        **of(None),
         "n": len(ran),
         "failed": len(failed),
-        "gap": len(wide),
-        "recovered": spread(loop["recovered"] for _, loop in wide),
-        "worse": share([_worse(loop) for _, loop in wide] + [True] * len(failed)),
-        "worse_of_all": share([_worse(loop) for _, loop in loops] + [True] * len(failed)),
-        "better_percent": spread(loop["better_percent"]["value"] for _, loop in loops),
-        "by_cause": {
-            name: {
-                "n": sum(other == name for other, _ in loops),
-                "gap": sum(other == name for other, _ in wide),
-                "recovered": spread(loop["recovered"] for other, loop in wide if other == name),
-                "better_percent": spread(
-                    loop["better_percent"]["value"] for other, loop in loops if other == name
-                ),
-            }
-            for name in COMPENSABLE
-        },
+        "worse": share([mark for gap, mark in worse if gap >= GAP] + failed),
+        "worse_of_all": share([mark for _, mark in worse] + failed),
+        "by_cause": {name: of(name) for name in COMPENSABLE},
     }
-
-
-def _worse(loop: Mapping[str, Any]) -> bool:
-    return bool(loop["after_mm"] > (1.0 + WORSE) * loop["before_mm"])
 
 
 def line(one: Answer) -> str:

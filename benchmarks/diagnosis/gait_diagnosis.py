@@ -18,19 +18,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.diagnosis.gait_recording import GaitRecording, record
+from benchmarks.diagnosis.plain_plant import Parameters, PlainPlant, plain_causes
 from pam_envs.constants import GRAVITY
-from pam_envs.diagnosis.cause import Cause, Form, Term
+from pam_envs.diagnosis.cause import Cause
 from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.decide.structure import Regressors
 from pam_envs.diagnosis.decide.verdict import Decision, decide
 from pam_envs.diagnosis.fit.blocks import EVERY, Blocks
 from pam_envs.diagnosis.fit.candidate import Candidate, fit_base
-from pam_envs.diagnosis.fit.least_squares import Free, Problem
+from pam_envs.diagnosis.fit.least_squares import Problem
 from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE
 
 Array = NDArray[np.float64]
 
-BOUNDS: dict[str, tuple[float, float, float, float]] = {
+PARAMETERS: Parameters = {
     "shank.length": (0.43, 0.3, 0.6, 0.01),
     "horizontal.share": (0.0, -3.0, 3.0, 0.1),
     "weight.share": (0.0, -5.0, 5.0, 0.1),
@@ -44,49 +45,27 @@ BOUNDS: dict[str, tuple[float, float, float, float]] = {
     "knee.damping": (0.0, -20.0, 20.0, 0.5),
     "torque.bias": (0.0, -50.0, 50.0, 1.0),
 }
-"""Neutral value, bounds and meaningful change of every parameter [SI]."""
-NAMES = tuple(BOUNDS)
-BASE = ("shank.length",)
-"""Base parameters; the length is known to 1 cm."""
 
 
 @dataclass(frozen=True)
-class GaitEstimate:
-    """Eq. 1 with optional terms, as a diagnosable plant.
-
-    Attributes
-    ----------
-    recording : GaitRecording
-        Inputs.
-    """
+class GaitEstimate(PlainPlant):
+    """Eq. 1 with optional terms for the inputs of a recording, as a diagnosable plant."""
 
     recording: GaitRecording
 
     channels = ("torque",)
     units = ("N m",)
 
-    @property
-    def column(self) -> Array:
-        """Neutral parameters, shape (p,)."""
-        return np.array([neutral for neutral, *_ in BOUNDS.values()])
-
-    def free(self, name: str, **changes: Any) -> Free:
-        """Return the fit settings of a parameter."""
-        start, low, high, scale = BOUNDS[name]
-        made = dict(low=low, high=high, scale=scale, start=start)
-        made["prior"] = 1.0 if name in BASE else np.inf
-        return Free(name, NAMES.index(name), **{**made, **changes})
-
-    def base(self) -> tuple[Free, ...]:
-        """Return the base parameters."""
-        return tuple(self.free(name) for name in BASE)
+    parameters = PARAMETERS
+    base_names = ("shank.length",)
+    weighed = base_names  # the length is known to 1 cm
 
     def simulate(self, columns: Array) -> Array:
         """Return the knee torque [N m] for parameters (n, p), shape (1, T, n)."""
         return np.stack([self._torque(column) for column in columns], axis=-1)[None]
 
     def _torque(self, column: Array) -> Array:
-        r, at = self.recording, dict(zip(NAMES, column, strict=True))
+        r, at = self.recording, dict(zip(PARAMETERS, column, strict=True))
         lean = r.lean + at["lean.bias"] + at["foot.share"] * (r.ankle - r.lean)
         arm = at["shank.length"] * np.sin(lean) - r.cop - at["sole.shift"]
         shoe = (1.0 + at["force.gain"]) * r.vertical * arm
@@ -117,89 +96,44 @@ class GaitEstimate:
         return Regressors(values, np.array(rows))
 
 
-def _one(name: str, *starts: float) -> Term:
-    return Term(name, starts)
-
-
-CAUSES = (
-    Cause(
-        "horizontal_force",
-        "the horizontal part of the ground's force",
-        (Form("times the knee's height", (_one("horizontal.share", 0.5),)),),
-        signature="flexion while the leg brakes, extension while it drives; with the pace squared",
-        neighbours=("delay", "sole_shift"),
-        experiment="The same walk at two paces.",
-        sensor="a force plate, or an accelerometer at the waist",
-    ),
-    Cause(
-        "shank_weight",
-        "the weight of shank and foot",
-        (Form("at their centre of mass", (_one("weight.share", 0.5),)),),
-        signature="with the lean of the shank, whatever the foot bears",
-        neighbours=("lean_bias",),
-        experiment="The leg lifted and held at several leans.",
-    ),
-    Cause(
-        "inertia",
-        "the acceleration of shank and foot",
-        (Form("below a hip that moves evenly", (_one("inertia.share", 0.5),)),),
-        signature="at the heel's contact and before the toe leaves; with the pace squared",
-        experiment="The same walk at two paces.",
-    ),
-    Cause(
-        "force_gain",
-        "load cells that read too much or too little",
-        (Form("in proportion", (_one("force.gain", 0.05),)),),
-        signature="in proportion to the estimate",
-        experiment="Standing on one leg on a scale.",
-    ),
-    Cause(
-        "sole_shift",
-        "a sole that is not where it was measured",
-        (Form("along the foot", (_one("sole.shift", 0.005),)),),
-        signature="in proportion to the ground's force",
-        neighbours=("lean_bias",),
-        experiment="Standing upright: the estimate is the force times the shift.",
-    ),
-    Cause(
-        "lean_bias",
-        "a lean that is read from another zero",
-        (Form("constant", (_one("lean.bias", 0.02),)),),
-        signature="in proportion to the ground's force",
-        neighbours=("sole_shift",),
-        experiment="Standing with the shank upright.",
-    ),
-    Cause(
-        "foot_pitch",
-        "the pitch of the foot, taken to lie flat",
-        (Form("in proportion", (_one("foot.share", 0.2),)),),
-        signature="at the heel's contact and when it rises",
-        experiment="Standing on the ball of the foot.",
-    ),
-    Cause(
-        "delay",
-        "a shoe and a laboratory of two clocks",
-        (Form("constant", (_one("shoe.delay", 0.02, -0.02),)),),
-        signature="with the rate of the torque",
-        experiment="A stamp of the foot.",
-    ),
-    Cause(
-        "passive_knee",
-        "a knee that is stiff or damped by itself",
-        (
-            Form("spring", (_one("knee.stiffness", 2.0),)),
-            Form("damper", (_one("knee.damping", 0.5),)),
+CAUSES = plain_causes(
+    {
+        "horizontal_force": (
+            "the horizontal part of the ground's force",
+            ("times the knee's height", "horizontal.share", 0.5),
         ),
-        signature="with the knee's flexion or its rate, whatever the foot bears",
-        experiment="A leg that is let swing.",
-    ),
-    Cause(
-        "torque_bias",
-        "a laboratory whose torque has another zero",
-        (Form("constant", (_one("torque.bias", 1.0),)),),
-        signature="the same at all times",
-        experiment="A recording with nobody on the plate.",
-    ),
+        "shank_weight": (
+            "the weight of shank and foot",
+            ("at their centre of mass", "weight.share", 0.5),
+        ),
+        "inertia": (
+            "the acceleration of shank and foot",
+            ("below a hip that moves evenly", "inertia.share", 0.5),
+        ),
+        "force_gain": (
+            "load cells that read too much or too little",
+            ("in proportion", "force.gain", 0.05),
+        ),
+        "sole_shift": (
+            "a sole that is not where it was measured",
+            ("along the foot", "sole.shift", 0.005),
+        ),
+        "lean_bias": ("a lean that is read from another zero", ("constant", "lean.bias", 0.02)),
+        "foot_pitch": (
+            "the pitch of the foot, taken to lie flat",
+            ("in proportion", "foot.share", 0.2),
+        ),
+        "delay": ("a shoe and a laboratory of two clocks", ("constant", "shoe.delay", 0.02, -0.02)),
+        "passive_knee": (
+            "a knee that is stiff or damped by itself",
+            ("spring", "knee.stiffness", 2.0),
+            ("damper", "knee.damping", 0.5),
+        ),
+        "torque_bias": (
+            "a laboratory whose torque has another zero",
+            ("constant", "torque.bias", 1.0),
+        ),
+    }
 )
 """Causes of errors of the estimate or of the recording."""
 
@@ -241,14 +175,7 @@ class Outcome:
 
 
 def white_noise(values: Array, stride: NDArray[np.int64]) -> float:
-    """Return the RMS of the white part of samples, from second differences within strides.
-
-    Parameters
-    ----------
-    values : ndarray, shape (T,)
-        NaN where there is none.
-    stride : ndarray of int, shape (T,)
-    """
+    """Return the RMS of the white part of samples, from second differences within strides."""
     second = np.diff(values, 2)
     second = second[(stride[2:] == stride[:-2]) & np.isfinite(second)]
     low, high = np.quantile(second, [0.1587, 0.8413])
@@ -274,7 +201,6 @@ def diagnose(
     Parameters
     ----------
     recording : GaitRecording
-        Recorded strides.
     causes : sequence of Cause
         Rival terms.
     rule : Rule, optional
@@ -293,14 +219,6 @@ def diagnose(
     return Outcome(recording, problem, blocks, base, decision)
 
 
-def line(title: str, found: Outcome) -> str:
-    """Return a result in one line."""
-    shares = {n: v for n, v in found.values.items() if n not in BASE}
-    terms = ", ".join(f"{name} {value:.2f}" for name, value in shares.items()) or "nothing"
-    before, after = (found.error(c) for c in (found.base, found.decision.model))
-    return f"{title}: {found.decision.verdict}; {terms}; {before:.1f} -> {after:.1f} N m"
-
-
 def main(strides: int = 24, seed: int = 1) -> None:
     """Print the results at several paces, and of walks at two paces."""
     walks = {f"{p:g} s a stride": record(p, strides, seed) for p in PACES}
@@ -309,7 +227,10 @@ def main(strides: int = 24, seed: int = 1) -> None:
         walks[f"{title} and {PAPER_STRIDE:g} s"] = walk.and_then(slow)
     for title, walk in walks.items():
         found = diagnose(walk)
-        print(line(title, found))
+        shares = {n: v for n, v in found.values.items() if n not in GaitEstimate.base_names}
+        terms = ", ".join(f"{name} {value:.2f}" for name, value in shares.items()) or "nothing"
+        before, after = (found.error(c) for c in (found.base, found.decision.model))
+        print(f"{title}: {found.decision.verdict}; {terms}; {before:.1f} -> {after:.1f} N m")
         for k, level in enumerate(found.ladder[1:], 1):
             gains = [f"{'+'.join(r['names'])} {r['gain']:.2f}" for r in level["rivals"][:4]]
             print(f"  {k}: {'; '.join(gains)}")

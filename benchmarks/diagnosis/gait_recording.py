@@ -7,7 +7,6 @@ makes Eq. (1) of them. No two strides are alike: pace and centre of pressure var
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -39,22 +38,19 @@ class GaitRecording:
     Attributes
     ----------
     stride : ndarray of int
-        Which stride a sample is of.
+        Number of the stride of each sample.
     torque : ndarray
         Knee torque by inverse dynamics [N m]; NaN while the foot is in the air.
     vertical, cop, lean : ndarray
-        What the orthosis reads: ground force [N], centre of pressure [m ahead of the ankle], lean
-        of the shank [rad].
+        Readings of the orthosis: ground force [N], centre of pressure [m ahead of the ankle], lean
+        of
+        the shank [rad].
     horizontal : ndarray
-        Of the plate [N], ahead positive.
-    knee, knee_rate : ndarray
-        Flexion [rad], [rad/s].
-    ankle : ndarray
-        Dorsiflexion [rad].
+        Ground force on the plate [N], ahead positive.
+    knee, knee_rate, ankle : ndarray
+        Flexion [rad], [rad/s], dorsiflexion [rad].
     inertial : ndarray
         Knee torque [N m] that accelerates shank and foot, from the markers.
-    leg : Leg
-        Whose it is.
     """
 
     stride: NDArray[np.int64]
@@ -88,18 +84,9 @@ class GaitRecording:
 
 
 def record(pace: float, strides: int, seed: int = 0, noise: float = 1.0) -> GaitRecording:
-    """Return strides of level walking.
+    """Return strides of level walking with a mean duration [s].
 
-    Parameters
-    ----------
-    pace : float
-        Mean duration of a stride [s].
-    strides : int
-        How many.
-    seed : int
-        Of all draws.
-    noise : float
-        Share of the sensors' noise that acts; 0: none.
+    ``noise`` is the share of the sensors' noise that acts.
     """
     rng = np.random.default_rng(seed)
     times = pace * (1.0 + PACE_SPREAD * rng.uniform(-1.0, 1.0, strides))
@@ -109,9 +96,7 @@ def record(pace: float, strides: int, seed: int = 0, noise: float = 1.0) -> Gait
         for time, aim in zip(times, aims, strict=True)
     ]
     columns = _strides(plants, times)
-    leg = KneeOrthosis.on_leg("walk").leg
-    plant = plants[0]
-    n, loaded = len(columns["lean"]), columns["vertical"] > LOADED
+    plant, n, loaded = plants[0], len(columns["lean"]), columns["vertical"] > LOADED
     sizes = {
         "vertical": plant.ground.noise,
         "cop": plant.cop.noise,
@@ -123,15 +108,14 @@ def record(pace: float, strides: int, seed: int = 0, noise: float = 1.0) -> Gait
         columns[name] = columns[name] + noise * size * rng.standard_normal(n)
     columns["torque"] = np.where(loaded, columns["torque"], np.nan)
     of = columns.pop("stride").astype(np.int64)
-    return GaitRecording(**columns, stride=of, leg=leg)
+    return GaitRecording(**columns, stride=of, leg=KneeOrthosis.on_leg("walk").leg)
 
 
-def _strides(plants: Sequence[KneeOrthosis], times: Array) -> dict[str, Array]:
+def _strides(plants: list[KneeOrthosis], times: Array) -> dict[str, Array]:
     """Return the second of three strides of each plant, one after the other, free of noise."""
     steps = round(3.0 * float(times.max()) / PERIOD)
     made = simulate_knee(plants, np.full(steps, 1.5e5), pressure=1.5e5)
     turns = (np.arange(1, steps + 1) * PERIOD)[:, None] / times
-    inertial = inertial_torque(made["shank"], made["knee"], plants[0].leg)
     source = {
         "torque": made["demand"],
         "vertical": made["ground_z"],
@@ -141,7 +125,7 @@ def _strides(plants: Sequence[KneeOrthosis], times: Array) -> dict[str, Array]:
         "knee": made["knee"],
         "knee_rate": made["knee_rate"],
         "ankle": made["ankle"],
-        "inertial": inertial,
+        "inertial": inertial_torque(made["shank"], made["knee"], plants[0].leg),
         "stride": np.broadcast_to(np.arange(len(plants)), turns.shape),
     }
     second = ((turns >= 1.0) & (turns < 2.0)).T
@@ -151,11 +135,7 @@ def _strides(plants: Sequence[KneeOrthosis], times: Array) -> dict[str, Array]:
 def inertial_torque(lean: Array, knee: Array, leg: Leg) -> Array:
     """Return the knee torque [N m] that accelerates shank and foot below a hip that moves evenly.
 
-    Parameters
-    ----------
-    lean, knee : ndarray, shape (T, n)
-        Lean of the shank and flexion of the knee [rad], one sample a control period.
-    leg : Leg
+    Lean of the shank and flexion of the knee [rad] have shape (T, n), one sample a control period.
     """
     first, second = (_derivatives(angle) for angle in (lean, knee))
     thigh, rate, acceleration = knee - lean, second[0] - first[0], second[1] - first[1]

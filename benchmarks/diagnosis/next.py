@@ -30,31 +30,26 @@ FRESH = ("cycles_after_rest",)
 
 
 def again(case: Case, made: Made, plan_name: str) -> tuple[Recording, Rig]:
-    """Return the recording of the campaign and the experiment after it, and the owner's sheet.
-
-    Parameters
-    ----------
-    case : Case
-    made : Made
-        The case, made.
-    plan_name : str
-        As the report names the experiment.
-    """
+    """Return the recording of the campaign and the experiment after it, and the owner's sheet."""
     means = Means.of(made.recording, made.sheet)
     plan = {p.name: p for p in plans(means)}[plan_name]
-    before, extra = made.ground.campaign, _campaign(plan, made.ground.campaign)
-    effects = [(truth.effect, truth.amplitude) for truth in made.truths]
+    before = made.ground.campaign
+    extra = _campaign(plan, before)
     whole = _joined(before, extra)
     sheet = sheet_of(made.ground.base, whole, case.noise)
-    if plan.name in FRESH:
-        columns = _after_rest(case, made, effects, before, extra)
+    if plan.name in FRESH:  # time starts anew in the second recording
+        runs = [(made.effects, before), (made.effects, extra)]
     else:
         share = before.command_bar.size / whole.command_bar.size
-        lasting = [(_sooner(effect, share), amplitude) for effect, amplitude in effects]
-        columns = hidden.make_recording(
-            made.ground.base, lasting, whole, case.seed + 13, noise_factor=case.noise
+        runs = [([(_sooner(effect, share), a) for effect, a in made.effects], whole)]
+    columns = [
+        hidden.make_recording(
+            made.ground.base, effects, campaign, case.seed + 13 + k, noise_factor=case.noise
         )
-    return recording_of(columns, sheet, f"case {case.seed} and {plan.name}"), sheet
+        for k, (effects, campaign) in enumerate(runs)
+    ]
+    joined = {name: np.concatenate([run[name] for run in columns]) for name in columns[0]}
+    return recording_of(joined, sheet, f"case {case.seed} and {plan.name}"), sheet
 
 
 def _campaign(plan: Plan, before: hidden.Campaign) -> hidden.Campaign:
@@ -85,23 +80,6 @@ def _sooner(effect: hidden.Effect, share: float) -> hidden.Effect:
     return replace(effect, shape={**effect.shape, "when": share * effect.shape["when"]})
 
 
-def _after_rest(
-    case: Case,
-    made: Made,
-    effects: list[tuple[hidden.Effect, float]],
-    before: hidden.Campaign,
-    extra: hidden.Campaign,
-) -> dict[str, np.ndarray]:
-    """Return both recordings, one after the other; time starts anew in the second."""
-    runs = [
-        hidden.make_recording(
-            made.ground.base, effects, campaign, case.seed + 13 + k, noise_factor=case.noise
-        )
-        for k, campaign in enumerate((before, extra))
-    ]
-    return {name: np.concatenate([run[name] for run in runs]) for name in runs[0]}
-
-
 # --- controllers on the rig ---------------------------------------------------------------------
 
 
@@ -111,10 +89,9 @@ class DrivenRig:
     period = PERIOD
 
     def __init__(self, made: Made, load: float, celsius: float) -> None:
-        effects = [(truth.effect, truth.amplitude) for truth in made.truths]
         self._rig = hidden.Stepper(
             made.ground.base,
-            effects,
+            made.effects,
             load,
             0,
             PERIOD,
@@ -153,13 +130,7 @@ def _advance(
 
 
 class OracleBatch:
-    """Copies of a hidden rig side by side, free of noise.
-
-    Attributes
-    ----------
-    position : ndarray, shape (n,)
-        True contractions [m].
-    """
+    """Copies of a hidden rig side by side, free of noise; ``position`` [m] is true, shape (n,)."""
 
     def __init__(self, constants_of: Any, states: Any, celsius: float) -> None:
         self._constants, self.states, self._celsius = constants_of, states, celsius
@@ -188,8 +159,7 @@ class OracleRig:
 
     def __init__(self, made: Made, load: float, celsius: float) -> None:
         self.noise = float(made.noise[0])
-        effects = [(truth.effect, truth.amplitude) for truth in made.truths]
-        self._constants = constants(made.ground.base, effects, DURATION)
+        self._constants = constants(made.ground.base, made.effects, DURATION)
         self._rest = blank(STATE)
         begin(self._constants, self._rest, load)
         self._celsius = celsius

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from benchmarks.diagnosis import counts as counting
 from benchmarks.diagnosis.counts import BINS, GAP, HELD_OUT, VERDICTS, Answer, Numbers, share
@@ -49,12 +48,11 @@ def figures(
     tables: Mapping[str, Any] | None = None,
     whole_report_s: Sequence[float] = (),
 ) -> Numbers:
-    """Return all statistics of the page.
+    """Return all statistics of the page from the records of :func:`benchmarks.diagnosis.run.run`.
 
     Parameters
     ----------
     records : sequence of mappings
-        From :func:`benchmarks.diagnosis.run.run`.
     tables : mapping, optional
         Report of :func:`pam_envs.diagnosis.static.diagnosis.diagnose_readings` on the measured
         tables.
@@ -62,53 +60,39 @@ def figures(
         Durations of whole reports on 10 minutes at 50 Hz, on 2 cores [s].
     """
     answers = [Answer.of(record) for record in records]
-    by_kind: dict[str, list[Answer]] = {}
+    kinds = defaultdict[str, list[Answer]](list)
     for one in answers:
-        by_kind.setdefault(one.kind, []).append(one)
-    single, weak = by_kind.get("single", []), by_kind.get("weak", [])
-    alone = single + weak
+        kinds[one.kind].append(one)
+    cases = {kind: len(ones) for kind, ones in sorted(kinds.items())}
+    single, weak = kinds["single"], kinds["weak"]
+    alone, named = single + weak, [one for one in answers if one.verdict == "named"]
+    failed = [one for one in answers if one.failed]
+    pairs = [found["error"] for one in kinds["pair"] for found in one.traces.values()]
     return {
-        "cases": {kind: len(ones) for kind, ones in sorted(by_kind.items())},
+        "cases": cases,
         "rule_versions": sorted({r["rule_version"] for r in records if not r["failure"]}),
         "verdicts": counting.verdicts_by_size(alone),
         "confusion": counting.confusion(single),
-        "confused": counting.confused(alone + by_kind.get("loud", [])),
+        "confused": counting.confused(alone + kinds["loud"]),
         "curve": counting.curve(alone),
         "by_cause": {name: counting.of_cause(name, single, weak) for name in EFFECTS},
-        "right_first": share(one.right_first for one in single),
+        **counting.shares(kinds),
         "least_right_first": counting.least_right(single),
-        "exact": share(one.exact for one in single),
-        "wrong": share(one.wrong for one in alone),
-        "wrong_first": share(one.wrong and not one.extra for one in alone),
-        "extra": share(one.extra or one.verdict == "failed" for one in single),
-        "extra_weak": share(one.extra or one.verdict == "failed" for one in weak),
         "ambiguous_with_truth": share(o.listed for o in alone if o.verdict == "ambiguous"),
-        "loud": share(one.right_first for one in by_kind.get("loud", [])),
-        "loud_exact": share(one.exact for one in by_kind.get("loud", [])),
-        "loud_wrong": share(one.wrong for one in by_kind.get("loud", [])),
-        **counting.without_truth(by_kind),
-        **counting.of_pairs(by_kind.get("pair", [])),
+        "alarms": counting.firsts(o for o in kinds["clean"] + kinds["decoy"] if o.alarm),
+        "brief": counting.firsts(kinds["brief"]),
+        "unknown_by_kind": counting.unknown_by_kind(kinds["unknown"]),
         "trace": counting.spread(one.trace_error for one in single if one.right_first),
-        "trace_pairs": counting.spread(
-            found["error"] for one in by_kind.get("pair", []) for found in one.traces.values()
-        ),
-        "held_out": share(
-            (one.held_out or np.inf) <= HELD_OUT for one in answers if one.verdict == "named"
-        ),
-        "held_out_spread": counting.spread(
-            one.held_out for one in answers if one.verdict == "named"
-        ),
+        "trace_pairs": counting.spread(pairs),
+        "held_out": counting.held_out_share(answers),
+        "held_out_spread": counting.spread(one.held_out for one in named),
         "recovery": counting.recovery(alone),
         "next": counting.following(answers),
         "loop": counting.closed_loops(answers),
         "tables": _of_tables(tables),
         "whole_report_s": counting.spread(whole_report_s),
         "runtime_s": counting.spread(r.get("volatile", {}).get("runtime_s") for r in records),
-        "failures": [
-            f"{counting.line(one)}: {one.record['failure']}"
-            for one in answers
-            if one.verdict == "failed"
-        ],
+        "failures": [f"{counting.line(one)}: {one.record['failure']}" for one in failed],
     }
 
 
@@ -206,15 +190,7 @@ def targets(made: Numbers) -> list[tuple[str, str, str, int, bool | None]]:
 
 
 def page(made: Numbers, arguments: str) -> str:
-    """Return the page, in Markdown.
-
-    Parameters
-    ----------
-    made : dict
-        From :func:`figures`.
-    arguments : str
-        Of the command that makes it.
-    """
+    """Return the page, in Markdown, from :func:`figures` and the arguments of the command."""
     words = {True: "reached", False: "**missed**", None: "not run"}
     head = ["figure", "target", "reached", "n", ""]
     rows = [(*row[:4], words[row[4]]) for row in targets(made)]
@@ -371,14 +347,8 @@ def write(
 ) -> list[Path]:
     """Write ``diagnosis.md``, ``diagnosis.json`` and ``diagnosis.png`` and return their paths.
 
-    Parameters
-    ----------
-    records : sequence of mappings
-    folder : Path
-    arguments : str
-        Of the command that makes them.
-    **beside
-        What :func:`figures` takes beside the records.
+    ``arguments`` are those of the command, ``beside`` what :func:`figures` takes beside the
+    records.
     """
     made = figures(records, **beside)
     paths = [folder / f"diagnosis.{kind}" for kind in ("md", "json", "png")]

@@ -66,31 +66,9 @@ class Task:
 class Options:
     """Selection of cases to run.
 
-    Attributes
-    ----------
-    chosen : {"small", "tune", "final"}
-    offset : int
-        Another number gives freshly drawn cases.
-    fraction : float
-        Part of the cases of every kind and cause.
-    kinds, names : tuple of str
-        Only these kinds, and only cases in which one of these is hidden.
-    limit : int, optional
-        Most cases.
-    loops : int
-        Cases of every cause that are run in closed loop.
-    next : bool
-        Carry out the experiments that are proposed.
-    jobs : int
-        Processes; 1 computes in this one.
-    force : bool
-        Make again what is there already.
-    folder : Path
-        Of the records.
-    backend : {"loky", "dask"}
-        Processes of this machine, or an existing Dask cluster at ``address``.
-    address : str
-        Of the Dask scheduler.
+    ``fraction`` is the part of the cases of every kind and cause, ``kinds`` and ``names`` keep only
+    these kinds and cases that hide one of these effects, ``loops`` is the number of cases of every
+    cause that are run in closed loop, ``next`` carries out the proposed experiments.
     """
 
     chosen: str = "small"
@@ -121,34 +99,22 @@ class Options:
     @property
     def arguments(self) -> str:
         """Arguments of the command that gives the same records."""
-        given = [f"--chosen {self.chosen}"]
-        if self.offset:
-            given.append(f"--offset {self.offset}")
-        if self.fraction < 1.0:
-            given.append(f"--fraction {self.fraction:g}")
-        for word, listed in (("--kind", self.kinds), ("--name", self.names)):
-            given += [" ".join((word, *listed))] if listed else []
-        if self.limit is not None:
-            given.append(f"--limit {self.limit}")
-        if self.loops:
-            given.append(f"--loops {self.loops}")
-        return " ".join(given + ["--next"] * self.next)
+        given: dict[str, Any] = {"chosen": self.chosen, "offset": self.offset or None}
+        given["fraction"] = f"{self.fraction:g}" if self.fraction < 1.0 else None
+        given |= {"kind": " ".join(self.kinds), "name": " ".join(self.names)}
+        given |= {"limit": self.limit, "loops": self.loops or None}
+        words = [f"--{name} {value}" for name, value in given.items() if value not in (None, "")]
+        return " ".join(words + ["--next"] * self.next)
 
 
 @dataclass
 class Report:
-    """Outcome of a run.
+    """Outcome of a run: one record a case, with the sections of its further stages.
 
-    Attributes
-    ----------
-    records : list of dict
-        One a case, with the sections of its further stages.
-    computed, found : int
-        Stages that were made now, and that were there already.
-    failed : list of str
-        Cases that failed, with the reason; they count as wrong.
-    quarantined : list of str
-        Corrupt records that were set aside and made again.
+    ``computed`` and ``found`` count the stages that were made now and those that were there
+    already;
+    ``failed`` are cases with the reason, which count as wrong, ``quarantined`` corrupt records that
+    were set aside and made again.
     """
 
     records: list[dict[str, Any]] = field(default_factory=list)
@@ -204,23 +170,22 @@ def run(
 ) -> Report:
     """Make what is missing of the records and return them all.
 
-    Parameters
-    ----------
-    options : Options
-    start : callable
-        Called, for each stage, with the number of cases to make; returns what to call after each.
-    act : callable
-        Makes a record of a case and some stages.
+    ``start`` is called with the number of cases to make of each stage and returns what to call
+    after
+    each; ``act`` makes a record of a case and some stages.
     """
     store = Store(options.folder)
     store.sweep()
     chosen, report, before = select(options), Report(), set(store.quarantined())
     made = _stage("verdict", chosen, store, options, report, start, act)
-    if options.loops:
-        _merge(made, "loop", _looped(chosen, options), store, options, report, start, act)
-    if options.next:
-        open_ones = [case for case in chosen if promised(made[case])]
-        _merge(made, "next", open_ones, store, options, report, start, act)
+    further = {
+        "loop": _looped(chosen, options),
+        "next": [case for case in chosen if options.next and promised(made[case])],
+    }
+    for stage, some in further.items():
+        for case, record in _stage(stage, some, store, options, report, start, act).items():
+            failed = record["failure"]
+            made[case][stage] = {"failure": failed} if failed else record.get(stage)
     report.records = sorted(made.values(), key=_place)
     report.failed = [
         f"{Case(**_tuples(record['case'])).title}: {record['failure']}"
@@ -284,15 +249,6 @@ def _looped(chosen: Sequence[Case], options: Options) -> list[Case]:
     return [case for case in chosen if case in kept]
 
 
-def _merge(
-    made: dict[Case, dict[str, Any]], stage: str, chosen: Sequence[Case], *rest: Any
-) -> None:
-    """Add the section of a stage to the records of its cases; a failure is kept in it."""
-    for case, record in _stage(stage, chosen, *rest).items():
-        failed = record["failure"]
-        made[case][stage] = {"failure": failed} if failed else record.get(stage)
-
-
 def _stage(
     stage: str,
     chosen: Sequence[Case],
@@ -312,12 +268,7 @@ def _stage(
         for _ in _computed(missing, store, options.cluster, act):
             report.computed += 1
             advance()
-    made = {}
-    for case, task in tasks.items():
-        record = store.load(task.key)
-        assert record is not None
-        made[case] = record
-    return made
+    return {case: read_record(store.path(task.key)) for case, task in tasks.items()}
 
 
 def _computed(

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.diagnosis.cases import NOISE, Case, Made, make
 from benchmarks.diagnosis.next import DrivenRig, OracleRig, again
 from benchmarks.identity.hashing import plain
 from benchmarks.runs import provenance
+from benchmarks.scoring.errors import rms
 from pam_envs.constants import CELSIUS, GRAVITY
 from pam_envs.diagnosis.closed_loop.gain import COMPENSABLE, closed_loop
 from pam_envs.diagnosis.diagnosis import diagnose
 from pam_envs.diagnosis.report.outcome import Diagnosis
-
-Array = NDArray[np.float64]
 
 STAGES = ("verdict", "loop", "next")
 """Diagnosis; controllers on the hidden rig; execution of the proposed experiment."""
@@ -27,19 +25,11 @@ MOST_RIVALS = 6
 
 
 def study(case: Case, stages: Collection[str] = ("verdict",)) -> dict[str, Any]:
-    """Generate a case, diagnose it, and return the result with the truth.
+    """Generate a case, diagnose it, and return the result with the truth in plain types.
 
-    Parameters
-    ----------
-    case : Case
-        Specification.
-    stages : collection of str
-        Some of :data:`STAGES`; ``verdict`` is always included.
-
-    Returns
-    -------
-    dict
-        Record in plain types, with the text of an error as ``failure``.
+    ``stages`` are some of :data:`STAGES`, ``verdict`` always included; the text of an error is kept
+    as
+    ``failure``.
     """
     unknown = sorted(set(stages) - set(STAGES))
     if unknown:
@@ -51,22 +41,20 @@ def study(case: Case, stages: Collection[str] = ("verdict",)) -> dict[str, Any]:
         made = make(case)
         record["truths"] = truths_of(case, made)
         spent["make_s"] = clock.perf_counter() - started
-        found = _timed(spent, lambda: diagnosed(made.recording, made.sheet))
+        started = clock.perf_counter()
+        found = diagnosed(made.recording, made.sheet)
+        spent["runtime_s"] = clock.perf_counter() - started
         record |= outcome(found) | {"traces": trace_errors(made, found)}
         if "loop" in stages and loops(case):
             record["loop"] = loop_of(made, found)
         if "next" in stages and promised(record):
-            record["next"] = next_of(case, made, record["experiment"]["name"])
+            plan = record["experiment"]["name"]
+            said = outcome(diagnosed(*again(case, made, plan)))
+            kept = ("verdict", "names", "open", "rivals")
+            record["next"] = {"plan": plan, **{key: said[key] for key in kept}}
     except Exception as error:
         record["failure"] = f"{type(error).__name__}: {error}"
     return dict(plain(record))
-
-
-def _timed(spent: dict[str, Any], act: Callable[[], Diagnosis]) -> Diagnosis:
-    started = clock.perf_counter()
-    found = act()
-    spent["runtime_s"] = clock.perf_counter() - started
-    return found
 
 
 def diagnosed(recording: Any, sheet: Any) -> Diagnosis:
@@ -140,33 +128,16 @@ def trace_errors(made: Made, found: Diagnosis) -> dict[str, dict[str, Any]]:
         trace = np.stack([shown[name] for name in OUTPUTS])
         true, ours = made.ground.left(truth.trace), made.ground.left(trace)
         k = int(np.argmax((true**2).mean(axis=1)))
-        size = _rms(true[k])
+        size = rms(true[k])
         errors[truth.name] = {
             "output": OUTPUTS[k],
-            "error": _rms(ours[k] - true[k]) / size,
-            "found": _rms(ours[k]),
+            "error": rms(ours[k] - true[k]) / size,
+            "found": rms(ours[k]),
             "true": size,
-            "found_raw": _rms(trace[k]) / NOISE[k],
-            "true_raw": _rms(truth.trace[k]) / NOISE[k],
+            "found_raw": rms(trace[k]) / NOISE[k],
+            "true_raw": rms(truth.trace[k]) / NOISE[k],
         }
     return errors
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-# --- the proposed experiment ---------------------------------------------------------------------
-
-
-def next_of(case: Case, made: Made, plan: str) -> dict[str, Any]:
-    """Run an experiment and return the summary of the diagnosis with it."""
-    found = diagnosed(*again(case, made, plan))
-    said = outcome(found)
-    return {"plan": plan, **{key: said[key] for key in ("verdict", "names", "open", "rivals")}}
-
-
-# --- in closed loop ------------------------------------------------------------------------------
 
 
 def loop_of(made: Made, found: Diagnosis) -> dict[str, Any] | None:

@@ -7,15 +7,14 @@ With the causes below it is diagnosed as a muscle is, by one output instead of t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from benchmarks.diagnosis.plain_plant import Parameters, PlainPlant, plain_causes
 from pam_envs.diagnosis.cause import Cause, Form, Term
 from pam_envs.diagnosis.decide.structure import FILTERS, Regressors, low_pass
-from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.diagnosis.fit.starting_values import grid
 
 Array = NDArray[np.float64]
@@ -33,61 +32,32 @@ CREEPING = 2e-4
 """Speed over which friction is regularised [m/s]."""
 FORCES = (0.1, 0.16, 0.27, 0.43, 0.7, 1.14, 1.85, 3.0)
 """Grid of starting values of the dry friction [N]."""
-NEUTRAL = {
-    "mass": 1.0,
-    "stiffness": 100.0,
-    "damping": 2.0,
-    "friction.force": 0.0,
-    "friction.breakaway": 0.0,
-    "drag.quadratic": 0.0,
-    "spring.hardening": 0.0,
-    "spring.asymmetry": 0.0,
-    "actuator.dead_time": 0.0,
-    "actuator.lag": 0.0,
-    "actuator.bend": 0.0,
-    "position.bias": 0.0,
-    "position.drift": 0.0,
-    "position.play": 0.0,
-    "relaxation.stiffness": 0.0,
-    "relaxation.time": 1.0,
+PARAMETERS: Parameters = {
+    "mass": (1.0, 0.05, 20.0, 0.1),
+    "stiffness": (100.0, 1.0, 1e4, 10.0),
+    "damping": (2.0, 0.01, 100.0, 0.2),
+    "friction.force": (0.0, 0.0, 10.0, 0.1),
+    "friction.breakaway": (0.0, 0.0, 1.0, 0.05),
+    "drag.quadratic": (0.0, 0.0, 50.0, 0.5),
+    "spring.hardening": (0.0, -0.5, 5.0, 0.05),
+    "spring.asymmetry": (0.0, -0.8, 0.8, 0.05),
+    "actuator.dead_time": (0.0, 0.0, 0.2, 0.005),
+    "actuator.lag": (0.0, 0.0, 1.0, 0.01),
+    "actuator.bend": (0.0, -0.5, 0.5, 0.02),
+    "position.bias": (0.0, -0.1, 0.1, 1e-3),
+    "position.drift": (0.0, -0.01, 0.01, 1e-5),
+    "position.play": (0.0, 0.0, 0.05, 5e-4),
+    "relaxation.stiffness": (0.0, 0.0, 1e3, 5.0),
+    "relaxation.time": (1.0, 0.02, 100.0, 0.1),
 }
-"""Every parameter with its value in a plain plant [SI]."""
-NAMES = tuple(NEUTRAL)
-BASE = ("mass", "stiffness", "damping")
-BOUNDS = {
-    "mass": (0.05, 20.0, 0.1),
-    "stiffness": (1.0, 1e4, 10.0),
-    "damping": (0.01, 100.0, 0.2),
-    "friction.force": (0.0, 10.0, 0.1),
-    "friction.breakaway": (0.0, 1.0, 0.05),
-    "drag.quadratic": (0.0, 50.0, 0.5),
-    "spring.hardening": (-0.5, 5.0, 0.05),
-    "spring.asymmetry": (-0.8, 0.8, 0.05),
-    "actuator.dead_time": (0.0, 0.2, 0.005),
-    "actuator.lag": (0.0, 1.0, 0.01),
-    "actuator.bend": (-0.5, 0.5, 0.02),
-    "position.bias": (-0.1, 0.1, 1e-3),
-    "position.drift": (-0.01, 0.01, 1e-5),
-    "position.play": (0.0, 0.05, 5e-4),
-    "relaxation.stiffness": (0.0, 1e3, 5.0),
-    "relaxation.time": (0.02, 100.0, 0.1),
-}
-"""Bounds and meaningful change of every parameter [SI]."""
-LOGARITHMIC = ("mass", "stiffness", "damping", "relaxation.time")
 
 
 @dataclass(frozen=True)
-class MassSpringDamper:
-    """Mass-spring-damper with the force of a recording.
+class MassSpringDamper(PlainPlant):
+    """Mass-spring-damper with the force [N] of a recording, held from each reading to the next.
 
-    Attributes
-    ----------
-    force : ndarray, shape (T,)
-        Force, held from each reading to the next [N].
-    period : float
-        Sampling period [s].
-    start : dict of str to float
-        Starting values that differ from :data:`NEUTRAL`, by name.
+    ``period`` is that of sampling [s], ``start`` has starting values that differ from the neutral
+    ones.
     """
 
     force: Array
@@ -96,37 +66,22 @@ class MassSpringDamper:
 
     channels = ("position",)
     units = ("mm",)
+    parameters = PARAMETERS
+    base_names = ("mass", "stiffness", "damping")
+    logarithmic = (*base_names, "relaxation.time")
 
     @property
-    def column(self) -> Array:
-        """Parameters, shape (p,)."""
-        return np.array([{**NEUTRAL, **self.start}[name] for name in NAMES])
+    def values(self) -> dict[str, float]:
+        """Parameters before a fit."""
+        return {**super().values, **self.start}
 
     def simulate(self, columns: Array) -> Array:
         """Return sensor readings [m], shape (1, T, n)."""
         found = _positions(np.ascontiguousarray(columns), self.force, self.period)
         return np.ascontiguousarray(found.T)[None]
 
-    def free(self, name: str, **changes: Any) -> Free:
-        """Return the fit settings of a parameter."""
-        place = NAMES.index(name)
-        low, high, scale = BOUNDS[name]
-        made = dict(low=low, high=high, scale=scale, log=name in LOGARITHMIC)
-        made["start"] = float(self.column[place])
-        return Free(name, place, **{**made, **changes})
-
-    def base(self) -> tuple[Free, ...]:
-        """Return the base parameters."""
-        return tuple(self.free(name) for name in BASE)
-
     def regressors(self, position: Array) -> Regressors:
-        """Return the variables that may explain a residual.
-
-        Parameters
-        ----------
-        position : ndarray, shape (T,)
-            Position simulated with the refitted base [m].
-        """
+        """Return the variables that may explain a residual, from the simulated position [m]."""
         time: Array = np.asarray(np.arange(len(position)) * self.period, np.float64)
         speed = np.gradient(position, self.period)
         slow = [low_pass(self.force, tau, self.period) for tau in FILTERS]
@@ -215,83 +170,40 @@ CAUSES = (
                 search=grid(FORCES, (0.1, 0.3)),
             ),
         ),
-        signature="the error has the sign of the velocity, and a hold keeps it",
-        neighbours=("play", "quadratic_drag", "relaxation"),
-        experiment="Slow ramps up and down, with a hold on either way.",
-        sensor="a load cell between guide and mass",
     ),
-    Cause(
-        "quadratic_drag",
-        "drag that grows with the square of the speed",
-        (Form("square", (Term("drag.quadratic", (1.0,)),)),),
-        signature="large swings die out faster than small ones",
-        neighbours=("dry_friction",),
-        experiment="Let it swing freely from a large and from a small displacement.",
-    ),
-    Cause(
-        "hardening_spring",
-        "a spring that hardens or softens",
-        (Form("cubic", (Term("spring.hardening", (0.05, -0.05)),)),),
-        signature="large displacements are smaller, or larger, than the force says, both ways",
-        neighbours=("actuator_bend",),
-        experiment="Settled displacements at several forces.",
-    ),
-    Cause(
-        "asymmetric_spring",
-        "a spring that is stiffer one way",
-        (Form("square", (Term("spring.asymmetry", (0.05, -0.05)),)),),
-        signature="the error has one sign and grows with the displacement",
-        neighbours=("sensor_bias",),
-        experiment="Settled displacements at forces of both signs.",
-    ),
-    Cause(
-        "dead_time",
-        "a delay between the force asked for and the reading",
-        (Form("delay", (Term("actuator.dead_time", (0.01, 0.04)),)),),
-        signature="the error goes with the speed, and is gone in a hold",
-        neighbours=("actuator_lag",),
-        experiment="A step.",
-    ),
-    Cause(
-        "actuator_lag",
-        "a force that follows its command with a lag",
-        (Form("first order", (Term("actuator.lag", (0.01, 0.05)),)),),
-        signature="the error goes with the speed, and is gone in a hold",
-        neighbours=("dead_time",),
-        experiment="A step.",
-    ),
-    Cause(
-        "actuator_bend",
-        "a force that is not in proportion to its command",
-        (Form("quadratic", (Term("actuator.bend", (0.02, -0.02)),)),),
-        signature="large forces give less, or more, than they should",
-        neighbours=("hardening_spring",),
-        experiment="Settled displacements at several forces.",
-    ),
-    Cause(
-        "sensor_bias",
-        "a bias of the sensor",
-        (Form("constant", (Term("position.bias", (1e-3,)),)),),
-        signature="the same error at all times, before the first force too",
-        neighbours=("asymmetric_spring", "sensor_drift"),
-        experiment="A rest without force.",
-    ),
-    Cause(
-        "sensor_drift",
-        "a drifting sensor",
-        (Form("straight", (Term("position.drift", (2e-5,)),)),),
-        signature="the error grows with time, whatever the mass does",
-        neighbours=("sensor_bias", "relaxation"),
-        experiment="A rest without force at the end.",
-    ),
-    Cause(
-        "play",
-        "play in the linkage of the sensor",
-        (Form("backlash", (Term("position.play", (5e-4, 3e-3)),)),),
-        signature="the error has the sign of the velocity, and a hold keeps it",
-        neighbours=("dry_friction",),
-        experiment="A free swing: play does not slow it down, friction halts it.",
-        sensor="a second position sensor on the mass itself",
+    *plain_causes(
+        {
+            "quadratic_drag": (
+                "drag that grows with the square of the speed",
+                ("square", "drag.quadratic", 1.0),
+            ),
+            "hardening_spring": (
+                "a spring that hardens or softens",
+                ("cubic", "spring.hardening", 0.05, -0.05),
+            ),
+            "asymmetric_spring": (
+                "a spring that is stiffer one way",
+                ("square", "spring.asymmetry", 0.05, -0.05),
+            ),
+            "dead_time": (
+                "a delay between the force asked for and the reading",
+                ("delay", "actuator.dead_time", 0.01, 0.04),
+            ),
+            "actuator_lag": (
+                "a force that follows its command with a lag",
+                ("first order", "actuator.lag", 0.01, 0.05),
+            ),
+            "actuator_bend": (
+                "a force that is not in proportion to its command",
+                ("quadratic", "actuator.bend", 0.02, -0.02),
+            ),
+            "sensor_bias": ("a bias of the sensor", ("constant", "position.bias", 1e-3)),
+            "sensor_drift": ("a drifting sensor", ("straight", "position.drift", 2e-5)),
+            "play": (
+                "play in the linkage of the sensor",
+                ("backlash", "position.play", 5e-4, 3e-3),
+            ),
+        }
     ),
     Cause(
         "relaxation",
@@ -305,9 +217,6 @@ CAUSES = (
                 ),
             ),
         ),
-        signature="after a step the displacement goes on growing",
-        neighbours=("sensor_drift", "dry_friction"),
-        experiment="Long holds.",
     ),
 )
 """Effects that a mass-spring-damper may lack."""

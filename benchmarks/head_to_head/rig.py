@@ -7,7 +7,7 @@ is a set-valued Coulomb law with a higher breakaway force. No code is shared wit
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,22 +33,13 @@ SETTLED = 2.0
 
 @dataclass(frozen=True)
 class Oscillator:
-    """Constants of a rig.
+    """Constants of a rig in SI.
 
-    Attributes
-    ----------
-    mass, stiffness, damping : float
-        [kg], [N/m], [N s/m].
-    friction : float
-        Dry friction while sliding [N].
-    breakaway : float
-        Friction at rest over that while sliding.
-    delay : int
-        Delay of the force [samples].
-    bias : float
-        Bias of the sensor [m].
-    drift : float
-        Drift of the sensor over an experiment [m].
+    ``friction`` is the dry friction while sliding [N], ``breakaway`` that at rest over it;
+    ``delay`` is
+    that of the force [samples], ``bias`` that of the sensor [m], ``drift`` its drift over an
+    experiment
+    [m].
     """
 
     mass: float = NOMINAL["mass"]
@@ -69,13 +60,7 @@ class Oscillator:
         return cls(**constants, breakaway=float(rng.uniform(*BREAKAWAY)), **hidden)  # type: ignore[arg-type]
 
     def positions(self, force: Array) -> Array:
-        """Return the position [m] at each sample, from rest, under a force held between samples.
-
-        Parameters
-        ----------
-        force : ndarray, shape (T,)
-            [N].
-        """
+        """Return the position [m] at each sample, from rest, under a force [N] held in between."""
         late = np.concatenate([np.zeros(self.delay), force])[: len(force)]
         state, found = (0.0, 0.0), np.empty(len(force))
         for k, value in enumerate(late.tolist()):
@@ -132,32 +117,15 @@ class Oscillator:
         return about + gone, size * turn * (odd * c - even * s) - decay * gone
 
 
-@dataclass(frozen=True)
-class Experiment:
-    """Inputs of an experiment.
-
-    Attributes
-    ----------
-    force : ndarray, shape (T,)
-        Force, held from each sample to the next [N].
-    time : ndarray, shape (T,)
-        Time [s].
-    """
-
-    force: Array
-    time: Array = field(repr=False)
-
-    @classmethod
-    def of(cls, *parts: Array) -> Experiment:
-        """Return a sequence of parts after a rest."""
-        force = np.concatenate([np.zeros(round(SETTLED / PERIOD)), *parts])
-        return cls(force, np.asarray(np.arange(len(force)) * PERIOD, np.float64))
+def experiment(*parts: Array) -> Array:
+    """Return a sequence of forces [N] after a rest, each held from its sample to the next."""
+    return np.concatenate([np.zeros(round(SETTLED / PERIOD)), *parts])
 
 
-def campaign(seed: int) -> Experiment:
-    """Return 60 s of random steps, a growing sine, a multisine and slow ramps."""
+def campaign(seed: int) -> Array:
+    """Return 60 s of random steps, a growing sine, a multisine and slow ramps [N]."""
     rng = np.random.default_rng([seed, 3])
-    return Experiment.of(
+    return experiment(
         steps(rng, 8, 2.0, 8.0),
         swelling_sine(12.0, 0.7, 6.0),
         many_sines(rng, 16.0, 2.5),
@@ -165,12 +133,17 @@ def campaign(seed: int) -> Experiment:
     )
 
 
-def another(seed: int) -> Experiment:
-    """Return 40 s of another kind of motion: a chirp and small steps."""
+def another(seed: int) -> Array:
+    """Return 40 s of another kind of motion: a chirp and small steps [N]."""
     rng = np.random.default_rng([seed, 4])
-    time = np.arange(round(26.0 / PERIOD)) * PERIOD
+    time = times(26.0)
     tone = 4.0 * np.sin(2.0 * np.pi * (0.1 + 0.5 * 2.9 * time / time[-1]) * time)
-    return Experiment.of(tone, steps(rng, 8, 1.5, 5.0))
+    return experiment(tone, steps(rng, 8, 1.5, 5.0))
+
+
+def times(seconds: float) -> Array:
+    """Return the sampling times [s] of a duration."""
+    return np.asarray(np.arange(round(seconds / PERIOD)) * PERIOD, np.float64)
 
 
 def steps(rng: np.random.Generator, number: int, seconds: float, most: float) -> Array:
@@ -180,13 +153,13 @@ def steps(rng: np.random.Generator, number: int, seconds: float, most: float) ->
 
 def swelling_sine(seconds: float, frequency: float, most: float) -> Array:
     """Return a sine [Hz] whose amplitude grows to ``most`` [N]."""
-    time = np.arange(round(seconds / PERIOD)) * PERIOD
+    time = times(seconds)
     return np.asarray(most * time / seconds * np.sin(2.0 * np.pi * frequency * time))
 
 
 def many_sines(rng: np.random.Generator, seconds: float, spread: float) -> Array:
     """Return a multisine of random phases, 0.2 to 4 Hz, of a given RMS [N]."""
-    time = np.arange(round(seconds / PERIOD)) * PERIOD
+    time = times(seconds)
     tones = np.geomspace(0.2, 4.0, 12)[:, None]
     phases = rng.uniform(0.0, 2.0 * np.pi, (12, 1))
     total = np.sin(2.0 * np.pi * tones * time + phases).sum(axis=0)
@@ -197,4 +170,4 @@ def ramps(corners: tuple[float, ...], seconds: float) -> Array:
     """Return ramps of equal rate from 0 through the corners [N]."""
     lengths = np.abs(np.diff((0.0, *corners)))
     at = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum() * seconds
-    return np.interp(np.arange(round(seconds / PERIOD)) * PERIOD, at, (0.0, *corners))
+    return np.interp(times(seconds), at, (0.0, *corners))

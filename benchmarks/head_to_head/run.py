@@ -50,17 +50,7 @@ START = {"mass": 1.5, "stiffness": 70.0, "damping": 3.0}
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A drawn rig, with or without a hidden effect.
-
-    Attributes
-    ----------
-    seed : int
-        Seed of all random draws.
-    effect : str
-        Name of the correct cause; empty without one.
-    hidden : dict of str to float
-        Hidden constants of :meth:`Oscillator.drawn`.
-    """
+    """A drawn rig: name of the correct cause (empty without one), hidden constants of the rig."""
 
     seed: int
     effect: str
@@ -105,16 +95,8 @@ def cases(rigs: int, others: int, first: int = FIRST) -> Iterator[Case]:
 def diagnose(force: Array, reading: Array, rule: Rule | None = None, seed: int = 0) -> Outcome:
     """Diagnose the error of a mass-spring-damper on a recording.
 
-    Parameters
-    ----------
-    force : ndarray, shape (T,)
-        Force, held from each reading to the next [N].
-    reading : ndarray, shape (T,)
-        Position readings [m].
-    rule : Rule, optional
-        Thresholds of the decision.
-    seed : int
-        Seed of the bootstrap.
+    The force [N] is held from each position reading [m] to the next, both of shape (T,); ``seed``
+    is that of the bootstrap.
     """
     family = MassSpringDamper(force, PERIOD, START)
     time: Array = np.asarray(np.arange(len(force)) * PERIOD, np.float64)
@@ -131,23 +113,38 @@ def diagnose(force: Array, reading: Array, rule: Rule | None = None, seed: int =
 def run(case: Case, against: bool, told: bool = False) -> dict[str, Any]:
     """Return the results of both tools on a case, in plain types.
 
-    Parameters
-    ----------
-    case : Case
-        Rig and experiment.
-    against : bool
-        Whether MuJoCo is run.
-    told : bool
-        Whether MuJoCo is also run with friction as a parameter.
+    MuJoCo runs if ``against``, with friction as a further parameter if ``told``.
     """
-    rig, force, fresh = case.rig, campaign(case.seed).force, another(case.seed).force
+    rig, force, fresh = case.rig, campaign(case.seed), another(case.seed)
     reading, truth = rig.readings(force, case.seed), rig.positions(fresh)
     row = {**dataclasses.asdict(case), "rig": dataclasses.asdict(rig)}
-    row["ours"] = _ours(force, reading, fresh, truth)
-    if against:
-        row["sysid"] = _theirs(force, reading, fresh, truth, friction=False)
-        if told and "friction" in case.hidden:
-            row["sysid_told"] = _theirs(force, reading, fresh, truth, friction=True)
+    found = diagnose(force, reading)
+    decision, model, blocks = found.decision, found.decision.model, found.blocks
+    row["ours"] = {
+        "verdict": decision.verdict,
+        "causes": list(model.names),
+        "forms": [form.name for _, form in model.causes],
+        "values": model.fit.values(),
+        "base_values": found.base.fit.values(),
+        "residual": _rms(found.predict(found.base, force) - reading),
+        "held_out": [found.error(found.base), found.error(model)],
+        "gain": blocks.gain(found.base.errors, model.errors),
+        "rivals": [
+            {"causes": list(r.names), "gain": blocks.gain(found.base.errors, r.errors)}
+            for r in decision.rivals[:3]
+        ],
+        "another": [_rms(found.predict(c, fresh) - truth) for c in (found.base, model)],
+    }
+    runs = {"sysid": against, "sysid_told": against and told and "friction" in case.hidden}
+    for key in (key for key, runs_it in runs.items() if runs_it):
+        fit = theirs.identify(force, reading, PERIOD, START, friction=key == "sysid_told")
+        row[key] = {
+            "values": fit.values,
+            "intervals": fit.intervals,
+            "issues": fit.issues,
+            "residual": _rms(fit.position - reading),
+            "another": _rms(theirs.predict(fit.values, fresh, PERIOD) - truth),
+        }
     return row
 
 
@@ -156,43 +153,15 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.nanmean(values**2))) / NOISE
 
 
-def _ours(force: Array, reading: Array, fresh: Array, truth: Array) -> dict[str, Any]:
-    found = diagnose(force, reading)
-    decision, model = found.decision, found.decision.model
-    return {
-        "verdict": decision.verdict,
-        "causes": list(model.names),
-        "forms": [form.name for _, form in model.causes],
-        "values": model.fit.values(),
-        "base_values": found.base.fit.values(),
-        "residual": _rms(found.predict(found.base, force) - reading),
-        "held_out": [found.error(found.base), found.error(model)],
-        "gain": found.blocks.gain(found.base.errors, model.errors),
-        "rivals": [
-            {"causes": list(r.names), "gain": found.blocks.gain(found.base.errors, r.errors)}
-            for r in decision.rivals[:3]
-        ],
-        "another": [_rms(found.predict(c, fresh) - truth) for c in (found.base, model)],
-    }
-
-
-def _theirs(
-    force: Array, reading: Array, fresh: Array, truth: Array, friction: bool
-) -> dict[str, Any]:
-    found = theirs.identify(force, reading, PERIOD, START, friction)
-    return {
-        "values": found.values,
-        "intervals": found.intervals,
-        "issues": found.issues,
-        "residual": _rms(found.position - reading),
-        "another": _rms(theirs.predict(found.values, fresh, PERIOD) - truth),
-    }
+def written() -> dict[str, Any]:
+    """Return the stored results."""
+    return dict(json.loads(RESULTS.read_text(encoding="utf-8")))
 
 
 def kept(row: dict[str, Any]) -> dict[str, Any]:
     """Return a row with MuJoCo's stored result of the same case."""
     alike = ("seed", "effect", "hidden")
-    for old in json.loads(RESULTS.read_text(encoding="utf-8"))["rows"]:
+    for old in written()["rows"]:
         if all(old[key] == row[key] for key in alike):
             return {**row, **{key: value for key, value in old.items() if key.startswith("sysid")}}
     raise ValueError(f"{RESULTS.name} has no row of seed {row['seed']}, {row['hidden']}: run both")
@@ -218,7 +187,7 @@ def main(
     """
     from rich.progress import track
 
-    version = _kept_version() if keep else theirs.version()
+    version = written()["packages"]["mujoco"] if keep else theirs.version()
     if version is None:
         print("mujoco.sysid is not installed (pip install -e .[mujoco]): ours alone is run")
     rows = []
@@ -239,11 +208,6 @@ def main(
         RESULTS.write_text(json.dumps(plain(result), indent=1) + "\n", encoding="utf-8")
         PAGE.write_text(text, encoding="utf-8")
     return result
-
-
-def _kept_version() -> str | None:
-    version: str | None = json.loads(RESULTS.read_text(encoding="utf-8"))["packages"]["mujoco"]
-    return version
 
 
 if __name__ == "__main__":

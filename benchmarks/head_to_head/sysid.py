@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.head_to_head.mass_spring_damper import BOUNDS
+from benchmarks.head_to_head.mass_spring_damper import PARAMETERS
 
 Array = NDArray[np.float64]
 
@@ -42,18 +42,11 @@ LOSS = ("friction.force", 0.5)
 
 @dataclass(frozen=True)
 class Identified:
-    """Result of an identification.
+    """Result of an identification; parameters by our names [SI].
 
-    Attributes
-    ----------
-    values : dict of str to float
-        Parameters by our names [SI].
-    intervals : dict of str to float
-        Half-widths of their 95 % intervals from ``calculate_intervals``.
-    issues : list of str
-        Warnings of its report.
-    position : ndarray, shape (T,)
-        Position of the fitted model [m]; NaN where it is not compared.
+    ``intervals`` are half-widths of 95 % intervals, ``issues`` the warnings of its report;
+    ``position``
+    is that of the fitted model [m], shape (T,), NaN where it is not compared.
     """
 
     values: dict[str, float]
@@ -78,18 +71,8 @@ def identify(
 ) -> Identified:
     """Fit mass, stiffness and damping, and optionally MuJoCo's dry friction.
 
-    Parameters
-    ----------
-    force : ndarray, shape (T,)
-        Force, held from each reading to the next [N].
-    reading : ndarray, shape (T,)
-        Position readings [m].
-    period : float
-        Sampling period [s].
-    start : dict of str to float
-        Starting values.
-    friction : bool
-        Whether dry friction is a parameter.
+    Positions [m] are read every ``period`` [s]; the force [N] is held from each reading to the
+    next.
     """
     import mujoco
     from mujoco import sysid
@@ -104,12 +87,14 @@ def identify(
     left, (predicted,), _ = residual(found.as_vector(), found, return_pred_all=True)
     _, widths = sysid.calculate_intervals(left, result.jac)
     names = found.get_non_frozen_parameter_names()
+    position = np.full(len(force), np.nan)
+    position[np.round(predicted[0].times / period).astype(int)] = predicted[0].data[:, 0]
     insights = AutomatedInsights("insights", found).get_context()["insights"]
     return Identified(
         dict(zip(names, found.as_vector().tolist(), strict=True)),
         dict(zip(names, np.asarray(widths).tolist(), strict=True)),
         [f"{i['title']}: {i['message']}" for i in insights if i["type"] == "warning"],
-        _placed(predicted[0], len(force), period),
+        position,
     )
 
 
@@ -132,7 +117,7 @@ def _parameters(start: dict[str, float]) -> Any:
 
     made = sysid.ParameterDict()
     for name, value in start.items():
-        low, high, _ = BOUNDS[name]
+        _, low, high, _ = PARAMETERS[name]
         made.add(sysid.Parameter(name, value, low, high, modifier=modifier(name)))
     return made
 
@@ -141,28 +126,15 @@ def _sequence(spec: Any, force: Array, reading: Array, period: float) -> Any:
     """Return the recording for ``mujoco.sysid``, with the force at each simulation step."""
     from mujoco import sysid
 
-    model = spec.compile()
+    model, each = spec.compile(), round(period / STEP)
     times = np.arange(len(force)) * period
-    each = round(period / STEP)
     finely = np.arange((len(force) - 1) * each + 1) * STEP
     held = np.repeat(force, each)[: len(finely), None]
     # the state, not the sensor: a sensor is read before a step and stamped with the time after it
     shown = sysid.TimeSeries.from_names(times, reading[:, None], model, ["slide_qpos"])
-    return sysid.ModelSequences(
-        "rig",
-        spec,
-        "campaign",
-        sysid.create_initial_state(model, np.zeros(1)),
-        sysid.TimeSeries.from_control_names(finely, held, model),
-        shown,
-    )
-
-
-def _placed(predicted: Any, samples: int, period: float) -> Array:
-    """Return predicted positions by sample."""
-    found = np.full(samples, np.nan)
-    found[np.round(predicted.times / period).astype(int)] = predicted.data[:, 0]
-    return found
+    pushed = sysid.TimeSeries.from_control_names(finely, held, model)
+    rest = sysid.create_initial_state(model, np.zeros(1))
+    return sysid.ModelSequences("rig", spec, "campaign", rest, pushed, shown)
 
 
 def predict(values: dict[str, float], force: Array, period: float) -> Array:

@@ -89,6 +89,15 @@ def note(*words: str) -> str:
     return "; ".join(words)
 
 
+def aligned(lines: Sequence[Sequence[str]]) -> str:
+    """Return the lines of a table with columns of even width."""
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
+        for line in lines
+    )
+
+
 def table(figures: Sequence[Figure]) -> str:
     """Return the figures as aligned text."""
     lines: list[tuple[str, ...]] = [
@@ -99,8 +108,4 @@ def table(figures: Sequence[Figure]) -> str:
         known = ["" if value is None else f"{value:.4g}" for value in values]
         ours = "-" if f.ours is None else f"{f.ours:.4g}"
         lines.append((f.name, *known, ours, f.unit, f.judged_by, f.verdict, f.remark))
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
-        for line in lines
-    )
+    return aligned(lines)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import subprocess
@@ -9,6 +10,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -53,27 +55,25 @@ def write_case(folder: Path) -> None:
     (folder / "rig.yaml").write_text(sheet, encoding="utf-8")
 
 
-def whole_reports(rounds: int = 3) -> list[float]:
-    """Return the wall times [s] of consecutive whole reports of ten minutes at 50 Hz."""
+def timed(rounds: int = 3) -> tuple[list[float], list[float], str]:
+    """Return wall times [s] of consecutive verdicts and whole reports, and the verdict's text."""
     with tempfile.TemporaryDirectory() as name:
         write_case(Path(name))
-        return [_timed(Path(name))[1] for _ in range(rounds)]
+        runs = [_timed(Path(name)) for _ in range(rounds)]
+    return [run[0] for run in runs], [run[1] for run in runs], runs[-1][2]
 
 
 def diagnosing(rounds: int) -> list[Measurement]:
     """Time the verdict and the whole report, closed loop and page included."""
     if (os.cpu_count() or 1) < CORES:
         raise Missing(f"this machine has fewer than {CORES} cores")
-    with tempfile.TemporaryDirectory() as name:
-        write_case(Path(name))
-        timed = [_timed(Path(name)) for _ in range(max(1, min(rounds, 3)))]
-    verdicts, reports, said = [t[0] for t in timed], [t[1] for t in timed], timed[-1][2]
+    verdicts, reports, said = timed(max(1, min(rounds, 3)))
     note = f"10 minutes at 50 Hz, {CORES} threads, wall; it said: {said}"
+    limits: dict[str, Any] = {"unit": "s", "better": "less", "note": note}
+    whole = Measurement("diagnosis", "whole report", median(reports), **limits)
     return [
-        Measurement("diagnosis", "verdict", median(verdicts), "s", VERDICT_S, None, "less", note),
-        Measurement(
-            "diagnosis", "whole report", median(reports), "s", 2 * VERDICT_S, REPORT_S, "less", note
-        ),
+        Measurement("diagnosis", "verdict", median(verdicts), floor=VERDICT_S, **limits),
+        dataclasses.replace(whole, floor=2 * VERDICT_S, aim=REPORT_S),
     ]
 
 

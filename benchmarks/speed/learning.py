@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from benchmarks.speed.rates import Chunk, Measurement, Missing, interleaved, median, ratio
+from benchmarks.speed.rates import Chunk, Measurement, interleaved, median, ratio
 
 ENV = "PAM/MusclePositioning-v0"
 MOST = 0.05
@@ -17,7 +16,11 @@ MOST = 0.05
 
 def learning(rounds: int) -> list[Measurement]:
     """PPO at 256 environments against the default on one Pendulum."""
-    chunk = preset_chunk(ENV, 256)
+    from agents.settings.presets import preset
+    from agents.training import building
+
+    config = dataclasses.replace(preset(ENV, "ppo"), num_envs=256)
+    chunk = rollouts_of(building.make_model(config, 0, building.make_env(config)))
     import torch
     from stable_baselines3 import PPO
 
@@ -28,8 +31,7 @@ def learning(rounds: int) -> list[Measurement]:
         peer.learn(2048, reset_num_timesteps=False)
         return 2048
 
-    subjects: dict[str, Chunk] = {"ours": chunk, "peer": default}
-    rates = interleaved(subjects, min(rounds, 3))
+    rates = interleaved({"ours": chunk, "peer": default}, min(rounds, 3))
     ours, peers = rates["ours"], rates["peer"]
     gain = "PPO N = 256 / default on one Pendulum"
     return [
@@ -37,27 +39,6 @@ def learning(rounds: int) -> list[Measurement]:
         Measurement("learning", "PPO default, one Pendulum, the same", median(peers), "1/s"),
         Measurement("learning", gain, ratio(ours, peers), "x", 25.0, 60.0),
     ]
-
-
-def _agents(*names: str) -> list[Any]:
-    """Return modules of the package ``agents``.
-
-    Raises
-    ------
-    Missing
-        If it, or a package that it needs, is not installed.
-    """
-    try:
-        return [importlib.import_module(f"agents.{name}") for name in names]
-    except ModuleNotFoundError as error:
-        raise Missing(f"agents cannot be imported: {error.name} is not installed") from error
-
-
-def preset_chunk(env: str, num_envs: int) -> Chunk:
-    """Return a function that trains the PPO preset for one rollout and returns its steps."""
-    building, presets = _agents("training.building", "settings.presets")
-    config = dataclasses.replace(presets.preset(env, "ppo"), num_envs=num_envs)
-    return rollouts_of(building.make_model(config, 0, building.make_env(config)))
 
 
 def rollouts_of(model: Any) -> Chunk:
@@ -74,15 +55,16 @@ def rollouts_of(model: Any) -> Chunk:
 
 def shares(rounds: int) -> list[Measurement]:
     """Environments' share of the time of each PPO preset."""
-    building, presets = _agents("training.building", "settings.presets")
+    from agents.settings.presets import preset
+    from agents.training import building
     from pam_envs.__main__ import env_ids
 
     found = []
-    for preset in (presets.preset(env, "ppo") for env in env_ids()):
-        env = building.make_env(preset)
-        chunk = rollouts_of(building.make_model(preset, 0, env))
-        name = preset.env.removeprefix("PAM/").rpartition("-")[0]
-        found.append(_share(f"{name}, N = {preset.num_envs}", env, chunk, min(rounds, 3)))
+    for config in (preset(env_id, "ppo") for env_id in env_ids()):
+        env = building.make_env(config)
+        chunk = rollouts_of(building.make_model(config, 0, env))
+        name = config.env.removeprefix("PAM/").rpartition("-")[0]
+        found.append(_share(f"{name}, N = {config.num_envs}", env, chunk, min(rounds, 3)))
         env.close()
     return found
 

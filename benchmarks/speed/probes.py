@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -70,31 +71,43 @@ def _batch(number: int, mode: str = "vector_entry_point", **kwargs: Any) -> Any:
 # --- one environment ------------------------------------------------------------------------
 
 
+def _peers(subjects: dict[str, Chunk], steps: dict[str, int]) -> dict[str, str]:
+    """Add environments of other libraries; return by name why one is not installed."""
+    gym, notes = _gym(), {}
+    for name, number in steps.items():
+        try:
+            subjects[name] = stepping(gym.make(name), number)
+        except (ImportError, gym.error.DependencyNotInstalled) as error:
+            notes[name] = f"not installed: {error}"
+    return notes
+
+
+def _rates(rates: dict[str, list[float]]) -> list[Measurement]:
+    return [
+        Measurement("single", f"{name}, steps per CPU second", median(found), "1/s")
+        for name, found in rates.items()
+    ]
+
+
 def single(rounds: int) -> list[Measurement]:
     """Single environment through gym.make, with info."""
     gym = _gym()
-    subjects = {"ours": stepping(gym.make(ENV), 20000)}
-    preisach = gym.make(ENV, hysteresis="preisach")
-    subjects["preisach"] = stepping(preisach, 20000)
-    subjects["KneeWalk"] = stepping(gym.make(KNEE), 10000)
-    notes = {}
-    for name, steps in ((PENDULUM, 2000), (CARTPOLE, 10000)):
-        try:
-            subjects[name] = stepping(gym.make(name), steps)
-        except (ImportError, gym.error.DependencyNotInstalled) as error:
-            notes[name] = f"not installed: {error}"
+    subjects = {
+        "ours": stepping(gym.make(ENV), 20000),
+        "preisach": stepping(gym.make(ENV, hysteresis="preisach"), 20000),
+        "KneeWalk": stepping(gym.make(KNEE), 10000),
+    }
+    notes = _peers(subjects, {PENDULUM: 2000, CARTPOLE: 10000})
     rates = interleaved(subjects, rounds)
-    results = [
-        Measurement("single", f"{name}, steps per CPU second", median(rates[name]), "1/s")
-        for name in subjects
-    ]
-    for name, floor, aim in ((PENDULUM, 10.0, 20.0), (CARTPOLE, 3.0, 5.0)):
-        value = ratio(rates["ours"], rates[name]) if name in rates else None
-        note = notes.get(name, "")
-        results.append(Measurement("single", f"ours / {name}", value, "x", floor, aim, note=note))
-    knee = ratio(rates["KneeWalk"], rates[PENDULUM]) if PENDULUM in rates else None
-    note, title = notes.get(PENDULUM, ""), f"KneeWalk / {PENDULUM}"
-    return [*results, Measurement("single", title, knee, "x", 5.0, 10.0, note=note)]
+    results = _rates(rates)
+    for name, peer, floor, aim in (
+        ("ours", PENDULUM, 10.0, 20.0),
+        ("ours", CARTPOLE, 3.0, 5.0),
+        ("KneeWalk", PENDULUM, 5.0, 10.0),
+    ):
+        value, note = ratio(rates[name], rates.get(peer)), notes.get(peer, "")
+        results.append(Measurement("single", f"{name} / {peer}", value, "x", floor, aim, note=note))
+    return results
 
 
 def single_joints(rounds: int) -> list[Measurement]:
@@ -106,26 +119,17 @@ def single_joints(rounds: int) -> list[Measurement]:
         "joint": stepping(gym.make(JOINT), 5000),
         "arm": stepping(gym.make(ARM), 2000),
     }
-    note = ""
-    try:
-        subjects[HOPPER] = stepping(gym.make(HOPPER), 1000)
-    except (ImportError, gym.error.DependencyNotInstalled) as error:
-        note = f"not installed: {error}"
+    note = _peers(subjects, {HOPPER: 1000}).get(HOPPER, "")
     rates = interleaved(subjects, rounds)
-    results = [
-        Measurement("single", f"{name}, steps per CPU second", median(rates[name]), "1/s")
-        for name in subjects
-    ]
-    for name, env, floor in (
-        ("elbow", ELBOW, 8.0),
-        ("elbow, on/off valves", ELBOW, 8.0),
-        ("joint", JOINT, 8.0),
-        ("arm", ARM, 2.0),
+    results = _rates(rates)
+    for name, title, floor in (
+        ("elbow", ELBOW[4:-3], 8.0),
+        ("elbow, on/off valves", f"{ELBOW[4:-3]}, on/off valves", 8.0),
+        ("joint", JOINT[4:-3], 8.0),
+        ("arm", ARM[4:-3], 2.0),
     ):
-        value = ratio(rates[name], rates[HOPPER]) if HOPPER in rates else None
-        _, _, make = name.partition(", ")
-        title = f"{env[4:-3]}{make and ', ' + make} / {HOPPER}"
-        results.append(Measurement("single", title, value, "x", floor, 2 * floor, note=note))
+        value, what = ratio(rates[name], rates.get(HOPPER)), f"{title} / {HOPPER}"
+        results.append(Measurement("single", what, value, "x", floor, 2 * floor, note=note))
     return results
 
 
@@ -144,18 +148,13 @@ def batch(rounds: int) -> list[Measurement]:
     except (ImportError, Missing) as error:
         note = f"envpool is not installed: {error}"
     rates = interleaved(subjects, rounds)
+    title = "N = 1024, {}, env-steps per CPU second"
+    targets = {"ours": (8e6, 20e6)}
     results = [
-        Measurement(
-            "batch",
-            f"N = 1024, {name}, env-steps per CPU second",
-            median(rates[name]),
-            "1/s",
-            8e6 if name == "ours" else None,
-            20e6 if name == "ours" else None,
-        )
-        for name in subjects
+        Measurement("batch", title.format(name), median(found), "1/s", *targets.get(name, ()))
+        for name, found in rates.items()
     ]
-    value = ratio(rates["ours"], rates["envpool"]) if "envpool" in rates else None
+    value = ratio(rates["ours"], rates.get("envpool"))
     title = f"ours / envpool {CARTPOLE}, one thread, N = 1024"
     results.append(Measurement("batch", title, value, "x", 5.0, 20.0, note=note))
     return results
@@ -169,13 +168,11 @@ def variants(rounds: int) -> list[Measurement]:
         "none": {"hysteresis": "none"},
         "randomised": {"randomize": True},
     }
-    rates = interleaved(
-        {
-            name: stepping_batch(_batch(1024, info=False, threads=1, **kwargs), 200)
-            for name, kwargs in kinds.items()
-        },
-        rounds,
-    )
+    subjects = {
+        name: stepping_batch(_batch(1024, info=False, threads=1, **kwargs), 200)
+        for name, kwargs in kinds.items()
+    }
+    rates = interleaved(subjects, rounds)
     first = rates["maxwell_slip"]
     return [
         Measurement("batch", f"N = 1024, {name} / maxwell_slip", ratio(rates[name], first))
@@ -286,16 +283,10 @@ def _python(code: str, *arguments: str, **environment: str) -> str:
 def uncompiled(rounds: int) -> list[Measurement]:
     """Uncompiled single step against InvertedPendulum-v5."""
     rates = json.loads(_python(_UNCOMPILED, str(rounds), PAM_ENVS_COMPILE="0"))
+    value = ratio(rates["ours"], rates["peer"])
     return [
         Measurement("plain", "uncompiled, steps per CPU second", median(rates["ours"]), "1/s"),
-        Measurement(
-            "plain",
-            f"uncompiled / {PENDULUM}",
-            ratio(rates["ours"], rates["peer"]),
-            "x",
-            1.0,
-            2.0,
-        ),
+        Measurement("plain", f"uncompiled / {PENDULUM}", value, "x", 1.0, 2.0),
     ]
 
 
@@ -335,7 +326,8 @@ def start_up(rounds: int) -> list[Measurement]:
     """Import and first step in a fresh interpreter, and the way to machine code.
 
     An environment begins in plain Python and changes to machine code after some steps; what that
-    takes is measured beside the first step, and has no target.
+    takes
+    is measured beside the first step, and has no target.
     """
     from pam_envs.envs.core.plant_env import INTERPRETED_CALLS
 
@@ -348,9 +340,7 @@ def start_up(rounds: int) -> list[Measurement]:
             again = [float(_python(_START, ENV, steps, PAM_ENVS_CACHE=c)) for c in caches]
             for state, times, floor, aim in (("warm", again, 0.7, 0.35), ("cold", cold, 1.5, 1.0)):
                 name = f"interpreter, import and {title}, {state}"
-                limits = (floor, aim) if steps == "1" else (None, None)
-                found = median(times)
-                results.append(
-                    Measurement("start", name, found, "s", limits[0], limits[1], "less", note)
-                )
+                shown = Measurement("start", name, median(times), "s", better="less", note=note)
+                first = steps == "1"
+                results.append(replace(shown, floor=floor, aim=aim) if first else shown)
     return results

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from benchmarks.papers.published import aligned
 from benchmarks.runs import provenance
 
 Chunk = Callable[[], int]
@@ -24,17 +25,9 @@ class Missing(Exception):
 
 @dataclass(frozen=True)
 class Measurement:
-    """One measured figure beside its target.
+    """One measured figure beside its floor (required) and aim (desired).
 
-    Attributes
-    ----------
-    group, name, unit : str
-    value : float or None
-        ``None`` if it could not be measured; ``note`` says why.
-    floor, aim : float or None
-        Required value and target.
-    better : {"more", "less"}
-    note : str
+    ``value`` is None if it could not be measured; ``note`` says why.
     """
 
     group: str
@@ -71,16 +64,7 @@ class Measurement:
 def interleaved(
     subjects: Mapping[str, Chunk], rounds: int, clock: Callable[[], float] = time.process_time
 ) -> dict[str, list[float]]:
-    """Return the rate of each subject in each round [steps/s].
-
-    Parameters
-    ----------
-    subjects : mapping of callable
-        Each is called once to warm up and then once a round.
-    rounds : int
-    clock : callable
-        CPU time by default.
-    """
+    """Return the rate of each subject in each round [steps/s], after a call to warm up."""
     for chunk in subjects.values():
         chunk()
     rates: dict[str, list[float]] = {name: [] for name in subjects}
@@ -97,9 +81,9 @@ def median(rates: Sequence[float]) -> float:
     return float(statistics.median(rates))
 
 
-def ratio(above: Sequence[float], below: Sequence[float]) -> float:
-    """Return the median of the ratios within each round."""
-    return median([a / b for a, b in zip(above, below, strict=True)])
+def ratio(above: Sequence[float], below: Sequence[float] | None) -> float | None:
+    """Return the median of the ratios within each round; None if one side was not measured."""
+    return None if below is None else median([a / b for a, b in zip(above, below, strict=True)])
 
 
 def _shown(value: float | None) -> str:
@@ -115,24 +99,12 @@ def _shown(value: float | None) -> str:
 def table(results: Sequence[Measurement]) -> str:
     """Return the figures as aligned text: target, measured, pass."""
     heading = ("group", "what", "floor", "aim", "measured", "unit", "", "note")
-    lines = [heading] + [
-        (
-            r.group,
-            r.name,
-            f"{'>=' if r.better == 'more' else '<='} {_shown(r.floor)}" if r.floor else "",
-            _shown(r.aim) if r.aim else "",
-            _shown(r.value),
-            r.unit,
-            r.verdict,
-            r.note,
-        )
-        for r in results
-    ]
-    widths = [max(len(line[i]) for line in lines) for i in range(len(heading))]
-    return "\n".join(
-        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
-        for line in lines
-    )
+    lines: list[tuple[str, ...]] = [heading]
+    for r in results:
+        floor = f"{'>=' if r.better == 'more' else '<='} {_shown(r.floor)}" if r.floor else ""
+        measured = (_shown(r.aim) if r.aim else "", _shown(r.value), r.unit)
+        lines.append((r.group, r.name, floor, *measured, r.verdict, r.note))
+    return aligned(lines)
 
 
 def record(results: Sequence[Measurement]) -> dict[str, Any]:

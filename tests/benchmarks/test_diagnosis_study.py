@@ -281,8 +281,8 @@ def test_traces_are_compared_where_the_truth_is_largest() -> None:
 def made_rig(name: str) -> Any:
     effect = hidden.draw_effect(name, np.random.default_rng(1))
     base = hidden.draw_base(np.random.default_rng(3))
-    truth = SimpleNamespace(effect=effect, amplitude=3.0)
-    return SimpleNamespace(ground=SimpleNamespace(base=base), truths=(truth,), noise=NOISE)
+    ground = SimpleNamespace(base=base)
+    return SimpleNamespace(ground=ground, effects=[(effect, 3.0)], noise=NOISE)
 
 
 @pytest.mark.parametrize("name", ["creep", "dead_time", "sensor_delay"])
