@@ -12,7 +12,7 @@ from benchmarks.diagnosis.cases import NOISE, Case, Made, make
 from benchmarks.diagnosis.next import DrivenRig, OracleRig, again
 from benchmarks.identity.hashing import plain
 from benchmarks.runs import provenance
-from benchmarks.scoring.errors import rms
+from benchmarks.scoring.group import rms
 from pam_envs.constants import CELSIUS, GRAVITY
 from pam_envs.diagnosis.closed_loop.gain import COMPENSABLE, closed_loop
 from pam_envs.diagnosis.diagnosis import diagnose

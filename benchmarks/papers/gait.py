@@ -23,7 +23,7 @@ from baselines.linear.bumpless import make_bumpless
 from baselines.linear.systems import discrete
 from benchmarks.papers.knee import PERIOD, SOURCE
 from benchmarks.papers.published import BEFORE, Figure, Group, note
-from benchmarks.scoring.errors import rms
+from benchmarks.scoring.group import rms
 from pam_envs.constants import GRAVITY
 from pam_envs.identification.emg_calibration import PUBLISHED, change, stride_torques
 from pam_envs.muscle.emg import MuscleActivation, Reading, calibration, emg_proxy

@@ -30,7 +30,7 @@ from baselines.core.catalogue import CONTROLLERS, make_controller
 from baselines.joint.model import POLE
 from baselines.linear.systems import discrete, double_lag
 from benchmarks.runs import rollout
-from benchmarks.scoring.errors import rms
+from benchmarks.scoring.group import rms
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
 from pam_envs.parameters import Signal, Signals

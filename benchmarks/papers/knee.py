@@ -22,7 +22,7 @@ from baselines.linear.bumpless import SMALLEST, certificate
 from baselines.linear.ltr import closed_loop_poles, design_ltr, loop_figures
 from baselines.linear.systems import discrete
 from benchmarks.papers.published import BEFORE, Figure, Group, note
-from benchmarks.scoring.errors import rms
+from benchmarks.scoring.group import rms
 from pam_envs.hysteresis.modified_maxwell_slip import even_model
 from pam_envs.identification.maxwell_slip_lp import (
     OpenParameters,
