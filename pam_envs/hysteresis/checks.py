@@ -47,6 +47,13 @@ def check_not_negative(name: str, values: Sequence[float], why: str) -> None:
             )
 
 
+def width_of(width: float) -> float:
+    """Return a factor on the width of a hysteresis, or raise if it is below 0."""
+    (width,) = floats("width", (width,))
+    check_not_negative("width", (width,), "to stay passive")
+    return width
+
+
 def single_rows(state: Any, count: int) -> Array:
     """Return a state of ``count`` numbers as rows of one lane."""
     rows = np.array(state, dtype=float)

@@ -37,18 +37,10 @@ def creep_step(
     value: Any,
     width: Any, total: Any,
 ) -> None:  # fmt: skip
-    """Add the creep of lanes ``first`` to ``last`` to ``total``.
+    """Add the creep of lanes ``first`` to ``last`` to the row ``total``.
 
-    Parameters
-    ----------
-    rows, fixed : rows
-        State and parameters.
-    state, compliance, time : int
-        First rows of the elements' state, compliances and time constants [s].
-    first, last : int
-        Lanes.
-    value, width, total : row
-        The quantity that is followed, seconds since the last time, and where to add.
+    ``state``, ``compliance`` and ``time`` are the first rows of the elements' state, compliances
+    and time constants [s]; ``value`` is the quantity that they follow, over ``width`` seconds.
     """
     for k in range(ELEMENTS):
         lag = rows[state + k]

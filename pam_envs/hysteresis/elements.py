@@ -1,4 +1,4 @@
-"""Scalar kernels of plays and stops, for use inside other kernels, and their loops over time.
+"""Plays and stops: scalar kernels, loops over time, and the base of the models made of them.
 
 A play is written in its absolute form ``max(x - r, min(x + r, w))``. Its state is then always one
 of three exact numbers, so that a closed excursion of the input returns it to the last bit; the
@@ -7,12 +7,13 @@ incremental form ``clip(s + dx, -r, r)`` collects rounding errors.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+import math
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.hysteresis.checks import series, single_rows
 from pam_envs.hysteresis.protocol import ELEMENTS
 from pam_envs.kernels.build import entry, kernel
 
@@ -26,19 +27,8 @@ LINEAR, THRESHOLD, WEIGHT = 1, 2, 2 + ELEMENTS
 def play(x: float, threshold: float, w: float) -> float:
     """Return the position of a play after its input has moved monotonically to ``x``.
 
-    Parameters
-    ----------
-    x : float
-        Input, in any unit.
-    threshold : float
-        Half the dead width, in the unit of the input, not negative.
-    w : float
-        Position before.
-
-    Returns
-    -------
-    float
-        Position after; at most ``threshold`` away from ``x``.
+    ``threshold`` is half the dead width, not negative, ``w`` the position before, both in the unit
+    of the input; the position after is at most ``threshold`` away from ``x``.
     """
     low, high = x - threshold, x + threshold
     if w < low:
@@ -139,28 +129,91 @@ def plays_peek(
 
 
 @entry
-def simulate_plays(
-    x: Array, state: Array, thresholds: Array, weights: Array, linear: float, y: Array
+def simulate_elements(
+    x: Array, state: Array, thresholds: Array, gains: Array, line: float, slips: bool, y: Array
 ) -> None:
-    """Run plays over a record, (T,), from the rows ``state``; write the outputs to ``y``."""
+    """Run plays, or stops if ``slips``, over a record, (T,), from the rows ``state``."""
     for t in range(len(x)):
-        y[t] = play_step(x[t], state, 0, thresholds, weights, linear)
+        if slips:
+            y[t] = slip_step(x[t], state, 0, thresholds, gains, line)
+        else:
+            y[t] = play_step(x[t], state, 0, thresholds, gains, line)
 
 
-@entry
-def simulate_slips(
-    x: Array, state: Array, breaks: Array, stiffnesses: Array, spring: float, y: Array
-) -> None:
-    """Run elasto-slip elements over a record, (T,), from the rows ``state``; write to ``y``."""
-    for t in range(len(x)):
-        y[t] = slip_step(x[t], state, 0, breaks, stiffnesses, spring)
-
-
-def move_plays(x: Array, thresholds: Sequence[float], state: ArrayLike) -> Array:
+def move_plays(x: Array, thresholds: Array, state: ArrayLike) -> Array:
     """Return the positions of plays after inputs (...), from positions (..., n)."""
-    # the comparisons of the kernel, spelt out, so that even the sign of a zero is the same
+    # the comparisons of the kernel, so that even the sign of a zero is the same
     w = np.asarray(state, dtype=float)
-    r = np.asarray(thresholds)
-    upper, lower = x[..., None] + r, x[..., None] - r
+    upper, lower = x[..., None] + thresholds, x[..., None] - thresholds
     inner = np.where(w < upper, w, upper)
     return np.where(inner > lower, inner, lower)
+
+
+class ParallelElements:
+    """A line and plays, or stops, in parallel: the common part of their models.
+
+    The state holds the positions of the plays (the slip positions of the stops), shape (..., n).
+    """
+
+    slips: ClassVar[bool] = False
+    """True for stops."""
+
+    @property
+    def parts(self) -> tuple[Array, Array, float]:
+        """Thresholds and gains of the elements, shape (n,) each, and slope of the line."""
+        raise NotImplementedError
+
+    @property
+    def friction(self) -> float:
+        """Output that all elements hold together when all slip."""
+        thresholds, gains, _ = self.parts
+        return math.fsum(gains * thresholds)
+
+    def initial_state(self, batch_shape: tuple[int, ...] = ()) -> Array:
+        """Return the positions of the virgin state, zeros of shape ``(*batch_shape, n)``."""
+        return np.zeros((*batch_shape, len(self.parts[0])))
+
+    def step(self, x: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
+        """Return the output and the new state for one sample of every row.
+
+        Parameters
+        ----------
+        x : array_like, shape (...)
+            Inputs.
+        state : array_like, shape (..., n)
+            Positions before; they are not changed.
+
+        Returns
+        -------
+        y : ndarray, shape (...)
+            Outputs, the same bits as :meth:`simulate` gives.
+        state : ndarray, shape (..., n)
+            Positions after.
+        """
+        thresholds, gains, line = self.parts
+        x = np.asarray(x, dtype=float)
+        new = move_plays(x, thresholds, state)
+        y = np.asarray(line * x)
+        for i, gain in enumerate(gains):
+            y = y + gain * (x - new[..., i] if self.slips else new[..., i])
+        return y, new
+
+    def simulate(self, x: ArrayLike, state: ArrayLike | None = None) -> tuple[Array, Array]:
+        """Return the outputs, shape (T,), for inputs of shape (T,), and the last state, (n,)."""
+        values = series(x)
+        start = self.initial_state() if state is None else state
+        rows = single_rows(start, len(self.parts[0]))
+        y = np.empty_like(values)
+        simulate_elements(values, rows, *self.parts, self.slips, y)
+        return y, rows[:, 0]
+
+    def dissipated(self, before: ArrayLike, after: ArrayLike) -> Array:
+        """Return the work lost between two states, ``sum(gain * threshold * abs(change))``.
+
+        The input must have moved one way in between, or not passed its last turn by enough to
+        move a play back. Summed over a closed cycle it is the loop area, the integral of ``x dy``
+        of plays and of ``y dx`` of stops; never negative.
+        """
+        moved = np.abs(np.asarray(after, dtype=float) - np.asarray(before, dtype=float))
+        thresholds, gains, _ = self.parts
+        return moved @ (gains * thresholds)

@@ -3,15 +3,15 @@
 ``E(alpha, beta)`` is the change of the output when the input rises from ``beta`` to ``alpha``
 (and has been below ``beta`` before): the weight of all relays that switch up at or below
 ``alpha`` and down at or above ``beta``. A falling input changes it by ``E(beta, alpha) =
--E(alpha, beta)``, so the table is antisymmetric. It lives on a uniform grid and is interpolated
+-E(alpha, beta)``, so the table is antisymmetric. It is given on a uniform grid and interpolated
 bilinearly, which spreads the relays of a cell evenly over the cell; relays of a cell on the
-diagonal are free of hysteresis (their loops are narrower than the grid can tell).
+diagonal are free of hysteresis (their loops are narrower than the grid resolves).
 
 There is no factor one half here: a relay goes from 0 to its weight.
 
 References
 ----------
-I. D. Mayergoyz, "Mathematical Models of HysteresisModel", Springer 1991. D. H. Everett, "A general
+I. D. Mayergoyz, "Mathematical Models of Hysteresis", Springer 1991. D. H. Everett, "A general
 approach to hysteresis, part 4", Trans. Faraday Society 51 (1955).
 """
 
@@ -90,18 +90,10 @@ def play_table(operator: PlayOperator, levels: Array) -> Array:
 
 
 def symmetry_error(table: ArrayLike) -> float:
-    """Return how far a map is from ``mu(a, b) = mu(-b, -a)``, inputs counted from mid-range.
+    """Return the asymmetry of a map, shape (n, n), inputs counted from mid-range.
 
-    Parameters
-    ----------
-    table : array_like, shape (n, n)
-        Everett map.
-
-    Returns
-    -------
-    float
-        Largest ``abs(E(a, b) - E(-b, -a))`` divided by the largest entry; 0 when the descending
-        branches are the ascending ones turned by half a turn.
+    The largest ``abs(E(a, b) - E(-b, -a))`` over the largest entry; 0 when the descending branches
+    are the ascending ones turned by half a turn.
     """
     values = np.asarray(table, dtype=float)
     mirrored = -values[::-1, ::-1]  # E(-b, -a) = -E(-a, -b)

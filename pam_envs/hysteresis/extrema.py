@@ -121,20 +121,13 @@ def preisach_step(
     stack, sums : rows of float, shape (depth, lanes)
         Extrema and the outputs there; changed in place. ``depth`` is at least 3.
     count : row of int, shape (lanes,)
-        Number of points in use; changed in place.
-    lane : int
-        Column to work on.
+        Number of points in use of each ``lane``; changed in place.
     table : rows of float, shape (n, n)
         Antisymmetric Everett map.
     low : float
         Input of the table's first row.
     inverse_cell : float
         Cells per unit of input, ``(n - 1) / (high - low)``.
-
-    Returns
-    -------
-    float
-        Output.
 
     Notes
     -----
@@ -150,18 +143,6 @@ def preisach_step(
     sums[n][lane] = y
     count[lane] = n + 1
     return y
-
-
-@kernel
-def preisach_peek(
-    x: float, stack: Any, sums: Any, count: Any, lane: int, table: Any, low: float,
-    inverse_cell: float,
-) -> float:  # fmt: skip
-    """Return the output that :func:`preisach_step` would give, without changing the state."""
-    x = _held(x, low, low + (len(table) - 1) / inverse_cell)
-    _, turn, output, part = _find_turn(x, stack, sums, count, lane, low)
-    change = everett((x - low) * inverse_cell, (turn - low) * inverse_cell, table)
-    return output + part * change
 
 
 @kernel
@@ -261,10 +242,12 @@ def invert_rows(
     y: Array, stack: Any, sums: Any, count: Any, table: Any, low: float, inverse_cell: float,
     x: Array,
 ) -> None:  # fmt: skip
-    """Write into ``x`` the input of every lane that gives ``y``, and advance the states."""
-    for lane in range(len(y)):
-        x[lane] = preisach_inverse(y[lane], stack, sums, count, lane, table, low, inverse_cell)
-        preisach_step(x[lane], stack, sums, count, lane, table, low, inverse_cell)
+    """Write into ``x`` the inputs that give ``y[t][lane]`` in turn, and advance the states."""
+    for t in range(len(y)):
+        for lane in range(len(y[t])):
+            found = preisach_inverse(y[t][lane], stack, sums, count, lane, table, low, inverse_cell)
+            x[t][lane] = found
+            preisach_step(found, stack, sums, count, lane, table, low, inverse_cell)
 
 
 # --- tiles of lanes -----------------------------------------------------------------------------
@@ -355,11 +338,8 @@ def relays_peek(
     for m in range(operators):
         at = state + m * STATE_ROWS
         x, lag, stick = rows[x_at + m], rows[lag_at + m], rows[stick_at + m]
-        low, high, inverse_cell = (
-            fixed[model + LOW],
-            fixed[model + HIGH],
-            fixed[model + INVERSE_CELL],
-        )
+        low, high = fixed[model + LOW], fixed[model + HIGH]
+        inverse_cell = fixed[model + INVERSE_CELL]
         present, output, turn = rows[at + PRESENT], rows[at + OUTPUT], rows[at + TURN]
         turn_output, part = rows[at + TURN_OUTPUT], rows[at + PART]
         stack, sums = rows[at : at + DEPTH], rows[at + DEPTH : at + 2 * DEPTH]

@@ -13,7 +13,7 @@ from pam_envs.parameters import assumed, effect
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionEffects:
-    """Shape and pressure dependence of the friction, neutral unless a recording shows them."""
+    """Shape and pressure dependence of the friction."""
 
     shape: float = assumed(1.0, "1", 0.01, 100.0, "slope of small loops over plays'", neutral=1.0)
     pressure_slope: float = effect("1", -2.0, 20.0, "friction gained up to full pressure, linear")
@@ -22,7 +22,7 @@ class FrictionEffects:
 
 @dataclass(frozen=True, kw_only=True)
 class FirstCycles:
-    """Loss of force in the first cycles, none unless a recording shows it."""
+    """Loss of force in the first cycles."""
 
     first_loss: float = effect("1", -0.9, 0.9, "effective pressure missing at first")
     first_travel: float = assumed(2e6, "Pa", 1e4, 1e9, "pressure travel of the transition")
@@ -30,7 +30,7 @@ class FirstCycles:
 
 @dataclass(frozen=True, kw_only=True)
 class Threshold:
-    """Pressure below which the muscle exerts no force, none unless a recording shows it."""
+    """Pressure below which the muscle exerts no force."""
 
     threshold: float = effect("Pa", 0.0, 3e5, "pressure before the tube meets the braid")
 
@@ -55,16 +55,9 @@ def newness(travel: float, span: float) -> float:
 def friction_with_effects(
     friction: float, most: float, share_of_full: float, shape: float, slope: float, bend: float
 ) -> float:
-    """Return the friction [Pa] with its shape and its dependence on pressure.
+    """Return the friction [Pa] of the plays, at most ``most``, with :class:`FrictionEffects`.
 
-    Parameters
-    ----------
-    friction, most : float
-        Of the plays, and its largest size [Pa].
-    share_of_full : float
-        Pressure over full pressure.
-    shape, slope, bend : float
-        Parameters of :class:`FrictionEffects`.
+    ``share_of_full`` is the pressure over full pressure.
     """
     share = min(1.0, abs(friction) / max(most, 1.0))
     friction = friction * shape / (1.0 + (shape - 1.0) * share)

@@ -23,22 +23,14 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.hysteresis.checks import (
-    check_not_negative,
-    check_thresholds,
-    floats,
-    series,
-    single_rows,
-)
+from pam_envs.hysteresis.checks import check_not_negative, check_thresholds, floats, width_of
 from pam_envs.hysteresis.elements import (
-    move_plays,
+    ParallelElements,
     play,
     play_step,
     plays_lag,
     plays_peek,
     plays_step,
-    simulate_plays,
-    simulate_slips,
     slip_step,
     stop,
 )
@@ -61,7 +53,7 @@ Array = NDArray[np.float64]
 
 @register
 @dataclass(frozen=True)
-class PlayOperator(HysteresisModel):
+class PlayOperator(ParallelElements, HysteresisModel):
     """A line and plays in parallel: ``y = linear * x + sum(weights * plays)``.
 
     Parameters
@@ -89,6 +81,11 @@ class PlayOperator(HysteresisModel):
         object.__setattr__(self, "linear", floats("linear", (self.linear,))[0])
         check_thresholds("thresholds", self.thresholds, len(self.weights), "weights")
 
+    @cached_property
+    def parts(self) -> tuple[Array, Array, float]:
+        """Thresholds, weights and linear part."""
+        return np.array(self.thresholds), np.array(self.weights), self.linear
+
     @property
     def total_slope(self) -> float:
         """The slope where every play moves: that of large amplitudes."""
@@ -97,7 +94,7 @@ class PlayOperator(HysteresisModel):
     @property
     def largest_lag(self) -> float:
         """Distance of the output from the line after a long way in one direction."""
-        return math.fsum(w * t for w, t in zip(self.weights, self.thresholds, strict=True))
+        return self.friction
 
     # --- the protocol ---------------------------------------------------------------------------
 
@@ -139,61 +136,10 @@ class PlayOperator(HysteresisModel):
         self, low: float, high: float, levels: int, start: Start
     ) -> tuple[Array, float]:
         """Return the Everett map, shape (levels, levels), and the output at the start."""
-        output = 0.0
-        if start == "low":
-            output = self.total_slope * low + math.fsum(
-                a * r for a, r in zip(self.weights, self.thresholds, strict=True)
-            )
+        output = self.total_slope * low + self.friction if start == "low" else 0.0
         return play_table(self, grid(low, high, levels)), output
 
-    # --- operation ------------------------------------------------------------------------------
-
-    def initial_state(self, batch_shape: tuple[int, ...] = ()) -> Array:
-        """Return the play positions of the virgin state, zeros of shape ``(*batch_shape, n)``."""
-        return np.zeros((*batch_shape, len(self.thresholds)))
-
-    def step(self, x: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
-        """Return the output and the new state for one sample of every row.
-
-        Parameters
-        ----------
-        x : array_like, shape (...)
-            Inputs.
-        state : array_like, shape (..., n)
-            Play positions before; they are not changed.
-
-        Returns
-        -------
-        y : ndarray, shape (...)
-            Outputs, the same bits as :meth:`simulate` gives.
-        state : ndarray, shape (..., n)
-            Play positions after.
-        """
-        x = np.asarray(x, dtype=float)
-        new = move_plays(x, self.thresholds, state)
-        y = np.asarray(self.linear * x)
-        for i, weight in enumerate(self.weights):
-            y = y + weight * new[..., i]
-        return y, new
-
-    def simulate(self, x: ArrayLike, state: ArrayLike | None = None) -> tuple[Array, Array]:
-        """Return the outputs, shape (T,), for inputs of shape (T,), and the last state, (n,)."""
-        values = series(x)
-        start = self.initial_state() if state is None else state
-        rows = single_rows(start, len(self.thresholds))
-        y = np.empty_like(values)
-        arrays = np.array(self.thresholds), np.array(self.weights)
-        simulate_plays(values, rows, *arrays, self.linear, y)
-        return y, rows[:, 0]
-
-    def dissipated(self, before: ArrayLike, after: ArrayLike) -> Array:
-        """Return the work lost between two states, ``sum(weights * r * abs(change))``.
-
-        The input must have moved one way in between, or not passed its last turn by enough to
-        move a play back. Over a closed cycle the sum is the loop area, the integral of ``x dy``.
-        """
-        moved = np.abs(np.asarray(after, dtype=float) - np.asarray(before, dtype=float))
-        return moved @ (np.array(self.weights) * np.array(self.thresholds))
+    # --- inverse --------------------------------------------------------------------------------
 
     def inverse_step(self, y: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
         """Return the input that gives the output ``y``, and the state after it.
@@ -209,8 +155,7 @@ class PlayOperator(HysteresisModel):
         The output is ``s x - width (s x - y)`` with ``s`` the total slope (whatever ``slope``): 0
         is free of hysteresis, 1 is this operator, and the slope of large amplitudes is the same.
         """
-        (width,) = floats("width", (width,))
-        check_not_negative("width", (width,), "to stay passive")
+        width = width_of(width)
         linear = width * self.linear + (1.0 - width) * self.total_slope
         return replace(self, weights=tuple(width * a for a in self.weights), linear=linear)
 
@@ -242,13 +187,8 @@ class PlayOperator(HysteresisModel):
             If a weight is negative or the initial slope is not above 0.
         """
         slopes = self._slopes()
-        stiffnesses = tuple(
-            (weight if threshold > 0.0 else 0.0) / (before * after)
-            for threshold, weight, before, after in zip(
-                self.thresholds, self.weights, slopes, slopes[1:], strict=False
-            )
-        )
-        return MaxwellSlip(1.0 / slopes[-1], stiffnesses, _loading(self.thresholds, slopes))
+        stiffnesses, breaks = _dual(self.thresholds, self.weights, slopes)
+        return MaxwellSlip(1.0 / slopes[-1], stiffnesses, breaks)
 
     def inverse_state(self, state: ArrayLike) -> Array:
         """Return the inverse's state, shape (..., n), for a state that this operator reached.
@@ -270,39 +210,29 @@ class PlayRows(Rows):
     operator: PlayOperator
 
     @cached_property
-    def _arrays(self) -> tuple[Array, Array, Array, Array, Array]:
-        undo = self.operator.inverse()
+    def _inverse(self) -> tuple[MaxwellSlip, Array]:
         mirror = self.operator.inverse_state(np.eye(self.operator.elements)).T  # it is linear
-        return (
-            np.array(self.operator.thresholds),
-            np.array(self.operator.weights),
-            mirror,
-            np.array(undo.break_displacements),
-            np.array(undo.stiffnesses),
-        )
+        return self.operator.inverse(), mirror
 
-    @cached_property
-    def _spring(self) -> float:
-        return self.operator.inverse().spring
-
-    def forward(self, felt: Array, state: RowsState) -> tuple[Array, RowsState]:
+    def forward(self, x: Array, state: RowsState) -> tuple[Array, RowsState]:
         """Return the outputs for inputs, shape (rows,), and the states they leave."""
-        thresholds, weights, *_ = self._arrays
-        x = felt[:, None]
-        plays = np.maximum(x - thresholds, np.minimum(x + thresholds, state[0]))
-        return self.operator.linear * felt + np.add.reduce(weights * plays, axis=1), (plays,)
+        thresholds, weights, linear = self.operator.parts
+        column = x[:, None]
+        plays = np.maximum(column - thresholds, np.minimum(column + thresholds, state[0]))
+        return linear * x + np.add.reduce(weights * plays, axis=1), (plays,)
 
-    def inverse(self, wanted: Array, state: RowsState) -> Array:
-        """Return the inputs that give outputs, shape (rows,); the states stay."""
-        _, _, mirror, breaks, stiffnesses = self._arrays
+    def inverse(self, y: Array, state: RowsState) -> Array:
+        """Return the inputs that give outputs, shape (rows,), without changing the states."""
+        undo, mirror = self._inverse
+        breaks, stiffnesses, spring = undo.parts
         slips = np.add.reduce(mirror * state[0][:, None, :], axis=2)
-        y = wanted[:, None]
-        slips = np.maximum(y - breaks, np.minimum(y + breaks, slips))
-        return np.asarray(self._spring * wanted + np.add.reduce(stiffnesses * (y - slips), axis=1))
+        column = y[:, None]
+        slips = np.maximum(column - breaks, np.minimum(column + breaks, slips))
+        return np.asarray(spring * y + np.add.reduce(stiffnesses * (column - slips), axis=1))
 
 
 @dataclass(frozen=True)
-class MaxwellSlip:
+class MaxwellSlip(ParallelElements):
     """A spring and elasto-slip elements in parallel: ``spring * x + sum(k * stop)``.
 
     Parameters
@@ -320,6 +250,8 @@ class MaxwellSlip:
     The state holds the slip positions (where each element would be free of force), shape (..., n).
     """
 
+    slips: ClassVar[bool] = True
+
     spring: float
     stiffnesses: tuple[float, ...]
     break_displacements: tuple[float, ...]
@@ -333,45 +265,15 @@ class MaxwellSlip:
         check_not_negative("stiffnesses", self.stiffnesses, "to dissipate and not create energy")
         check_not_negative("spring", (self.spring,), "to be a spring")
 
+    @cached_property
+    def parts(self) -> tuple[Array, Array, float]:
+        """Break displacements, stiffnesses and spring."""
+        return np.array(self.break_displacements), np.array(self.stiffnesses), self.spring
+
     @property
     def total_slope(self) -> float:
         """The stiffness where every element slips: that of large amplitudes."""
         return self.spring
-
-    def initial_state(self, batch_shape: tuple[int, ...] = ()) -> Array:
-        """Return the slip positions of the virgin state, zeros of shape ``(*batch_shape, n)``."""
-        return np.zeros((*batch_shape, len(self.stiffnesses)))
-
-    def step(self, x: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
-        """Return the force, shape (...), and the new state, (..., n), for one sample of every row.
-
-        The bits are those of :meth:`simulate`; ``state`` is not changed.
-        """
-        x = np.asarray(x, dtype=float)
-        new = move_plays(x, self.break_displacements, state)
-        force = np.asarray(self.spring * x)
-        for i, stiffness in enumerate(self.stiffnesses):
-            force = force + stiffness * (x - new[..., i])
-        return force, new
-
-    def simulate(self, x: ArrayLike, state: ArrayLike | None = None) -> tuple[Array, Array]:
-        """Return the forces, shape (T,), for inputs of shape (T,), and the last state, (n,)."""
-        values = series(x)
-        start = self.initial_state() if state is None else state
-        rows = single_rows(start, len(self.stiffnesses))
-        force = np.empty_like(values)
-        arrays = np.array(self.break_displacements), np.array(self.stiffnesses)
-        simulate_slips(values, rows, *arrays, self.spring, force)
-        return force, rows[:, 0]
-
-    def dissipated(self, before: ArrayLike, after: ArrayLike) -> Array:
-        """Return the friction work between two states, ``sum(k * x_break * abs(slip))``.
-
-        Exact when the input moved one way in between. Summed over the steps of a cycle it is the
-        loop area, the integral of ``force dx``; never negative.
-        """
-        slipped = np.abs(np.asarray(after, dtype=float) - np.asarray(before, dtype=float))
-        return slipped @ (np.array(self.stiffnesses) * np.array(self.break_displacements))
 
     def stored_energy(self, x: ArrayLike, state: ArrayLike) -> Array:
         """Return the elastic energy at input ``x``, shape (...), with slip positions (..., n)."""
@@ -381,8 +283,7 @@ class MaxwellSlip:
 
     def scaled(self, width: float) -> MaxwellSlip:
         """Return this model with its hysteresis ``width`` times as wide, 0 for the spring alone."""
-        (width,) = floats("width", (width,))
-        check_not_negative("width", (width,), "to stay passive")
+        width = width_of(width)
         return replace(self, stiffnesses=tuple(width * k for k in self.stiffnesses))
 
     def _slopes(self) -> list[float]:
@@ -401,13 +302,7 @@ class MaxwellSlip:
     def inverse(self) -> PlayOperator:
         """Return the play operator that undoes this model exactly (``spring`` must be above 0)."""
         slopes = self._slopes()
-        weights = tuple(
-            (stiffness if displacement > 0.0 else 0.0) / (before * after)
-            for displacement, stiffness, before, after in zip(
-                self.break_displacements, self.stiffnesses, slopes, slopes[1:], strict=False
-            )
-        )
-        thresholds = _loading(self.break_displacements, slopes)
+        weights, thresholds = _dual(self.break_displacements, self.stiffnesses, slopes)
         return PlayOperator(thresholds, weights, 1.0 / slopes[0])
 
     def inverse_state(self, state: ArrayLike) -> Array:
@@ -415,13 +310,16 @@ class MaxwellSlip:
         return _mirrored(state, self._slopes(), tuple(-k for k in self.stiffnesses))
 
 
-def _loading(thresholds: tuple[float, ...], slopes: list[float]) -> tuple[float, ...]:
-    """Return the initial loading curve, piecewise linear, at its kinks ``thresholds``."""
-    values, x, y = [], 0.0, 0.0
-    for threshold, slope in zip(thresholds, slopes, strict=False):
-        y, x = y + slope * (threshold - x), threshold
-        values.append(y)
-    return tuple(values)
+def _dual(
+    thresholds: tuple[float, ...], gains: tuple[float, ...], slopes: list[float]
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return gains and thresholds of the inverse: the initial loading curve, mirrored."""
+    made, levels, x, y = [], [], 0.0, 0.0
+    for i, (threshold, gain) in enumerate(zip(thresholds, gains, strict=True)):
+        made.append((gain if threshold > 0.0 else 0.0) / (slopes[i] * slopes[i + 1]))
+        y, x = y + slopes[i] * (threshold - x), threshold
+        levels.append(y)
+    return tuple(made), tuple(levels)
 
 
 def _mirrored(state: ArrayLike, slopes: list[float], changes: tuple[float, ...]) -> Array:

@@ -21,7 +21,6 @@ Meas., Control 128 (2006).
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -36,8 +35,9 @@ from pam_envs.hysteresis.checks import (
     floats,
     series,
     single_rows,
+    width_of,
 )
-from pam_envs.hysteresis.elements import play
+from pam_envs.hysteresis.elements import ParallelElements, play
 from pam_envs.hysteresis.everett import table_from_weights, weights_from_table
 from pam_envs.hysteresis.protocol import HysteresisModel, Kernels, Start, Usage, register
 from pam_envs.kernels.build import entry, kernel
@@ -56,11 +56,6 @@ def _cell(x: float, segment: float, cells: int) -> int:
     """Return the cell of the spring that ``x`` is in, the end cells reaching on for ever."""
     last = cells - 1.0
     return int(max(0.0, min(last, x / segment)))
-
-
-@kernel
-def _line(x: float, cell: int, low: float, high: float, segment: float) -> float:
-    return low + (high - low) * (x / segment - cell)
 
 
 @kernel
@@ -91,9 +86,9 @@ def _beyond(x: float, mark: float, rising: bool) -> bool:
 
 @kernel
 def _spring(x: float, spring: Any, segment: float) -> float:
-    cells = len(spring) - 1
-    cell = _cell(x, segment, cells)
-    return _line(x, cell, spring[cell], spring[cell + 1], segment)
+    cell = _cell(x, segment, len(spring) - 1)
+    low, high = spring[cell], spring[cell + 1]
+    return low + (high - low) * (x / segment - cell)
 
 
 @kernel
@@ -108,15 +103,11 @@ def pressure_step(
     x : float
         Stiffness [N/m].
     state : rows of float, shape (n, lanes)
-        Slip positions [N/m]; changed in place.
-    lane : int
-        Column to work on.
+        Slip positions [N/m] of each ``lane``; changed in place.
     breaks, stiffnesses : row of float, shape (n,)
         Deflections [N/m] at which the elements slip, rising, and their stiffnesses [Pa m/N].
     spring : row of float, shape (m,)
-        Pressures [Pa] of the spring at the stiffnesses ``0, segment, 2 segment, ...``.
-    segment : float
-        Distance of the spring's knots [N/m].
+        Pressures [Pa] of the spring at the stiffnesses ``0, segment, 2 segment, ...`` [N/m].
     width : float
         Factor on the hysteresis; 0 leaves the line between the tips of the major loop and what
         the spring departs from its own line.
@@ -146,10 +137,8 @@ def stiffness_step(
     The other parameters are those of :func:`pressure_step`. Not-a-number gives not-a-number and
     leaves the state alone.
 
-    Notes
-    -----
-    In every state that the model can reach, no element slips at the slip position of the
-    element that breaks first, and from there on the elements slip in the order of their thresholds.
+    In every state that the model can reach, no element slips at the slip position of the element
+    that breaks first, and from there on the elements slip in the order of their thresholds.
     """
     n, cells = len(breaks), len(spring) - 1
     x = state[0][lane]
@@ -227,7 +216,7 @@ def _run(
 
 @register
 @dataclass(frozen=True)
-class ModifiedMaxwellSlip(HysteresisModel):
+class ModifiedMaxwellSlip(ParallelElements, HysteresisModel):
     """Stiffness [N/m] as a hysteresis of pressure [Pa], with an exact inverse.
 
     Parameters
@@ -281,13 +270,6 @@ class ModifiedMaxwellSlip(HysteresisModel):
         return (len(self.spring) - 1) * self.segment
 
     @property
-    def friction(self) -> float:
-        """Pressure [Pa] that all elements hold together when all slip."""
-        return math.fsum(
-            k * r for k, r in zip(self.stiffnesses, self.break_stiffnesses, strict=True)
-        )
-
-    @property
     def total_slope(self) -> float:
         """Stiffness over pressure [N/(m Pa)] between the tips of the major loop."""
         return self.range / (self.spring[-1] - self.spring[0] + 2.0 * self.friction)
@@ -332,8 +314,8 @@ class ModifiedMaxwellSlip(HysteresisModel):
         """Return the Everett map of the first-order reversal curves, and the output at the start.
 
         An operator with this map agrees on every loop where the model's minor loops are congruent,
-        as they are with a straight spring; a spring with bends may need relays of negative
-        weight, which are left out.
+        as with a straight spring; relays of negative weight, which bends of the spring may need,
+        are left out.
         """
         grid = np.linspace(low, high, levels)
         table = np.zeros((levels, levels))
@@ -349,35 +331,26 @@ class ModifiedMaxwellSlip(HysteresisModel):
     @cached_property
     def arrays(self) -> tuple[Array, Array, Array, float]:
         """Arguments of the kernels: breaks, stiffnesses, spring, segment."""
-        lists = (self.break_stiffnesses, self.stiffnesses, self.spring)
-        breaks, stiffnesses, spring = (np.array(values) for values in lists)
-        return breaks, stiffnesses, spring, self.segment
+        return *self.parts[:2], np.array(self.spring), self.segment
+
+    @cached_property
+    def parts(self) -> tuple[Array, Array, float]:
+        """Break stiffnesses, stiffnesses, and the slope between the spring's ends."""
+        slope = (self.spring[-1] - self.spring[0]) / self.range
+        return np.array(self.break_stiffnesses), np.array(self.stiffnesses), slope
 
     def initial_state(self, batch_shape: tuple[int, ...] = ()) -> Array:
-        """Return the slip positions at stiffness 0 after a larger one, shape (*batch_shape, n).
+        """Return the slip positions after inflation and venting, shape (*batch_shape, n).
 
-        That is a muscle that has been inflated and vented before. An element that not even the
-        whole range can make slip is taken to have come from the middle of it.
+        An element that not even the whole range can make slip comes from the middle of it.
         """
         start = np.minimum(self.break_stiffnesses, 0.5 * self.range)
         return np.broadcast_to(start, (*batch_shape, len(start))).copy()
 
     def step(self, pressure: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
-        """Return the stiffness and the new state for one sample of every row.
+        """Return the stiffnesses [N/m] of pressures [Pa], shape (...), and the state after them.
 
-        Parameters
-        ----------
-        pressure : array_like, shape (...)
-            Pressures [Pa].
-        state : array_like, shape (..., n)
-            Slip positions before [N/m]; they are not changed.
-
-        Returns
-        -------
-        stiffness : ndarray, shape (...)
-            [N/m].
-        state : ndarray, shape (..., n)
-            Slip positions after.
+        The state holds the slip positions [N/m], shape (..., n); that given is not changed.
         """
         return self._rows(pressure, state, False)
 
@@ -398,23 +371,13 @@ class ModifiedMaxwellSlip(HysteresisModel):
         """Return the pressures, shape (T,), for stiffnesses of shape (T,), and the last state."""
         return self._record(stiffness, state, True)
 
-    def dissipated(self, before: ArrayLike, after: ArrayLike) -> Array:
-        """Return the friction work ``sum(k r abs(slip))`` of a way without turns, shape (...).
-
-        Summed over a closed cycle it is the loop area, the integral of ``pressure d stiffness``.
-        """
-        slipped = np.abs(np.asarray(after, dtype=float) - np.asarray(before, dtype=float))
-        breaks, stiffnesses = self.arrays[:2]
-        return slipped @ (breaks * stiffnesses)
-
     def scaled(self, width: float, slope: float | None = None) -> ModifiedMaxwellSlip:
         """Return this model with its hysteresis ``width`` times as wide, 0 for none.
 
         The spring takes over the pressure of the elements at the tips of the major loop; the tips
         are the same, whatever ``slope``.
         """
-        (width,) = floats("width", (width,))
-        check_not_negative("width", (width,), "to stay passive")
+        width = width_of(width)
         tilt = (1.0 - width) * self.friction * np.linspace(-1.0, 1.0, len(self.spring))
         stiffnesses = tuple(width * k for k in self.stiffnesses)
         return replace(self, stiffnesses=stiffnesses, spring=tuple(np.add(self.spring, tilt)))
@@ -460,10 +423,8 @@ def even_model(
 
     Parameters
     ----------
-    full_pressure : float
-        Pressure [Pa] of the major loop's upper tip; the lower one is at 0.
-    full_stiffness : float
-        Stiffness [N/m] there.
+    full_pressure, full_stiffness : float
+        Pressure [Pa] and stiffness [N/m] of the major loop's upper tip; the lower one is at 0.
     friction : float
         Pressure [Pa] that all elements hold together; below half the full pressure.
     elements : int

@@ -10,7 +10,7 @@ Play operators are the special case whose density depends on ``alpha - beta`` al
 
 References
 ----------
-I. D. Mayergoyz, "Mathematical Models of HysteresisModel", Springer 1991, chapter 1.
+I. D. Mayergoyz, "Mathematical Models of Hysteresis", Springer 1991, chapter 1.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis import everett as maps
-from pam_envs.hysteresis.checks import check_not_negative, floats, series
+from pam_envs.hysteresis.checks import floats, series, width_of
 from pam_envs.hysteresis.extrema import (
     DEPTH,
     STATE_ROWS,
@@ -57,7 +57,7 @@ SMALLEST_WEIGHT = -1e-12
 
 
 class PreisachState(NamedTuple):
-    """HysteresisModel of a batch: extrema and outputs, shapes (depth, ...), and points in use."""
+    """History of a batch: extrema and outputs, shapes (depth, ...), and points in use."""
 
     stack: Array
     sums: Array
@@ -174,8 +174,8 @@ class Preisach(HysteresisModel):
     ) -> Preisach:  # fmt: skip
         """Return the Preisach operator that is ``operator``, exactly at the grid's inputs.
 
-        It starts in the play's own virgin state, or where the play is after the input has come
-        up to ``low`` from far below; the outputs agree, start included.
+        It starts in the play's own virgin state, or where the play is after the input has come up
+        to ``low`` from far below.
         """
         return cls.resembling(operator, low, high, levels, start, depth)
 
@@ -197,8 +197,7 @@ class Preisach(HysteresisModel):
         The output is ``s x - width (s x - y)`` with ``s`` the ``slope``, :attr:`total_slope`
         unless given: 0 is the line ``s x``, 1 is this operator.
         """
-        (width,) = floats("width", (width,))
-        check_not_negative("width", (width,), "to stay passive")
+        width = width_of(width)
         s = self.total_slope if slope is None else slope
         return self._mixed(width, (1.0 - width) * s)
 
@@ -244,22 +243,17 @@ class Preisach(HysteresisModel):
         e = self.everett
         return 0.5 * float(np.max(np.asarray(e[-1, 0] - e[-1] - e[:, 0])))
 
-    @property
-    def chord_slope(self) -> float:
-        """Slope of the line between the tips of the major loop."""
-        return self.table[-1][0] / (self.high - self.low)
-
     # --- the protocol ---------------------------------------------------------------------------
 
     def numbers(self, full: float | None = None) -> list[float]:
         """Return the slope of the chord, range and cells per input, and the start."""
-        cells = len(self.table) - 1
-        low, per_input = self.low, cells / (self.high - self.low)
+        cells, span = len(self.table) - 1, self.high - self.low
+        low, per_input = self.low, cells / span
         if full is not None:
             low, per_input = -full, 0.5 * cells * (1.0 / full)
         bottom = self.low if self.start == "low" else 0.0
         high = low + cells / per_input  # as preisach_step has it
-        return padded([self.chord_slope, low, per_input, high, bottom, self.start_output])
+        return padded([self.table[-1][0] / span, low, per_input, high, bottom, self.start_output])
 
     def table_rows(self) -> Array:
         """Return the Everett map."""
@@ -279,7 +273,6 @@ class Preisach(HysteresisModel):
                 f"{self.depth}; {usage.plant} needs a map{text} with start {usage.start!r} and "
                 f"depth {DEPTH}"
             )
-
         if self.high < usage.reach:
             raise ValueError(
                 f"hysteresis: the Everett map spans +-{self.high:g} and {usage.plant} needs "
@@ -287,7 +280,7 @@ class Preisach(HysteresisModel):
             )
 
     def rows(self) -> PreisachRows:
-        """Return the operator over rows of environments."""
+        """Return the operator over rows of environments, whose state has the row first."""
         return PreisachRows(self)
 
     def record(self) -> dict[str, Any]:
@@ -339,69 +332,54 @@ class Preisach(HysteresisModel):
         return y, _shaped(rows, ())
 
     def step(self, x: ArrayLike, state: PreisachState) -> tuple[Array, PreisachState]:
-        """Return the output and the new state for one sample of every row.
+        """Return the outputs and the new state for one sample of every row.
 
-        Parameters
-        ----------
-        x : array_like, shape batch_shape
-            Inputs.
-        state : PreisachState
-            HysteresisModel before; it is not changed.
-
-        Returns
-        -------
-        y : ndarray, shape batch_shape
-            Outputs.
-        state : PreisachState
-            HysteresisModel after.
+        ``x`` and the outputs have the batch's shape; ``state`` is not changed.
         """
-        shape = np.shape(state.counts)
-        values = np.array(np.broadcast_to(np.asarray(x, float), shape)).reshape(-1)
-        rows, y = self._rows(state), np.empty_like(values)
-        advance_rows(values[None], *rows, self.everett, self.low, self.inverse_cell, y[None])
-        return y.reshape(shape), _shaped(rows, shape)
+        return self._each(advance_rows, x, state)
 
     def inverse_step(self, y: ArrayLike, state: PreisachState) -> tuple[Array, PreisachState]:
-        """Return the input that takes the output to ``y``, and the hysteresis after that input.
+        """Return the input that takes the output to ``y``, and the state after that input.
 
-        Parameters
-        ----------
-        y : array_like, shape batch_shape
-            Desired outputs. One out of reach gives the nearest end of the input's range.
-        state : PreisachState
-            HysteresisModel before; it is not changed.
+        ``y`` has the batch's shape; an output out of reach gives the nearest end of the range of
+        inputs. ``state`` is not changed.
 
         Raises
         ------
         ValueError
-            If the output can rest while the input moves (a cell of the diagonal has no
-            weight), so that there is no unique input.
+            If the output can rest while the input moves (a cell of the diagonal has no weight), so
+            that there is no unique input.
         """
-        self._check_invertible()
-        shape = np.shape(state.counts)
-        values = np.array(np.broadcast_to(np.asarray(y, float), shape)).reshape(-1)
-        rows, x = self._rows(state), np.empty_like(values)
-        invert_rows(values, *rows, self.everett, self.low, self.inverse_cell, x)
-        return x.reshape(shape), _shaped(rows, shape)
-
-    @cached_property
-    def _stiff_cell(self) -> int:
-        return int(np.argmin(np.diag(self.weights)))
-
-    def _check_invertible(self) -> None:
-        k = self._stiff_cell
-        if self.weights[k, k] <= 0.0:
+        k, weight = self._stiff_cell
+        if weight <= 0.0:
             raise ValueError(
-                f"the relay weight of the diagonal cell {k} is {self.weights[k, k]}; it must be"
+                f"the relay weight of the diagonal cell {k} is {weight}; it must be"
                 " above 0 for an inverse, or the output does not move after a turn: add a line"
                 " with plus_linear(slope)"
             )
+        return self._each(invert_rows, y, state)
+
+    @cached_property
+    def _stiff_cell(self) -> tuple[int, float]:
+        """Cell of the diagonal with the smallest relay weight, and that weight."""
+        diagonal = np.diag(self.weights)
+        k = int(np.argmin(diagonal))
+        return k, diagonal[k]
+
+    def _each(
+        self, kernel: Callable[..., None], given: ArrayLike, state: PreisachState
+    ) -> tuple[Array, PreisachState]:
+        """Return the answers of a kernel for one sample of every row, and the new state."""
+        shape = np.shape(state.counts)
+        values = np.array(np.broadcast_to(np.asarray(given, float), shape)).reshape(1, -1)
+        rows, answers = self._rows(state), np.empty_like(values)
+        kernel(values, *rows, self.everett, self.low, self.inverse_cell, answers)
+        return answers.reshape(shape), _shaped(rows, shape)
 
     def _rows(self, state: PreisachState) -> tuple[Array, Array, NDArray[np.int64]]:
         """Return copies of the arrays, shapes (depth, lanes) and (lanes,)."""
-        depth = len(state.stack)
-        stack = np.array(state.stack, dtype=float).reshape(depth, -1)
-        sums = np.array(state.sums, dtype=float).reshape(depth, -1)
+        shape = (len(state.stack), -1)
+        stack, sums = (np.array(values, float).reshape(shape) for values in state[:2])
         return stack, sums, np.array(state.counts, dtype=np.int64).reshape(-1)
 
 
@@ -415,14 +393,14 @@ class PreisachRows(Rows):
         """Return extrema and outputs, shapes (rows, depth), and counts, (rows,)."""
         return _row_first(self.operator.initial_state((rows,)))
 
-    def forward(self, felt: Array, state: RowsState) -> tuple[Array, RowsState]:
+    def forward(self, x: Array, state: RowsState) -> tuple[Array, RowsState]:
         """Return the outputs for inputs, shape (rows,), and the states they leave."""
-        output, after = self.operator.step(felt, _row_last(state))
+        output, after = self.operator.step(x, _row_last(state))
         return output, _row_first(after)
 
-    def inverse(self, wanted: Array, state: RowsState) -> Array:
-        """Return the inputs by the recursion over the stack; the states stay."""
-        return self.operator.inverse_step(wanted, _row_last(state))[0]
+    def inverse(self, y: Array, state: RowsState) -> Array:
+        """Return the inputs by the recursion over the stack; the states do not change."""
+        return self.operator.inverse_step(y, _row_last(state))[0]
 
 
 def _row_first(state: PreisachState) -> RowsState:

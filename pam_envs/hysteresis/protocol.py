@@ -283,7 +283,7 @@ class Rows:
         return output, (after,)
 
     def inverse(self, y: Array, state: RowsState) -> Array:
-        """Return the inputs that give outputs, shape (rows,); the states stay."""
+        """Return the inputs that give outputs, shape (rows,); the states do not change."""
         return self.operator.inverse_step(y, state[0])[0]  # type: ignore[no-any-return]
 
 
@@ -324,13 +324,7 @@ def kinds() -> tuple[str, ...]:
 
 
 def model_of(kind: str) -> type[HysteresisModel]:
-    """Return the model of a kind.
-
-    Raises
-    ------
-    ValueError
-        If there is no such kind.
-    """
+    """Return the model of a kind; raise ValueError if there is none."""
     if kind not in MODELS:
         *rest, final = (repr(name) for name in kinds())
         raise ValueError(f"hysteresis = {kind!r}; choose {', '.join(rest)} or {final}")
@@ -353,21 +347,8 @@ def preset(
 ) -> HysteresisModel | None:
     """Return the operator of a kind with the loops of a reference model, None for no hysteresis.
 
-    Parameters
-    ----------
-    kind : str
-        One of :func:`kinds`.
-    reference : HysteresisModel
-        The answer itself where it is of that kind.
-    low, high, levels : float, float, int
-        Inputs that the operator is made for, and levels of a map over them.
-    start : {"low", "virgin"}
-        State at the beginning.
-
-    Raises
-    ------
-    ValueError
-        If there is no such kind.
+    A reference of that kind is the answer itself. The operator spans the inputs ``low`` to ``high``
+    with ``levels`` levels of a map. Raises ValueError if there is no such kind.
     """
     if choice_of(reference) == kind:
         return reference
@@ -381,7 +362,7 @@ def tables_of(operators: Sequence[HysteresisModel | None]) -> Array:
 
 
 def state_rows(kind: str) -> int:
-    """Return how many rows of state one operator of a kind has."""
+    """Return the number of state rows of one operator of a kind."""
     return model_of(kind).state_rows
 
 
