@@ -22,37 +22,27 @@ _KEY_LIKE = re.compile(r"(?<![\w.])[a-z]{3,}(?:19|20)\d\d[a-z]?(?!\w)")
 
 @lru_cache(maxsize=1)
 def entries() -> dict[str, str]:
-    """Return the BibTeX entry of each key, as the file holds it.
-
-    Raises
-    ------
-    ValueError
-        If a key occurs twice, or an entry has another form than one field a line.
-    """
+    """Return the BibTeX entry of each key, as the file holds it (see :func:`parse`)."""
     return parse(FILE.read_text(encoding="utf-8"))
 
 
 def parse(text: str) -> dict[str, str]:
     """Return the entries of a BibTeX text by key.
 
-    Each entry begins with ``@type{key,``, has one ``  name = {value},`` a line and ends with a
-    line ``}``; the lines between entries are comments.
-
-    Parameters
-    ----------
-    text : str
-
-    Raises
-    ------
-    ValueError
-        If a key occurs twice, or an entry has another form.
+    Each entry begins with ``@type{key,``, has one ``  name = {value},`` a line and ends with a line
+    ``}``; the lines between entries are comments. Raises ValueError if a key occurs twice, or an
+    entry has another form.
     """
     found: dict[str, str] = {}
     for head in _HEAD.finditer(text):
         end = text.find("\n}\n", head.start())
         entry = text[head.start() : end + 3]
         lines = entry.splitlines()[1:-1]
-        wrong = [line for line in lines if not _FIELD.fullmatch(line) or not _balanced(line)]
+        wrong = [
+            line
+            for line in lines
+            if not _FIELD.fullmatch(line) or line.count("{") != line.count("}")
+        ]
         if end < 0 or wrong or head[2] in found:
             raise ValueError(
                 f"entry {head[2]!r} is repeated or malformed{f' at {wrong[0]!r}' if wrong else ''}"
@@ -62,36 +52,18 @@ def parse(text: str) -> dict[str, str]:
     return found
 
 
-def _balanced(line: str) -> bool:
-    """Return whether every brace of a line is closed."""
-    return line.count("{") == line.count("}")
-
-
 def fields(key: str) -> dict[str, str]:
-    """Return the fields of an entry by name, without the braces around their values.
-
-    Parameters
-    ----------
-    key : str
-        For example ``"yeh2010"``.
-    """
+    """Return the fields of an entry by name, without the braces around their values."""
     (entry,) = entry_texts([key])
-    return {name: _unbraced(value) for name, value in _FIELD.findall(entry)}
-
-
-def _unbraced(value: str) -> str:
-    """Return a value without the second pair of braces that keeps its capital letters."""
-    return value[1:-1] if value.startswith("{") and value.endswith("}") else value
+    # a second pair of braces keeps capital letters
+    return {
+        name: value[1:-1] if value.startswith("{") and value.endswith("}") else value
+        for name, value in _FIELD.findall(entry)
+    }
 
 
 def in_words(key: str) -> str:
-    """Return authors, title, publication and year of a source in one line.
-
-    Parameters
-    ----------
-    key : str
-        For example ``"yeh2010"``.
-    """
+    """Return authors, title, publication and year of a source in one line."""
     held = fields(key)
     authors = held.get("author", "").replace(" and others", " et al.").replace(" and ", "; ")
     place = held.get("journal") or held.get("booktitle") or held.get("publisher", "")
@@ -106,24 +78,12 @@ def in_words(key: str) -> str:
 
 
 def bibtex(keys: Iterable[str]) -> str:
-    """Return the BibTeX entries of keys, in their order, each once.
-
-    Raises
-    ------
-    ValueError
-        If a key has no entry.
-    """
+    """Return the BibTeX entries of keys, in their order, each once (see :func:`entry_texts`)."""
     return "\n".join(entry_texts(keys))
 
 
 def entry_texts(keys: Iterable[str]) -> list[str]:
-    """Return the BibTeX entry of each key, in their order, each once.
-
-    Raises
-    ------
-    ValueError
-        If a key has no entry.
-    """
+    """Return the BibTeX entry of each key, in their order, each once; raise ValueError if none."""
     chosen = list(dict.fromkeys(keys))
     unknown = [key for key in chosen if key not in entries()]
     if unknown:
@@ -132,13 +92,7 @@ def entry_texts(keys: Iterable[str]) -> list[str]:
 
 
 def named_in(text: str) -> list[str]:
-    """Return the keys that a text names, in its order, each once; also those without an entry.
-
-    Parameters
-    ----------
-    text : str
-        A docstring, a declared source or the citation of a catalogue's entry.
-    """
+    """Return the keys that a text names, in its order, each once; also those without an entry."""
     known = "|".join(map(re.escape, entries()))
     pattern = re.compile(rf"{_KEY_LIKE.pattern}|(?<!\w)(?:{known})(?!\w)")
     return list(dict.fromkeys(found[0] for found in pattern.finditer(text)))

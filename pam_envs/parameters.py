@@ -91,8 +91,8 @@ def effect(unit: str, low: float, high: float, source: str) -> Any:
 def declarations(component: Any) -> dict[str, Declaration]:
     """Return the declared parameters of a component class or instance, by field name.
 
-    A class attribute ``quantity = (unit, size)`` completes declarations whose unit holds ``{}``:
-    it is put in its place, and their bounds are multiples of ``size``.
+    A class attribute ``quantity = (unit, size)`` completes declarations whose unit holds ``{}``: it
+    is put in its place, and their bounds are multiples of ``size``.
     """
     return dict(_declarations(component if isinstance(component, type) else type(component)))
 
@@ -136,13 +136,7 @@ def parameter_rows(*components: type) -> Any:
 
 
 def check(component: Any, where: str = "") -> None:
-    """Raise if a parameter of ``component`` is not a finite number within its bounds.
-
-    Raises
-    ------
-    ValueError
-        Naming the parameter, its value, the bounds and what to do.
-    """
+    """Raise ValueError if a parameter of ``component`` is not a finite number within its bounds."""
     prefix = f"{where}." if where else ""
     for name, declared in declarations(component).items():
         value = getattr(component, name)

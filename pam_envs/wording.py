@@ -8,17 +8,7 @@ from importlib import metadata
 
 
 def near(word: str, known: Iterable[str], otherwise: str = "") -> str:
-    """Return "; did you mean 'x'?", or what there is to choose from.
-
-    Parameters
-    ----------
-    word : str
-        What was given.
-    known : iterable of str
-        What might have been meant.
-    otherwise : str
-        What to say in place of all that is known, where nothing known is near.
-    """
+    """Return "; did you mean 'x'?", or the known words, or ``otherwise`` if given."""
     choices = list(known)
     close = difflib.get_close_matches(word, choices, n=1, cutoff=0.6)
     if close:

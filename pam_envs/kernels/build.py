@@ -3,7 +3,7 @@
 A *kernel* is a plain Python function of scalars (or of rows of scalars) marked :func:`kernel`.
 :func:`build` turns one and all that it calls into machine code with numba, or, with
 ``PAM_ENVS_COMPILE=0`` in the environment, leaves it plain Python. Both give the same bits, because
-nothing here calls libm, BLAS or LAPACK, no fast-math is allowed, and random numbers are integer
+kernels do not call libm, BLAS or LAPACK, fast-math is off, and random numbers are integer
 arithmetic on a counter.
 
 Arrays reach a kernel as *rows*: ``rows[FIELD][lane]``. Compiled, ``rows`` is a two-dimensional
@@ -41,7 +41,7 @@ def kernel(function: F) -> F:
 
 
 def routine(function: F) -> F:
-    """Mark a function that kernels call seldom; compiled, it stays a function of its own."""
+    """Mark a function that kernels rarely call; compiled, it is not inlined."""
     function.__pam_kernel__ = False  # type: ignore[attr-defined]
     return function
 
@@ -62,7 +62,7 @@ class Entry:
 
 
 def entry(function: F) -> F:
-    """Mark a function that Python calls: compiled on its first call and kept on disk."""
+    """Mark a function that Python calls: compiled on its first call and cached on disk."""
     return Entry(function) if COMPILED else function  # type: ignore[return-value]
 
 
@@ -117,18 +117,8 @@ def build(
     """Return ``function`` ready to call, with some global names of its call graph replaced.
 
     So a loop nest is written once and built for each plant: the physics that it calls are
-    placeholders in its module.
-
-    Parameters
-    ----------
-    function : callable
-        A kernel.
-    name : str
-        Its name, also of its file in the cache.
-    parallel : bool
-        Spread ``prange`` loops over the cores.
-    **names : object
-        Values for global names, wherever the call graph uses them.
+    placeholders in its module. ``name`` is also that of its file in the cache; ``parallel`` spreads
+    ``prange`` loops over the cores.
     """
     if COMPILED:
         from pam_envs.kernels.compiler import compiled

@@ -12,12 +12,8 @@ TURN = 6.283185307179586
 
 
 @kernel
-def oscillator(phase: float) -> tuple[float, float]:
-    """Return ``cos(sqrt(phase))`` and ``sin(sqrt(phase)) / sqrt(phase)``, entire in ``phase``.
-
-    Negative phases (an overdamped motion) give the hyperbolic functions.
-    """
-    z = 0.25 * phase
+def series(z: float) -> tuple[float, float]:
+    """Return ``cos(sqrt(z))`` and ``sin(sqrt(z)) / sqrt(z)`` for ``abs(z) <= 4``."""
     c = z * (1.0 / 479001600.0) - 1.0 / 3628800.0
     c = c * z + 1.0 / 40320.0
     c = c * z - 1.0 / 720.0
@@ -30,25 +26,23 @@ def oscillator(phase: float) -> tuple[float, float]:
     s = s * z + 1.0 / 120.0
     s = s * z - 1.0 / 6.0
     s = s * z + 1.0
+    return c, s
+
+
+@kernel
+def oscillator(phase: float) -> tuple[float, float]:
+    """Return ``cos(sqrt(phase))`` and ``sin(sqrt(phase)) / sqrt(phase)``, entire in ``phase``.
+
+    Negative phases (an overdamped motion) give the hyperbolic functions.
+    """
+    c, s = series(0.25 * phase)
     return 2.0 * c * c - 1.0, s * c
 
 
 @kernel
 def oscillator_wide(phase: float) -> tuple[float, float]:
     """Return the same as :func:`oscillator` for phases up to 256, for long steps."""
-    z = 0.015625 * phase
-    c = z * (1.0 / 479001600.0) - 1.0 / 3628800.0
-    c = c * z + 1.0 / 40320.0
-    c = c * z - 1.0 / 720.0
-    c = c * z + 1.0 / 24.0
-    c = c * z - 0.5
-    c = c * z + 1.0
-    s = z * (1.0 / 6227020800.0) - 1.0 / 39916800.0
-    s = s * z + 1.0 / 362880.0
-    s = s * z - 1.0 / 5040.0
-    s = s * z + 1.0 / 120.0
-    s = s * z - 1.0 / 6.0
-    s = s * z + 1.0
+    c, s = series(0.015625 * phase)
     s, c = s * c, 2.0 * c * c - 1.0
     s, c = s * c, 2.0 * c * c - 1.0
     return 2.0 * c * c - 1.0, s * c
@@ -66,18 +60,8 @@ def damped_motion(
 ) -> tuple[float, float]:
     """Return displacement and velocity after ``h`` of ``u'' = a + j t - k u - d u'``: exact.
 
-    Parameters
-    ----------
-    velocity : float
-        At the start [m/s]; the displacement starts at 0.
-    acceleration, jerk : float
-        ``a`` [m/s2] and ``j`` [m/s3].
-    stiffness, damping : float
-        ``k`` [1/s2], above zero, and ``d`` [1/s], per unit mass.
-    damped : float
-        ``exp(-d h / 2)``.
-    h : float
-        Duration [s].
+    The displacement starts at 0, in one unit with ``velocity``. ``stiffness`` ``k`` [1/s2], above
+    zero, and ``damping`` ``d`` [1/s] are per unit mass; ``damped`` is ``exp(-d h / 2)``.
     """
     half = 0.5 * damping
     c, s = oscillator((stiffness - half * half) * h * h)
@@ -98,16 +82,8 @@ def resonator_step(
 ) -> tuple[float, float]:
     """Return value and rate of a resonator whose input went straight from ``was`` to ``now``.
 
-    Parameters
-    ----------
-    y, rate : float
-        Value and its rate [1/s] at the start.
-    was, now : float
-        Input at the start and after ``h``.
-    turns, ratio : float
-        Natural frequency [Hz] and damping ratio.
-    h : float
-        Duration [s].
+    ``y`` and ``rate`` [1/s] are those ``h`` seconds before, ``turns`` the natural frequency [Hz]
+    and ``ratio`` the damping ratio.
     """
     omega = TURN * turns
     k, d = omega * omega, 2.0 * ratio * omega

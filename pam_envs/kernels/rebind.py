@@ -31,10 +31,9 @@ def rebind(
     names : dict
         Values for global names, wherever the call graph uses them.
     finish : callable
-        Gets the copy, the original, and the names and values that are bound in its call graph.
+        Takes the copy, the original, and the names and values that are bound in its call graph.
     done : dict
-        The callees so far, by original and what is bound in it: those that use none of the names,
-        or the same values, are made once. It can serve several calls with other names.
+        The callees so far, by original and what is bound in it; may serve calls with other names.
     known : dict, optional
         What is bound in each function with these ``names``.
     """
@@ -78,19 +77,11 @@ def bound(function: Callable[..., Any], names: dict[str, Any], known: dict[Any, 
 def graph_digest(
     function: Callable[..., Any], names: Mapping[str, Any], known: dict[Any, str] | None = None
 ) -> str:
-    """Return a digest of a call graph: what machine code on disk is valid for.
+    """Return a digest of a call graph: the key of machine code on disk.
 
-    Covers the byte code, the constants and the values of global names of a kernel and of all that
-    it calls. Comments, docstrings, line numbers and the names of modules do not matter.
-
-    Parameters
-    ----------
-    function : callable
-        A kernel.
-    names : mapping
-        Values that replace global names, wherever the call graph uses them.
-    known : dict, optional
-        Digests of functions with these ``names`` so far.
+    Covers the byte code, the constants and the values of global names (replaced by ``names``) of a
+    kernel and of all that it calls. Comments, docstrings, line numbers and the names of modules do
+    not matter. ``known`` holds the digests with these ``names`` so far.
     """
     known = {} if known is None else known
     if function not in known:

@@ -1,4 +1,4 @@
-"""Allocation of torque and stiffness of a joint to its two bundles, exactly, with the residual.
+"""Allocation of torque and stiffness of a joint to its two bundles: exact, torque first.
 
 A bundle's force is ``P = X phi(C)`` and its slope over the contraction ``dP/dC = X psi(C)``, with
 ``phi = (L_n - C)(C_max - C)``, ``psi = 2 C - L_n - C_max`` and the *factor* ``X = k_0 + k_1 p``
@@ -9,11 +9,10 @@ stiffness ``S = -dQ/dq`` are linear in both factors:
     Q / r     = -phi_a X_a + phi_b X_b
     -S / r^2  =  psi_a X_a + psi_b X_b,       determinant -(phi_a psi_b + phi_b psi_a) > 0
 
-for contractions below ``C_max``. What the pressures can give is therefore a parallelogram. A wish
-outside is answered *torque first*: the torque is held within its range, then the stiffness within
-what the pressures leave at that torque. This is the solution of the box-constrained least squares
-in the limit of a weight on the torque alone. The paper searches for the same pressures by an
-optimisation (its reference 14); none is needed.
+for contractions below ``C_max``: the feasible set is a parallelogram. Outside, the torque is
+limited to its range, then the stiffness to what the pressures leave at that torque, which is
+box-constrained least squares in the limit of a weight on the torque alone. The paper searches for
+the same pressures by an optimisation.
 """
 
 from __future__ import annotations
@@ -54,16 +53,8 @@ def factors_for(
 ) -> tuple[float, float]:
     """Return the factors [N/m^2] that give torque and stiffness, whatever pressures they take.
 
-    Parameters
-    ----------
-    torque, stiffness : float
-        [N m], bending positive, and [N m/rad].
-    radius : float
-        Of the pulley [m].
-    phi_a, phi_b : float
-        Of the bundles [m^2].
-    psi_a, psi_b : float
-        Of the bundles [m].
+    ``torque`` [N m], bending positive, ``stiffness`` [N m/rad], ``radius`` of the pulley [m];
+    ``phi`` [m^2] and ``psi`` [m] of both bundles.
     """
     pull, slope = torque / radius, -stiffness / (radius * radius)
     over = 1.0 / determinant(phi_a, phi_b, psi_a, psi_b)
@@ -86,11 +77,8 @@ def allocate(
 ) -> tuple[float, float]:
     """Return the factors [N/m^2] within their limits for torque and stiffness, torque first.
 
-    Parameters
-    ----------
-    low_a, high_a, low_b, high_b : float
-        Factors at the lowest and the highest pressure [N/m^2]; the others as in
-        :func:`factors_for`.
+    ``low`` and ``high`` are the factors at the lowest and the highest pressure; the others as in
+    :func:`factors_for`.
     """
     a, b = max(phi_a, LEAST_SHAPE), max(phi_b, LEAST_SHAPE)
     x_a, x_b = factors_for(torque, stiffness, radius, a, b, psi_a, psi_b)

@@ -97,7 +97,7 @@ def span(
 ) -> tuple[float, float, float]:
     """Return the distance [m] between the ends of a muscle and its two derivatives by the angle.
 
-    ``side`` is 1 for muscle A and -1 for muscle B; the rest is what :func:`squares` returns.
+    ``side`` is 1 for muscle A and -1 for muscle B; the rest is the result of :func:`squares`.
     """
     length = math.sqrt(total + 2.0 * (even * cosine - side * odd * sine))
     per_length = 1.0 / length

@@ -1,11 +1,11 @@
-"""The wearer's forearm with the orthosis on it, below a hanging upper arm.
+"""Wearer's forearm with the orthosis on it, below a hanging upper arm.
 
     J_w q'' = J_w q_w'' + K (q_w - q) + D (q_w' - q') + w_w (sin q_w - sin q) + felt + pushed
     J_o q'' = Q - w_o sin q - d q' - felt
 
-The wearer moves his forearm as he intends, ``q_w``, and holds it there with a stiffness and a
-damping of his own; ``felt`` is the torque that the orthosis puts on him at cuff and handle. An
-orthosis that bears itself is not felt, and the intended motion is then carried out exactly.
+The wearer intends the motion ``q_w`` and holds the forearm there with a stiffness and a damping of
+his own; ``felt`` is the torque of the orthosis on him at cuff and handle. If the orthosis bears
+itself, ``felt`` is 0 and the intended motion is carried out exactly.
 """
 
 from __future__ import annotations

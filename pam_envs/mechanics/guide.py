@@ -13,7 +13,7 @@ from pam_envs.parameters import assumed, effect, parameter_rows
 
 @dataclass(frozen=True, kw_only=True)
 class GuideEffects:
-    """Dry friction of the guide of a load, none unless a recording shows it."""
+    """Dry friction of the guide of a load."""
 
     stick: float = effect("N", 0.0, 200.0, "force at which the guide breaks away")
     stick_kinetic: float = assumed(0.5, "1", 0.0, 1.0, "sliding friction over breakaway friction")
@@ -22,7 +22,7 @@ class GuideEffects:
 
 @dataclass(frozen=True, kw_only=True)
 class BearingEffects:
-    """Dry friction of a joint's bearing, none unless a recording shows it."""
+    """Dry friction of a joint's bearing."""
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (("stick", "stick_kinetic", "stick_speed"),)
 
@@ -42,20 +42,13 @@ def stick_slip_step(
 ) -> tuple[float, float, float]:  # fmt: skip
     """Return displacement, velocity and whether the guide holds after ``h`` seconds.
 
-    The guide holds until the push exceeds the breakaway friction; in motion the friction falls
-    with speed towards the kinetic one (Stribeck). It holds again where the velocity passes zero.
+    The guide holds until the push exceeds the breakaway friction; in motion the friction falls with
+    speed towards the kinetic one (Stribeck). It holds again where the velocity passes zero.
 
-    Parameters
-    ----------
-    velocity, stuck : float
-        At the start; ``stuck`` is 1 where the guide holds, else 0.
-    push, jerk, stiffness, damping : float
-        Motion without friction, per unit mass (see ``damped_motion``); the push is that at the
-        predicted middle.
-    most, kinetic, pace : float
-        Breakaway friction per unit mass, kinetic share and Stribeck speed.
-    h : float
-        Duration [s].
+    ``stuck`` is 1 where the guide holds at the start, else 0. Push (at the predicted middle), jerk,
+    stiffness and damping describe the motion without friction, per unit mass (``damped_motion``);
+    ``most``, ``kinetic`` and ``pace`` are the breakaway friction per unit mass, the kinetic share
+    and the Stribeck speed.
     """
     end = push + jerk * h
     held = stuck > 0.0 and most > 0.0

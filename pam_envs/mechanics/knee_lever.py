@@ -99,9 +99,8 @@ def wanted_tension(
 ) -> float:
     """Return the tension ``T_d`` [N] for an assistive torque [N m] at an angle [rad].
 
-    ``[kappa (theta_0 - theta) + tau_a] / (L_b cos(theta / 2))``, held at 0: a muscle cannot push.
-    Within half a degree of the toggle, where the tension has no lever arm, that of half a degree
-    counts.
+    ``[kappa (theta_0 - theta) + tau_a] / (L_b cos(theta / 2))``, at least 0: a muscle cannot push.
+    Within half a degree of the toggle the lever arm is that at half a degree.
     """
     _, cosine = half_angle(angle)
     return max(0.0, stiffness * (relaxed - angle) + torque) / (arm * max(cosine, 0.00436))

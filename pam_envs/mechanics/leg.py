@@ -6,20 +6,18 @@ the knee flexion ``q``. The hip moves evenly, so that the knee's acceleration is
 
     tau = F_z (l sin psi - r) - F_x h - m c [a_x cos psi ... ] - I psi''
 
-(:func:`knee_torque`) is what the wearer's muscles and the orthosis bear together. Its first term
-is all that Eq. (1) of yeh2010 knows of. Off the natural pace the force leans less, with the
-square of the pace, and the centre of pressure stays at the heel for longer
-(:func:`centre_of_pressure`).
+is what the wearer's muscles and the orthosis bear together; Eq. (1) of yeh2010 is its first term.
+Off the natural pace the force leans less, with the square of the pace, and the centre of pressure
+stays at the heel for longer (:func:`centre_of_pressure`).
 
-The wearer walks a path of his own; where the orthosis
-pushes him off it by ``e``, he holds against it like a spring and a damper, the more so the more of
-his weight the leg carries, and gravity on the shank helps or hinders:
+Where the orthosis pushes the wearer off his path by ``e``, he resists like a spring and a damper,
+more so the more of his weight the leg carries, and gravity on the shank helps or hinders:
 
     (I + I_brace) e'' = -tau_a - K e - B e' + d(gravity) e
 
-In stance this is a model of the wearer's posture and not of the bodies above the knee. Past the
-relaxed angle of the brace's wire, where no muscle can take its torque from him, he has learnt to
-bear it (``habituation``).
+In stance this models the wearer's posture and not the bodies above the knee. Past the relaxed angle
+of the brace's wire, where no muscle can take its torque from him, he bears a share of it
+(``habituation``).
 """
 
 from __future__ import annotations
@@ -76,24 +74,15 @@ def centre_of_pressure(
 ) -> float:  # fmt: skip
     """Return the centre of pressure [m ahead of the ankle] at another pace than the natural one.
 
-    Horizontal forces grow with the square of the pace. The body would tip over if the ground's
-    force did not keep pointing at about its centre of mass, so a wearer who walks slowly, with a
-    force that is almost upright, stays at the heel for longer. While the force drives the body
-    ahead nothing moves: the centre of pressure is at the ball of the foot already, and further
-    ahead the heel would be free under the whole body weight.
+    Horizontal forces grow with the square of the pace. The ground's force points at about the
+    centre of mass, or the body would tip over: at a slow walk it is almost upright and acts at the
+    heel for longer. While it drives the body ahead the centre of pressure does not move: it is at
+    the ball of the foot already, and further ahead the heel would be free under the whole body
+    weight.
 
-    Parameters
-    ----------
-    natural : float
-        At natural pace [m].
-    ground_x, ground_z : float
-        Ground force at natural pace, in one unit.
-    quick : float
-        Pace over the natural one.
-    aim : float
-        Height [m] that the braking force points at; 0: the centre of pressure as measured.
-    heel, tip : float
-        Ends of the sole [m].
+    ``natural`` [m], ``ground_x`` and ``ground_z`` (one unit) are those of the natural pace,
+    ``quick`` the pace over it, ``aim`` the height [m] that the braking force points at (0: as
+    measured), ``heel`` and ``tip`` the ends of the sole [m].
     """
     leaning = min(0.0, ground_x) / max(ground_z, 0.05)
     return max(heel, min(tip, natural + (1.0 - quick * quick) * aim * leaning))
@@ -129,16 +118,8 @@ def shank_torque(
 ) -> float:
     """Return the knee torque [N m] for the weight and the acceleration of shank and foot.
 
-    Parameters
-    ----------
-    sine, cosine : float
-        Of the shank's lean.
-    ahead, up : float
-        Acceleration of the knee [m/s2].
-    angular : float
-        Second derivative of the lean [rad/s2].
-    mass, centre, inertia : float
-        [kg], [m] below the knee, [kg m2] about the knee.
+    ``sine, cosine`` and ``angular`` [rad/s2] are of the shank's lean, ``ahead`` and ``up`` [m/s2]
+    accelerate the knee; ``mass`` [kg], ``centre`` [m] below and ``inertia`` [kg m2] about it.
     """
     return mass * centre * (ahead * cosine - (GRAVITY + up) * sine) - inertia * angular
 

@@ -12,14 +12,14 @@ from pam_envs.parameters import assumed, effect, named_rows
 
 @dataclass(frozen=True, kw_only=True)
 class SupportEffects:
-    """A support that gives way under the load, none unless a recording shows it."""
+    """Support that gives way under the load."""
 
     slack: float = effect("m", 0.0, 0.02, "contraction over which the support lets the load go")
 
 
 @dataclass(frozen=True, kw_only=True)
 class MountEffects:
-    """A mount that gives way, rigid unless a recording shows a resonance."""
+    """Compliant mount; rigid by default."""
 
     ring_share: float = effect("1", -1.0, 1.0, "share of the motion behind a compliant mount")
     ring_frequency: float = assumed(7.0, "Hz", 0.5, 20.0, "of the mount")
@@ -45,16 +45,10 @@ def mount_step(
     rows: Any, j: int, state: int, was: float, now: float, share: float, turns: float, ratio: float,
     h: float,
 ) -> float:  # fmt: skip
-    """Return the position [m] of a load of lane ``j`` behind the mount.
+    """Return the position [m] of a load of lane ``j`` behind the mount after ``h`` seconds.
 
-    Parameters
-    ----------
-    rows : rows
-        State; that of the mount begins at row ``state`` (``MOUNT_STATE``).
-    was, now : float
-        Position before the mount at the start and after ``h`` seconds [m].
-    share, turns, ratio : float
-        Parameters of :class:`MountEffects`.
+    ``state`` is the first row of the mount (``MOUNT_STATE``); the load before the mount moves from
+    ``was`` to ``now`` [m]. ``share``, ``turns`` and ``ratio`` are those of :class:`MountEffects`.
     """
     swung, rate = resonator_step(
         rows[state + MOUNT_STATE.position][j],

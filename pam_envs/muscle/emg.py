@@ -1,14 +1,14 @@
-"""An EMG proxy of the knee's extensors, and what more the flexors do.
+"""EMG proxy of the knee's extensors and flexors.
 
 The extensors bear what the orthosis does not, ``u = max(0, tau - tau_a) / tau_max`` above a floor
-of co-contraction; where the orthosis extends more than is wanted, the flexors work against it:
+of co-contraction; where the orthosis extends more than needed, the flexors work against it:
 
     extensors  max(0, tau - tau_a)          flexors  max(0, tau_a - tau)
 
 Excitation becomes activation by a first-order lag, faster on the way up.
 
-Three readings of the demand ``tau``. *Uncalibrated*: the full balance about the knee. Both
-*calibrated* ones start from the paper's own estimate ``tau_w``, Eq. (1), and have one constant an
+There are three readings of the demand ``tau``. *Uncalibrated*: the full balance about the knee.
+Both *calibrated* ones start from the paper's own estimate ``tau_w``, Eq. (1), with one constant an
 activity, fitted to its three published reductions: *A* takes the true demand to be ``lambda
 tau_w``; *B* takes the EMG to be a power ``n`` of the torque. They count from the muscles' resting
 level, so that one constant is enough.
@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class MuscleActivation:
-    """From the torque that the wearer's muscles bear to their activation."""
+    """Activation of muscles that bear a torque."""
 
     largest_torque: float = assumed(200.0, "N m", 20.0, 600.0, "largest knee extension of an adult")
     floor: float = assumed(0.03, "1", 0.0, 0.3, "co-contraction, 0.02 to 0.05", neutral=0.0)
@@ -52,46 +52,40 @@ def excitation(torque: float, largest: float, floor: float) -> float:
 
 
 @kernel
-def activation(before: float, wanted: float, risen: float, fallen: float) -> float:
-    """Return the activation one period on; ``risen, fallen`` are what is left of a gap by then."""
-    left = risen if wanted > before else fallen
-    return wanted + (before - wanted) * left
+def activation(before: float, excited: float, risen: float, fallen: float) -> float:
+    """Return the activation after a period; ``risen, fallen`` are the remaining shares of a gap."""
+    left = risen if excited > before else fallen
+    return excited + (before - excited) * left
 
 
 @kernel
 def left_of_gap(period: float, time: float) -> float:
-    """Return the share of a gap that is left after a period of a first-order lag."""
+    """Return the remaining share of a gap after a period of a first-order lag."""
     return decay(min(20.0, period / time))
 
 
 @entry
-def _activations(wanted: Any, risen: float, fallen: float, out: Any) -> None:
+def _activations(excited: Any, risen: float, fallen: float, out: Any) -> None:
     """Run the activation over a record, from rest at its first value."""
-    level = wanted[0]
-    for t in range(len(wanted)):
-        level = activation(level, wanted[t], risen, fallen)
+    level = excited[0]
+    for t in range(len(excited)):
+        level = activation(level, excited[t], risen, fallen)
         out[t] = level
 
 
 def activation_of(torque: ArrayLike, period: float, muscle: MuscleActivation) -> Array:
     """Return the activation, shape (T,), of muscles that bear torques [N m], shape (T,)."""
     borne = np.maximum(0.0, np.asarray(torque, float))
-    wanted = np.clip(muscle.floor + borne / muscle.largest_torque, 0.0, 1.0)
-    out = np.empty_like(wanted)
+    excited = np.clip(muscle.floor + borne / muscle.largest_torque, 0.0, 1.0)
+    out = np.empty_like(excited)
     risen, fallen = (left_of_gap(period, t) for t in (muscle.rise_time, muscle.fall_time))
-    _activations(wanted, risen, fallen, out)
+    _activations(excited, risen, fallen, out)
     return out
 
 
 @functools.cache
 def calibration(activity: str, reading: Reading) -> float:
-    """Return the fitted constant of a calibrated reading for an activity.
-
-    Raises
-    ------
-    ValueError
-        If there is none.
-    """
+    """Return the fitted constant of a calibrated reading; raise ValueError if there is none."""
     with open(CONSTANTS, encoding="utf-8") as file:
         known = yaml.safe_load(file)["readings"]
     if reading not in known or activity not in known[reading]:
@@ -106,7 +100,7 @@ def calibration(activity: str, reading: Reading) -> float:
 class EmgProxy:
     """Activations with and without the orthosis, shape (T,) each.
 
-    ``extensors`` over ``extensors_free`` is what the paper's electrodes compare.
+    The paper's electrodes compare ``extensors`` with ``extensors_free``.
     """
 
     extensors: Array
@@ -118,12 +112,6 @@ class EmgProxy:
     def change(self) -> float:
         """Change of the extensors' RMS, -0.2 for a reduction by 20 %."""
         return rms(self.extensors) / rms(self.extensors_free) - 1.0
-
-    @property
-    def change_with_flexors(self) -> float:
-        """Change of the RMS where what the flexors do more than without counts as well."""
-        more = np.maximum(0.0, self.flexors - self.flexors_free)
-        return rms(self.extensors + more) / rms(self.extensors_free) - 1.0
 
 
 def rms(values: Array) -> float:
@@ -149,9 +137,9 @@ def emg_proxy(
     assistance : array_like, shape (T,)
         Torque of the orthosis as delivered [N m].
     period : float
-        [s].
+        Sampling period [s].
     muscle : MuscleActivation, optional
-        Defaults to its defaults. Calibrated readings leave its floor out.
+        Calibrated readings leave its floor out.
     reading : {"uncalibrated", "A", "B"}
         See the module.
     constant : float
@@ -159,14 +147,14 @@ def emg_proxy(
     """
     muscle = MuscleActivation() if muscle is None else muscle
     muscle = muscle if reading == "uncalibrated" else replace(muscle, floor=0.0)
-    wanted, helped = np.asarray(demand, float), np.asarray(assistance, float)
+    needed, helped = np.asarray(demand, float), np.asarray(assistance, float)
     if reading == "A":
-        wanted = constant * wanted
+        needed = constant * needed
     power = constant if reading == "B" else 1.0
 
     def active(torque: Array) -> Array:
         share = np.maximum(0.0, torque) / muscle.largest_torque
         return activation_of(share**power * muscle.largest_torque, period, muscle)
 
-    rest = wanted - helped
-    return EmgProxy(active(rest), active(wanted), active(-rest), active(-wanted))
+    rest = needed - helped
+    return EmgProxy(active(rest), active(needed), active(-rest), active(-needed))

@@ -40,11 +40,11 @@ PAPER_CONTRACTION = 0.25
 
 @dataclass(frozen=True)
 class ForceMap(TemperatureEffects):
-    """A muscle DMSP-10-150N.
+    """Muscle DMSP-10-150N.
 
-    ``stretch`` lengthens the axis of contraction; ``gain`` and ``imbalance`` are of the specimens,
-    and no inverse of the law knows them: muscle A pulls ``gain (1 + imbalance)`` times the law,
-    muscle B ``gain (1 - imbalance)`` times.
+    ``stretch`` lengthens the axis of contraction. Inverses of the law do not know ``gain`` and
+    ``imbalance``, which are of the specimens: muscle A pulls ``gain (1 + imbalance)`` times the
+    law, muscle B ``gain (1 - imbalance)`` times.
     """
 
     area: float = identified(8.9128e-4, "m2", 1e-5, 1e-2, _FIT)
@@ -140,9 +140,9 @@ def force_terms(
     contraction: float, area: float, taper: float, threshold: float, braid_force: float,
     braid_strain: float, stiffness: float, per_stretch: float,
 ) -> tuple[float, float, float, float]:  # fmt: skip
-    """Return what the force is made of at a contraction: ``pressure * first - second``.
+    """Return the terms of the force at a contraction, ``pressure * first - second``, and slopes.
 
-    Then minus the derivatives of the first and plus that of the second by contraction.
+    The slopes are minus that of the first and plus that of the second by contraction.
     ``per_stretch`` is one over the stretch.
     """
     e = contraction * per_stretch

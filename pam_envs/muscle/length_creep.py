@@ -9,7 +9,7 @@ from pam_envs.parameters import effect
 
 @dataclass(frozen=True, kw_only=True)
 class LengthCreepEffects:
-    """Creep of the length with the time constants of the hysteresis, none unless shown."""
+    """Creep of the length with the time constants of the hysteresis."""
 
     creep_1: float = effect("1", -0.5, 2.0, "length that follows at creep_time_1")
     creep_2: float = effect("1", -0.5, 2.0, "length that follows at creep_time_2")

@@ -11,7 +11,7 @@ from pam_envs.parameters import effect
 
 @dataclass(frozen=True, kw_only=True)
 class LoadEffects:
-    """Dependence of the static law on the load, none unless a recording shows it."""
+    """Dependence of the static law on the load."""
 
     load_curve: float = effect("Pa/N2", -200.0, 200.0, "pressure shift over load squared")
     load_stiffening: float = effect("1/N", -0.015, 0.05, "stiffness gained per newton of load")

@@ -130,8 +130,8 @@ def grown_volume(contraction: float, length: float, reach: float) -> float:
 def bundle_volume(muscles: float, length: float, share: float, diameter: float) -> float:
     """Return the volume [m3] of ideal braided muscles at their nominal length.
 
-    ``share`` is the largest contraction over the length: it says how the threads lie, since
-    filled muscles end at a braid angle of 54.7 degrees.
+    ``share`` is the largest contraction over the length; it fixes the thread angle, since filled
+    muscles end at a braid angle of 54.7 degrees.
     """
     left = 1.0 - share
     sine = 1.0 - 1.0 / (3.0 * left * left)

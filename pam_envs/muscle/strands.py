@@ -16,7 +16,7 @@ STRANDS = len(BREAKS)
 
 @dataclass(frozen=True, kw_only=True)
 class StrandEffects:
-    """Friction of strands against each other, none unless a recording shows it."""
+    """Friction of strands against each other."""
 
     strand_1: float = effect("N", 0.0, 500.0, "friction of the first strands to break away")
     strand_2: float = effect("N", 0.0, 500.0, "friction of the second strands to break away")
@@ -32,8 +32,8 @@ def strand_forces(
 ) -> None:  # fmt: skip
     """Add the strands' force [N] and its slope by strain [N] at strains of a tile.
 
-    ``state``, ``force`` and ``break_away`` are the first rows of the strands' slip positions,
-    forces, and the row of the strain at which the last one breaks away.
+    ``state``, ``force`` and ``break_away`` are the first rows of the slip positions and forces, and
+    the row of the strain at which the last strand breaks away.
     """
     for i in range(STRANDS):
         slip, part = rows[state + i], BREAKS[i]
@@ -57,7 +57,7 @@ def slip_strands(rows: Any, fixed: Any, state: int, break_away: int, strain: Any
 
 @kernel
 def strands_on(fixed: Any, force: int) -> int:
-    """Return the number of lanes and strands of a tile that rub."""
+    """Return the number of lanes and strands of a tile with friction."""
     on = 0
     for i in range(STRANDS):
         on = on + count_on(fixed[force + i], 0.0)

@@ -12,7 +12,7 @@ from pam_envs.parameters import assumed, effect
 
 @dataclass(frozen=True, kw_only=True)
 class TemperatureEffects:
-    """Temperature of a muscle; without effect unless a recording shows one."""
+    """Temperature of a muscle; the law is that of 293.15 K."""
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (("temperature", "temperature_gain"),)
 

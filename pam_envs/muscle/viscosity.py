@@ -11,7 +11,7 @@ from pam_envs.parameters import assumed, effect
 
 @dataclass(frozen=True, kw_only=True)
 class ViscosityEffects:
-    """Damping at small speeds, none unless a recording shows it."""
+    """Damping at small speeds."""
 
     viscosity: float = effect("N s/m", 0.0, 1e5, "damping at small speed beside the mass's")
     viscosity_speed: float = assumed(0.02, "m/s", 1e-4, 10.0, "speed that lowers it by 1 / sqrt(2)")

@@ -24,16 +24,9 @@ def delay_commands(
 ) -> None:  # fmt: skip
     """Write the two delayed set-points of a control period and the time between them.
 
-    Parameters
-    ----------
-    rows : rows
-        State; the ring of the last set-points begins at row ``ring``.
-    set_point, dead, step : row
-        Set-points [Pa], dead times [s] and control periods of a tile.
-    period : float
-        Control period [s].
-    older, newer, switch : row
-        Set-points that take effect first and then [Pa], and the time [s] at which they change.
+    ``ring`` is the first row of the last set-points, ``dead`` the dead times [s], ``step`` the
+    control periods and ``period`` their duration [s]. ``older`` takes effect first, then, at
+    ``switch`` [s], ``newer`` [Pa].
     """
     for j in range(LANES):
         age = dead[j] / period
@@ -51,20 +44,10 @@ def air_step(
 ) -> None:  # fmt: skip
     """Advance the pressures of a tile towards their targets, each by its ``width`` [s].
 
-    Parameters
-    ----------
-    rows, fixed : rows
-        State and parameters.
-    state, effects : int
-        First row of the air's state (``AIR_STATE``) and of its effects (``AIR``).
-    pressure, full, lag, slew : row
-        Pressures [Pa], full pressures [Pa], time constants [s] and slew rates [Pa/s].
-    target, width : row
-        Set-points [Pa], below zero with the valve shut, and durations [s].
-    own : rows
-        Two rows of scratch; the second holds the pressures before.
-    valve, lines : int
-        Whether effects of valve and supply, and of the line, are on.
+    ``state`` and ``effects`` are the first rows of the air's state (``AIR_STATE``) and effects
+    (``AIR``); ``full`` [Pa], ``lag`` [s] and ``slew`` [Pa/s] are rows. A target below zero shuts
+    the valve. ``own`` is two rows of scratch; the second receives the pressures before. ``valve``
+    and ``lines`` are above 0 where effects of valve and supply, and of the line, are on.
     """
     regulated = rows[state + AIR_STATE.regulated]
     for j in range(LANES):

@@ -12,7 +12,7 @@ from pam_envs.parameters import assumed, effect, named_rows, parameter_rows
 
 @dataclass(frozen=True, kw_only=True)
 class LineEffects:
-    """Line of a regulator; rigid unless a recording shows a resonance."""
+    """Resonance of the line behind a regulator."""
 
     ring_share: float = effect("1", 0.0, 1.0, "share of the pressure behind a line that rings")
     ring_flow: float = effect("1", -2.0, 2.0, "ringing that goes with the flow")

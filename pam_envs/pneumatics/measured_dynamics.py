@@ -1,13 +1,13 @@
-"""The orthosis' measured frequency response as exact modes, and its plain regulator.
+"""Modes of the orthosis' measured frequency response, and its plain regulator.
 
-yeh2010 identifies the response from pressure set-point to tension as ``G_T(s)``, Eq. (10):
-seven poles, four zeros. Divided by its gain at rest it is what lies between set-point and
-pressure in the preset "measured". In partial fractions each mode is
+yeh2010 identifies the response from pressure set-point to tension as ``G_T(s)``, Eq. (10): seven
+poles, four zeros. Divided by its static gain it is the response from set-point to pressure in the
+preset "measured". In partial fractions each mode is
 
     x' = p (x - u),    pressure = sum_i gain_i x_i
 
-so that a step at a held set-point is exact for any duration, and every mode of a plant at rest
-is the set-point itself.
+so that a step at a held set-point is exact for any duration, and every mode of a plant at rest is
+the set-point itself.
 """
 
 from __future__ import annotations
@@ -31,10 +31,9 @@ MODES = REAL_MODES + 2
 
 @dataclass(frozen=True)
 class OrthosisRegulator(DelayedEffects):
-    """The electronic pressure valve (SMC ITV1031), as the muscle feels it.
+    """Electronic pressure valve (SMC ITV1031): a first-order lag with a limited rate.
 
-    A first-order lag with a limited rate. A plant with ``dynamics="measured"`` has the paper's
-    frequency response in its place.
+    A plant with ``dynamics="measured"`` has the paper's frequency response in its place.
     """
 
     max_pressure: float = published(4.5e5, "Pa", 1e4, 1.2e6, "yeh2010, section 5.2: of the muscle")
@@ -71,8 +70,7 @@ def gain_at_rest() -> float:
 def modes() -> list[tuple[complex, complex]]:
     """Return pole [1/s] and gain of each mode of ``G_T(s) / G_T(0)``; of the pair, the upper one.
 
-    The real modes come first. The gains of the real modes and twice the real part of the pair's
-    sum to 1.
+    The real modes come first. Their gains and twice the real part of the pair's sum to 1.
     """
     zeros = [z for factor in NUMERATOR for z in roots(factor)]
     poles = [p for factor in DENOMINATOR for p in roots(factor)]
@@ -91,7 +89,7 @@ def modes() -> list[tuple[complex, complex]]:
 
 
 def mode_rows() -> list[float]:
-    """Return what the kernel needs of the modes.
+    """Return the numbers of the modes that the kernel reads.
 
     Rates and gains of the real ones, then decay [1/s] and frequency [turns/s] of the pair, and the
     real and imaginary part of its gain, doubled.

@@ -1,14 +1,14 @@
-"""A pair of on/off valves, one that fills a bundle and one that empties it.
+"""Pair of on/off valves, one that fills a bundle and one that empties it.
 
 The coil of a valve is switched on for a pulse at the start of a cycle. A valve opens when its coil
 has been on for ``opening_time`` and closes when it has been off for ``closing_time``: a pulse of
 width ``w`` opens it for ``w - opening_time + closing_time``, and one shorter than ``opening_time``
-does not open it at all. Open, it passes air by ISO 6358,
+not at all. The flow of an open valve follows ISO 6358,
 
     m' = C rho_0 p_1 f(p_2 / p_1),    f(x) = 1 for x <= b,  sqrt(1 - ((x - b) / (1 - b))^2) above
 
-with absolute pressures, upstream first, at 20 degrees C: choked up to the critical ratio ``b``.
-The air in the bundle stays at that temperature. A check valve keeps it out of the supply.
+with absolute pressures, upstream first, at 20 degrees C: choked up to the critical ratio ``b``. The
+air in the bundle stays at that temperature. A check valve keeps it out of the supply.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ _RESTORED = _LOST + "; restored so that the flow from 6 to 5 bar is the 8.4 l/mi
 
 @dataclass(frozen=True)
 class OnOffValve:
-    """A direct-operated 3-port valve (SMC V114), used as 2-port.
+    """Direct-operated 3-port valve (SMC V114), used as 2-port.
 
-    It is small: open for a whole cycle it fills seven muscles by some 5 kPa.
+    Open for a whole cycle it fills seven muscles by some 5 kPa.
     """
 
     supply_pressure: float = published(
@@ -62,24 +62,10 @@ class OnOffValve:
 def coil_window(
     left: float, lift: float, opened: float, opening: float, closing: float, h: float
 ) -> tuple[float, float, float, float]:
-    """Return how long a valve is open within ``h`` seconds, and its state afterwards.
+    """Return how long a valve is open within ``h`` seconds, then new ``left, lift, opened``.
 
-    Parameters
-    ----------
-    left : float
-        Time [s] for which the coil stays on.
-    lift : float
-        From 0, where the coil has long been off, to 1, where it has been on for ``opening``.
-    opened : float
-        1 while the valve is open, else 0.
-    opening, closing : float
-        Duration [s].
-    h : float
-        [s].
-
-    Returns
-    -------
-    duration, left, lift, opened : float
+    ``left`` [s] is for how long the coil stays on; ``lift`` rises from 0, long off, to 1, on for
+    ``opening`` [s]; ``opened`` is 1 while the valve is open, else 0.
     """
     on = min(left, h)
     wait = (1.0 - lift) * opening if opened < 0.5 else 0.0
@@ -112,10 +98,10 @@ def filled(
     mass: float, per_volume: float, supply: float, conductance: float, critical: float,
     duration: float,
 ) -> float:  # fmt: skip
-    """Return the air [kg] that comes in through an open valve.
+    """Return the air [kg] that enters through an open valve, by the midpoint rule.
 
-    By the midpoint rule; not more than brings the chamber to the supply's absolute pressure [Pa].
-    ``per_volume`` is the chamber's pressure over its mass [Pa/kg].
+    At most what brings the chamber to the supply's absolute pressure [Pa]. ``per_volume`` is the
+    chamber's pressure over its mass [Pa/kg].
     """
     room = max(0.0, supply / per_volume - mass)
     half = 0.5 * duration * mass_flow(supply, mass * per_volume, conductance, critical)

@@ -27,7 +27,7 @@ UNCHOKED = 100.0
 
 @dataclass(frozen=True, kw_only=True)
 class ValveEffects:
-    """Effects of a regulator's valve, neutral unless a recording shows them."""
+    """Effects of a regulator's valve."""
 
     gain: float = assumed(1.0, "1", 0.5, 1.5, "pressure reached over set-point", neutral=1.0)
     slew_bend: float = effect("1", 0.0, 1.0, "from a sharp slew limit to a rounded one")
@@ -62,7 +62,7 @@ class RegulatorEffects(LineEffects, SupplyEffects, ValveEffects):
 
 @dataclass(frozen=True, kw_only=True)
 class DelayedEffects(RegulatorEffects):
-    """The same, and a dead time, of regulators whose plain model has none."""
+    """The same with a dead time, of regulators whose plain model has none."""
 
     effects: ClassVar[tuple[tuple[str, ...], ...]] = (("dead_time",), *RegulatorEffects.effects)
 
@@ -71,12 +71,12 @@ class DelayedEffects(RegulatorEffects):
 
 @dataclass(frozen=True)
 class Regulator(RegulatorEffects):
-    """A closed-loop pressure regulator as its user sees it.
+    """Closed-loop pressure regulator.
 
     The set-point, held between 0 and ``max_pressure``, takes effect after ``dead_time``. The
-    pressure then follows it by a first-order lag whose rate is limited to ``slew_rate``.
-    No value was published for the regulator of the measured muscle (Festo MPPES-3-1/4-6-010): the
-    defaults are assumed, within what two identified regulators of its class show.
+    pressure then follows it by a first-order lag whose rate is limited to ``slew_rate``. No value
+    was published for the regulator of the measured muscle (Festo MPPES-3-1/4-6-010): the defaults
+    are assumed, within what two identified regulators of its class show.
     """
 
     max_pressure: float = published(
@@ -104,8 +104,8 @@ assert AIR_STATE.line + LINE_STATE.rate == AIR_STATE.line_rate
 def delayed_fraction(end: float, per_width: float, switch: float) -> float:
     """Return the share of an interval after ``switch``.
 
-    The interval ends at ``end`` and is ``1 / per_width`` wide; shares within 1e-9 of 0 and 1 are
-    rounding errors and count as such.
+    The interval ends at ``end`` and is ``1 / per_width`` wide; shares within 1e-9 of 0 and 1 count
+    as these, as rounding errors.
     """
     share = (end - switch) * per_width
     if share < 1e-9:
@@ -125,21 +125,11 @@ def regulator_step(
     per_slew: float,
     h: float,
 ) -> float:
-    """Return the pressure after ``h`` seconds at a constant target: exact.
+    """Return the pressure [Pa] after ``h`` seconds at a constant target: exact.
 
     While the gap to the target exceeds ``slew * lag`` the pressure ramps; the rest of the interval
-    it decays exponentially.
-
-    Parameters
-    ----------
-    pressure, target : float
-        [Pa].
-    lag, per_lag : float
-        Time constant [s] and its reciprocal.
-    slew, per_slew : float
-        Largest rate [Pa/s] and its reciprocal.
-    h : float
-        Duration [s].
+    it decays exponentially. ``per_lag`` and ``per_slew`` are the reciprocals of the time constant
+    [s] and the largest rate [Pa/s].
     """
     gap = target - pressure
     size = abs(gap)
@@ -157,20 +147,8 @@ def regulate_with_effects(
 ) -> float:  # fmt: skip
     """Return the regulated pressure [Pa] of lane ``j`` after ``h`` seconds, with all effects.
 
-    Parameters
-    ----------
-    rows, fixed : rows
-        State and parameters.
-    j : int
-        Lane.
-    state, effects : int
-        First row of the air's state (``AIR_STATE``) and of its effects (``AIR``).
-    lag, slew, full : float
-        Time constant [s], slew rate [Pa/s] and full pressure [Pa].
-    target : float
-        Set-point [Pa]; below zero the valve is shut.
-    h : float
-        Duration [s].
+    ``state`` and ``effects`` are the first rows of the air's state (``AIR_STATE``) and effects
+    (``AIR``). A target below zero shuts the valve.
     """
     pressure = rows[state + AIR_STATE.regulated][j]
     drop = rows[state + AIR_STATE.drop][j]

@@ -15,7 +15,7 @@ AMPLE = 2e7
 
 @dataclass(frozen=True, kw_only=True)
 class SupplyEffects:
-    """Supply of a regulator; without limit unless a recording shows one."""
+    """Supply of a regulator, without limit by default."""
 
     supply_pressure: float = assumed(AMPLE, "Pa", 5e4, AMPLE, "reservoir at rest", neutral=AMPLE)
     supply_droop: float = effect("1", 0.0, 5.0, "supply pressure lost over pressure filled")
@@ -37,18 +37,9 @@ def supplied(
 ) -> float:
     """Return the pressure [Pa] after ``h`` seconds, limited by the flow of the supply.
 
-    The flow is choked, and goes with the root of the difference near the supply's pressure.
-
-    Parameters
-    ----------
-    pressure, reached : float
-        At the start, and without the limit [Pa].
-    rest, drop : float
-        Supply pressure at rest and its drop [Pa].
-    time : float
-        ``supply_time`` [s].
-    h : float
-        Duration [s].
+    ``reached`` is the pressure without the limit, ``rest`` the supply pressure at rest, ``drop``
+    its drop, ``time`` the ``supply_time`` [s]. The flow is choked, and goes with the root of the
+    difference near the supply's pressure.
     """
     supply = rest - drop
     most = (supply + ATMOSPHERE) / time

@@ -1,9 +1,9 @@
 """Strides as smooth periodic curves: knee, shank, ground force, centre of pressure, ankle.
 
 A curve is a periodic cubic B-spline over the phase (0 to 1, in turns; 0 is heel contact), so that
-value, rate and acceleration are continuous and a force that is zero in swing is exactly zero. All
-curves of an activity stand in one table, ``table[k][signal]``: coefficient ``k - 1`` of each
-curve, with three rows more than the ``n`` knots so that no index wraps.
+value, rate and acceleration are continuous and a force that is zero in swing is exactly zero. One
+table holds all curves of an activity, ``table[k][signal]``: coefficient ``k - 1`` of each curve,
+with three rows more than the ``n`` knots so that no index wraps.
 
 Level walking is measured (one subject, a stride of 1.224 s); both stairs are synthetic, drawn
 through a few knots (``data/PROVENANCE.md``).
@@ -48,29 +48,16 @@ def _table(activity: str) -> NDArray[np.float64]:
 
 
 def gait_table(activity: str) -> NDArray[np.float64]:
-    """Return the curves of an activity, shape (n + 3, 6), as the kernels read them.
-
-    Raises
-    ------
-    ValueError
-        If there is no such activity.
-    """
+    """Return the curves of an activity, shape (n + 3, 6); raise ValueError if unknown."""
     return _table(activity).copy()
 
 
 def gait_curves(
     activity: str, phase: ArrayLike, derivative: int = 0
 ) -> dict[str, NDArray[np.float64]]:
-    """Return every curve of an activity, or a derivative of it, at phases (...).
+    """Return every curve of an activity, or a derivative of it (per turn), at phases (...).
 
-    Parameters
-    ----------
-    activity : {"walk", "stairs_up", "stairs_down"}
-        Which table.
-    phase : array_like, shape (...)
-        In turns; only its fraction counts.
-    derivative : {0, 1, 2}
-        Per turn to this power.
+    ``activity`` is one of :data:`ACTIVITIES`; of a phase [turns] only its fraction counts.
     """
     table = _table(activity)
     n = len(table) - 3
@@ -102,23 +89,14 @@ def basis(u: Any, n: Any) -> Any:
 
 @kernel
 def fraction_of_turn(turns: float) -> float:
-    """Return the fraction of a phase that is not negative."""
+    """Return the fraction of a phase, at least 0."""
     return turns - float(int(turns))
 
 
 @kernel
 def curve(table: Any, signal: int, phase: float) -> float:
     """Return a curve at a phase in [0, 1)."""
-    n = len(table) - 3
-    share = phase * n
-    k = min(int(share), n - 1)
-    value, _, _ = basis(share - k, n)
-    return (  # type: ignore[no-any-return]
-        value[0] * table[k][signal]
-        + value[1] * table[k + 1][signal]
-        + value[2] * table[k + 2][signal]
-        + value[3] * table[k + 3][signal]
-    )
+    return curve_and_rates(table, signal, phase)[0]
 
 
 @kernel

@@ -1,11 +1,11 @@
 """Paths of a tool: position and direction over time.
 
-A path is given by the joint angles of its two ends, between which each joint goes in a straight
-line; its poses are those of the arm on this line. So every path is within reach, and there are
-joint angles to compare a plan with. That the ends of fluidic_muscles's example are meant so, and
-not as ends of a straight line of the tool, follows from its figures: the smallest angles then peak
-at 37.12 degrees and the weighted ones at 27.77, as stated; along a straight line of tip and
-direction it would be 39.0 and 28.2 degrees.
+A path is given by the joint angles of its two ends, between which each joint moves in a straight
+line; its poses are those of the arm on this line. So every path is feasible, and a plan can be
+compared with known joint angles. The figures of fluidic_muscles's example show that its ends are
+meant so, and not as ends of a straight line of the tool: the smallest angles then peak at 37.12
+degrees and the weighted ones at 27.77, as stated; along a straight line of tip and direction it
+would be 39.0 and 28.2 degrees.
 """
 
 from __future__ import annotations
@@ -31,15 +31,8 @@ MOST_TRIES = 1000
 class PathEnds:
     """Joint angles [degrees] at both ends of a path, one entry a joint.
 
-    Attributes
-    ----------
-    name : str
-    start_degrees, end_degrees : tuple of float
-    source : str
-        Where they come from.
-    calibrated : bool
-        Whether the ends were searched for such that the angles peak as published. The peaks are
-        then inputs, and no evidence for what is computed with them.
+    ``calibrated`` ends were searched for such that the angles peak as published: the peaks are then
+    inputs, and no evidence for results obtained with them.
     """
 
     name: str
@@ -83,10 +76,7 @@ PATHS = (
 def joint_line(start: ArrayLike, end: ArrayLike, points: int = POINTS) -> Array:
     """Return joint angles from ``start`` to ``end`` [rad] in equal steps, shape (points, n).
 
-    Raises
-    ------
-    ValueError
-        If the ends do not fit, or there are fewer than two points.
+    Raises ValueError if the ends do not fit, or there are fewer than two points.
     """
     first, last = np.asarray(start, float), np.asarray(end, float)
     if first.ndim != 1 or first.shape != last.shape:
@@ -100,18 +90,11 @@ def joint_line(start: ArrayLike, end: ArrayLike, points: int = POINTS) -> Array:
 
 
 def draw_ends(seed: int, number: int, stages: int, limit: float) -> tuple[Array, Array]:
-    """Return the ends of paths that are drawn at random: joint angles [rad], shapes (number, n).
+    """Return the ends of ``number`` random paths: joint angles [rad], shapes (number, stages).
 
-    Path ``i`` of a seed is the same however many are drawn. An end uses up to 0.9 of the limit,
-    the joints turn by 0.8 of it or more on the way, all together, and the arm is nowhere almost
-    straight: there it could go either way.
-
-    Parameters
-    ----------
-    seed, number, stages : int
-        Of the draws; how many paths; joints.
-    limit : float
-        Largest angle of a joint [rad].
+    Path ``i`` of a seed is the same however many are drawn. An end uses up to 0.9 of ``limit``
+    [rad], the joints turn by 0.8 of it or more on the way, all together, and the arm is nowhere
+    almost straight: there it could move either way.
     """
     key_a, key_b = seed_words(seed)
     starts, ends = np.empty((number, stages)), np.empty((number, stages))
@@ -134,21 +117,16 @@ def _usable(line: Array, limit: float) -> bool:
 
 @kernel
 def least_jerk(share: float) -> float:
-    """Return the share of the way at a share of the time, starting and ending without a jolt."""
+    """Return the minimum-jerk share of the way at a share of the time."""
     u = max(0.0, min(1.0, share))
     return u * u * u * (10.0 + u * (6.0 * u - 15.0))
 
 
 @kernel
 def along(time: float, rest: float, move: float) -> float:
-    """Return the share of the path, 0 to 1, at a time [s]: rest, there, rest, back, and so on.
+    """Return the share of the path, 0 to 1, at a time [s]: rest, there, rest, back, repeated.
 
-    Parameters
-    ----------
-    time : float
-        Since the start [s], not negative.
-    rest, move : float
-        Durations of a rest at an end and of the way from end to end [s].
+    ``rest`` and ``move`` are the durations of a rest at an end and of the way between the ends [s].
     """
     turns = time / (2.0 * (rest + move))
     since = (turns - float(int(turns))) * 2.0 * (rest + move)

@@ -1,9 +1,9 @@
 """Intended motion of a wearer: minimum-jerk reaches, sines, or rest.
 
-Everything is a function of time and of a few constants that are drawn when an episode begins, so
+Every motion is a function of time and of a few constants that are drawn when an episode begins, so
 that a preview is an evaluation at a later time. Reaches run from one drawn place to the next, one
-in each window of equal duration, with a rest before it. Their course is that of least jerk
-(T. Flash, N. Hogan, The coordination of arm movements, J. Neuroscience 5 (1985)).
+in each window of equal duration, with a rest before it, at minimum jerk (T. Flash, N. Hogan, The
+coordination of arm movements, J. Neuroscience 5 (1985)).
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def least_jerk_bend(share: float) -> float:
 
 @kernel
 def place_of(rows: Any, base: int, lane: int, window: int) -> float:
-    """Return where the reach of a window ends, and that of the next one begins."""
+    """Return the place at which the reach of a window ends and the next one begins."""
     if window < 0:
         return rows[base + FIRST][lane]  # type: ignore[no-any-return]
     key_a, key_b = int(rows[base + KEY_A][lane]), int(rows[base + KEY_B][lane])
@@ -88,13 +88,7 @@ def swing(rows: Any, base: int, lane: int, t: float) -> tuple[float, float, floa
 
 @kernel
 def motion_at(rows: Any, base: int, lane: int, t: float) -> tuple[float, float, float]:
-    """Return the intended angle [rad], its rate and acceleration at a time [s] of one lane.
-
-    Parameters
-    ----------
-    rows : rows
-        Constants of the motion from row ``base`` on.
-    """
+    """Return the intended angle [rad], its rate and acceleration at a time [s] of one lane."""
     kind = rows[base + KIND][lane]
     if kind == REACHES:
         return reach(rows, base, lane, t)
@@ -117,12 +111,8 @@ def draw_motion(
 ) -> None:
     """Draw the constants of one lane's motion between ``low`` and ``high``.
 
-    Parameters
-    ----------
-    kind : int
-        Of ``MOTIONS``; ``MIXED`` draws one of the others.
-    window : float
-        Seconds of a reach with its rest; a sine takes two of them or more.
+    ``kind`` is one of ``MOTIONS``; ``MIXED`` draws one of the others. ``window`` is the duration
+    [s] of a reach with its rest; a sine takes two of them or more.
     """
     chosen = kind
     if kind == MIXED:

@@ -4,9 +4,9 @@ Every family is one formula with other constants, drawn once an episode:
 
     r(t) = base(t) + sum_i a_i sin(2 pi (f_i t + phi_i))
 
-where ``base`` runs through knots of equal duration, holds each one for a share of it and goes to
-the next by a straight line (share 1: steps; share 0: ramps). So a preview is an evaluation at a
-later time, and nothing is stored but the constants.
+where ``base`` runs through knots of equal duration, holds each one for a share of it and moves to
+the next in a straight line (share 1: steps; share 0: ramps). So a preview is an evaluation at a
+later time, and only the constants are stored.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _RISE = KNOTS // 4
 
 
 def sines_needed(family: int) -> int:
-    """Return how many sines the evaluation has to sum for a family."""
+    """Return the number of sines of a family."""
     return {SINGLE: 1, MULTI: SINES, MIXED: SINES}.get(family, 0)
 
 

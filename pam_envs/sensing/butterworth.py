@@ -1,7 +1,7 @@
 """Eighth-order Butterworth low-pass of 5 Hz at 100 Hz, as second-order sections.
 
-yeh2010, section 5.2, passes the assistive torque through it before it becomes a reference. At
-100 Hz it delays slow signals by 163 ms.
+yeh2010, section 5.2, filters the assistive torque with it to obtain the reference. It delays slow
+signals by 163 ms.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def butterworth(rows: Any, base: int, lane: int, x: float) -> float:
 
 @kernel
 def settle(rows: Any, base: int, lane: int, x: float) -> None:
-    """Put the filter of one lane at rest with ``x``, as after a long time of it."""
+    """Put the filter of one lane in the steady state of a constant ``x``."""
     for i in range(4):
         a1, a2 = SECTIONS[i]
         b = 0.25 * (1.0 + a1 + a2)

@@ -19,12 +19,8 @@ class SensorEffects:
     """Effects of any sensor, neutral unless a recording shows them.
 
     A reading is ``x + bow x (x / full - 1) + drift + ramp + slip`` of the quantity ``x`` that the
-    sensor measured ``delay`` seconds ago.
-
-    Attributes
-    ----------
-    quantity : tuple of str and float
-        Unit, and the largest drift, ramp and slip.
+    sensor measured ``delay`` seconds ago. ``quantity`` is its unit and the largest drift, ramp and
+    slip.
     """
 
     quantity: ClassVar[tuple[str, float]] = ("1", 1.0)
@@ -100,21 +96,9 @@ def sense(
 ) -> None:  # fmt: skip
     """Write the reading of one lane, without bias, noise and quantisation.
 
-    Parameters
-    ----------
-    rows, fixed : rows
-        State and parameters.
-    j : int
-        Lane.
-    reading, ring, effects : int
-        Row of the reading, first row of the ring of the measured quantity (``N_HISTORY`` rows) and
-        of the sensor's effects (``SENSOR``).
-    value, full : float
-        The measured quantity and the full scale, in its unit.
-    step : int
-        Control period.
-    time, period : float
-        Time of the episode and control period [s].
+    ``ring`` is the first of ``N_HISTORY`` rows of the measured quantity, ``effects`` the first row
+    of the sensor's effects (``SENSOR``); ``full`` is the full scale, ``time`` and ``period`` are in
+    seconds.
     """
     note(rows, ring, j, step, value)
     age = fixed[effects + SENSOR.delay][j] / period

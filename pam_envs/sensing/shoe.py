@@ -14,7 +14,7 @@ HEEL_CELLS = 3.0
 
 @dataclass(frozen=True)
 class Shoe:
-    """A stiff sole on load cells; those of the heel tell stance from swing."""
+    """Stiff sole on load cells; those of the heel distinguish stance from swing."""
 
     heel: float = assumed(-0.05, "m", -0.15, 0.05, "heel cells, ahead of the ankle: behind it")
     tip: float = assumed(
@@ -41,6 +41,6 @@ def heel_load(vertical: float, cop: float, heel: float, tip: float) -> float:
 def estimated_torque(vertical: float, cop: float, inclination_sine: float, shank: float) -> float:
     """Return ``tau_w = f (L_0 cos q_a - r)`` [N m], yeh2010, Eq. (1).
 
-    ``inclination_sine`` is the sine of the shank's lean from the vertical, ``cos q_a``.
+    ``inclination_sine`` is ``cos q_a``, the sine of the shank's lean from the vertical.
     """
     return vertical * (shank * inclination_sine - cop)

@@ -51,10 +51,7 @@ def gated_reward(error: float, gate: float, scale: float, weight: float) -> floa
 
 @kernel
 def over_assistance(torque: float, demand: float) -> float:
-    """Return the torque [N m] that the wearer's antagonist muscles have to balance.
-
-    Assistance beyond the demand of the knee, and assistance in the wrong direction.
-    """
+    """Return the assistance [N m] beyond the demand, or in the wrong direction."""
     low, high = min(0.0, demand), max(0.0, demand)
     return max(0.0, torque - high) + max(0.0, low - torque)
 

@@ -69,29 +69,17 @@ class TorqueStiffness:
                 )
 
     def worst(self, torque: float, stiffness: float) -> float:
-        """Return the largest cost of a control period.
-
-        Parameters
-        ----------
-        torque, stiffness : float
-            Largest possible errors [N m], [N m/rad].
-        """
+        """Return the largest cost of a control period with these errors [N m], [N m/rad]."""
         off = self.torque_weight * torque / self.torque_scale
         return off + self.stiffness_weight * stiffness / self.stiffness_scale + self.effort_weight
 
 
 @kernel
 def object_torque(kind: float, angle: float, place: float, strength: float) -> float:
-    """Return the torque [N m] of an object at an angle [rad].
+    """Return the torque [N m] of an object of a kind (``WEIGHT``, ...) at an angle [rad].
 
-    Parameters
-    ----------
-    kind : float
-        ``WEIGHT``, ``WALL`` or ``FREE``.
-    place : float
-        Angle of a wall [rad].
-    strength : float
-        Largest torque of a weight [N m], or stiffness of a wall [N m/rad].
+    ``place`` is the angle of a wall, ``strength`` the largest torque of a weight [N m] or the
+    stiffness of a wall [N m/rad].
     """
     if kind == WEIGHT:
         return -strength * sine_of_turns(angle * PER_TURN)
@@ -104,15 +92,10 @@ def object_torque(kind: float, angle: float, place: float, strength: float) -> f
 def object_stiffness(
     kind: float, angle: float, place: float, strength: float, level: float, depth: float
 ) -> float:
-    """Return the stiffness [N m/rad] of an object at an angle [rad].
+    """Return the stiffness [N m/rad] of an object (:func:`object_torque`) at an angle [rad].
 
-    Parameters
-    ----------
-    level : float
-        Stiffness where there is no wall [N m/rad].
-    depth : float
-        Angle over which it grows to that of the wall [rad]; the others as in
-        :func:`object_torque`.
+    ``level`` is the stiffness without a wall, ``depth`` [rad] the angle over which it rises to the
+    wall's.
     """
     if kind == WALL:
         return level + (strength - level) * max(0.0, min(1.0, (angle - place) / depth))

@@ -1,15 +1,14 @@
 """Optimality conditions of a redundant chain: the equations of one Newton iteration.
 
 fluidic_muscles, (2.2) to (2.12), with two corrections: the second derivative of the Lagrangian
-holds the curvature of the constraint, ``sum_i lambda_i d2 g_i / dq2``, which the text leaves to
-the reader, and the upper right block is ``dF_1 / d lambda = J_g'`` and not (2.9)'s ``dF_2 / d
-lambda``:
+holds the curvature of the constraint, ``sum_i lambda_i d2 g_i / dq2``, which the text leaves to the
+reader, and the upper right block is ``dF_1 / d lambda = J_g'`` and not (2.9)'s ``dF_2 / d lambda``:
 
     [ d2 f + sum_i lambda_i d2 g_i   J_g' ] [ dq       ]     [ df       ]
     [ J_g                            0    ] [ lambda + ] = - [ g(q) - x ]
 
-The five equations of a pose are the three of its position and, of its direction, the two
-components across the wanted one. All rows have one lane: ``LANES = 1``.
+The five equations of a pose are the three of its position and, of its direction, the two components
+across the desired one. All rows have one lane: ``LANES = 1``.
 """
 
 from __future__ import annotations
@@ -70,7 +69,7 @@ def weight_of(q: Any, limit: float, weighted: bool) -> float:
 
 @kernel
 def column(work: Any, k: int) -> tuple[float, float, float, float, float, float]:
-    """Return how tip and direction move where joint ``k`` turns."""
+    """Return the rates of tip and direction per rate of joint ``k``."""
     at, end = block(0, N_STAGES, k + 1), block(0, N_STAGES, N_STAGES)
     ax, ay, az = work[at + AXIS][0], work[at + AXIS + 1][0], work[at + AXIS + 2][0]
     px, py, pz = work[end + POINT][0], work[end + POINT + 1][0], work[end + POINT + 2][0]
@@ -131,8 +130,8 @@ def set_equations(
 ) -> float:
     """Write the equations of an iteration without the constraint's curvature.
 
-    The matrix is ``system[row][column]``, its last column the right-hand side. Returns the error
-    of the pose.
+    The matrix is ``system[row][column]``, its last column the right-hand side. Returns the error of
+    the pose.
     """
     n, last = N_STAGES, N_STAGES + TASK
     place_chain(q, fixed, work, 0, 0, 0)

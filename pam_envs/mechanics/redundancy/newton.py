@@ -1,10 +1,9 @@
 """Newton's method on the Lagrangian of a redundant chain, pose after pose of a path.
 
-The pose is no linear function of the angles, so the problem is not convex (fluidic_muscles says it
-is): the method needs a start nearby, steps that stay between the limits, and an arm that is not
-straight, where the Jacobian loses rank. A path is followed from each pose to the next; where that
-leads nowhere, and at its beginning, bent poses are tried. The equations are in
-``redundancy_equations``.
+The pose is not a linear function of the angles, so the problem is not convex (fluidic_muscles says
+it is): the method needs a start nearby, steps that stay between the limits, and an arm that is not
+straight, where the Jacobian loses rank. Each pose starts from the solution of the one before; at
+the beginning of a path, and where that fails, bent poses are tried.
 """
 
 from __future__ import annotations
@@ -30,21 +29,21 @@ CLOSE = 1e-9
 LONGEST_STEP = 0.5
 """Largest change of an angle [rad] in an iteration."""
 KEPT = 0.9
-"""Share of the way to a limit that an iteration may go."""
+"""Largest share of the way to a limit in an iteration."""
 STARTS = 16
-"""Bent poses from which a search begins; as many again, bent less, where those lead nowhere."""
+"""Bent poses from which a search begins; as many again, bent less, where those fail."""
 BEND, STRAIGHT = 0.35, 1e-3
 """Angle [rad] of the bent poses, and below which all joints count as straight."""
 WARM = 0.05
-"""Change of an angle [rad] below which the constraint's curvature is let in after a cold start."""
+"""Change of an angle [rad] below which the constraint's curvature is used after a cold start."""
 MOST_HALVINGS = 12
 LOST = 1e6
 """Change of an angle [rad] from which an iteration has failed."""
 MUCH = 1e7
-"""Weight of the constraint where convexity is looked at."""
+"""Weight of the constraint in the test of convexity."""
 SMALLEST_PIVOT = 1e-13
 SMALLEST_ROOM = 1e-9
-"""Share of the limit that an angle has to keep from it."""
+"""Least distance from a limit, as a share of it."""
 
 
 @routine
@@ -77,7 +76,7 @@ def solve_equations(system: Any, size: int) -> None:
 
 @kernel
 def share_of_step(q: Any, system: Any, limit: float, weighted: bool) -> tuple[float, float]:
-    """Return how much of a step may be gone, and its largest change of an angle [rad]."""
+    """Return the admissible share of a step, and its largest change of an angle [rad]."""
     last, share, largest = N_STAGES + TASK, 1.0, 0.0
     for k in range(N_STAGES):
         change = system[k][last]
@@ -93,7 +92,7 @@ def share_of_step(q: Any, system: Any, limit: float, weighted: bool) -> tuple[fl
 
 @kernel
 def change_angles(q: Any, system: Any, share: float) -> None:
-    """Go a share of the step."""
+    """Add a share of the step to the angles."""
     for k in range(N_STAGES):
         q[k][0] = q[k][0] + share * system[k][N_STAGES + TASK]
 
@@ -103,7 +102,7 @@ def shortened(
     q: Any, fixed: Any, work: Any, system: Any, pose: Any, limit: float, weighted: bool,
     share: float,
 ) -> float:  # fmt: skip
-    """Go the share of the step that lessens weight and errors together; return it."""
+    """Apply the share of the step that lowers weight and errors together; return it."""
     penalty = 1.0
     for r in range(TASK):
         penalty = max(penalty, 2.0 * abs(system[N_STAGES + r][N_STAGES + TASK]))
@@ -119,7 +118,7 @@ def shortened(
 
 @routine
 def bends_upwards(system: Any, trial: Any) -> bool:
-    """Return whether the Lagrangian is convex along all that leaves the pose as it is.
+    """Return whether the Lagrangian is convex along all directions that keep the pose.
 
     It is if its second derivative plus much of ``J_g' J_g`` has positive pivots (Debreu's lemma).
     """
@@ -144,11 +143,11 @@ def iterate(
     q: Any, multipliers: Any, fixed: Any, work: Any, system: Any, trial: Any, pose: Any,
     limit: float, weighted: bool, warm: bool,
 ) -> int:  # fmt: skip
-    """Go to the nearby minimum for a pose; return the iterations taken, or 0 without success.
+    """Converge to the nearby minimum for a pose; return the iterations, or 0 without success.
 
     Where the Lagrangian is not convex, and after a cold start until the steps are small, the
-    constraint's curvature is left out and the step shortened until weight and errors get less:
-    so it is a minimum that comes near, and no saddle.
+    constraint's curvature is left out and the step shortened until weight and errors decrease: so
+    it converges to a minimum, and not to a saddle.
     """
     near, last = warm, N_STAGES + TASK
     for iteration in range(MOST_ITERATIONS):
@@ -189,7 +188,7 @@ def room_of(q: Any, limit: float) -> float:
 
 @routine
 def bend(q: Any, fixed: Any, start: int, limit: float) -> None:
-    """Bend the chain one way or in an S, for each axis: ``start`` counts the ways."""
+    """Bend the chain one way or in an S, for each axis; ``start`` numbers the ways."""
     size = min(BEND, 0.5 * limit)
     if start >= STARTS:
         size = 0.4 * size
@@ -214,7 +213,7 @@ def search(
     q: Any, best: Any, multipliers: Any, fixed: Any, work: Any, system: Any, trial: Any,
     pose: Any, limit: float, weighted: bool,
 ) -> int:  # fmt: skip
-    """Go to the best optimum found from bent poses; return its iterations, or 0 without any."""
+    """Find the best optimum from bent poses; return its iterations, or 0 without any."""
     taken, least = 0, 0.0
     for start in range(2 * STARTS):
         if start >= STARTS and taken > 0:
@@ -241,7 +240,7 @@ def search(
 
 @kernel
 def nearly_straight(q: Any) -> bool:
-    """Return whether all joints are straight: there the Jacobian has lost rank."""
+    """Return whether all joints are straight, where the Jacobian has lost rank."""
     largest = 0.0
     for k in range(N_STAGES):
         largest = max(largest, abs(q[k][0]))
@@ -255,26 +254,21 @@ def resolve_path(
 ) -> int:  # fmt: skip
     """Find the angles for poses one after the other, each from those of the pose before.
 
+    Returns how many poses were resolved: all, or the number of the first that was not.
+
     Parameters
     ----------
     poses : rows, (m, 6)
         Position [m] and direction.
     q, multipliers : rows (n, 1), (5,)
-        Where to begin [rad]; ``known`` says whether they are near the first pose.
+        Initial angles [rad] and multipliers; ``known`` if they are near the first pose.
     fixed, work, system, trial, best : rows
         ``SerialChain.rows()`` in one lane; scratch: ``work_rows(n)`` rows of one lane,
         (n + 5) x (n + 6), n x n, and n + 5.
-    limit : float
-        Largest angle [rad].
-    weighted : bool
-        Whether the weight (2.1) or the squares of the angles are minimised.
+    limit, weighted : float, bool
+        Largest angle [rad]; whether the weight (2.1) is minimised, or the squares of the angles.
     angles, found, iterations : rows (m, n), (m, 5), (m,)
-        Take angles, multipliers and iterations.
-
-    Returns
-    -------
-    int
-        How many poses were resolved: all, or the number of the first that was not.
+        Receive angles, multipliers and iterations.
     """
     near = known
     for i in range(len(poses)):

@@ -2,9 +2,8 @@
 
     minimise f(q)  with  g(q) = x,      f = sum_i 4 q_i^2 - ln(1 - (q_i / q_max)^2)         (2.1)
 
-fluidic_muscles, section 2. The weight grows without bound towards the limits, so that an optimum
-within them is found wherever there is one nearby; the unweighted variant minimises ``q'q`` and
-has no limits. The iteration is in ``redundancy_newton``.
+fluidic_muscles, section 2. The weight grows without bound towards the limits, so that a nearby
+optimum within them is always found; the unweighted variant minimises ``q'q`` and has no limits.
 """
 
 from __future__ import annotations
@@ -33,17 +32,16 @@ REACHED = 1e-5
 
 
 class UnreachablePose(ValueError):
-    """A pose for which no joint angles within the limits were found.
+    """Pose for which no joint angles within the limits were found.
 
     Attributes
     ----------
     index : int
         Number of the pose in the path.
     pose : ndarray, shape (6,)
-    distance : float
-        From the pose's position to the nearest one found [m].
-    turn : float
-        From the pose's direction to that of the nearest one found [rad].
+        Position [m] and direction.
+    distance, turn : float
+        Distance [m] and angle [rad] to the nearest pose found.
     """
 
     def __init__(
@@ -73,7 +71,7 @@ class Resolution:
     angles : ndarray, shape (m, n)
         [rad].
     multipliers : ndarray, shape (m, 5)
-        Lagrange multipliers of (2.2), with which a later path may go on.
+        Lagrange multipliers of (2.2), from which a later path may continue.
     iterations : ndarray of int, shape (m,)
         Newton iterations that each pose took.
     limit : float
@@ -87,17 +85,17 @@ class Resolution:
 
     @property
     def peak(self) -> float:
-        """Return the largest angle of a joint in the path [rad]."""
+        """Largest angle of a joint in the path [rad]."""
         return float(np.max(np.abs(self.angles)))
 
     @property
     def within_limits(self) -> bool:
-        """Return whether no joint goes past its limit."""
+        """Whether no joint exceeds its limit."""
         return self.peak < self.limit
 
     @property
     def longest_step(self) -> float:
-        """Return the largest change of a joint from pose to pose [rad]: large where it jumps."""
+        """Largest change of a joint from pose to pose [rad]: large where it jumps."""
         return float(np.max(np.abs(np.diff(self.angles, axis=0)), initial=0.0))
 
 
@@ -120,17 +118,17 @@ def resolve(
     limit : float
         Largest angle of a joint [rad].
     weighted : bool
-        Whether the weight (2.1) is minimised, or ``q'q``, which lets joints go past the limit.
+        Whether the weight (2.1) is minimised, or ``q'q``, which lets joints exceed the limit.
     start : array_like, shape (n,), optional
-        Angles near the first pose [rad]; without them, bent poses are tried and the best result
-        is taken. So they are where ``start`` is straight.
+        Angles near the first pose [rad]. Without them, or where they are straight, the best of
+        several bent poses is taken.
     multipliers : array_like, shape (5,), optional
         Of the solution in ``start``.
 
     Raises
     ------
     UnreachablePose
-        Naming the first pose without a solution, and how near the arm comes.
+        Naming the first pose without a solution, and the distance of the nearest pose.
     ValueError
         If shapes or values do not make sense.
     """
@@ -150,28 +148,24 @@ def resolve(
 
 
 def nearest(chain: SerialChain, pose: ArrayLike, limit: float = LIMIT) -> tuple[float, float]:
-    """Return how near the arm comes to a pose within its limits: distance [m] and turn [rad]."""
+    """Return the distance [m] and turn [rad] from a pose to the nearest one within the limits."""
     from scipy.optimize import least_squares
 
-    wanted, best, least = np.asarray(pose, float), (np.inf, np.inf), np.inf
+    goal, best, least = np.asarray(pose, float), (np.inf, np.inf), np.inf
     bound = np.full(chain.stages, limit)
 
     def off(angles: Array) -> Array:
-        return chain.pose(angles) - wanted
+        return chain.pose(angles) - goal
 
     for amplitude in (0.5, -0.5):
         for period in (1, 2):  # bent, then in an S
             signs = np.where(np.arange(chain.stages) * period // chain.stages % 2, -1.0, 1.0)
-            found = least_squares(
-                off,
-                amplitude * limit * signs,
-                chain.jacobian,
-                bounds=(-bound, bound),
-            )
+            start = amplitude * limit * signs
+            found = least_squares(off, start, chain.jacobian, bounds=(-bound, bound))
             if found.cost < least:
                 left, least = chain.pose(found.x), found.cost
-                cosine = float(np.clip(left[3:] @ wanted[3:], -1.0, 1.0))
-                best = (float(np.linalg.norm(left[:3] - wanted[:3])), float(np.arccos(cosine)))
+                cosine = float(np.clip(left[3:] @ goal[3:], -1.0, 1.0))
+                best = (float(np.linalg.norm(left[:3] - goal[:3])), float(np.arccos(cosine)))
     return best
 
 

@@ -1,12 +1,12 @@
-"""A serial chain of joints and links in numpy: pose, its derivatives, and the equations of motion.
+"""Serial chain of joints and links in numpy: pose, its derivatives, and the equations of motion.
 
     x = g(q),   M(q) qdd + bias(q, qd) = joint torques
 
 fluidic_muscles, sections 1.2 and 2: six stages, each a joint of +-30 degrees. The base's frame has
 its origin in the first joint and its z along the straight arm. A *pose* is the tip's position and
 the direction in which the last link points (a unit vector): six numbers, five degrees of freedom.
-The formulas here are those of a textbook, by Jacobians; the kernels of ``serial_chain_kinematics``
-and ``serial_chain_dynamics`` find the same numbers recursively, for lanes side by side.
+These are textbook formulas, by Jacobians; the kernels of ``kinematics`` and ``dynamics`` compute
+the same numbers recursively, for lanes side by side.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.constants import GRAVITY
-from pam_envs.mechanics.serial_chain.rows import GRAVITY_ROWS, LINK_ROWS
 from pam_envs.parameters import assumed
 
 Array = NDArray[np.float64]
@@ -34,16 +33,14 @@ BOUNDS = {
     "across": ("kg m2", 0.0, 100.0),
     "along": ("kg m2", 1e-9, 100.0),
 }
-"""Unit and bounds of what each link has."""
-
-
+"""Unit and bounds of the properties of a link."""
 HEAVY = ("masses", "across", "along")
 """Properties that are proportional to the mass of the links."""
 
 
 @dataclass(frozen=True)
 class LinkForm:
-    """A link of the arm of fluidic_muscles, as a solid cylinder, unless a chain says otherwise."""
+    """Link of the arm of fluidic_muscles, a solid cylinder."""
 
     length: float = assumed(0.25, "m", 1e-3, 5.0, "fluidic_muscles, as its figures suggest")
     mass: float = assumed(
@@ -120,7 +117,7 @@ class SerialChain:
         length, mass, radius : float
             Of one link [m], [kg], [m]; by default those of :class:`LinkForm`.
         centre : float
-            Where its mass is, as a share of its length.
+            Centre of mass, as a share of the length.
         gravity : tuple of float
             In the base's frame [m/s2].
         """
@@ -137,12 +134,12 @@ class SerialChain:
 
     @property
     def stages(self) -> int:
-        """Return the number of joints."""
+        """Number of joints."""
         return len(self.axes)
 
     @cached_property
     def reach(self) -> float:
-        """Return the length of the straight arm [m]."""
+        """Length of the straight arm [m]."""
         return float(sum(self.lengths))
 
     def heavier(self, factor: float) -> Self:
@@ -153,12 +150,10 @@ class SerialChain:
     def rows(self) -> Array:
         """Return gravity and links as the kernels read them, shape (3 + 8 n,)."""
         turns = np.array([AXES[name] for name in self.axes])
-        numbers = (self.lengths, self.masses, self.centres, self.across, self.along)
-        links = np.column_stack([turns, *numbers])
-        assert links.shape[1] == LINK_ROWS and len(self.gravity) == GRAVITY_ROWS
+        links = np.column_stack([turns, *(getattr(self, name) for name in BOUNDS)])
         return np.concatenate([self.gravity, links.ravel()])
 
-    # --- where it is ----------------------------------------------------------------------------
+    # --- kinematics -----------------------------------------------------------------------------
 
     def frames(self, angles: ArrayLike) -> tuple[Array, Array, Array]:
         """Return joint axes, joint positions and link directions in the base's frame.
@@ -201,28 +196,7 @@ class SerialChain:
         linear, angular = np.cross(axes, arms), np.cross(axes, directions[..., -1:, :])
         return np.swapaxes(np.concatenate([linear, angular], -1), -1, -2)
 
-    def hessian(self, angles: ArrayLike, weights: ArrayLike) -> Array:
-        """Return ``sum_i weights_i d2 g_i / dq2``, shape (n, n), for one vector of angles.
-
-        Parameters
-        ----------
-        angles : array_like, shape (n,)
-            [rad].
-        weights : array_like, shape (6,)
-            Of the pose's entries; Lagrange multipliers of (2.2) spread over them.
-        """
-        axes, points, directions = self.frames(angles)
-        given = np.asarray(weights, float)
-        second = np.zeros((self.stages, self.stages))
-        for k in range(self.stages):
-            linear = np.cross(axes[k], points[-1] - points[k])
-            angular = np.cross(axes[k], directions[-1])
-            for i in range(k + 1):  # joint i carries joint k along
-                value = given[:3] @ np.cross(axes[i], linear)
-                second[i, k] = second[k, i] = value + given[3:] @ np.cross(axes[i], angular)
-        return second
-
-    # --- how it moves ---------------------------------------------------------------------------
+    # --- dynamics -------------------------------------------------------------------------------
 
     def mass_matrix(self, angles: ArrayLike, payload: float = 0.0) -> Array:
         """Return the mass matrix [kg m2], shape (n, n); ``payload`` [kg] is a point at the tip."""
@@ -234,7 +208,7 @@ class SerialChain:
     def bias(self, angles: ArrayLike, rates: ArrayLike, payload: float = 0.0) -> Array:
         """Return the torques [N m] of gravity, Coriolis and centrifugal forces, shape (n,).
 
-        They are what the joints have to exert where nothing accelerates them.
+        The joints exert them where nothing accelerates.
         """
         axes, points, directions = self.frames(angles)
         speed = self._angles(rates)

@@ -4,8 +4,8 @@
 
 Recursive: the bias by Newton and Euler from the base outwards and back, the mass matrix by
 composite bodies (R. Featherstone, Rigid Body Dynamics Algorithms, 2008), both as screws about the
-base's origin (``serial_chain_kinematics``). Each link is a body of revolution about its own
-direction; the payload is a point at the tip. Gravity is an acceleration of the base.
+base's origin. Each link is a body of revolution about its own direction; the payload is a point at
+the tip. Gravity is an acceleration of the base.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ CARRIED = INERTIA + 6 - FORCE
 
 @kernel
 def start_base(work: Any, fixed: Any, chain: int, base: int) -> None:
-    """Let the base rest, in free fall upwards."""
+    """Start the base at rest, accelerated upwards by gravity."""
     at = block(base, N_STAGES, 0)
     for j in range(LANES):
         for r in range(6):
@@ -123,7 +123,7 @@ def add(work: Any, row: int, j: int, x: float, y: float, z: float) -> None:
 
 @kernel
 def add_payload(work: Any, base: int, payload: Any) -> None:
-    """Add a point at the tip to what the last link carries."""
+    """Add a point at the tip to the load of the last link."""
     at = block(base, N_STAGES, N_STAGES)
     for j in range(LANES):
         m = payload[j]
@@ -141,7 +141,7 @@ def add_payload(work: Any, base: int, payload: Any) -> None:
 
 @kernel
 def project(work: Any, base: int, k: int, at: int) -> None:
-    """Write bias torque and row ``k`` of the mass matrix, from what joint ``k`` carries."""
+    """Write bias torque and row ``k`` of the mass matrix, from the load of joint ``k``."""
     for j in range(LANES):
         ax, ay, az = work[at + AXIS][j], work[at + AXIS + 1][j], work[at + AXIS + 2][j]
         vx, vy, vz = work[at + LEVER][j], work[at + LEVER + 1][j], work[at + LEVER + 2][j]
@@ -179,17 +179,10 @@ def chain_terms(
 ) -> None:
     """Write bias torques and mass matrix of a chain.
 
-    Parameters
-    ----------
-    rows, fixed, work : rows
-        State, parameters and scratch.
-    angle, velocity : int
-        First of the rows of the joint angles [rad] and of their rates [rad/s].
-    payload : int
-        Row of the mass at the tip [kg].
-    chain, base : int
-        First rows of the chain's parameters and of its scratch (``serial_chain_rows``): the bias
-        [N m] stands in ``base + k``, the mass matrix [kg m2] in ``mass_row(base, n, i, k)``.
+    ``angle``, ``velocity`` and ``payload`` are the first rows of the joint angles [rad] and rates
+    [rad/s] and the row of the mass at the tip [kg]; ``chain`` and ``base`` the first rows of the
+    chain's parameters and of its scratch (``rows``): the bias [N m] is in ``base + k``, the mass
+    matrix [kg m2] in ``mass_row(base, n, i, k)``.
     """
     place_chain(rows, fixed, work, angle, chain, base)
     start_base(work, fixed, chain, base)
@@ -215,7 +208,7 @@ def chain_terms(
 def chain_solve(work: Any, base: int) -> None:
     """Replace the right-hand side in ``base + n + k`` by the solution of ``M x = b``.
 
-    By ``M = L D L'``, in the place of M, which is lost.
+    By ``M = L D L'``, which overwrites M.
     """
     right = base + N_STAGES
     for k in range(N_STAGES):
@@ -233,7 +226,7 @@ def chain_solve(work: Any, base: int) -> None:
 
 @kernel
 def eliminate(work: Any, base: int, right: int, k: int) -> None:
-    """Take unknown ``k`` out of the equations behind it; its pivot is inverted."""
+    """Eliminate unknown ``k`` from the equations behind it and invert its pivot."""
     pivot = work[mass_row(base, N_STAGES, k, k)]
     for j in range(LANES):
         pivot[j] = 1.0 / pivot[j]

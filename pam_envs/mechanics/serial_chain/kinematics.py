@@ -1,8 +1,8 @@
 """Kinematics of a serial chain: frames, joint axes and tip, for lanes side by side.
 
 Each joint turns about a fixed axis of the frame before it; its link is along the z of the frame
-behind it. Everything is told in the base's frame, and motions as screws about the base's origin:
-a turn about joint ``k`` moves the point of a body in the origin with ``point_k x axis_k``. So no
+behind it. All quantities are in the base's frame, and motions are screws about the base's origin: a
+turn about joint ``k`` moves the point of a body in the origin with ``point_k x axis_k``. So no
 vector has to be turned from frame to frame.
 """
 
@@ -97,16 +97,10 @@ def place_link(work: Any, fixed: Any, link: int, at: int, was: int, angle: Any, 
 
 @kernel
 def place_chain(rows: Any, fixed: Any, work: Any, angle: int, chain: int, base: int) -> None:
-    """Write where all links are.
+    """Write the frames, ends and joint axes of all links.
 
-    Parameters
-    ----------
-    rows, fixed, work : rows
-        State, parameters and scratch.
-    angle : int
-        First of the rows of the joint angles [rad].
-    chain, base : int
-        First rows of the chain's parameters and of its scratch (``serial_chain_rows``).
+    ``angle`` is the first row of the joint angles [rad], ``chain`` and ``base`` the first rows of
+    the chain's parameters and of its scratch (``rows``).
     """
     place_base(work, base)
     for k in range(N_STAGES):
