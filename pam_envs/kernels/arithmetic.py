@@ -6,6 +6,11 @@ from typing import Any
 
 from pam_envs.kernels.build import LANES, kernel
 
+TURN = 6.283185307179586
+"""Radians in a turn."""
+PER_TURN = 0.15915494309189535
+"""Turns in a radian."""
+
 
 @kernel
 def clip(x: float, low: float, high: float) -> float:
@@ -69,6 +74,13 @@ def sine_of_turns(turns: float) -> float:
     t = t * y - 1.0 / 6.0
     t = t * y + 1.0
     return t * a
+
+
+@kernel
+def sine_and_cosine(angle: float) -> tuple[float, float]:
+    """Return sine and cosine of an angle [rad]."""
+    turns = angle * PER_TURN
+    return sine_of_turns(turns), sine_of_turns(turns + 0.25)
 
 
 @kernel

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pam_envs.kernels.arithmetic import decay
+from typing import Any
+
+from pam_envs.kernels.arithmetic import TURN, decay
 from pam_envs.kernels.build import kernel
 
 LARGEST_PHASE = 16.0
 """Largest ``abs(k - d^2 / 4) h^2`` for which the step's series hold (3e-7 relative)."""
-TURN = 6.283185307179586
-"""Radians in a turn."""
 
 
 @kernel
@@ -78,17 +78,19 @@ def damped_motion(
 
 @kernel
 def resonator_step(
-    y: float, rate: float, was: float, now: float, turns: float, ratio: float, h: float
+    rows: Any, j: int, state: int, was: float, now: float, turns: float, ratio: float, h: float
 ) -> tuple[float, float]:
-    """Return value and rate of a resonator whose input went straight from ``was`` to ``now``.
+    """Advance a resonator whose input went straight from ``was`` to ``now`` in ``h`` seconds.
 
-    ``y`` and ``rate`` [1/s] are those ``h`` seconds before, ``turns`` the natural frequency [Hz]
-    and ``ratio`` the damping ratio.
+    Its value and rate [1/s] are in the rows ``state`` and ``state + 1`` of lane ``j``, and are
+    returned. ``turns`` is the natural frequency [Hz] and ``ratio`` the damping ratio.
     """
     omega = TURN * turns
     k, d = omega * omega, 2.0 * ratio * omega
     span = max(h, 1e-9)
+    y, rate = rows[state][j], rows[state + 1][j]
     moved, rate = damped_motion(
         rate, k * (was - y) - d * rate, k * (now - was) / span, k, d, decay(0.5 * d * span), span
     )
+    rows[state][j], rows[state + 1][j] = y + moved, rate
     return y + moved, rate

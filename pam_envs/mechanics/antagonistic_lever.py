@@ -19,12 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.kernels.arithmetic import sine_of_turns
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import assumed, derived
 
 _SIZE = "with it +-30 degrees take 0 to 25 % of a muscle of 150 mm (fluidic_muscles, section 2)"
-PER_TURN = 1.0 / (2.0 * math.pi)
 SIDES = (1.0, -1.0)
 """Of muscle A and of muscle B."""
 
@@ -82,13 +80,6 @@ def squares(r_u: float, r_o: float, l_u: float, l_o: float) -> tuple[float, floa
     """Return ``a, b, c`` of the squared distance ``a + 2 (b cos(phi) -+ c sin(phi))`` [m2]."""
     total = r_u * r_u + l_u * l_u + r_o * r_o + l_o * l_o
     return total, l_u * l_o - r_u * r_o, r_u * l_o + l_u * r_o
-
-
-@kernel
-def sine_and_cosine_of(angle: float) -> tuple[float, float]:
-    """Return sine and cosine of an angle [rad]."""
-    turns = angle * PER_TURN
-    return sine_of_turns(turns), sine_of_turns(turns + 0.25)
 
 
 @kernel

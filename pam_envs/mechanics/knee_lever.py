@@ -13,19 +13,17 @@ later a squared cosine, which the virtual work of ``T`` does not.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.kernels.arithmetic import sine_of_turns
+from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import kernel
 from pam_envs.mechanics.guide import BearingEffects
 from pam_envs.parameters import assumed, derived
 
 _GEOMETRY = "reproduces 158 N at 2 bar and 22 cm with yeh2010's range of tension and stiffness"
-PER_TURN = 1.0 / (2.0 * math.pi)
 
 
 @dataclass(frozen=True)
@@ -73,13 +71,6 @@ class KneeLever(BearingEffects):
 
 
 @kernel
-def half_angle(angle: float) -> tuple[float, float]:
-    """Return sine and cosine of half an angle [rad]."""
-    turns = angle * (0.5 * PER_TURN)
-    return sine_of_turns(turns), sine_of_turns(turns + 0.25)
-
-
-@kernel
 def muscle_length(sine: float, arm: float, fittings: float) -> float:
     """Return the muscle's length [m]; ``sine`` is that of half the angle."""
     return 2.0 * arm * sine - fittings
@@ -94,7 +85,7 @@ def assistive_torque(
 
 
 @kernel
-def wanted_tension(
+def required_tension(
     angle: float, torque: float, arm: float, stiffness: float, relaxed: float
 ) -> float:
     """Return the tension ``T_d`` [N] for an assistive torque [N m] at an angle [rad].
@@ -102,5 +93,5 @@ def wanted_tension(
     ``[kappa (theta_0 - theta) + tau_a] / (L_b cos(theta / 2))``, at least 0: a muscle cannot push.
     Within half a degree of the toggle the lever arm is that at half a degree.
     """
-    _, cosine = half_angle(angle)
+    _, cosine = sine_and_cosine(0.5 * angle)
     return max(0.0, stiffness * (relaxed - angle) + torque) / (arm * max(cosine, 0.00436))

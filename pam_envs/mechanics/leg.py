@@ -25,9 +25,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pam_envs.constants import GRAVITY
-from pam_envs.kernels.arithmetic import sine_of_turns
+from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import kernel
-from pam_envs.mechanics.knee_lever import PER_TURN
 from pam_envs.parameters import assumed, derived, published
 
 _AIM = (
@@ -86,13 +85,6 @@ def centre_of_pressure(
     """
     leaning = min(0.0, ground_x) / max(ground_z, 0.05)
     return max(heel, min(tip, natural + (1.0 - quick * quick) * aim * leaning))
-
-
-@kernel
-def sine_and_cosine(angle: float) -> tuple[float, float]:
-    """Return sine and cosine of an angle [rad]."""
-    turns = angle * PER_TURN
-    return sine_of_turns(turns), sine_of_turns(turns + 0.25)
 
 
 @kernel

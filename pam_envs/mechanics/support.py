@@ -50,14 +50,5 @@ def mount_step(
     ``state`` is the first row of the mount (``MOUNT_STATE``); the load before the mount moves from
     ``was`` to ``now`` [m]. ``share``, ``turns`` and ``ratio`` are those of :class:`MountEffects`.
     """
-    swung, rate = resonator_step(
-        rows[state + MOUNT_STATE.position][j],
-        rows[state + MOUNT_STATE.rate][j],
-        was,
-        now,
-        turns,
-        ratio,
-        h,
-    )
-    rows[state + MOUNT_STATE.position][j], rows[state + MOUNT_STATE.rate][j] = swung, rate
+    swung, _ = resonator_step(rows, j, state, was, now, turns, ratio, h)
     return (1.0 - share) * now + share * swung

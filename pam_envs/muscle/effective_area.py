@@ -19,11 +19,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import kernel
-from pam_envs.muscle.length_creep import LengthCreepEffects
-from pam_envs.muscle.load_effects import LoadEffects
+from pam_envs.muscle.effects import (
+    LengthCreepEffects,
+    LoadEffects,
+    TemperatureEffects,
+    ViscosityEffects,
+)
 from pam_envs.muscle.strands import StrandEffects
-from pam_envs.muscle.temperature import TemperatureEffects
-from pam_envs.muscle.viscosity import ViscosityEffects
 from pam_envs.parameters import assumed, effect, identified, published
 
 _FIT = "least squares on positioning2021, Tables 3-5"

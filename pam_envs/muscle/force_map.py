@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import kernel
-from pam_envs.muscle.temperature import TemperatureEffects
+from pam_envs.muscle.effects import TemperatureEffects
 from pam_envs.parameters import assumed, derived, identified, published
 
 _FIT = "least squares on the measured map of a DMSP-10-250 (data/dmsp10_force_map.csv)"

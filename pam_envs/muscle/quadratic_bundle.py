@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.kernels.build import kernel
-from pam_envs.muscle.temperature import TemperatureEffects
+from pam_envs.muscle.effects import TemperatureEffects
 from pam_envs.parameters import assumed, published
 
 Array = NDArray[np.float64]

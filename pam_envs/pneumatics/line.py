@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from pam_envs.kernels.arithmetic import TURN
 from pam_envs.kernels.build import kernel
-from pam_envs.kernels.motion import TURN, resonator_step
-from pam_envs.parameters import assumed, effect, named_rows, parameter_rows
+from pam_envs.kernels.motion import resonator_step
+from pam_envs.parameters import assumed, effect, parameter_rows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,8 +23,6 @@ class LineEffects:
 
 LINE = parameter_rows(LineEffects)
 """Rows of a line's effects, from its first."""
-LINE_STATE = named_rows("pressure", "rate")
-"""Rows of a line's state, from its first."""
 
 
 @kernel
@@ -32,16 +31,7 @@ def line_step(
 ) -> float:
     """Return the pressure [Pa] behind the line whose input went from ``was`` to ``now``."""
     turns, ratio = fixed[effects + LINE.ring_frequency][j], fixed[effects + LINE.ring_damping][j]
-    swung, rate = resonator_step(
-        rows[state + LINE_STATE.pressure][j],
-        rows[state + LINE_STATE.rate][j],
-        was,
-        now,
-        turns,
-        ratio,
-        h,
-    )
-    rows[state + LINE_STATE.pressure][j], rows[state + LINE_STATE.rate][j] = swung, rate
+    swung, rate = resonator_step(rows, j, state, was, now, turns, ratio, h)
     part = fixed[effects + LINE.ring_share][j]
     flow = fixed[effects + LINE.ring_flow][j] * rate / (TURN * turns)
     return max(0.0, (1.0 - part) * now + part * swung + flow)

@@ -13,8 +13,8 @@ from typing import Any, ClassVar
 from pam_envs.constants import ATMOSPHERE
 from pam_envs.kernels.arithmetic import count_on, decay
 from pam_envs.kernels.build import kernel
-from pam_envs.parameters import assumed, effect, named_rows, parameter_rows, published
-from pam_envs.pneumatics.line import LINE_STATE, LineEffects
+from pam_envs.parameters import assumed, derived, effect, named_rows, parameter_rows, published
+from pam_envs.pneumatics.line import LineEffects
 from pam_envs.pneumatics.supply import AMPLE, SupplyEffects, supplied, supply_drop
 
 DELAY_PERIODS = 12
@@ -93,11 +93,39 @@ class Regulator(RegulatorEffects):
     )
 
 
+@dataclass(frozen=True)
+class JointRegulator(DelayedEffects):
+    """A proportional regulator for each muscle: a first-order lag with a limited rate."""
+
+    max_pressure: float = assumed(6.5e5, "Pa", 1e4, 1.2e6, "highest of the measured force map")
+    time_constant: float = derived(
+        1.0 / 23.0,
+        "s",
+        0.002,
+        2.0,
+        "one of two poles, fluidic_muscles, Fig. 12",
+        spread=(0.03, 0.06),
+    )
+    slew_rate: float = assumed(1e9, "Pa/s", 1e4, 1e9, "not published; no limit", neutral=1e9)
+
+
+@dataclass(frozen=True)
+class BundleRegulator(DelayedEffects):
+    """A closed-loop pressure regulator in the place of the paper's valves."""
+
+    max_pressure: float = published(6e5, "Pa", 1e4, 1.2e6, "largest: chakarov2018, section 2")
+    time_constant: float = assumed(
+        0.05, "s", 0.002, 2.0, "of its class; see regulator.py", spread=(0.035, 0.12)
+    )
+    slew_rate: float = assumed(
+        1.5e6, "Pa/s", 1e4, 1e9, "200 l/min into seven muscles", neutral=1e9, spread=(0.8e6, 3e6)
+    )
+
+
 AIR = parameter_rows(RegulatorEffects)
 """Rows of the effects of valve, supply and line, from the first."""
 AIR_STATE = named_rows("regulated", "opened", "drop", "line", "line_rate")
 """Rows of the state of valve, supply and line, from the first."""
-assert AIR_STATE.line + LINE_STATE.rate == AIR_STATE.line_rate
 
 
 @kernel

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pam_envs.kernels.arithmetic import sine_of_turns
+from pam_envs.kernels.arithmetic import TURN, sine_of_turns
 from pam_envs.kernels.build import kernel, routine
 from pam_envs.kernels.random import uniform
 from pam_envs.references.path import least_jerk
@@ -28,7 +28,6 @@ STREAM = 36
 FIRST_WINDOW = 16
 SHORTEST, LONGEST = 0.4, 0.9
 """Shares of a window that a reach may take."""
-TURN = 6.283185307179586
 
 
 @kernel

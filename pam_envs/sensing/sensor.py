@@ -65,6 +65,17 @@ class PressureSensor(SensorEffects):
     bias: float = effect("Pa", -1e5, 1e5, "zeroed at rest")
 
 
+@dataclass(frozen=True)
+class JointEncoder(SensorEffects):
+    """Angle at a joint."""
+
+    quantity: ClassVar[tuple[str, float]] = ("rad", 0.2)
+
+    noise: float = assumed(5e-4, "rad", 0.0, 0.2, "0.03 degrees RMS, order seen", neutral=0.0)
+    resolution: float = assumed(1.534e-3, "rad", 0.0, 0.1, "encoder of 4096 steps", neutral=0.0)
+    bias: float = effect("rad", -0.5, 0.5, "zeroed when straight")
+
+
 SENSOR = parameter_rows(SensorEffects)
 """Rows of a sensor's effects, from its first."""
 

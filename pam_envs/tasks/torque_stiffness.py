@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pam_envs.kernels.arithmetic import sine_of_turns
+from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import kernel
 from pam_envs.parameters import assumed
 from pam_envs.tasks.rewards import weight
@@ -27,7 +27,6 @@ RANGES = (
     ("softest_wall", "stiffest_wall"),
 )
 """Pairs of parameters that bound the range of an episode's object."""
-PER_TURN = 0.15915494309189535
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,8 @@ def object_torque(kind: float, angle: float, place: float, strength: float) -> f
     stiffness of a wall [N m/rad].
     """
     if kind == WEIGHT:
-        return -strength * sine_of_turns(angle * PER_TURN)
+        sine, _ = sine_and_cosine(angle)
+        return -strength * sine
     if kind == WALL:
         return -strength * max(0.0, angle - place)
     return 0.0

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
+from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.mechanics.knee_lever import (
     KneeLever,
     assistive_torque,
-    half_angle,
     muscle_length,
-    wanted_tension,
+    required_tension,
 )
 
 ANGLES = np.radians(np.linspace(82.0, 178.0, 49))
@@ -54,16 +54,16 @@ def test_knee_kernels_equal_numpy() -> None:
     lever = KneeLever()
     numbers = (lever.arm, lever.stiffness, lever.relaxed_angle)
     for angle in ANGLES:
-        sine, cosine = half_angle(angle)
+        sine, cosine = sine_and_cosine(0.5 * angle)
         length = muscle_length(sine, lever.arm, lever.fittings)
         assert length == pytest.approx(float(lever.length(angle)), abs=1e-15)
         torque = assistive_torque(200.0, cosine, angle, *numbers)
         assert torque == pytest.approx(float(lever.torque(200.0, angle)), abs=1e-12)
-        wanted = wanted_tension(angle, 3.0, *numbers)
+        wanted = required_tension(angle, 3.0, *numbers)
         held = max(0.0, float(lever.tension(3.0, angle)))
         assert wanted == pytest.approx(held, rel=1e-9, abs=1e-12)
 
 
 def test_tension_is_never_negative() -> None:
     lever = KneeLever()
-    assert wanted_tension(math.radians(150.0), -9.0, lever.arm, 30.0, lever.relaxed_angle) == 0.0
+    assert required_tension(math.radians(150.0), -9.0, lever.arm, 30.0, lever.relaxed_angle) == 0.0

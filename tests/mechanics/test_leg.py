@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pam_envs.constants import GRAVITY
+from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.mechanics.leg import (
     Leg,
     centre_of_pressure,
@@ -13,7 +14,6 @@ from pam_envs.mechanics.leg import (
     ground_torque,
     knee_acceleration,
     shank_torque,
-    sine_and_cosine,
 )
 
 H = 1e-4

@@ -7,13 +7,8 @@ import pytest
 
 from pam_envs.constants import GRAVITY
 from pam_envs.identification.gait_tables import STAIRS, tables
-from pam_envs.mechanics.leg import (
-    Leg,
-    ground_torque,
-    knee_acceleration,
-    shank_torque,
-    sine_and_cosine,
-)
+from pam_envs.kernels.arithmetic import sine_and_cosine
+from pam_envs.mechanics.leg import Leg, ground_torque, knee_acceleration, shank_torque
 from pam_envs.references.gait import (
     ACTIVITIES,
     FOLDER,

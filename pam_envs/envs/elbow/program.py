@@ -9,10 +9,10 @@ from typing import Any
 
 from pam_envs.envs.core.step import CHOICE
 from pam_envs.envs.elbow import layout as L
-from pam_envs.kernels.arithmetic import sine_of_turns
+from pam_envs.kernels.arithmetic import PER_TURN, sine_of_turns
 from pam_envs.kernels.build import kernel
 from pam_envs.mechanics.allocation import allocate, stiffness_of, torque_of
-from pam_envs.tasks.torque_stiffness import PER_TURN, object_stiffness, object_torque
+from pam_envs.tasks.torque_stiffness import object_stiffness, object_torque
 
 
 @kernel

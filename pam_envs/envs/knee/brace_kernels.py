@@ -11,9 +11,10 @@ from pam_envs.envs.core.step import CHOICE, PERIOD, copy_rows, write_references
 from pam_envs.envs.knee import brace_layout as L
 from pam_envs.envs.knee.kernels import advance_knee
 from pam_envs.hysteresis.protocol import state_rows
+from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import uniform
-from pam_envs.mechanics.knee_lever import half_angle, muscle_length
+from pam_envs.mechanics.knee_lever import muscle_length
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.step import SENSED, begin_lane, replacements
 from pam_envs.references import trajectory as T
@@ -28,7 +29,7 @@ def read_brace(rows: Any, fixed: Any, counts: Any, work: Any, j: int) -> None:
     tension = sense(rows[SENSED[0]][j], fixed, counts, K.TENSION_NOISE, L.NOISE_T, step, j)
     angle = sense(rows[SENSED[1]][j], fixed, counts, K.ANGLE_NOISE, L.NOISE_A, step, j)
     pressure = sense(rows[SENSED[2]][j], fixed, counts, K.PRESSURE_NOISE, L.NOISE_P, step, j)
-    sine, _ = half_angle(angle)
+    sine, _ = sine_and_cosine(0.5 * angle)
     length = muscle_length(sine, fixed[K.LEVER_ARM][j], fixed[K.LEVER_FITTINGS][j])
     stiffness = tension / max(1e-3, length - fixed[K.SHORTEST_LENGTH][j])
     work[L.INFO.sensor_tension][j] = work[L.SIGNALS][j] = tension

@@ -18,10 +18,10 @@ from pam_envs.envs.knee import gait_layout as L
 from pam_envs.envs.knee.gait_plan import lean, planned_reference, pressure_for, prime
 from pam_envs.envs.knee.kernels import advance_knee
 from pam_envs.hysteresis.protocol import state_rows
+from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import uniform
-from pam_envs.mechanics.knee_lever import wanted_tension as tension_for
-from pam_envs.mechanics.leg import sine_and_cosine
+from pam_envs.mechanics.knee_lever import required_tension as tension_for
 from pam_envs.muscle.emg import activation, excitation, left_of_gap
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.step import SENSED, begin_lane, replacements

@@ -11,9 +11,10 @@ from typing import Any
 from pam_envs.constants import GRAVITY
 from pam_envs.envs.core.step import CHOICE, PERIOD
 from pam_envs.envs.knee import gait_layout as L
+from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import kernel, routine
-from pam_envs.mechanics.knee_lever import wanted_tension as tension_for
-from pam_envs.mechanics.leg import centre_of_pressure, sine_and_cosine
+from pam_envs.mechanics.knee_lever import required_tension as tension_for
+from pam_envs.mechanics.leg import centre_of_pressure
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.references import gait as G
 from pam_envs.references.gait import curve, fraction_of_turn

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel
-from pam_envs.mechanics.leg import sine_and_cosine
 from pam_envs.mechanics.serial_chain.rows import (
     AXIS,
     DIRECTION,

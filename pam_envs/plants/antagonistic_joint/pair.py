@@ -6,8 +6,9 @@ import math
 from typing import Any
 
 from pam_envs.constants import ATMOSPHERE, DENSITY_PER_PRESSURE
+from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel
-from pam_envs.mechanics.antagonistic_lever import sine_and_cosine_of, span, squares
+from pam_envs.mechanics.antagonistic_lever import span, squares
 from pam_envs.muscle.force_map import force_terms, inner_volume
 from pam_envs.plants.antagonistic_joint.rows import (
     AREA,
@@ -78,7 +79,7 @@ def clear_hysteresis_models(
 @kernel
 def lever_of(fixed: Any, j: int, angle: float, side: float) -> tuple[float, float, float]:
     """Return contraction, ``dL/dphi`` [m] and its derivative [m] of the muscle on one side."""
-    sine, cosine = sine_and_cosine_of(angle)
+    sine, cosine = sine_and_cosine(angle)
     total, even, odd = squares(fixed[R_U][j], fixed[R_O][j], fixed[L_U][j], fixed[L_O][j])
     length, rate, curve = span(sine, cosine, side, total, even, odd)
     return 1.0 - (length - fixed[FITTINGS][j]) / fixed[REST_LENGTH][j], rate, curve

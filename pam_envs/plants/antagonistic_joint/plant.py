@@ -34,9 +34,9 @@ from pam_envs.plants.antagonistic_joint import statics as pair_statics
 from pam_envs.plants.antagonistic_joint.hysteresis import JointHysteresis, joint_hysteresis
 from pam_envs.plants.antagonistic_joint.link import Link, NominalPoint
 from pam_envs.plants.core.plant import Plant, effects_of, neutral_of
-from pam_envs.pneumatics.joint_regulator import JointRegulator
-from pam_envs.sensing.joint import JointEncoder
+from pam_envs.pneumatics.regulator import JointRegulator
 from pam_envs.sensing.orthosis import GaugeSensor
+from pam_envs.sensing.sensor import JointEncoder
 
 Dynamics = Literal["muscles", "reduced"]
 Array = NDArray[np.float64]

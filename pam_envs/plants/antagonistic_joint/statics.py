@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.mechanics.antagonistic_lever import SIDES, AntagonisticLever
 from pam_envs.muscle.force_map import ForceMap
-from pam_envs.pneumatics.joint_regulator import JointRegulator
+from pam_envs.pneumatics.regulator import JointRegulator
 
 Array = NDArray[np.float64]
 STEP = 1e-6

@@ -16,10 +16,9 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.hysteresis import protocol
-from pam_envs.kernels.arithmetic import decay
+from pam_envs.kernels.arithmetic import decay, sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.motion import damped_motion
-from pam_envs.mechanics.antagonistic_lever import sine_and_cosine_of
 from pam_envs.mechanics.guide import turn
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.effects import effect_kernels
@@ -107,7 +106,7 @@ def begin_muscles(rows: Any, fixed: Any, j: int) -> None:
 @kernel
 def load_torque(rows: Any, fixed: Any, j: int, angle: float) -> tuple[float, float]:
     """Return the torque [N m] of disturbance, weight and stop, and minus its slope [N m/rad]."""
-    sine, cosine = sine_and_cosine_of(angle)
+    sine, cosine = sine_and_cosine(angle)
     moment = fixed[GRAVITY][j] * (
         fixed[LINK_MASS][j] * fixed[LINK_CENTRE][j] + rows[PAYLOAD][j] * fixed[PAYLOAD_ARM][j]
     )

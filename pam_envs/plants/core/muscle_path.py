@@ -14,7 +14,7 @@ from pam_envs.hysteresis.creep import CreepEffects, begin_creep, creep_step
 from pam_envs.hysteresis.friction_effects import FirstCycles, newness
 from pam_envs.kernels.build import LANES, kernel, scratch
 from pam_envs.kernels.history import N_HISTORY
-from pam_envs.muscle.temperature import TemperatureEffects, temperature_factor
+from pam_envs.muscle.effects import TemperatureEffects, temperature_factor
 from pam_envs.parameters import declarations, parameter_rows, row_blocks
 from pam_envs.pneumatics.air_path import air_step, delay_commands
 from pam_envs.pneumatics.regulator import (

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import kernel
-from pam_envs.mechanics.leg import sine_and_cosine
 from pam_envs.mechanics.pulley import contraction_of
 from pam_envs.muscle.quadratic_bundle import bundle_shape, bundle_volume, grown_volume
 from pam_envs.plants.elbow_orthosis.rows import (

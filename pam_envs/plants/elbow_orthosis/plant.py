@@ -34,8 +34,8 @@ from pam_envs.muscle.quadratic_bundle import QuadraticBundle
 from pam_envs.plants.core.plant import Plant, effects_of, neutral_of
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.hysteresis import ElbowHysteresis, elbow_hysteresis
-from pam_envs.pneumatics.bundle_regulator import BundleRegulator
 from pam_envs.pneumatics.on_off_pair import OnOffValve
+from pam_envs.pneumatics.regulator import BundleRegulator
 from pam_envs.sensing.orthosis import AngleSensor, GaugeSensor
 
 Valves = Literal["proportional", "on_off"]

@@ -13,9 +13,9 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.hysteresis import protocol
+from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.mechanics.guide import turn
-from pam_envs.mechanics.leg import sine_and_cosine
 from pam_envs.mechanics.pulley import stop_torque
 from pam_envs.plants.core.sensors import read_sensors
 from pam_envs.plants.elbow_orthosis import rows as K

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.constants import GRAVITY
+from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import kernel, routine
 from pam_envs.mechanics.leg import (
     centre_of_pressure,
@@ -12,7 +13,6 @@ from pam_envs.mechanics.leg import (
     ground_torque,
     knee_acceleration,
     shank_torque,
-    sine_and_cosine,
 )
 from pam_envs.muscle.emg import activation, excitation, left_of_gap
 from pam_envs.plants.knee_orthosis import rows as K

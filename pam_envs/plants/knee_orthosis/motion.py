@@ -14,11 +14,11 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.constants import ATMOSPHERE, DENSITY_PER_PRESSURE
-from pam_envs.kernels.arithmetic import decay
+from pam_envs.kernels.arithmetic import decay, sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.motion import damped_motion
 from pam_envs.mechanics.guide import turn
-from pam_envs.mechanics.knee_lever import assistive_torque, half_angle, muscle_length
+from pam_envs.mechanics.knee_lever import assistive_torque, muscle_length
 from pam_envs.muscle.gas_spring import gas_volume, spring_tension, stretch_of
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.leg import gait_at, share_muscles, start_muscles
@@ -58,7 +58,7 @@ N_WORK = 6
 @kernel
 def torque_and_slope(fixed: Any, j: int, angle: float, stiffness: float) -> tuple[float, float]:
     """Return the assistive torque [N m] at an angle [rad] and its slope [N m/rad]."""
-    sine, cosine = half_angle(angle)
+    sine, cosine = sine_and_cosine(0.5 * angle)
     arm, spring = fixed[LEVER_ARM][j], fixed[LEVER_STIFFNESS][j]
     stretch = stretch_of(
         muscle_length(sine, arm, fixed[LEVER_FITTINGS][j]), fixed[SHORTEST_LENGTH][j]
@@ -189,7 +189,7 @@ def report_muscle(rows: Any, fixed: Any, j: int, length: float) -> None:
 @kernel
 def report_alone(rows: Any, fixed: Any, j: int, period: float) -> None:
     """Write what can be seen of a brace without a leg."""
-    sine, _ = half_angle(rows[ANGLE][j])
+    sine, _ = sine_and_cosine(0.5 * rows[ANGLE][j])
     report_muscle(
         rows, fixed, j, muscle_length(sine, fixed[LEVER_ARM][j], fixed[LEVER_FITTINGS][j])
     )
@@ -234,7 +234,7 @@ def rest_rig(rows: Any, fixed: Any, gait: Any, j: int) -> None:
     low, high = 0.0, 3.141592653589793
     for _ in range(60):
         angle = 0.5 * (low + high)
-        sine, _ = half_angle(angle)
+        sine, _ = sine_and_cosine(0.5 * angle)
         if (
             muscle_length(sine, fixed[LEVER_ARM][j], fixed[LEVER_FITTINGS][j])
             < fixed[FIXTURE_LENGTH][j]

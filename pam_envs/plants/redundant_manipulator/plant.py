@@ -52,9 +52,9 @@ from pam_envs.plants.antagonistic_joint.plant import (
 )
 from pam_envs.plants.core.plant import Plant, effects_of, neutral_of
 from pam_envs.plants.redundant_manipulator import rows as M
-from pam_envs.pneumatics.joint_regulator import JointRegulator
-from pam_envs.sensing.joint import JointEncoder
+from pam_envs.pneumatics.regulator import JointRegulator
 from pam_envs.sensing.orthosis import GaugeSensor
+from pam_envs.sensing.sensor import JointEncoder
 
 Array = NDArray[np.float64]
 

@@ -14,11 +14,13 @@ from pam_envs.hysteresis.protocol import NUMBERS
 from pam_envs.kernels.history import N_HISTORY
 from pam_envs.mechanics.guide import GuideEffects
 from pam_envs.mechanics.support import MOUNT_STATE, MountEffects, SupportEffects
-from pam_envs.muscle.length_creep import LengthCreepEffects
-from pam_envs.muscle.load_effects import LoadEffects
+from pam_envs.muscle.effects import (
+    LengthCreepEffects,
+    LoadEffects,
+    TemperatureEffects,
+    ViscosityEffects,
+)
 from pam_envs.muscle.strands import StrandEffects
-from pam_envs.muscle.temperature import TemperatureEffects
-from pam_envs.muscle.viscosity import ViscosityEffects
 from pam_envs.parameters import declarations, named_rows, row_blocks
 from pam_envs.pneumatics.regulator import AIR, AIR_STATE
 from pam_envs.sensing.sensor import SENSOR
