@@ -20,7 +20,7 @@ def citation():
     return yaml.safe_load((ROOT / "CITATION.cff").read_text())
 
 
-def test_the_citation_file_is_valid(citation):
+def test_citation_file_is_valid(citation):
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
     jsonschema.validate(citation, SCHEMA)
 
@@ -37,7 +37,7 @@ def test_the_citation_file_is_valid(citation):
         ("licence", "MIT"),
     ],
 )
-def test_a_wrong_field_is_refused(citation, field, value):
+def test_wrong_field_is_refused(citation, field, value):
     wrong = copy.deepcopy(citation)
     wrong[field] = value
     if value is None:

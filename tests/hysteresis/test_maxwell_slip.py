@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +14,6 @@ from pam_envs.hysteresis import MaxwellSlip, PlayOperator
 
 Array = NDArray[np.float64]
 Step = Callable[[float, Array], Array]
-ROOT = Path(__file__).resolve().parents[2]
 BOUND = 4.0
 NEVER_SATURATED = 5.0  # a threshold that inputs within +-BOUND cannot sweep over
 
@@ -57,15 +52,15 @@ def exact(operator: PlayOperator) -> Step:
 
 
 def leaky(operator: PlayOperator) -> Step:
-    """A mutant that forgets 0.1 % a step: the properties below must notice."""
+    """Return a mutant that loses 0.1 % a step, which the properties below must detect."""
     return lambda x, state: operator.step(x, 0.999 * state)[1]
 
 
-# --- the properties, as numbers: 0 where they hold ------------------------------------------------
+# --- errors of the properties ---------------------------------------------------------------------
 
 
 def return_point_error(step: Step, start: Array, history: list[float], part: float) -> float:
-    """Leave the last branch for a part of it, come back, and compare the hysteresis."""
+    """Return the change of the state by an excursion that returns to its turn."""
     before, turn = history[-2:]
     at_turn = run(step, history, start)
     back = run(step, [turn + part * (before - turn), turn], at_turn)
@@ -73,7 +68,7 @@ def return_point_error(step: Step, start: Array, history: list[float], part: flo
 
 
 def wiping_error(step: Step, start: Array, history: list[float]) -> float:
-    """Wipe a history out by an excursion larger than all of it."""
+    """Return the trace that a history leaves after an excursion larger than all of it."""
     largest = max(map(abs, history))
     through = run(step, [largest, -largest, *history, largest], start)
     without = run(step, [largest, -largest, largest], start)
@@ -107,7 +102,7 @@ def test_speed_and_stops_on_the_way_change_nothing(operator, history, splits):
 
 @given(plays())
 @settings(max_examples=20, deadline=None)
-def test_properties_notice_a_leaky_play(operator):
+def test_properties_detect_a_leaky_play(operator):
     step, start = leaky(operator), operator.initial_state()
     history = [3.9, -3.0, 3.5, -2.5, 3.0]
     scale = np.max(np.abs(run(step, history, start)))
@@ -123,7 +118,7 @@ def congruency_gap(
     operator: PlayOperator, step: Step, one: list[float], other: list[float], low: float,
     high: float,
 ) -> float:  # fmt: skip
-    """Return the relative difference of one minor loop met in two histories."""
+    """Return the relative difference of one minor loop in two histories."""
     shapes = []
     for history in (one, other):
         # once round the loop first: a fresh loop may still be closing
@@ -290,35 +285,6 @@ def test_rows_of_steps_have_the_bits_of_a_simulation(operator, rows):
         y, last = operator.simulate(row)
         assert [v.hex() for v in y] == [float(v[i]).hex() for v in stepped]
         assert [v.hex() for v in last] == [v.hex() for v in state[i]]
-
-
-FIXED = """
-import numpy as np
-from pam_envs.hysteresis import MaxwellSlip, PlayOperator
-from pam_envs.kernels.build import COMPILED
-play = PlayOperator((0.1, 0.7, 1.9), (0.3, 0.21, 0.4), 0.17)
-slip = MaxwellSlip(0.13, (0.3, 0.21, 0.4), (0.1, 0.7, 1.9))
-t = np.arange(400)
-x = ((t * 7919) % 1009) / 251.0 - 2.0
-print(COMPILED)
-for model in (play, slip):
-    y, state = model.simulate(x)
-    print(*[float(v).hex() for v in [*y, *state]])
-"""
-
-
-def in_new_process(script: str, compiled: bool) -> list[str]:
-    settings = os.environ | {"PAM_ENVS_COMPILE": str(int(compiled)), "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        [sys.executable, "-c", script], env=settings, capture_output=True, text=True, check=True
-    )
-    return done.stdout.splitlines()
-
-
-def test_compiled_and_plain_python_agree_to_the_bit():
-    compiled, plain = in_new_process(FIXED, True), in_new_process(FIXED, False)
-    assert (compiled[0], plain[0]) == ("True", "False")
-    assert compiled[1:] == plain[1:]
 
 
 # --- errors ---------------------------------------------------------------------------------------

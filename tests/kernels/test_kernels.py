@@ -195,6 +195,19 @@ def _spread(n: int) -> float:
     return total
 
 
+def run(cache: Path, *arguments: str, paths: tuple[Path, ...] = (ROOT,)) -> list[str]:
+    """Return the words that a new Python process with its own cache of machine code prints."""
+    known = os.pathsep.join(map(str, paths))
+    variables = {**os.environ, "PYTHONPATH": known, "PAM_ENVS_CACHE": str(cache)}
+    command = [sys.executable, *arguments]
+    done = subprocess.run(
+        command, env=variables, cwd=ROOT, check=True, capture_output=True, text=True
+    )
+    return done.stdout.split()
+
+
+cached = pytest.mark.skipif(not kernels.COMPILED, reason="nothing is kept on disk")
+
 _KEPT = """
 from pam_envs.kernels.build import build, kernel
 OFFSET = {offset}
@@ -209,38 +222,31 @@ print(build(outer, "kept")(1.0))
 """
 
 
-@pytest.mark.skipif(not kernels.COMPILED, reason="nothing is kept on disk")
-def test_code_on_disk_survives_other_words_and_not_another_value(tmp_path: Path) -> None:
-    cache = tmp_path / "cache"
-    variables = {**os.environ, "PYTHONPATH": str(ROOT), "PAM_ENVS_CACHE": str(cache)}
-    script = tmp_path / "kept.py"
+@cached
+def test_cached_code_depends_on_values_and_not_on_docstrings(tmp_path: Path) -> None:
+    cache, script = tmp_path / "cache", tmp_path / "kept.py"
 
-    def run(**values: object) -> float:
+    def built(**values: object) -> list[str]:
         script.write_text(_KEPT.format(**values))
-        command = [sys.executable, str(script)]
-        done = subprocess.run(command, env=variables, check=True, capture_output=True, text=True)
-        return float(done.stdout)
+        return run(cache, str(script))
 
-    assert run(offset=1.0, docstring="Add the offset.") == 4.0
+    assert built(offset=1.0, docstring="Add the offset.") == ["4.0"]
     before = {p: p.stat().st_mtime_ns for p in cache.iterdir()}
     assert sorted(p.suffix for p in before) == [".nbc", ".nbi"]
-    assert run(offset=1.0, docstring="Return the sum.") == 4.0
+    assert built(offset=1.0, docstring="Return the sum.") == ["4.0"]
     assert {p: p.stat().st_mtime_ns for p in cache.iterdir()} == before
-    assert run(offset=2.0, docstring="Return the sum.") == 6.0
+    assert built(offset=2.0, docstring="Return the sum.") == ["6.0"]
     assert len(list(cache.iterdir())) == 4
 
 
-@pytest.mark.skipif(not kernels.COMPILED, reason="nothing is kept on disk")
-def test_code_on_disk_survives_a_move_of_its_module(tmp_path: Path) -> None:
+@cached
+def test_cached_code_survives_a_move_of_its_module(tmp_path: Path) -> None:
     cache = tmp_path / "cache"
-    places = os.pathsep.join([str(ROOT), str(tmp_path)])
-    variables = {**os.environ, "PYTHONPATH": places, "PAM_ENVS_CACHE": str(cache)}
     source = _KEPT.format(offset=3.0, docstring="Add.").replace("print(build", "made = (build")
     for name in ("before_the_move", "after_the_move"):
         (tmp_path / f"{name}.py").write_text(source)
-        command = [sys.executable, "-c", f"import {name}; print({name}.made)"]
-        done = subprocess.run(command, env=variables, check=True, capture_output=True, text=True)
-        assert float(done.stdout) == 8.0
+        code = f"import {name}; print({name}.made)"
+        assert run(cache, "-c", code, paths=(ROOT, tmp_path)) == ["8.0"]
         (tmp_path / f"{name}.py").unlink()
         assert sorted(p.suffix for p in cache.iterdir()) == [".nbc", ".nbi"]
 
@@ -279,36 +285,22 @@ for name in sys.argv[1:]:
 """
 
 
-@pytest.mark.skipif(not kernels.COMPILED, reason="nothing is kept on disk")
-def test_kernels_that_were_compiled_apart_run_side_by_side(tmp_path: Path) -> None:
-    (tmp_path / "apart.py").write_text(_BUILT_APART)
-    library = str(Path(kernels.__file__).parents[2])  # also where the package is not installed
-    known = os.pathsep.join(filter(None, (library, os.environ.get("PYTHONPATH"))))
-    cache = {"PAM_ENVS_CACHE": str(tmp_path / "cache"), "PYTHONPATH": known}
-    environment = {**os.environ, **cache}
-
-    def run(*names: str) -> list[str]:
-        command = [sys.executable, str(tmp_path / "apart.py"), *names]
-        done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
-        return done.stdout.split()
-
-    one, two = run("one"), run("two")
+@cached
+def test_kernels_compiled_in_separate_processes_run_in_one(tmp_path: Path) -> None:
+    cache, script = tmp_path / "cache", tmp_path / "apart.py"
+    script.write_text(_BUILT_APART)
+    one, two = run(cache, str(script), "one"), run(cache, str(script), "two")
     assert one != two
-    assert run("one", "two") == [*one, *two]
+    assert run(cache, str(script), "one", "two") == [*one, *two]
 
 
-@pytest.mark.skipif(not kernels.COMPILED, reason="nothing is kept on disk")
-def test_one_name_with_other_values_or_on_both_cores_is_another_file(tmp_path: Path) -> None:
+@cached
+def test_other_values_or_parallel_loops_are_cached_in_another_file(tmp_path: Path) -> None:
     code = """
 import tests.kernels.test_kernels as t
 for parallel, offset in ((False, 1), (True, 1), (False, 5)):
     print(t.kernels.build(t._spread, "spread", parallel, OFFSET=offset)(3))
 """
-    variables = {**os.environ, "PYTHONPATH": str(ROOT), "PAM_ENVS_CACHE": str(tmp_path)}
-    command = [sys.executable, "-c", code]
     for _ in range(2):  # compiled, then from the disk
-        done = subprocess.run(
-            command, env=variables, cwd=ROOT, check=True, capture_output=True, text=True
-        )
-        assert done.stdout.split() == ["6.0", "6.0", "18.0"]
+        assert run(tmp_path, "-c", code) == ["6.0", "6.0", "18.0"]
     assert sum(path.suffix == ".nbi" for path in tmp_path.iterdir()) == 3

@@ -1,4 +1,4 @@
-"""Geometry and torque of the brace: virtual work, the inverse, the published nominal point."""
+"""Geometry and torque of the brace: virtual work, inverse, published nominal point."""
 
 from __future__ import annotations
 
@@ -59,9 +59,9 @@ def test_knee_kernels_equal_numpy() -> None:
         assert length == pytest.approx(float(lever.length(angle)), abs=1e-15)
         torque = assistive_torque(200.0, cosine, angle, *numbers)
         assert torque == pytest.approx(float(lever.torque(200.0, angle)), abs=1e-12)
-        wanted = required_tension(angle, 3.0, *numbers)
+        tension = required_tension(angle, 3.0, *numbers)
         held = max(0.0, float(lever.tension(3.0, angle)))
-        assert wanted == pytest.approx(held, rel=1e-9, abs=1e-12)
+        assert tension == pytest.approx(held, rel=1e-9, abs=1e-12)
 
 
 def test_tension_is_never_negative() -> None:

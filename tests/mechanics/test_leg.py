@@ -32,7 +32,7 @@ def rates(of, t: float) -> tuple[float, float]:  # type: ignore[no-untyped-def]
 
 
 def knee_at(t: float, leg: Leg) -> np.ndarray:
-    """A hip that moves evenly, and the knee below it."""
+    """Return the position of the knee below a hip that moves evenly."""
     return np.array([1.2 * t, 0.9]) + leg.thigh * np.array([np.sin(thigh(t)), -np.cos(thigh(t))])
 
 
@@ -59,17 +59,17 @@ def test_full_balance_satisfies_newton_and_euler(t: float) -> None:
         return float(-arm[1] * f[0] + arm[0] * f[1])
 
     spin = -rates(lean, t)[1] * (leg.inertia - leg.mass * leg.centre**2)
-    wanted = spin - moment(knee - centre, joint) - moment(contact - centre, force)
+    expected = spin - moment(knee - centre, joint) - moment(contact - centre, force)
 
     ahead, up = knee_acceleration(thigh(t), *rates(thigh, t), leg.thigh)
     s, c = sine_and_cosine(lean(t))
     made = ground_torque(force[1], force[0], cop, s, c, leg.shank, leg.ankle_height)
     made += shank_torque(s, c, ahead, up, rates(lean, t)[1], leg.mass, leg.centre, leg.inertia)
-    assert made == pytest.approx(wanted, abs=1e-4)
+    assert made == pytest.approx(expected, abs=1e-4)
 
 
 def test_gravity_stiffness_is_the_slope_of_the_shank_torque() -> None:
-    """Flexing by e leans the shank by e more; the torque the shank asks for falls by K e."""
+    """Flexing by e leans the shank by e more; the torque of the shank falls by K e."""
     leg, ahead, up = Leg(), 2.0, -1.5
 
     def torque(angle: float) -> float:

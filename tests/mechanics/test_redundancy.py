@@ -48,7 +48,7 @@ def gradient(angles: np.ndarray, weighted: bool) -> np.ndarray:
 
 
 def free_direction(angles: np.ndarray, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the change of angles that leaves the pose, and an orthonormal basis of the rest."""
+    """Return the change of angles that keeps the pose, and an orthonormal basis of the rest."""
     sides = np.linalg.svd(pose[None, 3:])[2][1:]
     jacobian = ARM.jacobian(angles)
     rows = np.vstack([jacobian[:3], sides @ jacobian[3:]])
@@ -66,7 +66,7 @@ def back_on_pose(angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("weighted", [True, False])
 def test_solution_is_a_minimum_on_the_pose(weighted: bool) -> None:
-    """No slope along the joint motion that leaves the pose, and more weight to either side."""
+    """No slope along the joint motion that keeps the pose, and more weight to either side."""
     poses = ARM.pose(joint_line(START, END, 9))
     found = resolve(ARM, poses, weighted=weighted, start=START)
     for angles, pose in zip(found.angles, poses, strict=True):
@@ -99,7 +99,7 @@ def test_iteration_leaves_a_nearby_saddle(start: tuple[float, ...]) -> None:
 
 
 def test_multipliers_are_those_of_the_lagrangian() -> None:
-    """They are the weight's slope over a change of the pose wanted."""
+    """They are the slope of the weight over a change of the desired pose."""
     pose = ARM.pose(END)
     found = resolve(ARM, pose[None], start=END)
     for i in range(3):
@@ -162,7 +162,7 @@ def test_equations_are_solved_with_row_exchange() -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_saddle_is_distinguished_from_a_minimum(sign: float) -> None:
-    """Of a form that is negative where the constraint holds it, and ``sign`` where it does not."""
+    """Of a form that is negative along constrained directions, and ``sign`` along the free one."""
     rng = np.random.default_rng(1)
     basis = np.linalg.qr(rng.normal(size=(6, 6)))[0]
     form = basis @ np.diag([-3.0, -1.0, -2.0, -5.0, -1.0, sign]) @ basis.T
@@ -234,7 +234,7 @@ def test_chain_with_more_redundant_joints_is_solved(monkeypatch: pytest.MonkeyPa
     np.testing.assert_allclose(free @ gradient(found, True), 0.0, atol=1e-9)
 
 
-# --- answers to what cannot be ------------------------------------------------------------------
+# --- refusals -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -166,25 +166,24 @@ def states(chain: SerialChain, lanes: int = LANES) -> tuple[np.ndarray, np.ndarr
     return rows, fixed, np.zeros((work_rows(chain.stages), lanes))
 
 
-def plain(function: Any, chain: SerialChain, *arrays: np.ndarray, lanes: int = LANES) -> Any:
+def plain(
+    function: Any,
+    chain: SerialChain,
+    *arrays: np.ndarray,
+    lanes: int = LANES,
+    starts: tuple[int, ...] = (),
+) -> Any:
     """Call a kernel with lists, uncompiled, and return its scratch."""
     lists = [array.tolist() for array in arrays]
     names = {"N_STAGES": chain.stages, "LANES": lanes}
-    interpreted(function, names)(*lists)
+    interpreted(function, names)(*lists, *starts)
     return np.array(lists[-1])
 
 
 @CHAINS
 def test_chain_kernels_equal_numpy_kinematics(chain: SerialChain) -> None:
-    rows, fixed, work = states(chain)
-
-    def placed(*arrays: Any) -> None:
-        interpreted(place_chain, {"N_STAGES": chain.stages, "LANES": LANES})(*arrays, 0, 0, 0)
-
-    lists = [array.tolist() for array in (rows, fixed, work)]
-    placed(*lists)
-    got = np.array(lists[-1])
-    n = chain.stages
+    rows, n = states(chain)[0], chain.stages
+    got = plain(place_chain, chain, *states(chain), starts=(0, 0, 0))
     where = [*range(tip_row(n), tip_row(n) + 3), *range(pointing_row(n), pointing_row(n) + 3)]
     np.testing.assert_allclose(got[where].T, chain.pose(rows[:n].T), atol=1e-14)
 
@@ -193,11 +192,7 @@ def test_chain_kernels_equal_numpy_kinematics(chain: SerialChain) -> None:
 def test_chain_kernels_equal_numpy_dynamics(chain: SerialChain) -> None:
     rows, fixed, work = states(chain)
     n = chain.stages
-
-    lists = [array.tolist() for array in (rows, fixed, work)]
-    names = {"N_STAGES": n, "LANES": LANES}
-    interpreted(chain_terms, names)(*lists, 0, n, 2 * n, 0, 0)
-    got = np.array(lists[-1])
+    got = plain(chain_terms, chain, rows, fixed, work, starts=(0, n, 2 * n, 0, 0))
     for j in range(LANES):
         q, v, payload = rows[:n, j], rows[n : 2 * n, j], float(rows[2 * n, j])
         np.testing.assert_allclose(got[:n, j], chain.bias(q, v, payload), atol=1e-13)
@@ -262,7 +257,7 @@ def test_row_counts_match_their_declarations() -> None:
     assert work_rows(6) > max(tip_row(6) + 3, pointing_row(6) + 3)
 
 
-# --- answers to bad input -----------------------------------------------------------------------
+# --- refusals -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ LAWS = (ForceMap(), ForceMap(stretch=paper_stretch()))
 CONTRACTIONS = np.linspace(-0.02, 0.25, 28)
 
 
-def test_the_law_meets_the_measured_map() -> None:
+def test_law_meets_the_measured_map() -> None:
     data = measured_map()
     assert len(data.force) == 85 and data.force.max() == pytest.approx(542.5)
     errors = data.residuals(ForceMap())
@@ -23,7 +23,7 @@ def test_the_law_meets_the_measured_map() -> None:
     assert np.abs(errors[data.pressure > 1.5e5]).max() < 2.5
 
 
-def test_its_numbers_are_the_least_squares_fit() -> None:
+def test_defaults_are_the_least_squares_fit() -> None:
     start = dataclasses.replace(
         ForceMap(), **{name: 0.8 * getattr(ForceMap(), name) for name in FITTED}
     )
@@ -33,7 +33,7 @@ def test_its_numbers_are_the_least_squares_fit() -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_the_inverse_is_exact(law: ForceMap) -> None:
+def test_inverse_is_exact(law: ForceMap) -> None:
     forces = np.linspace(0.0, 400.0, 9)[:, None]
     pressures = law.pressure(forces, CONTRACTIONS)
     assert law.law(pressures, CONTRACTIONS) == pytest.approx(
@@ -42,7 +42,7 @@ def test_the_inverse_is_exact(law: ForceMap) -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_the_force_rises_with_pressure_and_falls_with_contraction(law: ForceMap) -> None:
+def test_force_rises_with_pressure_and_falls_with_contraction(law: ForceMap) -> None:
     pressures = np.linspace(0.0, FULL_PRESSURE, 14)[:, None]
     values = law.law(pressures, CONTRACTIONS)
     assert np.all(np.diff(values, axis=0) > 0.0)
@@ -50,7 +50,7 @@ def test_the_force_rises_with_pressure_and_falls_with_contraction(law: ForceMap)
     assert np.all(law.force(pressures, CONTRACTIONS) >= 0.0)
 
 
-def test_the_presets_end_where_they_should() -> None:
+def test_force_ends_at_the_published_contraction() -> None:
     assert ForceMap().longest_contraction() == pytest.approx(0.209, abs=1e-3)
     stretched = ForceMap(stretch=paper_stretch())
     assert stretched.longest_contraction() == pytest.approx(0.25, abs=1e-9)
@@ -58,7 +58,7 @@ def test_the_presets_end_where_they_should() -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_the_pressure_does_its_work_on_the_volume(law: ForceMap) -> None:
+def test_volume_satisfies_virtual_work(law: ForceMap) -> None:
     """The share of the force that is proportional to the pressure is -dV/dL."""
     h = 1e-6
     slope = (law.volume(CONTRACTIONS + h) - law.volume(CONTRACTIONS - h)) / (2 * h)
@@ -66,7 +66,7 @@ def test_the_pressure_does_its_work_on_the_volume(law: ForceMap) -> None:
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_the_kernel_is_the_law(law: ForceMap) -> None:
+def test_force_map_kernel_equals_numpy(law: ForceMap) -> None:
     numbers = (law.area, law.taper, law.threshold, law.braid_force, law.braid_strain, law.stiffness)
     for x in CONTRACTIONS:
         area, passive, less, more = force_terms(float(x), *numbers, 1.0 / law.stretch)

@@ -22,23 +22,23 @@ def bundle(muscles: float) -> QuadraticBundle:
 
 
 def printed(muscles: float) -> QuadraticBundle:
-    """The bundle with k1 as printed, -21 per kPa, which no plant may have."""
+    """Return the bundle with k1 as printed, -21 per kPa, which no plant may have."""
     return dataclasses.replace(bundle(muscles), pressure_base=-0.021, largest_contraction=0.33)
 
 
-def test_the_factors_are_those_of_equation_6_as_read() -> None:
+def test_factors_equal_equation_6_as_read() -> None:
     for n in NUMBERS:
         assert bundle(n).passive_factor == pytest.approx(-39.0 + 321.0 * n)
         assert 1e3 * bundle(n).pressure_factor == pytest.approx(-0.21 + 4.41 * n)
 
 
-def test_k1_as_printed_lets_up_to_four_muscles_push() -> None:
+def test_k1_as_printed_makes_up_to_four_muscles_push() -> None:
     forces = [float(printed(n).law(4e5, 0.0)) for n in NUMBERS]
     assert forces[:4] == pytest.approx([-319.0, -214.0, -110.0, -5.0], abs=0.5)
     assert min(forces[4:]) > 0.0
 
 
-def test_the_force_grows_with_the_number_of_muscles() -> None:
+def test_force_grows_with_the_number_of_muscles() -> None:
     """REPRODUCTION's values with 33 % of largest contraction; linear, as the paper says."""
     read = [float(dataclasses.replace(bundle(n), largest_contraction=0.33).law(4e5, 0.0))
             for n in NUMBERS]  # fmt: skip
@@ -46,7 +46,7 @@ def test_the_force_grows_with_the_number_of_muscles() -> None:
     assert np.diff(read, 2) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_the_sign_changes_at_28_per_cent() -> None:
+def test_filling_lowers_the_force_beyond_28_percent_contraction() -> None:
     """The change of force by filling to 500 kPa, at the contractions of Fig. 2."""
     muscle = bundle(1.0)
     contraction = 0.39 * np.array([0.08, 0.13, 0.19, 0.24, 0.28, 0.32])
@@ -62,7 +62,7 @@ def test_the_sign_changes_at_28_per_cent() -> None:
 
 
 @pytest.mark.parametrize("muscles", NUMBERS)
-def test_the_slope_is_a_finite_difference(muscles: float) -> None:
+def test_stiffness_is_the_slope_of_the_force(muscles: float) -> None:
     made, h = bundle(muscles), 1e-5
     c = np.linspace(0.0, 0.12, 13)
     slope = (made.law(3e5, c + h) - made.law(3e5, c - h)) / (2.0 * h)
@@ -70,16 +70,16 @@ def test_the_slope_is_a_finite_difference(muscles: float) -> None:
 
 
 @pytest.mark.parametrize("muscles", NUMBERS)
-def test_the_volume_does_the_pressures_work(muscles: float) -> None:
-    """dV/dC is the force over the pressure, less what the empty muscle pulls."""
+def test_bundle_volume_satisfies_virtual_work(muscles: float) -> None:
+    """dV/dC is the force over the pressure, less the force of the empty muscle."""
     made, h = bundle(muscles), 1e-5
     c = np.linspace(0.0, 0.12, 13)
     rise = (made.volume(c + h) - made.volume(c - h)) / (2.0 * h)
     assert 2e5 * rise == pytest.approx(made.law(2e5, c) - made.law(0.0, c), rel=1e-6, abs=1e-6)
 
 
-def test_the_volume_is_near_that_of_an_ideal_braid() -> None:
-    """Threads of constant length on a cylinder: the fit's volume strays by a few per cent."""
+def test_volume_is_near_that_of_an_ideal_braid() -> None:
+    """Threads of constant length on a cylinder: the fit deviates by a few per cent."""
     made = dataclasses.replace(bundle(1.0), line_volume=0.0)
     cosine = np.sqrt(1.0 / 3.0) / (1.0 - made.largest_contraction)
     c = np.linspace(0.0, made.reach, 9)
@@ -89,12 +89,12 @@ def test_the_volume_is_near_that_of_an_ideal_braid() -> None:
     assert made.volume(c) == pytest.approx(ideal, rel=0.04)
 
 
-def test_the_inverse_in_pressure_is_exact() -> None:
+def test_inverse_in_pressure_is_exact() -> None:
     made, p = bundle(3.0), np.linspace(0.0, 6e5, 7)
     assert made.pressure(made.factor(p)) == pytest.approx(p, abs=1e-6)
 
 
-def test_the_kernels_are_the_numpy_face() -> None:
+def test_bundle_kernels_equal_numpy() -> None:
     made = bundle(4.0)
     for c in (0.0, 0.03, 0.11):
         shape, slope = bundle_shape(c, made.nominal_length, made.reach)

@@ -1,4 +1,4 @@
-"""The published frequency response in modes."""
+"""Modes of the published frequency response."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ def rational(s: complex) -> complex:
     return top / bottom
 
 
-def test_the_gain_at_rest_is_published() -> None:
+def test_static_gain_is_the_published_one() -> None:
     assert gain_at_rest() == pytest.approx(0.7398, abs=1e-4)
     assert rational(0j).real == pytest.approx(gain_at_rest())
 
 
-def test_the_modes_are_the_frequency_response() -> None:
+def test_modes_equal_the_frequency_response() -> None:
     for omega in (0.0, 0.63, 3.0, 6.3, 12.6, 60.0):
         s = 1j * omega
         total = 0j
@@ -45,13 +45,13 @@ def test_the_modes_are_the_frequency_response() -> None:
         assert total == pytest.approx(rational(s) / gain_at_rest(), abs=1e-9)
 
 
-def test_published_phases() -> None:
+def test_phases_equal_the_published_ones() -> None:
     for frequency, phase in ((0.1, -10.6), (0.5, -55.8), (1.0, -105.4), (2.0, -163.8)):
         value = rational(2j * np.pi * frequency)
         assert np.degrees(np.angle(value)) == pytest.approx(phase, abs=0.1)
 
 
-def test_the_steps_are_exact() -> None:
+def test_steps_are_exact() -> None:
     """Steps of two lengths under held set-points, against a cascade integrated numerically."""
     rows = mode_rows()
     rates, gains = np.array(rows[:REAL_MODES]), rows[REAL_MODES : 2 * REAL_MODES]

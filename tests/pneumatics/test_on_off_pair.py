@@ -1,4 +1,4 @@
-"""On/off valves: when they are open, what passes, and the air that is kept."""
+"""On/off valves: opening times, mass flow, pressures of the chamber."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SUPPLY = VALVE.supply_pressure + ATMOSPHERE
 
 
 def opened(widths: list[float], h: float, gap: float = 0.05) -> list[tuple[float, float]]:
-    """Intervals of an open valve [s]: starts and ends, pulses of ``widths`` every ``gap`` s."""
+    """Return starts and ends [s] of an open valve, pulses of ``widths`` every ``gap`` s."""
     left, lift, state, spans = 0.0, 0.0, 0.0, list[tuple[float, float]]()
     steps = round(gap / h)
     for k in range(len(widths) * steps):
@@ -37,25 +37,25 @@ def opened(widths: list[float], h: float, gap: float = 0.05) -> list[tuple[float
 
 @pytest.mark.parametrize("h", [2.5e-3, 1e-3, 3.3e-4])
 @pytest.mark.parametrize("width", [0.0071, 0.012, 0.03])
-def test_a_valve_opens_5_ms_late_and_closes_4_ms_late(width: float, h: float) -> None:
+def test_valve_opens_5_ms_late_and_closes_4_ms_late(width: float, h: float) -> None:
     spans = opened([width], h)
     assert len(spans) == 1
     assert spans[0] == pytest.approx((5e-3, width + 4e-3), abs=1e-9)
 
 
 @pytest.mark.parametrize("h", [5e-3, 2.5e-3, 1e-3])
-def test_a_pulse_shorter_than_the_opening_time_opens_nothing(h: float) -> None:
+def test_pulse_shorter_than_the_opening_time_does_not_open_the_valve(h: float) -> None:
     assert opened([4.9e-3, 4.9e-3], h) == []
 
 
 @pytest.mark.parametrize("h", [2.5e-3, 1e-3])
-def test_pulses_that_touch_keep_the_valve_open(h: float) -> None:
+def test_contiguous_pulses_keep_the_valve_open(h: float) -> None:
     assert opened([0.05, 0.05, 0.02], h) == [pytest.approx((5e-3, 0.124), abs=1e-9)]
     two = opened([0.048, 0.02], h)
     assert two == [pytest.approx((5e-3, 0.074), abs=1e-9)]
 
 
-def test_the_time_open_is_the_same_for_every_step() -> None:
+def test_open_time_does_not_depend_on_the_step() -> None:
     def total(h: float) -> float:
         state, time = (0.0231, 0.0, 0.0), 0.0
         for _ in range(round(0.05 / h)):
@@ -67,7 +67,7 @@ def test_the_time_open_is_the_same_for_every_step() -> None:
         assert total(h) == pytest.approx(0.0231 - 1e-3, abs=1e-12)
 
 
-def test_the_flow_is_that_of_iso_6358() -> None:
+def test_flow_follows_iso_6358() -> None:
     c, b = VALVE.conductance, VALVE.critical_ratio
     choked = c * REFERENCE_DENSITY * SUPPLY
     for ratio in (0.0, 0.05, b):
@@ -78,7 +78,7 @@ def test_the_flow_is_that_of_iso_6358() -> None:
     assert mass_flow(SUPPLY, middle * SUPPLY, c, b) == pytest.approx(0.8 * choked, rel=1e-12)
 
 
-def test_the_catalogues_flow_figure_is_met() -> None:
+def test_flow_equals_the_catalogue_figure() -> None:
     """8.4 l/min (ANR) from 0.6 to 0.5 MPa gauge: both printed beside C and b."""
     passed = mass_flow(7e5, 6e5, VALVE.conductance, VALVE.critical_ratio)
     assert 6e4 * passed / REFERENCE_DENSITY == pytest.approx(8.4, abs=0.1)
@@ -86,7 +86,7 @@ def test_the_catalogues_flow_figure_is_met() -> None:
 
 @pytest.mark.parametrize("muscles", [1, 7])
 @pytest.mark.parametrize("fills", [True, False])
-def test_a_long_opening_follows_a_fine_solution(muscles: int, fills: bool) -> None:
+def test_long_opening_follows_a_fine_solution(muscles: int, fills: bool) -> None:
     """Steps of 2.5 ms through choked and sub-sonic flow, up to the end of the flow."""
     volume, h = 3e-5 * muscles, 2.5e-3
     per_volume, c, b = PRESSURE_PER_DENSITY / volume, VALVE.conductance, VALVE.critical_ratio
@@ -114,7 +114,7 @@ def test_a_long_opening_follows_a_fine_solution(muscles: int, fills: bool) -> No
     assert mass * per_volume == pytest.approx(SUPPLY if fills else ATMOSPHERE, abs=1e-6)
 
 
-def test_no_opening_leaves_the_supply_or_the_atmosphere_behind() -> None:
+def test_pressure_stays_between_atmosphere_and_supply() -> None:
     per_volume = PRESSURE_PER_DENSITY / 3e-5
     for duration in (1e-3, 1.0, 50.0):
         full = SUPPLY / per_volume
@@ -124,7 +124,7 @@ def test_no_opening_leaves_the_supply_or_the_atmosphere_behind() -> None:
     assert filled(1.1 * SUPPLY / per_volume, per_volume, SUPPLY, 1e-8, 0.1, 1.0) == 0.0
 
 
-def test_a_choked_chamber_empties_exponentially() -> None:
+def test_choked_chamber_empties_exponentially() -> None:
     per_volume, h = PRESSURE_PER_DENSITY / 2e-4, 2.5e-3
     mass = start = 12e5 / per_volume
     for _ in range(80):

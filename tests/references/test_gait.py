@@ -1,4 +1,4 @@
-"""Strides: periodic, smooth, and the measured one against its inverse dynamics."""
+"""Strides: periodic, smooth, and consistent with the measured inverse dynamics."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ def test_gait_kernels_equal_numpy(activity: str) -> None:
             three = curve_and_rates(table, signal, phase)
             assert curve(table, signal, phase) == three[0]
             for derivative in range(3):
-                wanted = gait_curves(activity, phase, derivative)[name]
-                assert three[derivative] == pytest.approx(float(wanted), rel=1e-9, abs=1e-9)
+                expected = float(gait_curves(activity, phase, derivative)[name])
+                assert three[derivative] == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
 def test_phase_is_taken_modulo_one() -> None:

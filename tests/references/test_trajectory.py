@@ -1,4 +1,4 @@
-"""References: seeded, within range, previewed as they come."""
+"""References: seeded, within range, with exact previews."""
 
 from __future__ import annotations
 
@@ -56,12 +56,12 @@ def test_each_family_has_its_characteristic_shape() -> None:
 def test_preview_equals_the_future_reference(preview: int, stride: int) -> None:
     env = gym.make(NAME, preview=preview, preview_stride=stride, reference="mixed", normalize=False)
     observation, info = env.reset(seed=5)
-    seen, promised = [info["reference"]], [observation[4:]]
+    seen, previews = [info["reference"]], [observation[4:]]
     for _ in range(400):
         observation, _, _, _, info = env.step(np.zeros(1, np.float32))
         seen.append(info["reference"])
-        promised.append(observation[4:])
-    for k, future in enumerate(promised):
+        previews.append(observation[4:])
+    for k, future in enumerate(previews):
         for i, value in enumerate(future):
             if k + i * stride < len(seen):
                 assert value == np.float32(seen[k + i * stride])
