@@ -14,7 +14,6 @@ from pam_envs.diagnosis.fit.blocks import Blocks
 from pam_envs.diagnosis.fit.candidate import Candidate, fit_base
 from pam_envs.diagnosis.fit.least_squares import Fit, Free, Problem, column_of, evaluate, improve
 from pam_envs.diagnosis.fit.single_muscle import MuscleFamily
-from pam_envs.hysteresis.elements import move_plays, simulate_plays
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 
 PRESSURE = ("regulator.gain", "regulator.time_constant")
@@ -76,13 +75,8 @@ def _regulator(problem: Problem, family: MuscleFamily) -> Fit:
 
 def play_gaps(pressure: Array, thresholds: tuple[float, ...]) -> Array:
     """Return pressure minus the output of each play operator, shape (plays, T), initially at 0."""
-    gaps = np.empty((len(thresholds), len(pressure)))
-    for k, threshold in enumerate(thresholds):
-        output = np.empty(len(pressure))
-        state = move_plays(np.zeros(1), (threshold,), np.zeros((1, 1))).T.copy()
-        simulate_plays(pressure, state, np.array([threshold]), np.array([1.0]), 0.0, output)
-        gaps[k] = pressure - output
-    return gaps
+    outputs = [PlayOperator((size,), (1.0,), 0.0).simulate(pressure)[0] for size in thresholds]
+    return pressure - np.reshape(outputs, (len(thresholds), len(pressure)))
 
 
 def balance(family: MuscleFamily, contraction: Array, pressure: Array) -> dict[str, float]:
