@@ -1,4 +1,4 @@
-"""Keyword arguments that all environments share: checks, and conversion to numbers."""
+"""Keyword arguments of environments: the common ones, their checks, and the two classes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import dataclasses
 import difflib
 import functools
 import inspect
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,8 +15,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.envs.core.plant_env import PlantEnv
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, check_whole
 from pam_envs.envs.core.step import MOST_PREVIEW
+from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.hysteresis.protocol import kinds, model_of
 from pam_envs.parameters import check, declarations
 
@@ -26,24 +29,16 @@ RENDER_MODES = (None, "rgb_array", "human")
 
 @dataclass(frozen=True)
 class Randomisation:
-    """Parameters of a family that ``randomize`` may draw.
-
-    Attributes
-    ----------
-    parameters : sequence of str
-        Parameters of the plant in the order of the kernels' rows.
-    fixed : sequence of str
-        Those that cannot be drawn: they scale the action or enter derived numbers.
-    example : str
-        A valid mapping, for the error message.
-    corner : mapping of callable
-        ``min`` or ``max``: the end of a range at which the motion is fastest or a limit nearest.
-    """
+    """Parameters of a family that ``randomize`` may draw."""
 
     parameters: Sequence[str]
+    """Parameters of the plant in the order of the kernels' rows."""
     fixed: Sequence[str]
+    """Those that cannot be drawn: they scale the action or enter derived numbers."""
     example: str
+    """A valid mapping, for the error message."""
     corner: Mapping[str, Callable[..., float]] = field(default_factory=dict)
+    """``min`` or ``max``: the end of a range at which the motion is fastest or a limit nearest."""
 
 
 @dataclass(frozen=True)
@@ -96,15 +91,7 @@ class Common:
         check_number("episode_seconds", self.episode_seconds, 0.02, 3600.0, "s")
 
     def plant_of(self, kind: type[T], default: Callable[[Any], T]) -> T:
-        """Return the plant that ``plant`` and ``hysteresis`` name.
-
-        Parameters
-        ----------
-        kind : type
-            Class of the plants.
-        default : callable
-            Returns the default plant with a hysteresis model.
-        """
+        """Return the plant that ``plant`` and ``hysteresis`` name; default: of a hysteresis."""
         plant, hysteresis = self.plant, self.hysteresis
         if hysteresis is not None:
             check_choice("hysteresis", hysteresis, kinds())
@@ -134,24 +121,10 @@ class Common:
         largest: float | Sequence[float],
         channels: int = 1,
     ) -> tuple[int, NDArray[np.float64]]:
-        """Return the number of the reference's family, and its samples if it is given as samples.
+        """Return the number of the reference's family, and samples of shape (channels, n).
 
-        Parameters
-        ----------
-        families : sequence of str
-            Known families; ``len(families)`` is the number of given samples, shape (n,) or
-            (n, channels).
-        unit : str
-            Of the samples; of several channels, separated by commas.
-        largest : float or sequence of float
-            Largest magnitude of a sample, of each channel.
-        channels : int
-            References that are tracked at once.
-
-        Returns
-        -------
-        family : int
-        samples : ndarray, shape (channels, n)
+        ``len(families)`` is the number of given samples, shape (n,) or (n, channels), each of at
+        most ``largest`` in magnitude; units of several channels are separated by commas.
         """
         reference = self.reference
         if isinstance(reference, str):
@@ -197,13 +170,7 @@ class Common:
         return task  # type: ignore[no-any-return]
 
     def spread_of(self, plant: Any, which: Randomisation) -> NDArray[np.float64]:
-        """Return (row, low, high) of each parameter that every episode draws.
-
-        Raises
-        ------
-        ValueError
-            If a parameter cannot be drawn, or a range is out of bounds or cannot be simulated.
-        """
+        """Return (row, low, high) of each parameter that every episode draws, checked."""
         names, corner = list(which.parameters), which.corner
         ranges = self._ranges(plant, which)
         allowed = tuple(name for name in names if name not in which.fixed)
@@ -215,9 +182,9 @@ class Common:
                     + ", ".join(allowed)
                 )
             if (
-                not isinstance(span, (Sequence, np.ndarray))
+                isinstance(span, str)
+                or not isinstance(span, (Sequence, np.ndarray))
                 or len(span) != 2
-                or isinstance(span, str)
             ):
                 raise ValueError(f"randomize: {name} needs (low, high), got {span!r}")
             low, high = (check_number(f"randomize: {name}", v, -1e12, 1e12, "") for v in span)
@@ -264,53 +231,52 @@ def environment_arguments(
     argument, its value, the bounds and the remedy.
     """
     defaults = Common(reference, preview, preview_stride, episode_seconds)
+    word = inspect.Parameter.KEYWORD_ONLY
+    shared = [
+        inspect.Parameter(f.name, word, default=getattr(defaults, f.name))
+        for f in dataclasses.fields(Common)
+    ]
 
     def decorate(make: Callable[..., Setup]) -> Callable[..., Setup]:
-        signature = inspect.signature(make)
-        own = list(signature.parameters.values())[1:]
-        shared = [
-            inspect.Parameter(f.name, inspect.Parameter.KEYWORD_ONLY, default=value)
-            for f in dataclasses.fields(Common)
-            for value in (getattr(defaults, f.name),)
-        ]
+        own = list(inspect.signature(make).parameters.values())[1:]
         fixed = [p for p in own if p.default is p.empty]
-        known = [p.name for p in shared] + [p.name for p in own if p.default is not p.empty]
+        keywords = [*shared, *(p.replace(kind=word) for p in own if p.default is not p.empty)]
+        known = [p.name for p in keywords]
 
         @functools.wraps(make)
         def made(*given: Any, **arguments: Any) -> Setup:
-            for name in arguments:
-                if name not in known and name not in signature.parameters:
-                    close = difflib.get_close_matches(name, known, n=1)
-                    hint = f", but {close[0]!r}" if close else ""
-                    raise TypeError(
-                        f"there is no argument {name!r}{hint}; the arguments are {', '.join(known)}"
-                    )
-            names = {p.name for p in shared} & set(arguments)
-            common = dataclasses.replace(defaults, **{n: arguments.pop(n) for n in names})
-            return make(common, *given, **arguments)
+            for name in set(arguments) - {*known, *(p.name for p in fixed)}:
+                close = difflib.get_close_matches(name, known, n=1)
+                hint = f", but {close[0]!r}" if close else ""
+                raise TypeError(
+                    f"there is no argument {name!r}{hint}; the arguments are {', '.join(known)}"
+                )
+            common = {p.name: arguments.pop(p.name) for p in shared if p.name in arguments}
+            return make(dataclasses.replace(defaults, **common), *given, **arguments)
 
-        keywords = [p.replace(kind=p.KEYWORD_ONLY) for p in own if p.default is not p.empty]
-        made.__signature__ = inspect.Signature([*fixed, *shared, *keywords])  # type: ignore[attr-defined]
+        made.__signature__ = inspect.Signature([*fixed, *keywords])  # type: ignore[attr-defined]
         return made
 
     return decorate
 
 
-def payloads_of(payload: Any, most: float) -> NDArray[np.float64]:
-    """Return the payloads [kg] from which episodes draw, shape (1, n).
+def environments(name: str, make_setup: Callable[..., Setup], *fixed: Any) -> tuple[Any, Any]:
+    """Return the classes ``NameEnv`` and ``NameVectorEnv``, whose page is that of the module.
 
-    Parameters
-    ----------
-    payload : float, sequence of float or None
-        As given by the user; None: any up to ``most``.
-    most : float
-        Largest payload [kg].
+    ``fixed`` are the first arguments of ``make_setup``, which the id of the environment fixes.
     """
-    if payload is None:
-        return np.array([np.linspace(0.0, most, 6)])
-    given = payload if isinstance(payload, (Sequence, np.ndarray)) else [payload]
-    if isinstance(payload, str) or not len(given):
-        raise ValueError(
-            f"payload = {payload!r} must be a mass [kg], several of them, or None for any"
-        )
-    return np.array([[check_number("payload", mass, 0.0, most, "kg") for mass in given]])
+    module = make_setup.__module__
+    scope = {"__module__": module, "__doc__": sys.modules[module].__doc__}
+    made = functools.partial(make_setup, *fixed)
+    single = type(f"{name}Env", (PlantEnv,), dict(scope), make_setup=made)
+    return single, type(f"{name}VectorEnv", (PlantVectorEnv,), dict(scope), make_setup=made)
+
+
+def masses_of(name: str, given: Any, most: float, default: Sequence[float]) -> NDArray[np.float64]:
+    """Return the masses [kg] from which episodes draw, shape (1, n); None: the default ones."""
+    masses = default if given is None else given
+    if not isinstance(masses, (Sequence, np.ndarray)):
+        masses = [masses]
+    if isinstance(masses, str) or len(masses) == 0:
+        raise ValueError(f"{name} = {given!r} must be a mass [kg], several of them, or None")
+    return np.array([[check_number(name, mass, 0.0, most, "kg") for mass in masses]])

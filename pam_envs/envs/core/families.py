@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from pam_envs.envs.core.kernels import advance_plant, trajectory_at
 from pam_envs.envs.core.layout import Report, indices
 from pam_envs.envs.core.step import MOST_PREVIEW, N_SEED, do_nothing, step_by_address, step_tiles
 from pam_envs.kernels.build import LANES, build, interpreted
@@ -21,54 +22,51 @@ class Kernels:
 
     Attributes
     ----------
-    name : str
-        Name of the machine code on disk: the family and the key.
+    family : str
+        Name, also of the machine code on disk.
     maker, key : callable, tuple
         ``maker(*key)`` returns these kernels again: machine code is not pickled.
     report : Report
-        Entries of ``info``, in the order in which ``evaluate`` writes them.
-    advance : kernel
-        Advances the plant by a control period.
-    reference : kernel
-        Returns a reference at a control period.
+        Entries of ``info`` and signals of the observation.
     evaluate : kernel
-        Writes report and observation.
+        Writes what is computed of both.
     begin : routine
         Starts an episode.
-    apply : kernel
-        Applies actions and disturbances at the start of a control period; default: nothing.
-    config, choices : named tuple of int
-        Index of each of the family's own numbers and whole numbers in the configuration.
-    placeholders : mapping
-        Values of further global names in the call graph, such as those of the plant's kernels.
     rows, parameters, counts : int
         Rows of the state, of the parameters, and of the integers without those of the seed.
-    signals : int
-        Signals of an observation without its references and their previews, at most.
     set_points, old_set_points : int
         First row of the set-points, and of those of the previous period.
     channels : int
         References that are tracked at once.
+    config, choices : named tuple of int
+        Index of each of the family's own numbers and whole numbers in the configuration.
+    apply : kernel
+        Applies actions and disturbances at the start of a control period; default: nothing.
+    advance : kernel
+        Advances the plant by a control period; default: by the placeholder ``plant_advance``.
+    reference : kernel
+        Returns a reference at a control period; default: a drawn trajectory, or given samples.
+    placeholders : mapping
+        Values of further global names in the call graph, such as those of the plant's kernels.
     """
 
-    name: str
+    family: str
     maker: Callable[..., Any]
     key: tuple[Any, ...]
     report: Report
-    advance: Kernel
-    reference: Kernel
     evaluate: Kernel
     begin: Kernel
     rows: int
     parameters: int
     counts: int
-    signals: int
     set_points: int
     old_set_points: int
     channels: int = 1
     config: Any = NONE
     choices: Any = NONE
     apply: Kernel = do_nothing
+    advance: Kernel = advance_plant
+    reference: Kernel = trajectory_at
     placeholders: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -90,7 +88,7 @@ class Kernels:
             "N_ROWS": self.rows,
             "N_PARAMETERS": self.parameters,
             "N_COUNTS": self.n_counts,
-            "N_WORK_ROWS": self.report.signals + self.signals + channels * (1 + MOST_PREVIEW),
+            "N_WORK_ROWS": self.report.end + channels * (1 + MOST_PREVIEW),
             "FIRST_INFO": self.report.scratch,
             "N_INFO": len(keys),
             "N_REWARDS": sum(key.startswith("reward/") for key in keys),
@@ -104,26 +102,28 @@ class Kernels:
         """Pickle the key instead of machine code."""
         return self.maker, self.key
 
-    def _build(self, name: str, lanes: int, parallel: bool = False) -> Callable[..., Any]:
-        names = {**self.names, "LANES": lanes}
-        return build(step_tiles, f"{name}_{self.name}", parallel, **names)
+    def _build(
+        self, lanes: int, prefix: str, function: Kernel = step_tiles, parallel: bool = False
+    ) -> Kernel:
+        name = "_".join((prefix, self.family, *map(str, self.key)))
+        return build(function, name, parallel, **{**self.names, "LANES": lanes})
 
     @cached_property
-    def interpreted(self) -> Callable[..., Any]:
+    def interpreted(self) -> Kernel:
         """One environment, in plain Python."""
         return interpreted(step_tiles, {**self.names, "LANES": 1})
 
     @cached_property
-    def single(self) -> Callable[..., Any]:
+    def single(self) -> Kernel:
         """One environment, called with the address book of its arrays."""
-        return build(step_by_address, f"single_{self.name}", **{**self.names, "LANES": 1})
+        return self._build(1, "single", step_by_address)
 
     @cached_property
-    def batch(self) -> Callable[..., Any]:
+    def batch(self) -> Kernel:
         """Tiles on one core."""
-        return self._build("batch", LANES)
+        return self._build(LANES, "batch")
 
     @cached_property
-    def parallel(self) -> Callable[..., Any]:
+    def parallel(self) -> Kernel:
         """Tiles on all cores."""
-        return self._build("parallel", LANES, parallel=True)
+        return self._build(LANES, "parallel", parallel=True)

@@ -1,17 +1,26 @@
-"""Kernels that several families of environments share: plant step, reference, sensors."""
+"""Kernels that families of environments share: plant step, reference, sensors, payload, report.
+
+``info`` and ``at`` are a family's named tuples of work rows and of numbers in the configuration.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
-from pam_envs.envs.core.step import CHOICE, KEY_A, KEY_B, PERIOD
-from pam_envs.kernels.build import kernel
-from pam_envs.kernels.random import normal
+from pam_envs.envs.core.step import CHOICE, EPISODE_SECONDS, KEY_A, KEY_B, PERIOD
+from pam_envs.kernels.build import LANES, kernel
+from pam_envs.kernels.random import normal, uniform
 from pam_envs.references.trajectory import SAMPLES, reference_value
 from pam_envs.sensing.sensor import read_sensor
+from pam_envs.tasks.rewards import effort_reward, ended_reward, error_reward, excess
 
 FIRST_HYSTERESIS = FIRST_REFERENCE = 0  # placeholders: first rows of hysteresis and reference
 plant_advance: Any = None
+
+PAYLOAD_ROWS = 3
+"""Rows of the state: declared payload, time of its change, size of the change."""
+EARLIEST, LATEST = 0.3, 0.7
+"""Range of the time of the change, as shares of an episode."""
 
 
 @kernel
@@ -44,14 +53,7 @@ def sense(
 ) -> float:
     """Return the reading of a sensor in lane ``j``.
 
-    Parameters
-    ----------
-    true : float
-        Value that it measures.
-    sensor : int
-        First row of its parameters in ``fixed``: noise, resolution, bias.
-    stream, draw : int
-        Random stream, and number of the draw in it.
+    ``sensor`` is the first row of its noise, resolution and bias, ``stream`` its random stream.
     """
     return read_sensor(
         true,
@@ -59,4 +61,69 @@ def sense(
         fixed[sensor + 1][j],
         fixed[sensor + 2][j],
         normal(counts[KEY_A][j], counts[KEY_B][j], stream, draw),
+    )
+
+
+@kernel
+def draw_payload(
+    rows: Any, counts: Any, settings: Any, choices: Any, stream: int, number: int, change: float,
+    declared: int, payload: int, j: int,
+) -> None:  # fmt: skip
+    """Draw one of the own settings' payloads [kg] for lane ``j``, and time and size of its change.
+
+    Up or down with equal probability, but up if the payload is smaller than the change.
+    """
+    key_a, key_b = counts[KEY_A][j], counts[KEY_B][j]
+    mass = settings[choices[CHOICE.at_own]][int(uniform(key_a, key_b, stream, 0) * number)]
+    rows[declared][j] = rows[payload][j] = mass
+    when = EARLIEST + (LATEST - EARLIEST) * uniform(key_a, key_b, stream, 1)
+    rows[declared + 1][j] = settings[0][EPISODE_SECONDS] * when
+    down = uniform(key_a, key_b, stream, 2) < 0.5 and mass >= change
+    rows[declared + 2][j] = -change if down else change
+
+
+@kernel
+def change_payload(rows: Any, step: Any, period: float, declared: int, payload: int) -> None:
+    """Change the payload of a tile at its time."""
+    for j in range(LANES):
+        changed = step[j] * period >= rows[declared + 1][j]
+        rows[payload][j] = rows[declared][j] + (rows[declared + 2][j] if changed else 0.0)
+
+
+@kernel
+def change_of(rows: Any, row: int, old: int, j: int) -> float:
+    """Return the change of a row of lane ``j`` since the last call, which row ``old`` stores."""
+    change = rows[row][j] - rows[old][j]
+    rows[old][j] = rows[row][j]
+    return change  # type: ignore[no-any-return]
+
+
+@kernel
+def report_tracking(
+    work: Any, config: Any, info: Any, at: Any, reference: float, output: float, j: int
+) -> None:
+    """Write reference, output and the reward for their difference."""
+    work[info.reference][j], work[info.output][j] = reference, output
+    work[info.reward_tracking][j] = error_reward(
+        output - reference, config[at.error_scale], config[at.tracking_weight]
+    )
+
+
+@kernel
+def report_pressure(
+    work: Any, config: Any, info: Any, at: Any, pressure: float, change: float, full: float, j: int
+) -> None:
+    """Write what the highest pressure costs, and a change of set-points out of ``full``."""
+    work[info.cost_pressure][j] = excess(pressure, config[at.soft_pressure])
+    work[info.margin_pressure][j] = config[at.soft_pressure] - pressure
+    work[info.reward_effort][j] = effort_reward(change, full, config[at.effort_weight])
+
+
+@kernel
+def report_end(work: Any, config: Any, info: Any, at: Any, flag: int, broken: bool, j: int) -> None:
+    """Write whether a limit is broken to row ``flag``, and the reward for the periods left then."""
+    ended, worst = 1.0 if broken else 0.0, config[at.worst_period]
+    work[flag][j] = ended
+    work[info.reward_ended][j] = ended_reward(
+        ended, work[info.time][j], config[EPISODE_SECONDS], config[PERIOD], worst
     )

@@ -3,23 +3,12 @@
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
-
-PREFIXES = ("reward", "cost", "margin", "effort", "state", "sensor")
-"""Groups of the entries of ``info``, besides ``time``, ``reference``, ``output``, ``saturated``."""
 
 
 def indices(keys: Iterable[str], first: int = 0) -> Any:
-    """Return a named tuple of consecutive numbers, one for each key.
-
-    Parameters
-    ----------
-    keys : iterable of str
-        ``reward/tracking`` becomes the field ``reward_tracking``.
-    first : int
-        Number of the first key.
-    """
+    """Return a named tuple of consecutive numbers; ``a/b`` becomes the field ``a_b``."""
     fields = [key.replace("/", "_") for key in keys]
     make: Any = namedtuple  # its fields are not literals
     return make("Indices", fields)(*range(first, first + len(fields)))
@@ -30,8 +19,13 @@ def computed(prefix: str, *names: str) -> dict[str, None]:
     return {f"{prefix}/{name}": None for name in names}
 
 
+def copied(prefix: str, rows: Any, *names: str) -> dict[str, int]:
+    """Return entries of ``info`` that copy the state's row of their name in upper case."""
+    return {f"{prefix}/{name}": getattr(rows, name.upper()) for name in names}
+
+
 class Report:
-    """Entries of ``info`` and the work rows into which kernels write them.
+    """Entries of ``info`` and signals, and the work rows into which kernels write them.
 
     Parameters
     ----------
@@ -41,25 +35,30 @@ class Report:
         computes it.
     scratch : int
         Work rows of the plant, which come before the report.
+    observed : sequence of int or None
+        Likewise of the signals of the observation, without references.
 
     Attributes
     ----------
-    keys : tuple of str
-        All keys in order.
-    rows : named tuple of int
-        Work row of each key: ``rows.reward_tracking``.
+    keys, rows : tuple of str, named tuple of int
+        All keys in order, and the work row of each: ``rows.reward_tracking``.
     copied : tuple of (int, int)
-        Work row and state row of each entry that is a copy; see :func:`copy_rows
-        <pam_envs.envs.core.step.copy_rows>`.
-    ended, signals : int
-        Work row of the flag of a broken limit, and the first one of the observation.
+        Work row and state row of each copy.
+    ended, signals, end : int
+        Work row of the flag of a broken limit, the first one of the observation, and the first one
+        behind its ``observed`` signals.
     """
 
-    def __init__(self, entries: Mapping[str, int | None], scratch: int) -> None:
+    def __init__(
+        self, entries: Mapping[str, int | None], scratch: int, observed: Sequence[int | None] = ()
+    ) -> None:
         self.keys = ("time", "reference", "output", *entries, "saturated")
         self.scratch = scratch
         self.rows = indices(self.keys, scratch)
-        numbered = enumerate(entries.values(), scratch + 3)
-        self.copied = tuple((to, row) for to, row in numbered if row is not None)
         self.ended = scratch + len(self.keys)
         self.signals = self.ended + 1
+        self.end = self.signals + len(observed)
+        sources = (*entries.values(), None, None, *observed)
+        self.copied = tuple(
+            (to, row) for to, row in enumerate(sources, scratch + 3) if row is not None
+        )

@@ -1,8 +1,4 @@
-"""Configuration of an environment: checked, and laid out as arrays for the kernels.
-
-A :class:`Setup` is built once from the keyword arguments. The single environment and the batch hold
-the same setup and differ only in the number of lanes.
-"""
+"""Configuration of an environment: checked, and laid out as arrays for the kernels."""
 
 from __future__ import annotations
 
@@ -26,16 +22,16 @@ STEP, STEP_AND_RESTART, BEGIN = 0, 1, 2
 
 @dataclass(frozen=True)
 class Setup:
-    """A checked configuration.
+    """Checked configuration that the single environment and the batch share.
 
     Attributes
     ----------
-    plant : object
+    plant : plant
         The plant that is simulated.
     signals, action_signals : Signals
         Signals of observation and action.
-    kernels : object
-        With ``single``, ``batch`` and ``parallel``, which take the arrays of a batch and a mode.
+    kernels : Kernels
+        Kernels of the family.
     drawn : bool
         Whether environments differ in their parameters; otherwise all tiles share them.
     ring : int
@@ -89,12 +85,12 @@ def compose(
     kernels: Any,
     given: Any,
     *,
-    observation: Iterable[Part],
+    observation: Sequence[Part],
     references: Iterable[Part],
     action: Iterable[Part],
     config: Mapping[str, float],
-    choices: Mapping[str, int],
     spread: NDArray[np.float64],
+    choices: Mapping[str, int] | None = None,
     reference: int = 0,
     sines: int = 0,
     own: NDArray[np.float64] | None = None,
@@ -106,14 +102,14 @@ def compose(
 
     Parameters
     ----------
-    plant : object
-        With ``control_period``, ``substeps``, ``members``, ``parameter_rows``, ``digest`` and,
-        where it has hysteresis, ``elements``.
+    plant : plant
+        With ``control_period``, ``substeps``, ``members``, ``parameter_rows`` and, where it has
+        hysteresis, ``elements``.
     kernels : Kernels
         Of :mod:`pam_envs.envs.core.families`.
     given : Common
         Of :mod:`pam_envs.envs.core.arguments`.
-    observation, references, action : iterable of (name, unit, low, high)
+    observation, references, action : sequence of (name, unit, low, high)
         Signals of the observation without references; references, each of which its preview
         follows; signals of the action.
     config, choices : mapping of numbers
@@ -131,17 +127,21 @@ def compose(
     view : str
         Import name of the :class:`~pam_envs.envs.rendering.scene.View`: ``my_family.view:VIEW``.
     """
-    signals = _observed(observation, references, given, plant.control_period)
+    parts = [(part, 0.0) for part in observation]
+    for name, *span in references:
+        parts.append(((name, *span), 0.0))  # type: ignore[arg-type]
+        for i in range(1, given.preview + 1):
+            ahead = i * given.preview_stride * plant.control_period
+            parts.append(((f"{name}_{i}", *span), ahead))  # type: ignore[arg-type]
+    signals = Signals(Signal(*p, i, given.normalize, ahead) for i, (p, ahead) in enumerate(parts))
     actions = Signals(Signal(*part, i, given.normalize) for i, part in enumerate(action))
     drawn = given.randomize is not False
     members = plant.members() if drawn else (plant,)
-    none = np.zeros((kernels.channels, 1))
-    tables = np.zeros((len(members), 1, 1)) if tables is None else tables[: len(members)]
     own_numbers = [config[name] for name in kernels.config._fields]
     blocks = [
         np.array([(plant.control_period, given.episode_seconds, *own_numbers)], np.float64),
-        np.array([_action_scale(signal) for signal in actions]),
-        scales_of(signals),
+        np.array([(1.0 / a, -b / a, *_bounds(s)) for s in actions for a, b in (s.scale,)]),
+        np.array([(*s.scale, *np.array(_bounds(s), np.float32).tolist()) for s in signals]),
         spread,
         np.array([member.parameter_rows() for member in members]),
         np.zeros((1, 1)) if own is None else own,
@@ -154,6 +154,7 @@ def compose(
         "substeps": plant.substeps,
         "actions": len(actions),
         "signals": len(signals),
+        "fixed": len(observation),
         "preview": int(given.preview),
         "stride": int(given.preview_stride),
         "spread": len(spread),
@@ -163,10 +164,8 @@ def compose(
         "sines": sines,
         **dict(zip(CHOICE._fields[-5:], first[1:6], strict=True)),
     }
-    numbers = (
-        *(whole[name] for name in CHOICE._fields),
-        *(choices[n] for n in kernels.choices._fields),
-    )
+    numbers = [whole[name] for name in CHOICE._fields]
+    numbers += [(choices or {})[name] for name in kernels.choices._fields]
     ring = 1 << (whole["preview"] * whole["stride"]).bit_length()
     return Setup(
         plant=plant,
@@ -176,8 +175,8 @@ def compose(
         drawn=drawn,
         ring=kernels.channels * ring,
         shared=(
-            tables,
-            none if samples is None else samples,
+            np.zeros((len(members), 1, 1)) if tables is None else tables[: len(members)],
+            np.zeros((kernels.channels, 1)) if samples is None else samples,
             settings,
             np.array(numbers, np.int64),
         ),
@@ -188,26 +187,9 @@ def compose(
     )
 
 
-def _observed(
-    now: Iterable[Part], references: Iterable[Part], given: Any, period: float
-) -> Signals:
-    """Return the signals of an observation."""
-    parts = [(part, 0.0) for part in now]
-    for name, *span in references:
-        parts.append(((name, *span), 0.0))  # type: ignore[arg-type]
-        for i in range(1, given.preview + 1):
-            ahead = i * given.preview_stride * period
-            parts.append(((f"{name}_{i}", *span), ahead))  # type: ignore[arg-type]
-    return Signals(
-        Signal(*part, i, given.normalize, ahead) for i, (part, ahead) in enumerate(parts)
-    )
-
-
-def _action_scale(signal: Any) -> tuple[float, float, float, float]:
-    """Return ``scale, offset, low, high``: the set-point is ``scale * clip(action) + offset``."""
-    a, b = signal.scale
-    low, high = (-1.0, 1.0) if signal.normalized else (signal.low, signal.high)
-    return 1.0 / a, -b / a, low, high
+def _bounds(signal: Signal) -> tuple[float, float]:
+    """Return the range of a signal's entry in its vector."""
+    return (-1.0, 1.0) if signal.normalized else (signal.low, signal.high)
 
 
 def for_kernels(array: Any) -> Any:
@@ -218,18 +200,6 @@ def for_kernels(array: Any) -> Any:
 def tiles_for(number: int) -> int:
     """Return how many tiles hold ``number`` environments."""
     return -(-number // LANES)
-
-
-def scales_of(signals: Signals) -> NDArray[np.float64]:
-    """Return ``a, b, low, high`` of each signal: its entry is ``clip(a * si + b, low, high)``.
-
-    The bounds are rounded to single precision inwards, so that a clipped value is in the space.
-    """
-    table = np.empty((len(signals), 4))
-    for i, signal in enumerate(signals):
-        low, high = (-1.0, 1.0) if signal.normalized else (signal.low, signal.high)
-        table[i] = *signal.scale, float(np.float32(low)), float(np.float32(high))
-    return table
 
 
 def check_choice(name: str, value: Any, choices: Sequence[Any]) -> None:

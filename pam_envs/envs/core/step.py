@@ -1,8 +1,8 @@
 """One step of any environment: actions, plant, references, observation, reward, end, reset.
 
 The same kernels serve one environment (a tile of one lane) and a batch (tiles of 32 lanes). A
-family of environments adds five kernels and a few sizes, which replace the placeholders below when
-the kernels are built (see :mod:`pam_envs.envs.core.families`).
+family adds kernels and sizes, which replace the placeholders below when the kernels are built (see
+:mod:`pam_envs.envs.core.families`).
 
 Arguments of the kernels, of every family:
 
@@ -19,7 +19,8 @@ Arguments of the kernels, of every family:
   high`` of each drawn parameter, the parameters of each member, and the family's own.
 * ``choices``, shape (n,): whole numbers of the configuration.
 * ``work``, shape (n, lanes): the plant's scratch, ``info`` (time, reference, output, terms of the
-  reward, ..., saturated), the flag of a broken limit, the observation in SI.
+  reward, ..., saturated), the flag of a broken limit, the observation in SI. Time, copies of the
+  state and references are written before ``env_evaluate``, which writes the rest.
 """
 
 from __future__ import annotations
@@ -42,13 +43,14 @@ FIRST_CONFIG = 2
 
 CHOICE = indices(
     (
-        *("substeps", "actions", "signals", "preview", "stride", "spread", "members", "elements"),
-        *("reference", "sines", "at_actions", "at_scales", "at_spread", "at_members", "at_own"),
+        *("substeps", "actions", "signals", "fixed", "preview", "stride", "spread", "members"),
+        *("elements", "reference", "sines"),
+        *("at_actions", "at_scales", "at_spread", "at_members", "at_own"),
     )
 )
-"""Index of each whole number that every configuration begins with: ``reference`` is the number of
-the reference's family, ``sines`` how many sines its evaluation sums, ``at_...`` the first row of a
-part of the settings."""
+"""Index of each whole number that every configuration begins with: ``fixed`` counts the signals
+before the references, ``reference`` is the number of the reference's family, ``sines`` how many
+sines its evaluation sums, ``at_...`` the first row of a part of the settings."""
 FIRST_CHOICE = len(CHOICE)
 """First whole number of the configuration that is the family's own."""
 MOST_PREVIEW = 20
@@ -66,7 +68,7 @@ env_advance: Any = None
 env_reference: Any = None
 env_evaluate: Any = None
 env_begin: Any = None
-COPIED: tuple[tuple[int, int], ...] = ()
+COPIED: tuple[tuple[int, int], ...] = ()  # work row and state row of each copy
 
 
 @kernel
@@ -97,11 +99,8 @@ def extend_preview(
     rows: Any, fixed: Any, counts: Any, ahead: Any, samples: Any, settings: Any, choices: Any
 ) -> None:
     """Add the references at the preview horizon to the ring buffers."""
-    step, ring, far = (
-        counts[STEP],
-        len(ahead) // CHANNELS,
-        choices[CHOICE.preview] * choices[CHOICE.stride],
-    )
+    step, ring = counts[STEP], len(ahead) // CHANNELS
+    far = choices[CHOICE.preview] * choices[CHOICE.stride]
     for channel in range(CHANNELS):
         first = channel * ring
         for j in range(LANES):
@@ -112,24 +111,23 @@ def extend_preview(
 
 
 @kernel
-def write_references(counts: Any, ahead: Any, choices: Any, work: Any, first: int) -> None:
-    """Write each channel's reference and its preview to ``work``, channel after channel."""
+def write_common(
+    rows: Any, counts: Any, ahead: Any, settings: Any, choices: Any, work: Any
+) -> None:
+    """Write time, copies of the state, and each channel's reference with its preview."""
     step, ring, stride = counts[STEP], len(ahead) // CHANNELS, choices[CHOICE.stride]
-    count = choices[CHOICE.preview] + 1
+    for j in range(LANES):
+        work[FIRST_INFO][j] = step[j] * settings[0][PERIOD]
+    for k in range(len(COPIED)):
+        to, source = work[COPIED[k][0]], rows[COPIED[k][1]]
+        for j in range(LANES):
+            to[j] = source[j]
+    first, count = FIRST_INFO + N_INFO + 1 + choices[CHOICE.fixed], choices[CHOICE.preview] + 1
     for channel in range(CHANNELS):
         for i in range(count):
             sample = work[first + channel * count + i]
             for j in range(LANES):
                 sample[j] = ahead[channel * ring + ((step[j] + i * stride) & (ring - 1))][j]
-
-
-@kernel
-def copy_rows(rows: Any, work: Any) -> None:
-    """Copy rows of the state into ``info``, as the family's report declares."""
-    for k in range(len(COPIED)):
-        to, source = work[COPIED[k][0]], rows[COPIED[k][1]]
-        for j in range(LANES):
-            to[j] = source[j]
 
 
 @routine
@@ -224,14 +222,9 @@ def step_tiles(
 ) -> None:  # fmt: skip
     """Step or reset a batch, tile by tile.
 
-    Parameters
-    ----------
-    mode : int
-        0: step. 1: step, and reset environments whose episode ended. 2: reset the environments
-        whose ``flags[0]`` is set.
-    observations, infos : arrays
-        ``[0]`` holds the present ones, ``[1]`` the last ones of episodes that ended in this step;
-        ``infos[...][0]`` is the reward.
+    ``mode`` 0: step. 1: step, and reset environments whose episode ended. 2: reset the environments
+    whose ``flags[0]`` is set. ``observations[0]`` and ``infos[0]`` are the present ones, ``[1]``
+    the last ones of episodes that ended in this step; ``infos[...][0]`` is the reward.
     """
     observation, info = observations[0], infos[0]
     for tile in prange(len(all_rows)):
@@ -258,7 +251,8 @@ def step_tiles(
             for j in range(lanes, LANES):  # unused lanes of the last tile
                 copy_lane(rows, fixed, counts, ahead, lanes - 1, j)
         for again in range(2):
-            env_evaluate(rows, fixed, counts, ahead, settings, choices, work)
+            write_common(rows, counts, ahead, settings, choices, work)
+            env_evaluate(rows, fixed, counts, settings, choices, work)
             if mode == 2 or again == 1:
                 for j in range(lanes):
                     if flags[0][start + j] + flags[1][start + j] > 0:

@@ -52,10 +52,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments
-from pam_envs.envs.core.plant_env import PlantEnv
+from pam_envs.envs.core.arguments import (
+    Common,
+    Randomisation,
+    environment_arguments,
+    environments,
+)
 from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, compose
-from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.envs.elbow import layout as L
 from pam_envs.envs.elbow.kernels import kernels_for
 from pam_envs.envs.elbow.ranges import largest_errors, signal_ranges
@@ -296,7 +299,6 @@ def make_setup(
         "motion": MOTIONS.index(motion),
         "mode": L.ACTIONS.index(action),
         "pulsed": int(pulsed),
-        "fixed_signals": L.COMMON_SIGNALS + (1 if pulsed else 0),
         "samples": samples.shape[1],
     }
     spread = given.spread_of(made, RANDOMISATION)
@@ -321,9 +323,4 @@ def make_setup(
     )
 
 
-class ElbowOrthosisEnv(PlantEnv, make_setup=make_setup):
-    """Single environment (see the module's page)."""
-
-
-class ElbowOrthosisVectorEnv(PlantVectorEnv, make_setup=make_setup):
-    """Batch of environments (see the module's page)."""
+ElbowOrthosisEnv, ElbowOrthosisVectorEnv = environments("ElbowOrthosis", make_setup)

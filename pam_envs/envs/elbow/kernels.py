@@ -7,8 +7,8 @@ from typing import Any
 
 from pam_envs.constants import GRAVITY
 from pam_envs.envs.core.families import Kernels
-from pam_envs.envs.core.kernels import advance_plant, sense
-from pam_envs.envs.core.step import CHOICE, EPISODE_SECONDS, PERIOD, copy_rows, write_references
+from pam_envs.envs.core.kernels import advance_plant, report_end, report_pressure, sense
+from pam_envs.envs.core.step import CHOICE, PERIOD
 from pam_envs.envs.elbow import layout as L
 from pam_envs.envs.elbow.program import (
     desired_at,
@@ -30,7 +30,7 @@ from pam_envs.plants.elbow_orthosis.step import (
     start_hysteresis,
 )
 from pam_envs.references.reaches import draw_motion, motion_at
-from pam_envs.tasks.rewards import effort_reward, ended_reward, error_reward, excess
+from pam_envs.tasks.rewards import error_reward, excess
 from pam_envs.tasks.torque_stiffness import FREE, MIXED, WALL, WEIGHT
 
 
@@ -40,21 +40,15 @@ def apply_elbow(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any,
 
     Pulses keep their widths until the next ones are taken.
     """
-    step, period, by_torque = (
-        counts[K.STEP],
-        settings[0][PERIOD],
-        choices[L.CHOICE.mode] == L.BY_TORQUE,
-    )
-    model = settings[choices[CHOICE.at_own]]
+    step, period, model = counts[K.STEP], settings[0][PERIOD], settings[choices[CHOICE.at_own]]
     for j in range(LANES):
         store_period(rows, j)
-        angle, rate, acceleration = motion_at(rows, L.MOTION, j, (step[j] + 1) * period)
-        rows[K.INTENT][j] = angle
-        rows[K.INTENT_RATE][j] = rate
-        rows[K.INTENT_ACCELERATION][j] = acceleration
+        rows[K.INTENT][j], rows[K.INTENT_RATE][j], rows[K.INTENT_ACCELERATION][j] = motion_at(
+            rows, L.MOTION, j, (step[j] + 1) * period
+        )
     for j in range(LANES):
         a, b = rows[L.ACTION][j], rows[L.ACTION + 1][j]
-        if by_torque:
+        if choices[L.CHOICE.mode] == L.BY_TORQUE:
             desired, stiff = a, b
             a, b = pressures_for(model, rows[L.READ_ANGLE][j], desired, stiff)
             torque, stiffness = estimate(model, rows[L.READ_ANGLE][j], a, b)
@@ -62,8 +56,7 @@ def apply_elbow(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any,
                 work[L.INFO.saturated][j] = 1.0
         if choices[L.CHOICE.pulsed] > 0 and rows[K.CLOCK][j] >= 0.5 * period:
             a, b = rows[K.COMMAND_A][j], rows[K.COMMAND_B][j]
-        rows[K.COMMAND_A][j] = a
-        rows[K.COMMAND_B][j] = b
+        rows[K.COMMAND_A][j], rows[K.COMMAND_B][j] = a, b
 
 
 @kernel
@@ -91,9 +84,20 @@ def reference_at(
 
 
 @kernel
-def read_elbow(rows: Any, fixed: Any, counts: Any, j: int) -> None:
-    """Read the sensors of lane ``j``."""
-    step = counts[K.STEP][j]
+def advance_elbow(
+    rows: Any, fixed: Any, counts: Any, tables: Any, samples: Any, settings: Any, choices: Any,
+    work: Any,
+) -> None:  # fmt: skip
+    """Advance the plant by a control period and read its sensors."""
+    advance_plant(rows, fixed, counts, tables, samples, settings, choices, work)
+    step = counts[K.STEP]
+    for j in range(LANES):
+        read_elbow(rows, fixed, counts, step[j] + 1, j)
+
+
+@kernel
+def read_elbow(rows: Any, fixed: Any, counts: Any, step: int, j: int) -> None:
+    """Read the sensors of lane ``j`` at a control period."""
     rows[L.READ_ANGLE][j] = sense(
         rows[SENSED_ANGLE][j], fixed, counts, K.ANGLE_NOISE, L.NOISE_ANGLE, step, j
     )
@@ -105,86 +109,56 @@ def read_elbow(rows: Any, fixed: Any, counts: Any, j: int) -> None:
 
 @kernel
 def observe(rows: Any, counts: Any, settings: Any, choices: Any, work: Any, j: int) -> None:
-    """Write the observation of lane ``j``, without the previews, from the readings."""
+    """Write what the readings of lane ``j`` give: rate, estimates, references at the angle."""
     model, step = settings[choices[CHOICE.at_own]], counts[K.STEP][j]
     angle, before = rows[L.READ_ANGLE][j], rows[L.OLD_READ][j]
     torque, stiffness = estimate(model, angle, rows[L.READ_A][j], rows[L.READ_B][j])
-    work[L.INFO.sensor_torque][j], work[L.INFO.sensor_stiffness][j] = torque, stiffness
-    work[L.SIGNALS][j] = angle
+    work[L.INFO.sensor_torque][j] = work[L.SIGNALS + 6][j] = torque
+    work[L.INFO.sensor_stiffness][j] = work[L.SIGNALS + 7][j] = stiffness
     work[L.SIGNALS + 1][j] = (angle - before) / settings[0][PERIOD] if step > 0 else 0.0
-    work[L.SIGNALS + 2][j] = rows[L.READ_A][j]
-    work[L.SIGNALS + 3][j] = rows[L.READ_B][j]
-    work[L.SIGNALS + 4][j] = rows[K.COMMAND_A][j]
-    work[L.SIGNALS + 5][j] = rows[K.COMMAND_B][j]
-    work[L.SIGNALS + 6][j] = torque
-    work[L.SIGNALS + 7][j] = stiffness
     if choices[L.CHOICE.pulsed] > 0:
         work[L.SIGNALS + 8][j] = max(0.0, rows[K.CLOCK][j])
     torque, stiffness = desired_at(rows, settings, choices, j, angle, step)
     torque, stiffness = within_reach(model, angle, torque, stiffness)
-    first = L.SIGNALS + choices[L.CHOICE.fixed_signals]
+    first = L.SIGNALS + choices[CHOICE.fixed]
     work[first][j] = torque
     work[first + choices[CHOICE.preview] + 1][j] = stiffness
 
 
 @kernel
-def evaluate(
-    rows: Any, fixed: Any, counts: Any, ahead: Any, settings: Any, choices: Any, work: Any
-) -> None:
-    """Write observation and report of a tile into ``work``."""
-    write_references(counts, ahead, choices, work, L.SIGNALS + choices[L.CHOICE.fixed_signals])
-    for j in range(LANES):
-        read_elbow(rows, fixed, counts, j)
+def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
+    """Write observation, references at the true angle, rewards, costs, margins and efforts."""
+    config, model, step = settings[0], settings[choices[CHOICE.at_own]], counts[K.STEP]
     for j in range(LANES):
         observe(rows, counts, settings, choices, work, j)
-        judge(rows, counts, settings, choices, work, j)
-    copy_rows(rows, work)
-
-
-@kernel
-def judge(rows: Any, counts: Any, settings: Any, choices: Any, work: Any, j: int) -> None:
-    """Write references at the true angle, rewards, costs, margins and efforts of lane ``j``."""
-    config, model, step = settings[0], settings[choices[CHOICE.at_own]], counts[K.STEP][j]
-    angle, torque = rows[K.ANGLE][j], rows[K.TORQUE][j]
-    desired, stiff = desired_at(rows, settings, choices, j, angle, step)
-    reference, stiffness = within_reach(model, angle, desired, stiff)
-    work[L.INFO.time][j] = step * config[PERIOD]
-    work[L.INFO.reference][j], work[L.INFO.output][j] = reference, torque
-    work[L.INFO.state_stiffness_reference][j] = stiffness
-    work[L.INFO.state_object_torque][j] = desired - own_weight(model, config, angle)
-    work[L.INFO.state_torque_clipped][j] = desired - reference
-    work[L.INFO.state_stiffness_clipped][j] = stiff - stiffness
-    work[L.INFO.reward_torque][j] = error_reward(
-        torque - reference, config[L.CONFIG.torque_scale], config[L.CONFIG.torque_weight]
-    )
-    work[L.INFO.reward_stiffness][j] = error_reward(
-        rows[K.STIFFNESS][j] - stiffness,
-        config[L.CONFIG.stiffness_scale],
-        config[L.CONFIG.stiffness_weight],
-    )
-    moved = effort_of(rows, choices, j)
-    work[L.INFO.reward_effort][j] = effort_reward(
-        moved, config[L.CONFIG.command_range], config[L.CONFIG.effort_weight]
-    )
-    a, b = rows[K.PRESSURE_A][j], rows[K.PRESSURE_B][j]
-    work[L.INFO.cost_pressure][j] = excess(max(a, b), config[L.CONFIG.soft_pressure])
-    work[L.INFO.margin_pressure][j] = config[L.CONFIG.soft_pressure] - max(a, b)
-    beyond = max(model[L.MODEL.lowest] - angle, angle - model[L.MODEL.highest])
-    work[L.INFO.cost_angle][j] = excess(beyond, 0.0)
-    work[L.INFO.margin_angle][j] = min(
-        angle - config[L.CONFIG.lowest_angle], config[L.CONFIG.highest_angle] - angle
-    )
-    work[L.ENDED][j] = 1.0 if work[L.INFO.margin_angle][j] < 0.0 else 0.0
-    work[L.INFO.reward_ended][j] = ended_reward(
-        work[L.ENDED][j],
-        work[L.INFO.time][j],
-        config[EPISODE_SECONDS],
-        config[PERIOD],
-        config[L.CONFIG.worst_period],
-    )
-    work[L.INFO.effort_pressure_travel][j] = abs(a - rows[L.OLD_A][j]) + abs(b - rows[L.OLD_B][j])
-    work[L.INFO.effort_air][j] = max(0.0, rows[K.USED][j] - rows[L.OLD_USED][j])
-    work[L.INFO.effort_switchings][j] = rows[K.SWITCHES][j] - rows[L.OLD_SWITCHES][j]
+        angle, torque = rows[K.ANGLE][j], rows[K.TORQUE][j]
+        desired, stiff = desired_at(rows, settings, choices, j, angle, step[j])
+        reference, stiffness = within_reach(model, angle, desired, stiff)
+        work[L.INFO.reference][j], work[L.INFO.output][j] = reference, torque
+        work[L.INFO.state_stiffness_reference][j] = stiffness
+        work[L.INFO.state_object_torque][j] = desired - own_weight(model, config, angle)
+        work[L.INFO.state_torque_clipped][j] = desired - reference
+        work[L.INFO.state_stiffness_clipped][j] = stiff - stiffness
+        work[L.INFO.reward_torque][j] = error_reward(
+            torque - reference, config[L.CONFIG.torque_scale], config[L.CONFIG.torque_weight]
+        )
+        work[L.INFO.reward_stiffness][j] = error_reward(
+            rows[K.STIFFNESS][j] - stiffness,
+            config[L.CONFIG.stiffness_scale],
+            config[L.CONFIG.stiffness_weight],
+        )
+        a, b = rows[K.PRESSURE_A][j], rows[K.PRESSURE_B][j]
+        moved, full = effort_of(rows, choices, j), config[L.CONFIG.command_range]
+        report_pressure(work, config, L.INFO, L.CONFIG, max(a, b), moved, full, j)
+        beyond = max(model[L.MODEL.lowest] - angle, angle - model[L.MODEL.highest])
+        work[L.INFO.cost_angle][j] = excess(beyond, 0.0)
+        margin = min(angle - config[L.CONFIG.lowest_angle], config[L.CONFIG.highest_angle] - angle)
+        work[L.INFO.margin_angle][j] = margin
+        report_end(work, config, L.INFO, L.CONFIG, L.ENDED, margin < 0.0, j)
+        travel = abs(a - rows[L.OLD_A][j]) + abs(b - rows[L.OLD_B][j])
+        work[L.INFO.effort_pressure_travel][j] = travel
+        work[L.INFO.effort_air][j] = max(0.0, rows[K.USED][j] - rows[L.OLD_USED][j])
+        work[L.INFO.effort_switchings][j] = rows[K.SWITCHES][j] - rows[L.OLD_SWITCHES][j]
 
 
 @kernel
@@ -196,6 +170,12 @@ def effort_of(rows: Any, choices: Any, j: int) -> float:
     return abs(a - rows[L.OLD_COMMAND_A][j]) + abs(b - rows[L.OLD_COMMAND_B][j])
 
 
+@kernel
+def between(config: Any, low: int, high: int, share: float) -> float:
+    """Return a number between two of the configuration, given by their indices."""
+    return config[low] + (config[high] - config[low]) * share  # type: ignore[no-any-return]
+
+
 @routine
 def draw_object(rows: Any, counts: Any, settings: Any, choices: Any, j: int) -> None:
     """Draw the virtual object of lane ``j``."""
@@ -204,29 +184,18 @@ def draw_object(rows: Any, counts: Any, settings: Any, choices: Any, j: int) -> 
     if kind == MIXED:
         kind = int(3.0 * uniform(key_a, key_b, L.TASK, 0))
     kind = min(kind, FREE)
-    u = uniform(key_a, key_b, L.TASK, 1)
-    strength = 0.0
+    strength, u = 0.0, uniform(key_a, key_b, L.TASK, 1)
     if kind == WEIGHT:
-        mass = (
-            config[L.CONFIG.lightest] + (config[L.CONFIG.heaviest] - config[L.CONFIG.lightest]) * u
-        )
+        mass = between(config, L.CONFIG.lightest, L.CONFIG.heaviest, u)
         strength = mass * GRAVITY * config[L.CONFIG.handle]
     if kind == WALL:
-        strength = (
-            config[L.CONFIG.softest_wall]
-            + (config[L.CONFIG.stiffest_wall] - config[L.CONFIG.softest_wall]) * u
-        )
+        strength = between(config, L.CONFIG.softest_wall, L.CONFIG.stiffest_wall, u)
     place, soft = uniform(key_a, key_b, L.TASK, 2), uniform(key_a, key_b, L.TASK, 3)
-    least, most = config[L.CONFIG.softest_free], config[L.CONFIG.stiffest_free]
+    level = between(config, L.CONFIG.softest_free, L.CONFIG.stiffest_free, soft)
     if kind == WEIGHT:
-        least, most = config[L.CONFIG.softest_held], config[L.CONFIG.stiffest_held]
-    rows[L.LEVEL][j] = least + (most - least) * soft
-    rows[L.OBJECT][j] = float(kind)
-    rows[L.PLACE][j] = (
-        config[L.CONFIG.nearest_wall]
-        + (config[L.CONFIG.farthest_wall] - config[L.CONFIG.nearest_wall]) * place
-    )
-    rows[L.STRENGTH][j] = strength
+        level = between(config, L.CONFIG.softest_held, L.CONFIG.stiffest_held, soft)
+    rows[L.OBJECT][j], rows[L.STRENGTH][j], rows[L.LEVEL][j] = float(kind), strength, level
+    rows[L.PLACE][j] = between(config, L.CONFIG.nearest_wall, L.CONFIG.farthest_wall, place)
 
 
 @routine
@@ -238,22 +207,15 @@ def begin_elbow(
     key_a, key_b, config = counts[K.KEY_A][j], counts[K.KEY_B][j], settings[0]
     model = settings[choices[CHOICE.at_own]]
     counts[K.MEMBER][j] = member
-    low, high = config[L.CONFIG.motion_low], config[L.CONFIG.motion_high]
-    draw_motion(
-        rows,
-        L.MOTION,
-        j,
-        key_a,
-        key_b,
-        choices[L.CHOICE.motion],
-        low,
-        high,
+    low, high, window = (
+        config[L.CONFIG.motion_low],
+        config[L.CONFIG.motion_high],
         config[L.CONFIG.window],
     )
+    draw_motion(rows, L.MOTION, j, key_a, key_b, choices[L.CHOICE.motion], low, high, window)
     draw_object(rows, counts, settings, choices, j)
     angle, _, _ = motion_at(rows, L.MOTION, j, 0.0)
-    rows[K.INTENT][j], rows[K.INTENT_RATE][j] = angle, 0.0
-    rows[K.INTENT_ACCELERATION][j] = 0.0
+    rows[K.INTENT][j], rows[K.INTENT_RATE][j], rows[K.INTENT_ACCELERATION][j] = angle, 0.0, 0.0
     rows[K.DISTURBANCE][j] = 0.0
     torque, stiffness = desired_at(rows, settings, choices, j, angle, 0)
     a, b = pressures_for(model, angle, torque, stiffness)
@@ -269,6 +231,7 @@ def begin_elbow(
         rows[L.ACTION][j], rows[L.ACTION + 1][j] = estimate(model, angle, a, b)
     rows[L.READ_ANGLE][j] = rows[K.ANGLE][j]
     store_period(rows, j)
+    read_elbow(rows, fixed, counts, 0, j)
 
 
 @lru_cache(maxsize=16)
@@ -276,27 +239,26 @@ def kernels_for(kind: str, valves: str, extended: bool = False) -> Kernels:
     """Return the kernels for a hysteresis model and valves, plain or with effects."""
     rows = L.HYSTERESIS + state_rows(kind)
     return Kernels(
-        f"elbow_{kind}_{valves}" + ("_extended" if extended else ""),
+        "elbow",
         kernels_for,
         (kind, valves, extended),
         L.REPORT,
-        apply=apply_elbow,
-        advance=advance_plant,
-        reference=reference_at,
-        evaluate=evaluate,
-        begin=begin_elbow,
+        evaluate,
+        begin_elbow,
+        rows=rows + (K.STATE.end if extended else 0),
+        parameters=K.N_PARAMETERS,
+        counts=K.N_COUNTS,
+        set_points=L.ACTION,
+        old_set_points=L.OLD_ACTION,
+        channels=L.CHANNELS,
         config=L.CONFIG,
         choices=L.CHOICE,
+        apply=apply_elbow,
+        advance=advance_elbow,
+        reference=reference_at,
         placeholders={
             "plant_advance": advance,
             "FIRST_HYSTERESIS": L.HYSTERESIS,
             **replacements(kind, valves, rows if extended else None),
         },
-        rows=rows + (K.STATE.end if extended else 0),
-        parameters=K.N_PARAMETERS,
-        counts=K.N_COUNTS,
-        signals=L.COMMON_SIGNALS + 1,
-        set_points=L.ACTION,
-        old_set_points=L.OLD_ACTION,
-        channels=L.CHANNELS,
     )

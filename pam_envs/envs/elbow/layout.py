@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pam_envs.envs.core.layout import Report, computed, indices
+from pam_envs.envs.core.layout import Report, computed, copied, indices
 from pam_envs.envs.core.step import FIRST_CHOICE, FIRST_CONFIG
 from pam_envs.parameters import declarations
 from pam_envs.plants.elbow_orthosis import rows as K
@@ -37,31 +37,18 @@ REPORT = Report(
         **computed("state", "stiffness_reference", "object_torque"),
         **computed("state", "torque_clipped", "stiffness_clipped"),
         **computed("sensor", "torque", "stiffness"),
-        "state/angle": K.ANGLE,
-        "state/velocity": K.VELOCITY,
-        "state/intent": K.INTENT,
-        "state/pressure_a": K.PRESSURE_A,
-        "state/pressure_b": K.PRESSURE_B,
-        "state/command_a": K.COMMAND_A,
-        "state/command_b": K.COMMAND_B,
-        "state/force_a": K.FORCE_A,
-        "state/force_b": K.FORCE_B,
-        "state/torque": K.TORQUE,
-        "state/stiffness": K.STIFFNESS,
-        "state/felt": K.FELT,
-        "state/wearer": K.WEARER,
-        "state/slack": K.SLACK,
+        **copied("state", K, "angle", "velocity", "intent", "pressure_a", "pressure_b"),
+        **copied("state", K, "command_a", "command_b", "force_a", "force_b", "torque"),
+        **copied("state", K, "stiffness", "felt", "wearer", "slack"),
         "state/object": OBJECT,
         "sensor/angle": READ_ANGLE,
         "sensor/pressure_a": READ_A,
         "sensor/pressure_b": READ_B,
     },
     N_WORK,
+    observed=(READ_ANGLE, None, READ_A, READ_B, K.COMMAND_A, K.COMMAND_B, None, None, None),
 )
 INFO, ENDED, SIGNALS = REPORT.rows, REPORT.ended, REPORT.signals
-COMMON_SIGNALS = 8
-"""Angle, rate, two pressures, two commands, estimates of torque and stiffness; then the time to the
-next pulse (on/off valves only) and the references."""
 CHANNELS = 2
 
 CONFIG = indices(
@@ -72,7 +59,7 @@ CONFIG = indices(
     ),
     FIRST_CONFIG,
 )
-CHOICE = indices(("motion", "mode", "pulsed", "fixed_signals", "samples"), FIRST_CHOICE)
+CHOICE = indices(("motion", "mode", "pulsed", "samples"), FIRST_CHOICE)
 SAMPLES = len(OBJECTS)
 """Number of a reference that is given as samples of torque and stiffness."""
 ACTIONS = ("pressures", "torque_stiffness")

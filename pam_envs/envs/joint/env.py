@@ -46,17 +46,15 @@ from pam_envs.envs.core.arguments import (
     Common,
     Randomisation,
     environment_arguments,
-    payloads_of,
+    environments,
+    masses_of,
 )
-from pam_envs.envs.core.plant_env import PlantEnv
 from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, compose
-from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.envs.joint import layout as L
 from pam_envs.envs.joint.kernels import kernels_for
 from pam_envs.plants.antagonistic_joint import rows as R
 from pam_envs.plants.antagonistic_joint.bearing import check_borne
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
-from pam_envs.plants.single_muscle.hysteresis import Kind
 from pam_envs.references.trajectory import FAMILIES, SAMPLES, sines_needed
 from pam_envs.tasks.joint_tracking import JointTracking
 
@@ -86,9 +84,7 @@ RANDOMISATION = Randomisation(
 )
 
 
-@lru_cache(maxsize=8)
-def _default(hysteresis: Kind) -> AntagonisticJoint:
-    return AntagonisticJoint.paper(hysteresis)
+default_plant = lru_cache(maxsize=8)(AntagonisticJoint.paper)
 
 
 def _actions(plant: AntagonisticJoint, action: str) -> list[Part]:
@@ -160,7 +156,7 @@ def make_setup(
     UnbearableLoad
         If the muscles cannot hold the largest angle with the heaviest payload.
     """
-    made = given.plant_of(AntagonisticJoint, _default)
+    made = given.plant_of(AntagonisticJoint, default_plant)
     most = made.angle_range[1]
     place, samples = given.reference_of(L.REFERENCES, "rad", most)
     family = NUMBERS.get(place, place)
@@ -173,8 +169,8 @@ def make_setup(
         )
     usual = USUAL_SHARE * most
     reach = usual if amplitude is None else check_number("amplitude", amplitude, 0.0, most, "rad")
-    task, now = given.task_of(JointTracking), _signals(made, action)
-    payloads = payloads_of(payload, MOST_PAYLOAD)
+    task = given.task_of(JointTracking)
+    payloads = masses_of("payload", payload, MOST_PAYLOAD, np.linspace(0.0, MOST_PAYLOAD, 6))
     change = check_number("payload_change", payload_change, 0.0, MOST_PAYLOAD, "kg")
     largest = np.abs(samples).max() if family == SAMPLES else reach
     ends, heaviest = np.array([[-largest], [largest]]), float(payloads.max()) + change
@@ -191,17 +187,16 @@ def make_setup(
         "disturbance": check_number("disturbance", disturbance, 0.0, 100.0, "N m"),
         "worst_period": task.worst(made.largest_angle + most),
     }
-    mode = L.MODES.index(action)
     spread = given.spread_of(made, RANDOMISATION)
     return compose(
         made,
         kernels_for(made.hysteresis.kind, made.dynamics, made.needs_effects(spread)),
         given,
-        observation=now,
+        observation=_signals(made, action),
         references=[("reference", "rad", *ANGLES)],
         action=_actions(made, action),
         config=config,
-        choices={"mode": mode, "payloads": payloads.size, "fixed_signals": len(now)},
+        choices={"mode": L.MODES.index(action), "payloads": payloads.size},
         reference=family,
         sines=sines_needed(family),
         own=payloads,
@@ -212,9 +207,4 @@ def make_setup(
     )
 
 
-class AntagonisticJointEnv(PlantEnv, make_setup=make_setup):
-    """Single environment (see the module's page)."""
-
-
-class AntagonisticJointVectorEnv(PlantVectorEnv, make_setup=make_setup):
-    """Batch of environments (see the module's page)."""
+AntagonisticJointEnv, AntagonisticJointVectorEnv = environments("AntagonisticJoint", make_setup)

@@ -6,9 +6,17 @@ from functools import lru_cache
 from typing import Any
 
 from pam_envs.envs.core.families import Kernels
-from pam_envs.envs.core.kernels import advance_plant, sense, trajectory_at
-from pam_envs.envs.core.payload import change_payload, draw_payload
-from pam_envs.envs.core.step import CHOICE, EPISODE_SECONDS, PERIOD, copy_rows, write_references
+from pam_envs.envs.core.kernels import (
+    change_of,
+    change_payload,
+    draw_payload,
+    report_end,
+    report_pressure,
+    report_tracking,
+    sense,
+    trajectory_at,
+)
+from pam_envs.envs.core.step import CHOICE, PERIOD
 from pam_envs.envs.joint import layout as L
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.arithmetic import sine_of_turns
@@ -25,7 +33,7 @@ from pam_envs.plants.antagonistic_joint.step import (
     start_hysteresis,
 )
 from pam_envs.references.trajectory import SAMPLES, draw_reference
-from pam_envs.tasks.rewards import effort_reward, ended_reward, error_reward, excess
+from pam_envs.tasks.rewards import excess
 
 
 @kernel
@@ -100,65 +108,26 @@ def read_joint(rows: Any, fixed: Any, counts: Any, work: Any, j: int) -> None:
 
 
 @kernel
-def evaluate(
-    rows: Any, fixed: Any, counts: Any, ahead: Any, settings: Any, choices: Any, work: Any
-) -> None:
-    """Write observation and report of a tile into ``work``."""
-    copy_rows(rows, work)
+def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
+    """Write readings, rewards, costs, margins and efforts of a tile into ``work``."""
+    config, reference = settings[0], work[L.SIGNALS + choices[CHOICE.fixed]]
     for j in range(LANES):
         read_joint(rows, fixed, counts, work, j)
-        work[L.SIGNALS + 3][j] = rows[K.SET_POINT_A][j]
-        work[L.SIGNALS + 4][j] = rows[K.SET_POINT_B][j]
-        work[L.SIGNALS + 5][j] = rows[L.DECLARED_PAYLOAD][j]
-        work[L.SIGNALS + L.COMMON_SIGNALS][j] = rows[L.ACTION][j]
-        work[L.SIGNALS + L.COMMON_SIGNALS + 1][j] = rows[L.ACTION + 1][j]
-    write_references(counts, ahead, choices, work, L.SIGNALS + choices[L.CHOICE.fixed_signals])
-    judge(rows, fixed, counts, settings, choices, work)
-
-
-@kernel
-def judge(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
-    """Write time, output, rewards, costs, margins and efforts of a tile into ``work``."""
-    config, reference = settings[0], work[L.SIGNALS + choices[L.CHOICE.fixed_signals]]
-    for j in range(LANES):
-        angle, full = rows[K.ANGLE][j], fixed[K.MAX_PRESSURE][j]
-        pressure_a, pressure_b = rows[K.PRESSURE_A][j], rows[K.PRESSURE_B][j]
-        higher = max(pressure_a, pressure_b)
-        work[L.INFO.time][j] = counts[K.STEP][j] * config[PERIOD]
-        work[L.INFO.reference][j] = reference[j]
-        work[L.INFO.output][j] = angle
-        work[L.INFO.reward_tracking][j] = error_reward(
-            angle - reference[j], config[L.CONFIG.error_scale], config[L.CONFIG.tracking_weight]
-        )
+        angle = rows[K.ANGLE][j]
+        report_tracking(work, config, L.INFO, L.CONFIG, reference[j], angle, j)
+        higher = max(rows[K.PRESSURE_A][j], rows[K.PRESSURE_B][j])
         moved = abs(rows[K.SET_POINT_A][j] - rows[L.OLD_SET_A][j])
         moved = moved + abs(rows[K.SET_POINT_B][j] - rows[L.OLD_SET_B][j])
-        work[L.INFO.reward_effort][j] = effort_reward(
-            moved, 2.0 * full, config[L.CONFIG.effort_weight]
-        )
+        full = 2.0 * fixed[K.MAX_PRESSURE][j]
+        report_pressure(work, config, L.INFO, L.CONFIG, higher, moved, full, j)
         work[L.INFO.cost_angle][j] = excess(abs(angle), config[L.CONFIG.soft_angle])
-        work[L.INFO.cost_pressure][j] = excess(higher, config[L.CONFIG.soft_pressure])
-        work[L.INFO.margin_angle][j] = config[L.CONFIG.largest_angle] - abs(angle)
-        work[L.INFO.margin_pressure][j] = config[L.CONFIG.soft_pressure] - higher
-        work[L.ENDED][j] = 1.0 if work[L.INFO.margin_angle][j] < 0.0 else 0.0
-        work[L.INFO.reward_ended][j] = ended_reward(
-            work[L.ENDED][j],
-            work[L.INFO.time][j],
-            config[EPISODE_SECONDS],
-            config[PERIOD],
-            config[L.CONFIG.worst_period],
-        )
-        travel = abs(pressure_a - rows[L.OLD_A][j]) + abs(pressure_b - rows[L.OLD_B][j])
+        margin = config[L.CONFIG.largest_angle] - abs(angle)
+        work[L.INFO.margin_angle][j] = margin
+        report_end(work, config, L.INFO, L.CONFIG, L.ENDED, margin < 0.0, j)
+        travel = abs(change_of(rows, K.PRESSURE_A, L.OLD_A, j))
+        travel = travel + abs(change_of(rows, K.PRESSURE_B, L.OLD_B, j))
         work[L.INFO.effort_pressure_travel][j] = travel
-        work[L.INFO.effort_air][j] = max(0.0, rows[K.AIR][j] - rows[L.OLD_AIR][j])
-        store_period(rows, j)
-
-
-@kernel
-def store_period(rows: Any, j: int) -> None:
-    """Store the pressures and the air from which the next period's effort is counted."""
-    rows[L.OLD_A][j] = rows[K.PRESSURE_A][j]
-    rows[L.OLD_B][j] = rows[K.PRESSURE_B][j]
-    rows[L.OLD_AIR][j] = rows[K.AIR][j]
+        work[L.INFO.effort_air][j] = max(0.0, change_of(rows, K.AIR, L.OLD_AIR, j))
 
 
 @routine
@@ -169,11 +138,9 @@ def begin_joint(
     """Bring lane ``j`` to rest at a drawn angle under a drawn payload, and draw its reference."""
     key_a, key_b, config = counts[K.KEY_A][j], counts[K.KEY_B][j], settings[0]
     counts[K.MEMBER][j] = member
-    payloads = settings[choices[CHOICE.at_own]]
-    number, change = choices[L.CHOICE.payloads], config[L.CONFIG.payload_change]
     draw_payload(
-        rows, key_a, key_b, L.START, payloads, number, change,
-        config[EPISODE_SECONDS], L.DECLARED_PAYLOAD, K.PAYLOAD, j,
+        rows, counts, settings, choices, L.START, choices[L.CHOICE.payloads],
+        config[L.CONFIG.payload_change], L.DECLARED_PAYLOAD, K.PAYLOAD, j,
     )  # fmt: skip
     rows[K.DISTURBANCE][j] = 0.0
     angle = config[L.CONFIG.start_angle] * (2.0 * uniform(key_a, key_b, L.START, 3) - 1.0)
@@ -185,7 +152,8 @@ def begin_joint(
     rows[L.ACTION + 1][j] = rows[K.SET_POINT_B][j] if by_pressure else prestress
     rows[L.OLD_SET_A][j] = rows[K.SET_POINT_A][j]
     rows[L.OLD_SET_B][j] = rows[K.SET_POINT_B][j]
-    store_period(rows, j)
+    rows[L.OLD_A][j], rows[L.OLD_B][j] = rows[K.PRESSURE_A][j], rows[K.PRESSURE_B][j]
+    rows[L.OLD_AIR][j] = rows[K.AIR][j]
     if choices[CHOICE.reference] < SAMPLES:
         low, high = -config[L.CONFIG.amplitude], config[L.CONFIG.amplitude]
         draw_reference(rows, L.REFERENCE, j, key_a, key_b, choices[CHOICE.reference], low, high)
@@ -196,27 +164,25 @@ def kernels_for(kind: str, dynamics: str, extended: bool = False) -> Kernels:
     """Return the kernels for a hysteresis model and a dynamics, plain or with effects."""
     rows = L.HYSTERESIS + 2 * state_rows(kind)
     return Kernels(
-        f"joint_{kind}_{dynamics}" + ("_extended" if extended else ""),
+        "joint",
         kernels_for,
         (kind, dynamics, extended),
         L.REPORT,
-        apply=apply_joint,
-        advance=advance_plant,
-        reference=reference_at,
-        evaluate=evaluate,
-        begin=begin_joint,
+        evaluate,
+        begin_joint,
+        rows=rows + (K.STATE.end if extended else 0),
+        parameters=K.N_PARAMETERS,
+        counts=K.N_COUNTS,
+        set_points=L.ACTION,
+        old_set_points=L.OLD_ACTION,
         config=L.CONFIG,
         choices=L.CHOICE,
+        apply=apply_joint,
+        reference=reference_at,
         placeholders={
             "plant_advance": advance,
             "FIRST_HYSTERESIS": L.HYSTERESIS,
             "FIRST_REFERENCE": L.REFERENCE,
             **replacements(kind, dynamics, rows if extended else None),
         },
-        rows=rows + (K.STATE.end if extended else 0),
-        parameters=K.N_PARAMETERS,
-        counts=K.N_COUNTS,
-        signals=L.COMMON_SIGNALS + 2,
-        set_points=L.ACTION,
-        old_set_points=L.OLD_ACTION,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pam_envs.envs.core.layout import Report, computed, indices
+from pam_envs.envs.core.layout import Report, computed, copied, indices
 from pam_envs.envs.core.step import FIRST_CHOICE, FIRST_CONFIG
 from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.step import N_WORK
@@ -25,28 +25,18 @@ REPORT = Report(
         **computed("cost", "angle", "pressure"),
         **computed("margin", "angle", "pressure"),
         **computed("effort", "pressure_travel", "air"),
-        "state/angle": K.ANGLE,
-        "state/velocity": K.VELOCITY,
-        "state/pressure_a": K.PRESSURE_A,
-        "state/pressure_b": K.PRESSURE_B,
-        "state/set_point_a": K.SET_POINT_A,
-        "state/set_point_b": K.SET_POINT_B,
-        "state/command": K.COMMAND,
-        "state/prestress": K.PRESTRESS,
-        "state/force_a": K.FORCE_A,
-        "state/force_b": K.FORCE_B,
-        "state/torque": K.TORQUE,
-        "state/stiffness": K.STIFFNESS,
-        "state/slack": K.SLACK,
-        "state/disturbance": K.DISTURBANCE,
-        "state/payload": K.PAYLOAD,
+        **copied("state", K, "angle", "velocity", "pressure_a", "pressure_b", "set_point_a"),
+        **copied("state", K, "set_point_b", "command", "prestress", "force_a", "force_b"),
+        **copied("state", K, "torque", "stiffness", "slack", "disturbance", "payload"),
         **computed("sensor", "angle", "pressure_a", "pressure_b"),
     },
     N_WORK,
+    observed=(
+        *(None, None, None, K.SET_POINT_A, K.SET_POINT_B, DECLARED_PAYLOAD),
+        *(ACTION, ACTION + 1),
+    ),
 )
 INFO, ENDED, SIGNALS = REPORT.rows, REPORT.ended, REPORT.signals
-COMMON_SIGNALS = 6
-"""Angle, pressures, their set-points, payload; the actions and then the references follow."""
 
 CONFIG = indices(
     (
@@ -56,7 +46,7 @@ CONFIG = indices(
     ),
     FIRST_CONFIG,
 )
-CHOICE = indices(("mode", "payloads", "fixed_signals"), FIRST_CHOICE)
+CHOICE = indices(("mode", "payloads"), FIRST_CHOICE)
 """The own row of the settings holds the payloads [kg] to draw from."""
 MODES = ("angle", "angle_stiffness", "pressures")
 BY_ANGLE, BY_BOTH, BY_PRESSURE = range(len(MODES))

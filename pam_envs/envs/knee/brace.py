@@ -33,10 +33,13 @@ from __future__ import annotations
 
 from functools import lru_cache, partial
 
-from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments
-from pam_envs.envs.core.plant_env import PlantEnv
+from pam_envs.envs.core.arguments import (
+    Common,
+    Randomisation,
+    environment_arguments,
+    environments,
+)
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose
-from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.envs.knee import brace_layout as L
 from pam_envs.envs.knee.brace_kernels import kernels_for
 from pam_envs.plants.knee_orthosis import rows as R
@@ -138,17 +141,7 @@ def make_setup(
     )
 
 
-class KneeTensionEnv(PlantEnv, make_setup=partial(make_setup, L.TENSION, "no_load")):
-    """Single environment of the tension (see the module's page)."""
-
-
-class KneeTensionVectorEnv(PlantVectorEnv, make_setup=partial(make_setup, L.TENSION, "no_load")):
-    """Batch of environments of the tension (see the module's page)."""
-
-
-class KneeStiffnessEnv(PlantEnv, make_setup=partial(make_setup, L.STIFFNESS, "rig")):
-    """Single environment of the stiffness (see the module's page)."""
-
-
-class KneeStiffnessVectorEnv(PlantVectorEnv, make_setup=partial(make_setup, L.STIFFNESS, "rig")):
-    """Batch of environments of the stiffness (see the module's page)."""
+KneeTensionEnv, KneeTensionVectorEnv = environments("KneeTension", make_setup, L.TENSION, "no_load")
+KneeStiffnessEnv, KneeStiffnessVectorEnv = environments(
+    "KneeStiffness", make_setup, L.STIFFNESS, "rig"
+)

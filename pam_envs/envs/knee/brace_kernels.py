@@ -6,20 +6,33 @@ from functools import lru_cache
 from typing import Any
 
 from pam_envs.envs.core.families import Kernels
-from pam_envs.envs.core.kernels import sense, trajectory_at
-from pam_envs.envs.core.step import CHOICE, PERIOD, copy_rows, write_references
+from pam_envs.envs.core.kernels import change_of, report_pressure, report_tracking, sense
+from pam_envs.envs.core.step import CHOICE, PERIOD
 from pam_envs.envs.knee import brace_layout as L
-from pam_envs.envs.knee.kernels import advance_knee
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import uniform
 from pam_envs.mechanics.knee_lever import muscle_length
 from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.step import SENSED, begin_lane, replacements
+from pam_envs.plants.knee_orthosis.step import SENSED, advance, begin_lane, replacements
 from pam_envs.references import trajectory as T
 from pam_envs.references.trajectory import draw_reference
-from pam_envs.tasks.rewards import effort_reward, error_reward, excess
+
+FIRST_HYSTERESIS = 0  # a placeholder: first row of the state of the hysteresis
+
+
+@kernel
+def advance_knee(
+    rows: Any, fixed: Any, counts: Any, tables: Any, samples: Any, settings: Any, choices: Any,
+    work: Any,
+) -> None:  # fmt: skip
+    """Advance the plant by a control period."""
+    gait = settings[choices[CHOICE.at_own] :]
+    advance(
+        rows, fixed, counts, tables, gait, FIRST_HYSTERESIS, choices[CHOICE.elements],
+        choices[CHOICE.substeps], settings[0][PERIOD], work,
+    )  # fmt: skip
 
 
 @kernel
@@ -39,45 +52,27 @@ def read_brace(rows: Any, fixed: Any, counts: Any, work: Any, j: int) -> None:
 
 
 @kernel
-def evaluate(
-    rows: Any, fixed: Any, counts: Any, ahead: Any, settings: Any, choices: Any, work: Any
-) -> None:
-    """Write observation and report of a tile into ``work``."""
-    set_point = rows[K.SET_POINT]
-    copy_rows(rows, work)
+def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
+    """Write readings, rewards, costs, margins and efforts of a tile into ``work``."""
+    config, reference = settings[0], work[L.SIGNALS + choices[CHOICE.fixed]]
+    tracked = K.STIFFNESS if choices[L.CHOICE.quantity] == L.STIFFNESS else K.TENSION
     for j in range(LANES):
         read_brace(rows, fixed, counts, work, j)
-        work[L.SIGNALS + 4][j] = set_point[j]
-    write_references(counts, ahead, choices, work, L.SIGNALS + L.FIXED_SIGNALS)
-    judge(rows, fixed, counts, settings[0], choices, work)
+        report_tracking(work, config, L.INFO, L.CONFIG, reference[j], rows[tracked][j], j)
+        report_brace(rows, fixed, config, work, L.INFO, L.CONFIG, j)
+        margin = config[L.CONFIG.highest_tension] - rows[K.TENSION][j]
+        work[L.INFO.margin_tension][j] = margin
+        work[L.ENDED][j] = 1.0 if margin < 0.0 else 0.0
+        work[L.INFO.effort_air][j] = max(0.0, change_of(rows, K.AIR, K.OLD_AIR, j))
 
 
 @kernel
-def judge(rows: Any, fixed: Any, counts: Any, config: Any, choices: Any, work: Any) -> None:
-    """Write time, output, rewards, costs, margins and efforts of a tile into ``work``."""
-    pressure, set_point, older = rows[K.PRESSURE], rows[K.SET_POINT], rows[K.OLD_SET_POINT]
-    stiffness = choices[L.CHOICE.quantity] == L.STIFFNESS
-    reference = work[L.SIGNALS + L.FIXED_SIGNALS]
-    for j in range(LANES):
-        output = rows[K.STIFFNESS][j] if stiffness else rows[K.TENSION][j]
-        work[L.INFO.time][j] = counts[K.STEP][j] * config[PERIOD]
-        work[L.INFO.output][j] = output
-        work[L.INFO.reference][j] = reference[j]
-        work[L.INFO.reward_tracking][j] = error_reward(
-            output - reference[j], config[L.CONFIG.error_scale], config[L.CONFIG.tracking_weight]
-        )
-        work[L.INFO.reward_effort][j] = effort_reward(
-            set_point[j] - older[j], fixed[K.MAX_PRESSURE][j], config[L.CONFIG.effort_weight]
-        )
-        work[L.INFO.cost_pressure][j] = excess(pressure[j], config[L.CONFIG.soft_pressure])
-        margin = config[L.CONFIG.highest_tension] - rows[K.TENSION][j]
-        work[L.INFO.margin_tension][j] = margin
-        work[L.INFO.margin_pressure][j] = config[L.CONFIG.soft_pressure] - pressure[j]
-        work[L.ENDED][j] = 1.0 if margin < 0.0 else 0.0
-        work[L.INFO.effort_pressure_travel][j] = abs(pressure[j] - rows[K.OLD_PRESSURE][j])
-        work[L.INFO.effort_air][j] = max(0.0, rows[K.AIR][j] - rows[K.OLD_AIR][j])
-        rows[K.OLD_PRESSURE][j] = pressure[j]
-        rows[K.OLD_AIR][j] = rows[K.AIR][j]
+def report_brace(rows: Any, fixed: Any, config: Any, work: Any, info: Any, at: Any, j: int) -> None:
+    """Write costs, margins and efforts of the muscle's pressure."""
+    moved, full = rows[K.SET_POINT][j] - rows[K.OLD_SET_POINT][j], fixed[K.MAX_PRESSURE][j]
+    report_pressure(work, config, info, at, rows[K.PRESSURE][j], moved, full, j)
+    travel = change_of(rows, K.PRESSURE, K.OLD_PRESSURE, j)
+    work[info.effort_pressure_travel][j] = abs(travel)
 
 
 @routine
@@ -119,25 +114,23 @@ def kernels_for(kind: str, mounting: str, dynamics: str, extended: bool = False)
     """Return the kernels for a hysteresis model, mounting and dynamics, plain or with effects."""
     rows = L.HYSTERESIS + state_rows(kind)
     return Kernels(
-        f"brace_{kind}_{mounting}_{dynamics}" + ("_extended" if extended else ""),
+        "brace",
         kernels_for,
         (kind, mounting, dynamics, extended),
         L.REPORT,
-        advance=advance_knee,
-        reference=trajectory_at,
-        evaluate=evaluate,
-        begin=begin_brace,
+        evaluate,
+        begin_brace,
+        rows=rows + (K.STATE.end if extended else 0),
+        parameters=K.N_PARAMETERS,
+        counts=K.N_COUNTS,
+        set_points=K.SET_POINT,
+        old_set_points=K.OLD_SET_POINT,
         config=L.CONFIG,
         choices=L.CHOICE,
+        advance=advance_knee,
         placeholders={
             "FIRST_HYSTERESIS": L.HYSTERESIS,
             "FIRST_REFERENCE": L.REFERENCE,
             **replacements(kind, mounting, dynamics, rows if extended else None),
         },
-        rows=rows + (K.STATE.end if extended else 0),
-        parameters=K.N_PARAMETERS,
-        counts=K.N_COUNTS,
-        signals=L.FIXED_SIGNALS,
-        set_points=K.SET_POINT,
-        old_set_points=K.OLD_SET_POINT,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pam_envs.envs.core.layout import Report, computed, indices
+from pam_envs.envs.core.layout import Report, computed, copied, indices
 from pam_envs.envs.core.step import FIRST_CHOICE, FIRST_CONFIG
 from pam_envs.parameters import declarations
 from pam_envs.plants.knee_orthosis import rows as K
@@ -21,19 +21,13 @@ REPORT = Report(
         **computed("cost", "pressure"),
         **computed("margin", "tension", "pressure"),
         **computed("effort", "pressure_travel", "air"),
-        "state/tension": K.TENSION,
-        "state/stiffness": K.STIFFNESS,
-        "state/angle": K.ANGLE,
-        "state/velocity": K.VELOCITY,
-        "state/length": K.LENGTH,
-        "state/pressure": K.PRESSURE,
+        **copied("state", K, "tension", "stiffness", "angle", "velocity", "length", "pressure"),
         **computed("sensor", "tension", "stiffness", "angle", "pressure"),
     },
     N_WORK,
+    observed=(None, None, None, None, K.SET_POINT),
 )
 INFO, ENDED, SIGNALS = REPORT.rows, REPORT.ended, REPORT.signals
-FIXED_SIGNALS = 5
-"""Readings of tension, stiffness, angle and pressure, set-point; the references follow."""
 
 CONFIG = indices(
     (

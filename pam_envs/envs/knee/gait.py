@@ -45,10 +45,13 @@ from __future__ import annotations
 from functools import lru_cache, partial
 from typing import Any
 
-from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments
-from pam_envs.envs.core.plant_env import PlantEnv
+from pam_envs.envs.core.arguments import (
+    Common,
+    Randomisation,
+    environment_arguments,
+    environments,
+)
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose
-from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.envs.knee.gait_kernels import kernels_for
 from pam_envs.envs.knee.gait_layout import SOURCES
 from pam_envs.muscle.emg import calibration
@@ -171,7 +174,6 @@ def make_setup(
         references=[("reference", "N", *TENSIONS), ("angle_reference", "rad", *ANGLES)],
         action=[("pressure_set_point", "Pa", 0.0, full)],
         config=config,
-        choices={},
         reference=source,
         own=made.gait_table(),
         samples=samples,
@@ -181,25 +183,8 @@ def make_setup(
     )
 
 
-class KneeWalkEnv(PlantEnv, make_setup=partial(make_setup, "walk")):
-    """Single environment of level walking (see the module's page)."""
-
-
-class KneeWalkVectorEnv(PlantVectorEnv, make_setup=partial(make_setup, "walk")):
-    """Batch of environments of level walking (see the module's page)."""
-
-
-class KneeStairsUpEnv(PlantEnv, make_setup=partial(make_setup, "stairs_up")):
-    """Single environment of stairs up (see the module's page)."""
-
-
-class KneeStairsUpVectorEnv(PlantVectorEnv, make_setup=partial(make_setup, "stairs_up")):
-    """Batch of environments of stairs up (see the module's page)."""
-
-
-class KneeStairsDownEnv(PlantEnv, make_setup=partial(make_setup, "stairs_down")):
-    """Single environment of stairs down (see the module's page)."""
-
-
-class KneeStairsDownVectorEnv(PlantVectorEnv, make_setup=partial(make_setup, "stairs_down")):
-    """Batch of environments of stairs down (see the module's page)."""
+KneeWalkEnv, KneeWalkVectorEnv = environments("KneeWalk", make_setup, "walk")
+KneeStairsUpEnv, KneeStairsUpVectorEnv = environments("KneeStairsUp", make_setup, "stairs_up")
+KneeStairsDownEnv, KneeStairsDownVectorEnv = environments(
+    "KneeStairsDown", make_setup, "stairs_down"
+)

@@ -12,11 +12,11 @@ from functools import lru_cache
 from typing import Any
 
 from pam_envs.envs.core.families import Kernels
-from pam_envs.envs.core.kernels import sense
-from pam_envs.envs.core.step import CHOICE, PERIOD, copy_rows, write_references
+from pam_envs.envs.core.kernels import change_of, sense
+from pam_envs.envs.core.step import CHOICE, PERIOD
 from pam_envs.envs.knee import gait_layout as L
+from pam_envs.envs.knee.brace_kernels import advance_knee, report_brace
 from pam_envs.envs.knee.gait_plan import lean, planned_reference, pressure_for, prime
-from pam_envs.envs.knee.kernels import advance_knee
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, routine
@@ -28,7 +28,7 @@ from pam_envs.plants.knee_orthosis.step import SENSED, begin_lane, replacements
 from pam_envs.sensing.butterworth import butterworth
 from pam_envs.sensing.shoe import estimated_torque
 from pam_envs.tasks.gait_assistance import desired_assistance, gated_reward, over_assistance
-from pam_envs.tasks.rewards import effort_reward, excess
+from pam_envs.tasks.rewards import excess
 
 VENTED = 1e3
 """Gauge pressure [Pa] up to which a growing muscle draws ambient air, at no cost."""
@@ -122,39 +122,20 @@ def advance_leg(
 
 
 @kernel
-def evaluate(
-    rows: Any, fixed: Any, counts: Any, ahead: Any, settings: Any, choices: Any, work: Any
-) -> None:
-    """Write observation and report of a tile into ``work``."""
-    copy_rows(rows, work)
-    judge(rows, fixed, counts, settings, work)
-    for k in range(L.FIXED_SIGNALS):
-        source, to = rows[L.OBSERVED_ROWS[k]], work[L.SIGNALS + k]
-        for j in range(LANES):
-            to[j] = source[j]
-    first = L.SIGNALS + L.FIXED_SIGNALS
-    write_references(counts, ahead, choices, work, first)
+def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
+    """Write true references, rewards, costs, margins and efforts of a tile into ``work``."""
+    config, first = settings[0], L.SIGNALS + choices[CHOICE.fixed]
     other = first + choices[CHOICE.preview] + 1
-    for j in range(LANES):  # the present references are the true ones and not the planned ones
-        work[first][j] = rows[L.DESIRED_TENSION][j]
-        work[other][j] = rows[L.DESIRED_ANGLE][j]
-
-
-@kernel
-def judge(rows: Any, fixed: Any, counts: Any, settings: Any, work: Any) -> None:
-    """Write time, tension, rewards, costs, margins and efforts of a tile into ``work``."""
-    config, step = settings[0], counts[K.STEP]
-    pressure, set_point, older = rows[K.PRESSURE], rows[K.SET_POINT], rows[K.OLD_SET_POINT]
     for j in range(LANES):
+        desired, angle = rows[L.DESIRED_TENSION][j], rows[L.DESIRED_ANGLE][j]
+        work[first][j], work[other][j] = desired, angle  # true and not planned
         stance, tension, off = rows[K.STANCE][j], rows[K.TENSION][j], abs(rows[K.DEVIATION][j])
         seen, demand = rows[L.READ_STANCE][j], rows[K.DEMAND][j]
         over = over_assistance(rows[K.TORQUE][j], demand)
-        work[L.INFO.time][j] = step[j] * config[PERIOD]
-        work[L.INFO.reference][j] = rows[L.DESIRED_TENSION][j]
-        work[L.INFO.output][j] = tension
+        work[L.INFO.reference][j], work[L.INFO.output][j] = desired, tension
         work[L.INFO.state_torque_ideal][j] = config[L.CONFIG.ratio] * demand
         work[L.INFO.reward_tension][j] = gated_reward(
-            tension - rows[L.DESIRED_TENSION][j],
+            tension - desired,
             stance * seen,
             config[L.CONFIG.tension_scale],
             config[L.CONFIG.tension_weight],
@@ -168,22 +149,15 @@ def judge(rows: Any, fixed: Any, counts: Any, settings: Any, work: Any) -> None:
         work[L.INFO.reward_over_assistance][j] = gated_reward(
             over, 1.0, config[L.CONFIG.over_scale], config[L.CONFIG.over_weight]
         )
-        work[L.INFO.reward_effort][j] = effort_reward(
-            set_point[j] - older[j], fixed[K.MAX_PRESSURE][j], config[L.CONFIG.effort_weight]
-        )
-        work[L.INFO.cost_pressure][j] = excess(pressure[j], config[L.CONFIG.soft_pressure])
+        report_brace(rows, fixed, config, work, L.INFO, L.CONFIG, j)
         work[L.INFO.cost_deviation][j] = excess(off, config[L.CONFIG.soft_deviation])
         work[L.INFO.margin_tension][j] = config[L.CONFIG.highest_tension] - tension
         work[L.INFO.margin_deviation][j] = config[L.CONFIG.largest_deviation] - off
-        work[L.INFO.margin_pressure][j] = config[L.CONFIG.soft_pressure] - pressure[j]
         broken = min(work[L.INFO.margin_tension][j], work[L.INFO.margin_deviation][j])
         work[L.ENDED][j] = 1.0 if broken < 0.0 else 0.0
         work[L.INFO.effort_over_assistance][j] = over
-        work[L.INFO.effort_pressure_travel][j] = abs(pressure[j] - rows[K.OLD_PRESSURE][j])
-        drawn = max(0.0, rows[K.AIR][j] - rows[K.OLD_AIR][j])
-        work[L.INFO.effort_air][j] = drawn if pressure[j] > VENTED else 0.0
-        rows[K.OLD_PRESSURE][j] = pressure[j]
-        rows[K.OLD_AIR][j] = rows[K.AIR][j]
+        drawn = max(0.0, change_of(rows, K.AIR, K.OLD_AIR, j))
+        work[L.INFO.effort_air][j] = drawn if rows[K.PRESSURE][j] > VENTED else 0.0
 
 
 @routine
@@ -195,24 +169,13 @@ def begin_leg(
     key_a, key_b, config = counts[K.KEY_A][j], counts[K.KEY_B][j], settings[0]
     counts[K.MEMBER][j] = member
     gait = settings[choices[CHOICE.at_own] :]
-    phase = config[L.CONFIG.start_phase]
-    if phase < 0.0:
-        phase = uniform(key_a, key_b, L.START, 0)
+    start = config[L.CONFIG.start_phase]
+    phase = uniform(key_a, key_b, L.START, 0) if start < 0.0 else start
     share = 1.0 + config[L.CONFIG.start_spread] * (2.0 * uniform(key_a, key_b, L.START, 1) - 1.0)
     torque = prime(rows, fixed, settings, choices, phase, j)
     pressure = share * pressure_for(fixed, gait, torque, phase, j)
-    begin_lane(
-        rows,
-        fixed,
-        counts,
-        tables,
-        gait,
-        L.HYSTERESIS,
-        choices[CHOICE.elements],
-        j,
-        phase,
-        pressure,
-    )
+    elements = choices[CHOICE.elements]
+    begin_lane(rows, fixed, counts, tables, gait, L.HYSTERESIS, elements, j, phase, pressure)
     for k in range(len(L.SENSORS)):
         read(rows, fixed, counts, k, 0, j)
     share_of_torque(rows, fixed, settings, choices, j)
@@ -231,24 +194,23 @@ def kernels_for(kind: str, dynamics: str, extended: bool = False) -> Kernels:
     """Return the kernels for a hysteresis model and a dynamics, plain or with effects."""
     rows = L.HYSTERESIS + state_rows(kind)
     return Kernels(
-        f"gait_{kind}_{dynamics}" + ("_extended" if extended else ""),
+        "gait",
         kernels_for,
         (kind, dynamics, extended),
         L.REPORT,
+        evaluate,
+        begin_leg,
+        rows=rows + (K.STATE.end if extended else 0),
+        parameters=K.N_PARAMETERS,
+        counts=K.N_COUNTS,
+        set_points=K.SET_POINT,
+        old_set_points=K.OLD_SET_POINT,
+        channels=L.CHANNELS,
+        config=L.CONFIG,
         advance=advance_leg,
         reference=planned_reference,
-        evaluate=evaluate,
-        begin=begin_leg,
-        config=L.CONFIG,
         placeholders={
             "FIRST_HYSTERESIS": L.HYSTERESIS,
             **replacements(kind, "leg", dynamics, rows if extended else None),
         },
-        rows=rows + (K.STATE.end if extended else 0),
-        parameters=K.N_PARAMETERS,
-        counts=K.N_COUNTS,
-        signals=L.FIXED_SIGNALS,
-        set_points=K.SET_POINT,
-        old_set_points=K.OLD_SET_POINT,
-        channels=L.CHANNELS,
     )

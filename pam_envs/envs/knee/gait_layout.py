@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pam_envs.envs.core.layout import Report, computed, indices
+from pam_envs.envs.core.layout import Report, computed, copied, indices
 from pam_envs.envs.core.step import FIRST_CONFIG
 from pam_envs.parameters import declarations
 from pam_envs.plants.knee_orthosis import rows as K
@@ -11,34 +11,19 @@ from pam_envs.sensing.butterworth import ROWS as FILTER_ROWS
 from pam_envs.tasks.gait_assistance import GaitAssistance
 
 # the environment's own state, after the plant's
-(
-    READ_TENSION,
-    READ_ANGLE,
-    READ_PRESSURE,
-    READ_HEEL,
-    READ_GROUND,
-    READ_COP,
-    READ_ANKLE,
-    READ_STANCE,
-    DESIRED_TORQUE,
-    DESIRED_TENSION,
-    DESIRED_ANGLE,
-    BEARS,
-    BEARS_FREE,
-    FILTER,
-) = range(K.END, K.END + 14)
+READ_TENSION, READ_ANGLE, READ_PRESSURE, READ_HEEL, READ_GROUND, READ_COP, READ_ANKLE = range(
+    K.END, K.END + 7
+)
+READ_STANCE, DESIRED_TORQUE, DESIRED_TENSION, DESIRED_ANGLE, BEARS, BEARS_FREE, FILTER = range(
+    READ_ANKLE + 1, READ_ANKLE + 8
+)
 PLAN_FILTER = FILTER + FILTER_ROWS
 HYSTERESIS = PLAN_FILTER + FILTER_ROWS
 """First row of the state of the hysteresis."""
 
 SENSORS = (
-    K.TENSION_NOISE,
-    K.ANGLE_NOISE,
-    K.PRESSURE_NOISE,
-    K.HEEL_NOISE,
-    K.GROUND_NOISE,
-    K.COP_NOISE,
-    K.ANKLE_NOISE,
+    *(K.TENSION_NOISE, K.ANGLE_NOISE, K.PRESSURE_NOISE, K.HEEL_NOISE, K.GROUND_NOISE),
+    *(K.COP_NOISE, K.ANKLE_NOISE),
 )
 """First row of the parameters of each reading's sensor, from ``READ_TENSION`` on."""
 
@@ -55,26 +40,14 @@ REPORT = Report(
         "effort/extensors_free_calibrated": BEARS_FREE,
         "effort/flexors": K.FLEXORS,
         "effort/flexors_free": K.FLEXORS_FREE,
-        "state/tension": K.TENSION,
-        "state/stiffness": K.STIFFNESS,
-        "state/length": K.LENGTH,
-        "state/angle": K.ANGLE,
-        "state/velocity": K.VELOCITY,
+        **copied("state", K, "tension", "stiffness", "length", "angle", "velocity"),
         "state/angle_reference": DESIRED_ANGLE,
-        "state/deviation": K.DEVIATION,
-        "state/pressure": K.PRESSURE,
-        "state/torque": K.TORQUE,
+        **copied("state", K, "deviation", "pressure", "torque"),
         "state/torque_reference": DESIRED_TORQUE,
-        "state/demand": K.DEMAND,
-        "state/estimate": K.ESTIMATE,
+        **copied("state", K, "demand", "estimate"),
         "state/ground_force": K.GROUND_Z,
         "state/ground_force_ahead": K.GROUND_X,
-        "state/cop": K.COP,
-        "state/knee": K.KNEE,
-        "state/shank": K.SHANK,
-        "state/ankle": K.ANKLE,
-        "state/phase": K.PHASE,
-        "state/stance": K.STANCE,
+        **copied("state", K, "cop", "knee", "shank", "ankle", "phase", "stance"),
         "sensor/tension": READ_TENSION,
         "sensor/angle": READ_ANGLE,
         "sensor/pressure": READ_PRESSURE,
@@ -82,19 +55,12 @@ REPORT = Report(
         "sensor/stance": READ_STANCE,
     },
     N_WORK,
+    observed=(
+        *(READ_TENSION, READ_ANGLE, READ_PRESSURE, K.SET_POINT, READ_STANCE, READ_GROUND),
+        DESIRED_TORQUE,
+    ),
 )
 INFO, ENDED, SIGNALS = REPORT.rows, REPORT.ended, REPORT.signals
-OBSERVED_ROWS = (
-    READ_TENSION,
-    READ_ANGLE,
-    READ_PRESSURE,
-    K.SET_POINT,
-    READ_STANCE,
-    READ_GROUND,
-    DESIRED_TORQUE,
-)
-"""Rows of the state that are copied into the observation."""
-FIXED_SIGNALS = len(OBSERVED_ROWS)
 CHANNELS = 2
 TENSION_CHANNEL, ANGLE_CHANNEL = range(CHANNELS)
 

@@ -51,18 +51,16 @@ from pam_envs.envs.core.arguments import (
     Common,
     Randomisation,
     environment_arguments,
-    payloads_of,
+    environments,
+    masses_of,
 )
-from pam_envs.envs.core.plant_env import PlantEnv
 from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, compose
-from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.envs.manipulator.kernels import kernels_for
 from pam_envs.envs.manipulator.layout import MODES, POSE, joint_names, muscle_names
 from pam_envs.envs.manipulator.paths import paths_for
 from pam_envs.plants.antagonistic_joint.bearing import bearable_payload, check_borne
 from pam_envs.plants.redundant_manipulator import rows as R
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
-from pam_envs.plants.single_muscle.hysteresis import Kind
 from pam_envs.tasks.joint_tracking import PathTracking
 
 ANGLES = (-0.8, 0.8)
@@ -79,9 +77,7 @@ RANDOMISATION = Randomisation(
 )
 
 
-@lru_cache(maxsize=8)
-def _default(hysteresis: Kind) -> RedundantManipulator:
-    return RedundantManipulator.paper(hysteresis)
+default_plant = lru_cache(maxsize=8)(RedundantManipulator.paper)
 
 
 def _pose(plant: RedundantManipulator, key: str) -> list[Part]:
@@ -125,7 +121,7 @@ def _payloads(
     if payload is None:
         borne = [bearable_payload(plant, plan, by_pressure) for plan in plans.values()]
         most = max(0.0, min(most, *borne) - change)
-    payloads = payloads_of(payload, most)
+    payloads = masses_of("payload", payload, MOST_PAYLOAD, np.linspace(0.0, most, 6))
     for name, plan in plans.items():
         check_borne(plant, plan, float(payloads.max()) + change, name, by_pressure)
     return payloads
@@ -175,7 +171,7 @@ def make_setup(
     UnbearableLoad
         If its muscles cannot hold it there with the heaviest payload.
     """
-    made = given.plant_of(RedundantManipulator, _default)
+    made = given.plant_of(RedundantManipulator, default_plant)
     check_choice("action", action, MODES)
     check_choice("plan", plan, (True, False))
     check_choice("weighted", weighted, (True, False))
@@ -221,9 +217,6 @@ def make_setup(
     )
 
 
-class RedundantManipulatorEnv(PlantEnv, make_setup=make_setup):
-    """Single environment (see the module's page)."""
-
-
-class RedundantManipulatorVectorEnv(PlantVectorEnv, make_setup=make_setup):
-    """Batch of environments (see the module's page)."""
+RedundantManipulatorEnv, RedundantManipulatorVectorEnv = environments(
+    "RedundantManipulator", make_setup
+)

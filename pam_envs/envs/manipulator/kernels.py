@@ -10,9 +10,8 @@ from functools import lru_cache
 from typing import Any
 
 from pam_envs.envs.core.families import Kernels
-from pam_envs.envs.core.kernels import advance_plant, sense
-from pam_envs.envs.core.payload import change_payload, draw_payload
-from pam_envs.envs.core.step import CHANNELS, CHOICE, EPISODE_SECONDS, FIRST_INFO, N_INFO, PERIOD
+from pam_envs.envs.core.kernels import advance_plant, change_payload, draw_payload, sense
+from pam_envs.envs.core.step import CHANNELS, CHOICE, FIRST_INFO, N_INFO, PERIOD
 from pam_envs.envs.manipulator import layout as L
 from pam_envs.envs.manipulator.report import evaluate
 from pam_envs.kernels.build import LANES, kernel, routine
@@ -107,11 +106,9 @@ def begin_chain(
     """Bring lane ``j`` to rest at the beginning of a drawn path, under a drawn payload."""
     key_a, key_b, config = counts[M.KEY_A][j], counts[M.KEY_B][j], settings[0]
     counts[M.MEMBER][j] = member
-    payloads = settings[choices[CHOICE.at_own]]
-    number, change = choices[L.CHOICE.payloads], config[L.CONFIG.payload_change]
     draw_payload(
-        rows, key_a, key_b, L.START, payloads, number, change,
-        config[EPISODE_SECONDS], L.DECLARED_PAYLOAD, M.PAYLOAD, j,
+        rows, counts, settings, choices, L.START, choices[L.CHOICE.payloads],
+        config[L.CONFIG.payload_change], L.DECLARED_PAYLOAD, M.PAYLOAD, j,
     )  # fmt: skip
     path = int(uniform(key_a, key_b, L.START, 3) * choices[L.CHOICE.paths])
     rows[L.PATH][j] = path
@@ -136,27 +133,26 @@ def kernels_for(kind: str, stages: int, extended: bool = False) -> Kernels:
     """Return the kernels for a kind of hysteresis and a number of joints, plain or with effects."""
     rows = L.HYSTERESIS + hysteresis_rows(kind, stages)
     return Kernels(
-        f"manipulator_{kind}_{stages}" + ("_extended" if extended else ""),
+        "manipulator",
         kernels_for,
         (kind, stages, extended),
         L.report_for(stages),
+        evaluate,
+        begin_chain,
+        rows=rows + (M.STATE.end if extended else 0),
+        parameters=M.CHAIN + parameter_rows(stages),
+        counts=M.N_COUNTS,
+        set_points=L.ACTION,
+        old_set_points=L.OLD_ACTION,
+        channels=L.N_POSE + stages,
+        config=L.CONFIG,
+        choices=L.CHOICE,
         apply=apply_chain,
         advance=advance_chain,
         reference=path_at,
-        evaluate=evaluate,
-        begin=begin_chain,
-        config=L.CONFIG,
-        choices=L.CHOICE,
         placeholders={
             "plant_advance": advance,
             "FIRST_HYSTERESIS": L.HYSTERESIS,
             **replacements(kind, stages, rows if extended else None),
         },
-        rows=rows + (M.STATE.end if extended else 0),
-        parameters=M.CHAIN + parameter_rows(stages),
-        counts=M.N_COUNTS,
-        signals=6 * stages + 1 + L.N_POSE,
-        set_points=L.ACTION,
-        old_set_points=L.OLD_ACTION,
-        channels=L.N_POSE + stages,
     )

@@ -103,4 +103,12 @@ def report_for(stages: int) -> Report:
     for key, row in BY_MUSCLE.items():
         entries |= {name: row + k for k, name in enumerate(muscle_names(key, stages))}
     entries |= dict.fromkeys(joint_names("state/joint_reference", stages))
-    return Report(entries, work_rows(stages))
+    observed = (
+        *range(READ_ANGLE, READ_ANGLE + stages),
+        *range(RATE, RATE + stages),
+        *range(READ_PRESSURE, READ_PRESSURE + 2 * stages),
+        DECLARED_PAYLOAD,
+        *[None] * N_POSE,
+        *range(ACTION, ACTION + 2 * stages),
+    )
+    return Report(entries, work_rows(stages), observed)

@@ -29,20 +29,19 @@ Arguments: :func:`make_setup`, and those of every environment
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments
-from pam_envs.envs.core.plant_env import PlantEnv
+from pam_envs.envs.core.arguments import (
+    Common,
+    Randomisation,
+    environment_arguments,
+    environments,
+    masses_of,
+)
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose
-from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.envs.positioning.kernels import kernels_for
 from pam_envs.plants.single_muscle import rows as R
-from pam_envs.plants.single_muscle.hysteresis import Kind
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.references.trajectory import FAMILIES, sines_needed
 from pam_envs.tasks.tracking import Tracking
@@ -67,23 +66,7 @@ RANDOMISATION = Randomisation(
 )
 
 
-@lru_cache(maxsize=8)
-def _default(hysteresis: Kind) -> SingleMuscle:
-    return SingleMuscle.mas10(hysteresis)
-
-
-def _loads(load: Any) -> NDArray[np.float64]:
-    """Return the loads [kg] from which episodes draw."""
-    values = LOADS if load is None else load
-    if isinstance(values, (int, float, np.integer, np.floating)):
-        values = (values,)
-    if (
-        not isinstance(values, (Sequence, np.ndarray))
-        or isinstance(values, str)
-        or len(values) == 0
-    ):
-        raise ValueError(f"load = {load!r} must be a number of kg, several of them, or None")
-    return np.array([check_number("load", v, 0.0, HIGHEST_LOAD, "kg") for v in values])
+default_plant = lru_cache(maxsize=8)(SingleMuscle.mas10)
 
 
 @environment_arguments(reference="steps", preview=5, preview_stride=4, episode_seconds=10.0)
@@ -106,8 +89,8 @@ def make_setup(
     start : {"random", "rest"}
         Random pressure history, or never inflated.
     """
-    made = given.plant_of(SingleMuscle, _default)
-    loads = _loads(load)
+    made = given.plant_of(SingleMuscle, default_plant)
+    loads = masses_of("load", load, HIGHEST_LOAD, LOADS)
     family, samples = given.reference_of(FAMILIES, "m", 0.2)
     check_choice("start", start, ("random", "rest"))
     task, full = given.task_of(Tracking), made.regulator.max_pressure
@@ -134,10 +117,10 @@ def make_setup(
         references=[("reference", *position)],
         action=[("pressure_set_point", *pressure)],
         config=config,
-        choices={"loads": len(loads)},
+        choices={"loads": loads.size},
         reference=family,
         sines=sines_needed(family),
-        own=loads[None],
+        own=loads,
         samples=samples,
         tables=made.hysteresis_tables(),
         spread=spread,
@@ -145,9 +128,4 @@ def make_setup(
     )
 
 
-class MusclePositioningEnv(PlantEnv, make_setup=make_setup):
-    """Single environment (see the module's page)."""
-
-
-class MusclePositioningVectorEnv(PlantVectorEnv, make_setup=make_setup):
-    """Batch of environments (see the module's page)."""
+MusclePositioningEnv, MusclePositioningVectorEnv = environments("MusclePositioning", make_setup)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pam_envs.envs.core.layout import Report, computed, indices
+from pam_envs.envs.core.layout import Report, computed, copied, indices
 from pam_envs.envs.core.step import FIRST_CHOICE, FIRST_CONFIG
 from pam_envs.parameters import declarations
 from pam_envs.plants.single_muscle import rows as R
@@ -21,17 +21,13 @@ REPORT = Report(
         **computed("margin", "contraction", "pressure"),
         **computed("effort", "pressure_travel", "air"),
         **computed("state", "contraction"),
-        "state/velocity": R.VELOCITY,
-        "state/pressure": R.PRESSURE,
-        "state/drive": R.DRIVE,
-        "state/load": R.LOAD,
+        **copied("state", R, "velocity", "pressure", "drive", "load"),
         **computed("sensor", "contraction", "pressure"),
     },
     N_WORK,
+    observed=(None, None, R.SET_POINT, R.TOLD_LOAD),
 )
 INFO, ENDED, SIGNALS = REPORT.rows, REPORT.ended, REPORT.signals
-FIXED_SIGNALS = 4
-"""Contraction, pressure, set-point, load; the references follow."""
 
 CONFIG = indices(
     (*declarations(Tracking), "reference_low", "reference_high", "start_share", "load_change"),

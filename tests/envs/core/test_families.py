@@ -17,7 +17,7 @@ from pam_envs.envs.core.families import Kernels
 from pam_envs.envs.core.layout import Report, computed
 from pam_envs.envs.core.plant_env import PlantEnv
 from pam_envs.envs.core.setup import Setup, compose
-from pam_envs.envs.core.step import PERIOD, copy_rows, write_references
+from pam_envs.envs.core.step import PERIOD
 from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import normal, uniform
@@ -28,6 +28,7 @@ MASS = 0
 REPORT = Report(
     {**computed("reward", "near", "calm"), "state/drift": DRIFT},
     scratch=0,
+    observed=tuple(range(PLACE, PLACE + CARTS)),
 )
 INFO, ENDED, SIGNALS = REPORT.rows, REPORT.ended, REPORT.signals
 FARTHEST = 5.0
@@ -41,15 +42,9 @@ def drift(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work:
 
 @kernel
 def roll(
-    rows: Any,
-    fixed: Any,
-    counts: Any,
-    tables: Any,
-    samples: Any,
-    settings: Any,
-    choices: Any,
+    rows: Any, fixed: Any, counts: Any, tables: Any, samples: Any, settings: Any, choices: Any,
     work: Any,
-) -> None:
+) -> None:  # fmt: skip
     for k in range(CARTS):
         for j in range(LANES):
             push = (rows[PUSH + k][j] + rows[DRIFT][j]) / fixed[MASS][j]
@@ -58,49 +53,29 @@ def roll(
 
 @kernel
 def desired(
-    rows: Any,
-    fixed: Any,
-    samples: Any,
-    settings: Any,
-    choices: Any,
-    step: int,
-    lane: int,
+    rows: Any, fixed: Any, samples: Any, settings: Any, choices: Any, step: int, lane: int,
     channel: int,
-) -> float:
+) -> float:  # fmt: skip
     return 0.01 * (channel + 1) * step
 
 
 @kernel
-def judge(
-    rows: Any, fixed: Any, counts: Any, ahead: Any, settings: Any, choices: Any, work: Any
-) -> None:
-    copy_rows(rows, work)
+def judge(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
     for j in range(LANES):
-        work[INFO.time][j] = counts[3][j] * settings[0][PERIOD]
         far, change = 0.0, 0.0
         for k in range(CARTS):
-            work[SIGNALS + k][j] = rows[PLACE + k][j]
             far = max(far, abs(rows[PLACE + k][j]))
             change = change + abs(rows[PUSH + k][j] - rows[OLD_PUSH + k][j])
         work[INFO.reference][j], work[INFO.output][j] = fixed[MASS][j], far
         work[INFO.reward_near][j], work[INFO.reward_calm][j] = -far, -change
         work[ENDED][j] = 1.0 if far > FARTHEST else 0.0
-    write_references(counts, ahead, choices, work, SIGNALS + CARTS)
 
 
 @routine
 def begin(
-    rows: Any,
-    fixed: Any,
-    counts: Any,
-    tables: Any,
-    samples: Any,
-    settings: Any,
-    choices: Any,
-    work: Any,
-    member: int,
-    j: int,
-) -> None:
+    rows: Any, fixed: Any, counts: Any, tables: Any, samples: Any, settings: Any, choices: Any,
+    work: Any, member: int, j: int,
+) -> None:  # fmt: skip
     for k in range(len(rows)):
         rows[k][j] = 0.0
     for k in range(CARTS):
@@ -113,18 +88,17 @@ def carts() -> Kernels:
         carts,
         (),
         REPORT,
-        apply=drift,
-        advance=roll,
-        reference=desired,
-        evaluate=judge,
-        begin=begin,
+        judge,
+        begin,
         rows=3 * CARTS + 1,
         parameters=1,
         counts=4,
-        signals=CARTS,
         set_points=PUSH,
         old_set_points=OLD_PUSH,
         channels=2,
+        apply=drift,
+        advance=roll,
+        reference=desired,
     )
 
 
@@ -148,7 +122,6 @@ def setup(normalize: bool = True, seconds: float = 0.4) -> Setup:
         references=[(name, "m", -5.0, 5.0) for name in ("first", "second")],
         action=[(f"push_{k}", "N", -10.0, 10.0 * (k + 1)) for k in range(CARTS)],
         config={},
-        choices={},
         spread=np.array([[MASS, 1.0, 3.0]]),
     )
 

@@ -14,27 +14,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments
-from pam_envs.envs.core.families import Kernels
-from pam_envs.envs.core.kernels import trajectory_at
-from pam_envs.envs.core.layout import Report, computed, indices
-from pam_envs.envs.core.plant_env import PlantEnv
-from pam_envs.envs.core.setup import Setup, compose
-from pam_envs.envs.core.step import (
-    CHOICE,
-    FIRST_CONFIG,
-    KEY_A,
-    KEY_B,
-    PERIOD,
-    STEP,
-    copy_rows,
-    write_references,
+from pam_envs.envs.core.arguments import (
+    Common,
+    Randomisation,
+    environment_arguments,
+    environments,
 )
-from pam_envs.envs.core.vector_env import PlantVectorEnv
+from pam_envs.envs.core.families import Kernels
+from pam_envs.envs.core.kernels import report_tracking
+from pam_envs.envs.core.layout import Report, computed, indices
+from pam_envs.envs.core.setup import Setup, compose
+from pam_envs.envs.core.step import CHOICE, FIRST_CONFIG, KEY_A, KEY_B, PERIOD
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.parameters import parameter
 from pam_envs.references.trajectory import FAMILIES, ROWS, SAMPLES, draw_reference, sines_needed
-from pam_envs.tasks.rewards import error_reward, weight
+from pam_envs.tasks.rewards import weight
 
 PRESSURE, CONTRACTION, SET_POINT, OLD_SET_POINT, REFERENCE = range(5)
 LAG, GAIN = range(2)
@@ -48,6 +42,7 @@ REPORT = Report(
         "state/pressure": PRESSURE,
     },
     scratch=0,
+    observed=(CONTRACTION, PRESSURE),
 )
 INFO, ENDED, SIGNALS = REPORT.rows, REPORT.ended, REPORT.signals
 LONGEST, FULL = 0.03, 6e5
@@ -108,21 +103,12 @@ def advance(
 
 
 @kernel
-def evaluate(
-    rows: Any, fixed: Any, counts: Any, ahead: Any, settings: Any, choices: Any, work: Any
-) -> None:
-    """Write observation and report of a tile into ``work``."""
-    copy_rows(rows, work)
-    write_references(counts, ahead, choices, work, SIGNALS + 2)
-    config, reference = settings[0], work[SIGNALS + 2]
+def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
+    """Write rewards, costs and margins of a tile into ``work``."""
+    config, reference = settings[0], work[SIGNALS + choices[CHOICE.fixed]]
     for j in range(LANES):
         output = rows[CONTRACTION][j]
-        work[SIGNALS][j], work[SIGNALS + 1][j] = output, rows[PRESSURE][j]
-        work[INFO.time][j] = counts[STEP][j] * config[PERIOD]
-        work[INFO.reference][j], work[INFO.output][j] = reference[j], output
-        work[INFO.reward_tracking][j] = error_reward(
-            output - reference[j], config[CONFIG.error_scale], config[CONFIG.tracking_weight]
-        )
+        report_tracking(work, config, INFO, CONFIG, reference[j], output, j)
         work[INFO.margin_contraction][j] = LONGEST - output
         work[INFO.cost_contraction][j] = 0.0
         travel = abs(rows[SET_POINT][j] - rows[OLD_SET_POINT][j])
@@ -150,18 +136,16 @@ def kernels() -> Kernels:
         kernels,
         (),
         REPORT,
-        advance=advance,
-        reference=trajectory_at,
-        evaluate=evaluate,
-        begin=begin,
-        config=CONFIG,
-        placeholders={"FIRST_REFERENCE": REFERENCE},
+        evaluate,
+        begin,
         rows=REFERENCE + ROWS,
         parameters=2,
         counts=4,
-        signals=2,
         set_points=SET_POINT,
         old_set_points=OLD_SET_POINT,
+        config=CONFIG,
+        advance=advance,
+        placeholders={"FIRST_REFERENCE": REFERENCE},
     )
 
 
@@ -181,7 +165,6 @@ def make_setup(given: Common) -> Setup:
         references=[("reference", *span)],
         action=[("pressure_set_point", *pressure)],
         config=vars(given.task_of(Holding)),
-        choices={},
         reference=family,
         sines=sines_needed(family),
         samples=samples,
@@ -190,9 +173,4 @@ def make_setup(given: Common) -> Setup:
     )
 
 
-class SpringMuscleEnv(PlantEnv, make_setup=make_setup):
-    """Single environment (see the module's page)."""
-
-
-class SpringMuscleVectorEnv(PlantVectorEnv, make_setup=make_setup):
-    """Batch of environments (see the module's page)."""
+SpringMuscleEnv, SpringMuscleVectorEnv = environments("SpringMuscle", make_setup)
