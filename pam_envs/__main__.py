@@ -19,7 +19,7 @@ import tyro
 from numpy.typing import NDArray
 
 from pam_envs.envs.registration import full_id, register_all
-from pam_envs.envs.rendering.film import write_film
+from pam_envs.envs.rendering.renderer import write_film
 from pam_envs.envs.rendering.scene import view_of
 from pam_envs.hysteresis.protocol import kinds
 from pam_envs.parameters import Signals

@@ -270,13 +270,3 @@ def environments(name: str, make_setup: Callable[..., Setup], *fixed: Any) -> tu
     made = functools.partial(make_setup, *fixed)
     single = type(f"{name}Env", (PlantEnv,), dict(scope), make_setup=made)
     return single, type(f"{name}VectorEnv", (PlantVectorEnv,), dict(scope), make_setup=made)
-
-
-def masses_of(name: str, given: Any, most: float, default: Sequence[float]) -> NDArray[np.float64]:
-    """Return the masses [kg] from which episodes draw, shape (1, n); None: the default ones."""
-    masses = default if given is None else given
-    if not isinstance(masses, (Sequence, np.ndarray)):
-        masses = [masses]
-    if isinstance(masses, str) or len(masses) == 0:
-        raise ValueError(f"{name} = {given!r} must be a mass [kg], several of them, or None")
-    return np.array([[check_number(name, mass, 0.0, most, "kg") for mass in masses]])

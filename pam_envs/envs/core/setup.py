@@ -220,6 +220,16 @@ def check_number(name: str, value: Any, low: float, high: float, unit: str) -> f
     return float(value)
 
 
+def masses_of(name: str, given: Any, most: float, default: Any) -> NDArray[np.float64]:
+    """Return the masses [kg] from which episodes draw, shape (1, n); None: the default ones."""
+    masses = default if given is None else given
+    if not isinstance(masses, (Sequence, np.ndarray)):
+        masses = [masses]
+    if isinstance(masses, str) or len(masses) == 0:
+        raise ValueError(f"{name} = {given!r} must be a mass [kg], several of them, or None")
+    return np.array([[check_number(name, mass, 0.0, most, "kg") for mass in masses]])
+
+
 def check_whole(name: str, value: Any, low: int, high: int) -> int:
     """Return ``value`` as an int, or raise naming value, bounds and remedy."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)):

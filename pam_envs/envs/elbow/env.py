@@ -52,12 +52,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.envs.core.arguments import (
-    Common,
-    Randomisation,
-    environment_arguments,
-    environments,
-)
+from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
 from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, compose
 from pam_envs.envs.elbow import layout as L
 from pam_envs.envs.elbow.kernels import kernels_for

@@ -42,16 +42,9 @@ from typing import Any
 
 import numpy as np
 
-from pam_envs.envs.core.arguments import (
-    Common,
-    Randomisation,
-    environment_arguments,
-    environments,
-    masses_of,
-)
-from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, compose
-from pam_envs.envs.joint import layout as L
-from pam_envs.envs.joint.kernels import kernels_for
+from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
+from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, compose, masses_of
+from pam_envs.envs.joint import kernels as L
 from pam_envs.plants.antagonistic_joint import rows as R
 from pam_envs.plants.antagonistic_joint.bearing import check_borne
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
@@ -190,7 +183,7 @@ def make_setup(
     spread = given.spread_of(made, RANDOMISATION)
     return compose(
         made,
-        kernels_for(made.hysteresis.kind, made.dynamics, made.needs_effects(spread)),
+        L.kernels_for(made.hysteresis.kind, made.dynamics, made.needs_effects(spread)),
         given,
         observation=_signals(made, action),
         references=[("reference", "rad", *ANGLES)],

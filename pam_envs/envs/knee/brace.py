@@ -33,15 +33,9 @@ from __future__ import annotations
 
 from functools import lru_cache, partial
 
-from pam_envs.envs.core.arguments import (
-    Common,
-    Randomisation,
-    environment_arguments,
-    environments,
-)
+from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose
-from pam_envs.envs.knee import brace_layout as L
-from pam_envs.envs.knee.brace_kernels import kernels_for
+from pam_envs.envs.knee import brace_kernels as L
 from pam_envs.plants.knee_orthosis import rows as R
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.plants.single_muscle.hysteresis import Kind
@@ -118,7 +112,9 @@ def make_setup(
     spread = given.spread_of(made, RANDOMISATION)
     return compose(
         made,
-        kernels_for(made.hysteresis.kind, made.mounting, made.dynamics, made.needs_effects(spread)),
+        L.kernels_for(
+            made.hysteresis.kind, made.mounting, made.dynamics, made.needs_effects(spread)
+        ),
         given,
         observation=[
             ("tension", "N", *RANGES[L.TENSION]),

@@ -7,18 +7,53 @@ from typing import Any
 
 from pam_envs.envs.core.families import Kernels
 from pam_envs.envs.core.kernels import change_of, report_pressure, report_tracking, sense
-from pam_envs.envs.core.step import CHOICE, PERIOD
-from pam_envs.envs.knee import brace_layout as L
+from pam_envs.envs.core.layout import Report, computed, copied, indices
+from pam_envs.envs.core.step import CHOICE, FIRST_CHOICE, FIRST_CONFIG, PERIOD
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import uniform
 from pam_envs.mechanics.knee_lever import muscle_length
+from pam_envs.parameters import declarations
 from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.step import SENSED, advance, begin_lane, replacements
+from pam_envs.plants.knee_orthosis.step import N_WORK, SENSED, advance, begin_lane, replacements
 from pam_envs.references import trajectory as T
-from pam_envs.references.trajectory import draw_reference
+from pam_envs.tasks.gait_assistance import BraceTracking
 
+REFERENCE = K.END
+HYSTERESIS = K.END + T.ROWS
+"""First row of the state of the hysteresis."""
+
+REPORT = Report(
+    {
+        **computed("reward", "tracking", "effort"),
+        **computed("cost", "pressure"),
+        **computed("margin", "tension", "pressure"),
+        **computed("effort", "pressure_travel", "air"),
+        **copied("state", K, "tension", "stiffness", "angle", "velocity", "length", "pressure"),
+        **computed("sensor", "tension", "stiffness", "angle", "pressure"),
+    },
+    N_WORK,
+    observed=(None, None, None, None, K.SET_POINT),
+)
+INFO, ENDED, SIGNALS = REPORT.rows, REPORT.ended, REPORT.signals
+
+CONFIG = indices(
+    (
+        *declarations(BraceTracking),
+        *("reference_low", "reference_high", "frequency", "start_low", "start_high"),
+    ),
+    FIRST_CONFIG,
+)
+OWN = indices(("quantity",), FIRST_CHOICE)
+QUANTITIES = ("tension", "stiffness")
+TENSION, STIFFNESS = range(len(QUANTITIES))
+"""Tracked quantities."""
+
+PAPER = T.SAMPLES + 1
+"""Number of the reference of yeh2010: a sine that begins at its lowest value."""
+NOISE_T, NOISE_A, NOISE_P, START = 8, 9, 10, 15
+"""Random streams."""
 FIRST_HYSTERESIS = 0  # a placeholder: first row of the state of the hysteresis
 
 
@@ -39,31 +74,31 @@ def advance_knee(
 def read_brace(rows: Any, fixed: Any, counts: Any, work: Any, j: int) -> None:
     """Write the readings of lane ``j``."""
     step = counts[K.STEP][j]
-    tension = sense(rows[SENSED[0]][j], fixed, counts, K.TENSION_NOISE, L.NOISE_T, step, j)
-    angle = sense(rows[SENSED[1]][j], fixed, counts, K.ANGLE_NOISE, L.NOISE_A, step, j)
-    pressure = sense(rows[SENSED[2]][j], fixed, counts, K.PRESSURE_NOISE, L.NOISE_P, step, j)
+    tension = sense(rows[SENSED[0]][j], fixed, counts, K.TENSION_NOISE, NOISE_T, step, j)
+    angle = sense(rows[SENSED[1]][j], fixed, counts, K.ANGLE_NOISE, NOISE_A, step, j)
+    pressure = sense(rows[SENSED[2]][j], fixed, counts, K.PRESSURE_NOISE, NOISE_P, step, j)
     sine, _ = sine_and_cosine(0.5 * angle)
     length = muscle_length(sine, fixed[K.LEVER_ARM][j], fixed[K.LEVER_FITTINGS][j])
     stiffness = tension / max(1e-3, length - fixed[K.SHORTEST_LENGTH][j])
-    work[L.INFO.sensor_tension][j] = work[L.SIGNALS][j] = tension
-    work[L.INFO.sensor_stiffness][j] = work[L.SIGNALS + 1][j] = stiffness
-    work[L.INFO.sensor_angle][j] = work[L.SIGNALS + 2][j] = angle
-    work[L.INFO.sensor_pressure][j] = work[L.SIGNALS + 3][j] = pressure
+    work[INFO.sensor_tension][j] = work[SIGNALS][j] = tension
+    work[INFO.sensor_stiffness][j] = work[SIGNALS + 1][j] = stiffness
+    work[INFO.sensor_angle][j] = work[SIGNALS + 2][j] = angle
+    work[INFO.sensor_pressure][j] = work[SIGNALS + 3][j] = pressure
 
 
 @kernel
 def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
     """Write readings, rewards, costs, margins and efforts of a tile into ``work``."""
-    config, reference = settings[0], work[L.SIGNALS + choices[CHOICE.fixed]]
-    tracked = K.STIFFNESS if choices[L.CHOICE.quantity] == L.STIFFNESS else K.TENSION
+    config, reference = settings[0], work[SIGNALS + choices[CHOICE.fixed]]
+    tracked = K.STIFFNESS if choices[OWN.quantity] == STIFFNESS else K.TENSION
     for j in range(LANES):
         read_brace(rows, fixed, counts, work, j)
-        report_tracking(work, config, L.INFO, L.CONFIG, reference[j], rows[tracked][j], j)
-        report_brace(rows, fixed, config, work, L.INFO, L.CONFIG, j)
-        margin = config[L.CONFIG.highest_tension] - rows[K.TENSION][j]
-        work[L.INFO.margin_tension][j] = margin
-        work[L.ENDED][j] = 1.0 if margin < 0.0 else 0.0
-        work[L.INFO.effort_air][j] = max(0.0, change_of(rows, K.AIR, K.OLD_AIR, j))
+        report_tracking(work, config, INFO, CONFIG, reference[j], rows[tracked][j], j)
+        report_brace(rows, fixed, config, work, INFO, CONFIG, j)
+        margin = config[CONFIG.highest_tension] - rows[K.TENSION][j]
+        work[INFO.margin_tension][j] = margin
+        work[ENDED][j] = 1.0 if margin < 0.0 else 0.0
+        work[INFO.effort_air][j] = max(0.0, change_of(rows, K.AIR, K.OLD_AIR, j))
 
 
 @kernel
@@ -83,41 +118,41 @@ def begin_brace(
     """Bring lane ``j`` to rest under a drawn pressure, and draw its reference."""
     key_a, key_b, config = counts[K.KEY_A][j], counts[K.KEY_B][j], settings[0]
     counts[K.MEMBER][j] = member
-    span = config[L.CONFIG.start_high] - config[L.CONFIG.start_low]
-    pressure = config[L.CONFIG.start_low] + span * uniform(key_a, key_b, L.START, 0)
+    span = config[CONFIG.start_high] - config[CONFIG.start_low]
+    pressure = config[CONFIG.start_low] + span * uniform(key_a, key_b, START, 0)
     gait, elements = settings[choices[CHOICE.at_own] :], choices[CHOICE.elements]
-    begin_lane(rows, fixed, counts, tables, gait, L.HYSTERESIS, elements, j, 0.0, pressure)
-    low, high = config[L.CONFIG.reference_low], config[L.CONFIG.reference_high]
+    begin_lane(rows, fixed, counts, tables, gait, HYSTERESIS, elements, j, 0.0, pressure)
+    low, high = config[CONFIG.reference_low], config[CONFIG.reference_high]
     family = choices[CHOICE.reference]
-    if family == L.PAPER:
-        draw_paper(rows, j, low, high, config[L.CONFIG.frequency])
+    if family == PAPER:
+        draw_paper(rows, j, low, high, config[CONFIG.frequency])
     elif family != T.SAMPLES:
-        draw_reference(rows, L.REFERENCE, j, key_a, key_b, family, low, high)
+        T.draw_reference(rows, REFERENCE, j, key_a, key_b, family, low, high)
 
 
 @routine
 def draw_paper(rows: Any, j: int, low: float, high: float, frequency: float) -> None:
     """Set the reference of lane ``j`` to a sine between ``low`` and ``high``, from ``low`` on."""
-    rows[L.REFERENCE + T.RATE][j] = 1.0
-    rows[L.REFERENCE + T.RAMP][j] = 0.0
+    rows[REFERENCE + T.RATE][j] = 1.0
+    rows[REFERENCE + T.RAMP][j] = 0.0
     for k in range(T.KNOTS):
-        rows[L.REFERENCE + T.KNOT + k][j] = 0.5 * (low + high)
+        rows[REFERENCE + T.KNOT + k][j] = 0.5 * (low + high)
     for k in range(3 * T.SINES):
-        rows[L.REFERENCE + T.SINE + k][j] = 0.0
-    rows[L.REFERENCE + T.SINE][j] = 0.5 * (high - low)
-    rows[L.REFERENCE + T.SINE + 1][j] = frequency
-    rows[L.REFERENCE + T.SINE + 2][j] = -0.25
+        rows[REFERENCE + T.SINE + k][j] = 0.0
+    rows[REFERENCE + T.SINE][j] = 0.5 * (high - low)
+    rows[REFERENCE + T.SINE + 1][j] = frequency
+    rows[REFERENCE + T.SINE + 2][j] = -0.25
 
 
 @lru_cache(maxsize=16)
 def kernels_for(kind: str, mounting: str, dynamics: str, extended: bool = False) -> Kernels:
     """Return the kernels for a hysteresis model, mounting and dynamics, plain or with effects."""
-    rows = L.HYSTERESIS + state_rows(kind)
+    rows = HYSTERESIS + state_rows(kind)
     return Kernels(
         "brace",
         kernels_for,
         (kind, mounting, dynamics, extended),
-        L.REPORT,
+        REPORT,
         evaluate,
         begin_brace,
         rows=rows + (K.STATE.end if extended else 0),
@@ -125,12 +160,12 @@ def kernels_for(kind: str, mounting: str, dynamics: str, extended: bool = False)
         counts=K.N_COUNTS,
         set_points=K.SET_POINT,
         old_set_points=K.OLD_SET_POINT,
-        config=L.CONFIG,
-        choices=L.CHOICE,
+        config=CONFIG,
+        choices=OWN,
         advance=advance_knee,
         placeholders={
-            "FIRST_HYSTERESIS": L.HYSTERESIS,
-            "FIRST_REFERENCE": L.REFERENCE,
+            "FIRST_HYSTERESIS": HYSTERESIS,
+            "FIRST_REFERENCE": REFERENCE,
             **replacements(kind, mounting, dynamics, rows if extended else None),
         },
     )

@@ -45,12 +45,7 @@ from __future__ import annotations
 from functools import lru_cache, partial
 from typing import Any
 
-from pam_envs.envs.core.arguments import (
-    Common,
-    Randomisation,
-    environment_arguments,
-    environments,
-)
+from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose
 from pam_envs.envs.knee.gait_kernels import kernels_for
 from pam_envs.envs.knee.gait_layout import SOURCES

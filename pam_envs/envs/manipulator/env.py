@@ -47,14 +47,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pam_envs.envs.core.arguments import (
-    Common,
-    Randomisation,
-    environment_arguments,
-    environments,
-    masses_of,
-)
-from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, compose
+from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
+from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, compose, masses_of
 from pam_envs.envs.manipulator.kernels import kernels_for
 from pam_envs.envs.manipulator.layout import MODES, POSE, joint_names, muscle_names
 from pam_envs.envs.manipulator.paths import paths_for

@@ -32,14 +32,8 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
-from pam_envs.envs.core.arguments import (
-    Common,
-    Randomisation,
-    environment_arguments,
-    environments,
-    masses_of,
-)
-from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose
+from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
+from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose, masses_of
 from pam_envs.envs.positioning.kernels import kernels_for
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.plant import SingleMuscle

@@ -14,17 +14,19 @@ from pam_envs.envs.core.kernels import (
     report_tracking,
     sense,
 )
-from pam_envs.envs.core.step import CHOICE, EPISODE_SECONDS, PERIOD
-from pam_envs.envs.positioning import layout as L
+from pam_envs.envs.core.layout import Report, computed, copied, indices
+from pam_envs.envs.core.step import CHOICE, EPISODE_SECONDS, FIRST_CHOICE, FIRST_CONFIG, PERIOD
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.history import N_HISTORY
 from pam_envs.kernels.random import uniform
 from pam_envs.muscle.effective_area import volume
+from pam_envs.parameters import declarations
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.effects import replacements
 from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.step import (
+    N_WORK,
     advance,
     begin_effects,
     rest_contraction,
@@ -32,9 +34,38 @@ from pam_envs.plants.single_muscle.step import (
     seen_pressure,
     true_position,
 )
-from pam_envs.references.trajectory import SAMPLES, draw_reference
+from pam_envs.references import trajectory as T
 from pam_envs.tasks.rewards import excess
+from pam_envs.tasks.tracking import Tracking
 
+REFERENCE = R.END
+HYSTERESIS = R.END + T.ROWS
+"""First row of the state of the hysteresis."""
+
+REPORT = Report(
+    {
+        **computed("reward", "tracking", "effort"),
+        **computed("cost", "contraction", "pressure"),
+        **computed("margin", "contraction", "pressure"),
+        **computed("effort", "pressure_travel", "air"),
+        **computed("state", "contraction"),
+        **copied("state", R, "velocity", "pressure", "drive", "load"),
+        **computed("sensor", "contraction", "pressure"),
+    },
+    N_WORK,
+    observed=(None, None, R.SET_POINT, R.TOLD_LOAD),
+)
+INFO, ENDED, SIGNALS = REPORT.rows, REPORT.ended, REPORT.signals
+
+CONFIG = indices(
+    (*declarations(Tracking), "reference_low", "reference_high", "start_share", "load_change"),
+    FIRST_CONFIG,
+)
+OWN = indices(("loads",), FIRST_CHOICE)
+"""The own row of the settings holds the loads [kg] to draw from."""
+
+NOISE_X, NOISE_P, START = 1, 2, 3
+"""Random streams."""
 remember: Any = None  # a placeholder, replaced for each hysteresis
 
 
@@ -55,29 +86,29 @@ def change_load(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any,
 @kernel
 def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
     """Write readings, rewards, costs, margins and efforts of a tile into ``work``."""
-    step, config, reference = counts[R.STEP], settings[0], work[L.SIGNALS + choices[CHOICE.fixed]]
+    step, config, reference = counts[R.STEP], settings[0], work[SIGNALS + choices[CHOICE.fixed]]
     for j in range(LANES):
         output, pressure = true_position(rows, j), rows[R.PRESSURE][j]
-        seen = sense(seen_position(rows, j), fixed, counts, R.POSITION_NOISE, L.NOISE_X, step[j], j)
-        work[L.INFO.sensor_contraction][j] = work[L.SIGNALS][j] = seen
-        seen = sense(seen_pressure(rows, j), fixed, counts, R.PRESSURE_NOISE, L.NOISE_P, step[j], j)
-        work[L.INFO.sensor_pressure][j] = work[L.SIGNALS + 1][j] = seen
-        work[L.INFO.state_contraction][j] = output
-        report_tracking(work, config, L.INFO, L.CONFIG, reference[j], output, j)
+        seen = sense(seen_position(rows, j), fixed, counts, R.POSITION_NOISE, NOISE_X, step[j], j)
+        work[INFO.sensor_contraction][j] = work[SIGNALS][j] = seen
+        seen = sense(seen_pressure(rows, j), fixed, counts, R.PRESSURE_NOISE, NOISE_P, step[j], j)
+        work[INFO.sensor_pressure][j] = work[SIGNALS + 1][j] = seen
+        work[INFO.state_contraction][j] = output
+        report_tracking(work, config, INFO, CONFIG, reference[j], output, j)
         moved = rows[R.SET_POINT][j] - rows[R.OLD_SET_POINT][j]
         full = fixed[R.MAX_PRESSURE][j]
-        report_pressure(work, config, L.INFO, L.CONFIG, pressure, moved, full, j)
-        work[L.INFO.cost_contraction][j] = excess(output, config[L.CONFIG.soft_contraction])
+        report_pressure(work, config, INFO, CONFIG, pressure, moved, full, j)
+        work[INFO.cost_contraction][j] = excess(output, config[CONFIG.soft_contraction])
         margin = min(
-            config[L.CONFIG.highest_contraction] - output,
-            output - config[L.CONFIG.lowest_contraction],
+            config[CONFIG.highest_contraction] - output,
+            output - config[CONFIG.lowest_contraction],
         )
-        work[L.INFO.margin_contraction][j] = margin
-        work[L.ENDED][j] = 1.0 if margin < 0.0 else 0.0
+        work[INFO.margin_contraction][j] = margin
+        work[ENDED][j] = 1.0 if margin < 0.0 else 0.0
         travel = change_of(rows, R.PRESSURE, R.OLD_PRESSURE, j)
         air = air_in_muscle(rows, fixed, j)
-        work[L.INFO.effort_pressure_travel][j] = abs(travel)
-        work[L.INFO.effort_air][j] = max(0.0, air - rows[R.OLD_AIR][j])
+        work[INFO.effort_pressure_travel][j] = abs(travel)
+        work[INFO.effort_air][j] = max(0.0, air - rows[R.OLD_AIR][j])
         rows[R.OLD_AIR][j] = air
 
 
@@ -89,25 +120,25 @@ def begin_muscle(
     """Bring lane ``j`` to rest under a drawn load and pressure history, and draw its reference."""
     key_a, key_b, config = counts[R.KEY_A][j], counts[R.KEY_B][j], settings[0]
     counts[R.MEMBER][j] = member
-    drawn = int(uniform(key_a, key_b, L.START, 0) * choices[L.CHOICE.loads])
-    load, change = settings[choices[CHOICE.at_own]][drawn], config[L.CONFIG.load_change]
+    drawn = int(uniform(key_a, key_b, START, 0) * choices[OWN.loads])
+    load, change = settings[choices[CHOICE.at_own]][drawn], config[CONFIG.load_change]
     rows[R.TOLD_LOAD][j] = rows[R.LOAD][j] = load
-    when = 0.3 + 0.4 * uniform(key_a, key_b, L.START, 1)
+    when = 0.3 + 0.4 * uniform(key_a, key_b, START, 1)
     rows[R.CHANGE_TIME][j] = config[EPISODE_SECONDS] * when
     rows[R.CHANGE][j] = change
-    if uniform(key_a, key_b, L.START, 2) < 0.5:
+    if uniform(key_a, key_b, START, 2) < 0.5:
         rows[R.CHANGE][j] = max(-load, -change)
-    for k in range(len(rows) - L.HYSTERESIS):
-        rows[L.HYSTERESIS + k][j] = 0.0
+    for k in range(len(rows) - HYSTERESIS):
+        rows[HYSTERESIS + k][j] = 0.0
     counts[R.STACK_COUNT][j] = 1
-    full = config[L.CONFIG.start_share] * fixed[R.MAX_PRESSURE][j]
-    peak = full * uniform(key_a, key_b, L.START, 3)
-    begin = peak * uniform(key_a, key_b, L.START, 4)
+    full = config[CONFIG.start_share] * fixed[R.MAX_PRESSURE][j]
+    peak = full * uniform(key_a, key_b, START, 3)
+    begin = peak * uniform(key_a, key_b, START, 4)
     rows[R.REST][j] = rest_contraction(fixed, j, 0.0, load)
     elements = choices[CHOICE.elements]
     for pressure in (0.0, peak, begin):
         rows[R.PRESSURE][j] = pressure
-        remember(rows, fixed, counts, tables, L.HYSTERESIS, j, j + 1, elements, work)
+        remember(rows, fixed, counts, tables, HYSTERESIS, j, j + 1, elements, work)
     for k in range(N_HISTORY):
         rows[R.HISTORY + k][j] = begin
     rows[R.SET_POINT][j] = rows[R.OLD_SET_POINT][j] = rows[R.OLD_PRESSURE][j] = begin
@@ -116,21 +147,21 @@ def begin_muscle(
     rows[R.OLD_AIR][j] = air_in_muscle(rows, fixed, j)
     begin_effects(rows, fixed, j)
     family = choices[CHOICE.reference]
-    if family != SAMPLES:
-        low, high = config[L.CONFIG.reference_low], config[L.CONFIG.reference_high]
-        draw_reference(rows, L.REFERENCE, j, key_a, key_b, family, low, high)
+    if family != T.SAMPLES:
+        low, high = config[CONFIG.reference_low], config[CONFIG.reference_high]
+        T.draw_reference(rows, REFERENCE, j, key_a, key_b, family, low, high)
 
 
 @lru_cache(maxsize=8)
 def kernels_for(kind: str, extended: bool = False) -> Kernels:
     """Return the kernels for a hysteresis model, plain or with effects."""
-    rows = L.HYSTERESIS + state_rows(kind)
+    rows = HYSTERESIS + state_rows(kind)
     effects = replacements(kind, rows) if extended else {}
     return Kernels(
         "positioning",
         kernels_for,
         (kind, extended),
-        L.REPORT,
+        REPORT,
         evaluate,
         begin_muscle,
         rows=rows + (R.N_EFFECTS if extended else 0),
@@ -138,12 +169,12 @@ def kernels_for(kind: str, extended: bool = False) -> Kernels:
         counts=R.N_COUNTS,
         set_points=R.SET_POINT,
         old_set_points=R.OLD_SET_POINT,
-        config=L.CONFIG,
-        choices=L.CHOICE,
+        config=CONFIG,
+        choices=OWN,
         apply=change_load,
         placeholders={
-            "FIRST_HYSTERESIS": L.HYSTERESIS,
-            "FIRST_REFERENCE": L.REFERENCE,
+            "FIRST_HYSTERESIS": HYSTERESIS,
+            "FIRST_REFERENCE": REFERENCE,
             **hysteresis_kernels(kind),
             **effects,
             "plant_advance": effects.get("advance", advance),
