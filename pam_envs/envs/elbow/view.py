@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.envs.rendering import scene as S
 from pam_envs.tasks.torque_stiffness import WALL, WEIGHT
-
-if TYPE_CHECKING:
-    from pam_envs.envs.rendering.renderer import Canvas
 
 ELBOW: S.Point = (92.0, 300.0)
 """Position of the elbow [pixels], at the lower end of the upper arm."""
@@ -29,25 +26,18 @@ def bent(angle: float, length: float) -> S.Point:
     return ELBOW[0] + length * math.sin(angle), ELBOW[1] + length * math.cos(angle)
 
 
-def _bundle(canvas: Canvas, side: float, share: float, contracted: float, muscles: float) -> None:
+def _bundle(canvas: S.Canvas, side: float, share: float, contracted: float, muscles: float) -> None:
     """Draw a bundle beside the upper arm, ``side`` 1 in front; it bulges as it contracts."""
     x, top = ELBOW[0] + side * PULLEY, 96.0
     end = top + 128.0 * (1.0 - 0.9 * contracted)
     wide = (4.0 + 1.3 * muscles) * (1.0 + 1.6 * contracted)
-    left, right = [], []
-    for k in range(17):
-        bulge = wide * min(1.0, math.sin(math.pi * k / 16) * 2.0 + 0.25)
-        y = top + (end - top) * k / 16
-        left.append((x - bulge, y))
-        right.append((x + bulge, y))
-    tint = S.blend(S.COLD, S.HOT, share)
+    bulge = [wide * min(1.0, math.sin(math.pi * k / 16) * 2.0 + 0.25) for k in range(17)]
     canvas.line([(x, top - 10), (x, top)], S.STEEL, 5)
     canvas.line([(x, end), (x, ELBOW[1])], S.STEEL, 3)
-    canvas.polygon(left + right[::-1], tint)
-    S.thread(canvas, left, right, tint, 2)
+    S.muscle(canvas, (x, top), (x, end), bulge, S.blend(S.COLD, S.HOT, share), 2)
 
 
-def _object(canvas: Canvas, info: Any, hand: S.Point) -> None:
+def _object(canvas: S.Canvas, info: Any, hand: S.Point) -> None:
     """Draw the weight in the hand, or name the object."""
     kind, torque = info["state/object"], info["state/object_torque"]
     words = "free motion"
@@ -60,7 +50,7 @@ def _object(canvas: Canvas, info: Any, hand: S.Point) -> None:
     canvas.text(words, (20, 24), S.REFERENCE, 14)
 
 
-def elbow_scene(canvas: Canvas, env: Any, info: Any) -> None:
+def elbow_scene(canvas: S.Canvas, env: Any, info: Any) -> None:
     """Draw the arm with the orthosis, the virtual object and torques."""
     plant, angle = env.plant, info["state/angle"]
     length = plant.wearer.handle * PER_METRE
@@ -95,7 +85,7 @@ def elbow_scene(canvas: Canvas, env: Any, info: Any) -> None:
     S.torque_bars(canvas, bars, TORQUE_SPAN, 492.0, "N m, flexion to the right")
 
 
-def _reach(canvas: Canvas, env: Any, info: Any, points: S.Trace) -> None:
+def _reach(canvas: S.Canvas, env: Any, info: Any, points: S.Trace) -> None:
     """Draw torque and stiffness within the reach of the pressures at this angle."""
     axes = S.Axes(canvas, S.PANEL, (-15.0, 30.0), (0.0, 15.0))
     axes.frame(range(-10, 31, 10), range(0, 16, 5), "torque [N m]", "stiffness [N m/rad]")
@@ -103,15 +93,10 @@ def _reach(canvas: Canvas, env: Any, info: Any, points: S.Trace) -> None:
     corners = [axes.at(q, s) for q, s in zip(torque.tolist(), stiffness.tolist(), strict=True)]
     canvas.polygon(corners, S.blend(S.PAPER, S.OUTPUT, 0.12))
     canvas.line([*corners, corners[0]], S.blend(S.PAPER, S.OUTPUT, 0.5), 1.5)
-    places = [axes.at(q, s) for q, s in points]
-    for i in range(0, len(places) - 1, 12):
-        shade = S.blend(S.GRID, S.OUTPUT, 0.15 + 0.85 * i / len(places))
-        canvas.line(places[i : i + 13], shade, 2)
     desired = axes.at(info["reference"], info["state/stiffness_reference"])
     canvas.disc(desired, 6.0, S.REFERENCE)
     canvas.disc(desired, 3.5, S.PAPER)
-    if places:
-        canvas.disc(places[-1], 4.5, S.OUTPUT)
+    S.draw_loop(canvas, points, axes)
 
 
 class ElbowAllocation:
@@ -138,21 +123,14 @@ class ElbowAllocation:
         return np.asarray(encoded, np.float32)
 
 
-STIFFNESS_LINES = (
-    ("state/stiffness_reference", S.REFERENCE, 1.5),
-    ("state/stiffness", S.OUTPUT, 2.0),
-)
-PRESSURE_LINES = (("state/pressure_a", PULL_A, 1.5), ("state/pressure_b", PULL_B, 2.0))
+STIFFNESS = (("state/stiffness_reference", S.REFERENCE, 1.5), ("state/stiffness", S.OUTPUT, 2.0))
+PRESSURES = (("state/pressure_a", PULL_A, 1.5), ("state/pressure_b", PULL_B, 2.0))
 VIEW = S.View(
     elbow_scene,
     (
-        S.fixed_strip("torque", "N m", 1.0, S.LINES, (350, 56), (-8.0, 8.0), range(-8, 9, 4)),
-        S.fixed_strip(
-            "stiffness", "N m/rad", 1.0, STIFFNESS_LINES, (442, 46), (0.0, 12.0), range(0, 13, 4)
-        ),
-        S.fixed_strip(
-            "pressures, a and b", "bar", 1e-5, PRESSURE_LINES, (524, 40), (0.0, 6.0), (0, 3, 6)
-        ),
+        S.Strip("torque", "N m", 1.0, S.LINES, 350, 56, (-8.0, 8.0), range(-8, 9, 4)),
+        S.Strip("stiffness", "N m/rad", 1.0, STIFFNESS, 442, 46, (0.0, 12.0), range(0, 13, 4)),
+        S.pressure_strip(524, 40, "pressures, a and b", PRESSURES),
     ),
     ElbowAllocation,
     number=("torque at the hand", "N m", lambda info: info["state/felt"]),

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.envs.rendering import scene as S
-
-if TYPE_CHECKING:
-    from pam_envs.envs.rendering.renderer import Canvas
 
 PIVOT: S.Point = (140.0, 196.0)
 """Position of the joint's axis [pixels]."""
@@ -31,29 +28,23 @@ def turned(angle: float, across: float, along: float) -> S.Point:
     return PIVOT[0] + PER_METRE * x, PIVOT[1] + PER_METRE * y
 
 
-def _muscle(canvas: Canvas, lower: S.Point, upper: S.Point, share: float, shortened: float) -> None:
-    """Draw a muscle between its fittings; it bulges as it shortens."""
-    tint, steps = S.blend(S.COLD, S.HOT, share), 24
-    length = max(1e-9, math.dist(lower, upper))
-    across = ((lower[1] - upper[1]) / length, (upper[0] - lower[0]) / length)
-    ends = 31.0  # pixels of each fitting
-    radius = 8.0 + 34.0 * max(0.0, shortened)
-    left, right = [], []
-    for i in range(steps + 1):
-        s = i / steps
-        at = (ends + s * (length - 2 * ends)) / length
-        x, y = (lower[k] + at * (upper[k] - lower[k]) for k in (0, 1))
-        wide = 6.0 + (radius - 6.0) * min(1.0, math.sin(math.pi * s) * 2.2) ** 0.7
-        left.append((x - wide * across[0], y - wide * across[1]))
-        right.append((x + wide * across[0], y + wide * across[1]))
+def _muscle(
+    canvas: S.Canvas, lower: S.Point, upper: S.Point, share: float, shortened: float
+) -> None:
+    """Draw a muscle between its fittings of 31 pixels; it bulges as it shortens."""
+    tint, grown = S.blend(S.COLD, S.HOT, share), 2.0 + 34.0 * max(0.0, shortened)
+    end = 31.0 / max(1e-9, math.dist(lower, upper))
+    a, b = (
+        (lower[0] + at * (upper[0] - lower[0]), lower[1] + at * (upper[1] - lower[1]))
+        for at in (end, 1.0 - end)
+    )
+    shape = [min(1.0, math.sin(math.pi * i / 24) * 2.2) ** 0.7 for i in range(25)]
     canvas.line([lower, upper], S.STEEL, 5)
-    canvas.polygon(left + right[::-1], tint)
-    S.thread(canvas, left, right, tint, 3)
-    for side in (left, right):
+    for side in S.muscle(canvas, a, b, [6.0 + grown * part for part in shape], tint, 3):
         canvas.line(side, S.blend(tint, S.INK, 0.5), 1.5)
 
 
-def _arc(canvas: Canvas, torque: float) -> None:
+def _arc(canvas: S.Canvas, torque: float) -> None:
     """Draw the disturbance as an arrow around the end of the arm."""
     if abs(torque) < 1e-3:
         return
@@ -68,7 +59,7 @@ def _arc(canvas: Canvas, torque: float) -> None:
     canvas.text(f"{torque:+.1f} N m", (PIVOT[0], 458), S.HOT, 12, "center")
 
 
-def _scale(canvas: Canvas, largest: float) -> None:
+def _scale(canvas: S.Canvas, largest: float) -> None:
     """Draw a scale of degrees below the arm."""
     radius, end = ARM + 0.012, math.degrees(largest)
     canvas.line(
@@ -82,7 +73,7 @@ def _scale(canvas: Canvas, largest: float) -> None:
         canvas.text(f"{degrees}", (x, y - 7), S.MUTED, 10, "center")
 
 
-def joint_scene(canvas: Canvas, env: Any, info: Any) -> None:
+def joint_scene(canvas: S.Canvas, env: Any, info: Any) -> None:
     """Draw the joint with its muscles, the reference, the disturbance and the payload."""
     plant, angle = env.plant, info["state/angle"]
     lever, full = plant.lever, plant.regulator.max_pressure
@@ -109,14 +100,14 @@ def joint_scene(canvas: Canvas, env: Any, info: Any) -> None:
     _numbers(canvas, info)
 
 
-def _payload(canvas: Canvas, at: S.Point, mass: float) -> None:
+def _payload(canvas: S.Canvas, at: S.Point, mass: float) -> None:
     """Draw the payload [kg] at the end of the arm."""
     canvas.disc(at, 6.0 + 9.0 * max(0.0, mass) ** (1 / 3), S.blend(S.STEEL, S.INK, 0.55))
     if mass > 0.005:
         canvas.text(f"{mass:.2f} kg", (at[0] - 20, at[1] - 6), S.MUTED, 11, "right")
 
 
-def _numbers(canvas: Canvas, info: Any) -> None:
+def _numbers(canvas: S.Canvas, info: Any) -> None:
     """Write pressures and forces of the muscles, and the stiffness of the joint."""
     for column, name, color in ((96, "muscle B", PULL_B), (176, "muscle A", PULL_A)):
         letter = name[-1].lower()
@@ -138,20 +129,6 @@ def _numbers(canvas: Canvas, info: Any) -> None:
 def both_pressures(info: Any) -> float:
     """Return pressure of A minus that of B [bar]."""
     return float(1e-5 * (info["state/pressure_a"] - info["state/pressure_b"]))
-
-
-def _difference_loop(canvas: Canvas, env: Any, _: Any, points: S.Trace) -> None:
-    """Draw the angle over the difference of the pressures."""
-    first, full = ANGLE, S.full_bar(env.plant)
-    axes = S.Axes(canvas, S.PANEL, (-full, full), first.span(env.plant))
-    across = tuple(first.ticks(env.plant))
-    axes.frame(
-        range(-int(full), int(full) + 1, max(1, round(full / 4))),
-        across,
-        "pressure of A minus B [bar]",
-        f"{first.name} [{first.unit}]",
-    )
-    S.draw_loop(canvas, points, axes, first.scale)
 
 
 def _degrees(plant: Any) -> S.Point:
@@ -191,17 +168,13 @@ class JointIntegral:
         return np.asarray(encoded, np.float32)
 
 
+def _difference_loop(canvas: S.Canvas, env: Any, _: Any, points: S.Trace) -> None:
+    S.pressure_loop(canvas, env.plant, ANGLE, points, both=True)
+
+
 ANGLE = S.Strip("angle", "deg", 180.0 / math.pi, S.LINES, 350, 116, _degrees, angle_ticks)
-PRESSURES = S.Strip(
-    "pressures",
-    "bar",
-    1e-5,
-    (("state/pressure_b", PULL_B, 1.5), ("state/pressure_a", PULL_A, 2.0)),
-    498,
-    60,
-    lambda plant: (0.0, S.full_bar(plant)),
-    lambda plant: (0.0, 0.5 * S.full_bar(plant), S.full_bar(plant)),
-)
+MUSCLES = (("state/pressure_b", PULL_B, 1.5), ("state/pressure_a", PULL_A, 2.0))
+PRESSURES = S.pressure_strip(498, 60, "pressures", MUSCLES)
 VIEW = S.View(
     joint_scene,
     (ANGLE, PRESSURES),

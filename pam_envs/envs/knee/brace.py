@@ -110,11 +110,10 @@ def make_setup(
         "start_high": PAPER_PRESSURE if start == "paper" else 0.9 * full,
     }
     spread = given.spread_of(made, RANDOMISATION)
+    effects = made.needs_effects(spread)
     return compose(
         made,
-        L.kernels_for(
-            made.hysteresis.kind, made.mounting, made.dynamics, made.needs_effects(spread)
-        ),
+        L.kernels_for(made.hysteresis.kind, made.mounting, made.dynamics, effects),
         given,
         observation=[
             ("tension", "N", *RANGES[L.TENSION]),
@@ -133,7 +132,7 @@ def make_setup(
         samples=samples,
         tables=made.hysteresis_tables(),
         spread=spread,
-        view=f"pam_envs.envs.knee.view:{L.QUANTITIES[quantity].upper()}",
+        view=f"pam_envs.envs.knee.view:{L.QUANTITIES[quantity].upper()}_VIEW",
     )
 
 

@@ -174,7 +174,7 @@ def make_setup(
         samples=samples,
         tables=made.hysteresis_tables(),
         spread=spread,
-        view="pam_envs.envs.knee.view:GAIT",
+        view="pam_envs.envs.knee.view:GAIT_VIEW",
     )
 
 

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.envs.rendering import scene as S
-
-if TYPE_CHECKING:
-    from pam_envs.envs.rendering.renderer import Canvas
 
 KNEE: S.Point = (160.0, 225.0)
 """Position of the knee's axis [pixels]."""
@@ -27,7 +24,7 @@ def along(start: S.Point, angle: float, length: float) -> S.Point:
 
 
 def _brace(
-    canvas: Canvas,
+    canvas: S.Canvas,
     env: Any,
     knee: S.Point,
     middle: float,
@@ -56,7 +53,7 @@ def _brace(
     canvas.disc(knee, 6.0 * thick, S.INK)
 
 
-def gait_scene(canvas: Canvas, env: Any, info: Any) -> None:
+def gait_scene(canvas: S.Canvas, env: Any, info: Any) -> None:
     """Draw the wearer's leg with the orthosis on it, torques and the phase of the stride."""
     leg, stance = env.plant.leg, info["state/stance"] > 0.5
     off = info["state/deviation"]
@@ -86,7 +83,7 @@ def gait_scene(canvas: Canvas, env: Any, info: Any) -> None:
     S.torque_bars(canvas, bars, TORQUE_SPAN, 512.0, "N m, extension to the right")
 
 
-def _ground_force(canvas: Canvas, ankle: S.Point, info: Any) -> None:
+def _ground_force(canvas: S.Canvas, ankle: S.Point, info: Any) -> None:
     """Draw the ground's force at the centre of pressure."""
     foot = (ankle[0] + info["state/cop"] * PER_METRE, GROUND)
     tip = (
@@ -97,7 +94,7 @@ def _ground_force(canvas: Canvas, ankle: S.Point, info: Any) -> None:
     canvas.disc(foot, 3.0, S.PRESSURE)
 
 
-def _phase(canvas: Canvas, phase: float, stance: bool) -> None:
+def _phase(canvas: S.Canvas, phase: float, stance: bool) -> None:
     """Draw a ring with the phase of the stride, and whether it is stance or swing."""
     centre, radius = (280.0, 290.0), 20.0
     ring = [
@@ -111,7 +108,7 @@ def _phase(canvas: Canvas, phase: float, stance: bool) -> None:
     canvas.text(word, (centre[0], centre[1] + 28), color, 13, "center")
 
 
-def brace_scene(canvas: Canvas, env: Any, info: Any) -> None:
+def brace_scene(canvas: S.Canvas, env: Any, info: Any) -> None:
     """Draw the brace alone."""
     half, knee, middle = 0.5 * info["state/angle"], (60.0, 250.0), 0.5 * math.pi
     for way in (1.0, -1.0):
@@ -152,33 +149,12 @@ class BraceFeedforward:
         return np.asarray(self.action.encode(pressure), np.float32)
 
 
-def _first(name: str, unit: str, scale: float, span: S.Point, step: int, height: int) -> S.Strip:
-    """Return the strip of output and reference."""
-    ticks = range(0, int(span[1]) + 1, step)
-    return S.fixed_strip(name, unit, scale, S.LINES, (350, height), span, ticks)
-
-
-ANGLE = S.fixed_strip(
-    "angle",
-    "deg",
-    180.0 / math.pi,
-    (("state/angle_reference", S.REFERENCE, 1.5), ("state/angle", S.OUTPUT, 2.0)),
-    (446, 56),
-    (80.0, 180.0),
-    (80, 130, 180),
-)
-TENSION = S.View(
-    brace_scene,
-    (_first("tension", "N", 1.0, (0.0, 360.0), 100, 116), S.pressure_strip(498, 60)),
-    BraceFeedforward,
-)
-STIFFNESS = S.View(
-    brace_scene,
-    (_first("stiffness", "N/cm", 1e-2, (0.0, 80.0), 20, 116), S.pressure_strip(498, 60)),
-    BraceFeedforward,
-)
-GAIT = S.View(
-    gait_scene,
-    (_first("tension", "N", 1.0, (0.0, 400.0), 200, 64), ANGLE, S.pressure_strip(534, 34)),
-    BraceFeedforward,
-)
+ANGLES = (("state/angle_reference", S.REFERENCE, 1.5), ("state/angle", S.OUTPUT, 2.0))
+ANGLE = S.Strip("angle", "deg", 180.0 / math.pi, ANGLES, 446, 56, (80.0, 180.0), (80, 130, 180))
+PRESSURE = S.pressure_strip(498, 60)
+TENSION = S.Strip("tension", "N", 1.0, S.LINES, 350, 116, (0.0, 360.0), range(0, 361, 100))
+STIFFNESS = S.Strip("stiffness", "N/cm", 1e-2, S.LINES, 350, 116, (0.0, 80.0), range(0, 81, 20))
+GAIT = S.Strip("tension", "N", 1.0, S.LINES, 350, 64, (0.0, 400.0), range(0, 401, 200))
+TENSION_VIEW = S.View(brace_scene, (TENSION, PRESSURE), BraceFeedforward)
+STIFFNESS_VIEW = S.View(brace_scene, (STIFFNESS, PRESSURE), BraceFeedforward)
+GAIT_VIEW = S.View(gait_scene, (GAIT, ANGLE, S.pressure_strip(534, 34)), BraceFeedforward)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from pam_envs.envs.joint.view import JointIntegral, angle_ticks
 from pam_envs.envs.rendering import scene as S
 from pam_envs.envs.rendering.camera import Camera
-
-if TYPE_CHECKING:
-    from pam_envs.envs.rendering.renderer import Canvas
 
 BOX = (26.0, 40.0, 262.0, 428.0)
 """Area of the arm in the picture: left, top, width, height [pixels]."""
@@ -43,7 +40,7 @@ def _camera(plant: Any, path: NDArray[np.float64]) -> tuple[Camera, float]:
     return CAMERA.fitted(np.vstack([arms, base, shadows]), BOX), floor
 
 
-def _grid(canvas: Canvas, camera: Camera, points: NDArray[np.float64], depth: float) -> None:
+def _grid(canvas: S.Canvas, camera: Camera, points: NDArray[np.float64], depth: float) -> None:
     """Draw squares of 0.2 m on the floor, as far as the points reach."""
     low = np.floor(points.min(axis=0) / 0.2 - 0.5) * 0.2
     high = np.ceil(points.max(axis=0) / 0.2 + 0.5) * 0.2
@@ -53,7 +50,7 @@ def _grid(canvas: Canvas, camera: Camera, points: NDArray[np.float64], depth: fl
         canvas.line(camera.line([(low[0], y, depth), (high[0], y, depth)]), S.GRID, 1)
 
 
-def _arm(canvas: Canvas, camera: Camera, plant: Any, info: Any) -> None:
+def _arm(canvas: S.Canvas, camera: Camera, plant: Any, info: Any) -> None:
     """Draw links and muscles, from the back to the front."""
     angles = [info[f"state/angle_{k}"] for k in range(plant.stages)]
     axes, points, directions = plant.chain.frames(angles)
@@ -80,7 +77,7 @@ def _arm(canvas: Canvas, camera: Camera, plant: Any, info: Any) -> None:
         canvas.disc(bone[0], 3.0, S.PAPER)
 
 
-def _tool(canvas: Canvas, camera: Camera, info: Any) -> None:
+def _tool(canvas: S.Canvas, camera: Camera, info: Any) -> None:
     """Draw position and direction of the tool, and their references."""
     for key, color, wide in (("reference_", S.REFERENCE, 2.0), ("", S.OUTPUT, 3.0)):
         tip = np.array([info[f"state/{key}{name}"] for name in ("x", "y", "z")])
@@ -90,7 +87,7 @@ def _tool(canvas: Canvas, camera: Camera, info: Any) -> None:
         canvas.disc(ends[0], 5.0, color)
 
 
-def arm_scene(canvas: Canvas, env: Any, info: Any) -> None:
+def arm_scene(canvas: S.Canvas, env: Any, info: Any) -> None:
     """Draw the arm in its world, with its path and its shadow."""
     plant, path = env.plant, path_of(env, info)
     camera, floor = _camera(plant, path)
@@ -116,7 +113,7 @@ def _mean_pressure(info: Any) -> float:
     return float(sum(pressures) / len(pressures))
 
 
-def _numbers(canvas: Canvas, plant: Any, info: Any) -> None:
+def _numbers(canvas: S.Canvas, plant: Any, info: Any) -> None:
     """Write the errors of the tool, and the largest joint angle."""
     largest = max(abs(info[f"state/angle_{k}"]) for k in range(plant.stages))
     rows = [
@@ -128,16 +125,12 @@ def _numbers(canvas: Canvas, plant: Any, info: Any) -> None:
     S.table(canvas, rows, 92, 508)
 
 
-def _tip(info: Any) -> tuple[float, ...]:
-    return tuple(info[f"state/{name}"] for name in ("x", "y", "z"))
-
-
 def _upright(path: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return points (3, k) with the height [m] above the base in the place of the depth."""
     return path * np.array([[1.0], [1.0], [-1.0]])
 
 
-def _plan_view(canvas: Canvas, env: Any, info: Any, points: S.Trace) -> None:
+def _plan_view(canvas: S.Canvas, env: Any, info: Any, points: S.Trace) -> None:
     """Draw reference path and path of the tip in the plane in which the reference is longest."""
     path, tips = _upright(path_of(env, info)[:3]), _upright(np.array(points).T)
     seen = sorted(np.argsort(np.ptp(path, axis=1))[1:].tolist())
@@ -163,34 +156,25 @@ def _round_ticks(low: float, high: float) -> list[float]:
     return [round(k * step, 6) for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
 
 
-def _joint_lines(stages: int) -> tuple[tuple[str, S.Color, float], ...]:
-    wanted = [(f"state/joint_reference_{k}", S.REFERENCE, 1.0) for k in range(stages)]
-    tints = [S.blend(S.OUTPUT, (0, 170, 150), k / max(1, stages - 1)) for k in range(stages)]
-    return (*wanted, *((f"state/angle_{k}", tints[k], 1.5) for k in range(stages)))
-
-
-OFF_PATH = S.fixed_strip(
-    "position error", "mm", 1e3, (("output", S.OUTPUT, 2.0),), (350, 64), (0.0, 100.0), (0, 50, 100)
+OFF_PATH = S.Strip(
+    "position error", "mm", 1e3, (("output", S.OUTPUT, 2.0),), 350, 64, (0.0, 100.0), (0, 50, 100)
 )
 
 
 def view(plant: Any) -> S.View:
     """Return the view of an arm."""
-    joints = S.Strip(
-        "joint angles, planned and true",
-        "deg",
-        180.0 / math.pi,
-        _joint_lines(plant.stages),
-        456,
-        102,
-        lambda plant: (-math.degrees(plant.largest_angle), math.degrees(plant.largest_angle)),
-        angle_ticks,
-    )
+    end, n = math.degrees(plant.largest_angle), plant.stages
+    lines = [(f"state/joint_reference_{k}", S.REFERENCE, 1.0) for k in range(n)]
+    for k in range(n):
+        tint = S.blend(S.OUTPUT, (0, 170, 150), k / max(1, n - 1))
+        lines.append((f"state/angle_{k}", tint, 1.5))
+    name, scale = "joint angles, planned and true", 180.0 / math.pi
+    joints = S.Strip(name, "deg", scale, lines, 456, 102, (-end, end), angle_ticks)
     return S.View(
         arm_scene,
         (OFF_PATH, joints),
         JointIntegral,
         number=("mean pressure", "bar", lambda info: 1e-5 * _mean_pressure(info)),
-        trace=_tip,
+        trace=lambda info: (info["state/x"], info["state/y"], info["state/z"]),
         panel=_plan_view,
     )

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pam_envs.envs.rendering import scene as S
-
-if TYPE_CHECKING:
-    from pam_envs.envs.rendering.renderer import Canvas
 
 LOWEST_MM = -1.0
 AXIS, TOP, NATURAL, RADIUS = 140.0, 76.0, 300.0, 21.0
@@ -30,7 +27,7 @@ def highest_mm(plant: Any) -> float:
     return max(2.0, math.ceil(reached + 0.2))
 
 
-def muscle_scene(canvas: Canvas, env: Any, info: Any) -> None:
+def muscle_scene(canvas: S.Canvas, env: Any, info: Any) -> None:
     """Draw a muscle that lifts a hanging load, with ruler, reference marker and pressure scale."""
     plant, pressure = env.plant, info["state/pressure"]
     contraction = info["state/contraction"]
@@ -47,7 +44,7 @@ def muscle_scene(canvas: Canvas, env: Any, info: Any) -> None:
     S.pressure_scale(canvas, pressure, full)
 
 
-def _braid(canvas: Canvas, bottom: float, plant: Any, contraction: float, tint: S.Color) -> None:
+def _braid(canvas: S.Canvas, bottom: float, plant: Any, contraction: float, tint: S.Color) -> None:
     """Draw the muscle's body: threads of constant length on a tube that bulges as it shortens."""
     braid_angle = plant.muscle.braid_angle
     cosine = (1.0 - contraction / plant.muscle.rest_length) * math.cos(braid_angle)
@@ -73,7 +70,7 @@ def _braid(canvas: Canvas, bottom: float, plant: Any, contraction: float, tint: 
         canvas.line(side, S.blend(tint, S.INK, 0.5), 1.5)
 
 
-def _weight(canvas: Canvas, top: float, load: float) -> None:
+def _weight(canvas: S.Canvas, top: float, load: float) -> None:
     """Draw the load [kg] below ``top``; its width follows the cube root of its mass."""
     if load < 0.005:
         canvas.text("no load", (AXIS, TOP + NATURAL + 24), S.MUTED, 13, "center")
@@ -89,7 +86,7 @@ def _weight(canvas: Canvas, top: float, load: float) -> None:
         canvas.text(f"{load:.2f} kg", (AXIS, foot + 6), S.INK, 14, "center")
 
 
-def _ruler(canvas: Canvas, highest: float, contraction: float, reference: float) -> None:
+def _ruler(canvas: S.Canvas, highest: float, contraction: float, reference: float) -> None:
     """Draw a ruler in mm beside the lower fitting, with output and reference [m] on it."""
 
     def level(metres: float) -> float:
@@ -131,20 +128,14 @@ class InverseFeedforward:
         return np.asarray(self.action.encode(pressure), np.float32)
 
 
-VIEW = S.View(
-    muscle_scene,
-    (
-        S.Strip(
-            "contraction",
-            "mm",
-            1e3,
-            S.LINES,
-            350,
-            116,
-            lambda plant: (LOWEST_MM, highest_mm(plant)),
-            lambda plant: range(0, int(highest_mm(plant)) + 1, 5),
-        ),
-        S.pressure_strip(498, 60),
-    ),
-    InverseFeedforward,
+STRIP = S.Strip(
+    "contraction",
+    "mm",
+    1e3,
+    S.LINES,
+    350,
+    116,
+    lambda plant: (LOWEST_MM, highest_mm(plant)),
+    lambda plant: range(0, int(highest_mm(plant)) + 1, 5),
 )
+VIEW = S.View(muscle_scene, (STRIP, S.pressure_strip(498, 60)), InverseFeedforward)

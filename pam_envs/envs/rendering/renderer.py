@@ -1,8 +1,7 @@
 """Pictures of an environment: the plant, its loop, and the last seconds.
 
 Drawn with pygame-ce on a plain surface, so that ``rgb_array`` needs no display. Drawing reads the
-``info`` of the steps and changes neither the simulation nor its random numbers. The view of a
-family draws the plant; frame, loop and strips are common.
+``info`` of the steps and does not change the simulation.
 """
 
 from __future__ import annotations
@@ -127,23 +126,19 @@ class Canvas:
 
 
 class Renderer:
-    """Record of the recent past of one environment, and its pictures.
-
-    The renderers of a batch may share a ``canvas``: a picture is a copy.
-    """
+    """Record of the recent past of one environment, and its pictures; batches share a canvas."""
 
     def __init__(self, env: Any, canvas: Canvas | None = None) -> None:
         self.env = env
         self.canvas = Canvas() if canvas is None else canvas
         self.view = view_of(env)
-        plant, strips = env.plant, self.view.strips
+        strips = self.view.strips
         self._keys = ("time", *dict.fromkeys(key for strip in strips for key, _, _ in strip.lines))
         self.strip: deque[tuple[float, ...]] = deque(
             maxlen=round(STRIP_SECONDS / env.control_period) + 1
         )
         self.loop: deque[tuple[float, ...]] = deque(maxlen=LOOP_SAMPLES)
         self.info: Any = None
-        self._spans = [(strip.span(plant), tuple(strip.ticks(plant))) for strip in strips]
         self._window: Any = None
         self._clock: Any = None
         self._dismissed = False
@@ -161,8 +156,16 @@ class Renderer:
         self.canvas.clear()
         self.view.scene(self.canvas, self.env, self.info)
         self._draw_numbers()
-        self._draw_panel()
-        self._draw_strips()
+        points, first = list(self.loop), self.view.strips[0]
+        if self.view.panel is None:
+            pressure_loop(self.canvas, self.env.plant, first, points)
+        else:
+            self.view.panel(self.canvas, self.env, self.info, points)
+        start = max(0.0, self.strip[-1][0] - STRIP_SECONDS)
+        for strip in self.view.strips:
+            self._draw_strip(strip, (start, start + STRIP_SECONDS))
+        self.canvas.text("reference", (712, first.top - 21), REFERENCE, 12, "right")
+        self.canvas.text("output", (770, first.top - 21), OUTPUT, 12, "right")
         return self.canvas.picture()
 
     def _draw_numbers(self) -> None:
@@ -180,27 +183,11 @@ class Renderer:
             text("action", (770, 14), REFERENCE, 11, "right")
             text("clipped", (770, 29), REFERENCE, 16, "right")
 
-    def _draw_panel(self) -> None:
-        points = list(self.loop)
-        if self.view.panel is None:
-            pressure_loop(self.canvas, self.env.plant, self.view.strips[0], points)
-        else:
-            self.view.panel(self.canvas, self.env, self.info, points)
-
-    def _draw_strips(self) -> None:
-        first = max(0.0, self.strip[-1][0] - STRIP_SECONDS)
-        for i, strip in enumerate(self.view.strips):
-            self._draw_strip(strip, i, (first, first + STRIP_SECONDS))
-        top = self.view.strips[0].top - 21
-        self.canvas.text("reference", (712, top), REFERENCE, 12, "right")
-        self.canvas.text("output", (770, top), OUTPUT, 12, "right")
-
-    def _draw_strip(self, strip: Strip, number: int, seconds: Point) -> None:
+    def _draw_strip(self, strip: Strip, seconds: Point) -> None:
         """Draw one plot of the last seconds; the lowest one has the time axis."""
-        lowest, (span, across) = number == len(self.view.strips) - 1, self._spans[number]
+        lowest, (span, across, name) = strip is self.view.strips[-1], strip.axis(self.env.plant)
         whole = range(2 * math.ceil(0.5 * seconds[0]), math.floor(seconds[1]) + 1, 2)
         axes = Axes(self.canvas, (360, strip.top, 410, strip.height), seconds, span)
-        name = f"{strip.name} [{strip.unit}]"
         axes.frame(whole, across, "time [s]" if lowest else "", name, numbers=lowest)
         for key, color, width in strip.lines:
             k = self._keys.index(key)
@@ -218,7 +205,10 @@ class Renderer:
             return
         pygame = self.canvas.pygame
         if self._window is None:
-            self._open()
+            pygame.display.init()
+            self._window = pygame.display.set_mode(SIZE)
+            pygame.display.set_caption(str(getattr(self.env.spec, "id", "pam-envs")))
+            self._clock = pygame.time.Clock()
         if any(event.type == pygame.QUIT for event in pygame.event.get()):
             self._dismissed = True
             self.close()
@@ -229,14 +219,6 @@ class Renderer:
             pygame.display.flip()
             self._clock.tick(fps)
 
-    def _open(self) -> None:
-        """Open the window."""
-        pygame = self.canvas.pygame
-        pygame.display.init()
-        self._window = pygame.display.set_mode(SIZE)
-        pygame.display.set_caption(str(getattr(self.env.spec, "id", "pam-envs")))
-        self._clock = pygame.time.Clock()
-
     def close(self) -> None:
         """Close the window, if there is one."""
         if self._window is not None:
@@ -245,13 +227,7 @@ class Renderer:
 
 
 def write_film(path: Path, pictures: Iterable[NDArray[np.uint8]], fps: int) -> None:
-    """Write pictures of equal size to a ``.mp4`` or ``.gif`` file.
-
-    Raises
-    ------
-    ImportError
-        If imageio is not installed; says how to get it.
-    """
+    """Write pictures of equal size to a ``.mp4`` or ``.gif`` file."""
     try:
         import imageio.v2 as imageio
     except ImportError as error:

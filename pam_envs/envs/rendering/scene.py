@@ -1,7 +1,6 @@
 """Elements of scenes: colours, plots with axes, limbs, scales, and the declaration of a view.
 
-A view draws the plant of an environment in the left 320 pixels; the frame around it is common.
-Views read the plant and ``info`` and change neither.
+A view draws the plant in the left 320 pixels; the frame around it is common.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pam_envs.envs.rendering.renderer import Canvas
+    from pam_envs.envs.rendering.renderer import Canvas as Canvas  # noqa: PLC0414 (for views)
 
 Color = tuple[int, int, int]
 Box = tuple[int, int, int, int]
@@ -35,88 +34,62 @@ def blend(a: Color, b: Color, share: float) -> Color:
 
 @dataclass(frozen=True)
 class Strip:
-    """A plot of the last seconds.
+    """Plot of the last seconds, at a height in the picture [pixels].
 
-    Attributes
-    ----------
-    name, unit : str
-        Of the axis.
-    scale : float
-        Value in the unit divided by the SI value.
-    lines : tuple of (str, Color, float)
-        Key of ``info``, colour and width of each line.
-    top, height : int
-        Position and size [pixels].
-    span : callable
-        Lowest and highest value on the axis, in the unit, from the plant.
-    ticks : callable
-        Values of the grid lines, from the plant.
+    ``lines`` holds key of ``info``, colour and width of each line, ``scale`` is the value in the
+    unit divided by the SI value. ``span`` and ``ticks`` of the axis, in the unit, are constants or
+    functions of the plant.
     """
 
     name: str
     unit: str
     scale: float
-    lines: tuple[tuple[str, Color, float], ...]
+    lines: Sequence[tuple[str, Color, float]]
     top: int
     height: int
-    span: Callable[[Any], Point]
-    ticks: Callable[[Any], Iterable[float]]
+    span: Point | Callable[[Any], Point]
+    ticks: Sequence[float] | Callable[[Any], Sequence[float]]
+
+    def axis(self, plant: Any) -> tuple[Point, Sequence[float], str]:
+        """Return lowest and highest value, the grid lines and the name."""
+        span = self.span(plant) if callable(self.span) else self.span
+        ticks = self.ticks(plant) if callable(self.ticks) else self.ticks
+        return span, ticks, f"{self.name} [{self.unit}]"
 
 
 Trace = Sequence[tuple[float, ...]]
-Panel = Callable[["Canvas", Any, Any, Trace], None]
-
-
 Policy = Callable[[Any], Any]
 """Returns the action for an observation."""
 
 
 @dataclass(frozen=True)
 class View:
-    """Declaration of the pictures of a family of environments.
-
-    Attributes
-    ----------
-    scene : callable
-        ``draw(canvas, env, info)``: the plant.
-    strips : tuple of Strip
-        From top to bottom; the first one holds output and reference.
-    demonstrator : callable
-        Returns the policy that moves the plant in films, from the environment.
-    number : tuple of str, str, callable
-        Name, unit and value (from ``info``) of the number beside time and error.
-    trace : callable
-        ``trace(info)``: the point that a step adds to the panel.
-    panel : callable, optional
-        ``panel(canvas, env, info, points)``: the plot above the strips, of all points; default:
-        the loop of the output over the pressure.
-    """
+    """Declaration of the pictures of a family of environments."""
 
     scene: Callable[[Canvas, Any, Any], None]
+    """``draw(canvas, env, info)``: the plant."""
     strips: tuple[Strip, ...]
+    """From top to bottom; the first one holds output and reference."""
     demonstrator: Callable[[Any], Policy]
+    """Returns the policy that moves the plant in films, from the environment."""
     number: tuple[str, str, Callable[[Any], float]] = (
         "pressure",
         "bar",
         lambda info: 1e-5 * info["state/pressure"],
     )
+    """Name, unit and value (from ``info``) of the number beside time and error."""
     trace: Callable[[Any], tuple[float, ...]] = lambda info: (
         1e-5 * info["state/pressure"],
         info["output"],
     )
-    panel: Panel | None = None
+    """``trace(info)``: the point that a step adds to the panel."""
+    panel: Callable[[Canvas, Any, Any, Trace], None] | None = None
+    """``panel(canvas, env, info, points)``: the plot above the strips; default: the loop of the
+    output over the pressure."""
 
 
 def view_of(env: Any) -> View:
-    """Return the view that the setup of an environment names, like ``my_family.view:VIEW``.
-
-    The name may also be that of a function that returns the view for a plant.
-
-    Raises
-    ------
-    ValueError
-        If the setup names none.
-    """
+    """Return the view that the setup of an environment names, or a function of the plant there."""
     module, _, name = env.setup.view.partition(":")
     if not name:
         raise ValueError("the environment has no view; name one in compose(view='module:NAME')")
@@ -129,30 +102,25 @@ def full_bar(plant: Any) -> float:
     return 1e-5 * float(plant.regulator.max_pressure)
 
 
-def pressure_strip(top: int, height: int) -> Strip:
-    """Return the strip of the pressure."""
-    return Strip(
-        "pressure",
-        "bar",
-        1e-5,
-        (("state/pressure", PRESSURE, 2.0),),
-        top,
-        height,
-        lambda plant: (0.0, full_bar(plant)),
-        lambda plant: (0.0, 0.5 * full_bar(plant), full_bar(plant)),
-    )
+def pressure_strip(
+    top: int,
+    height: int,
+    name: str = "pressure",
+    lines: Sequence[tuple[str, Color, float]] = (("state/pressure", PRESSURE, 2.0),),
+) -> Strip:
+    """Return a strip of pressures."""
+
+    def ticks(plant: Any) -> Sequence[float]:
+        return 0.0, 0.5 * full_bar(plant), full_bar(plant)
+
+    return Strip(name, "bar", 1e-5, lines, top, height, lambda p: (0.0, full_bar(p)), ticks)
 
 
 PANEL: Box = (360, 88, 410, 200)
 """Position and size of the plot above the strips."""
 
 
-def draw_loop(
-    canvas: Canvas,
-    points: Trace,
-    axes: Axes,
-    scale: float,
-) -> None:
+def draw_loop(canvas: Canvas, points: Trace, axes: Axes, scale: float = 1.0) -> None:
     """Draw a path of points whose second coordinate is SI: pale where old, a disc at the end."""
     places, step = [axes.at(x, scale * y) for x, y in points], 12
     for i in range(0, len(places) - 1, step):
@@ -162,13 +130,15 @@ def draw_loop(
         canvas.disc(places[-1], 4.5, OUTPUT)
 
 
-def pressure_loop(canvas: Canvas, plant: Any, first: Strip, points: Trace) -> None:
-    """Draw the output, in the unit of the first strip, over the pressure [bar]."""
-    full = full_bar(plant)
-    axes = Axes(canvas, PANEL, (0.0, full), first.span(plant))
-    ticks = range(0, int(full) + 1, max(1, round(full / 6)))
-    across = tuple(first.ticks(plant))
-    axes.frame(ticks, across, "pressure [bar]", f"{first.name} [{first.unit}]")
+def pressure_loop(
+    canvas: Canvas, plant: Any, first: Strip, points: Trace, both: bool = False
+) -> None:
+    """Draw the output, in the unit of the first strip, over the pressure, or the difference of two."""
+    full, (span, across, name) = full_bar(plant), first.axis(plant)
+    low, ticks = (-full, full / 4) if both else (0.0, full / 6)
+    axes = Axes(canvas, PANEL, (low, full), span)
+    word = "pressure of A minus B [bar]" if both else "pressure [bar]"
+    axes.frame(range(int(low), int(full) + 1, max(1, round(ticks))), across, word, name)
     draw_loop(canvas, points, axes, first.scale)
 
 
@@ -259,16 +229,27 @@ def table(canvas: Canvas, rows: Iterable[tuple[str, str]], left: float, top: flo
         canvas.text(value, (310, top + 20 * row), INK, 12, "right")
 
 
-def thread(canvas: Canvas, left: list[Point], right: list[Point], tint: Color, step: int) -> None:
-    """Draw crossing threads on a muscle with the given outlines."""
-    for k in range(step - 1, len(left) - 2, step):
+def muscle(
+    canvas: Canvas, a: Point, b: Point, widths: Sequence[float], tint: Color, step: int
+) -> tuple[list[Point], list[Point]]:
+    """Draw a muscle from ``a`` to ``b`` with half-widths along it; return its two outlines.
+
+    Crossing threads start at every ``step``-th width.
+    """
+    length, last = max(1e-9, math.dist(a, b)), len(widths) - 1
+    across = ((a[1] - b[1]) / length, (b[0] - a[0]) / length)
+    left, right = (
+        [
+            (
+                a[0] + k / last * (b[0] - a[0]) + way * wide * across[0],
+                a[1] + k / last * (b[1] - a[1]) + way * wide * across[1],
+            )
+            for k, wide in enumerate(widths)
+        ]
+        for way in (-1.0, 1.0)
+    )
+    canvas.polygon(left + right[::-1], tint)
+    for k in range(step - 1, last - 1, step):
         canvas.line([left[k], right[k + 2]], blend(tint, PAPER, 0.4), 1.2)
         canvas.line([right[k], left[k + 2]], blend(tint, PAPER, 0.4), 1.2)
-
-
-def fixed_strip(
-    name: str, unit: str, scale: float, lines: Sequence[tuple[str, Color, float]],
-    box: tuple[int, int], span: Point, ticks: Sequence[float],
-) -> Strip:  # fmt: skip
-    """Return a strip whose axis is the same for every plant; ``box`` is top and height."""
-    return Strip(name, unit, scale, tuple(lines), *box, lambda _: span, lambda _: ticks)
+    return left, right

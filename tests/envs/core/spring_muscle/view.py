@@ -32,8 +32,8 @@ LINES = (("state/pressure", S.PRESSURE, 2.0),)
 VIEW = S.View(
     draw,
     (
-        S.fixed_strip("contraction", "mm", 1e3, S.LINES, (350, 116), (0.0, 30.0), (0, 15, 30)),
-        S.fixed_strip("pressure", "bar", 1e-5, LINES, (498, 60), (0.0, 6.0), (0, 3, 6)),
+        S.Strip("contraction", "mm", 1e3, S.LINES, 350, 116, (0.0, 30.0), (0, 15, 30)),
+        S.Strip("pressure", "bar", 1e-5, LINES, 498, 60, (0.0, 6.0), (0, 3, 6)),
     ),
     demonstrate,
     panel=lambda canvas, env, info, points: None,
