@@ -34,6 +34,7 @@ from pam_envs.plants.antagonistic_joint.step import (
     start_hysteresis,
 )
 from pam_envs.references import trajectory as T
+from pam_envs.references.trajectory import draw_reference
 from pam_envs.tasks.rewards import excess
 
 # the environment's own state, after the plant's
@@ -165,6 +166,7 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
     config, reference = settings[0], work[SIGNALS + choices[CHOICE.fixed]]
     for j in range(LANES):
         read_joint(rows, fixed, counts, work, j)
+    for j in range(LANES):
         angle = rows[K.ANGLE][j]
         report_tracking(work, config, INFO, CONFIG, reference[j], angle, j)
         higher = max(rows[K.PRESSURE_A][j], rows[K.PRESSURE_B][j])
@@ -208,7 +210,7 @@ def begin_joint(
     rows[OLD_AIR][j] = rows[K.AIR][j]
     if choices[CHOICE.reference] < T.SAMPLES:
         low, high = -config[CONFIG.amplitude], config[CONFIG.amplitude]
-        T.draw_reference(rows, REFERENCE, j, key_a, key_b, choices[CHOICE.reference], low, high)
+        draw_reference(rows, REFERENCE, j, key_a, key_b, choices[CHOICE.reference], low, high)
 
 
 @lru_cache(maxsize=16)

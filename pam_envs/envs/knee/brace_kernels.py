@@ -18,6 +18,7 @@ from pam_envs.parameters import declarations
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.step import N_WORK, SENSED, advance, begin_lane, replacements
 from pam_envs.references import trajectory as T
+from pam_envs.references.trajectory import draw_reference
 from pam_envs.tasks.gait_assistance import BraceTracking
 
 REFERENCE = K.END
@@ -93,6 +94,7 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
     tracked = K.STIFFNESS if choices[OWN.quantity] == STIFFNESS else K.TENSION
     for j in range(LANES):
         read_brace(rows, fixed, counts, work, j)
+    for j in range(LANES):
         report_tracking(work, config, INFO, CONFIG, reference[j], rows[tracked][j], j)
         report_brace(rows, fixed, config, work, INFO, CONFIG, j)
         margin = config[CONFIG.highest_tension] - rows[K.TENSION][j]
@@ -127,7 +129,7 @@ def begin_brace(
     if family == PAPER:
         draw_paper(rows, j, low, high, config[CONFIG.frequency])
     elif family != T.SAMPLES:
-        T.draw_reference(rows, REFERENCE, j, key_a, key_b, family, low, high)
+        draw_reference(rows, REFERENCE, j, key_a, key_b, family, low, high)
 
 
 @routine

@@ -126,9 +126,10 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
     """Write true references, rewards, costs, margins and efforts of a tile into ``work``."""
     config, first = settings[0], L.SIGNALS + choices[CHOICE.fixed]
     other = first + choices[CHOICE.preview] + 1
+    for j in range(LANES):  # the present references are the true ones and not the planned ones
+        work[first][j], work[other][j] = rows[L.DESIRED_TENSION][j], rows[L.DESIRED_ANGLE][j]
     for j in range(LANES):
-        desired, angle = rows[L.DESIRED_TENSION][j], rows[L.DESIRED_ANGLE][j]
-        work[first][j], work[other][j] = desired, angle  # true and not planned
+        desired = rows[L.DESIRED_TENSION][j]
         stance, tension, off = rows[K.STANCE][j], rows[K.TENSION][j], abs(rows[K.DEVIATION][j])
         seen, demand = rows[L.READ_STANCE][j], rows[K.DEMAND][j]
         over = over_assistance(rows[K.TORQUE][j], demand)

@@ -19,35 +19,33 @@ from pam_envs.tasks.rewards import error_reward, excess
 
 
 @kernel
-def copy_pose(source: Any, to: Any) -> None:
+def copy_pose(work: Any, to: int) -> None:
     """Copy the pose that :func:`place_chain` wrote to the scratch."""
     tip = block(CHAIN_WORK, N_STAGES, N_STAGES)
     for i in range(3):
         for j in range(LANES):
-            to[i][j], to[3 + i][j] = source[tip + POINT + i][j], source[tip + DIRECTION + i][j]
+            work[to + i][j] = work[tip + POINT + i][j]
+            work[to + 3 + i][j] = work[tip + DIRECTION + i][j]
 
 
 @kernel
 def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
     """Write poses, planned angles, rewards, costs, margins and efforts of a tile into ``work``."""
-    info, seen = work[FIRST_INFO:], work[FIRST_INFO + N_INFO + 2 + 4 * N_STAGES :]
-    references, count = (
-        work[FIRST_INFO + N_INFO + 1 + choices[CHOICE.fixed] :],
-        choices[CHOICE.preview] + 1,
-    )
+    info, count = work[FIRST_INFO:], choices[CHOICE.preview] + 1
+    references, planned = N_INFO + 1 + choices[CHOICE.fixed], N_INFO - 1 - N_STAGES
     place_chain(rows, fixed, work, L.READ_ANGLE, M.CHAIN, CHAIN_WORK)
-    copy_pose(work, seen)
+    copy_pose(work, FIRST_INFO + N_INFO + 2 + 4 * N_STAGES)
     place_chain(rows, fixed, work, M.ANGLE, M.CHAIN, CHAIN_WORK)
-    copy_pose(work, info[L.INFO.state_x :])
-    planned = N_INFO - 1 - N_STAGES
+    copy_pose(work, FIRST_INFO + L.INFO.state_x)
+    for i in range(L.N_POSE + N_STAGES):
+        to = L.INFO.state_reference_x + i if i < L.N_POSE else planned + i - L.N_POSE
+        for j in range(LANES):
+            info[to][j] = info[references + i * count][j]
     for j in range(LANES):
-        for i in range(L.N_POSE):
-            info[L.INFO.state_reference_x + i][j] = references[i * count][j]
         off, largest = 0.0, 0.0
         for k in range(N_STAGES):
-            angle, plan = rows[M.ANGLE + k][j], references[(L.N_POSE + k) * count][j]
-            info[planned + k][j] = plan
-            error = angle - plan
+            angle = rows[M.ANGLE + k][j]
+            error = angle - info[planned + k][j]
             off = off + error * error
             largest = max(largest, abs(angle))
         info[L.INFO.state_joint_error][j] = math.sqrt(off / N_STAGES)
@@ -55,7 +53,7 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
         share = along(info[L.INFO.time][j], settings[0][L.CONFIG.rest_seconds], seconds)
         info[L.INFO.state_resting][j] = 0.0 if 0.0 < share < 1.0 else 1.0
         judge_pressures(rows, fixed, settings[0], info, j)
-        judge(settings[0], info, seen, largest, j)
+        judge(settings[0], info, largest, j)
 
 
 @kernel
@@ -73,19 +71,21 @@ def judge_pressures(rows: Any, fixed: Any, config: Any, info: Any, j: int) -> No
 
 
 @kernel
-def apart(one: Any, other: Any, j: int) -> float:
-    """Return the distance between two vectors, given from their first rows on."""
+def apart(info: Any, one: int, other: int, j: int) -> float:
+    """Return the distance between two vectors, given their first rows."""
     return distance(  # type: ignore[no-any-return]
-        one[0][j] - other[0][j], one[1][j] - other[1][j], one[2][j] - other[2][j]
+        info[one][j] - info[other][j],
+        info[one + 1][j] - info[other + 1][j],
+        info[one + 2][j] - info[other + 2][j],
     )
 
 
 @kernel
-def judge(config: Any, info: Any, seen: Any, largest: float, j: int) -> None:
+def judge(config: Any, info: Any, largest: float, j: int) -> None:
     """Write errors, rewards, costs and margins of lane ``j``; ``largest`` is its largest angle."""
-    pose, reference = info[L.INFO.state_x :], info[L.INFO.state_reference_x :]
-    off, aside = apart(pose, reference, j), apart(pose[3:], reference[3:], j)
-    info[L.INFO.sensor_output][j] = apart(seen, reference, j)
+    pose, reference = L.INFO.state_x, L.INFO.state_reference_x
+    off, aside = apart(info, pose, reference, j), apart(info, pose + 3, reference + 3, j)
+    info[L.INFO.sensor_output][j] = apart(info, N_INFO + 2 + 4 * N_STAGES, reference, j)
     info[L.INFO.reference][j], info[L.INFO.output][j] = 0.0, off
     info[L.INFO.state_pointing_error][j] = aside
     info[L.INFO.reward_position][j] = error_reward(

@@ -35,6 +35,7 @@ from pam_envs.plants.single_muscle.step import (
     true_position,
 )
 from pam_envs.references import trajectory as T
+from pam_envs.references.trajectory import draw_reference
 from pam_envs.tasks.rewards import excess
 from pam_envs.tasks.tracking import Tracking
 
@@ -88,12 +89,13 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
     """Write readings, rewards, costs, margins and efforts of a tile into ``work``."""
     step, config, reference = counts[R.STEP], settings[0], work[SIGNALS + choices[CHOICE.fixed]]
     for j in range(LANES):
-        output, pressure = true_position(rows, j), rows[R.PRESSURE][j]
+        work[INFO.state_contraction][j] = true_position(rows, j)
         seen = sense(seen_position(rows, j), fixed, counts, R.POSITION_NOISE, NOISE_X, step[j], j)
         work[INFO.sensor_contraction][j] = work[SIGNALS][j] = seen
         seen = sense(seen_pressure(rows, j), fixed, counts, R.PRESSURE_NOISE, NOISE_P, step[j], j)
         work[INFO.sensor_pressure][j] = work[SIGNALS + 1][j] = seen
-        work[INFO.state_contraction][j] = output
+    for j in range(LANES):
+        output, pressure = work[INFO.state_contraction][j], rows[R.PRESSURE][j]
         report_tracking(work, config, INFO, CONFIG, reference[j], output, j)
         moved = rows[R.SET_POINT][j] - rows[R.OLD_SET_POINT][j]
         full = fixed[R.MAX_PRESSURE][j]
@@ -149,7 +151,7 @@ def begin_muscle(
     family = choices[CHOICE.reference]
     if family != T.SAMPLES:
         low, high = config[CONFIG.reference_low], config[CONFIG.reference_high]
-        T.draw_reference(rows, REFERENCE, j, key_a, key_b, family, low, high)
+        draw_reference(rows, REFERENCE, j, key_a, key_b, family, low, high)
 
 
 @lru_cache(maxsize=8)

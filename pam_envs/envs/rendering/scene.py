@@ -133,7 +133,7 @@ def draw_loop(canvas: Canvas, points: Trace, axes: Axes, scale: float = 1.0) -> 
 def pressure_loop(
     canvas: Canvas, plant: Any, first: Strip, points: Trace, both: bool = False
 ) -> None:
-    """Draw the output, in the unit of the first strip, over the pressure, or the difference of two."""
+    """Draw the output, in the unit of the first strip, over the pressure or a difference of two."""
     full, (span, across, name) = full_bar(plant), first.axis(plant)
     low, ticks = (-full, full / 4) if both else (0.0, full / 6)
     axes = Axes(canvas, PANEL, (low, full), span)
