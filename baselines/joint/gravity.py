@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from baselines.core.controller import Array
-from pam_envs.plants.antagonistic_joint.statics import shift_for
 
 ANGLES, TORQUES = 61, 81
 """Size of the table of shifts."""
@@ -56,7 +55,7 @@ class Gravity:
         low, high = self.plant.angle_range
         angle = np.linspace(low, high, ANGLES)[:, None]
         torque = np.linspace(-LARGEST_TORQUE, LARGEST_TORQUE, TORQUES)[None, :]
-        return shift_for(self.plant, angle, self.plant.prestress, torque, high)
+        return self.plant.shift_for(angle, self.plant.prestress, torque, high)
 
 
 def _between(table: Array, along: Array, across: Array) -> Array:

@@ -22,7 +22,7 @@ from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.decide.isolability import ALIKE
 from pam_envs.diagnosis.diagnosis import fit_failures_explained
 from pam_envs.kernels.build import COMPILED
-from pam_envs.plants.single_muscle.plant import UnstableParameters
+from pam_envs.plants.core.plant import UnstableParameters
 from tests.diagnosis import hidden
 
 pytestmark = pytest.mark.skipif(not COMPILED, reason="too many samples for plain Python")

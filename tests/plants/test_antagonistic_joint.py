@@ -247,7 +247,7 @@ def test_rows_stand_where_their_names_say() -> None:
     assert len(column) == K.N_PARAMETERS
     for name in K.NAMES:
         assert column[K.place(name)] == plant.value(name)
-    assert column[K.MAX_PRESSURE] == 6.5e5 and column[K.PAYLOAD_ARM] == plant.link.length
+    assert column[K.REGULATOR_MAX_PRESSURE] == 6.5e5 and column[K.LINK_LENGTH] == plant.link.length
     quiet = plant.without_noise()
     assert quiet.angle.noise == quiet.pressure.resolution == 0.0
 

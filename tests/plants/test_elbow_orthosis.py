@@ -146,10 +146,10 @@ def test_names_and_rows_agree() -> None:
     column = plant.parameter_rows()
     assert len(column) == K.N_PARAMETERS
     assert column[K.place("bundle_b.muscles")] == 7.0
-    assert column[K.BUNDLE + K.BUNDLE_ROWS + K.MUSCLES] == 7.0
-    assert column[K.RADIUS] == plant.pulley.radius
+    assert column[len(K.BUNDLE) + K.BUNDLE.muscles] == 7.0
+    assert column[K.PULLEY_RADIUS] == plant.pulley.radius
     assert column[K.PRESSURE_BIAS] == column[K.place("pressure.bias")]
-    assert column[K.HANDLE] == plant.wearer.handle
+    assert column[K.WEARER_HANDLE] == plant.wearer.handle
 
 
 # --- hysteresis ----------------------------------------------------------------------------------

@@ -14,8 +14,9 @@ from pam_envs.diagnosis.arrays import Array
 from pam_envs.diagnosis.fit.least_squares import Free
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.parameters import declarations
+from pam_envs.plants.core.plant import UnstableParameters
 from pam_envs.plants.single_muscle import rows as R
-from pam_envs.plants.single_muscle.plant import NEUTRAL, SingleMuscle, UnstableParameters
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.replay import CHANNELS, Inputs, replay_rows
 
 THRESHOLDS = (3e3, 7e3, 1.2e4, 1.8e4, 2.5e4, 3.3e4, 4.2e4, 5.2e4, 6.3e4, 7.6e4, 9.1e4, 1.1e5)
@@ -43,8 +44,10 @@ PLAIN_NEUTRAL = {
     "hysteresis.stretch": 0.0,
     "hysteresis.width_per_load": 0.0,
 }
-"""Effects of the plain step, which :data:`NEUTRAL` does not list."""
-SWITCHED_OFF = {k: v for k, v in (NEUTRAL | PLAIN_NEUTRAL).items() if k != "mass.carried"}
+"""Effects of the plain step, which ``SingleMuscle.neutral`` does not list."""
+SWITCHED_OFF = {
+    k: v for k, v in (SingleMuscle.neutral | PLAIN_NEUTRAL).items() if k != "mass.carried"
+}
 """Neutral values of all effects; the rig declares the other parameter."""
 
 

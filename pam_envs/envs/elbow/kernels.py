@@ -223,7 +223,7 @@ def begin_elbow(
         a = config[L.CONFIG.start_share] * uniform(key_a, key_b, L.START, 0)
         b = config[L.CONFIG.start_share] * uniform(key_a, key_b, L.START, 1)
     if choices[L.CHOICE.pulsed] > 0:
-        a, b = min(a, fixed[K.SUPPLY_PRESSURE][j]), min(b, fixed[K.SUPPLY_PRESSURE][j])
+        a, b = min(a, fixed[K.VALVE_SUPPLY_PRESSURE][j]), min(b, fixed[K.VALVE_SUPPLY_PRESSURE][j])
     start_hysteresis(rows, counts, L.HYSTERESIS, j)
     begin_lane(rows, fixed, counts, tables, L.HYSTERESIS, choices[CHOICE.elements], j, a, b)
     rows[L.ACTION][j], rows[L.ACTION + 1][j] = rows[K.COMMAND_A][j], rows[K.COMMAND_B][j]

@@ -172,7 +172,7 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
         higher = max(rows[K.PRESSURE_A][j], rows[K.PRESSURE_B][j])
         moved = abs(rows[K.SET_POINT_A][j] - rows[OLD_SET_A][j])
         moved = moved + abs(rows[K.SET_POINT_B][j] - rows[OLD_SET_B][j])
-        full = 2.0 * fixed[K.MAX_PRESSURE][j]
+        full = 2.0 * fixed[K.REGULATOR_MAX_PRESSURE][j]
         report_pressure(work, config, INFO, CONFIG, higher, moved, full, j)
         work[INFO.cost_angle][j] = excess(abs(angle), config[CONFIG.soft_angle])
         margin = config[CONFIG.largest_angle] - abs(angle)

@@ -80,7 +80,7 @@ def read_brace(rows: Any, fixed: Any, counts: Any, work: Any, j: int) -> None:
     pressure = sense(rows[SENSED[2]][j], fixed, counts, K.PRESSURE_NOISE, NOISE_P, step, j)
     sine, _ = sine_and_cosine(0.5 * angle)
     length = muscle_length(sine, fixed[K.LEVER_ARM][j], fixed[K.LEVER_FITTINGS][j])
-    stiffness = tension / max(1e-3, length - fixed[K.SHORTEST_LENGTH][j])
+    stiffness = tension / max(1e-3, length - fixed[K.MUSCLE_SHORTEST_LENGTH][j])
     work[INFO.sensor_tension][j] = work[SIGNALS][j] = tension
     work[INFO.sensor_stiffness][j] = work[SIGNALS + 1][j] = stiffness
     work[INFO.sensor_angle][j] = work[SIGNALS + 2][j] = angle
@@ -106,7 +106,10 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
 @kernel
 def report_brace(rows: Any, fixed: Any, config: Any, work: Any, info: Any, at: Any, j: int) -> None:
     """Write costs, margins and efforts of the muscle's pressure."""
-    moved, full = rows[K.SET_POINT][j] - rows[K.OLD_SET_POINT][j], fixed[K.MAX_PRESSURE][j]
+    moved, full = (
+        rows[K.SET_POINT][j] - rows[K.OLD_SET_POINT][j],
+        fixed[K.REGULATOR_MAX_PRESSURE][j],
+    )
     report_pressure(work, config, info, at, rows[K.PRESSURE][j], moved, full, j)
     travel = change_of(rows, K.PRESSURE, K.OLD_PRESSURE, j)
     work[info.effort_pressure_travel][j] = abs(travel)

@@ -136,6 +136,6 @@ def pressure_for(fixed: Any, gait: Any, torque: float, phase: float, j: int) -> 
     )
     sine, _ = sine_and_cosine(0.5 * angle)
     length = 2.0 * arm * sine - fixed[K.LEVER_FITTINGS][j]
-    stretch = max(1e-3, length - fixed[K.SHORTEST_LENGTH][j])
-    pressure = tension / (stretch * fixed[K.GAIN][j] * fixed[K.STIFFNESS_RATIO][j])
-    return max(0.0, min(0.8 * fixed[K.MAX_PRESSURE][j], pressure))
+    stretch = max(1e-3, length - fixed[K.MUSCLE_SHORTEST_LENGTH][j])
+    pressure = tension / (stretch * fixed[K.MUSCLE_GAIN][j] * fixed[K.MUSCLE_STIFFNESS_RATIO][j])
+    return max(0.0, min(0.8 * fixed[K.REGULATOR_MAX_PRESSURE][j], pressure))

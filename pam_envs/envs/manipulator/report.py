@@ -64,7 +64,7 @@ def judge_pressures(rows: Any, fixed: Any, config: Any, info: Any, j: int) -> No
         higher = max(higher, rows[M.PRESSURE + k][j])
         travel = travel + abs(change_of(rows, M.PRESSURE + k, L.OLD_PRESSURE + k, j))
         moved = moved + abs(rows[M.SET_POINT + k][j] - rows[L.OLD_SET_POINT + k][j])
-    full = 2 * N_STAGES * fixed[M.MAX_PRESSURE][j]
+    full = 2 * N_STAGES * fixed[M.REGULATOR_MAX_PRESSURE][j]
     report_pressure(info, config, L.INFO, L.CONFIG, higher, moved, full, j)
     info[L.INFO.effort_pressure_travel][j] = travel
     info[L.INFO.effort_air][j] = max(0.0, change_of(rows, M.AIR, L.OLD_AIR, j))

@@ -54,7 +54,7 @@ REPORT = Report(
         **computed("sensor", "contraction", "pressure"),
     },
     N_WORK,
-    observed=(None, None, R.SET_POINT, R.TOLD_LOAD),
+    observed=(None, None, R.SET_POINT, R.DECLARED_LOAD),
 )
 INFO, ENDED, SIGNALS = REPORT.rows, REPORT.ended, REPORT.signals
 
@@ -73,7 +73,7 @@ remember: Any = None  # a placeholder, replaced for each hysteresis
 @kernel
 def air_in_muscle(rows: Any, fixed: Any, j: int) -> float:
     """Return the mass of air [kg] in the muscle of lane ``j``."""
-    length = fixed[R.REST_LENGTH][j]
+    length = fixed[R.MUSCLE_REST_LENGTH][j]
     space = volume(rows[R.CONTRACTION][j] / length, length, fixed[R.TALL][j], fixed[R.COSINE][j])
     return DENSITY_PER_PRESSURE * (rows[R.PRESSURE][j] + ATMOSPHERE) * space
 
@@ -81,7 +81,7 @@ def air_in_muscle(rows: Any, fixed: Any, j: int) -> float:
 @kernel
 def change_load(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work: Any) -> None:
     """Change the load at its time."""
-    change_payload(rows, counts[R.STEP], settings[0][PERIOD], R.TOLD_LOAD, R.LOAD)
+    change_payload(rows, counts[R.STEP], settings[0][PERIOD], R.DECLARED_LOAD, R.LOAD)
 
 
 @kernel
@@ -98,7 +98,7 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
         output, pressure = work[INFO.state_contraction][j], rows[R.PRESSURE][j]
         report_tracking(work, config, INFO, CONFIG, reference[j], output, j)
         moved = rows[R.SET_POINT][j] - rows[R.OLD_SET_POINT][j]
-        full = fixed[R.MAX_PRESSURE][j]
+        full = fixed[R.REGULATOR_MAX_PRESSURE][j]
         report_pressure(work, config, INFO, CONFIG, pressure, moved, full, j)
         work[INFO.cost_contraction][j] = excess(output, config[CONFIG.soft_contraction])
         margin = min(
@@ -124,7 +124,7 @@ def begin_muscle(
     counts[R.MEMBER][j] = member
     drawn = int(uniform(key_a, key_b, START, 0) * choices[OWN.loads])
     load, change = settings[choices[CHOICE.at_own]][drawn], config[CONFIG.load_change]
-    rows[R.TOLD_LOAD][j] = rows[R.LOAD][j] = load
+    rows[R.DECLARED_LOAD][j] = rows[R.LOAD][j] = load
     when = 0.3 + 0.4 * uniform(key_a, key_b, START, 1)
     rows[R.CHANGE_TIME][j] = config[EPISODE_SECONDS] * when
     rows[R.CHANGE][j] = change
@@ -133,7 +133,7 @@ def begin_muscle(
     for k in range(len(rows) - HYSTERESIS):
         rows[HYSTERESIS + k][j] = 0.0
     counts[R.STACK_COUNT][j] = 1
-    full = config[CONFIG.start_share] * fixed[R.MAX_PRESSURE][j]
+    full = config[CONFIG.start_share] * fixed[R.REGULATOR_MAX_PRESSURE][j]
     peak = full * uniform(key_a, key_b, START, 3)
     begin = peak * uniform(key_a, key_b, START, 4)
     rows[R.REST][j] = rest_contraction(fixed, j, 0.0, load)
@@ -166,7 +166,7 @@ def kernels_for(kind: str, extended: bool = False) -> Kernels:
         REPORT,
         evaluate,
         begin_muscle,
-        rows=rows + (R.N_EFFECTS if extended else 0),
+        rows=rows + (R.STATE.end if extended else 0),
         parameters=R.N_PARAMETERS,
         counts=R.N_COUNTS,
         set_points=R.SET_POINT,

@@ -26,22 +26,17 @@ def at_rest(
     """Return the equations about the rest at an angle and a co-contraction.
 
     States: pressure_a, pressure_b [Pa], angle [rad], velocity [rad/s]; of the reduced plant angle
-    and velocity. Inputs: set_point_a, set_point_b [Pa], or command [rad] and co_contraction [N]
-    through the feed-forward (of the reduced plant: command). Output: angle.
+    and velocity. Inputs: set_point_a, set_point_b [Pa], or with ``inputs="angle"`` command [rad]
+    and co_contraction [N] through the feedforward (of the reduced plant: command). Output: angle.
 
     Parameters
     ----------
-    plant : AntagonisticJoint
     angle : float
         Angle at rest [rad], reached from the straight joint.
     prestress : float, optional
         Co-contraction [N]; default: the nominal one.
     payload : float
         Mass at the link's end [kg].
-    inputs : {"pressure", "angle"}
-        Set-points of the regulators, or of the feed-forward.
-    branch : {"loading", "turned"}
-        See :mod:`pam_envs.plants.core.linearise`.
     """
     link = plant.link
     inertia = link.inertia + payload * link.length**2

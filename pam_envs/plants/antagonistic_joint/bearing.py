@@ -2,40 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from pam_envs.plants.antagonistic_joint.statics import PairPlant
 
 SMALLEST_ARM = 1e-12
-
-
-class Bearer(Protocol):
-    """A plant with n joints that bears weights."""
-
-    def weight_torque(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
-        """Return the torques [N m] that hold plant and payload [kg] at angles (..., n) [rad]."""
-
-    def torque_range(self, angles: ArrayLike, by_pressure: bool = False) -> tuple[Array, Array]:
-        """Return the least and the largest torque [N m] at angles [rad]."""
 
 
 class UnbearableLoad(ValueError):
     """The muscles cannot hold the weight at an angle of the plan."""
 
 
-def bearable_payload(plant: Bearer, angles: ArrayLike, by_pressure: bool = False) -> float:
-    """Return the largest payload [kg] that is borne at all angles; below 0 where none is.
+def bearable_payload(plant: PairPlant, angles: ArrayLike, by_pressure: bool = False) -> float:
+    """Return the largest payload [kg] that is borne at all angles (k, n) [rad]; below 0 if none is.
 
-    Parameters
-    ----------
-    plant : AntagonisticJoint or RedundantManipulator
-    angles : array_like, shape (k, n)
-        [rad].
-    by_pressure : bool
-        Whether pressures are set, and not angles, whose set-points are limited.
+    ``by_pressure``: pressures are set, and not angles, whose set-points are limited.
     """
     low, high = plant.torque_range(angles, by_pressure)
     empty = plant.weight_torque(angles)
@@ -47,23 +29,11 @@ def bearable_payload(plant: Bearer, angles: ArrayLike, by_pressure: bool = False
 
 
 def check_borne(
-    plant: Bearer, angles: ArrayLike, payload: float, where: str, by_pressure: bool = False
+    plant: PairPlant, angles: ArrayLike, payload: float, where: str, by_pressure: bool = False
 ) -> None:
-    """Raise if the weight at one of a plan's angles is more than the muscles exert there.
+    """Raise :class:`UnbearableLoad` where the muscles cannot hold a plan's angles (k, n) [rad].
 
-    Parameters
-    ----------
-    plant, angles, by_pressure
-        As of :func:`bearable_payload`.
-    payload : float
-        The heaviest [kg].
-    where : str
-        Subject of the error's sentence.
-
-    Raises
-    ------
-    UnbearableLoad
-        Naming pose, joint, the torque that is needed and the torque there is.
+    ``payload`` is the heaviest [kg], ``where`` the subject of the error's sentence.
     """
     low, high = plant.torque_range(angles, by_pressure)
     wanted = plant.weight_torque(angles, payload)

@@ -1,63 +1,71 @@
-"""Effects of the antagonistic joint: kernels in the place of the plain plant's placeholders.
+"""Effects of a plant with antagonistic pairs: kernels in the place of the plain placeholders.
 
-Both muscles have the effects of their path (dead time, regulator, supply, leak, line, creep,
-temperature, first cycles), the bearing sticks and slips, and the sensors have theirs. In the
-reduced plant, which moves by its commands, only the pressures and the sensors have effects.
+Every muscle has the effects of its path (``core.muscle_path``), with the same parameters; the
+bearing of a single joint sticks and slips; the sensors have theirs. In the reduced plant, which
+moves by its commands, only the pressures and the sensors have effects.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+from pam_envs.hysteresis import protocol
 from pam_envs.kernels.build import kernel
-from pam_envs.mechanics.guide import turn_on_bearing
 from pam_envs.plants.antagonistic_joint import rows as K
-from pam_envs.plants.antagonistic_joint.rows import EFFECT, STATE
+from pam_envs.plants.antagonistic_joint.pair import N_PAIRS, PAIR, pair_rows
 from pam_envs.plants.core.muscle_path import PATH_STATE, begin_path, path_step
-from pam_envs.plants.core.sensors import sensor_kernels
+from pam_envs.plants.core.sensors import effect_kernels
 
-EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
-FULL_SCALES = (0.5236, 6.5e5, 6.5e5)
-"""Full scales of the sensors: rad, Pa, Pa."""
+FULL_ANGLE, FULL_PRESSURE = 0.5236, 6.5e5
+"""Full scales of the sensors [rad, Pa]."""
 
 
 @kernel
 def regulate_extended(
-    rows: Any, fixed: Any, counts: Any, side: int, i: int, substeps: int, period: float, work: Any
+    rows: Any, fixed: Any, counts: Any, m: int, i: int, substeps: int, period: float, work: Any
 ) -> None:
-    """Advance pressure and effective pressure of one muscle of a tile through a sub-step."""
+    """Advance pressure and effective pressure of muscle ``m`` of a tile through a sub-step."""
     path_step(
-        rows, fixed, EFFECTS_AT + STATE.paths + side * PATH_STATE.end, EFFECT.path, K.MAX_PRESSURE,
-        EFFECT.warm, rows[K.PRESSURE_A + side], rows[K.SET_POINT_A + side],
-        rows[EFFECTS_AT + STATE.effective + side], work[side], counts[K.STEP], i, substeps, period,
+        rows, fixed, PAIR.paths + m * PATH_STATE.end, PAIR.path, K.REGULATOR_MAX_PRESSURE,
+        PAIR.warm, rows[PAIR.pressure + m], rows[PAIR.set_point + m], rows[PAIR.effective + m],
+        work[m], counts[K.STEP], i, substeps, period,
     )  # fmt: skip
 
 
 @kernel
-def begin_muscles(rows: Any, fixed: Any, j: int) -> None:
-    """Begin the paths of both muscles of lane ``j`` at their pressures."""
-    for side in range(2):
-        state = EFFECTS_AT + STATE.paths + side * PATH_STATE.end
-        pressure = rows[K.PRESSURE_A + side][j]
-        rows[EFFECTS_AT + STATE.effective + side][j] = begin_path(
-            rows, fixed, j, state, EFFECT.path, EFFECT.warm, pressure
-        )
-    rows[EFFECTS_AT + STATE.stuck][j] = 1.0
+def begin_paths(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the paths of all muscles of lane ``j`` at their pressures."""
+    for m in range(2 * N_PAIRS):
+        rows[PAIR.effective + m][j] = begin_path(
+            rows, fixed, j, PAIR.paths + m * PATH_STATE.end, PAIR.path, PAIR.warm,
+            rows[PAIR.pressure + m][j],
+        )  # fmt: skip
 
 
-def effect_kernels(first: int) -> dict[str, Any]:
-    """Return the kernels of the effects, whose state begins at row ``first``."""
-    sensors = first + STATE.sensors
-    measured = (K.ANGLE, K.PRESSURE_A, K.PRESSURE_A + 1)
-    effects = (EFFECT.angle, EFFECT.pressure, EFFECT.pressure)
-    return sensor_kernels(sensors, measured, effects, FULL_SCALES) | {
-        "EFFECTS_AT": first,
-        "EFFECTIVE_A": first + STATE.effective,
-        "SENSED_ANGLE": sensors,
-        "SENSED_PRESSURE": sensors + 1,
-        "regulate": regulate_extended,
-        "begin_muscles": begin_muscles,
-        "STUCK": first + STATE.stuck,
-        "BEARING": EFFECT.bearing,
-        "turn": turn_on_bearing,
-    }
+@kernel
+def begin_paths_and_bearing(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the paths of both muscles of a single joint, whose bearing holds."""
+    begin_paths(rows, fixed, j)
+    rows[STUCK][j] = 1.0
+
+
+STUCK = 0  # placeholder: see mechanics.guide
+
+
+def pair_kernels(kind: str, layout: Any, pairs: int, effects: int | None) -> dict[str, Any]:
+    """Return what a plant with pairs puts in the place of their placeholders.
+
+    ``effects`` is the first row of the state of the effects; None for a plain plant.
+    """
+    found = protocol.kernels(kind) | {"PAIR": pair_rows(layout, effects), "N_PAIRS": pairs}
+    if effects is None:
+        return found
+    block, muscles = layout.EFFECT, 2 * pairs
+    measured = [found["PAIR"].angle + k for k in range(pairs)]
+    measured += [found["PAIR"].pressure + m for m in range(muscles)]
+    shown = effect_kernels(
+        effects, layout, measured, [block.angle] * pairs + [block.pressure] * muscles,
+        [FULL_ANGLE] * pairs + [FULL_PRESSURE] * muscles, angles=pairs,
+    )  # fmt: skip
+    begin = begin_paths_and_bearing if "bearing" in block._fields else begin_paths
+    return found | shown | {"regulate": regulate_extended, "begin_muscles": begin}

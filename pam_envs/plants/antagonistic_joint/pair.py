@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from typing import Any
 
 from pam_envs.constants import ATMOSPHERE, DENSITY_PER_PRESSURE
@@ -10,79 +11,141 @@ from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel
 from pam_envs.mechanics.antagonistic_lever import span, squares
 from pam_envs.muscle.force_map import force_terms, inner_volume
-from pam_envs.plants.antagonistic_joint.rows import (
-    AREA,
-    BRAID_FORCE,
-    BRAID_STRAIN,
-    DIAMETER,
-    FITTINGS,
-    FRICTION_BASE,
-    FRICTION_RATE,
-    GAIN,
-    IMBALANCE,
-    L_O,
-    L_U,
-    LIMIT,
-    LOOP_WIDTH,
-    MAX_PRESSURE,
-    MUSCLE_STIFFNESS,
-    R_O,
-    R_U,
-    REST_LENGTH,
-    SLEW_RATE,
-    STOP,
-    STOP_STIFFNESS,
-    STRETCH,
-    TAPER,
-    THRESHOLD,
-    TIME_CONSTANT,
-    VISCOSITY,
-)
+from pam_envs.plants.antagonistic_joint import rows as K
+from pam_envs.plants.core.sensors import read_sensors
 from pam_envs.pneumatics.regulator import regulator_step
+
+PAIR: Any = None
+"""Placeholder: rows of the plant whose joints have the pairs (:func:`pair_rows`)."""
+N_PAIRS = 1  # placeholder: number of joints
+# placeholders, filled in for each plant and each hysteresis
+hysteresis_lag: Any = None
+hysteresis_peek: Any = None
+move: Any = None
+report_state: Any = None
+
+ROWS = (
+    "angle velocity pressure set_point command prestress force contraction lag at stick torque "
+    "stiffness straight air slack model"
+)
+"""Rows of a plant that these kernels read: of joint ``k`` the row of the first and ``k``, of
+muscle ``m`` that of the first and ``m``."""
+
+
+def pair_rows(layout: Any, effects: int | None) -> Any:
+    """Return the rows of a plant with pairs; ``effects``: first row of the effects' state."""
+    found = {n: getattr(layout, n.upper(), None) for n in ROWS.split()}
+    found = {n: getattr(layout, f"{n.upper()}_A") if r is None else r for n, r in found.items()}
+    if effects is None:
+        found |= {"effective": found["pressure"], "paths": 0}
+    else:
+        own = layout.STATE
+        found |= {"effective": effects + own.effective, "paths": effects + own.paths}
+    found |= {"path": layout.EFFECT.path, "warm": layout.EFFECT.warm}
+    return namedtuple("PairRows", tuple(found))(**found)
 
 
 @kernel
-def fill(pressure: Any, set_point: Any, was: Any, fixed: Any, h: float) -> None:
-    """Advance the pressures of one muscle in all lanes, and keep those before."""
+def regulate(
+    rows: Any, fixed: Any, counts: Any, m: int, i: int, substeps: int, period: float, work: Any
+) -> None:
+    """Advance the pressure of muscle ``m`` of a tile through a sub-step; keep those before."""
+    pressure, set_point, was = rows[PAIR.pressure + m], rows[PAIR.set_point + m], work[m]
+    h = period / substeps
     for j in range(LANES):
-        time, slew = fixed[TIME_CONSTANT][j], fixed[SLEW_RATE][j]
-        target = max(0.0, min(fixed[MAX_PRESSURE][j], set_point[j]))
+        time, slew = fixed[K.REGULATOR_TIME_CONSTANT][j], fixed[K.REGULATOR_SLEW_RATE][j]
+        target = max(0.0, min(fixed[K.REGULATOR_MAX_PRESSURE][j], set_point[j]))
         was[j] = pressure[j]
         pressure[j] = regulator_step(pressure[j], target, time, 1.0 / time, slew, 1.0 / slew, h)
 
 
 @kernel
-def contract(rows: Any, fixed: Any, j: int, angle: float, at: int, straight: int) -> None:
-    """Write the contractions of a pair at an angle into two rows from ``at``.
-
-    They count from that of the straight joint, row ``straight``.
-    """
-    x_a, _, _ = lever_of(fixed, j, angle, 1.0)
-    x_b, _, _ = lever_of(fixed, j, angle, -1.0)
-    rows[at][j], rows[at + 1][j] = x_a - rows[straight][j], x_b - rows[straight][j]
+def begin_muscles(rows: Any, fixed: Any, j: int) -> None:
+    """Begin the effects of the muscles: a plain plant has none."""
 
 
 @kernel
-def clear_hysteresis_models(
-    rows: Any, counts: Any, hysteresis: int, first: int, number: int, j: int
-) -> None:
-    """Put the hysteresis models of one lane into their virgin state, ``number`` of them.
+def advance(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, substeps: int,
+    period: float, work: Any,
+) -> None:  # fmt: skip
+    """Advance a tile by one control period, towards its set-points [Pa].
 
-    Their state is all rows from ``hysteresis`` on; their counts begin at ``first``.
+    Set-points, disturbance [N m] and payload [kg] are the caller's to write, and the command that
+    the reduced plant follows. ``hysteresis`` is the first row of the hysteresis state, ``elements``
+    that of the plant; ``work`` are rows of scratch.
     """
+    h = period / substeps
+    for i in range(substeps):
+        for m in range(2 * N_PAIRS):
+            regulate(rows, fixed, counts, m, i, substeps, period, work)
+        move(rows, fixed, counts, table, hysteresis, elements, h, work)
+    for j in range(LANES):
+        report_state(rows, fixed, j)
+        read_sensors(rows, fixed, j, counts[K.STEP][j] + 1, period)
+
+
+@kernel
+def predict(rows: Any, fixed: Any, j: int, k: int, angle: float, work: Any) -> None:
+    """Write contractions, rates and curvatures of the pair of joint ``k`` at an angle."""
+    rate, curve, at, straight = 2 * N_PAIRS, 4 * N_PAIRS, PAIR.at + 2 * k, rows[PAIR.straight]
+    a, b = 2 * k, 2 * k + 1
+    x_a, work[rate + a][j], work[curve + a][j] = lever_of(fixed, j, angle, 1.0)
+    x_b, work[rate + b][j], work[curve + b][j] = lever_of(fixed, j, angle, -1.0)
+    rows[at][j], rows[at + 1][j] = x_a - straight[j], x_b - straight[j]
+
+
+@kernel
+def contract(rows: Any, fixed: Any, j: int, k: int, angle: float) -> None:
+    """Write the contractions of the pair of joint ``k``, from those of the straight joint."""
+    x_a, _, _ = lever_of(fixed, j, angle, 1.0)
+    x_b, _, _ = lever_of(fixed, j, angle, -1.0)
+    at, straight = PAIR.at + 2 * k, rows[PAIR.straight]
+    rows[at][j], rows[at + 1][j] = x_a - straight[j], x_b - straight[j]
+
+
+@kernel
+def lag_of(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, operators: int,
+    first: int, last: int,
+) -> None:  # fmt: skip
+    """Move the hysteresis of some operators in some lanes to their inputs, and write their lags."""
+    hysteresis_lag(
+        rows, fixed, counts, table, hysteresis, elements, PAIR.at, PAIR.lag, operators, PAIR.model,
+        K.STACK_COUNT, K.MEMBER, first, last,
+    )  # fmt: skip
+
+
+@kernel
+def peek_at(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, elements: int, m: int,
+    operators: int, first: int, last: int,
+) -> None:  # fmt: skip
+    """Write lags and sticking of operators from ``m`` on in some lanes, whose states stay."""
+    hysteresis_peek(
+        rows, fixed, counts, table, hysteresis, elements, PAIR.at + m, PAIR.lag + m,
+        PAIR.stick + m, operators, PAIR.model, K.STACK_COUNT + m, K.MEMBER, first, last,
+    )  # fmt: skip
+
+
+@kernel
+def start_hysteresis(rows: Any, counts: Any, hysteresis: int, j: int) -> None:
+    """Put the hysteresis models of one lane into their virgin state."""
     for k in range(len(rows) - hysteresis):
         rows[hysteresis + k][j] = 0.0
-    for m in range(number):
-        counts[first + m][j] = 1
+    for m in range(2 * N_PAIRS):
+        counts[K.STACK_COUNT + m][j] = 1
 
 
 @kernel
 def lever_of(fixed: Any, j: int, angle: float, side: float) -> tuple[float, float, float]:
     """Return contraction, ``dL/dphi`` [m] and its derivative [m] of the muscle on one side."""
     sine, cosine = sine_and_cosine(angle)
-    total, even, odd = squares(fixed[R_U][j], fixed[R_O][j], fixed[L_U][j], fixed[L_O][j])
+    total, even, odd = squares(
+        fixed[K.LEVER_R_U][j], fixed[K.LEVER_R_O][j], fixed[K.LEVER_L_U][j], fixed[K.LEVER_L_O][j]
+    )
     length, rate, curve = span(sine, cosine, side, total, even, odd)
-    return 1.0 - (length - fixed[FITTINGS][j]) / fixed[REST_LENGTH][j], rate, curve
+    return 1.0 - (length - fixed[K.LEVER_FITTINGS][j]) / fixed[K.MUSCLE_REST_LENGTH][j], rate, curve
 
 
 @kernel
@@ -90,26 +153,28 @@ def terms_of(fixed: Any, j: int, contraction: float) -> tuple[float, float, floa
     """Return the terms of the force at a contraction (:func:`force_terms`)."""
     return force_terms(
         contraction,
-        fixed[AREA][j],
-        fixed[TAPER][j],
-        fixed[THRESHOLD][j],
-        fixed[BRAID_FORCE][j],
-        fixed[BRAID_STRAIN][j],
-        fixed[MUSCLE_STIFFNESS][j],
-        1.0 / fixed[STRETCH][j],
+        fixed[K.MUSCLE_AREA][j],
+        fixed[K.MUSCLE_TAPER][j],
+        fixed[K.MUSCLE_THRESHOLD][j],
+        fixed[K.MUSCLE_BRAID_FORCE][j],
+        fixed[K.MUSCLE_BRAID_STRAIN][j],
+        fixed[K.MUSCLE_STIFFNESS][j],
+        1.0 / fixed[K.MUSCLE_STRETCH][j],
     )
 
 
 @kernel
 def friction_of(fixed: Any, j: int, pressure: float) -> float:
     """Return the friction over the hysteresis lag [N]."""
-    return fixed[LOOP_WIDTH][j] * (fixed[FRICTION_BASE][j] + fixed[FRICTION_RATE][j] * pressure)
+    return fixed[K.HYSTERESIS_WIDTH][j] * (
+        fixed[K.HYSTERESIS_BASE][j] + fixed[K.HYSTERESIS_RATE][j] * pressure
+    )
 
 
 @kernel
 def gain_of(fixed: Any, j: int, side: float) -> float:
     """Return the force of a specimen over that of the law."""
-    return fixed[GAIN][j] * (1.0 + side * fixed[IMBALANCE][j])
+    return fixed[K.MUSCLE_GAIN][j] * (1.0 + side * fixed[K.MUSCLE_IMBALANCE][j])
 
 
 @kernel
@@ -123,15 +188,15 @@ def pulled(
     """
     area, passive, less, more = terms_of(fixed, j, contraction)
     gain = gain_of(fixed, j, side)
-    drag = friction_of(fixed, j, pressure) * lag + fixed[VISCOSITY][j] * pressure * speed
+    drag = friction_of(fixed, j, pressure) * lag + fixed[K.MUSCLE_VISCOSITY][j] * pressure * speed
     force = gain * (pressure * area - passive) - drag
     return max(0.0, force), gain * (pressure * less + more) if force > 0.0 else 0.0
 
 
 @kernel
 def pulled_twice(
-    fixed: Any, j: int, side: float, contraction: float, speed: float, was: float,
-    pressure: float, lag: float, stick: float,
+    fixed: Any, j: int, side: float, contraction: float, speed: float, was: float, pressure: float,
+    lag: float, stick: float,
 ) -> tuple[float, float, float, float]:  # fmt: skip
     """Return the forces [N] at two pressures, without viscosity.
 
@@ -143,35 +208,66 @@ def pulled_twice(
     old = gain * (was * area - passive) - friction_of(fixed, j, was) * lag
     new = gain * (pressure * area - passive) - friction_of(fixed, j, pressure) * lag
     slope = gain * (middle * less + more) + friction_of(fixed, j, middle) * stick
-    drag = fixed[VISCOSITY][j] * middle
+    drag = fixed[K.MUSCLE_VISCOSITY][j] * middle
     tight = 1.0 if old + new > 2.0 * drag * speed else 0.0
     return tight * old, tight * new, tight * slope, tight * drag
 
 
 @kernel
 def turning(
-    fixed: Any, j: int, side: float, contraction: float, rate: float, curve: float,
-    velocity: float, was: float, pressure: float, lag: float, stick: float,
-) -> tuple[float, float, float, float]:  # fmt: skip
-    """Return the torque of a muscle [N m] at two pressures, for a joint that turns.
+    rows: Any, fixed: Any, j: int, k: int, side: int, work: Any
+) -> tuple[float, float, float, float]:
+    """Return the torque [N m] of a muscle of joint ``k`` before and after a sub-step.
 
-    Then minus its derivative by the angle [N m/rad] and its damping [N m s/rad] between them;
-    ``rate`` and ``curve`` are the derivatives of the muscle's length by the angle.
+    Then minus its derivative by the angle [N m/rad] and its damping [N m s/rad] between them, at
+    the geometry of :func:`predict`.
     """
-    per_length = 1.0 / fixed[REST_LENGTH][j]
-    speed = -rate * velocity * per_length
+    m, per_length = 2 * k + side, 1.0 / fixed[K.MUSCLE_REST_LENGTH][j]
+    rate, curve = work[2 * N_PAIRS + m][j], work[4 * N_PAIRS + m][j]
+    speed = -rate * rows[PAIR.velocity + k][j] * per_length
     old, new, stiff, viscous = pulled_twice(
-        fixed, j, side, contraction, speed, was, pressure, lag, stick
-    )
+        fixed, j, 1.0 - 2.0 * side, rows[PAIR.at + m][j] + rows[PAIR.straight][j], speed,
+        work[m][j], rows[PAIR.effective + m][j], rows[PAIR.lag + m][j], rows[PAIR.stick + m][j],
+    )  # fmt: skip
     square = rate * rate * per_length
     return -old * rate, -new * rate, stiff * square + 0.5 * (old + new) * curve, viscous * square
 
 
 @kernel
+def pull_of(rows: Any, fixed: Any, j: int, k: int, angle: float) -> tuple[float, float]:
+    """Return torque [N m] and stiffness [N m/rad] of the muscles of joint ``k``, and note them."""
+    torque, stiffness = 0.0, 0.0
+    for side in range(2):
+        m, sign = 2 * k + side, 1.0 - 2.0 * side
+        x, rate, curve = lever_of(fixed, j, angle, sign)
+        speed = -rate * rows[PAIR.velocity + k][j] / fixed[K.MUSCLE_REST_LENGTH][j]
+        effective = rows[PAIR.effective + m][j]
+        force, slope = pulled(fixed, j, sign, x, speed, effective, rows[PAIR.lag + m][j])
+        rows[PAIR.contraction + m][j], rows[PAIR.force + m][j] = x, force
+        torque = torque - force * rate
+        stiffness = stiffness + slope * rate * rate / fixed[K.MUSCLE_REST_LENGTH][j] + force * curve
+    return torque, stiffness
+
+
+@kernel
+def report_muscles(rows: Any, fixed: Any, j: int) -> None:
+    """Write torques, stiffnesses, air and slack muscles of one lane."""
+    air, slack = 0.0, 0.0
+    for k in range(N_PAIRS):
+        torque, stiffness = pull_of(rows, fixed, j, k, rows[PAIR.angle + k][j])
+        rows[PAIR.torque + k][j], rows[PAIR.stiffness + k][j] = torque, stiffness
+    for m in range(2 * N_PAIRS):
+        contraction, pressure = rows[PAIR.contraction + m][j], rows[PAIR.pressure + m][j]
+        air = air + air_of(fixed, j, contraction, pressure)
+        slack = slack + (0.0 if rows[PAIR.force + m][j] > 0.0 else 1.0)
+    rows[PAIR.air][j], rows[PAIR.slack][j] = air, slack
+
+
+@kernel
 def stop_torque(fixed: Any, j: int, angle: float) -> tuple[float, float]:
     """Return the torque of the mechanical stop [N m] and minus its slope [N m/rad]."""
-    over = max(0.0, abs(angle) - fixed[STOP][j])
-    stiffness = fixed[STOP_STIFFNESS][j]
+    over = max(0.0, abs(angle) - fixed[K.LINK_STOP][j])
+    stiffness = fixed[K.LINK_STOP_STIFFNESS][j]
     torque = -stiffness * over if angle > 0.0 else stiffness * over
     return torque, stiffness if over > 0.0 else 0.0
 
@@ -179,14 +275,14 @@ def stop_torque(fixed: Any, j: int, angle: float) -> tuple[float, float]:
 @kernel
 def air_of(fixed: Any, j: int, contraction: float, pressure: float) -> float:
     """Return the air in a muscle [kg]."""
-    bore = 0.25 * math.pi * fixed[DIAMETER][j] * fixed[DIAMETER][j]
+    bore = 0.25 * math.pi * fixed[K.MUSCLE_DIAMETER][j] * fixed[K.MUSCLE_DIAMETER][j]
     space = inner_volume(
         contraction,
-        fixed[AREA][j],
-        fixed[TAPER][j],
-        1.0 / fixed[STRETCH][j],
+        fixed[K.MUSCLE_AREA][j],
+        fixed[K.MUSCLE_TAPER][j],
+        1.0 / fixed[K.MUSCLE_STRETCH][j],
         bore,
-        fixed[REST_LENGTH][j],
+        fixed[K.MUSCLE_REST_LENGTH][j],
     )
     return DENSITY_PER_PRESSURE * (max(0.0, pressure) + ATMOSPHERE) * space
 
@@ -195,7 +291,7 @@ def air_of(fixed: Any, j: int, contraction: float, pressure: float) -> float:
 def set_pressure(fixed: Any, j: int, contraction: float, force: float) -> tuple[float, float]:
     """Return the pressure [Pa] of a force [N] by the law, at most the highest, and its force."""
     area, passive, _, _ = terms_of(fixed, j, contraction)
-    highest = fixed[MAX_PRESSURE][j]
+    highest = fixed[K.REGULATOR_MAX_PRESSURE][j]
     pressure = (force + passive) / area
     if pressure > highest:
         return highest, highest * area - passive
@@ -217,7 +313,7 @@ def feed_forward(fixed: Any, j: int, angle: float, prestress: float) -> tuple[fl
     short : float
         1 where the angle is out of reach: beyond its limit, or without force at full pressure.
     """
-    limit = fixed[LIMIT][j]
+    limit = fixed[K.LINK_LIMIT][j]
     held = max(-limit, min(limit, angle))
     x_a, rate_a, _ = lever_of(fixed, j, held, 1.0)
     x_b, rate_b, _ = lever_of(fixed, j, held, -1.0)

@@ -1,167 +1,177 @@
-"""The statics of a pair of muscles on its lever, without hysteresis."""
+"""Statics of a pair of muscles on its lever, without hysteresis: of a joint and of an arm's."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.mechanics.antagonistic_lever import SIDES, AntagonisticLever
 from pam_envs.muscle.force_map import ForceMap
+from pam_envs.plants.antagonistic_joint.hysteresis import JointHysteresis
+from pam_envs.plants.antagonistic_joint.link import Stage, StagePoint
+from pam_envs.plants.core.plant import Plant
 from pam_envs.pneumatics.regulator import JointRegulator
 
 Array = NDArray[np.float64]
 STEP = 1e-6
 SMALLEST_TORQUE = 1e-9
+PRESTRESS_RANGE = (20.0, 120.0)
+"""Co-contractions [N] that the preset takes: more and the buckling lever leaves no stiffness."""
 
 
-class Limits(Protocol):
-    """Limits of set-points and of the motion."""
+class PairPlant(Plant):
+    """A plant whose joints have an antagonistic pair of muscles each, all alike."""
+
+    regulator: JointRegulator
+    hysteresis: JointHysteresis
+    muscle: ForceMap
+    lever: AntagonisticLever
+    link: Stage
+    nominal: StagePoint
+
+    def _check_angles(self) -> None:
+        """Refuse a stop past the toggle, and a limit past the stop."""
+        limits, toggle = self.link, self.lever.toggle
+        if limits.stop >= toggle:
+            raise ValueError(
+                f"stop = {limits.stop:g} rad lies beyond {toggle:.4g} rad, where the stretched "
+                "muscle loses its lever arm; set the stop below it, or change the lever"
+            )
+        if limits.limit > limits.stop:
+            raise ValueError(
+                f"limit = {limits.limit:g} rad of the set-point lies beyond the stop at "
+                f"{limits.stop:g} rad; lower the limit"
+            )
+
+    # --- ranges ---------------------------------------------------------------------------------
 
     @property
-    def limit(self) -> float:
-        """Of the set-point [rad]."""
+    def angle_range(self) -> tuple[float, float]:
+        """Lowest and highest set-point [rad] of a joint."""
+        return -self.link.limit, self.link.limit
 
     @property
-    def stop(self) -> float:
-        """Of the motion [rad]."""
-
-
-class Pair(Protocol):
-    """A plant with a pair of muscles on a lever."""
+    def largest_angle(self) -> float:
+        """Angle of the mechanical stop [rad]."""
+        return self.link.stop
 
     @property
-    def muscle(self) -> ForceMap:
-        """The law of force."""
+    def prestress(self) -> float:
+        """Usual co-contraction [N]."""
+        return self.nominal.prestress
 
     @property
-    def lever(self) -> AntagonisticLever:
-        """The lever."""
+    def prestress_range(self) -> tuple[float, float]:
+        """Lowest and highest co-contraction [N] that is a set-point."""
+        return PRESTRESS_RANGE
 
-    @property
-    def regulator(self) -> JointRegulator:
-        """The regulators."""
+    # --- statics --------------------------------------------------------------------------------
 
+    def forces_for(
+        self, angle: ArrayLike, prestress: ArrayLike, torque: ArrayLike = 0.0
+    ) -> tuple[Array, Array]:
+        """Return the forces [N] of both muscles whose mean is ``prestress`` [N].
 
-def check_angles(pair: Pair, limits: Limits) -> None:
-    """Refuse a stop past the toggle, and a limit past the stop."""
-    toggle = pair.lever.toggle
-    if limits.stop >= toggle:
-        raise ValueError(
-            f"stop = {limits.stop:g} rad lies beyond {toggle:.4g} rad, where the stretched muscle "
-            "loses its lever arm; set the stop below it, or change the lever"
-        )
-    if limits.limit > limits.stop:
-        raise ValueError(
-            f"limit = {limits.limit:g} rad of the set-point lies beyond the stop at "
-            f"{limits.stop:g} rad; lower the limit"
-        )
+        ``torque`` [N m] is what they exert together, at an angle [rad].
+        """
+        rate = self.lever.rate(angle)
+        spread = rate[..., 1] - rate[..., 0]
+        stress = np.asarray(prestress, float)
+        a = (2.0 * stress * rate[..., 1] + np.asarray(torque, float)) / spread
+        return a, 2.0 * stress - a
 
+    def pressures_for(
+        self, angle: ArrayLike, prestress: ArrayLike | None = None, torque: ArrayLike = 0.0
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return both pressures [Pa] for an angle [rad], co-contraction [N] and torque [N m].
 
-def forces_for(
-    pair: Pair, angle: ArrayLike, prestress: ArrayLike, torque: ArrayLike = 0.0
-) -> tuple[Array, Array]:
-    """Return the forces [N] of both muscles with a mean [N] and a torque [N m] together."""
-    rate = pair.lever.rate(angle)
-    spread = rate[..., 1] - rate[..., 0]
-    stress, wanted = np.asarray(prestress, float), np.asarray(torque, float)
-    a = (2.0 * stress * rate[..., 1] + wanted) / spread
-    return a, 2.0 * stress - a
+        The exact inverse of the static law, without hysteresis. Where a muscle would need more than
+        full pressure the co-contraction gives way; the last value says where even without any the
+        angle is out of reach.
+        """
+        full, total = self.regulator.max_pressure, np.asarray(torque, float)
+        x = self.lever.contraction(angle, self.muscle.rest_length)
+        rate = np.broadcast_to(self.lever.rate(angle), x.shape)
+        top = self.muscle.law(full, x)
+        a, b = self.forces_for(angle, self.prestress if prestress is None else prestress, torque)
+        a, b = np.minimum(a, top[..., 0]), np.minimum(b, top[..., 1])
+        held = a
+        a = np.minimum(a, np.maximum(0.0, -(total + b * rate[..., 1]) / rate[..., 0]))
+        b = np.minimum(b, np.maximum(0.0, -(total + held * rate[..., 0]) / rate[..., 1]))
+        pulls = np.stack([a, b], axis=-1)
+        missed = np.abs(np.sum(pulls * rate, axis=-1) + total)
+        pressures = np.clip(self.muscle.pressure(pulls, x), 0.0, full)
+        return pressures[..., 0], pressures[..., 1], missed > SMALLEST_TORQUE
 
+    def torque(self, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
+        """Return a pair's torque [N m], positive towards muscle A, at pressures [Pa]."""
+        x = self.lever.contraction(angle, self.muscle.rest_length)
+        p = np.stack(np.broadcast_arrays(pressure_a, pressure_b, x[..., 0])[:2], axis=-1)
+        gains = self.muscle.gain * (1.0 + np.array(SIDES) * self.muscle.imbalance)
+        return -np.sum(gains * self.muscle.force(p, x) * self.lever.rate(angle), axis=-1)
 
-def pressures_for(
-    pair: Pair, angle: ArrayLike, prestress: ArrayLike, torque: ArrayLike = 0.0
-) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Return the pressures [Pa] for these forces, and where their torque is out of reach.
+    def stiffness(self, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
+        """Return minus the derivative of the torque by the angle [N m/rad] at held pressures."""
+        phi = np.asarray(angle, float)
+        ahead = self.torque(phi + STEP, pressure_a, pressure_b)
+        return (self.torque(phi - STEP, pressure_a, pressure_b) - ahead) / (2.0 * STEP)
 
-    Where a muscle would need more than full pressure, the co-contraction gives way.
-    """
-    x = pair.lever.contraction(angle, pair.muscle.rest_length)
-    rate = np.broadcast_to(pair.lever.rate(angle), x.shape)
-    top, wanted = pair.muscle.law(pair.regulator.max_pressure, x), np.asarray(torque, float)
-    a, b = forces_for(pair, angle, prestress, torque)
-    a, b = np.minimum(a, top[..., 0]), np.minimum(b, top[..., 1])
-    held = a
-    a = np.minimum(a, np.maximum(0.0, -(wanted + b * rate[..., 1]) / rate[..., 0]))
-    b = np.minimum(b, np.maximum(0.0, -(wanted + held * rate[..., 0]) / rate[..., 1]))
-    pulls = np.stack([a, b], axis=-1)
-    missed = np.abs(np.sum(pulls * rate, axis=-1) + wanted)
-    pressures = np.clip(pair.muscle.pressure(pulls, x), 0.0, pair.regulator.max_pressure)
-    return pressures[..., 0], pressures[..., 1], missed > SMALLEST_TORQUE
+    def stiffness_at(self, angle: ArrayLike, prestress: ArrayLike | None = None) -> Array:
+        """Return a pair's stiffness [N m/rad] at rest, pressures held, without hysteresis."""
+        return self.stiffness(angle, *self.pressures_for(angle, prestress)[:2])
 
+    def torque_range(self, angles: ArrayLike, by_pressure: bool = False) -> tuple[Array, Array]:
+        """Return the least and the largest torque [N m] of the muscles at angles [rad].
 
-def shift_for(
-    pair: Pair, angle: ArrayLike, prestress: float, torque: ArrayLike, limit: float
-) -> Array:
-    """Return what to add to a set-point [rad] within ``limit`` to rest at an angle under a torque.
+        Set-points of angles end at their limit, and so does what they exert; pressures do not.
+        """
+        a, b = np.array(self.regulator.max_pressure), np.array(0.0)
+        if not by_pressure:
+            a, b, _ = self.pressures_for(self.link.limit)
+        return self.torque(angles, b, a), self.torque(angles, a, b)
 
-    The muscles then exert ``torque`` [N m] at ``angle`` [rad], or come as near to it as they can.
-    """
-    phi, wanted = np.broadcast_arrays(np.asarray(angle, float), np.asarray(torque, float))
-    low, high = np.full(phi.shape, -limit), np.full(phi.shape, limit)
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        pressures = pressures_for(pair, middle, prestress)[:2]
-        less = pull(pair, phi, *pressures) < wanted
-        low, high = np.where(less, middle, low), np.where(less, high, middle)
-    return np.asarray(0.5 * (low + high) - phi)
+    def weight_torque(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
+        """Return the torques [N m] that hold plant and payload [kg] at angles [rad]."""
+        raise NotImplementedError
 
+    def shift_for(
+        self, angle: ArrayLike, prestress: float, torque: ArrayLike, limit: float
+    ) -> Array:
+        """Return the addition to a set-point [rad] within ``limit`` to rest under a torque.
 
-def forces(pair: Pair, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
-    """Return the forces [N] at an angle [rad] and pressures [Pa], shape (..., 2)."""
-    x = pair.lever.contraction(angle, pair.muscle.rest_length)
-    p = np.stack(np.broadcast_arrays(pressure_a, pressure_b, x[..., 0])[:2], axis=-1)
-    gains = pair.muscle.gain * (1.0 + np.array(SIDES) * pair.muscle.imbalance)
-    return gains * pair.muscle.force(p, x)
+        The muscles then exert ``torque`` [N m] at ``angle`` [rad], or come as near as they can.
+        """
+        phi, load = np.broadcast_arrays(np.asarray(angle, float), np.asarray(torque, float))
+        low, high = np.full(phi.shape, -limit), np.full(phi.shape, limit)
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            less = self.torque(phi, *self.pressures_for(middle, prestress)[:2]) < load
+            low, high = np.where(less, middle, low), np.where(less, high, middle)
+        return np.asarray(0.5 * (low + high) - phi)
 
+    def _shift(self, angles: Array, weight: Array) -> Array:
+        held = np.clip(angles, *self.angle_range)
+        return self.shift_for(held, self.prestress, weight, self.link.limit)
 
-def pull(pair: Pair, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
-    """Return the muscles' torque [N m], positive towards muscle A."""
-    pulls = forces(pair, angle, pressure_a, pressure_b)
-    return -np.sum(pulls * pair.lever.rate(angle), axis=-1)
+    def _reach(self, prestress: float | None, load: Callable[[float], float]) -> float:
+        """Return the largest angle [rad] up to the stop at which the co-contraction [N] is held.
 
+        ``load`` is the torque [N m] against which the muscles hold an angle.
+        """
+        stress = self.prestress if prestress is None else prestress
 
-def stiffness(pair: Pair, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
-    """Return minus the derivative of the torque by the angle [N m/rad] at held pressures."""
-    phi = np.asarray(angle, float)
-    ahead = pull(pair, phi + STEP, pressure_a, pressure_b)
-    return (pull(pair, phi - STEP, pressure_a, pressure_b) - ahead) / (2.0 * STEP)
+        def held(angle: float) -> bool:
+            pulls = np.array(self.forces_for(angle, stress, load(angle)))
+            x = self.lever.contraction(angle, self.muscle.rest_length)
+            within = self.muscle.pressure(pulls, x) <= self.regulator.max_pressure
+            return bool(np.all(within & (pulls >= 0.0)))
 
-
-def torque_range(
-    pair: Pair, angle: ArrayLike, limit: float | None, prestress: float
-) -> tuple[Array, Array]:
-    """Return the least and the largest torque [N m] of the muscles at an angle [rad].
-
-    ``limit`` [rad] bounds the set-points at a co-contraction [N]; without one the pressures are
-    free.
-    """
-    a, b = np.array(pair.regulator.max_pressure), np.array(0.0)
-    if limit is not None:
-        a, b, _ = pressures_for(pair, limit, prestress)
-    return pull(pair, angle, b, a), pull(pair, angle, a, b)
-
-
-def reachable_angle(
-    pair: Pair, stop: float, prestress: float, load: Callable[[float], float]
-) -> float:
-    """Return the largest angle [rad] up to ``stop`` at which the co-contraction [N] is held.
-
-    ``load`` is the torque [N m] against which the muscles hold an angle.
-    """
-
-    def held(angle: float) -> bool:
-        pulls = np.array(forces_for(pair, angle, prestress, load(angle)))
-        x = pair.lever.contraction(angle, pair.muscle.rest_length)
-        within = pair.muscle.pressure(pulls, x) <= pair.regulator.max_pressure
-        return bool(np.all(within & (pulls >= 0.0)))
-
-    low, high = 0.0, stop
-    if held(stop) or not held(0.0):
-        return stop if held(stop) else 0.0
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if held(middle) else (low, middle)
-    return low
+        low, high = 0.0, self.link.stop
+        if held(high) or not held(low):
+            return high if held(high) else low
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if held(middle) else (low, middle)
+        return low

@@ -1,6 +1,6 @@
 """Linear state-space models of plants about points of rest, as objects of python-control.
 
-Five lines from a plant to a linear-quadratic regulator of one's own::
+Five lines from a plant to a linear-quadratic regulator::
 
     import control, numpy as np
     from pam_envs.plants import SingleMuscle
@@ -11,13 +11,11 @@ Five lines from a plant to a linear-quadratic regulator of one's own::
 A family of plants declares its smooth equations in a module ``at_rest`` beside its ``plant``: a
 function ``at_rest(plant, ...)`` of the operating point that returns an :class:`Equilibrium`. The
 Jacobians are central differences of these equations in continuous time: lag of the regulators and
-motion. Dead time and rate limit of a regulator have no part in them; ``control.pade`` in series
-adds a dead time.
+motion, without dead time (``control.pade`` in series adds one) and rate limit.
 
 Hysteresis is replaced by the slope of one branch: ``branch="loading"`` (default) is the branch on
 which the point was reached from the state at the beginning, for motions that continue in that
-direction; ``branch="turned"`` the one right after a turn, for small motions about the point. A
-plant without hysteresis has neither.
+direction; ``branch="turned"`` the one right after a turn, for small motions about the point.
 """
 
 from __future__ import annotations
@@ -68,13 +66,7 @@ class Equilibrium:
 
 @dataclass(frozen=True)
 class LocalBranch:
-    """A hysteresis operator replaced by a line about one input.
-
-    Attributes
-    ----------
-    point, output, slope : float
-        Input, output and slope of the line.
-    """
+    """A hysteresis operator replaced by a line about one input: input, output and slope."""
 
     point: float
     output: float
@@ -88,17 +80,10 @@ class LocalBranch:
 def local_branch(
     operator: HysteresisModel | None, point: float, start: float, branch: Branch, size: float
 ) -> LocalBranch:
-    """Return the line of an operator about ``point``, reached from ``start``.
+    """Return the line of an operator about ``point``, reached in one direction from ``start``.
 
-    Parameters
-    ----------
-    operator : HysteresisModel or None
-    point, start : float
-        Inputs; the history goes straight from ``start`` to ``point``.
-    branch : {"loading", "turned"}
-        Whether the line goes on in that direction or back.
-    size : float
-        Length of the branch whose slope is taken, in the unit of the input.
+    It is the mean slope over ``size`` (in the unit of the input) in that direction (``"loading"``)
+    or back (``"turned"``).
     """
     if branch not in ("loading", "turned"):
         raise ValueError(f"branch = {branch!r}; choose 'loading' or 'turned'")

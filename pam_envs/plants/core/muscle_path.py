@@ -46,17 +46,9 @@ def path_air(
 ) -> None:  # fmt: skip
     """Advance the pressures of one muscle of a tile through sub-step ``i``.
 
-    Parameters
-    ----------
-    rows, fixed : rows
-        State and parameters.
-    state, effects, plain : int
-        First row of the path's state (``PATH_STATE``), of its effects (``PATH``), and of full
-        pressure, time constant and slew rate.
-    pressure, set_point, step : row
-        Pressures and set-points [Pa] (below zero: the valve is shut), and control periods.
-    i, substeps, period : int, int, float
-        Sub-step, sub-steps in a control period, and its duration [s].
+    ``state``, ``effects`` and ``plain`` are the first rows of the path's state (``PATH_STATE``), of
+    its effects (``PATH``), and of full pressure, time constant and slew rate; ``pressure``,
+    ``set_point`` [Pa] (below zero: the valve is shut) and ``step`` are rows.
     """
     h = period / substeps
     own = scratch(6, LANES)
@@ -90,20 +82,10 @@ def path_muscle(
     rows: Any, fixed: Any, state: int, effects: int, warm: int, pressure: Any, h: float, crept: Any,
     factor: Any,
 ) -> None:  # fmt: skip
-    """Advance creep, and write what makes effective pressures: ``(pressure + crept) factor``.
+    """Advance creep [Pa], and write what makes effective pressures: ``(pressure + crept) factor``.
 
-    Parameters
-    ----------
-    rows, fixed, state, effects
-        As of :func:`path_air`.
-    warm : int
-        First row of the muscle's temperature (``WARM``).
-    pressure : row
-        Pressures [Pa] after ``h`` seconds.
-    h : float
-        Duration [s].
-    crept, factor : row
-        Creep [Pa], and factor of temperature and first cycles.
+    ``warm`` is the first row of the muscle's temperature (``WARM``), ``pressure`` are those after
+    ``h`` seconds; otherwise see :func:`path_air`.
     """
     width = scratch(1, LANES)
     for j in range(LANES):
@@ -134,8 +116,7 @@ def path_step(
 ) -> None:  # fmt: skip
     """Advance pressures and effective pressures of one muscle of a tile through sub-step ``i``.
 
-    ``was`` receives the effective pressures before it [Pa]; otherwise see :func:`path_air` and
-    :func:`path_muscle`.
+    ``was`` receives the effective pressures before it [Pa] (:func:`path_air`, :func:`path_muscle`).
     """
     own = scratch(2, LANES)
     path_air(rows, fixed, state, effects, plain, pressure, set_point, step, i, substeps, period)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -13,34 +14,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.protocol import HysteresisModel, tables_of
+from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.parameters import check, declarations
 from pam_envs.plants.core import plant_file
 from pam_envs.plants.core.operator_component import OperatorComponent
 
 
-def effects_of(components: Mapping[str, type]) -> tuple[tuple[str, ...], ...]:
-    """Return the effects of component classes, by component name (see :class:`Plant`)."""
-    return tuple(
-        tuple(f"{part}.{name}" for name in group)
-        for part, component in components.items()
-        for group in getattr(component, "effects", ())
-    )
-
-
-def neutral_of(components: Mapping[str, type], names: Iterable[str]) -> dict[str, float]:
-    """Return the values at which effects are off, of those ``names`` that have one."""
-    found = {}
-    for name in names:
-        part, _, field_name = name.partition(".")
-        neutral = declarations(components[part])[field_name].neutral
-        if neutral is not None:
-            found[name] = neutral
-    return found
+class UnstableParameters(ValueError):
+    """Parameters whose motion the sub-steps cannot follow."""
 
 
 @dataclass(frozen=True)
 class Plant:
-    """A plant made of components; a family of plants derives from it.
+    """A plant made of components; a family of plants derives from it, with its module ``rows``.
+
+    Fields with a factory are its components. From their declarations and from ``rows`` follow
+    ``components``, ``names``, ``effects`` and ``neutral``.
 
     Attributes
     ----------
@@ -57,6 +46,8 @@ class Plant:
     effects : tuple of tuple of str
         Parameters that switch an effect on, each with those that shape it. A file leaves out what
         is off, so that a plant's digest stays when a new effect is added.
+    shared_effects : tuple of tuple of str
+        Those of them that span several components.
     neutral : mapping
         Value of each parameter that switches an effect off.
     provenance : mapping
@@ -75,6 +66,7 @@ class Plant:
     names: ClassVar[tuple[str, ...]]
     choices: ClassVar[tuple[str, ...]] = ()
     effects: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    shared_effects: ClassVar[tuple[tuple[str, ...], ...]] = ()
     neutral: ClassVar[Mapping[str, float]] = {}
 
     provenance: Mapping[str, tuple[str, str]] = field(
@@ -82,6 +74,33 @@ class Plant:
     )
     ensemble: tuple[Mapping[str, Any], ...] = field(default=(), compare=False, kw_only=True)
     substeps: int = field(default=4, kw_only=True)
+
+    def __init_subclass__(cls, rows: Any = None, **arguments: Any) -> None:
+        """Gather components, effects and neutral values; ``rows`` is a module (``core.rows``)."""
+        super().__init_subclass__(**arguments)
+        if rows is None:  # a base of several families
+            return
+        parts = {
+            name: type(entry.default_factory())
+            for name, entry in vars(cls).items()
+            if isinstance(entry, dataclasses.Field) and callable(entry.default_factory)
+        }
+        cls.components, cls.names = tuple(parts), rows.NAMES
+        cls.effects = (
+            *(
+                tuple(f"{part}.{name}" for name in group)
+                for part, component in parts.items()
+                for group in getattr(component, "effects", ())
+            ),
+            *cls.shared_effects,
+        )
+        declared = {
+            f"{part}.{name}": declaration.neutral
+            for part, component in parts.items()
+            for name, declaration in declarations(component).items()
+        }
+        neutral = {name: declared[name] for name in rows.EFFECTS}
+        cls.neutral = {name: value for name, value in neutral.items() if value is not None}
 
     def check_components(self) -> None:
         """Raise if a parameter is out of bounds, or the number of sub-steps is none."""
@@ -91,6 +110,22 @@ class Plant:
             raise ValueError(
                 f"substeps = {self.substeps!r} must be a whole number from 1 to 100; "
                 "4 is the default"
+            )
+
+    def check_phase(self, stiffness: float, damping: float, motion: str) -> None:
+        """Refuse a motion that the sub-steps cannot follow (see ``kernels.motion``).
+
+        ``stiffness`` [1/s2] and ``damping`` [1/s] are the largest, per unit mass or inertia;
+        ``motion`` is the subject of the error's sentence.
+        """
+        h = self.control_period / self.substeps
+        phase = max(stiffness, (0.5 * damping) ** 2) * h * h
+        if phase > LARGEST_PHASE:
+            enough = math.ceil(self.substeps * math.sqrt(phase / LARGEST_PHASE))
+            raise UnstableParameters(
+                f"{motion} moves too fast for {self.substeps} sub-steps: phase {phase:.1f} against "
+                f"at most {LARGEST_PHASE:g}; use at least {enough} sub-steps or a larger "
+                "inertia"
             )
 
     def replace(self, values: Mapping[str, Any]) -> Self:
@@ -105,6 +140,16 @@ class Plant:
             c: dataclasses.replace(getattr(self, c), **v) for c, v in changed.items()
         }
         return dataclasses.replace(self, **parts)
+
+    def changed(self, changes: Mapping[str, float]) -> Self:
+        """Return :meth:`replace` of keyword arguments, with ``__`` for the dot (``mass__load``)."""
+        return self.replace({name.replace("__", "."): value for name, value in changes.items()})
+
+    def without_noise(self) -> Self:
+        """Return the plant with sensors that show the truth."""
+        return self.replace(
+            {name: 0.0 for name in self.names if name.endswith((".noise", ".resolution"))}
+        )
 
     def value(self, name: str) -> float:
         """Return a parameter by dotted name, in SI."""
@@ -133,7 +178,11 @@ class Plant:
 
     def parameter_rows(self) -> NDArray[np.float64]:
         """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
-        raise NotImplementedError
+        return np.array([*map(self.value, self.names), *self.table_values()])
+
+    def table_values(self) -> Sequence[float]:
+        """Return what follows the named parameters: the numbers of the hysteresis operator."""
+        return self._model.numbers()
 
     @property
     def elements(self) -> int:

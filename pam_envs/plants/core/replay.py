@@ -1,7 +1,7 @@
-"""Replay of a recording, and single steps, for every plant: what its sensors would have shown.
+"""Replay of a recording, and single steps, for every plant: the readings of its sensors.
 
-A family's module ``rollout`` declares what drives its plants (``channels_of``), their sensors
-(``readings_of``) and their loop (``loop_of``).
+The module ``rollout`` beside a plant declares its inputs (``channels_of``), its sensors
+(``readings_of``) and its loop (``loop_of``).
 """
 
 from __future__ import annotations
@@ -26,13 +26,7 @@ def family_of(plant: Plant) -> Any:
 
 
 def drives_for(plant: Plant, channels: Mapping[str, ArrayLike]) -> Array:
-    """Return the given channels and the defaults of the others, shape (channels, T, 1).
-
-    Raises
-    ------
-    ValueError
-        If nothing of that name drives the plant.
-    """
+    """Return the given channels and the defaults of the others, shape (channels, T, 1)."""
     defaults = family_of(plant).channels_of(plant)
     unknown = set(channels) - set(defaults)
     if unknown:
@@ -51,7 +45,7 @@ def replay_plant(
     substeps: int | None = None,
     fresh: ArrayLike = (0,),
 ) -> dict[str, Array]:
-    """Replay what drove a plant; every plant, plain or with effects.
+    """Replay recorded inputs of a plant, plain or with effects.
 
     Parameters
     ----------
@@ -66,8 +60,13 @@ def replay_plant(
     Returns
     -------
     dict
-        The reading of each sensor at the beginning of each period, shape (T,), free of noise and
+        Reading of each sensor at the beginning of each period, shape (T,), without noise and
         quantisation.
+
+    Raises
+    ------
+    ValueError
+        If a channel is unknown.
     """
     family, drives = family_of(plant), drives_for(plant, channels)
     flags = np.zeros(drives.shape[1], np.int64)
@@ -80,13 +79,7 @@ def replay_plant(
 
 
 class Stepper:
-    """Any plant, stepped one control period at a time.
-
-    Parameters
-    ----------
-    plant : Plant
-        Plain or with effects.
-    """
+    """Any plant, plain or with effects, stepped one control period at a time."""
 
     def __init__(self, plant: Plant) -> None:
         self.plant = plant

@@ -6,13 +6,14 @@ what comes out. :func:`run` builds the machine code for it and lays out the arra
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import (
     COMPILED,
     LANES,
@@ -24,7 +25,7 @@ from pam_envs.kernels.build import (
     threads,
     tile_view,
 )
-from pam_envs.plants.core.tiles import in_tiles
+from pam_envs.plants.core.tiles import first_of, in_tiles
 
 BEGIN, REST, REZERO = 1, 2, 4
 """Flags of a control period: begin anew; come to rest instead of advancing; zero the sensor."""
@@ -32,12 +33,12 @@ STEP = 3
 """Row of the control period among the whole numbers of every plant."""
 
 # placeholders, filled in for each plant
-N_ROWS = N_PARAMETERS = N_COUNTS = N_WORK = 0
+N_ROWS = N_PARAMETERS = N_COUNTS = N_WORK = END = 0
 OUTPUT_ROWS: tuple[int, ...] = ()
 BIAS_ROWS: tuple[int, ...] = ()
 plant_drive: Any = None
 plant_begin: Any = None
-plant_advance: Any = None
+advance: Any = None
 
 Array = NDArray[np.float64]
 
@@ -53,6 +54,15 @@ def biased_output(rows: Any, fixed: Any, k: int, j: int) -> float:
     """Return output ``k`` of lane ``j``: an undisturbed reading with the sensor's bias."""
     bias = fixed[BIAS_ROWS[k]][j] if k < len(BIAS_ROWS) else 0.0
     return rows[OUTPUT_ROWS[k]][j] + bias  # type: ignore[no-any-return]
+
+
+@kernel
+def plant_advance(
+    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, elements: int, substeps: int,
+    period: float, work: Any,
+) -> None:  # fmt: skip
+    """Advance a tile by one control period, of plants whose step reads no table of its own."""
+    advance(rows, fixed, counts, table, END, elements, substeps, period, work)
 
 
 @kernel
@@ -82,20 +92,10 @@ def run_plants(
 ) -> None:  # fmt: skip
     """Run tiles of plants through the control periods of ``drives[channel][t][column]``.
 
-    Parameters
-    ----------
-    all_rows, all_fixed, all_counts : arrays, shape (tiles, rows, lanes)
-        State, parameters and whole numbers.
-    table, extra : arrays
-        Of the hysteresis, and of the plant (``Loop.extra``).
-    drives, flags, outputs : arrays
-        What drives each column, flags of the control periods, and ``outputs[k][t][plant]``.
-    elements, substeps, period : int, int, float
-        Of the hysteresis; sub-steps; duration of a control period [s].
-    begun : int
-        Number of the first control period.
-    before : int
-        Whether outputs are those at the beginning of each control period, not at its end.
+    State, parameters and whole numbers have the shape (tiles, rows, lanes), ``outputs`` (outputs,
+    T, plants); ``table`` is that of the hysteresis, ``extra`` that of the plant (``Loop.extra``),
+    ``begun`` the number of the first control period; with ``before`` above 0 the outputs are those
+    at the beginning of each control period, not at its end.
     """
     for tile in prange(len(all_rows)):
         rows = tile_view(all_rows, tile, N_ROWS, LANES)
@@ -180,6 +180,47 @@ class Loop:
         return _BUILT[key]
 
 
+def loop_for(
+    name: str, plant: Any, layout: Any, kernels: Mapping[str, Any],
+    replacements: Callable[[int | None], Mapping[str, Any]], outputs: Iterable[int], work: int, *,
+    extended: bool, readings: Mapping[str, tuple[int, int]] | None = None, operators: int = 1,
+    parameters: int | None = None, extra: Array | None = None,
+) -> Loop:  # fmt: skip
+    """Return the loop of a make of plants, plain or extended.
+
+    Parameters
+    ----------
+    name, kernels, work, extra
+        As of :class:`Loop`; ``layout`` is the plant's module of rows (``core.rows``).
+    replacements : callable
+        From the first row of the effects' state, None for a plain plant, to the kernels of the
+        plant's step.
+    outputs : iterable of int
+        Rows of a rollout's signals.
+    readings : mapping, optional
+        Sensors whose readings come out instead: row, counted from the first of the effects' state,
+        and row of the bias.
+    operators, parameters : int
+        Number of its hysteresis operators; rows of parameters, by default ``layout.N_PARAMETERS``.
+    """
+    effects = layout.END + operators * state_rows(plant.hysteresis.kind)
+    made = {"END": layout.END, **kernels, **replacements(effects if extended else None)}
+    if readings is not None:
+        made |= {"BIAS_ROWS": tuple(b for _, b in readings.values()), "plant_output": biased_output}
+        outputs = [effects + row for row, _ in readings.values()]
+    what = ("_extended" if extended else "") + ("_readings" if readings is not None else "")
+    return Loop(
+        name + what,
+        made,
+        tuple(outputs),
+        rows=effects + (layout.STATE.end if extended else 0),
+        parameters=layout.N_PARAMETERS if parameters is None else parameters,
+        counts=layout.N_COUNTS,
+        work=work,
+        extra=np.zeros((1, 1)) if extra is None else extra,
+    )
+
+
 _BUILT: dict[tuple[Any, ...], Callable[..., Any]] = {}
 
 
@@ -193,25 +234,20 @@ def run(
 
     Parameters
     ----------
-    loop : Loop
     plant : Plant
         Gives the hysteresis, and sub-steps and control period [s] unless others are given.
     columns : array_like, shape (n, n_parameters)
-        Parameter sets.
+        Parameter sets; the last serves all further columns of ``drives``, up to ``plants``.
     drives : ndarray, shape (channels, T, n or 1)
         See :func:`pam_envs.plants.core.tiles.drives_of`.
-    plants : int, optional
-        Number of plants where the last parameter set serves several columns of ``drives``.
     flags : array_like of int, shape (T,), optional
         Default: begin with the first control period.
     before : bool
         Whether outputs are those at the beginning of each control period.
     lanes : int, optional
         Plants that a tile advances together.
-    parallel : bool
-        Whether tiles may be spread over the cores.
-    compiled : bool
-        Whether kernels run as machine code; plain Python gives the same bits.
+    parallel, compiled : bool
+        Whether tiles may be spread over the cores, and kernels run as machine code.
 
     Returns
     -------
@@ -235,8 +271,7 @@ def call(
     loop: Loop, plant: Any, state: Sequence[Any], fixed: Array, drives: Array,
     flags: NDArray[np.int64], outputs: Array, substeps: int | None = None,
     period: float | None = None, *, table: Array | None = None, begun: int = 0,
-    before: bool = False, parallel: bool = False,
-    compiled: bool = COMPILED,
+    before: bool = False, parallel: bool = False, compiled: bool = COMPILED,
 ) -> None:  # fmt: skip
     """Run tiles that exist already; their state and the outputs change in place (:func:`run`).
 
@@ -263,3 +298,27 @@ def call(
     function(*lists, *numbers)
     for array, values in zip((rows, counts, outputs), (lists[0], lists[2], lists[7]), strict=True):
         array[...] = values
+
+
+def simulate_plants(
+    loop_of: Callable[..., Loop], plants: Any, make: Sequence[str], drives: Array,
+    signals: Iterable[str], *, single: bool, flags: ArrayLike | None = None,
+    compiled: bool = COMPILED,
+) -> dict[str, Array]:  # fmt: skip
+    """Run one plant, or several of one make, and return the signals of its loop by name.
+
+    ``single`` leaves out the last axis of shape (T, n); ``make`` are the attributes that all plants
+    have in common.
+    """
+    several = plants_of(plants)
+    first = first_of(several, *make)
+    loop = loop_of(first, any(plant.extended for plant in several))
+    columns = [plant.parameter_rows() for plant in several]
+    n = len(several) if len(several) > 1 else drives.shape[2]
+    made = run(loop, first, columns, drives, plants=n, flags=flags, compiled=compiled)
+    return {name: made[k, :, 0] if single else made[k] for k, name in enumerate(signals)}
+
+
+def plants_of(plants: Any) -> list[Any]:
+    """Return one plant, or several, as a list."""
+    return [plants] if hasattr(plants, "parameter_rows") else list(plants)

@@ -1,16 +1,17 @@
-"""Readings of a plant's sensors: none of their own in a plain plant, with effects in an extended.
+"""Readings of a plant's sensors, with their effects in an extended plant.
 
 The kernels of a plant call :func:`read_sensors` at the beginning (period 0) and at the end of each
-control period; ``sensor_kernels`` gives what takes its place.
+control period; :func:`effect_kernels` gives its replacement.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pam_envs.kernels.build import kernel
 from pam_envs.kernels.history import N_HISTORY
+from pam_envs.mechanics.guide import turn_on_bearing
 from pam_envs.sensing.sensor import begin_sensor, sense
 
 # placeholders, filled in for each plant
@@ -48,22 +49,35 @@ def sensor_rows(sensors: int) -> int:
     return sensors * (1 + N_HISTORY)
 
 
-def sensor_kernels(
-    first: int, measured: Sequence[int], effects: Sequence[int], full_scales: Sequence[float]
-) -> dict[str, Any]:
-    """Return the kernel of a plant's sensors and its placeholders.
+def effect_kernels(
+    first: int, layout: Any, measured: Sequence[int], effects: Sequence[int],
+    full_scales: Sequence[float], angles: int = 1,
+) -> dict[str, Any]:  # fmt: skip
+    """Return the kernels of a plant's sensors and bearing, and the rows of their effects.
 
-    Parameters
-    ----------
-    first : int
-        First row of their state, of :func:`sensor_rows`.
-    measured, effects, full_scales : sequence
-        Row of each measured quantity, first row of each sensor's effects, and full scale.
+    ``first`` is the first row of the effects' state, ``layout`` the plant's module of rows;
+    ``measured``, ``effects`` and ``full_scales`` hold the row of each measured quantity, the first
+    row of each sensor's effects, and its full scale. The first ``angles`` sensors show angles.
     """
-    return {
+    sensors = first + layout.STATE.sensors
+    found = {
         "MEASURED": tuple(measured),
         "SENSOR_EFFECTS": tuple(effects),
         "FULL_SCALES": tuple(full_scales),
-        "READINGS": first,
+        "READINGS": sensors,
         "read_sensors": read_with_effects,
+        "EFFECTS_AT": first,
+        "EFFECTIVE": first + layout.STATE.effective,
+        "SENSED": tuple(range(sensors, sensors + len(measured))),
+        "SENSED_ANGLE": sensors,
+        "SENSED_PRESSURE": sensors + angles,
     }
+    if "bearing" in layout.EFFECT._fields:
+        stuck = first + layout.STATE.stuck
+        found |= {"STUCK": stuck, "BEARING": layout.EFFECT.bearing, "turn": turn_on_bearing}
+    return found
+
+
+def reading_rows(first: int, biases: Mapping[str, int]) -> dict[str, tuple[int, int]]:
+    """Return the row of each sensor's reading, from ``first`` on, and the row of its bias."""
+    return {name: (first + k, bias) for k, (name, bias) in enumerate(biases.items())}

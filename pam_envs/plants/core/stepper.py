@@ -1,8 +1,7 @@
-"""Plants stepped set-point by set-point, with copies that look ahead.
+"""Single muscles stepped set-point by set-point, with copies that predict.
 
-A controller runs against a plant one control period at a time, and a controller with an internal
-plant predicts the response to many set-points. The step is that of a replay: the extended plant,
-one sub-step a period. Plants start at rest, without pressure and in the virgin state.
+The step is that of a replay: the extended plant, one sub-step a period. Plants start at rest,
+without pressure and in the virgin state.
 """
 
 from __future__ import annotations
@@ -42,11 +41,6 @@ class PlantBatch:
         Temperature [K]; default: ``muscle.temperature`` of each plant.
     period : float
         Control period [s], at most ``LONGEST_PERIOD``.
-
-    Attributes
-    ----------
-    position : ndarray, shape (n,)
-        True contraction [m].
     """
 
     def __init__(
@@ -87,18 +81,10 @@ class PlantBatch:
         self.position = np.zeros(len(self))
 
     def run(self, set_points: ArrayLike) -> Array:
-        """Advance every plant through several control periods.
+        """Advance every plant through the control periods of set-points [Pa], shape (T, n).
 
-        Parameters
-        ----------
-        set_points : array_like, shape (T, n)
-            Set-points [Pa].
-
-        Returns
-        -------
-        ndarray, shape (3, T, n)
-            Contraction [m] and pressure [Pa] as the sensors show them, free of noise, and the
-            true contraction [m], each at the end of its period.
+        Returns contraction [m] and pressure [Pa] as the sensors show them, free of noise, and the
+        true contraction [m], each at the end of its period: shape (3, T, n).
         """
         given = np.asarray(set_points, np.float64)
         outputs = np.empty((3, *given.shape))
@@ -126,29 +112,11 @@ class PlantBatch:
 
 
 class PlantStepper:
-    """One plant, stepped set-point by set-point.
+    """One plant, stepped set-point by set-point, with copies that predict.
 
-    Parameters
-    ----------
-    plant : SingleMuscle
-        Extended or not.
-    load_kg : float
-        Load [kg].
-    noise_seed : int, optional
-        Seed of the sensors' noise; without one they are free of noise and steps.
-    kelvin : float, optional
-        Temperature [K]; default: ``muscle.temperature`` of each plant.
-    period : float
-        Control period [s].
-
-    Attributes
-    ----------
-    position : float
-        True contraction [m].
-    max_pressure : float
-        Largest set-point [Pa] of its regulator.
-    noise : float
-        RMS noise [m] of its position sensor.
+    Parameters as of :class:`PlantBatch`; ``noise_seed`` is that of the sensors' noise, without
+    which they are free of noise and steps. ``position`` is the true contraction [m],
+    ``max_pressure`` the largest set-point [Pa], ``noise`` the RMS noise [m] of the position sensor.
     """
 
     def __init__(
@@ -194,19 +162,10 @@ class PlantStepper:
         return float(sensor.resolution * round(value / sensor.resolution))
 
     def try_ahead(self, set_points: ArrayLike, periods: int) -> Array:
-        """Return the positions predicted by copies of the plant, which itself does not move.
+        """Return the positions [m] predicted by copies of the plant, which itself does not move.
 
-        Parameters
-        ----------
-        set_points : array_like, shape (m,) or (periods, m)
-            Set-points [Pa] of at most ``LANES`` copies, held or one a period.
-        periods : int
-            Prediction horizon.
-
-        Returns
-        -------
-        ndarray, shape (periods, m)
-            True contraction [m] at the end of each period.
+        ``set_points`` [Pa] are of at most ``LANES`` copies, held, shape (m,), or one a period,
+        (periods, m); the true contraction at the end of each period has the shape (periods, m).
         """
         given = np.asarray(set_points, float)
         plans = np.empty((periods, LANES))

@@ -14,18 +14,9 @@ P = TypeVar("P")
 
 
 def first_of(plants: Sequence[P], *words: str) -> P:
-    """Return the first of some plants that are to run side by side.
+    """Return the first of some plants that run side by side.
 
-    Parameters
-    ----------
-    plants : sequence
-    words : str
-        Attributes that have to be the same in all of them: they choose the code that runs.
-
-    Raises
-    ------
-    ValueError
-        If there is none, or they are not of one make.
+    ``words`` are attributes that need to be the same in all of them, since they choose the code.
     """
     if not plants:
         raise ValueError("no plants are given; give one or more")
@@ -39,16 +30,9 @@ def first_of(plants: Sequence[P], *words: str) -> P:
 
 
 def in_tiles(parameters: ArrayLike, plants: int, lanes: int) -> Array:
-    """Return parameter sets as tiles hold them, shape (tiles, n_parameters, lanes).
+    """Return parameter sets, shape (n, n_parameters), as (tiles, n_parameters, lanes).
 
-    Parameters
-    ----------
-    parameters : array_like, shape (n, n_parameters)
-        The last set fills up what it takes to ``plants``, and the last tile.
-    plants : int
-        Number of plants side by side, at least n.
-    lanes : int
-        Plants that one tile holds.
+    The last set fills up what it takes to ``plants``, and the last tile.
     """
     columns: NDArray[Any] = np.asarray(parameters, np.float64)
     tiles = -(-plants // lanes)

@@ -12,29 +12,8 @@ from typing import Any
 from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
 from pam_envs.kernels.arithmetic import clip
 from pam_envs.kernels.build import LANES, kernel
+from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.bundles import contraction_at, factors_of, shape_of, volume_of
-from pam_envs.plants.elbow_orthosis.rows import (
-    AIR_A,
-    ANGLE,
-    CLOCK,
-    CLOSING_TIME,
-    COMMAND_A,
-    CONDUCTANCE,
-    CRITICAL_RATIO,
-    FREQUENCY,
-    LEFT,
-    LIFT,
-    MAX_PRESSURE,
-    OPENED,
-    OPENING_TIME,
-    PRESSURE_A,
-    SLEW_RATE,
-    SUPPLY_PRESSURE,
-    SWITCHES,
-    TIME_CONSTANT,
-    USED,
-    VALVES,
-)
 from pam_envs.pneumatics.on_off_pair import coil_window, emptied, filled
 from pam_envs.pneumatics.regulator import regulator_step
 
@@ -58,11 +37,11 @@ def breathe_regulated(
     """Advance both pressures of a tile towards their set-points."""
     h = period / substeps
     for side in range(2):
-        pressure, command = rows[PRESSURE_A + side], rows[COMMAND_A + side]
+        pressure, command = rows[K.PRESSURE_A + side], rows[K.COMMAND_A + side]
         was, now, gives = work[WAS_A + side], work[NOW_A + side], work[GIVES_A + side]
         for j in range(LANES):
-            time, slew = fixed[TIME_CONSTANT][j], fixed[SLEW_RATE][j]
-            target = max(0.0, min(fixed[MAX_PRESSURE][j], command[j]))
+            time, slew = fixed[K.REGULATOR_TIME_CONSTANT][j], fixed[K.REGULATOR_SLEW_RATE][j]
+            target = max(0.0, min(fixed[K.REGULATOR_MAX_PRESSURE][j], command[j]))
             was[j] = pressure[j]
             now[j] = regulator_step(pressure[j], target, time, 1.0 / time, slew, 1.0 / slew, h)
             gives[j] = 0.0
@@ -73,7 +52,7 @@ def settle_regulated(rows: Any, fixed: Any, work: Any) -> None:
     """Keep the pressures; what the air inside grows by comes from the supply."""
     for side in range(2):
         for j in range(LANES):
-            rows[PRESSURE_A + side][j] = work[NOW_A + side][j]
+            rows[K.PRESSURE_A + side][j] = work[NOW_A + side][j]
             count_used_air(rows, fixed, j, side)
 
 
@@ -81,30 +60,30 @@ def settle_regulated(rows: Any, fixed: Any, work: Any) -> None:
 def count_used_air(rows: Any, fixed: Any, j: int, side: int) -> None:
     """Write the air [kg] in a bundle, and add its growth to the air used."""
     air = air_at(rows, fixed, j, side)
-    rows[USED][j] = rows[USED][j] + max(0.0, air - rows[AIR_A + side][j])
-    rows[AIR_A + side][j] = air
+    rows[K.USED][j] = rows[K.USED][j] + max(0.0, air - rows[K.AIR_A + side][j])
+    rows[K.AIR_A + side][j] = air
 
 
 @kernel
 def air_at(rows: Any, fixed: Any, j: int, side: int) -> float:
     """Return the air [kg] in a bundle at its pressure."""
-    space = volume_of(fixed, j, side, contraction_at(fixed, j, side, rows[ANGLE][j]))
-    return (rows[PRESSURE_A + side][j] + ATMOSPHERE) * space / PRESSURE_PER_DENSITY
+    space = volume_of(fixed, j, side, contraction_at(fixed, j, side, rows[K.ANGLE][j]))
+    return (rows[K.PRESSURE_A + side][j] + ATMOSPHERE) * space / PRESSURE_PER_DENSITY
 
 
 @kernel
 def begin_pulsed(rows: Any, fixed: Any, j: int, period: float) -> None:
     """Hand the coils of one lane their pulses where a cycle begins: filling above 0."""
-    latches = rows[CLOCK][j] < 0.5 * period
-    cycle = 1.0 / fixed[FREQUENCY][j]
-    for valve in range(VALVES):
+    latches = rows[K.CLOCK][j] < 0.5 * period
+    cycle = 1.0 / fixed[K.VALVE_FREQUENCY][j]
+    for valve in range(K.VALVES):
         side, sign = valve // 2, 1.0 - 2.0 * (valve % 2)
-        width = clip(sign * rows[COMMAND_A + side][j], 0.0, cycle)
-        left = rows[LEFT + valve][j]
-        starts = latches and width > 0.0 and left <= 0.0 and rows[LIFT + valve][j] < STILL_ON
-        rows[SWITCHES][j] = rows[SWITCHES][j] + (1.0 if starts else 0.0)
-        rows[LEFT + valve][j] = width if latches else left
-    rows[CLOCK][j] = rows[CLOCK][j] + (cycle if latches else 0.0) - period
+        width = clip(sign * rows[K.COMMAND_A + side][j], 0.0, cycle)
+        left = rows[K.LEFT + valve][j]
+        starts = latches and width > 0.0 and left <= 0.0 and rows[K.LIFT + valve][j] < STILL_ON
+        rows[K.SWITCHES][j] = rows[K.SWITCHES][j] + (1.0 if starts else 0.0)
+        rows[K.LEFT + valve][j] = width if latches else left
+    rows[K.CLOCK][j] = rows[K.CLOCK][j] + (cycle if latches else 0.0) - period
 
 
 @kernel
@@ -117,7 +96,7 @@ def breathe_pulsed(
         for j in range(LANES):
             contraction = contraction_at(fixed, j, side, work[MIDDLE][j])
             per_volume = PRESSURE_PER_DENSITY / volume_of(fixed, j, side, contraction)
-            was = rows[AIR_A + side][j]
+            was = rows[K.AIR_A + side][j]
             come = inflow(rows, fixed, j, side, per_volume, h)
             left = outflow(rows, fixed, j, side, was + come, per_volume, h)
             now = was + come - left
@@ -127,23 +106,23 @@ def breathe_pulsed(
             work[NOW_A + side][j] = now * per_volume - ATMOSPHERE
             mean = 0.5 * (was + now) * per_volume
             work[GIVES_A + side][j] = mean * pressed * shape * per_volume / PRESSURE_PER_DENSITY
-            rows[AIR_A + side][j] = now
-            rows[USED][j] = rows[USED][j] + come
+            rows[K.AIR_A + side][j] = now
+            rows[K.USED][j] = rows[K.USED][j] + come
 
 
 @kernel
 def open_time(rows: Any, fixed: Any, j: int, valve: int, h: float) -> float:
     """Return how long [s] a valve is open in a sub-step, and advance it."""
     duration, left, lift, opened = coil_window(
-        rows[LEFT + valve][j],
-        rows[LIFT + valve][j],
-        rows[OPENED + valve][j],
-        fixed[OPENING_TIME][j],
-        fixed[CLOSING_TIME][j],
+        rows[K.LEFT + valve][j],
+        rows[K.LIFT + valve][j],
+        rows[K.OPENED + valve][j],
+        fixed[K.VALVE_OPENING_TIME][j],
+        fixed[K.VALVE_CLOSING_TIME][j],
         h,
     )
-    rows[LEFT + valve][j], rows[LIFT + valve][j] = left, lift
-    rows[OPENED + valve][j] = opened
+    rows[K.LEFT + valve][j], rows[K.LIFT + valve][j] = left, lift
+    rows[K.OPENED + valve][j] = opened
     return duration
 
 
@@ -151,9 +130,9 @@ def open_time(rows: Any, fixed: Any, j: int, valve: int, h: float) -> float:
 def inflow(rows: Any, fixed: Any, j: int, side: int, per_volume: float, h: float) -> float:
     """Return the air [kg] that a fill valve lets into a bundle in a sub-step."""
     duration = open_time(rows, fixed, j, 2 * side, h)
-    supply = fixed[SUPPLY_PRESSURE][j] + ATMOSPHERE
-    flow, critical = fixed[CONDUCTANCE][j], fixed[CRITICAL_RATIO][j]
-    return filled(rows[AIR_A + side][j], per_volume, supply, flow, critical, duration)
+    supply = fixed[K.VALVE_SUPPLY_PRESSURE][j] + ATMOSPHERE
+    flow, critical = fixed[K.VALVE_CONDUCTANCE][j], fixed[K.VALVE_CRITICAL_RATIO][j]
+    return filled(rows[K.AIR_A + side][j], per_volume, supply, flow, critical, duration)
 
 
 @kernel
@@ -162,7 +141,9 @@ def outflow(
 ) -> float:
     """Return the air [kg] that an exhaust valve lets out of a bundle in a sub-step."""
     duration = open_time(rows, fixed, j, 2 * side + 1, h)
-    return emptied(air, per_volume, fixed[CONDUCTANCE][j], fixed[CRITICAL_RATIO][j], duration)
+    return emptied(
+        air, per_volume, fixed[K.VALVE_CONDUCTANCE][j], fixed[K.VALVE_CRITICAL_RATIO][j], duration
+    )
 
 
 @kernel
@@ -170,9 +151,9 @@ def settle_pulsed(rows: Any, fixed: Any, work: Any) -> None:
     """Write the pressures of the air that is inside."""
     for side in range(2):
         for j in range(LANES):
-            contraction = contraction_at(fixed, j, side, rows[ANGLE][j])
+            contraction = contraction_at(fixed, j, side, rows[K.ANGLE][j])
             per_volume = PRESSURE_PER_DENSITY / volume_of(fixed, j, side, contraction)
-            rows[PRESSURE_A + side][j] = rows[AIR_A + side][j] * per_volume - ATMOSPHERE
+            rows[K.PRESSURE_A + side][j] = rows[K.AIR_A + side][j] * per_volume - ATMOSPHERE
 
 
 AIR: dict[str, dict[str, Any]] = {

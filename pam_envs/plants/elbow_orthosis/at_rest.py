@@ -17,18 +17,15 @@ def at_rest(
     """Return the equations about the rest at an angle, held by a wearer who intends that pose.
 
     States: pressure_a, pressure_b [Pa], angle [rad] (flexion), velocity [rad/s]. Inputs:
-    set_point_a, set_point_b [Pa]. Outputs: angle, torque [N m] of the bundles.
+    set_point_a, set_point_b [Pa]. Outputs: angle, torque [N m] of the bundles. Proportional valves
+    only.
 
     Parameters
     ----------
-    plant : ElbowOrthosis
-        With proportional valves.
     angle : float, optional
         Flexion [rad], reached from the middle of the range, which is the default.
     pressures : tuple of float, optional
         Of bundles a and b [Pa]; default: half of the full pressure.
-    branch : {"loading", "turned"}
-        See :mod:`pam_envs.plants.core.linearise`.
     """
     if plant.valves != "proportional":
         raise ValueError(

@@ -1,8 +1,7 @@
 """Effects of the elbow orthosis: kernels in the place of the plain plant's placeholders.
 
-Both bundles have the effects of their path: dead time, regulator, supply, leak and line where
-regulators drive them, creep, first cycles and their own temperature with any valves. The bearing
-sticks and slips, and the sensors have their effects.
+With proportional valves both bundles have all effects of their path; with on/off valves creep,
+first cycles and temperature. The bearing sticks and slips, and the sensors have their effects.
 """
 
 from __future__ import annotations
@@ -10,12 +9,10 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.kernels.build import LANES, kernel
-from pam_envs.mechanics.guide import turn_on_bearing
 from pam_envs.plants.core.muscle_path import PATH_STATE, WARM, begin_path, path_air, path_muscle
-from pam_envs.plants.core.sensors import sensor_kernels
+from pam_envs.plants.core.sensors import effect_kernels
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.air import AIR, GIVES_A, NOW_A, WAS_A, count_used_air
-from pam_envs.plants.elbow_orthosis.rows import EFFECT, STATE
 
 EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
 FULL_SCALES = (2.1, 6e5, 6e5)
@@ -27,21 +24,24 @@ plain_settle: Any = None
 @kernel
 def path_of(side: int) -> int:
     """Return the first row of the state of a bundle's path."""
-    return EFFECTS_AT + STATE.paths + side * PATH_STATE.end  # type: ignore[no-any-return]
+    return EFFECTS_AT + K.STATE.paths + side * PATH_STATE.end  # type: ignore[no-any-return]
 
 
 @kernel
 def effective_pressures(rows: Any, fixed: Any, side: int, h: float, work: Any) -> None:
     """Turn the pressures of a bundle before and after a sub-step into effective ones."""
     was, now, gives = work[WAS_A + side], work[NOW_A + side], work[GIVES_A + side]
-    crept, factor = rows[EFFECTS_AT + STATE.crept + side], rows[EFFECTS_AT + STATE.factor + side]
-    effective = rows[EFFECTS_AT + STATE.effective + side]
+    crept, factor = (
+        rows[EFFECTS_AT + K.STATE.crept + side],
+        rows[EFFECTS_AT + K.STATE.factor + side],
+    )
+    effective = rows[EFFECTS_AT + K.STATE.effective + side]
     path_muscle(
         rows,
         fixed,
         path_of(side),
-        EFFECT.path,
-        EFFECT.warm + side * len(WARM),
+        K.EFFECT.path,
+        K.EFFECT.warm + side * len(WARM),
         now,
         h,
         crept,
@@ -62,7 +62,7 @@ def breathe_regulated(
     for side in range(2):
         pressure = rows[K.PRESSURE_A + side]
         path_air(
-            rows, fixed, path_of(side), EFFECT.path, K.MAX_PRESSURE, pressure,
+            rows, fixed, path_of(side), K.EFFECT.path, K.REGULATOR_MAX_PRESSURE, pressure,
             rows[K.COMMAND_A + side], counts[K.STEP], i, substeps, period,
         )  # fmt: skip
         for j in range(LANES):
@@ -89,7 +89,7 @@ def settle_regulated(rows: Any, fixed: Any, work: Any) -> None:
     """Keep the pressures of regulated bundles and their effective pressures."""
     for side in range(2):
         for j in range(LANES):
-            rows[EFFECTS_AT + STATE.effective + side][j] = work[NOW_A + side][j]
+            rows[EFFECTS_AT + K.STATE.effective + side][j] = work[NOW_A + side][j]
             count_used_air(rows, fixed, j, side)
 
 
@@ -99,42 +99,34 @@ def settle_pulsed(rows: Any, fixed: Any, work: Any) -> None:
     plain_settle(rows, fixed, work)
     for side in range(2):
         crept, factor = (
-            rows[EFFECTS_AT + STATE.crept + side],
-            rows[EFFECTS_AT + STATE.factor + side],
+            rows[EFFECTS_AT + K.STATE.crept + side],
+            rows[EFFECTS_AT + K.STATE.factor + side],
         )
         for j in range(LANES):
             pressure = max(0.0, rows[K.PRESSURE_A + side][j] + crept[j])
-            rows[EFFECTS_AT + STATE.effective + side][j] = pressure * factor[j]
+            rows[EFFECTS_AT + K.STATE.effective + side][j] = pressure * factor[j]
 
 
 @kernel
 def begin_muscles(rows: Any, fixed: Any, j: int) -> None:
     """Begin the paths of both bundles of lane ``j`` at their pressures."""
     for side in range(2):
-        rows[EFFECTS_AT + STATE.effective + side][j] = begin_path(
-            rows, fixed, j, path_of(side), EFFECT.path, EFFECT.warm + side * len(WARM),
+        rows[EFFECTS_AT + K.STATE.effective + side][j] = begin_path(
+            rows, fixed, j, path_of(side), K.EFFECT.path, K.EFFECT.warm + side * len(WARM),
             rows[K.PRESSURE_A + side][j],
         )  # fmt: skip
-    rows[EFFECTS_AT + STATE.stuck][j] = 1.0
+    rows[EFFECTS_AT + K.STATE.stuck][j] = 1.0
 
 
-def effect_kernels(valves: str, first: int) -> dict[str, Any]:
+def bundle_kernels(valves: str, first: int) -> dict[str, Any]:
     """Return the kernels of the effects, whose state begins at row ``first``."""
     regulated = valves == "proportional"
-    sensors = first + STATE.sensors
     measured = (K.ANGLE, K.PRESSURE_A, K.PRESSURE_A + 1)
-    effects = (EFFECT.angle, EFFECT.pressure, EFFECT.pressure)
-    return sensor_kernels(sensors, measured, effects, FULL_SCALES) | {
-        "EFFECTS_AT": first,
-        "EFFECTIVE_A": first + STATE.effective,
-        "SENSED_ANGLE": sensors,
-        "SENSED_PRESSURE": sensors + 1,
+    effects = (K.EFFECT.angle, K.EFFECT.pressure, K.EFFECT.pressure)
+    return effect_kernels(first, K, measured, effects, FULL_SCALES) | {
         "plain_breathe": AIR[valves]["breathe"],
         "plain_settle": AIR[valves]["settle"],
         "breathe": breathe_regulated if regulated else breathe_pulsed,
         "settle": settle_regulated if regulated else settle_pulsed,
         "begin_muscles": begin_muscles,
-        "STUCK": first + STATE.stuck,
-        "BEARING": EFFECT.bearing,
-        "turn": turn_on_bearing,
     }

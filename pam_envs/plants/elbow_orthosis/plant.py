@@ -5,20 +5,17 @@
     (J_o + J_w) q'' = Q - weights + wearer
 
 Bundle b (seven muscles) flexes the elbow and bundle a (three) straightens it. Torque and stiffness
-are linear in the two pressures, so that a command of both is met exactly where it lies within the
-parallelogram of the four corners at which each bundle is empty or full. The stiffness is minus the
-paper's ``K_q``, which is negative.
+are linear in the two pressures, so that a command of both is met exactly within the parallelogram
+of the four corners at which each bundle is empty or full. The stiffness is minus the paper's
+``K_q``, which is negative.
 
-Effects (off unless set): of the regulators, static gain, dead time, dead band, spool overlap,
-rounded slew limit, slow and choked exhaust, leak, limited and drooping supply, resonance of the
-line (on/off valves have none of these); of both bundles, creep and first cycles, and of each its
-temperature; stick-slip of the bearing; delay, drift, ramp, bow and slip of both kinds of sensor.
+Effects (off unless set, ``ElbowOrthosis.effects``): of the regulators (on/off valves have none), of
+both bundles, of the bearing and of the sensors.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
@@ -27,11 +24,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.constants import ATMOSPHERE
 from pam_envs.hysteresis.protocol import Usage
-from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.mechanics.forearm import OrthosisLink, Wearer
 from pam_envs.mechanics.pulley import Pulley
 from pam_envs.muscle.quadratic_bundle import QuadraticBundle
-from pam_envs.plants.core.plant import Plant, effects_of, neutral_of
+from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.hysteresis import ElbowHysteresis, elbow_hysteresis
 from pam_envs.pneumatics.on_off_pair import OnOffValve
@@ -47,22 +43,8 @@ STOP_GIVES = 0.15
 SEVEN = ("published", "mus_b = 7: chakarov2018, section 3")
 
 
-PARTS: dict[str, type] = {
-    "bundle_a": QuadraticBundle,
-    "bundle_b": QuadraticBundle,
-    "regulator": BundleRegulator,
-    "valve": OnOffValve,
-    "hysteresis": ElbowHysteresis,
-    "pulley": Pulley,
-    "link": OrthosisLink,
-    "wearer": Wearer,
-    "angle": AngleSensor,
-    "pressure": GaugeSensor,
-}
-
-
 @dataclass(frozen=True)
-class ElbowOrthosis(Plant):
+class ElbowOrthosis(Plant, rows=K):
     """The plant; another one is :meth:`replace` of it.
 
     Attributes
@@ -77,11 +59,7 @@ class ElbowOrthosis(Plant):
     """
 
     family: ClassVar[str] = "elbow_orthosis"
-    components: ClassVar[tuple[str, ...]] = tuple(PARTS)
-    names: ClassVar[tuple[str, ...]] = K.NAMES
     choices: ClassVar[tuple[str, ...]] = ("valves",)
-    effects: ClassVar[tuple[tuple[str, ...], ...]] = effects_of(PARTS)
-    neutral: ClassVar[Mapping[str, float]] = neutral_of(PARTS, K.EFFECTS)
 
     valves: Valves = "proportional"
     bundle_a: QuadraticBundle = field(default_factory=QuadraticBundle)
@@ -127,21 +105,18 @@ class ElbowOrthosis(Plant):
             )
 
     def _check_motion(self) -> None:
-        """Refuse a motion that the sub-steps cannot follow (see ``kernels.motion``)."""
-        h = self.control_period / self.substeps
+        """Refuse a motion that the sub-steps cannot follow."""
         inertia = self.link.inertia + self.wearer.inertia
         damping = self.link.damping + self.wearer.damping
         ends = np.array(self.angle_range)
         full = float(np.max(self.stiffness(ends, self.full_pressure, self.full_pressure)))
         k = full + self._air_stiffness() + self.wearer.stiffness + self.pulley.stop_stiffness
-        phase = max(k / inertia, (0.5 * damping / inertia) ** 2) * h * h
-        if phase > LARGEST_PHASE:
-            raise ValueError(
-                f"link.inertia = {self.link.inertia:g} kg m2 and wearer.inertia = "
-                f"{self.wearer.inertia:g} kg m2 with wearer.damping = {self.wearer.damping:g} "
-                f"N m s/rad move too fast for {self.substeps} sub-steps: phase {phase:.1f} against "
-                f"at most {LARGEST_PHASE:g}; use more sub-steps or a larger inertia"
-            )
+        self.check_phase(
+            k / inertia,
+            damping / inertia,
+            f"link.inertia = {self.link.inertia:g} kg m2 with wearer.inertia = "
+            f"{self.wearer.inertia:g} kg m2, wearer.damping = {self.wearer.damping:g} N m s/rad",
+        )
 
     def _air_stiffness(self) -> float:
         """Return how much [N m/rad] the enclosed air adds at most."""
@@ -170,17 +145,7 @@ class ElbowOrthosis(Plant):
             Parameters to replace, with ``__`` for the dot (``bundle_a__muscles=4``).
         """
         plant = cls(hysteresis=elbow_hysteresis(hysteresis), provenance={"bundle_b.muscles": SEVEN})
-        return dataclasses.replace(plant._changed(changes), valves=valves)
-
-    def _changed(self, changes: Mapping[str, float]) -> ElbowOrthosis:
-        return self.replace({k.replace("__", "."): v for k, v in changes.items()})
-
-    def without_noise(self) -> ElbowOrthosis:
-        """Return the plant with sensors that show the truth."""
-        sensors = ("angle", "pressure")
-        return self.replace(
-            {f"{s}.{what}": 0.0 for s in sensors for what in ("noise", "resolution")}
-        )
+        return dataclasses.replace(plant.changed(changes), valves=valves)
 
     # --- ranges ---------------------------------------------------------------------------------
 
@@ -254,7 +219,7 @@ class ElbowOrthosis(Plant):
     ) -> tuple[Array, Array]:
         """Return the pressures [Pa] of a torque [N m] and a stiffness [N m/rad]: exact.
 
-        They are not held within their range; ``mechanics.allocation`` says what is best within it.
+        They are not clipped; ``mechanics.allocation`` gives the best ones within their range.
         """
         shape_a, shape_b, slope_a, slope_b = self.geometry(angle)
         pull = np.asarray(torque, float) / self.pulley.radius
@@ -290,10 +255,6 @@ class ElbowOrthosis(Plant):
 
     # --- rows, files, identity --------------------------------------------------------------------
 
-    def parameter_rows(self) -> Array:
-        """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
-        column = np.zeros(K.N_PARAMETERS)
-        column[: K.MODEL] = [self.value(name) for name in K.NAMES]
-        column[K.MODEL : K.LARGEST_LAG] = self._model.numbers()
-        column[K.LARGEST_LAG] = self.hysteresis.largest_lag
-        return column
+    def table_values(self) -> list[float]:
+        """Return the numbers of the hysteresis operator and its largest lag."""
+        return [*self._model.numbers(), self.hysteresis.largest_lag]

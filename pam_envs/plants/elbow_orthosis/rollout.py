@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import COMPILED, LANES, kernel
-from pam_envs.plants.core.rollout import Loop, biased_output, run
+from pam_envs.plants.core.rollout import Loop, loop_for, plants_of, simulate_plants
+from pam_envs.plants.core.rows import signal_rows
+from pam_envs.plants.core.sensors import reading_rows
 from pam_envs.plants.core.tiles import drives_of, first_of
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
@@ -22,27 +24,13 @@ from pam_envs.plants.elbow_orthosis.step import (
     start_hysteresis,
 )
 
-OUTPUTS = {
-    "angle": K.ANGLE,
-    "velocity": K.VELOCITY,
-    "pressure_a": K.PRESSURE_A,
-    "pressure_b": K.PRESSURE_B,
-    "force_a": K.FORCE_A,
-    "force_b": K.FORCE_B,
-    "contraction_a": K.CONTRACTION_A,
-    "contraction_b": K.CONTRACTION_B,
-    "lag": K.LAG,
-    "torque": K.TORQUE,
-    "stiffness": K.STIFFNESS,
-    "felt": K.FELT,
-    "wearer": K.WEARER,
-    "slack": K.SLACK,
-    "air_a": K.AIR_A,
-    "air_b": K.AIR_B,
-    "used": K.USED,
-    "switches": K.SWITCHES,
-}
+OUTPUTS = signal_rows(
+    K,
+    "angle velocity pressure_a pressure_b force_a force_b contraction_a contraction_b lag torque "
+    "stiffness felt wearer slack air_a air_b used switches",
+)
 """Every signal of a record (SI) and its row of state."""
+MAKE = ("hysteresis.kind", "valves", "substeps")
 DRIVEN = (K.COMMAND_A, K.COMMAND_B, K.INTENT, K.INTENT_RATE, K.INTENT_ACCELERATION, K.DISTURBANCE)
 """Rows that drive a record, in the order of its channels."""
 START = len(DRIVEN)
@@ -74,15 +62,6 @@ def begin(
         )  # fmt: skip
 
 
-@kernel
-def advance_elbow(
-    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, elements: int, substeps: int,
-    period: float, work: Any,
-) -> None:  # fmt: skip
-    """Advance a tile by one control period."""
-    advance(rows, fixed, counts, table, K.END, elements, substeps, period, work)
-
-
 def channels_of(plant: ElbowOrthosis) -> dict[str, float]:
     """Return what drives the orthosis, with defaults; ``start`` are the pressures at rest."""
     motion = ("intent", "intent_rate", "intent_acceleration")
@@ -91,39 +70,20 @@ def channels_of(plant: ElbowOrthosis) -> dict[str, float]:
 
 
 def readings_of(plant: ElbowOrthosis) -> dict[str, tuple[int, int]]:
-    """Return the sensors by name, each with its place among the readings and its bias' row."""
-    biases = (K.ANGLE_BIAS, K.PRESSURE_BIAS, K.PRESSURE_BIAS)
-    names = ("angle", "pressure_a", "pressure_b")
-    return {name: (k, bias) for k, (name, bias) in enumerate(zip(names, biases, strict=True))}
+    """Return row and bias of each sensor's reading, by name."""
+    biases = {"pressure_a": K.PRESSURE_BIAS, "pressure_b": K.PRESSURE_BIAS}
+    return reading_rows(K.STATE.sensors, {"angle": K.ANGLE_BIAS} | biases)
 
 
 def loop_of(plant: ElbowOrthosis, extended: bool = False, readings: bool = False) -> Loop:
     """Return the loop of a make of the orthosis; ``readings``: of its sensors alone."""
-    kind, valves = plant.hysteresis.kind, plant.valves
-    effects = K.END + state_rows(kind)
-    kernels: dict[str, Any] = {
-        "plant_drive": drive,
-        "plant_begin": begin,
-        "plant_advance": advance_elbow,
-    }
-    outputs: tuple[int, ...] = tuple(OUTPUTS.values())
-    if readings:
-        read = readings_of(plant).values()
-        kernels["BIAS_ROWS"] = tuple(bias for _, bias in read)
-        kernels["plant_output"] = biased_output
-        outputs = tuple(effects + K.STATE.sensors + place for place, _ in read)
-    return Loop(
-        f"elbow_{kind}_{valves}"
-        + ("_extended" if extended else "")
-        + ("_readings" if readings else ""),
-        kernels | replacements(kind, valves, effects if extended else None),
-        outputs,
-        rows=effects + (K.STATE.end if extended else 0),
-        parameters=K.N_PARAMETERS,
-        counts=K.N_COUNTS,
-        work=N_WORK,
-        extra=np.zeros((1, 1)),
-    )
+    make = plant.hysteresis.kind, plant.valves
+    kernels = {"plant_drive": drive, "plant_begin": begin, "advance": advance}
+    return loop_for(
+        f"elbow_{make[0]}_{make[1]}", plant, K, kernels, partial(replacements, *make),
+        OUTPUTS.values(), N_WORK, extended=extended,
+        readings=readings_of(plant) if readings else None,
+    )  # fmt: skip
 
 
 def _check_shapes(plants: Sequence[ElbowOrthosis], command: Array, motion: Sequence[Any]) -> None:
@@ -162,19 +122,19 @@ def simulate_elbow(
     Parameters
     ----------
     plants : ElbowOrthosis or sequence of them
-        Of one hysteresis, of one make of valves, and with the same sub-steps. A hysteresis map
-        is the first's.
+        Of one hysteresis, of one make of valves, and with the same sub-steps; a hysteresis map is
+        the first's.
     commands : array_like, shape (T, 2) or (T, n, 2)
         For bundles a and b, one a control period: set-points [Pa]; of on/off valves pulse widths
-        [s], filling above 0, looked at where a cycle begins.
+        [s], filling above 0, read where a cycle begins.
     intent : array_like or tuple of three
-        Where the wearer intends to be at the end of each period [rad]: a constant angle, or angle,
-        rate [rad/s] and acceleration [rad/s2], each (T,) or (T, n). The first is where he begins.
+        Intended pose of the wearer at the end of each period [rad]: a constant angle, or angle,
+        rate [rad/s] and acceleration [rad/s2], each (T,) or (T, n). The first is the start.
     disturbance : array_like
         Torque on the forearm [N m]; a number, (T,) or (T, n).
     pressures : tuple of array_like, optional
-        Pressures [Pa] of bundles a and b at the start. Default: the first set-points; of on/off
-        valves 0.
+        Pressures [Pa] of bundles a and b at the start; default: the first set-points, or 0 with
+        on/off valves.
     compiled : bool
         Whether kernels run as machine code; plain Python gives the same bits.
 
@@ -189,9 +149,8 @@ def simulate_elbow(
     ValueError
         If the plants are not of one make, or a shape or a value does not fit.
     """
-    several = [plants] if isinstance(plants, ElbowOrthosis) else list(plants)
-    first = first_of(several, "hysteresis.kind", "valves", "substeps")
-    command = np.asarray(commands, np.float64)
+    several = plants_of(plants)
+    first, command = first_of(several), np.asarray(commands, np.float64)
     motion = intent if isinstance(intent, tuple) else (intent, 0.0, 0.0)
     _check_shapes(several, command, motion)
     if pressures is None:
@@ -200,9 +159,5 @@ def simulate_elbow(
     channels = (command[..., 0], command[..., 1], *motion, disturbance)
     start = [np.broadcast_to(np.asarray(s, float), command.shape[:-1]) for s in pressures]
     drives = drives_of([*channels, *start])
-    n = len(several) if len(several) > 1 else drives.shape[2]
-    loop = loop_of(first, any(plant.extended for plant in several))
-    columns = [plant.parameter_rows() for plant in several]
-    made = run(loop, first, columns, drives, plants=n, compiled=compiled)
-    single = made.shape[2] == 1 and command.ndim == 2 and isinstance(plants, ElbowOrthosis)
-    return {name: made[k, :, 0] if single else made[k] for k, name in enumerate(OUTPUTS)}
+    single = isinstance(plants, ElbowOrthosis) and command.ndim == 2 and drives.shape[2] == 1
+    return simulate_plants(loop_of, plants, MAKE, drives, OUTPUTS, single=single, compiled=compiled)

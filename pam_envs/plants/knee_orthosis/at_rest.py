@@ -26,13 +26,10 @@ def at_rest(
 
     Parameters
     ----------
-    plant : KneeOrthosis
     pressure : float
         Set-point [Pa], reached by inflation from none.
     knee : float
         Flexion of the knee [rad], on the leg.
-    branch : {"loading", "turned"}
-        See :mod:`pam_envs.plants.core.linearise`.
     """
     full, muscle, lever = plant.regulator.max_pressure, plant.muscle, plant.lever
     if not 0.0 < pressure < full:

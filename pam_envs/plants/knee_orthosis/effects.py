@@ -1,9 +1,8 @@
 """Effects of the knee orthosis: kernels in the place of the plain plant's placeholders.
 
-The muscle has the effects of its path: dead time, regulator, supply, leak and line behind the
-regulator's lag, creep, temperature and first cycles with any dynamics; the hysteresis turns the
-effective pressure into stiffness. The brace alone has a bearing that sticks and slips, and all
-sensors have their effects.
+The muscle has the effects of its path (those of the air only behind the regulator's lag); the
+hysteresis turns the effective pressure into stiffness. The bearing of the brace sticks and slips
+where it is alone, and all sensors have their effects.
 """
 
 from __future__ import annotations
@@ -11,12 +10,9 @@ from __future__ import annotations
 from typing import Any
 
 from pam_envs.kernels.build import LANES, kernel, scratch
-from pam_envs.mechanics.guide import turn_on_bearing
 from pam_envs.plants.core.muscle_path import PATH_STATE, begin_path, path_air, path_muscle
-from pam_envs.plants.core.sensors import sensor_kernels
+from pam_envs.plants.core.sensors import effect_kernels
 from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.rows import EFFECT, STATE
-from pam_envs.sensing.sensor import SENSOR
 
 EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
 plain_regulate: Any = None  # placeholder: the dynamics of the pressure of the plain plant
@@ -33,8 +29,8 @@ def regulate_with_lag(
 ) -> None:
     """Advance the pressures of a tile behind the lag of the regulator, with all effects."""
     path_air(
-        rows, fixed, EFFECTS_AT + STATE.path, EFFECT.path, K.MAX_PRESSURE, rows[K.PRESSURE],
-        rows[K.SET_POINT], counts[K.STEP], i, substeps, period,
+        rows, fixed, EFFECTS_AT + K.STATE.path, K.EFFECT.path, K.REGULATOR_MAX_PRESSURE,
+        rows[K.PRESSURE], rows[K.SET_POINT], counts[K.STEP], i, substeps, period,
     )  # fmt: skip
     advance_muscle(rows, fixed, period / substeps)
 
@@ -44,7 +40,7 @@ def regulate_as_measured(
     rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float
 ) -> None:
     """Advance the modes of the published frequency response; the muscle has its effects."""
-    pressure, travel = rows[K.PRESSURE], rows[EFFECTS_AT + STATE.path + PATH_STATE.travel]
+    pressure, travel = rows[K.PRESSURE], rows[EFFECTS_AT + K.STATE.path + PATH_STATE.travel]
     was = scratch(1, LANES)
     for j in range(LANES):
         was[0][j] = pressure[j]
@@ -61,9 +57,9 @@ def advance_muscle(rows: Any, fixed: Any, h: float) -> None:
     path_muscle(
         rows,
         fixed,
-        EFFECTS_AT + STATE.path,
-        EFFECT.path,
-        EFFECT.warm,
+        EFFECTS_AT + K.STATE.path,
+        K.EFFECT.path,
+        K.EFFECT.warm,
         rows[K.PRESSURE],
         h,
         own[0],
@@ -71,34 +67,27 @@ def advance_muscle(rows: Any, fixed: Any, h: float) -> None:
     )
     for j in range(LANES):
         effective = max(0.0, rows[K.PRESSURE][j] + own[0][j]) * own[1][j]
-        rows[EFFECTS_AT + STATE.effective][j] = min(fixed[K.MAX_PRESSURE][j], effective)
+        rows[EFFECTS_AT + K.STATE.effective][j] = min(fixed[K.REGULATOR_MAX_PRESSURE][j], effective)
 
 
 @kernel
 def begin_muscle(rows: Any, fixed: Any, j: int) -> None:
     """Begin the path of the muscle of lane ``j`` at its pressure."""
     effective = begin_path(
-        rows, fixed, j, EFFECTS_AT + STATE.path, EFFECT.path, EFFECT.warm, rows[K.PRESSURE][j]
+        rows, fixed, j, EFFECTS_AT + K.STATE.path, K.EFFECT.path, K.EFFECT.warm, rows[K.PRESSURE][j]
     )
-    rows[EFFECTS_AT + STATE.effective][j] = min(fixed[K.MAX_PRESSURE][j], effective)
-    rows[EFFECTS_AT + STATE.stuck][j] = 1.0
+    rows[EFFECTS_AT + K.STATE.effective][j] = min(fixed[K.REGULATOR_MAX_PRESSURE][j], effective)
+    rows[EFFECTS_AT + K.STATE.stuck][j] = 1.0
 
 
-def effect_kernels(dynamics: str, plain: Any, first: int) -> dict[str, Any]:
+def muscle_kernels(dynamics: str, plain: Any, first: int) -> dict[str, Any]:
     """Return the kernels of the effects, whose state begins at row ``first``.
 
     ``plain`` is the dynamics of the pressure of the plain plant.
     """
-    sensors = first + STATE.sensors
-    effects = [EFFECT.sensors + k * len(SENSOR) for k in range(len(MEASURED))]
-    return sensor_kernels(sensors, MEASURED, effects, FULL_SCALES) | {
-        "EFFECTS_AT": first,
-        "EFFECTIVE": first + STATE.effective,
-        "SENSED": tuple(sensors + k for k in range(len(MEASURED))),
+    effects = [getattr(K.EFFECT, sensor) for sensor in K.SENSORS]
+    return effect_kernels(first, K, MEASURED, effects, FULL_SCALES) | {
         "plain_regulate": plain,
         "regulate": regulate_with_lag if dynamics == "lag" else regulate_as_measured,
         "begin_muscle": begin_muscle,
-        "STUCK": first + STATE.stuck,
-        "BEARING": EFFECT.bearing,
-        "turn": turn_on_bearing,
     }

@@ -6,18 +6,9 @@ from typing import Any
 
 from pam_envs.hysteresis import protocol
 from pam_envs.kernels.build import kernel
-from pam_envs.plants.knee_orthosis.rows import (
-    GAIN,
-    LOOP_WIDTH,
-    MEMBER,
-    MODEL,
-    PRESSURE,
-    STACK_COUNT,
-    STIFFNESS,
-    STIFFNESS_RATIO,
-)
+from pam_envs.plants.knee_orthosis import rows as K
 
-EFFECTIVE = PRESSURE
+EFFECTIVE = K.PRESSURE
 """Row of the effective pressure; that of the extended plant replaces it."""
 hysteresis_scaled: Any = None  # a placeholder
 
@@ -28,9 +19,9 @@ def stiffness_of_line(
     elements: int,
 ) -> None:  # fmt: skip
     """Write the stiffness without hysteresis, proportional to the pressure."""
-    pressure, stiffness = rows[EFFECTIVE], rows[STIFFNESS]
+    pressure, stiffness = rows[EFFECTIVE], rows[K.STIFFNESS]
     for j in range(first, last):
-        stiffness[j] = fixed[GAIN][j] * fixed[STIFFNESS_RATIO][j] * pressure[j]
+        stiffness[j] = fixed[K.MUSCLE_GAIN][j] * fixed[K.MUSCLE_STIFFNESS_RATIO][j] * pressure[j]
 
 
 @kernel
@@ -39,13 +30,13 @@ def stiffness_of_model(
     elements: int,
 ) -> None:  # fmt: skip
     """Write the stiffness by a hysteresis model of the pressure."""
-    stiffness = rows[STIFFNESS]
+    stiffness = rows[K.STIFFNESS]
     hysteresis_scaled(
-        rows[EFFECTIVE], stiffness, fixed[LOOP_WIDTH], rows, fixed, counts, table, elements,
-        hysteresis, MODEL, STACK_COUNT, MEMBER, first, last,
+        rows[EFFECTIVE], stiffness, fixed[K.HYSTERESIS_WIDTH], rows, fixed, counts, table, elements,
+        hysteresis, K.MODEL, K.STACK_COUNT, K.MEMBER, first, last,
     )  # fmt: skip
     for j in range(first, last):
-        stiffness[j] = fixed[GAIN][j] * stiffness[j]
+        stiffness[j] = fixed[K.MUSCLE_GAIN][j] * stiffness[j]
 
 
 def hysteresis_kernels(kind: str) -> dict[str, Any]:

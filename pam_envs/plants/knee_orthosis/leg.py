@@ -16,27 +16,6 @@ from pam_envs.mechanics.leg import (
 )
 from pam_envs.muscle.emg import activation, excitation, left_of_gap
 from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.rows import (
-    ACTIVATION_FALL_TIME,
-    ACTIVATION_FLOOR,
-    ACTIVATION_LARGEST_TORQUE,
-    ACTIVATION_RISE_TIME,
-    FLEXORS,
-    FLEXORS_FREE,
-    LEG_AIM_HEIGHT,
-    LEG_ANKLE_HEIGHT,
-    LEG_BODY_MASS,
-    LEG_CENTRE,
-    LEG_INERTIA,
-    LEG_MASS,
-    LEG_SHANK,
-    LEG_THIGH,
-    QUADS,
-    QUADS_FREE,
-    SHOE_HEEL,
-    SHOE_TIP,
-    STRIDE_TIME,
-)
 from pam_envs.references.gait import (
     ANKLE,
     COP,
@@ -54,10 +33,10 @@ from pam_envs.sensing.shoe import estimated_torque, heel_load
 @routine
 def gait_at(rows: Any, fixed: Any, gait: Any, j: int, phase: float) -> None:
     """Write the stride of one lane at a phase, 0 to 1: path, ground, demand, hold."""
-    pace = 1.0 / fixed[STRIDE_TIME][j]
+    pace = 1.0 / fixed[K.STRIDE_TIME][j]
     knee, knee_turn, knee_bend = curve_and_rates(gait, KNEE, phase)
     lean, lean_turn, lean_bend = curve_and_rates(gait, SHANK, phase)
-    weight = fixed[LEG_BODY_MASS][j] * GRAVITY
+    weight = fixed[K.LEG_BODY_MASS][j] * GRAVITY
     loaded = curve(gait, GROUND_Z, phase)
     quick = NATURAL_STRIDE * pace
     rows[K.PHASE][j] = phase
@@ -74,19 +53,21 @@ def gait_at(rows: Any, fixed: Any, gait: Any, j: int, phase: float) -> None:
         leaning,
         loaded,
         quick,
-        fixed[LEG_AIM_HEIGHT][j],
-        fixed[SHOE_HEEL][j],
-        fixed[SHOE_TIP][j],
+        fixed[K.LEG_AIM_HEIGHT][j],
+        fixed[K.SHOE_HEEL][j],
+        fixed[K.SHOE_TIP][j],
     )
     ahead, up = knee_acceleration(
         knee - lean,
         (knee_turn - lean_turn) * pace,
         (knee_bend - lean_bend) * pace * pace,
-        fixed[LEG_THIGH][j],
+        fixed[K.LEG_THIGH][j],
     )
     sine, cosine = sine_and_cosine(lean)
     balance(rows, fixed, j, sine, cosine, ahead, up, lean_bend * pace * pace)
-    restoring = gravity_stiffness(sine, cosine, ahead, up, fixed[LEG_MASS][j], fixed[LEG_CENTRE][j])
+    restoring = gravity_stiffness(
+        sine, cosine, ahead, up, fixed[K.LEG_MASS][j], fixed[K.LEG_CENTRE][j]
+    )
     hold(rows, fixed, j, loaded, restoring)
 
 
@@ -97,19 +78,19 @@ def balance(
 ) -> None:  # fmt: skip
     """Write what the knee has to bear, what Eq. (1) makes of it, and the load on the heel."""
     vertical, cop = rows[K.GROUND_Z][j], rows[K.COP][j]
-    shank = fixed[LEG_SHANK][j]
+    shank = fixed[K.LEG_SHANK][j]
     ground = ground_torque(
-        vertical, rows[K.GROUND_X][j], cop, sine, cosine, shank, fixed[LEG_ANKLE_HEIGHT][j]
+        vertical, rows[K.GROUND_X][j], cop, sine, cosine, shank, fixed[K.LEG_ANKLE_HEIGHT][j]
     )
     rows[K.DEMAND][j] = ground + shank_torque(
-        sine, cosine, ahead, up, angular, fixed[LEG_MASS][j], fixed[LEG_CENTRE][j],
-        fixed[LEG_INERTIA][j],
+        sine, cosine, ahead, up, angular, fixed[K.LEG_MASS][j], fixed[K.LEG_CENTRE][j],
+        fixed[K.LEG_INERTIA][j],
     )  # fmt: skip
     flat = fixed[K.SHOE_FLAT_FOOT][j]
     inclination = (1.0 - flat) * rows[K.SHANK][j] + flat * rows[K.ANKLE][j]
     seen, _ = sine_and_cosine(inclination)
     rows[K.ESTIMATE][j] = estimated_torque(vertical, cop, seen, shank)
-    heel = heel_load(vertical, cop, fixed[SHOE_HEEL][j], fixed[SHOE_TIP][j])
+    heel = heel_load(vertical, cop, fixed[K.SHOE_HEEL][j], fixed[K.SHOE_TIP][j])
     rows[K.HEEL][j] = heel
     rows[K.STANCE][j] = 1.0 if heel > fixed[K.SHOE_THRESHOLD][j] else 0.0
 
@@ -126,27 +107,27 @@ def hold(rows: Any, fixed: Any, j: int, loaded: float, restoring: float) -> None
 @kernel
 def wanted(fixed: Any, j: int, torque: float) -> float:
     """Return the excitation of muscles that bear a torque [N m]."""
-    return excitation(torque, fixed[ACTIVATION_LARGEST_TORQUE][j], fixed[ACTIVATION_FLOOR][j])
+    return excitation(torque, fixed[K.ACTIVATION_LARGEST_TORQUE][j], fixed[K.ACTIVATION_FLOOR][j])
 
 
 @kernel
 def start_muscles(rows: Any, fixed: Any, j: int) -> None:
     """Put the wearer's muscles where they are without the orthosis."""
     demand = rows[K.DEMAND][j]
-    rows[QUADS][j] = rows[QUADS_FREE][j] = wanted(fixed, j, demand)
-    rows[FLEXORS][j] = rows[FLEXORS_FREE][j] = wanted(fixed, j, -demand)
+    rows[K.QUADS][j] = rows[K.QUADS_FREE][j] = wanted(fixed, j, demand)
+    rows[K.FLEXORS][j] = rows[K.FLEXORS_FREE][j] = wanted(fixed, j, -demand)
 
 
 @kernel
 def share_muscles(rows: Any, fixed: Any, j: int, period: float) -> None:
     """Advance the activations, with the orthosis' torque as delivered and without it."""
-    risen = left_of_gap(period, fixed[ACTIVATION_RISE_TIME][j])
-    fallen = left_of_gap(period, fixed[ACTIVATION_FALL_TIME][j])
+    risen = left_of_gap(period, fixed[K.ACTIVATION_RISE_TIME][j])
+    fallen = left_of_gap(period, fixed[K.ACTIVATION_FALL_TIME][j])
     demand = rows[K.DEMAND][j]
     rest = demand - rows[K.TORQUE][j]
-    rows[QUADS][j] = activation(rows[QUADS][j], wanted(fixed, j, rest), risen, fallen)
-    rows[FLEXORS][j] = activation(rows[FLEXORS][j], wanted(fixed, j, -rest), risen, fallen)
+    rows[K.QUADS][j] = activation(rows[K.QUADS][j], wanted(fixed, j, rest), risen, fallen)
+    rows[K.FLEXORS][j] = activation(rows[K.FLEXORS][j], wanted(fixed, j, -rest), risen, fallen)
     free = wanted(fixed, j, demand)
-    rows[QUADS_FREE][j] = activation(rows[QUADS_FREE][j], free, risen, fallen)
+    rows[K.QUADS_FREE][j] = activation(rows[K.QUADS_FREE][j], free, risen, fallen)
     free = wanted(fixed, j, -demand)
-    rows[FLEXORS_FREE][j] = activation(rows[FLEXORS_FREE][j], free, risen, fallen)
+    rows[K.FLEXORS_FREE][j] = activation(rows[K.FLEXORS_FREE][j], free, risen, fallen)

@@ -1,12 +1,10 @@
 """Motion of the brace: held in a rig, free without a leg, or carried along by a walking leg.
 
-Each motion is four functions. ``begin_period`` looks up what a control period needs, ``move``
-advances a tile by one sub-step, ``rest`` puts a lane at rest, and ``report`` writes what can be
-seen at the end of the period.
-
-A sub-step is exact for the torque linearised about the predicted middle, with the stiffness of the
-muscle and the wearer's path going straight from their old to their new values: second order,
-and no stability limit from a stiff spring.
+Each motion is four functions: ``begin_period`` reads the gait, ``move`` advances a tile by one
+sub-step, ``rest`` puts a lane at rest, ``report`` writes signals at the end of the period. A
+sub-step is exact for the torque linearised about the predicted middle, with the stiffness of the
+muscle and the wearer's path going straight from their old to their new values: second order, and
+no stability limit from a stiff spring.
 """
 
 from __future__ import annotations
@@ -22,31 +20,6 @@ from pam_envs.mechanics.knee_lever import assistive_torque, muscle_length
 from pam_envs.muscle.gas_spring import gas_volume, spring_tension, stretch_of
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.leg import gait_at, share_muscles, start_muscles
-from pam_envs.plants.knee_orthosis.rows import (
-    ANGLE,
-    DEVIATION,
-    DEVIATION_RATE,
-    FIXTURE_LENGTH,
-    FULL_VOLUME,
-    HOLD,
-    HOLD_RATE,
-    KNEE,
-    LEG_HABITUATION,
-    LEG_INERTIA,
-    LEVER_ARM,
-    LEVER_DAMPING,
-    LEVER_FITTINGS,
-    LEVER_INERTIA,
-    LEVER_MOUNT_ANGLE,
-    LEVER_RELAXED_ANGLE,
-    LEVER_STIFFNESS,
-    PRESSURE,
-    SHORTEST_LENGTH,
-    STIFFNESS,
-    STIFFNESS_RATIO,
-    STRIDE_TIME,
-    VELOCITY,
-)
 from pam_envs.references.gait import KNEE as KNEE_CURVE
 from pam_envs.references.gait import curve_and_rates, fraction_of_turn
 
@@ -59,12 +32,12 @@ N_WORK = 6
 def torque_and_slope(fixed: Any, j: int, angle: float, stiffness: float) -> tuple[float, float]:
     """Return the assistive torque [N m] at an angle [rad] and its slope [N m/rad]."""
     sine, cosine = sine_and_cosine(0.5 * angle)
-    arm, spring = fixed[LEVER_ARM][j], fixed[LEVER_STIFFNESS][j]
+    arm, spring = fixed[K.LEVER_ARM][j], fixed[K.LEVER_STIFFNESS][j]
     stretch = stretch_of(
-        muscle_length(sine, arm, fixed[LEVER_FITTINGS][j]), fixed[SHORTEST_LENGTH][j]
+        muscle_length(sine, arm, fixed[K.LEVER_FITTINGS][j]), fixed[K.MUSCLE_SHORTEST_LENGTH][j]
     )
     tension = spring_tension(stiffness, stretch)
-    torque = assistive_torque(tension, cosine, angle, arm, spring, fixed[LEVER_RELAXED_ANGLE][j])
+    torque = assistive_torque(tension, cosine, angle, arm, spring, fixed[K.LEVER_RELAXED_ANGLE][j])
     pulls = max(0.0, stiffness) if stretch > 0.0 else 0.0
     lever = arm * cosine
     return torque, spring + pulls * lever * lever - 0.5 * tension * arm * sine
@@ -89,11 +62,11 @@ def swing_free(
     rows: Any, fixed: Any, counts: Any, gait: Any, i: int, per_substep: float, h: float, work: Any
 ) -> None:
     """Move the brace alone."""
-    angle, velocity, stiffness, was = rows[ANGLE], rows[VELOCITY], rows[STIFFNESS], work[WAS]
+    angle, velocity, stiffness, was = rows[K.ANGLE], rows[K.VELOCITY], rows[K.STIFFNESS], work[WAS]
     for j in range(LANES):
         ahead = 0.5 * h * velocity[j]
-        per_inertia = 1.0 / fixed[LEVER_INERTIA][j]
-        drag = fixed[LEVER_DAMPING][j] * per_inertia
+        per_inertia = 1.0 / fixed[K.LEVER_INERTIA][j]
+        drag = fixed[K.LEVER_DAMPING][j] * per_inertia
         old, slope_old = torque_and_slope(fixed, j, angle[j] + ahead, was[j])
         new, slope_new = torque_and_slope(fixed, j, angle[j] + ahead, stiffness[j])
         slope = max(1.0, 0.5 * (slope_old + slope_new))
@@ -107,7 +80,7 @@ def swing_free(
 @kernel
 def phase_of(rows: Any, fixed: Any, j: int, time: float) -> float:
     """Return the phase of the stride, 0 to 1, at a time [s] of the episode."""
-    return fraction_of_turn(rows[K.START_PHASE][j] + time / fixed[STRIDE_TIME][j])
+    return fraction_of_turn(rows[K.START_PHASE][j] + time / fixed[K.STRIDE_TIME][j])
 
 
 @kernel
@@ -116,12 +89,12 @@ def begin_period_leg(
 ) -> None:
     """Look up the wearer's path at the end of the period and how firmly he holds it till then."""
     for j in range(LANES):
-        stiffness, damping = rows[HOLD][j], rows[HOLD_RATE][j]
-        work[KNEE_WAS][j], work[RATE_WAS][j] = rows[KNEE][j], rows[K.KNEE_RATE][j]
+        stiffness, damping = rows[K.HOLD][j], rows[K.HOLD_RATE][j]
+        work[KNEE_WAS][j], work[RATE_WAS][j] = rows[K.KNEE][j], rows[K.KNEE_RATE][j]
         work[FORCE_WAS][j] = rows[K.KNEE_ACCELERATION][j]
         gait_at(rows, fixed, gait, j, phase_of(rows, fixed, j, (counts[K.STEP][j] + 1) * period))
-        work[HELD][j] = 0.5 * (stiffness + rows[HOLD][j])
-        work[HELD_RATE][j] = 0.5 * (damping + rows[HOLD_RATE][j])
+        work[HELD][j] = 0.5 * (stiffness + rows[K.HOLD][j])
+        work[HELD_RATE][j] = 0.5 * (damping + rows[K.HOLD_RATE][j])
 
 
 @kernel
@@ -129,18 +102,23 @@ def follow_leg(
     rows: Any, fixed: Any, counts: Any, gait: Any, i: int, per_substep: float, h: float, work: Any
 ) -> None:
     """Move the knee off the wearer's path, with the brace on it."""
-    off, rate, stiffness, was = rows[DEVIATION], rows[DEVIATION_RATE], rows[STIFFNESS], work[WAS]
-    held, held_rate, mount = work[HELD], work[HELD_RATE], fixed[LEVER_MOUNT_ANGLE]
+    off, rate, stiffness, was = (
+        rows[K.DEVIATION],
+        rows[K.DEVIATION_RATE],
+        rows[K.STIFFNESS],
+        work[WAS],
+    )
+    held, held_rate, mount = work[HELD], work[HELD_RATE], fixed[K.LEVER_MOUNT_ANGLE]
     for j in range(LANES):
-        pace = 1.0 / fixed[STRIDE_TIME][j]
+        pace = 1.0 / fixed[K.STRIDE_TIME][j]
         time = (counts[K.STEP][j] * per_substep + (i + 1)) * h
         knee, turn, bend = curve_and_rates(gait, KNEE_CURVE, phase_of(rows, fixed, j, time))
         turn, bend = turn * pace, bend * pace * pace
         ahead, per_inertia = (
             0.5 * h * rate[j],
-            1.0 / (fixed[LEG_INERTIA][j] + fixed[LEVER_INERTIA][j]),
+            1.0 / (fixed[K.LEG_INERTIA][j] + fixed[K.LEVER_INERTIA][j]),
         )
-        drag = (held_rate[j] + fixed[LEVER_DAMPING][j]) * per_inertia
+        drag = (held_rate[j] + fixed[K.LEVER_DAMPING][j]) * per_inertia
         middle = mount[j] + off[j] + ahead
         old, slope_old = torque_and_slope(fixed, j, middle + work[KNEE_WAS][j], was[j])
         new, slope_new = torque_and_slope(fixed, j, middle + knee, stiffness[j])
@@ -164,51 +142,54 @@ def follow_leg(
 @kernel
 def along_path(fixed: Any, j: int, rate: float, acceleration: float) -> float:
     """Return the torque [N m] that carries the brace along the wearer's path."""
-    return fixed[LEVER_DAMPING][j] * rate + fixed[LEVER_INERTIA][j] * acceleration
+    return fixed[K.LEVER_DAMPING][j] * rate + fixed[K.LEVER_INERTIA][j] * acceleration
 
 
 @kernel
 def learnt(fixed: Any, j: int, knee: float) -> float:
     """Return the extending torque [N m] of the wire that the wearer bears beforehand."""
-    past = fixed[LEVER_MOUNT_ANGLE][j] + knee - fixed[LEVER_RELAXED_ANGLE][j]
-    return fixed[LEG_HABITUATION][j] * fixed[LEVER_STIFFNESS][j] * max(0.0, past)
+    past = fixed[K.LEVER_MOUNT_ANGLE][j] + knee - fixed[K.LEVER_RELAXED_ANGLE][j]
+    return fixed[K.LEG_HABITUATION][j] * fixed[K.LEVER_STIFFNESS][j] * max(0.0, past)
 
 
 @kernel
 def report_muscle(rows: Any, fixed: Any, j: int, length: float) -> None:
     """Write length, tension and air of one lane."""
-    stretch = stretch_of(length, fixed[SHORTEST_LENGTH][j])
+    stretch = stretch_of(length, fixed[K.MUSCLE_SHORTEST_LENGTH][j])
     rows[K.LENGTH][j] = length
-    rows[K.TENSION][j] = spring_tension(rows[STIFFNESS][j], stretch)
+    rows[K.TENSION][j] = spring_tension(rows[K.STIFFNESS][j], stretch)
     space = gas_volume(
-        length, fixed[SHORTEST_LENGTH][j], fixed[STIFFNESS_RATIO][j], fixed[FULL_VOLUME][j]
+        length,
+        fixed[K.MUSCLE_SHORTEST_LENGTH][j],
+        fixed[K.MUSCLE_STIFFNESS_RATIO][j],
+        fixed[K.MUSCLE_FULL_VOLUME][j],
     )
-    rows[K.AIR][j] = DENSITY_PER_PRESSURE * (max(0.0, rows[PRESSURE][j]) + ATMOSPHERE) * space
+    rows[K.AIR][j] = DENSITY_PER_PRESSURE * (max(0.0, rows[K.PRESSURE][j]) + ATMOSPHERE) * space
 
 
 @kernel
 def report_alone(rows: Any, fixed: Any, j: int, period: float) -> None:
     """Write what can be seen of a brace without a leg."""
-    sine, _ = sine_and_cosine(0.5 * rows[ANGLE][j])
+    sine, _ = sine_and_cosine(0.5 * rows[K.ANGLE][j])
     report_muscle(
-        rows, fixed, j, muscle_length(sine, fixed[LEVER_ARM][j], fixed[LEVER_FITTINGS][j])
+        rows, fixed, j, muscle_length(sine, fixed[K.LEVER_ARM][j], fixed[K.LEVER_FITTINGS][j])
     )
-    rows[K.TORQUE][j], _ = torque_and_slope(fixed, j, rows[ANGLE][j], rows[STIFFNESS][j])
+    rows[K.TORQUE][j], _ = torque_and_slope(fixed, j, rows[K.ANGLE][j], rows[K.STIFFNESS][j])
 
 
 @kernel
 def report_rig(rows: Any, fixed: Any, j: int, period: float) -> None:
     """Write what can be seen of a muscle held at its length."""
-    report_muscle(rows, fixed, j, fixed[FIXTURE_LENGTH][j])
-    rows[K.TORQUE][j], _ = torque_and_slope(fixed, j, rows[ANGLE][j], rows[STIFFNESS][j])
+    report_muscle(rows, fixed, j, fixed[K.FIXTURE_LENGTH][j])
+    rows[K.TORQUE][j], _ = torque_and_slope(fixed, j, rows[K.ANGLE][j], rows[K.STIFFNESS][j])
 
 
 @kernel
 def report_leg(rows: Any, fixed: Any, j: int, period: float) -> None:
     """Write what can be seen of the brace on the leg, and what the wearer's muscles do."""
-    rate = rows[K.KNEE_RATE][j] + rows[DEVIATION_RATE][j]
-    angle = fixed[LEVER_MOUNT_ANGLE][j] + rows[KNEE][j] + rows[DEVIATION][j]
-    rows[ANGLE][j], rows[VELOCITY][j] = angle, rate
+    rate = rows[K.KNEE_RATE][j] + rows[K.DEVIATION_RATE][j]
+    angle = fixed[K.LEVER_MOUNT_ANGLE][j] + rows[K.KNEE][j] + rows[K.DEVIATION][j]
+    rows[K.ANGLE][j], rows[K.VELOCITY][j] = angle, rate
     report_alone(rows, fixed, j, period)
     rows[K.TORQUE][j] = delivered(rows, fixed, j, rows[K.TORQUE][j])
     share_muscles(rows, fixed, j, period)
@@ -221,11 +202,11 @@ def delivered(rows: Any, fixed: Any, j: int, torque: float) -> float:
     The rest moves the brace itself, against its inertia and friction.
     """
     path = along_path(fixed, j, rows[K.KNEE_RATE][j], rows[K.KNEE_ACCELERATION][j])
-    off, rate = rows[DEVIATION][j], rows[DEVIATION_RATE][j]
-    drag = (rows[HOLD_RATE][j] + fixed[LEVER_DAMPING][j]) * rate
-    pull = torque + path - learnt(fixed, j, rows[KNEE][j]) + rows[HOLD][j] * off + drag
-    sway = -pull / (fixed[LEG_INERTIA][j] + fixed[LEVER_INERTIA][j])
-    return torque + path + fixed[LEVER_DAMPING][j] * rate + fixed[LEVER_INERTIA][j] * sway
+    off, rate = rows[K.DEVIATION][j], rows[K.DEVIATION_RATE][j]
+    drag = (rows[K.HOLD_RATE][j] + fixed[K.LEVER_DAMPING][j]) * rate
+    pull = torque + path - learnt(fixed, j, rows[K.KNEE][j]) + rows[K.HOLD][j] * off + drag
+    sway = -pull / (fixed[K.LEG_INERTIA][j] + fixed[K.LEVER_INERTIA][j])
+    return torque + path + fixed[K.LEVER_DAMPING][j] * rate + fixed[K.LEVER_INERTIA][j] * sway
 
 
 @routine
@@ -236,13 +217,13 @@ def rest_rig(rows: Any, fixed: Any, gait: Any, j: int) -> None:
         angle = 0.5 * (low + high)
         sine, _ = sine_and_cosine(0.5 * angle)
         if (
-            muscle_length(sine, fixed[LEVER_ARM][j], fixed[LEVER_FITTINGS][j])
-            < fixed[FIXTURE_LENGTH][j]
+            muscle_length(sine, fixed[K.LEVER_ARM][j], fixed[K.LEVER_FITTINGS][j])
+            < fixed[K.FIXTURE_LENGTH][j]
         ):
             low = angle
         else:
             high = angle
-    rows[ANGLE][j], rows[VELOCITY][j] = 0.5 * (low + high), 0.0
+    rows[K.ANGLE][j], rows[K.VELOCITY][j] = 0.5 * (low + high), 0.0
 
 
 @routine
@@ -251,12 +232,12 @@ def rest_alone(rows: Any, fixed: Any, gait: Any, j: int) -> None:
     low, high = 0.0, 3.141592653589793
     for _ in range(60):
         angle = 0.5 * (low + high)
-        torque, _ = torque_and_slope(fixed, j, angle, rows[STIFFNESS][j])
+        torque, _ = torque_and_slope(fixed, j, angle, rows[K.STIFFNESS][j])
         if torque < 0.0:
             low = angle
         else:
             high = angle
-    rows[ANGLE][j], rows[VELOCITY][j] = 0.5 * (low + high), 0.0
+    rows[K.ANGLE][j], rows[K.VELOCITY][j] = 0.5 * (low + high), 0.0
 
 
 @routine
@@ -264,17 +245,17 @@ def rest_leg(rows: Any, fixed: Any, gait: Any, j: int) -> None:
     """Put the knee where the wearer's hold balances the brace, moving along the path."""
     gait_at(rows, fixed, gait, j, fraction_of_turn(rows[K.START_PHASE][j]))
     load = along_path(fixed, j, rows[K.KNEE_RATE][j], rows[K.KNEE_ACCELERATION][j])
-    load = load - learnt(fixed, j, rows[KNEE][j])
-    angle = fixed[LEVER_MOUNT_ANGLE][j] + rows[KNEE][j]
+    load = load - learnt(fixed, j, rows[K.KNEE][j])
+    angle = fixed[K.LEVER_MOUNT_ANGLE][j] + rows[K.KNEE][j]
     low, high = -1.0, 1.0
     for _ in range(60):
         off = 0.5 * (low + high)
-        torque, _ = torque_and_slope(fixed, j, angle + off, rows[STIFFNESS][j])
-        if torque + load + rows[HOLD][j] * off < 0.0:
+        torque, _ = torque_and_slope(fixed, j, angle + off, rows[K.STIFFNESS][j])
+        if torque + load + rows[K.HOLD][j] * off < 0.0:
             low = off
         else:
             high = off
-    rows[DEVIATION][j], rows[DEVIATION_RATE][j] = 0.5 * (low + high), 0.0
+    rows[K.DEVIATION][j], rows[K.DEVIATION_RATE][j] = 0.5 * (low + high), 0.0
     start_muscles(rows, fixed, j)
 
 

@@ -10,11 +10,8 @@ the *leg* it opens with the knee, ``theta = mount angle + knee flexion``; the we
 stairs on a path that he holds with a stiffness of his own, and the knee bears the full balance of
 ground force, weight and acceleration, of which the paper's Eq. (1) sees the vertical force alone.
 
-Effects (off unless set): of the regulator, static gain, dead time, dead band, spool overlap,
-rounded slew limit, slow and choked exhaust, leak, limited and drooping supply, resonance of the
-line (the measured dynamics take the place of all these); of the muscle, creep, first cycles and
-temperature, before its hysteresis; stick-slip of the brace's bearing where it is alone; delay,
-drift, ramp, bow and slip of all sensors.
+Effects (off unless set, ``KneeOrthosis.effects``): of the regulator (the measured dynamics replace
+them), of the muscle before its hysteresis, of the bearing of the brace alone, and of all sensors.
 """
 
 from __future__ import annotations
@@ -28,13 +25,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.protocol import Usage
-from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.mechanics.knee_lever import KneeLever
 from pam_envs.mechanics.leg import Leg
 from pam_envs.muscle.emg import MuscleActivation
 from pam_envs.muscle.gas_spring import GasSpring
 from pam_envs.parameters import published
-from pam_envs.plants.core.plant import Plant, effects_of, neutral_of
+from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.hysteresis import KneeHysteresis, knee_hysteresis
 from pam_envs.pneumatics.measured_dynamics import OrthosisRegulator, mode_rows
@@ -82,28 +78,8 @@ class Stride:
     )
 
 
-PARTS: dict[str, type] = {
-    "regulator": OrthosisRegulator,
-    "hysteresis": KneeHysteresis,
-    "muscle": GasSpring,
-    "lever": KneeLever,
-    "fixture": Fixture,
-    "leg": Leg,
-    "stride": Stride,
-    "shoe": Shoe,
-    "activation": MuscleActivation,
-    "tension": TensionSensor,
-    "angle": AngleSensor,
-    "pressure": GaugeSensor,
-    "heel": HeelSensor,
-    "ground": GroundSensor,
-    "cop": CopSensor,
-    "ankle": AngleSensor,
-}
-
-
 @dataclass(frozen=True)
-class KneeOrthosis(Plant):
+class KneeOrthosis(Plant, rows=K):
     """The plant; another one is :meth:`replace` of it.
 
     Attributes
@@ -123,11 +99,7 @@ class KneeOrthosis(Plant):
     """
 
     family: ClassVar[str] = "knee_orthosis"
-    components: ClassVar[tuple[str, ...]] = tuple(PARTS)
-    names: ClassVar[tuple[str, ...]] = K.NAMES
     choices: ClassVar[tuple[str, ...]] = tuple(MAKES)
-    effects: ClassVar[tuple[tuple[str, ...], ...]] = effects_of(PARTS)
-    neutral: ClassVar[Mapping[str, float]] = neutral_of(PARTS, K.EFFECTS)
 
     mounting: Mounting = "no_load"
     dynamics: Dynamics = "lag"
@@ -163,23 +135,20 @@ class KneeOrthosis(Plant):
         self._check_toggle()
 
     def _check_motion(self) -> None:
-        """Refuse a motion that the sub-steps cannot follow (see ``kernels.motion``)."""
-        h = self.control_period / self.substeps
-        inertia, damping, hold = self.lever.inertia, self.lever.damping, 0.0
+        """Refuse a motion that the sub-steps cannot follow."""
+        lever, leg, hold = self.lever, self.leg, 0.0
+        inertia, damping = lever.inertia, lever.damping
         if self.mounting == "leg":
-            inertia += self.leg.inertia
-            damping += self.leg.hold_damping + self.leg.stance_damping + self.leg.damping
-            hold = self.leg.hold_stiffness + 2.0 * self.leg.stance_stiffness + self.leg.stiffness
+            inertia += leg.inertia
+            damping += leg.hold_damping + leg.stance_damping + leg.damping
+            hold = leg.hold_stiffness + 2.0 * leg.stance_stiffness + leg.stiffness
         pull = self.muscle.gain * self.muscle.stiffness_ratio * self.regulator.max_pressure
-        k = (self.lever.stiffness + hold + pull * self.lever.arm**2) / inertia
-        phase = max(k, (0.5 * damping / inertia) ** 2) * h * h
-        if phase > LARGEST_PHASE:
-            raise ValueError(
-                f"lever.inertia = {self.lever.inertia:g} kg m2 with lever.damping = "
-                f"{self.lever.damping:g} N m s/rad and lever.stiffness = {self.lever.stiffness:g} "
-                f"N m/rad moves too fast for {self.substeps} sub-steps: phase {phase:.1f} against "
-                f"at most {LARGEST_PHASE:g}; use more sub-steps or a larger inertia"
-            )
+        self.check_phase(
+            (lever.stiffness + hold + pull * lever.arm**2) / inertia,
+            damping / inertia,
+            f"lever.inertia = {lever.inertia:g} kg m2 with lever.damping = {lever.damping:g} "
+            f"N m s/rad and lever.stiffness = {lever.stiffness:g} N m/rad",
+        )
 
     def _check_toggle(self) -> None:
         """Refuse a strap setting with which the knee's flexion opens the wire past its toggle."""
@@ -249,15 +218,8 @@ class KneeOrthosis(Plant):
     def _preset(cls, hysteresis: str, changes: Mapping[str, float], **makes: Any) -> KneeOrthosis:
         activity = makes.pop("activity", "walk")
         plant = cls(hysteresis=knee_hysteresis(hysteresis), dynamics=makes["dynamics"])
-        plant = plant.replace({k.replace("__", "."): v for k, v in changes.items()})
+        plant = plant.changed(changes)
         return dataclasses.replace(plant, mounting=makes["mounting"], activity=activity)
-
-    def without_noise(self) -> KneeOrthosis:
-        """Return the plant with sensors that show the truth."""
-        sensors = ("tension", "angle", "pressure", "heel", "ground", "cop", "ankle")
-        return self.replace(
-            {f"{s}.{what}": 0.0 for s in sensors for what in ("noise", "resolution")}
-        )
 
     # --- statics ----------------------------------------------------------------------------------
 
@@ -285,10 +247,9 @@ class KneeOrthosis(Plant):
 
     # --- rows, files, identity --------------------------------------------------------------------
 
-    def parameter_rows(self) -> NDArray[np.float64]:
-        """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
-        named = [self.value(name) for name in K.NAMES]
-        return np.array(named + mode_rows() + self._model.numbers())
+    def table_values(self) -> list[float]:
+        """Return the modes of the measured dynamics and the numbers of the hysteresis operator."""
+        return mode_rows() + self._model.numbers()
 
     def gait_table(self) -> NDArray[np.float64]:
         """Return the stride's curves as the kernels read them, shape (points, signals)."""

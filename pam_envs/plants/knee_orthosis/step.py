@@ -14,25 +14,15 @@ from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.plants.core.sensors import read_sensors
 from pam_envs.plants.knee_orthosis import rows as K
-from pam_envs.plants.knee_orthosis.effects import effect_kernels
+from pam_envs.plants.knee_orthosis.effects import muscle_kernels
 from pam_envs.plants.knee_orthosis.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.knee_orthosis.motion import MOTIONS, N_WORK, WAS
-from pam_envs.plants.knee_orthosis.rows import (
-    MAX_PRESSURE,
-    MODE,
-    MODE_TABLE,
-    PRESSURE,
-    SET_POINT,
-    SLEW_RATE,
-    STIFFNESS,
-    TIME_CONSTANT,
-)
 from pam_envs.pneumatics.measured_dynamics import MODES, REAL_MODES, pair_factor, turned
 from pam_envs.pneumatics.regulator import regulator_step
 
 __all__ = ["N_WORK", "advance", "begin_lane", "replacements", "start_hysteresis"]
 
-PAIR = MODE_TABLE + 2 * REAL_MODES
+PAIR = K.MODE_TABLE + 2 * REAL_MODES
 """First row of what the slow pair is made of: decay, frequency, two gains."""
 
 # placeholders, filled in for each hysteresis, mounting and regulator
@@ -57,10 +47,10 @@ def begin_muscle(rows: Any, fixed: Any, j: int) -> None:
 def lag(rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float) -> None:
     """Advance the pressure behind a first-order lag."""
     h = period / substeps
-    pressure, set_point = rows[PRESSURE], rows[SET_POINT]
+    pressure, set_point = rows[K.PRESSURE], rows[K.SET_POINT]
     for j in range(LANES):
-        time, slew = fixed[TIME_CONSTANT][j], fixed[SLEW_RATE][j]
-        target = max(0.0, min(fixed[MAX_PRESSURE][j], set_point[j]))
+        time, slew = fixed[K.REGULATOR_TIME_CONSTANT][j], fixed[K.REGULATOR_SLEW_RATE][j]
+        target = max(0.0, min(fixed[K.REGULATOR_MAX_PRESSURE][j], set_point[j]))
         pressure[j] = regulator_step(pressure[j], target, time, 1.0 / time, slew, 1.0 / slew, h)
 
 
@@ -73,28 +63,28 @@ def settle_lag(rows: Any, fixed: Any, j: int) -> None:
 def measured(rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float) -> None:
     """Advance the modes of the published frequency response."""
     h = period / substeps
-    set_point = rows[SET_POINT]
+    set_point = rows[K.SET_POINT]
     for j in range(LANES):
-        u = max(0.0, min(fixed[MAX_PRESSURE][j], set_point[j]))
+        u = max(0.0, min(fixed[K.REGULATOR_MAX_PRESSURE][j], set_point[j]))
         c, s = pair_factor(fixed[PAIR][j], fixed[PAIR + 1][j], h)
         real, imaginary = turned(
-            u, rows[MODE + REAL_MODES][j], rows[MODE + REAL_MODES + 1][j], c, s
+            u, rows[K.MODE + REAL_MODES][j], rows[K.MODE + REAL_MODES + 1][j], c, s
         )
-        rows[MODE + REAL_MODES][j], rows[MODE + REAL_MODES + 1][j] = real, imaginary
+        rows[K.MODE + REAL_MODES][j], rows[K.MODE + REAL_MODES + 1][j] = real, imaginary
         total = fixed[PAIR + 2][j] * real - fixed[PAIR + 3][j] * imaginary
         for k in range(REAL_MODES):
-            x = u + (rows[MODE + k][j] - u) * decay(fixed[MODE_TABLE + k][j] * h)
-            rows[MODE + k][j] = x
-            total = total + fixed[MODE_TABLE + REAL_MODES + k][j] * x
-        rows[PRESSURE][j] = total
+            x = u + (rows[K.MODE + k][j] - u) * decay(fixed[K.MODE_TABLE + k][j] * h)
+            rows[K.MODE + k][j] = x
+            total = total + fixed[K.MODE_TABLE + REAL_MODES + k][j] * x
+        rows[K.PRESSURE][j] = total
 
 
 @kernel
 def settle_measured(rows: Any, fixed: Any, j: int) -> None:
     """Put the modes of one lane at rest at its pressure."""
     for k in range(MODES - 1):
-        rows[MODE + k][j] = rows[PRESSURE][j]
-    rows[MODE + MODES - 1][j] = 0.0
+        rows[K.MODE + k][j] = rows[K.PRESSURE][j]
+    rows[K.MODE + MODES - 1][j] = 0.0
 
 
 @kernel
@@ -102,29 +92,17 @@ def advance(
     rows: Any, fixed: Any, counts: Any, table: Any, gait: Any, hysteresis: int, elements: int,
     substeps: int, period: float, work: Any,
 ) -> None:  # fmt: skip
-    """Advance a tile by control period ``counts[STEP]``, towards its set-points.
+    """Advance a tile by control period ``counts[STEP]``, towards its set-points [Pa].
 
-    Parameters
-    ----------
-    rows, fixed, counts : rows
-        State, parameters and whole numbers (``knee_orthosis_rows``).
-    table : array
-        Of the hysteresis: ``KneeOrthosis.hysteresis_tables()``.
-    gait : array
-        ``KneeOrthosis.gait_table()``.
-    hysteresis, elements : int
-        First row of the hysteresis state, and ``KneeOrthosis.elements``.
-    substeps, period : int, float
-        Sub-steps and duration [s] of the period.
-    work : rows
-        ``N_WORK`` rows of scratch.
+    ``gait`` is ``KneeOrthosis.gait_table()``, ``hysteresis`` the first row of the hysteresis state;
+    ``work`` are ``N_WORK`` rows of scratch.
     """
     h = period / substeps
     begin_period(rows, fixed, counts, gait, period, work)
     for i in range(substeps):
         regulate(rows, fixed, counts, i, substeps, period)
         for j in range(LANES):
-            work[WAS][j] = rows[STIFFNESS][j]
+            work[WAS][j] = rows[K.STIFFNESS][j]
         remember(rows, fixed, counts, table, hysteresis, 0, LANES, elements)
         move(rows, fixed, counts, gait, i, substeps, h, work)
     for j in range(LANES):
@@ -143,8 +121,7 @@ def start_hysteresis(rows: Any, counts: Any, hysteresis: int, j: int) -> None:
 @routine
 def begin_lane(
     rows: Any, fixed: Any, counts: Any, table: Any, gait: Any, hysteresis: int, elements: int,
-    j: int,
-    start_phase: float, pressure: float,
+    j: int, start_phase: float, pressure: float,
 ) -> None:  # fmt: skip
     """Bring one lane to rest at a pressure [Pa] after inflation from none, at a phase in turns.
 
@@ -153,14 +130,14 @@ def begin_lane(
     hysteresis_begin(
         rows, fixed, counts, table, elements, hysteresis, K.MODEL, K.STACK_COUNT, K.MEMBER, j
     )
-    rows[PRESSURE][j] = 0.0
+    rows[K.PRESSURE][j] = 0.0
     begin_muscle(rows, fixed, j)
     remember(rows, fixed, counts, table, hysteresis, j, j + 1, elements)
-    rows[PRESSURE][j] = pressure
+    rows[K.PRESSURE][j] = pressure
     begin_muscle(rows, fixed, j)
     remember(rows, fixed, counts, table, hysteresis, j, j + 1, elements)
     settle(rows, fixed, j)
-    rows[SET_POINT][j] = rows[K.OLD_SET_POINT][j] = rows[K.OLD_PRESSURE][j] = pressure
+    rows[K.SET_POINT][j] = rows[K.OLD_SET_POINT][j] = rows[K.OLD_PRESSURE][j] = pressure
     rows[K.START_PHASE][j] = start_phase
     rest(rows, fixed, gait, j)
     report(rows, fixed, j, 0.0)
@@ -177,11 +154,8 @@ REGULATORS: dict[str, dict[str, Any]] = {
 def replacements(
     kind: str, mounting: str, dynamics: str, effects: int | None = None
 ) -> dict[str, Any]:
-    """Return the kernels that a plant of this make puts in the place of the placeholders.
-
-    ``effects`` is the first row of the state of the effects; None for a plain plant.
-    """
+    """Return the kernels of a make; ``effects``: first row of their state, None if plain."""
     kernels = hysteresis_kernels(kind) | MOTIONS[mounting] | REGULATORS[dynamics]
     if effects is None:
         return kernels
-    return kernels | effect_kernels(dynamics, kernels["regulate"], effects)
+    return kernels | muscle_kernels(dynamics, kernels["regulate"], effects)

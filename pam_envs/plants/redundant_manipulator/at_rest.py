@@ -18,25 +18,12 @@ def at_rest(
     inputs: Inputs = "pressure",
     branch: Branch = "loading",
 ) -> Equilibrium:
-    """Return the equations about the rest of n joints at their angles.
+    """Return the equations about the rest of n joints at their angles, shape () or (n,) [rad].
 
-    States: pressure_1a, pressure_1b, ... [Pa], angle_1, ... [rad], velocity_1, ... [rad/s].
-    Inputs: set_point_1a, ... [Pa]; or command_1, ... [rad] and co_contraction_1, ... [N] through
-    the feed-forward. Outputs: the angles.
-
-    Parameters
-    ----------
-    plant : RedundantManipulator
-    angles : array_like, shape () or (n,)
-        Angles at rest [rad].
-    prestress : float, optional
-        Co-contraction [N] of every joint; default: the nominal one.
-    payload : float
-        Mass at the tip [kg].
-    inputs : {"pressure", "angle"}
-        Set-points of the regulators, or of the feed-forward.
-    branch : {"loading", "turned"}
-        See :mod:`pam_envs.plants.core.linearise`.
+    States: pressure_1a, pressure_1b, ... [Pa], angle_1, ... [rad], velocity_1, ... [rad/s]. Inputs:
+    set_point_1a, ... [Pa]; or with ``inputs="angle"`` command_1, ... [rad] and co_contraction_1,
+    ... [N] through the feedforward. Outputs: the angles. ``prestress`` [N] is that of every joint
+    (default: the nominal one), ``payload`` the mass at the tip [kg].
     """
     n = plant.stages
     pose = np.array(np.broadcast_to(np.asarray(angles, float), (n,)))

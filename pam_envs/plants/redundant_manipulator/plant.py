@@ -3,20 +3,18 @@
     M(q) q'' + bias(q, q') = sum over a joint's muscles of -F dL/dq - D q' + disturbance
 
 Six stages with axes x-y-x-y-x-y unless another chain is given; each has the muscles, the
-hysteresis, the regulators and the feed-forward of a single joint
+hysteresis, the regulators and the feedforward of a single joint
 (:mod:`pam_envs.plants.antagonistic_joint.plant`). Gravity, inertia and the payload at the tip
 couple the joints. The arm hangs.
 
 Masses and damping are not published. Links of 0.1 kg are about as heavy as the muscles of a stage
-bear where the paper's paths bend the arm most, and lighter than two muscles with their fittings:
-the arm is as if its muscles weighed nothing. Each joint has, beside the viscosity of its muscles,
-the damping that gives it a ratio of one half with the rest of the straight arm held rigid. Both
-have a common factor (``arm.mass_factor``, ``arm.damping_factor``) that can be drawn.
+bear where the paper's paths bend the arm most, and lighter than two muscles with their fittings.
+Each joint has, beside the viscosity of its muscles, the damping that gives it a ratio of one half
+with the rest of the straight arm held rigid. Both have a common factor (``arm.mass_factor``,
+``arm.damping_factor``) that can be drawn.
 
-Effects (off unless set), the same for all joints: of the regulators, static gain, dead time, dead
-band, spool overlap, rounded slew limit, slow and choked exhaust, leak, limited and drooping
-supply, resonance of the line; of the muscles, creep, first cycles and temperature; delay, drift,
-ramp, bow and slip of all sensors. The bearings have viscous friction only.
+Effects (off unless set, ``RedundantManipulator.effects``), the same for all joints: of the
+regulators, the muscles and the sensors. The bearings have viscous friction only.
 """
 
 from __future__ import annotations
@@ -35,7 +33,6 @@ from pam_envs.hysteresis.protocol import Usage
 from pam_envs.mechanics.antagonistic_lever import AntagonisticLever
 from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.muscle.force_map import ForceMap, paper_stretch
-from pam_envs.plants.antagonistic_joint import statics as pair_statics
 from pam_envs.plants.antagonistic_joint.hysteresis import JointHysteresis, joint_hysteresis
 from pam_envs.plants.antagonistic_joint.link import (
     ArmFactors,
@@ -45,12 +42,11 @@ from pam_envs.plants.antagonistic_joint.link import (
     StagePoint,
 )
 from pam_envs.plants.antagonistic_joint.plant import (
-    PRESTRESS_RANGE,
     REACHED,
     STRETCHED,
     AntagonisticJoint,
 )
-from pam_envs.plants.core.plant import Plant, effects_of, neutral_of
+from pam_envs.plants.antagonistic_joint.statics import PairPlant
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.pneumatics.regulator import JointRegulator
 from pam_envs.sensing.orthosis import GaugeSensor
@@ -65,21 +61,8 @@ MOST_DAMPING = 100.0
 LINKS = ("lengths", "masses", "centres", "across", "along")
 
 
-PARTS: dict[str, type] = {
-    "arm": ArmFactors,
-    "regulator": JointRegulator,
-    "hysteresis": JointHysteresis,
-    "muscle": ForceMap,
-    "lever": AntagonisticLever,
-    "link": Stage,
-    "nominal": StagePoint,
-    "angle": JointEncoder,
-    "pressure": GaugeSensor,
-}
-
-
 @dataclass(frozen=True)
-class RedundantManipulator(Plant):
+class RedundantManipulator(PairPlant, rows=M):
     """The plant; another one is :meth:`replace` of it, or ``dataclasses.replace`` for the chain.
 
     Attributes
@@ -99,11 +82,7 @@ class RedundantManipulator(Plant):
     """
 
     family: ClassVar[str] = "redundant_manipulator"
-    components: ClassVar[tuple[str, ...]] = tuple(PARTS)
-    names: ClassVar[tuple[str, ...]] = M.NAMES
     choices: ClassVar[tuple[str, ...]] = ("axes", *LINKS, "gravity", "joint_damping")
-    effects: ClassVar[tuple[tuple[str, ...], ...]] = effects_of(PARTS)
-    neutral: ClassVar[Mapping[str, float]] = neutral_of(PARTS, M.EFFECTS)
     dynamics: ClassVar[str] = "muscles"
 
     axes: str = "".join(LINK.axes)
@@ -132,7 +111,7 @@ class RedundantManipulator(Plant):
             raise ValueError(f"gravity = {self.gravity!r}; give three numbers [m/s2]")
         self.check_components()
         self._model.check(Usage("an arm", "virgin"))
-        pair_statics.check_angles(self, self.link)
+        self._check_angles()
         if self.chain.stages > M.MOST_STAGES:
             raise ValueError(
                 f"axes = {self.axes!r}: {self.chain.stages} joints; at most {M.MOST_STAGES} are "
@@ -197,7 +176,7 @@ class RedundantManipulator(Plant):
             hysteresis=joint_hysteresis(hysteresis),
             muscle=muscle,
             provenance=provenance,
-        ).replace({k.replace("__", "."): v for k, v in changes.items()})
+        ).changed(changes)
         return dataclasses.replace(plant, joint_damping=plant.even_damping())
 
     def even_damping(self) -> tuple[float, ...]:
@@ -210,13 +189,6 @@ class RedundantManipulator(Plant):
         stiffness = float(self.stiffness_at(0.0)) + np.maximum(0.0, self.weight_stiffness())
         wanted = 2.0 * DAMPING_RATIO * np.sqrt(stiffness * inertia)
         return tuple(float(round(d, 3)) for d in np.maximum(0.0, wanted - own))
-
-    def without_noise(self) -> RedundantManipulator:
-        """Return the plant with sensors that show the truth."""
-        sensors = ("angle", "pressure")
-        return self.replace(
-            {f"{s}.{what}": 0.0 for s in sensors for what in ("noise", "resolution")}
-        )
 
     # --- chain and ranges -----------------------------------------------------------------------
 
@@ -237,43 +209,7 @@ class RedundantManipulator(Plant):
         """Number of joints."""
         return len(self.axes)
 
-    @property
-    def angle_range(self) -> tuple[float, float]:
-        """Lowest and highest set-point [rad] of a joint."""
-        return -self.link.limit, self.link.limit
-
-    @property
-    def largest_angle(self) -> float:
-        """Angle of the mechanical stops [rad]."""
-        return self.link.stop
-
-    @property
-    def prestress(self) -> float:
-        """Usual co-contraction [N]."""
-        return self.nominal.prestress
-
-    @property
-    def prestress_range(self) -> tuple[float, float]:
-        """Lowest and highest co-contraction [N] that is a set-point."""
-        return PRESTRESS_RANGE
-
     # --- statics --------------------------------------------------------------------------------
-
-    def pressures_for(
-        self, angle: ArrayLike, prestress: ArrayLike | None = None, torque: ArrayLike = 0.0
-    ) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Return the pressures [Pa] of a joint's muscles (see ``AntagonisticJoint``)."""
-        stress = self.prestress if prestress is None else prestress
-        return pair_statics.pressures_for(self, angle, stress, torque)
-
-    def torque(self, angle: ArrayLike, pressure_a: ArrayLike, pressure_b: ArrayLike) -> Array:
-        """Return the muscles' torque [N m] at joint angles [rad] and pressures [Pa]."""
-        return pair_statics.pull(self, angle, pressure_a, pressure_b)
-
-    def stiffness_at(self, angle: ArrayLike, prestress: ArrayLike | None = None) -> Array:
-        """Return the stiffness of a joint's muscles [N m/rad] at rest, without hysteresis."""
-        pressures = self.pressures_for(angle, prestress)[:2]
-        return pair_statics.stiffness(self, angle, *pressures)
 
     def weight_stiffness(self, payload: float = 0.0) -> Array:
         """Return how a joint's own angle changes its weight torque [N m/rad], arm straight."""
@@ -282,14 +218,8 @@ class RedundantManipulator(Plant):
     def reachable_angle(self, prestress: float | None = None, payload: float = 0.0) -> float:
         """Return the largest angle [rad] that each joint of a straight arm reaches alone.
 
-        Parameters
-        ----------
-        prestress : float, optional
-            Co-contraction [N]; default: the nominal one.
-        payload : float
-            Mass at the tip [kg].
+        At a co-contraction [N] (default: the nominal one), with a payload [kg] at the tip.
         """
-        stress = self.prestress if prestress is None else prestress
         straight, across = self._weights_alone(payload)
         found = self.link.stop
         for even, odd in zip(straight, across, strict=True):
@@ -297,7 +227,7 @@ class RedundantManipulator(Plant):
             def weight(angle: float, even: float = even, odd: float = odd) -> float:
                 return max(0.0, even * math.cos(angle) + odd * math.sin(angle))
 
-            found = min(found, pair_statics.reachable_angle(self, self.link.stop, stress, weight))
+            found = min(found, self._reach(prestress, weight))
         return found
 
     def _weights_alone(self, payload: float) -> tuple[Array, Array]:
@@ -308,31 +238,16 @@ class RedundantManipulator(Plant):
         return straight, np.array(across)
 
     def gravity_shift(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
-        """Return what to add to set-points [rad] so that gravity is borne, shape (..., n).
+        """Return the addition to set-points [rad] that bears gravity, shape (..., n).
 
-        Parameters
-        ----------
-        angles : array_like, shape (..., n)
-            Desired angles at rest [rad].
-        payload : array_like, shape (...)
-            Mass at the tip [kg].
+        ``angles`` (..., n) [rad] are those at rest, ``payload`` (...) [kg] is at the tip.
         """
         phi = np.asarray(angles, float)
-        weight = self.weight_torque(phi, payload)
-        held = np.clip(phi, *self.angle_range)
-        return pair_statics.shift_for(self, held, self.prestress, weight, self.link.limit)
+        return self._shift(phi, self.weight_torque(phi, payload))
 
     def weight_torque(self, angles: ArrayLike, payload: ArrayLike = 0.0) -> Array:
         """Return the torques [N m] that hold arm and payload [kg] at angles (..., n) [rad]."""
         return self.chain.gravity_torque(angles, payload)
-
-    def torque_range(self, angles: ArrayLike, by_pressure: bool = False) -> tuple[Array, Array]:
-        """Return the least and the largest torque [N m] of the muscles at angles [rad].
-
-        Set-points of angles end at their limit, and so does what they exert; pressures do not.
-        """
-        limit = None if by_pressure else self.link.limit
-        return pair_statics.torque_range(self, angles, limit, self.prestress)
 
     def stage(self) -> AntagonisticJoint:
         """Return one stage on its own, with its own link."""
@@ -357,12 +272,10 @@ class RedundantManipulator(Plant):
 
     # --- rows, files, identity --------------------------------------------------------------------
 
-    def parameter_rows(self) -> Array:
-        """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
+    def table_values(self) -> list[float]:
+        """Return the numbers of the hysteresis operator, the joints' damping and the chain."""
         damping = [*self.joint_damping, *[0.0] * (M.MOST_STAGES - self.stages)]
-        named = [self.value(name) for name in M.NAMES]
-        chain = self.nominal_chain.rows()
-        return np.array([*named, *self._model.numbers(), *damping, *chain])
+        return [*self._model.numbers(), *damping, *self.nominal_chain.rows()]
 
 
 def _numbers(name: str, values: Sequence[float]) -> tuple[float, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,32 +12,22 @@ from pam_envs.kernels.build import COMPILED, LANES, kernel
 from pam_envs.mechanics.serial_chain.kinematics import N_STAGES
 from pam_envs.mechanics.serial_chain.rows import parameter_rows
 from pam_envs.plants.antagonistic_joint.pair import command
-from pam_envs.plants.core.rollout import Loop, biased_output, run
+from pam_envs.plants.core.rollout import Loop, loop_for, run
+from pam_envs.plants.core.rows import signal_rows
+from pam_envs.plants.core.sensors import reading_rows
 from pam_envs.plants.core.tiles import drives_of
 from pam_envs.plants.redundant_manipulator import rows as M
 from pam_envs.plants.redundant_manipulator.plant import RedundantManipulator
 from pam_envs.plants.redundant_manipulator.step import (
     advance,
     begin_lane,
-    hysteresis_rows,
     replacements,
     start_hysteresis,
     work_rows,
 )
 
-JOINT_OUTPUTS = {
-    "angle": M.ANGLE,
-    "velocity": M.VELOCITY,
-    "torque": M.TORQUE,
-    "stiffness": M.STIFFNESS,
-}
-MUSCLE_OUTPUTS = {
-    "pressure": M.PRESSURE,
-    "set_point": M.SET_POINT,
-    "force": M.FORCE,
-    "contraction": M.CONTRACTION,
-    "lag": M.LAG,
-}
+JOINT_OUTPUTS = signal_rows(M, "angle velocity torque stiffness")
+MUSCLE_OUTPUTS = signal_rows(M, "pressure set_point force contraction lag")
 """Signals of a record (SI) and the first of their rows."""
 
 Array = NDArray[np.float64]
@@ -65,15 +56,6 @@ def begin(
         begin_lane(rows, fixed, counts, table, M.END, elements, j, work)
 
 
-@kernel
-def advance_arm(
-    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, elements: int, substeps: int,
-    period: float, work: Any,
-) -> None:  # fmt: skip
-    """Advance a tile by one control period."""
-    advance(rows, fixed, counts, table, M.END, elements, substeps, period, work)
-
-
 def channels_of(plant: RedundantManipulator) -> dict[str, float]:
     """Return what drives the arm, with defaults."""
     joints = range(plant.stages)
@@ -82,41 +64,24 @@ def channels_of(plant: RedundantManipulator) -> dict[str, float]:
 
 
 def readings_of(plant: RedundantManipulator) -> dict[str, tuple[int, int]]:
-    """Return the sensors by name, each with its place among the readings and its bias' row."""
-    n = plant.stages
-    angles = {f"angle_{k}": (k, M.ANGLE_BIAS) for k in range(n)}
-    return angles | {f"pressure_{m}": (n + m, M.PRESSURE_BIAS) for m in range(2 * n)}
+    """Return row and bias of each sensor's reading, by name."""
+    angles = {f"angle_{k}": M.ANGLE_BIAS for k in range(plant.stages)}
+    pressures = {f"pressure_{m}": M.PRESSURE_BIAS for m in range(2 * plant.stages)}
+    return reading_rows(M.STATE.sensors, angles | pressures)
 
 
 def loop_of(plant: RedundantManipulator, extended: bool = False, readings: bool = False) -> Loop:
     """Return the loop of a make of the arm; ``readings``: of its sensors alone."""
-    kind, stages = plant.hysteresis.kind, plant.stages
-    effects = M.END + hysteresis_rows(kind, stages)
-    kernels: dict[str, Any] = {
-        "plant_drive": drive,
-        "plant_begin": begin,
-        "plant_advance": advance_arm,
-    }
-    joints = [row + k for row in JOINT_OUTPUTS.values() for k in range(stages)]
-    muscles = [row + m for row in MUSCLE_OUTPUTS.values() for m in range(2 * stages)]
-    outputs: tuple[int, ...] = (*joints, *muscles)
-    if readings:
-        read = readings_of(plant).values()
-        kernels["BIAS_ROWS"] = tuple(bias for _, bias in read)
-        kernels["plant_output"] = biased_output
-        outputs = tuple(effects + M.STATE.sensors + place for place, _ in read)
-    return Loop(
-        f"arm_{kind}_{stages}"
-        + ("_extended" if extended else "")
-        + ("_readings" if readings else ""),
-        kernels | replacements(kind, stages, effects if extended else None),
-        outputs,
-        rows=effects + (M.STATE.end if extended else 0),
-        parameters=M.CHAIN + parameter_rows(stages),
-        counts=M.N_COUNTS,
-        work=work_rows(stages),
-        extra=np.zeros((1, 1)),
-    )
+    make = plant.hysteresis.kind, plant.stages
+    kernels = {"plant_drive": drive, "plant_begin": begin, "advance": advance}
+    joints = [row + k for row in JOINT_OUTPUTS.values() for k in range(plant.stages)]
+    muscles = [row + m for row in MUSCLE_OUTPUTS.values() for m in range(2 * plant.stages)]
+    return loop_for(
+        f"arm_{make[0]}_{make[1]}", plant, M, kernels, partial(replacements, *make),
+        [*joints, *muscles], work_rows(plant.stages), extended=extended,
+        operators=2 * plant.stages, parameters=M.CHAIN + parameter_rows(plant.stages),
+        readings=readings_of(plant) if readings else None,
+    )  # fmt: skip
 
 
 def simulate_manipulator(
@@ -128,14 +93,12 @@ def simulate_manipulator(
     payload: ArrayLike = 0.0,
     compiled: bool = COMPILED,
 ) -> dict[str, Array]:
-    """Simulate an arm from rest under the first commands.
+    """Simulate an arm of n joints from rest under the first commands.
 
     Parameters
     ----------
-    plant : RedundantManipulator
-        The arm, of n joints.
     commands : array_like, shape (T, n)
-        Set-points [rad] of the feed-forward, one row a control period.
+        Set-points [rad] of the feedforward, one row a control period.
     prestress : float, optional
         Co-contraction [N] of every joint. Default: the plant's.
     disturbance : array_like, shape () or (n,) or (T, n)

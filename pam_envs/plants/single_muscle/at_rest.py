@@ -15,20 +15,10 @@ def at_rest(
     load: float | None = None,
     branch: Branch = "loading",
 ) -> Equilibrium:
-    """Return the equations about the rest at a set-point pressure.
+    """Return the equations about the rest at a set-point pressure [Pa], reached from none.
 
     States: pressure [Pa], contraction [m] as measured, velocity [m/s]. Input: set_point [Pa].
-    Outputs: contraction, pressure.
-
-    Parameters
-    ----------
-    plant : SingleMuscle
-    pressure : float
-        Set-point [Pa], reached by inflation from none.
-    load : float, optional
-        Load [kg]; default: the plant's.
-    branch : {"loading", "turned"}
-        See :mod:`pam_envs.plants.core.linearise`.
+    Outputs: contraction, pressure. ``load`` [kg] is by default the plant's.
     """
     mass = plant.mass.load if load is None else load
     law, full = plant.hysteresis, plant.regulator.max_pressure

@@ -28,7 +28,6 @@ from pam_envs.muscle.effects import stiffening, temperature_factor, viscous_damp
 from pam_envs.muscle.strands import slip_strands, strand_forces, strands_on
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
-from pam_envs.plants.single_muscle.rows import EFFECT as P
 from pam_envs.plants.single_muscle.rows import STATE as S
 from pam_envs.pneumatics.air_path import air_step, delay_commands
 from pam_envs.pneumatics.regulator import (
@@ -62,7 +61,7 @@ def effective_pressure(
     true, friction, most = own[0], rows[EFFECTS_AT + S.friction], own[2]
     for j in range(first, last):
         true[j] = pressure[j]
-        pressure[j] = max(0.0, pressure[j] - fixed[P.hysteresis_threshold][j])
+        pressure[j] = max(0.0, pressure[j] - fixed[R.HYSTERESIS_THRESHOLD][j])
     plain_hysteresis(rows, fixed, counts, table, hysteresis, first, last, elements, work)
     for j in range(first, last):
         above = pressure[j]
@@ -75,32 +74,31 @@ def effective_pressure(
         for j in range(first, last):
             most[j] = most[j] + fixed[R.WEIGHT + k][j] * fixed[R.THRESHOLD + k][j]
     for j in range(first, last if worn > 0 else first):
-        new = newness(rows[EFFECTS_AT + S.travel][j], fixed[P.hysteresis_first_travel][j])
+        new = newness(rows[EFFECTS_AT + S.travel][j], fixed[R.HYSTERESIS_FIRST_TRAVEL][j])
         friction[j] = friction_with_effects(
             friction[j],
             most[j],
-            pressure[j] / fixed[R.MAX_PRESSURE][j],
-            fixed[P.hysteresis_shape][j],
-            fixed[P.hysteresis_pressure_slope][j],
-            fixed[P.hysteresis_pressure_bend][j],
+            pressure[j] / fixed[R.REGULATOR_MAX_PRESSURE][j],
+            fixed[R.HYSTERESIS_SHAPE][j],
+            fixed[R.HYSTERESIS_PRESSURE_SLOPE][j],
+            fixed[R.HYSTERESIS_PRESSURE_BEND][j],
         )
-        drive[j] = true[j] - (1.0 + fixed[P.hysteresis_first_width][j] * new) * friction[j]
+        drive[j] = true[j] - (1.0 + fixed[R.HYSTERESIS_FIRST_WIDTH][j] * new) * friction[j]
     if creeps > 0:
         for j in range(first, last):
             most[j] = 0.0
         creep_step(
-            rows, fixed, EFFECTS_AT + S.creep, P.hysteresis_creep_1, P.hysteresis_creep_time_1,
-            first,
-            last, drive, width, most,
+            rows, fixed, EFFECTS_AT + S.creep, R.HYSTERESIS_CREEP_1, R.HYSTERESIS_CREEP_TIME_1,
+            first, last, drive, width, most,
         )  # fmt: skip
         for j in range(first, last):
             drive[j] = drive[j] + most[j]
     for j in range(first, last if worn > 0 else first):
-        new = newness(rows[EFFECTS_AT + S.travel][j], fixed[P.hysteresis_first_travel][j])
+        new = newness(rows[EFFECTS_AT + S.travel][j], fixed[R.HYSTERESIS_FIRST_TRAVEL][j])
         gained = temperature_factor(
-            rows[EFFECTS_AT + S.kelvin][j], fixed[P.muscle_temperature_gain][j]
+            rows[EFFECTS_AT + S.kelvin][j], fixed[R.MUSCLE_TEMPERATURE_GAIN][j]
         )
-        drive[j] = drive[j] * gained * (1.0 - fixed[P.hysteresis_first_loss][j] * new)
+        drive[j] = drive[j] * gained * (1.0 - fixed[R.HYSTERESIS_FIRST_LOSS][j] * new)
 
 
 @kernel
@@ -112,7 +110,7 @@ def settled(
     own = scratch(3, LANES)
     for j in range(first, last):
         own[1][j] = 1e9
-        rows[EFFECTS_AT + S.kelvin][j] = fixed[P.muscle_temperature][j]
+        rows[EFFECTS_AT + S.kelvin][j] = fixed[R.MUSCLE_TEMPERATURE][j]
     effective_pressure(
         rows, fixed, counts, table, hysteresis, first, last, elements, work, own[1], own, 1, 1
     )
@@ -121,37 +119,37 @@ def settled(
 @routine
 def balance(fixed: Any, lane: int, drive: float, load: float, hangs: float) -> float:
     """Return the position [m] at rest of one lane, by bisection."""
-    length = fixed[R.REST_LENGTH][lane]
-    mass = load + (fixed[P.mass_load_error][lane] if load > 0.0 else 0.0)
+    length = fixed[R.MUSCLE_REST_LENGTH][lane]
+    mass = load + (fixed[R.MASS_LOAD_ERROR][lane] if load > 0.0 else 0.0)
     weight = mass * GRAVITY
     stiffer = stiffening(
         weight,
-        fixed[P.muscle_load_stiffening][lane],
-        fixed[P.muscle_load_stiffening_2][lane],
-        fixed[P.muscle_load_stiffening_root][lane],
+        fixed[R.MUSCLE_LOAD_STIFFENING][lane],
+        fixed[R.MUSCLE_LOAD_STIFFENING_2][lane],
+        fixed[R.MUSCLE_LOAD_STIFFENING_ROOT][lane],
     )
-    shifted = drive - fixed[P.muscle_load_curve][lane] * weight * weight
+    shifted = drive - fixed[R.MUSCLE_LOAD_CURVE][lane] * weight * weight
     low, high = -0.3, 0.6
     for _ in range(56):
         e = 0.5 * (low + high)
         pull = tension(
             shifted,
             e,
-            decay(e / fixed[R.BRAID_STRAIN][lane]),
-            fixed[R.AREA][lane],
-            fixed[R.AREA_TAPER][lane],
-            fixed[R.BRAID_FORCE][lane] * stiffer,
-            fixed[R.STIFFNESS][lane] * stiffer,
-            fixed[R.HARDENING][lane] * stiffer,
+            decay(e / fixed[R.MUSCLE_BRAID_STRAIN][lane]),
+            fixed[R.MUSCLE_AREA][lane],
+            fixed[R.MUSCLE_AREA_TAPER][lane],
+            fixed[R.MUSCLE_BRAID_FORCE][lane] * stiffer,
+            fixed[R.MUSCLE_STIFFNESS][lane] * stiffer,
+            fixed[R.MUSCLE_HARDENING][lane] * stiffer,
         ) + fine_tension(
             shifted,
             e,
-            fixed[R.AREA][lane],
-            fixed[P.muscle_area_curve][lane],
-            fixed[P.muscle_softening][lane] * stiffer,
-            fixed[P.muscle_stiffening][lane] * stiffer,
+            fixed[R.MUSCLE_AREA][lane],
+            fixed[R.MUSCLE_AREA_CURVE][lane],
+            fixed[R.MUSCLE_SOFTENING][lane] * stiffer,
+            fixed[R.MUSCLE_STIFFENING][lane] * stiffer,
         )
-        if pull > weight * load_fraction(e * length, hangs, fixed[P.mass_slack][lane]):
+        if pull > weight * load_fraction(e * length, hangs, fixed[R.MASS_SLACK][lane]):
             low = e
         else:
             high = e
@@ -173,12 +171,12 @@ def begin_effects(rows: Any, fixed: Any, j: int) -> None:
     rows[EFFECTS_AT + S.travel][j] = 0.0
     rows[EFFECTS_AT + S.stuck][j] = 1.0
     for k in range(4):
-        rows[EFFECTS_AT + S.strands + k][j] = x / fixed[R.REST_LENGTH][j]
-    rows[EFFECTS_AT + S.kelvin][j] = fixed[P.muscle_temperature][j]
-    begin_creep(rows, fixed, j, EFFECTS_AT + S.stretch, P.muscle_creep_1, x)
+        rows[EFFECTS_AT + S.strands + k][j] = x / fixed[R.MUSCLE_REST_LENGTH][j]
+    rows[EFFECTS_AT + S.kelvin][j] = fixed[R.MUSCLE_TEMPERATURE][j]
+    begin_creep(rows, fixed, j, EFFECTS_AT + S.stretch, R.MUSCLE_CREEP_1, x)
     crept = 0.0
     for k in range(4):
-        crept = crept + fixed[P.muscle_creep_1 + k][j]
+        crept = crept + fixed[R.MUSCLE_CREEP_1 + k][j]
     rows[EFFECTS_AT + S.shown][j] = x * (1.0 + crept)
     rows[EFFECTS_AT + S.mount + MOUNT_STATE.position][j] = x * (1.0 + crept)
     rows[EFFECTS_AT + S.mount + MOUNT_STATE.rate][j] = 0.0
@@ -187,37 +185,35 @@ def begin_effects(rows: Any, fixed: Any, j: int) -> None:
     rows[EFFECTS_AT + S.hangs][j] = balance(fixed, j, 0.0, rows[R.LOAD][j], NO_SUPPORT)
     position = x * (1.0 + crept) - rows[R.REST][j]
     rows[EFFECTS_AT + S.position][j] = position
-    full = FULL_STRAIN * fixed[R.REST_LENGTH][j]
+    full = FULL_STRAIN * fixed[R.MUSCLE_REST_LENGTH][j]
     begin_sensor(
         rows,
         fixed,
         j,
         EFFECTS_AT + S.position_reading,
         EFFECTS_AT + S.position_ring,
-        R.POSITION_SENSOR,
+        R.EFFECT.position,
         position,
         full,
     )
     begin_sensor(
         rows, fixed, j, EFFECTS_AT + S.pressure_reading, EFFECTS_AT + S.pressure_ring,
-        R.PRESSURE_SENSOR, rows[R.PRESSURE][j],
-        fixed[R.MAX_PRESSURE][j],
+        R.EFFECT.pressure, rows[R.PRESSURE][j], fixed[R.REGULATOR_MAX_PRESSURE][j],
     )  # fmt: skip
 
 
 @kernel
 def sense_muscle(rows: Any, fixed: Any, j: int, step: int, period: float) -> None:
     """Write the undisturbed readings of lane ``j`` at a control period."""
-    time, full = step * period, FULL_STRAIN * fixed[R.REST_LENGTH][j]
+    time, full = step * period, FULL_STRAIN * fixed[R.MUSCLE_REST_LENGTH][j]
     sense(
         rows, fixed, j, EFFECTS_AT + S.position_reading, EFFECTS_AT + S.position_ring,
-        R.POSITION_SENSOR, rows[EFFECTS_AT + S.position][j],
-        full, step, time, period,
+        R.EFFECT.position, rows[EFFECTS_AT + S.position][j], full, step, time, period,
     )  # fmt: skip
     sense(
         rows, fixed, j, EFFECTS_AT + S.pressure_reading, EFFECTS_AT + S.pressure_ring,
-        R.PRESSURE_SENSOR, rows[R.PRESSURE][j],
-        fixed[R.MAX_PRESSURE][j], step, time, period,
+        R.EFFECT.pressure, rows[R.PRESSURE][j], fixed[R.REGULATOR_MAX_PRESSURE][j], step, time,
+        period,
     )  # fmt: skip
 
 
@@ -243,8 +239,8 @@ def seen_pressure(rows: Any, j: int) -> float:
 def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) -> None:
     """Write the linearised motion of a tile, the effective pressure going from ``was``.
 
-    Rows 3 to 7 of ``own``: stiffness, push at the predicted middle, jerk and damping, all per unit
-    mass, and one over the mass [1/kg].
+    Rows 3 to 7 of ``own``, per unit mass: stiffness, push at the predicted middle, jerk, damping,
+    and one over the mass [1/kg].
     """
     x, v, drive, load = rows[R.CONTRACTION], rows[R.VELOCITY], rows[R.DRIVE], rows[R.LOAD]
     friction, sticking, strain = own[0], own[1], own[3]
@@ -254,30 +250,30 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) ->
         sticking[j] = 0.0
     if strands > 0:
         for j in range(LANES):
-            strain[j] = (x[j] + 0.5 * h * v[j]) / fixed[R.REST_LENGTH][j]
+            strain[j] = (x[j] + 0.5 * h * v[j]) / fixed[R.MUSCLE_REST_LENGTH][j]
         strand_forces(
-            rows, fixed, EFFECTS_AT + S.strands, P.muscle_strand_1, P.muscle_strand_break, strain,
+            rows, fixed, EFFECTS_AT + S.strands, R.MUSCLE_STRAND_1, R.MUSCLE_STRAND_BREAK, strain,
             friction, sticking,
         )  # fmt: skip
     for j in range(LANES):
-        per_length = 1.0 / fixed[R.REST_LENGTH][j]
-        mass = load[j] + (fixed[P.mass_load_error][j] if load[j] > 0.0 else 0.0)
+        per_length = 1.0 / fixed[R.MUSCLE_REST_LENGTH][j]
+        mass = load[j] + (fixed[R.MASS_LOAD_ERROR][j] if load[j] > 0.0 else 0.0)
         weight = mass * GRAVITY
         stiffer = stiffening(
             weight,
-            fixed[P.muscle_load_stiffening][j],
-            fixed[P.muscle_load_stiffening_2][j],
-            fixed[P.muscle_load_stiffening_root][j],
+            fixed[R.MUSCLE_LOAD_STIFFENING][j],
+            fixed[R.MUSCLE_LOAD_STIFFENING_2][j],
+            fixed[R.MUSCLE_LOAD_STIFFENING_ROOT][j],
         )
-        shift = fixed[P.muscle_load_curve][j] * weight * weight
+        shift = fixed[R.MUSCLE_LOAD_CURVE][j] * weight * weight
         ahead = 0.5 * h * v[j]
         e = (x[j] + ahead) * per_length
-        bend = decay(e / fixed[R.BRAID_STRAIN][j])
-        area, taper = fixed[R.AREA][j], fixed[R.AREA_TAPER][j]
-        force = fixed[R.BRAID_FORCE][j] * stiffer
-        k1, k3 = fixed[R.STIFFNESS][j] * stiffer, fixed[R.HARDENING][j] * stiffer
-        curve, k2 = fixed[P.muscle_area_curve][j], fixed[P.muscle_softening][j] * stiffer
-        k4 = fixed[P.muscle_stiffening][j] * stiffer
+        bend = decay(e / fixed[R.MUSCLE_BRAID_STRAIN][j])
+        area, taper = fixed[R.MUSCLE_AREA][j], fixed[R.MUSCLE_AREA_TAPER][j]
+        force = fixed[R.MUSCLE_BRAID_FORCE][j] * stiffer
+        k1, k3 = fixed[R.MUSCLE_STIFFNESS][j] * stiffer, fixed[R.MUSCLE_HARDENING][j] * stiffer
+        curve, k2 = fixed[R.MUSCLE_AREA_CURVE][j], fixed[R.MUSCLE_SOFTENING][j] * stiffer
+        k4 = fixed[R.MUSCLE_STIFFENING][j] * stiffer
         pull = (
             tension(was[j] - shift, e, bend, area, taper, force, k1, k3)
             + fine_tension(was[j] - shift, e, area, curve, k2, k4)
@@ -290,22 +286,22 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) ->
                 bend,
                 area,
                 taper,
-                force / fixed[R.BRAID_STRAIN][j],
+                force / fixed[R.MUSCLE_BRAID_STRAIN][j],
                 k1,
                 k3,
             )
             + fine_slope(0.5 * (was[j] + drive[j]) - shift, e, area, curve, k2, k4)
             + sticking[j]
         )
-        slack = fixed[P.mass_slack][j]
+        slack = fixed[R.MASS_SLACK][j]
         hangs = load_fraction(x[j] + ahead, rows[EFFECTS_AT + S.hangs][j], slack)
-        eased = weight * fixed[R.REST_LENGTH][j] / max(slack, 1e-6)
+        eased = weight * fixed[R.MUSCLE_REST_LENGTH][j] / max(slack, 1e-6)
         slope = slope + (eased if 0.0 < hangs < 1.0 else 0.0)
-        loss = fixed[R.DAMPING][j] + viscous_damping(
-            fixed[P.muscle_viscosity][j], v[j], fixed[P.muscle_viscosity_speed][j]
+        loss = fixed[R.MASS_DAMPING][j] + viscous_damping(
+            fixed[R.MUSCLE_VISCOSITY][j], v[j], fixed[R.MUSCLE_VISCOSITY_SPEED][j]
         )
         stiff = slope * per_length
-        moved = max(0.0, mass) * fixed[P.mass_carried][j] + fixed[R.MOVING_MASS][j]
+        moved = max(0.0, mass) * fixed[R.MASS_CARRIED][j] + fixed[R.MASS_MOVING_MASS][j]
         # motion that is over within the sub-step is followed as slowly as the series reaches
         per_mass = 1.0 / max(moved, loss * h * FASTEST_DECAY, stiff * h * h * FASTEST_TURN)
         springs[j] = stiff * per_mass
@@ -329,8 +325,8 @@ def move(
         for j in range(LANES):
             dx, v[j], stuck[j] = stick_slip_step(
                 v[j], stuck[j], pushes[j], jerks[j], springs[j], drags[j],
-                fixed[P.mass_stick][j] * lightness[j], fixed[P.mass_stick_kinetic][j],
-                fixed[P.mass_stick_speed][j], h,
+                fixed[R.MASS_STICK][j] * lightness[j], fixed[R.MASS_STICK_KINETIC][j],
+                fixed[R.MASS_STICK_SPEED][j], h,
             )  # fmt: skip
             x[j] = x[j] + dx
     else:
@@ -341,8 +337,8 @@ def move(
             x[j] = x[j] + dx
     if strands > 0:
         for j in range(LANES):
-            width[j] = x[j] / fixed[R.REST_LENGTH][j]
-        slip_strands(rows, fixed, EFFECTS_AT + S.strands, P.muscle_strand_break, width)
+            width[j] = x[j] / fixed[R.MUSCLE_REST_LENGTH][j]
+        slip_strands(rows, fixed, EFFECTS_AT + S.strands, R.MUSCLE_STRAND_BREAK, width)
     shown = rows[EFFECTS_AT + S.shown]
     for j in range(LANES):
         before[j] = shown[j]
@@ -350,17 +346,16 @@ def move(
         width[j] = h
     if stretches > 0:
         creep_step(
-            rows, fixed, EFFECTS_AT + S.stretch, P.muscle_creep_1, P.hysteresis_creep_time_1, 0,
-            LANES,
-            x, width, shown,
+            rows, fixed, EFFECTS_AT + S.stretch, R.MUSCLE_CREEP_1, R.HYSTERESIS_CREEP_TIME_1, 0,
+            LANES, x, width, shown,
         )  # fmt: skip
     for j in range(LANES):
         rows[EFFECTS_AT + S.position][j] = shown[j] - rows[R.REST][j]
     if mounts > 0:
         for j in range(LANES):
             position = mount_step(
-                rows, j, EFFECTS_AT + S.mount, before[j], shown[j], fixed[P.mass_ring_share][j],
-                fixed[P.mass_ring_frequency][j], fixed[P.mass_ring_damping][j], h,
+                rows, j, EFFECTS_AT + S.mount, before[j], shown[j], fixed[R.MASS_RING_SHARE][j],
+                fixed[R.MASS_RING_FREQUENCY][j], fixed[R.MASS_RING_DAMPING][j], h,
             )  # fmt: skip
             rows[EFFECTS_AT + S.position][j] = position - rows[R.REST][j]
 
@@ -376,27 +371,30 @@ def advance_extended(
     older, newer, switch, was, width = work[3], work[4], work[5], work[6], work[7]
     late = work[8]
     own = scratch(8, LANES)
-    creeps = creeps_on(fixed, P.hysteresis_creep_1)
-    stretches = creeps_on(fixed, P.muscle_creep_1)
-    lines, valve = line_effects_on(fixed, R.REGULATOR), valve_effects_on(fixed, R.REGULATOR)
-    mounts = count_on(fixed[P.mass_ring_share], 0.0)
-    worn = (
-        count_on(fixed[P.hysteresis_shape], 1.0)
-        + count_on(fixed[P.hysteresis_pressure_slope], 0.0)
-        + count_on(fixed[P.hysteresis_pressure_bend], 0.0)
-        + count_on(fixed[P.hysteresis_first_width], 0.0)
-        + count_on(fixed[P.hysteresis_first_loss], 0.0)
-        + count_on(fixed[P.muscle_temperature_gain], 0.0)
+    creeps = creeps_on(fixed, R.HYSTERESIS_CREEP_1)
+    stretches = creeps_on(fixed, R.MUSCLE_CREEP_1)
+    lines, valve = (
+        line_effects_on(fixed, R.EFFECT.regulator),
+        valve_effects_on(fixed, R.EFFECT.regulator),
     )
-    strands, sticks = strands_on(fixed, P.muscle_strand_1), count_on(fixed[P.mass_stick], 0.0)
-    fine = sticks + count_on(fixed[P.muscle_viscosity], 0.0)
+    mounts = count_on(fixed[R.MASS_RING_SHARE], 0.0)
+    worn = (
+        count_on(fixed[R.HYSTERESIS_SHAPE], 1.0)
+        + count_on(fixed[R.HYSTERESIS_PRESSURE_SLOPE], 0.0)
+        + count_on(fixed[R.HYSTERESIS_PRESSURE_BEND], 0.0)
+        + count_on(fixed[R.HYSTERESIS_FIRST_WIDTH], 0.0)
+        + count_on(fixed[R.HYSTERESIS_FIRST_LOSS], 0.0)
+        + count_on(fixed[R.MUSCLE_TEMPERATURE_GAIN], 0.0)
+    )
+    strands, sticks = strands_on(fixed, R.MUSCLE_STRAND_1), count_on(fixed[R.MASS_STICK], 0.0)
+    fine = sticks + count_on(fixed[R.MUSCLE_VISCOSITY], 0.0)
     for j in range(LANES):
         if load[j] != rows[EFFECTS_AT + S.hung][j]:
             rows[EFFECTS_AT + S.hung][j] = load[j]
             rows[EFFECTS_AT + S.hangs][j] = balance(fixed, j, 0.0, load[j], NO_SUPPORT)
     delay_commands(
-        rows, R.HISTORY, rows[R.SET_POINT], fixed[R.DEAD_TIME], counts[R.STEP], period, older,
-        newer, switch,
+        rows, R.HISTORY, rows[R.SET_POINT], fixed[R.REGULATOR_DEAD_TIME], counts[R.STEP], period,
+        older, newer, switch,
     )  # fmt: skip
     for i in range(substeps):
         for j in range(LANES):
@@ -410,10 +408,10 @@ def advance_extended(
             if busy == 0:
                 continue
             air_step(
-                rows, fixed, EFFECTS_AT + S.air, R.REGULATOR, rows[R.PRESSURE],
-                fixed[R.MAX_PRESSURE],
-                fixed[R.TIME_CONSTANT], fixed[R.SLEW_RATE], newer if stage == 1 else older, width,
-                own, valve, lines,
+                rows, fixed, EFFECTS_AT + S.air, R.EFFECT.regulator, rows[R.PRESSURE],
+                fixed[R.REGULATOR_MAX_PRESSURE], fixed[R.REGULATOR_TIME_CONSTANT],
+                fixed[R.REGULATOR_SLEW_RATE], newer if stage == 1 else older, width, own, valve,
+                lines,
             )  # fmt: skip
             for j in range(LANES):
                 rows[EFFECTS_AT + S.travel][j] += abs(rows[R.PRESSURE][j] - own[1][j])
@@ -435,10 +433,7 @@ def advance_extended(
 
 
 def replacements(kind: str, first: int) -> dict[str, Any]:
-    """Return the kernels of the extended plant for the placeholders of the plain one's.
-
-    ``first`` is the row after the hysteresis state.
-    """
+    """Return the kernels of the extended plant; ``first`` is the row after the hysteresis state."""
     return {
         "EFFECTS_AT": first,
         **hysteresis_kernels(kind, "plain_hysteresis"),

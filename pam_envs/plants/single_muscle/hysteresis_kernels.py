@@ -7,17 +7,7 @@ from typing import Any
 
 from pam_envs.hysteresis import protocol
 from pam_envs.kernels.build import kernel
-from pam_envs.plants.single_muscle.rows import (
-    DRIVE,
-    LOAD,
-    MAX_PRESSURE,
-    MEMBER,
-    MODEL,
-    PRESSURE,
-    STACK_COUNT,
-    STRETCH,
-    WIDTH_PER_LOAD,
-)
+from pam_envs.plants.single_muscle import rows as R
 
 hysteresis_step: Any = None  # a placeholder
 
@@ -51,7 +41,7 @@ def pressure_itself(
     elements: int, work: Any,
 ) -> None:  # fmt: skip
     """Write the pressure as effective pressure."""
-    pressure, drive = rows[PRESSURE], rows[DRIVE]
+    pressure, drive = rows[R.PRESSURE], rows[R.DRIVE]
     for j in range(first, last):
         drive[j] = pressure[j]
 
@@ -63,20 +53,19 @@ def effective_pressure(
 ) -> None:  # fmt: skip
     """Write the effective pressure by a hysteresis model on the stretched scale."""
     pressure, drive, stretch, full = (
-        rows[PRESSURE],
-        rows[DRIVE],
-        fixed[STRETCH],
-        fixed[MAX_PRESSURE],
+        rows[R.PRESSURE],
+        rows[R.DRIVE],
+        fixed[R.HYSTERESIS_STRETCH],
+        fixed[R.REGULATOR_MAX_PRESSURE],
     )
-    load, per_load = rows[LOAD], fixed[WIDTH_PER_LOAD]
+    load, per_load = rows[R.LOAD], fixed[R.HYSTERESIS_WIDTH_PER_LOAD]
     inputs, output, per_full = work[0], work[1], work[2]
     for j in range(first, last):
         per_full[j] = 1.0 / full[j]
         inputs[j] = stretched(pressure[j], stretch[j], per_full[j])
     hysteresis_step(
-        inputs, output, rows, fixed, counts, table, elements, hysteresis, MODEL, STACK_COUNT,
-        MEMBER,
-        first, last,
+        inputs, output, rows, fixed, counts, table, elements, hysteresis, R.MODEL, R.STACK_COUNT,
+        R.MEMBER, first, last,
     )  # fmt: skip
     for j in range(first, last):
         friction = inputs[j] - output[j]

@@ -4,21 +4,13 @@
     mass
 
 The measured quantity is the contraction from the rest length under the load that hangs at the
-start, as in the paper's tables.
-
-Effects (off unless set): of the regulator, static gain, dead band, spool overlap, rounded slew
-limit, slow and choked exhaust, leak, limited and drooping supply, resonance of the line; of the
-hysteresis, shape and pressure dependence of the friction, threshold, first cycles, creep; of the
-muscle, finer terms of the static law, temperature, dependence on the load, creep of the length,
-friction of the strands, viscosity; of the mass, load error, support, guide and mount; delay,
-drift, ramp, bow and slip of the sensors. The parameters with a neutral value in
-``SingleMuscle.neutral`` switch them on.
+start, as in the paper's tables. Effects (off unless set) of all components; the parameters with a
+neutral value in ``SingleMuscle.neutral`` switch them on.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -28,43 +20,28 @@ from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.constants import GRAVITY
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
-from pam_envs.hysteresis.protocol import NUMBERS, Usage, model_of, preset
-from pam_envs.kernels.motion import LARGEST_PHASE
+from pam_envs.hysteresis.protocol import Usage, model_of, preset
 from pam_envs.mechanics.hanging_mass import HangingMass
 from pam_envs.muscle.effective_area import EffectiveAreaMuscle
-from pam_envs.plants.core.plant import Plant, effects_of, neutral_of
+from pam_envs.plants.core.plant import Plant
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.hysteresis import Hysteresis
 from pam_envs.pneumatics.regulator import Regulator
 from pam_envs.sensing.sensor import PositionSensor, PressureSensor
 
-PARTS: dict[str, type] = {
-    "regulator": Regulator,
-    "hysteresis": Hysteresis,
-    "muscle": EffectiveAreaMuscle,
-    "mass": HangingMass,
-    "position": PositionSensor,
-    "pressure": PressureSensor,
-}
 CREEP = (
     *(f"{part}.creep_{k}" for part in ("hysteresis", "muscle") for k in (1, 2, 3, 4)),
     *(f"hysteresis.creep_time_{k}" for k in (1, 2, 3, 4)),
 )
 """Creep of pressure and length has the same time constants."""
-NEUTRAL = neutral_of(PARTS, R.EFFECTS)
-"""Values at which effects are off."""
 
 LEVELS = 49
 """Levels of a map that resembles the identified hysteresis."""
 FOLDER = Path(__file__).resolve().parents[2] / "data"
 
 
-class UnstableParameters(ValueError):
-    """Parameters whose motion the sub-steps cannot follow."""
-
-
 @dataclass(frozen=True)
-class SingleMuscle(Plant):
+class SingleMuscle(Plant, rows=R):
     """The plant; an extended one is ``dataclasses.replace`` of it.
 
     Attributes
@@ -74,10 +51,7 @@ class SingleMuscle(Plant):
     """
 
     family: ClassVar[str] = "single_muscle"
-    components: ClassVar[tuple[str, ...]] = tuple(PARTS)
-    names: ClassVar[tuple[str, ...]] = R.NAMES
-    effects: ClassVar[tuple[tuple[str, ...], ...]] = (*effects_of(PARTS), CREEP)
-    neutral: ClassVar[Mapping[str, float]] = NEUTRAL
+    shared_effects: ClassVar[tuple[tuple[str, ...], ...]] = (CREEP,)
 
     regulator: Regulator = field(default_factory=Regulator)
     hysteresis: Hysteresis = field(default_factory=Hysteresis)
@@ -93,8 +67,8 @@ class SingleMuscle(Plant):
         self._check_motion()
 
     def _check_motion(self) -> None:
-        """Refuse a motion that the sub-steps cannot follow (see ``kernels.motion``)."""
-        m, law, h = self.mass, self.muscle, self.control_period / self.substeps
+        """Refuse a motion that the sub-steps cannot follow."""
+        m, law = self.mass, self.muscle
         strains = np.linspace(-0.02, 0.2, 45)
         slope = (
             law.area * law.area_taper * self.regulator.max_pressure
@@ -102,17 +76,13 @@ class SingleMuscle(Plant):
             + law.stiffness
             + 3.0 * law.hardening * strains**2
         )
-        k = float(slope.max()) / law.rest_length / m.moving_mass
-        half = 0.5 * m.damping / m.moving_mass
-        phase = max(k, half * half) * h * h
-        if phase > LARGEST_PHASE:
-            enough = math.ceil(self.substeps * math.sqrt(phase / LARGEST_PHASE))
-            raise UnstableParameters(
-                f"moving_mass = {m.moving_mass:g} kg with damping = {m.damping:g} N s/m and a "
-                f"stiffness of {k * m.moving_mass:.0f} N/m moves too fast for {self.substeps} "
-                f"sub-steps: phase {phase:.1f} against at most {LARGEST_PHASE:g}; use at least "
-                f"{enough} sub-steps or a larger moving_mass"
-            )
+        k = float(slope.max()) / law.rest_length
+        self.check_phase(
+            k / m.moving_mass,
+            m.damping / m.moving_mass,
+            f"moving_mass = {m.moving_mass:g} kg with damping = {m.damping:g} N s/m and a "
+            f"stiffness of {k:.0f} N/m",
+        )
 
     @classmethod
     def mas10(cls, hysteresis: str = "maxwell_slip", **changes: float) -> SingleMuscle:
@@ -133,7 +103,7 @@ class SingleMuscle(Plant):
             full = plant.regulator.max_pressure
             made = preset(kind, plant._model, -full, full, LEVELS, "virgin")
             plant = plant.replace({"hysteresis.operator": made})
-        return plant.replace({k.replace("__", "."): v for k, v in changes.items()})
+        return plant.changed(changes)
 
     # --- the static law and its inverse -----------------------------------------------------
 
@@ -183,20 +153,8 @@ class SingleMuscle(Plant):
 
     # --- rows, files, identity ----------------------------------------------------------------
 
-    def parameter_rows(self) -> NDArray[np.float64]:
-        """Return the parameters as the column that the kernels read, shape (n_parameters,)."""
-        column = np.zeros(R.N_PARAMETERS)
-        for name in R.NAMES:
-            column[R.place(name)] = self.value(name)
-        column[R.TALL] = (
-            math.pi * self.muscle.diameter**2 / 4.0 / math.sin(self.muscle.braid_angle) ** 2
-        )
-        column[R.COSINE] = math.cos(self.muscle.braid_angle)
-        numbers = self._model.numbers(self.regulator.max_pressure)
-        column[R.MODEL : R.MODEL + NUMBERS] = numbers
-        return column
-
-    @property
-    def extended(self) -> bool:
-        """True if an effect is on that a plain plant has not."""
-        return any(self.value(name) != neutral for name, neutral in NEUTRAL.items())
+    def table_values(self) -> list[float]:
+        """Return area and cosine of the braid, and the numbers of the hysteresis operator."""
+        angle = self.muscle.braid_angle
+        tall = math.pi * self.muscle.diameter**2 / 4.0 / math.sin(angle) ** 2
+        return [tall, math.cos(angle), *self._model.numbers(self.regulator.max_pressure)]

@@ -1,8 +1,8 @@
 """Replay of a recording by the single muscle, many parameter sets side by side.
 
-Unlike a rollout the step is the sampling period of the recording, load and temperature change with
-time, the valve may be shut, the muscle may begin anew, and the outputs are the readings of the
-sensors at the beginning of each period.
+The step is the sampling period of the recording, load and temperature change with time, the valve
+may be shut, the muscle may begin anew, and the outputs are the readings of the sensors at the
+beginning of each period.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pam_envs.plants.core.rollout import BEGIN, REZERO, run
 from pam_envs.plants.core.tiles import drives_of
 from pam_envs.plants.single_muscle import rows as R
-from pam_envs.plants.single_muscle.plant import NEUTRAL, SingleMuscle
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 from pam_envs.plants.single_muscle.rollout import loop_of
 
 CHANNELS = ("contraction", "pressure")
@@ -104,22 +104,16 @@ COSTLY = (
 @lru_cache(maxsize=1)
 def _places() -> list[tuple[list[int], Array]]:
     return [
-        ([R.place(n) for n in names], np.array([NEUTRAL.get(n, 0.0) for n in names]))
+        ([R.place(n) for n in names], np.array([SingleMuscle.neutral.get(n, 0.0) for n in names]))
         for names in COSTLY
     ]
 
 
 def replay_rows(plant: SingleMuscle, columns: Array, inputs: Inputs) -> Array:
-    """Replay a recording with many parameter sets of one kind of plant.
+    """Replay a recording of T samples with many parameter sets of one kind of plant.
 
-    Parameters
-    ----------
-    plant : SingleMuscle
-        Gives the hysteresis kind and Everett map.
-    columns : array, shape (n, n_parameters)
-        As :meth:`SingleMuscle.parameter_rows` lays them out.
-    inputs : Inputs
-        T samples.
+    ``columns``, shape (n, n_parameters), are as of :meth:`SingleMuscle.parameter_rows`; the plant
+    gives hysteresis kind and Everett map.
 
     Returns
     -------
@@ -139,10 +133,10 @@ def replay_rows(plant: SingleMuscle, columns: Array, inputs: Inputs) -> Array:
 
 
 def alike(columns: Array) -> list[NDArray[np.int64]]:
-    """Return groups of columns to replay together, and in which order.
+    """Return groups of columns to replay together, in order.
 
     A tile does for all its lanes what one of them needs: those with the same effects go side by
-    side, and what takes finer steps goes by itself.
+    side, and those with finer steps are a group of their own.
     """
     active = np.array([(columns[:, at] != off).any(axis=1) for at, off in _places()])
     order = np.lexsort(active[:-1])

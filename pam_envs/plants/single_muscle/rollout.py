@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,7 +14,7 @@ from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.build import LANES, kernel
 from pam_envs.kernels.history import N_HISTORY
 from pam_envs.kernels.motion import oscillator_wide
-from pam_envs.plants.core.rollout import Loop, biased_output, run
+from pam_envs.plants.core.rollout import Loop, loop_for, run
 from pam_envs.plants.core.tiles import drives_of
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.effects import (
@@ -95,15 +97,6 @@ def rezero(rows: Any, fixed: Any) -> None:
 
 
 @kernel
-def advance_muscle(
-    rows: Any, fixed: Any, counts: Any, table: Any, extra: Any, elements: int, substeps: int,
-    period: float, work: Any,
-) -> None:  # fmt: skip
-    """Advance a tile by one control period."""
-    advance(rows, fixed, counts, table, R.END, elements, substeps, period, work)
-
-
-@kernel
 def output(rows: Any, fixed: Any, k: int, j: int) -> float:
     """Return an output of lane ``j``: the contraction, or a row of the state."""
     return true_position(rows, j) if k == 0 else rows[OUTPUT_ROWS[k]][j]  # type: ignore[no-any-return]
@@ -120,55 +113,44 @@ def channels_of(plant: SingleMuscle) -> dict[str, float]:
 
 
 def readings_of(plant: SingleMuscle) -> dict[str, tuple[int, int]]:
-    """Return the sensors by name, each with its place among the readings and its bias' row."""
-    return {"contraction": (0, R.POSITION_BIAS), "pressure": (1, R.PRESSURE_BIAS)}
+    """Return row and bias of each sensor's reading, by name."""
+    return {
+        "contraction": (R.STATE.position_reading, R.POSITION_BIAS),
+        "pressure": (R.STATE.pressure_reading, R.PRESSURE_BIAS),
+    }
+
+
+def _replacements(kind: str, effects: int | None) -> dict[str, Any]:
+    kernels = hysteresis_kernels(kind) | {"plant_output": output}
+    if effects is None:
+        return kernels
+    extended = {
+        "plant_drive": drive_extended,
+        "plant_begin": begin_extended,
+        "plant_rezero": rezero,
+    }
+    return kernels | replacements(kind, effects) | extended
 
 
 def loop_of(plant: SingleMuscle, extended: bool, readings: bool = False) -> Loop:
     """Return the loop of muscles with a hysteresis.
 
-    Parameters
-    ----------
-    plant : SingleMuscle
-    extended : bool
-        Whether its effects are needed.
-    readings : bool
-        Whether readings of both sensors and the true contraction [m] come out, in long steps.
+    ``readings``: the readings of both sensors and the true contraction [m] come out, in long steps.
     """
     kind = plant.hysteresis.kind
-    effects = R.END + state_rows(kind)
-    kernels = hysteresis_kernels(kind) | {
-        "plant_drive": drive,
-        "plant_begin": begin,
-        "plant_advance": advance_muscle,
-        "plant_output": output,
-    }
-    outputs: tuple[int, ...] = (R.CONTRACTION, R.VELOCITY, R.PRESSURE, R.DRIVE)
-    if extended:
-        kernels |= replacements(kind, effects) | {
-            "plant_drive": drive_extended,
-            "plant_begin": begin_extended,
-            "plant_rezero": rezero,
-        }
-    if readings:
-        kernels |= {
-            "oscillator": oscillator_wide,
-            "plant_output": biased_output,
-            "BIAS_ROWS": (R.POSITION_BIAS, R.PRESSURE_BIAS),
-        }
-        state = R.STATE
-        read = (state.position_reading, state.pressure_reading, state.position)
-        outputs = tuple(effects + row for row in read)
-    what = ("_extended" if extended else "") + ("_readings" if readings else "")
-    return Loop(
-        f"muscle_{kind}{what}",
-        kernels,
-        outputs,
-        rows=effects + (R.N_EFFECTS if extended else 0),
-        parameters=R.N_PARAMETERS,
-        counts=R.N_COUNTS,
-        work=N_WORK,
-        extra=np.zeros((1, 1)),
+    kernels = {"plant_drive": drive, "plant_begin": begin, "advance": advance}
+    loop = loop_for(
+        f"muscle_{kind}", plant, R, kernels, partial(_replacements, kind),
+        [R.CONTRACTION, R.VELOCITY, R.PRESSURE, R.DRIVE], N_WORK, extended=extended,
+        readings=readings_of(plant) if readings else None,
+    )  # fmt: skip
+    if not readings:
+        return loop
+    position = R.END + state_rows(kind) + R.STATE.position
+    return dataclasses.replace(
+        loop,
+        kernels=dict(loop.kernels) | {"oscillator": oscillator_wide},
+        outputs=(*loop.outputs, position),
     )
 
 
@@ -182,7 +164,7 @@ def simulate_rows(
     plant : SingleMuscle
         Gives the hysteresis kind, the Everett map and the sub-steps.
     parameters : array, shape (n, n_parameters)
-        Columns as :meth:`SingleMuscle.parameter_rows` lays them out.
+        Columns as of :meth:`SingleMuscle.parameter_rows`.
     set_points : array_like, shape (T,) or (T, n)
         Set-points [Pa], one a control period.
 
@@ -193,7 +175,7 @@ def simulate_rows(
         each control period, free of noise.
     """
     columns = np.asarray(parameters, np.float64)
-    loads, kelvin = columns[:, R.NOMINAL_LOAD], columns[:, R.place("muscle.temperature")]
+    loads, kelvin = columns[:, R.MASS_LOAD], columns[:, R.place("muscle.temperature")]
     commands = np.asarray(set_points, np.float64)
     drives = drives_of([commands, loads[None], kelvin[None], 0.0, 0.0])
     extended = plant.extended or bool(np.any(effects_on(columns)))

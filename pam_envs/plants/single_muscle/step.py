@@ -18,28 +18,6 @@ from pam_envs.kernels.history import N_HISTORY
 from pam_envs.kernels.motion import damped_motion
 from pam_envs.muscle.effective_area import tension, tension_slope
 from pam_envs.plants.single_muscle import rows as R
-from pam_envs.plants.single_muscle.rows import (
-    AREA,
-    AREA_TAPER,
-    BRAID_FORCE,
-    BRAID_STRAIN,
-    CONTRACTION,
-    DAMPING,
-    DEAD_TIME,
-    DRIVE,
-    HARDENING,
-    HISTORY,
-    LOAD,
-    MOVING_MASS,
-    PRESSURE,
-    REST_LENGTH,
-    SET_POINT,
-    SLEW_RATE,
-    STEP,
-    STIFFNESS,
-    TIME_CONSTANT,
-    VELOCITY,
-)
 from pam_envs.pneumatics.regulator import DELAY_PERIODS, delayed_fraction, regulator_step
 
 remember: Any = None  # a placeholder, see hysteresis_kernels
@@ -59,16 +37,26 @@ def advance(
 ) -> None:
     """Advance a tile by control period ``counts[STEP]``, towards its set-points."""
     h = period / substeps
-    x, v, pressure, drive = rows[CONTRACTION], rows[VELOCITY], rows[PRESSURE], rows[DRIVE]
-    load, moving, damping, dead = rows[LOAD], fixed[MOVING_MASS], fixed[DAMPING], fixed[DEAD_TIME]
-    lag, slew, length, area = (
-        fixed[TIME_CONSTANT],
-        fixed[SLEW_RATE],
-        fixed[REST_LENGTH],
-        fixed[AREA],
+    x, v, pressure, drive = rows[R.CONTRACTION], rows[R.VELOCITY], rows[R.PRESSURE], rows[R.DRIVE]
+    load, moving, damping, dead = (
+        rows[R.LOAD],
+        fixed[R.MASS_MOVING_MASS],
+        fixed[R.MASS_DAMPING],
+        fixed[R.REGULATOR_DEAD_TIME],
     )
-    taper, force, k1, k3 = fixed[AREA_TAPER], fixed[BRAID_FORCE], fixed[STIFFNESS], fixed[HARDENING]
-    braid_strain, set_point, step = fixed[BRAID_STRAIN], rows[SET_POINT], counts[STEP]
+    lag, slew, length, area = (
+        fixed[R.REGULATOR_TIME_CONSTANT],
+        fixed[R.REGULATOR_SLEW_RATE],
+        fixed[R.MUSCLE_REST_LENGTH],
+        fixed[R.MUSCLE_AREA],
+    )
+    taper, force, k1, k3 = (
+        fixed[R.MUSCLE_AREA_TAPER],
+        fixed[R.MUSCLE_BRAID_FORCE],
+        fixed[R.MUSCLE_STIFFNESS],
+        fixed[R.MUSCLE_HARDENING],
+    )
+    braid_strain, set_point, step = fixed[R.MUSCLE_BRAID_STRAIN], rows[R.SET_POINT], counts[R.STEP]
     older, newer, switch, was, damped = work[3], work[4], work[5], work[6], work[7]
     per_lag, per_slew, per_mass, per_length = work[8], work[9], work[10], work[11]
     per_strain, per_jerk, drag, late, width = work[12], work[13], work[14], work[15], work[16]
@@ -77,9 +65,9 @@ def advance(
         whole = min(int(age), DELAY_PERIODS)
         switch[j] = (age - whole) * period
         now = step[j]
-        rows[HISTORY + (now & (N_HISTORY - 1))][j] = set_point[j]
-        newer[j] = rows[HISTORY + ((now + N_HISTORY - whole) & (N_HISTORY - 1))][j]
-        older[j] = rows[HISTORY + ((now + N_HISTORY - whole - 1) & (N_HISTORY - 1))][j]
+        rows[R.HISTORY + (now & (N_HISTORY - 1))][j] = set_point[j]
+        newer[j] = rows[R.HISTORY + ((now + N_HISTORY - whole) & (N_HISTORY - 1))][j]
+        older[j] = rows[R.HISTORY + ((now + N_HISTORY - whole - 1) & (N_HISTORY - 1))][j]
     for j in range(LANES):
         per_lag[j] = 1.0 / lag[j]
         per_slew[j] = 1.0 / slew[j]
@@ -132,19 +120,19 @@ def advance(
 @kernel
 def true_position(rows: Any, j: int) -> float:
     """Return where the load of lane ``j`` is [m], from its rest position."""
-    return rows[CONTRACTION][j] - rows[R.REST][j]  # type: ignore[no-any-return]
+    return rows[R.CONTRACTION][j] - rows[R.REST][j]  # type: ignore[no-any-return]
 
 
 @kernel
 def seen_position(rows: Any, j: int) -> float:
     """Return what the position sensor measures [m], before its bias, noise and steps."""
-    return rows[CONTRACTION][j] - rows[R.REST][j]  # type: ignore[no-any-return]
+    return rows[R.CONTRACTION][j] - rows[R.REST][j]  # type: ignore[no-any-return]
 
 
 @kernel
 def seen_pressure(rows: Any, j: int) -> float:
     """Return what the pressure sensor measures [Pa], before its bias, noise and steps."""
-    return rows[PRESSURE][j]  # type: ignore[no-any-return]
+    return rows[R.PRESSURE][j]  # type: ignore[no-any-return]
 
 
 @kernel
@@ -159,19 +147,19 @@ N_WORK = 17
 @routine
 def rest_contraction(fixed: Any, lane: int, drive: float, load: float) -> float:
     """Return the contraction [m] at rest, by bisection to the last bit that matters."""
-    length = fixed[REST_LENGTH][lane]
+    length = fixed[R.MUSCLE_REST_LENGTH][lane]
     low, high = -0.3, 0.6
     for _ in range(56):
         e = 0.5 * (low + high)
         pull = tension(
             drive,
             e,
-            decay(e / fixed[BRAID_STRAIN][lane]),
-            fixed[AREA][lane],
-            fixed[AREA_TAPER][lane],
-            fixed[BRAID_FORCE][lane],
-            fixed[STIFFNESS][lane],
-            fixed[HARDENING][lane],
+            decay(e / fixed[R.MUSCLE_BRAID_STRAIN][lane]),
+            fixed[R.MUSCLE_AREA][lane],
+            fixed[R.MUSCLE_AREA_TAPER][lane],
+            fixed[R.MUSCLE_BRAID_FORCE][lane],
+            fixed[R.MUSCLE_STIFFNESS][lane],
+            fixed[R.MUSCLE_HARDENING][lane],
         )
         if pull > load * GRAVITY:
             low = e

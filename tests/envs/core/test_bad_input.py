@@ -11,7 +11,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from pam_envs.plants.single_muscle.plant import SingleMuscle, UnstableParameters
+from pam_envs.plants.core.plant import UnstableParameters
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 from tests.envs.cases import IDS
 
 EVERY = pytest.mark.parametrize("name", IDS)
