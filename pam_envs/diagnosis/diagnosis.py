@@ -50,7 +50,8 @@ from pam_envs.diagnosis.report.report import plain
 from pam_envs.diagnosis.report.summary import report_of
 from pam_envs.diagnosis.report.summary_causes import judged
 from pam_envs.diagnosis.report.traces import Traces
-from pam_envs.plants.single_muscle.plant import SingleMuscle, UnstableParameters
+from pam_envs.plants.core.plant import UnstableParameters
+from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 UNDECLARED, BELIEVED = 1.15, 1.5
 """Noise over the estimate from repeats or holds: without a declaration, and the largest declared

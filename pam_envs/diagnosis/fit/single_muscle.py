@@ -46,7 +46,7 @@ PLAIN_NEUTRAL = {
 }
 """Effects of the plain step, which ``SingleMuscle.neutral`` does not list."""
 SWITCHED_OFF = {
-    k: v for k, v in (SingleMuscle.neutral | PLAIN_NEUTRAL).items() if k != "mass.carried"
+    k: v for k, v in {**SingleMuscle.neutral, **PLAIN_NEUTRAL}.items() if k != "mass.carried"
 }
 """Neutral values of all effects; the rig declares the other parameter."""
 
