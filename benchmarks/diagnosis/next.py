@@ -75,9 +75,9 @@ def _joined(first: hidden.Campaign, second: hidden.Campaign) -> hidden.Campaign:
 
 def _sooner(effect: hidden.Effect, share: float) -> hidden.Effect:
     """Keep the moment of what happens at a share of the run, where the run gets longer."""
-    if "when" not in effect.shape:
+    if "slip_time" not in effect.shape:
         return effect
-    return replace(effect, shape={**effect.shape, "when": share * effect.shape["when"]})
+    return replace(effect, shape={**effect.shape, "slip_time": share * effect.shape["slip_time"]})
 
 
 # --- controllers on the rig ---------------------------------------------------------------------

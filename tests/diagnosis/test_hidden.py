@@ -231,7 +231,7 @@ def test_muscle_at_rest_moves_only_with_load_changes():
 
 def test_decoys_are_outside_the_usual_range():
     rng = np.random.default_rng(0)
-    for base in [hidden.decoys(rng) for _ in range(20)]:
+    for base in [hidden.draw_base(rng, decoy=True) for _ in range(20)]:
         assert not 0.035 <= base.lag <= 0.12
         assert not 0.97 <= base.gain <= 1.03
         assert not 0.15 <= base.mass <= 0.5

@@ -137,7 +137,7 @@ def test_reservoir_refill_rate_over_deficit_increases():
 
 @pytest.mark.parametrize("iron", [0.0, 1.0])
 def test_soft_minimum_cannot_imitate_the_coil(iron):
-    p, _ = _rig(_effect("slew_limit", iron=iron), 3.0)
+    p, _ = _rig(_effect("slew_limit", slew_kind=iron), 3.0)
     errors = np.linspace(-5.0, 5.0, 201)
     bent = np.array([driven(p, error) for error in errors])
 
@@ -224,7 +224,7 @@ def test_bracket_and_foot_resonate_in_two_modes():
 
 
 def test_tray_and_scale_errors_increase_with_load():
-    p, s = _rig(_effect("payload_error", scale=0.2), 3.0)
+    p, s = _rig(_effect("payload_error", tray_scale=0.2), 3.0)
 
     def more(told: float) -> float:
         hang(p, s, told)

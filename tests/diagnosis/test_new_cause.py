@@ -29,9 +29,9 @@ CAUSE = Cause(
 HIDDEN = '''
 """A silencer through which less air escapes at low absolute pressure."""
 
-from tests.diagnosis.hidden.effect import Kind, put
+from tests.diagnosis.hidden.effect import Kind
 
-KIND = Kind(lambda rng: {}, lambda record, strength, shape: put(record, exhaust=strength), 0.08)
+KIND = Kind("exhaust", 0.08)
 '''
 RIVALS = ("creep", "dead_time", "sensor_bias", "slew_limit", "temperature")
 

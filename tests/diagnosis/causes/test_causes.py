@@ -12,7 +12,6 @@ from pam_envs.data.rig_file import Rig
 from pam_envs.diagnosis import causes as package
 from pam_envs.diagnosis.cause import NEEDS
 from pam_envs.diagnosis.causes import by_name, catalogue, selected
-from pam_envs.diagnosis.closed_loop.gain import COMPENSABLE
 from pam_envs.diagnosis.fit.candidate import frees_for
 from pam_envs.diagnosis.fit.single_muscle import BASE, MuscleFamily, declared, start_plant
 from pam_envs.plants.single_muscle import rows as R
@@ -30,7 +29,7 @@ FILES = [p for p in Path(package.__file__).parent.rglob("*.py") if p.name != "__
 PLANT = start_plant(Rig(rest_length=0.2))
 PERIOD = 0.02
 EARLY = {"position.slip_at": 8.0, "position.ramp_at": 8.0, "pressure.ramp_at": 8.0}
-"""Moments [s] within the short campaign, for those that are looked for in a recording."""
+"""Times [s] within the short campaign, for those that are searched in a recording."""
 FORMS = [
     pytest.param(cause, form, id=f"{cause.name}-{form.name}")
     for cause in CATALOGUE
@@ -78,13 +77,13 @@ def plain():
 
 
 def started(form, **amounts):
-    """Return the values at which the last of a form's fits begins."""
+    """Return the starting values of a form's last fit."""
     values = {t.name: EARLY.get(t.name, t.starts[-1]) for t in form.terms}
     return {**values, **amounts}
 
 
 def neutral(form):
-    """Return what switches a form off; what only shapes it stays on."""
+    """Return the values that switch a form off; parameters that only shape it are kept."""
     return {t.name: declared(PLANT, t.name).neutral for t in form.terms if t.amount}
 
 
@@ -125,12 +124,6 @@ def test_causes_are_selected_by_name_or_value():
         selected([3])
 
 
-def test_compensable_causes_are_declared():
-    assert tuple(c.name for c in CATALOGUE if c.compensable) == COMPENSABLE
-    assert not by_name("slip_step").compensable
-    assert by_name("payload_error").compensable
-
-
 def test_causes_upstream_of_the_pressure():
     assert {c.name for c in CATALOGUE if c.in_valve} == {
         "leak",
@@ -144,11 +137,9 @@ def test_causes_upstream_of_the_pressure():
 
 @pytest.mark.parametrize("cause", CATALOGUE, ids=NAMES)
 def test_cause_is_documented(cause):
-    for text in (cause.signature, cause.experiment, cause.source, cause.sensor):
+    for text in (cause.title, cause.signature, cause.experiment, cause.source, cause.sensor):
         assert text.strip()
-    assert 5 < len(cause.title) <= 40
-    _, _, physics = page.documentation(cause).partition("\n\n")
-    assert 2 <= f"{physics} ".count(". ") + physics.count(".\n") <= 5
+    assert "\n\n" in page.documentation(cause)
 
 
 @pytest.mark.parametrize("cause", CATALOGUE, ids=NAMES)
@@ -194,21 +185,12 @@ def test_each_form_has_an_amount_with_neutral_value(cause, form):
 @pytest.mark.parametrize("name", page.parameters())
 def test_every_parameter_is_in_one_class(name):
     assert [kind for kind, _ in page.classes_of(name)] in (["base"], ["cause"], ["declared"])
-
-
-def test_classes_contain_only_parameters():
     assert {*page.named_by(), *page.GIVEN, *BASE} <= set(R.NAMES)
 
 
 @pytest.mark.parametrize("name", page.PARTS)
 def test_page_matches_the_declarations(name):
     assert page.part(name) == page.PARTS[name](), "run python -m tests.diagnosis.causes.causes_page"
-
-
-def test_each_cause_has_one_section_on_the_page():
-    text = page.PAGE.read_text(encoding="utf-8")
-    for name in NAMES:
-        assert text.count(f"\n### {name}\n") == 1
 
 
 @pytest.mark.parametrize(("cause", "form"), FORMS)
@@ -279,14 +261,10 @@ def test_plant_with_a_cause_survives_yaml(cause, form, tmp_path):
 # --- a user's own -------------------------------------------------------------------------------
 
 
-def test_users_cause_uses_an_unused_parameter():
+def test_users_cause_of_an_unused_parameter_changes_contraction_only(plain):
     form = users_cause.CAUSE.forms[0]
     assert users_cause.CAUSE.name not in NAMES
     assert not {t.name for t in form.terms} & {*page.named_by(), *BASE}
-
-
-def test_users_cause_changes_contraction_only(plain):
-    form = users_cause.CAUSE.forms[0]
     changed = replay(PLANT.replace(started(form)), INPUTS)
     assert differences(plain, changed)["contraction"] > 5e-6
     assert np.array_equal(changed["pressure"], plain["pressure"])
@@ -302,5 +280,5 @@ def test_users_cause_is_fitted_like_shipped_ones():
     column = family.column.copy()
     column[free.place] = free.outer(np.array([free.inner(0.4)]))[0]
     seen = family.simulate(column[None])
-    wanted = replay(PLANT.replace({"mass.carried": 0.4}), INPUTS)
-    np.testing.assert_array_equal(seen[0, :, 0], wanted["contraction"])
+    replayed = replay(PLANT.replace({"mass.carried": 0.4}), INPUTS)
+    np.testing.assert_array_equal(seen[0, :, 0], replayed["contraction"])

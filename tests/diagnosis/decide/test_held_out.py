@@ -22,7 +22,7 @@ PERIOD = 0.05
 
 
 def recording(*labels: str, seconds: float = 20.0) -> Any:
-    """Return as much of a recording as is looked at: a sine in each segment."""
+    """Return the parts of a recording that are used: a sine in each segment."""
     n = round(seconds / PERIOD)
     time = np.arange(n * len(labels)) * PERIOD
     command = 2e5 * (1.0 + np.sin(time))
@@ -56,7 +56,7 @@ def test_blocks_are_held_out_with_too_few_kinds(labels: tuple[str, ...]) -> None
 
 
 def held(blocks: int) -> HeldOut:
-    """Return something held out in so many blocks."""
+    """Return held-out data of a number of blocks."""
     rng = np.random.default_rng(3)
     of = np.repeat(np.arange(blocks), 50)
     part = Blocks(of, np.ones(blocks, bool), np.full((1, blocks), 50.0))
@@ -99,8 +99,8 @@ def test_wide_intervals_are_flagged(
     not_identified: bool,
 ) -> None:
     found = span(free(log), value, free(log).inner(value), 1.96 * sd)
-    for end, wanted in zip(found["interval"], ends, strict=True):
-        assert end == (None if wanted is None else pytest.approx(wanted, rel=1e-3))
+    for end, expected in zip(found["interval"], ends, strict=True):
+        assert end == (None if expected is None else pytest.approx(expected, rel=1e-3))
     assert (found["at_bound"], found["not_identified"]) == (at_bound, not_identified)
 
 

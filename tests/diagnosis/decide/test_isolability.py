@@ -36,15 +36,15 @@ def study_of(**changes: object) -> Study:
     """Return the base, refitted to a clean rig."""
     base, campaign = hidden.draw_base(np.random.default_rng(3)), hidden.campaign_short(1)
     columns = hidden.make_recording(base, [], campaign, noise_seed=5)
-    told = hidden.rig_yaml(base, campaign)
+    file = hidden.rig_yaml(base, campaign)
     sheet = Rig(
-        rest_length=1e-3 * told["muscle"]["rest_length_mm"],
-        diameter=1e-3 * told["muscle"]["diameter_mm"],
+        rest_length=1e-3 * file["muscle"]["rest_length_mm"],
+        diameter=1e-3 * file["muscle"]["diameter_mm"],
         max_pressure=6e5,
         contraction_noise=4.5e-5,
         pressure_noise=1260.0,
-        valve_closed=tuple(told["valve_closed"]),
-        tolerance=told["tolerance"],
+        valve_closed=tuple(file["valve_closed"]),
+        tolerance=file["tolerance"],
     )
     recording = Recording.from_arrays(
         columns["time_s"],
@@ -74,7 +74,7 @@ def of(study: Study, causes: list[Cause]) -> Isolability:
     return isolability(study.problem, study.family, study.base.fit, causes)
 
 
-def told(study: Study, causes: list[Cause]) -> dict[str, str]:
+def reasons_of(study: Study, causes: list[Cause]) -> dict[str, str]:
     return not_testable(
         study.problem, study.family, study.base.fit, causes, study.recording, study.sheet
     )[1]
@@ -87,7 +87,7 @@ def cause_of(name: str, parameter: str, start: float, **bounds: float) -> Cause:
 
 @needs_kernels
 def test_largest_effect_is_at_the_bounds(study):
-    """The bound counts, not a multiple of where a fit begins; and both signs."""
+    """The bounds of both signs count, not a multiple of the starting value."""
     narrow = cause_of("narrow", "position.bias", 1e-7, low=-1e-6, high=1e-6)
     wide = cause_of("wide", "position.bias", 1e-7, low=-1e-6, high=5e-4)
     below = cause_of("below", "position.bias", 1e-7, low=-5e-4, high=1e-6)
@@ -97,7 +97,7 @@ def test_largest_effect_is_at_the_bounds(study):
     assert reach["narrow"] < 0.03
     assert reach["wide"] == pytest.approx(500.0 * reach["narrow"], rel=1e-3)
     assert reach["below"] == pytest.approx(reach["wide"], rel=1e-6)
-    reasons = told(study, [narrow, wide, below])
+    reasons = reasons_of(study, [narrow, wide, below])
     assert set(reasons) == {"narrow"}
     assert f"shows at most {reach['narrow']:.2g} times the noise" in reasons["narrow"]
 
@@ -124,7 +124,7 @@ def test_invisible_start_has_no_absorbed_share(study):
     assert found.reach[0] > LEAST_SIZE
     assert 0.0 < found.absorbed[1] < 0.5
     bias = of(study, [silent, by_name("sensor_bias")])
-    assert bias.cosine[0, 1] > 0.5  # what it shows at its bounds stands for it
+    assert bias.cosine[0, 1] > 0.5  # represented by its effect at the bounds
 
 
 @needs_kernels
@@ -141,7 +141,7 @@ def test_number_of_simulated_columns(study):
 
 @needs_kernels
 def test_ineffective_form_is_not_testable(study):
-    reasons = told(study, list(catalogue()))
+    reasons = reasons_of(study, list(catalogue()))
     left = {c.name for c in catalogue()} - set(reasons)
     assert {"creep", "leak", "temperature", "sensor_bias", "stick_slip"} <= left
     empty = dataclasses.replace(
@@ -156,7 +156,7 @@ def test_ineffective_form_is_not_testable(study):
 
 @needs_kernels
 def test_users_cause_is_judged_like_shipped_ones(study):
-    assert told(study, [users_cause.CAUSE]) == {}
+    assert reasons_of(study, [users_cause.CAUSE]) == {}
     one_load = dataclasses.replace(study.recording, load=np.full(len(study.recording.time), 20.0))
     reasons = not_testable(
         study.problem, study.family, study.base.fit, [users_cause.CAUSE], one_load, study.sheet
@@ -164,23 +164,20 @@ def test_users_cause_is_judged_like_shipped_ones(study):
     assert reasons == {"sprung_load": "the load was 20 N throughout"}
 
 
-# without pressure
-
-
 @needs_kernels
 def test_without_pressure_similar_causes_are_not_testable(blind, study):
-    """A gain of the reading of the pressure shows in nothing else; a delay shows as another."""
+    """A gain of the pressure reading shows in nothing else; a delay imitates another delay."""
     late = cause_of("late", "regulator.dead_time", 0.01)
     later = dataclasses.replace(late, name="later")
-    reasons = told(blind, [late, later, by_name("leak")])
+    reasons = reasons_of(blind, [late, later, by_name("leak")])
     assert reasons == {
         "late": "cannot be separated from later without pressure_bar",
         "later": "cannot be separated from late without pressure_bar",
     }
-    assert told(study, [late, later]) == {}
+    assert reasons_of(study, [late, later]) == {}
     bow = cause_of("bow", "pressure.bow", 0.01)
-    assert "shows at most 0 times" in told(blind, [bow, by_name("leak")])["bow"]
-    assert told(study, [bow]) == {}
+    assert "shows at most 0 times" in reasons_of(blind, [bow, by_name("leak")])["bow"]
+    assert reasons_of(study, [bow]) == {}
 
 
 @needs_kernels
@@ -199,21 +196,18 @@ def test_without_pressure_valve_causes_are_isolable_or_listed(blind):
             assert cosines.max() < 0.9
 
 
-# loads that are known to a tolerance
-
-
 def test_load_error_is_compared_with_its_tolerance():
     loads = [0.0, 1.5, 3.0, 6.0]
     assert load_error_limit(loads, 0.02) == pytest.approx(0.03)
     assert may_be_within((-0.01, 0.01), loads, 0.02)
-    assert may_be_within((0.025, 0.2), loads, 0.02)  # it may be
+    assert may_be_within((0.025, 0.2), loads, 0.02)  # overlaps the tolerance
     assert not may_be_within((0.035, 0.2), loads, 0.02)
     assert may_be_within((-0.2, -0.025), loads, 0.02)
     assert not may_be_within((-0.2, -0.035), loads, 0.02)
     assert may_be_within((0.035, 0.2), loads, 0.05)
-    assert not may_be_within((-0.035, -0.2), loads, 0.02)  # either way round
+    assert not may_be_within((-0.035, -0.2), loads, 0.02)
     assert not may_be_within((0.035, np.inf), loads, 0.02)
-    assert may_be_within((5.0, 6.0), [0.0, 0.0], 0.02)  # of nothing there is no error
+    assert may_be_within((5.0, 6.0), [0.0, 0.0], 0.02)  # no load, no error
 
 
 @needs_kernels
@@ -224,9 +218,6 @@ def test_load_is_refitted_within_its_tolerance(study):
     assert free.names == ()
     assert len(free.fit.slopes) == len(free.fit.frees) == len(study.base.fit.frees) + 1
     assert free.fit.cost <= study.base.fit.cost * (1.0 + 1e-6)
-
-
-# how many are enough
 
 
 @pytest.mark.parametrize(

@@ -77,13 +77,15 @@ def test_verdict_follows_from_evidence(found: dict[str, Any], verdict: str, name
 
 
 @pytest.mark.parametrize(("blocks", "verdict"), [(25, "named"), (10, "adequate")])
-def test_few_blocks_have_to_gain_more(blocks: int, verdict: str) -> None:
+def test_few_blocks_require_a_larger_gain(blocks: int, verdict: str) -> None:
     found = evidence(level(0.2, LEAK)) | {"blocks": blocks}
     assert judge(found, RULE).verdict == verdict
 
 
 @pytest.mark.parametrize(("after", "verdict"), [(2.0, "named"), (6.0, "unexplained")])
-def test_what_is_left_decides_whether_a_cause_explains(after: float, verdict: str) -> None:
+def test_remaining_structure_decides_between_named_and_unexplained(
+    after: float, verdict: str
+) -> None:
     found = evidence(level(1.0, LEAK, left=left(excess=after)), before=left(excess=10.0))
     assert judge(found, RULE).verdict == verdict
 
@@ -119,13 +121,13 @@ def test_white_noise_has_no_peak_and_a_hum_has(seconds: int) -> None:
     assert height > RULE.peak
 
 
-# --- how sure a gain is --------------------------------------------------------------------------
+# --- p-values ------------------------------------------------------------------------------------
 
 
 def compared(
     change: float, slow: float, seed: int, seconds: int = 300, there: bool = True
 ) -> float:
-    """Return how unsure a cause is that is a sine, in noise of which part is slow, or not in it."""
+    """Return the p-value of a sine that is present or absent in noise with a slow part."""
     rng = np.random.default_rng(seed)
     time = np.arange(seconds * 50) * 0.02
     white, kept = rng.standard_normal((2, len(time))), np.exp(-0.02)
@@ -144,15 +146,15 @@ def compared(
 
 
 @pytest.mark.parametrize("slow", [0.0, 0.5])
-def test_what_is_taken_out_of_the_residual_is_sure(slow: float) -> None:
+def test_removed_sine_has_a_small_p_value(slow: float) -> None:
     assert compared(1.0, slow, 1) < 1e-3
 
 
 @pytest.mark.parametrize("slow", [0.0, 0.5])
-def test_what_is_not_there_is_not(slow: float) -> None:
+def test_absent_sine_is_seldom_significant(slow: float) -> None:
     found = [compared(0.1, slow, seed, there=False) for seed in range(60)]
     assert sum(value <= RULE.doubt for value in found) <= 1
 
 
-def test_more_data_makes_it_surer() -> None:
+def test_longer_data_lower_the_p_value() -> None:
     assert compared(0.3, 0.5, 3, seconds=600) < compared(0.3, 0.5, 3, seconds=60)

@@ -1,4 +1,4 @@
-"""A version of the rule stands for its numbers, those of the causes, and recorded decisions."""
+"""Recorded numbers and decisions of each version of the rule."""
 
 from __future__ import annotations
 
@@ -49,20 +49,20 @@ def test_engine_reproduces_its_recorded_decisions(part: str, known: Any, present
     assert_alike(present[part], known[part], part)
 
 
-def assert_alike(found: Any, wanted: Any, where: str) -> None:
+def assert_alike(found: Any, expected: Any, where: str) -> None:
     """Compare nested values, numbers within what processors differ by."""
-    if isinstance(wanted, dict):
-        assert found.keys() == wanted.keys(), where
-        for key, value in wanted.items():
+    if isinstance(expected, dict):
+        assert found.keys() == expected.keys(), where
+        for key, value in expected.items():
             assert_alike(found[key], value, f"{where}.{key}")
-    elif isinstance(wanted, list):
-        assert len(found) == len(wanted), where
-        for k, value in enumerate(wanted):
+    elif isinstance(expected, list):
+        assert len(found) == len(expected), where
+        for k, value in enumerate(expected):
             assert_alike(found[k], value, f"{where}[{k}]")
-    elif isinstance(wanted, float):
-        assert found == pytest.approx(wanted, rel=1e-3, abs=6e-3), f"{where}: {ADVICE}"
+    elif isinstance(expected, float):
+        assert found == pytest.approx(expected, rel=1e-3, abs=6e-3), f"{where}: {ADVICE}"
     else:
-        assert found == wanted, f"{where}: {ADVICE}"
+        assert found == expected, f"{where}: {ADVICE}"
 
 
 @pytest.mark.parametrize("field", [f.name for f in dataclasses.fields(Rule) if f.name != "version"])

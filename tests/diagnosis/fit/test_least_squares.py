@@ -60,7 +60,7 @@ def drawn(seed: int, correlation: float = 0.0) -> Array:
 
 def fitted(problem: Problem, *frees: Free, rounds: int = 30) -> Fit:
     column = np.array([1.0, 3.0, 0.0, 0.0])
-    fit = Fit(frees, np.array([f.inner(f.start) for f in frees]), column)
+    fit = Fit.at_start(frees, column)
     evaluate(problem, [fit])
     improve(problem, [fit], rounds, 1e-9)
     return fit
@@ -165,6 +165,6 @@ def test_confidence_intervals_have_nominal_coverage(correlation: float) -> None:
         for k, (name, true) in enumerate(zip(("gain", "lag", "slope"), TRUTH, strict=False)):
             low, high = spans(problem, blocks, fit)[name]["interval"]
             hits[k] += low <= true <= high
-    assert (hits / draws >= 0.83).all()  # 95 % wanted; 60 draws give 83 % once in 10,000
+    assert (hits / draws >= 0.83).all()  # nominally 95 %; 60 draws give 83 % once in 10,000
     width = np.diff(spans(problem, blocks, fit)["gain"]["interval"])[0]
     assert 0.001 < width < 0.2

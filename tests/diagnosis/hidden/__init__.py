@@ -4,7 +4,7 @@ Nothing here knows the library's plants: another muscle law, another friction, a
 and every effect in another mathematical form. The forms stand side by side in `catalogue`.
 """
 
-from .base import CONTRACTION_NOISE_MM, PRESSURE_NOISE_BAR, Base, decoys, draw_base
+from .base import CONTRACTION_NOISE_MM, PRESSURE_NOISE_BAR, Base, draw_base
 from .campaign import (
     Campaign,
     campaign_idle,
@@ -31,7 +31,6 @@ __all__ = [
     "campaign_long",
     "campaign_short",
     "campaign_standard",
-    "decoys",
     "draw_base",
     "draw_effect",
     "make_recording",

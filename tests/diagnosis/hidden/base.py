@@ -20,47 +20,29 @@ PRESSURE_NOISE_BAR = 0.0126
 
 @dataclass(frozen=True)
 class Base:
-    """The constants of a clean rig.
+    """Constants of a clean rig."""
 
-    Attributes
-    ----------
-    length_mm, diameter_mm : float, of the muscle at rest [mm]
-    gain, lag : float, of the regulator [-, s]
-    force : float, pull of 1 bar at rest [N]
-    angle : float, of the braid at rest [rad]
-    span : float, strain at which the dome and the bladder are measured
-    blend, dome : float, share and curvature of the dome
-    rubber, bend, bulk, grip, grip_span : float, of the bladder, forces over `force`
-    mass : float, moving mass besides the load, balanced: it has inertia and no weight [kg]
-    damping : float [N s/m]
-    loop : float, full width of the large pressure loop [bar]
-    largest : float, where the density of the breaks ends [bar]
-    spread : (float, float), exponents of the density of the breaks
-    coloured : float, share of the noise variance with a correlation of 1 s
-    grain_mm, grain_bar : float, quantisation of the readings, 0 for none
-    """
-
-    length_mm: float
+    length_mm: float  # at rest
     diameter_mm: float
-    gain: float
-    lag: float
-    force: float
-    angle: float
-    span: float
-    blend: float
-    dome: float
-    rubber: float
+    gain: float  # of the regulator
+    lag: float  # of the regulator [s]
+    force: float  # pull of 1 bar at rest [N]
+    angle: float  # of the braid at rest [rad]
+    span: float  # strain at which dome and bladder are measured
+    blend: float  # share of the dome
+    dome: float  # curvature of the dome
+    rubber: float  # of the bladder, a force over `force`, as the next four
     bend: float
     bulk: float
     grip: float
     grip_span: float
-    mass: float
-    damping: float
-    loop: float
-    largest: float
-    spread: tuple[float, float]
-    coloured: float
-    grain_mm: float
+    mass: float  # moving mass besides the load, balanced: inertia without weight [kg]
+    damping: float  # [N s/m]
+    loop: float  # full width of the large pressure loop [bar]
+    largest: float  # end of the density of the breaks [bar]
+    spread: tuple[float, float]  # exponents of the density of the breaks
+    coloured: float  # share of the noise variance with a correlation of 1 s
+    grain_mm: float  # quantisation of the readings, 0 for none
     grain_bar: float
 
     def sliders(self) -> tuple[np.ndarray, np.ndarray]:
@@ -71,7 +53,7 @@ class Base:
         return share, self.largest * place
 
     def parameters(self) -> np.ndarray:
-        """Return the constants as the jitted loop reads them, shape (1,)."""
+        """Return the constants for the compiled loop, shape (1,)."""
         record = blank(PARAMETERS)
         for name in _SHARED:
             record[name] = getattr(self, name)
@@ -154,8 +136,3 @@ def draw_base(rng: np.random.Generator, decoy: bool = False) -> Base:
         **_friction(rng, decoy),
         **_sensors(rng),
     )
-
-
-def decoys(rng: np.random.Generator) -> Base:
-    """Draw a clean rig whose constants are far from usual."""
-    return draw_base(rng, decoy=True)

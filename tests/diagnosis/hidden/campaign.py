@@ -16,22 +16,14 @@ PERIOD = 0.02
 
 @dataclass(frozen=True)
 class Campaign:
-    """A plan of n rows; row k holds from its own time to the next row's.
-
-    Attributes
-    ----------
-    command_bar, load_N, temperature_C : (n,) arrays; `load_N` is what the record tells.
-    segment : (n,) array of str
-    valve_closed : (n,) array of bool, where the regulator is cut off
-    period : float [s]
-    """
+    """A plan of n rows, each held until the time of the next one."""
 
     command_bar: np.ndarray
-    segment: np.ndarray
-    load_N: np.ndarray
+    segment: np.ndarray  # labels
+    load_N: np.ndarray  # as declared in the recording
     temperature_C: np.ndarray
-    valve_closed: np.ndarray
-    period: float = PERIOD
+    valve_closed: np.ndarray  # bool
+    period: float = PERIOD  # [s]
 
     @property
     def time(self) -> np.ndarray:
@@ -47,6 +39,10 @@ class Campaign:
         names = set(self.segment.tolist())
         pairs = ([f"{kind}_a", f"{kind}_b"] for kind in ("condition", "holds"))
         return [pair for pair in pairs if names.issuperset(pair)]
+
+
+Blocks = list[tuple[float, Callable[[], None]]]
+"""Load [N] and action of each block of a campaign."""
 
 
 @dataclass
@@ -155,7 +151,7 @@ def _shut(plan: _Plan, level: float) -> None:
     plan.add("reopen", constant(level, 1.4))
 
 
-def _blocks(plan: _Plan) -> list[tuple[float, Callable[[], None]]]:
+def _blocks(plan: _Plan) -> Blocks:
     rng = plan.rng
     return [
         (0.0, lambda: plan.add("staircase", levels(STAIRS, 3.0))),
@@ -178,28 +174,37 @@ def _blocks(plan: _Plan) -> list[tuple[float, Callable[[], None]]]:
     ]
 
 
-def _perform(plan: _Plan, blocks: list[tuple[float, Callable[[], None]]]) -> None:
-    for load, block in blocks:
+def _performed(
+    seed: int,
+    start: float,
+    end: float,
+    kept: tuple[int, ...] | None = None,
+    more: Callable[[_Plan], Blocks] = lambda plan: [],
+) -> Campaign:
+    """Return a campaign of some blocks between two rests [s]."""
+    plan = _Plan(np.random.default_rng(seed))
+    plan.rest(start, 0.0)
+    blocks = _blocks(plan)
+    for load, block in [blocks[i] for i in kept or range(len(blocks))] + more(plan):
         if load != plan.load:
             plan.rest(1.0, load)
         block()
+    plan.rest(end, 0.0)
+    return plan.finish()
 
 
 def campaign_standard(seed: int = 0) -> Campaign:
     """Return the usual campaign of about 300 s; `seed` draws random holds and the room."""
-    plan = _Plan(np.random.default_rng(seed))
-    plan.rest(5.0, 0.0)
-    _perform(plan, _blocks(plan))
-    plan.rest(4.0, 0.0)
-    return plan.finish()
+    return _performed(seed, 5.0, 4.0)
 
 
 def campaign_long(seed: int = 0) -> Campaign:
     """Return a campaign of about 600 s with finer stairs and more random holds."""
-    plan = _Plan(np.random.default_rng(seed))
-    plan.rest(5.0, 0.0)
-    _perform(plan, _blocks(plan))
-    more = [
+    return _performed(seed, 5.0, 5.0, more=_long_blocks)
+
+
+def _long_blocks(plan: _Plan) -> Blocks:
+    return [
         (15.0, lambda: plan.add("staircase", levels(FINE_STAIRS, 4.0))),
         (45.0, lambda: plan.add("triangle", triangle(5.8, 60.0))),
         (60.0, lambda: plan.add("random", random_holds(plan.rng, 40.0))),
@@ -209,20 +214,11 @@ def campaign_long(seed: int = 0) -> Campaign:
         (30.0, lambda: plan.add("steps", three_steps(0.6, [1.0, 2.4, 4.8], 1.5))),
         (15.0, lambda: plan.add("sine_fast", sine(2.6, 1.8, 0.5, 12.0))),
     ]
-    _perform(plan, more)
-    plan.rest(5.0, 0.0)
-    return plan.finish()
 
 
 def campaign_short(seed: int = 0) -> Campaign:
     """Return a campaign of about 120 s with one instance of most kinds, for quick tests."""
-    plan = _Plan(np.random.default_rng(seed))
-    plan.rest(3.0, 0.0)
-    kept = (0, 3, 4, 6, 7, 9, 12)
-    blocks = _blocks(plan)
-    _perform(plan, [blocks[i] for i in kept])
-    plan.rest(3.0, 0.0)
-    return plan.finish()
+    return _performed(seed, 3.0, 3.0, kept=(0, 3, 4, 6, 7, 9, 12))
 
 
 def campaign_idle(seed: int = 0, level: float = 0.0) -> Campaign:

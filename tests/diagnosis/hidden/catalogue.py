@@ -48,48 +48,12 @@ from __future__ import annotations
 import numpy as np
 
 from .base import Base
-from .effect import Effect, Kind
-from .effects_friction import FRICTION
-from .effects_load import LOAD
-from .effects_muscle import MUSCLE
-from .effects_pneumatic import PNEUMATIC
-from .effects_sensing import SENSING
+from .effect import Effect
+from .effects import CATALOGUE
 from .effects_unknown import FINAL, TUNING
 
-_FIRST = [
-    "creep",
-    "leak",
-    "valve_dead_band",
-    "dead_time",
-    "slew_limit",
-    "sensor_bias",
-    "sensor_drift",
-    "sensor_delay",
-    "viscous_loss",
-    "temperature",
-    "first_cycle_softening",
-    "load_dependent_hysteresis",
-    "load_dependent_compliance",
-    "hysteresis_shape",
-    "hysteresis_drive",
-    "supply_droop",
-    "stick_slip",
-    "threshold_pressure",
-    "exhaust_asymmetry",
-    "pressure_dependent_friction",
-    "sensor_nonlinearity",
-    "resonance",
-    "slip_step",
-    "wire_slack",
-    "payload_error",
-]
-"""Order in which the benchmark draws its cases; effects that are not listed follow."""
-_OF_CATALOGUE = {**PNEUMATIC, **FRICTION, **MUSCLE, **LOAD, **SENSING}
-EFFECTS: tuple[str, ...] = tuple(dict.fromkeys((*_FIRST, *_OF_CATALOGUE)))
-TUNING_UNKNOWN: tuple[str, ...] = tuple(TUNING)
-FINAL_UNKNOWN: tuple[str, ...] = tuple(FINAL)
-
-_KINDS: dict[str, Kind] = {**_OF_CATALOGUE, **TUNING, **FINAL}
+EFFECTS, TUNING_UNKNOWN, FINAL_UNKNOWN = tuple(CATALOGUE), tuple(TUNING), tuple(FINAL)
+_KINDS = {**CATALOGUE, **TUNING, **FINAL}
 
 
 def draw_effect(name: str, rng: np.random.Generator) -> Effect:
@@ -102,12 +66,10 @@ def draw_effect(name: str, rng: np.random.Generator) -> Effect:
 def constants(base: Base, effects: list[tuple[Effect, float]], duration: float) -> np.ndarray:
     """Return the record of a rig with its effects, each with an amplitude, shape (1,).
 
-    `duration` [s] is that of the run, which the moment of a slip is a share of.
+    The time of a slip is a share of the duration of the run [s].
     """
     record = base.parameters()
     for effect, amplitude in effects:
-        strength = effect.strength(amplitude)
-        if strength > 0.0:
-            effect.write(record, strength, dict(effect.shape))
+        effect.enter(record, amplitude)
     record["slip_time"] *= duration
     return record

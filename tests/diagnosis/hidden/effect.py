@@ -3,33 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 Shape = dict[str, float]
-Draw = Callable[[np.random.Generator], Shape]
-Write = Callable[[np.ndarray, float, Shape], None]
+Draw = tuple[float, float] | Callable[[np.random.Generator], float]
+Write = str | Callable[[np.ndarray, float, Shape], None]
 
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect with its shape drawn.
-
-    Attributes
-    ----------
-    name : str
-    shape : mapping of secondary constants, in the units of `records`
-    reference : float, strength at amplitude 1, where the trace moves by one to two noise RMS
-    exponent : float, the strength grows with amplitude ** exponent, so that the trace grows
-        about linearly
-    write : enters a strength into the constants of a rig
-    """
+    """An effect with its shape drawn."""
 
     name: str
     shape: Mapping[str, float]
-    reference: float
-    exponent: float
+    reference: float  # strength at amplitude 1, where the trace moves by one to two noise RMS
+    exponent: float  # of the amplitude in the strength, so that the trace grows about linearly
     write: Write
 
     def strength(self, amplitude: float) -> float:
@@ -38,23 +28,36 @@ class Effect:
             raise ValueError(f"amplitude {amplitude} of {self.name} is negative; give 0 or more")
         return self.reference * amplitude**self.exponent
 
+    def enter(self, record: np.ndarray, amplitude: float) -> None:
+        """Write the effect into the constants of a rig, nothing at amplitude 0."""
+        strength = self.strength(amplitude)
+        if strength > 0.0 and isinstance(self.write, str):
+            put(record, **{self.write: strength}, **self.shape)
+        elif strength > 0.0:
+            self.write(record, strength, dict(self.shape))
+
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of effect: how its shape is drawn and how a strength is written into a record.
+    """A kind of effect: its entry in a record, reference strength (within 25 %) and shape.
 
-    The reference strength is drawn within +-25 % of the one given here.
+    A shape is drawn from a range or by a function. It is written by a function of record, strength
+    and shape, or, with the name of the constant of the strength, under its own names.
     """
 
-    draw: Draw
     write: Write
     reference: float
+    shape: Mapping[str, Draw] = field(default_factory=dict)
     exponent: float = 1.0
 
     def effect(self, name: str, rng: np.random.Generator) -> Effect:
         """Draw one effect of this kind."""
         reference = self.reference * float(rng.uniform(0.8, 1.25))
-        return Effect(name, self.draw(rng), reference, self.exponent, self.write)
+        shape = {
+            key: uniform(rng, *draw) if isinstance(draw, tuple) else draw(rng)
+            for key, draw in self.shape.items()
+        }
+        return Effect(name, shape, reference, self.exponent, self.write)
 
 
 def uniform(rng: np.random.Generator, low: float, high: float) -> float:
@@ -70,6 +73,11 @@ def sign(rng: np.random.Generator) -> float:
 def coin(rng: np.random.Generator, share: float = 0.5) -> float:
     """Draw 1 with the given probability, else 0."""
     return float(rng.random() < share)
+
+
+def whole(low: int, high: int) -> Draw:
+    """Return the draw of an integer from ``low`` to below ``high``."""
+    return lambda rng: float(rng.integers(low, high))
 
 
 def put(record: np.ndarray, **values: float) -> None:

@@ -4,33 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .effect import Kind, Shape, put, uniform
+from .effect import Kind, Shape, put, whole
 from .records import WAVES
 
 
-def _vibration(record: np.ndarray, strength: float, shape: Shape) -> None:
-    """The building shakes the load all the time, with a slow beat [N]."""
-    put(record, shake=strength, shake_hz=shape["hertz"], shake_beat=shape["beat"])
-
-
-def _neighbour(record: np.ndarray, strength: float, shape: Shape) -> None:
-    """Another muscle fills and vents from the same supply on its own schedule [bar]."""
-    put(
-        record,
-        neighbour=strength,
-        neighbour_period=shape["period"],
-        neighbour_duty=shape["duty"],
-        neighbour_decay=shape["decay"],
-    )
-
-
-def _dropouts(record: np.ndarray, strength: float, shape: Shape) -> None:
-    """The position sensor holds its last value now and then, for about so long [s]."""
-    put(record, dropout=strength, dropout_cell=shape["cell"], dropout_seed=shape["seed"])
-
-
 def _gain_wander(record: np.ndarray, strength: float, shape: Shape) -> None:
-    """The pull of pressure wanders like a random walk."""
+    """Let the pull of pressure wander like a random walk."""
     rng = np.random.default_rng(int(shape["seed"]))
     hertz = np.geomspace(0.01, 0.3, WAVES) * rng.uniform(0.8, 1.25, WAVES)
     size = hertz**-0.8
@@ -40,82 +19,43 @@ def _gain_wander(record: np.ndarray, strength: float, shape: Shape) -> None:
     record["wave_phase"][0] = rng.uniform(0.0, 2 * np.pi, WAVES)
 
 
-def _end_stop(record: np.ndarray, strength: float, shape: Shape) -> None:
-    """A spring stop is met at a high contraction; strength is its force after 1 mm [N]."""
-    put(record, stop=strength, stop_at=shape["strain"])
-
-
-def _dither(record: np.ndarray, strength: float, shape: Shape) -> None:
-    """The regulator dithers its own set-point all the time [bar]."""
-    put(record, dither=strength, dither_hz=shape["hertz"])
-
-
 def _pendulum(record: np.ndarray, strength: float, shape: Shape) -> None:
-    """The load swings like a pendulum after every move and changes the pull on the wire."""
+    """Swing the load like a pendulum after every motion, which changes the pull on the wire."""
     omega = 2 * np.pi * shape["hertz"]
     put(record, swing=strength, swing_omega=omega, swing_drive=shape["drive"])
 
 
-def _buckling(record: np.ndarray, strength: float, shape: Shape) -> None:
-    """The bladder snaps into a fold at a high strain and out of it at a low one."""
-    put(record, buckle=strength, buckle_up=shape["up"], buckle_down=shape["down"])
-
-
-def _bumps(record: np.ndarray, strength: float, shape: Shape) -> None:
-    """Somebody knocks against the load at odd moments [N]."""
-    put(
-        record,
-        bump=strength,
-        bump_cell=shape["cell"],
-        bump_length=shape["length"],
-        bump_seed=shape["seed"],
-    )
-
-
-def _seed(rng: np.random.Generator) -> float:
-    return float(rng.integers(0, 1000))
-
-
 TUNING = {
-    "vibration": Kind(
-        lambda rng: {"hertz": uniform(rng, 0.3, 3.0), "beat": uniform(rng, 0.02, 0.08)},
-        _vibration,
-        1.5,
-    ),
+    # the building shakes the load all the time, with a slow beat [N]
+    "vibration": Kind("shake", 1.5, {"shake_hz": (0.3, 3.0), "shake_beat": (0.02, 0.08)}),
+    # another muscle fills and vents from the same supply on its own schedule [bar]
     "neighbour_crosstalk": Kind(
-        lambda rng: {
-            "period": uniform(rng, 3.0, 9.0),
-            "duty": uniform(rng, 0.3, 0.7),
-            "decay": uniform(rng, 0.2, 0.7),
-        },
-        _neighbour,
+        "neighbour",
         0.06,
+        {
+            "neighbour_period": (3.0, 9.0),
+            "neighbour_duty": (0.3, 0.7),
+            "neighbour_decay": (0.2, 0.7),
+        },
     ),
+    # the position sensor holds its last value now and then, for about so long [s]
     "sensor_dropouts": Kind(
-        lambda rng: {"cell": uniform(rng, 2.5, 6.0), "seed": _seed(rng)}, _dropouts, 0.05
+        "dropout", 0.05, {"dropout_cell": (2.5, 6.0), "dropout_seed": whole(0, 1000)}
     ),
-    "gain_wander": Kind(lambda rng: {"seed": _seed(rng)}, _gain_wander, 0.004),
+    "gain_wander": Kind(_gain_wander, 0.004, {"seed": whole(0, 1000)}),
 }
 FINAL = {
-    "end_stop": Kind(lambda rng: {"strain": uniform(rng, 0.085, 0.115)}, _end_stop, 0.3),
-    "set_point_dither": Kind(lambda rng: {"hertz": uniform(rng, 0.7, 3.5)}, _dither, 0.04),
-    "pendulum": Kind(
-        lambda rng: {"hertz": uniform(rng, 0.6, 1.2), "drive": uniform(rng, 0.03, 0.06)},
-        _pendulum,
-        1.0,
-    ),
-    "buckling": Kind(
-        lambda rng: {"up": uniform(rng, 0.10, 0.12), "down": uniform(rng, 0.04, 0.07)},
-        _buckling,
-        0.006,
-    ),
+    # a spring stop at a high contraction; strength is its force after 1 mm [N]
+    "end_stop": Kind("stop", 0.3, {"stop_at": (0.085, 0.115)}),
+    # the regulator dithers its own setpoint all the time [bar]
+    "set_point_dither": Kind("dither", 0.04, {"dither_hz": (0.7, 3.5)}),
+    "pendulum": Kind(_pendulum, 1.0, {"hertz": (0.6, 1.2), "drive": (0.03, 0.06)}),
+    # the bladder snaps into a fold at a high strain and out of it at a low one
+    "buckling": Kind("buckle", 0.006, {"buckle_up": (0.10, 0.12), "buckle_down": (0.04, 0.07)}),
+    # knocks against the load at irregular times [N]
     "bumps": Kind(
-        lambda rng: {
-            "cell": uniform(rng, 4.0, 9.0),
-            "length": uniform(rng, 0.06, 0.25),
-            "seed": _seed(rng),
-        },
-        _bumps,
+        "bump",
         5.0,
+        {"bump_cell": (4.0, 9.0), "bump_length": (0.06, 0.25), "bump_seed": whole(0, 1000)},
     ),
 }

@@ -6,6 +6,7 @@ import csv
 from pathlib import Path
 
 import numpy as np
+from scipy.signal import lfilter
 
 from .base import CONTRACTION_NOISE_MM, PRESSURE_NOISE_BAR, Base
 from .campaign import Campaign
@@ -13,10 +14,10 @@ from .catalogue import constants
 from .effect import Effect
 from .kernel import run
 from .kernel_tools import STEP
-from .noise import coloured_noise, quantised
 from .records import STATE, blank
 
 Hidden = list[tuple[Effect, float]]
+CORRELATION = 1.0  # of the slow part of the noise [s]
 
 _DECIMALS = {
     "time_s": 4,
@@ -29,7 +30,7 @@ _DECIMALS = {
 
 
 def steps_in(period: float) -> int:
-    """Return how many steps of the integrator a period has."""
+    """Return the number of integration steps in a period."""
     steps = round(period / STEP)
     if steps < 1 or abs(steps * STEP - period) > 1e-9:
         raise ValueError(f"period {period} s is not a whole number of {STEP} s; choose another")
@@ -39,16 +40,8 @@ def steps_in(period: float) -> int:
 def simulate(base: Base, effects: Hidden, campaign: Campaign) -> dict[str, np.ndarray]:
     """Run a campaign on a rig, without sensor noise.
 
-    Parameters
-    ----------
-    base : Base
-    effects : list of (Effect, amplitude); an amplitude of 0 leaves the rig clean
-    campaign : Campaign of n rows
-
-    Returns
-    -------
-    dict of (n,) arrays: `time` [s], `segment`, `command_bar`, `load_told_N`, `temperature_C`,
-    `contraction_mm` and `pressure_bar` as the sensors read them, `position_mm` as it is.
+    Time [s], segment, command [bar], declared load [N], temperature [deg C], readings of
+    contraction [mm] and pressure [bar], and the true contraction [mm], each of shape (n,).
     """
     duration = campaign.period * campaign.command_bar.size
     rows = run(
@@ -72,6 +65,18 @@ def simulate(base: Base, effects: Hidden, campaign: Campaign) -> dict[str, np.nd
     }
 
 
+def coloured_noise(
+    rng: np.random.Generator, count: int, period: float, rms: float, coloured: float
+) -> np.ndarray:
+    """Return noise, shape (count,): a white part and, by a share of its variance, a slow one."""
+    keep = np.exp(-period / CORRELATION)
+    white = np.sqrt(1.0 - coloured) * rng.standard_normal(count)
+    drive = np.sqrt(coloured * (1.0 - keep**2)) * rng.standard_normal(count)
+    first = np.sqrt(coloured) * rng.standard_normal()
+    slow, _ = lfilter([1.0], [1.0, -keep], drive, zi=np.array([keep * first]))
+    return rms * (white + slow)
+
+
 def make_recording(
     base: Base,
     effects: Hidden,
@@ -86,7 +91,8 @@ def make_recording(
 
     def noisy(name: str, rms: float, grain: float) -> np.ndarray:
         noise = coloured_noise(rng, count, campaign.period, noise_factor * rms, base.coloured)
-        return quantised(truth[name] + noise, grain)
+        values = truth[name] + noise
+        return values if grain <= 0.0 else grain * np.round(values / grain)
 
     contraction = noisy("contraction_mm", CONTRACTION_NOISE_MM, base.grain_mm)
     pressure = noisy("pressure_bar", PRESSURE_NOISE_BAR, base.grain_bar)
@@ -102,7 +108,7 @@ def make_recording(
 
 
 def rig_yaml(base: Base, campaign: Campaign, noise_factor: float = 1.0) -> dict:
-    """Return what an honest owner writes into RIG.yaml, as plain values."""
+    """Return the true contents of RIG.yaml, as plain values."""
     return {
         "plant": "single_muscle",
         "muscle": {"rest_length_mm": base.length_mm, "diameter_mm": base.diameter_mm},

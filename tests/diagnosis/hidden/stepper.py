@@ -8,28 +8,16 @@ from .base import CONTRACTION_NOISE_MM, PRESSURE_NOISE_BAR, Base
 from .catalogue import constants
 from .effect import Effect
 from .kernel import begin, one_period
-from .noise import CORRELATION
 from .records import STATE, blank
-from .rig import steps_in
+from .rig import CORRELATION, steps_in
 
 
 class Stepper:
-    """A rig under one load, stepped from rest at 0 bar.
+    """A rig under one declared load [N], stepped from rest at 0 bar.
 
-    Parameters
-    ----------
-    base : Base
-    effects : list of (Effect, amplitude)
-    load_N : float, the load that is told [N]
-    noise_seed : int
-    period : float, between two commands, a whole number of milliseconds [s]
-    noise_factor : float, over the usual sensor noise, 0 for none
-    temperature_C : float [deg C]
-    duration : float, of the run that a slip happens in [s]
-
-    Attributes
-    ----------
-    position_mm : float, true contraction [mm]
+    The period [s] between two commands is a whole number of milliseconds, ``noise_factor`` is over
+    the usual sensor noise, and a slip happens within ``duration`` [s]. ``position_mm`` is the true
+    contraction.
     """
 
     def __init__(
@@ -54,7 +42,7 @@ class Stepper:
         self.reset(noise_seed)
 
     def reset(self, seed: int) -> None:
-        """Put the rig to rest and start its noise anew."""
+        """Put the rig to rest and restart its noise."""
         self._state = blank(STATE)
         self._rng = np.random.default_rng(seed)
         self._slow = self._rng.standard_normal(2)
