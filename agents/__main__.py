@@ -59,12 +59,15 @@ def train(
     config
         YAML file, or policy.onnx, whose settings replace the preset.
     """
+    from agents.training import sweep as sweeping
     from agents.training import train as training
+    from agents.training.record import Run
 
     console = Console(stderr=True)
     given_env = full_id(env) if env else None
     name, kind, number = given_env or DEFAULT_ENV, algo or "ppo", seed or 0
-    folder = out or training.default_folder(name, kind, number, variant)
+    preset = f"{kind}-{variant}" if variant else kind
+    folder = out or sweeping.folder_of(Path("runs"), name, preset, number)
     if resume:
         run = training.saved_run(folder, steps)
         if config is not None or set:
@@ -81,7 +84,7 @@ def train(
         settings = _settings(name, kind, variant, config)
         changes = [*set, *([] if steps is None else [f"steps={steps}"])]
         _check_counts(seed=(number, 0))
-        run = training.Run(configs.changed(settings, changes), number, folder)
+        run = Run(configs.changed(settings, changes), number, folder)
         model = training.start(run)
     print(training.train(run, model, console))
 
@@ -279,11 +282,12 @@ def classical(env: Env, /, algo: Algo = "ppo", variant: Variant = "residual") ->
     This chooses the controller that a residual corrects; the leaderboard never does. The preset
     gives plants, references and, as evaluation.objective, the first number.
     """
-    from agents.policies.controllers import names_for
     from agents.training.evaluation import evaluate, value_of
+    from baselines.core.catalogue import CONTROLLERS
 
     config = configs.preset(full_id(env), algo, variant)
-    scores = {name: evaluate(name, config) for name in names_for(config.env)}
+    names = [name for name, entry in CONTROLLERS.items() if config.env in entry.envs]
+    scores = {name: evaluate(name, config) for name in names}
     values = {name: value_of(score, config) for name, score in scores.items()}
     for name in sorted(values, key=lambda name: values[name]):
         made = scores[name]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -34,7 +34,6 @@ class Entry:
     ----------
     file : str
         Name in ``agents/pretrained``, with ``{seed}`` for the training seed.
-    summary, citation : str
     knowledge : str
         Model knowledge: "nominal model" for a policy that was trained in simulation of it.
     envs : tuple of str
@@ -74,10 +73,7 @@ class Entry:
 
     @property
     def author(self) -> str:
-        """Author in BibTeX form, from the record of the lowest training seed.
-
-        It is empty for the authors of this package.
-        """
+        """Author in BibTeX form, of the lowest training seed; empty for those of this package."""
         return "" if self.first is None else str(record_of(self.first).get("author", ""))
 
     @property
@@ -152,11 +148,8 @@ WHERE: dict[str, str] = {
 def offered() -> dict[str, Entry]:
     """Return an entry for every preset.
 
-    Raises
-    ------
-    ValueError
-        If a preset is of another environment or algorithm than its file name, or its name is not
-        valid or not unique.
+    A SettingsError names a preset of another environment or algorithm than its file name, or whose
+    controller's name is not valid or not unique.
     """
     made: dict[str, Entry] = {}
     for (env_id, algo, variant), path in configs.presets().items():
@@ -192,28 +185,26 @@ def _entry(path: Path, preset: str, config: Config) -> Entry:
     where = WHERE.get(config.env.removeprefix("PAM/"), "")
     baseline = config.residual.controller
     trials, tuning = budget(config)
+    made = Entry(
+        file=f"{path.stem}.s{{seed}}.onnx",
+        summary="",
+        knowledge="nominal model",
+        citation="",
+        envs=(config.env,),
+        trials=trials,
+        tuning=tuning,
+    )
     if not baseline:
         kind = KINDS.get(preset) or _own(preset, path)
-        return Entry(
-            file=f"{path.stem}.s{{seed}}.onnx",
-            summary=f"{kind.summary}{where}",
-            knowledge="nominal model",
-            citation=kind.citation,
-            envs=(config.env,),
-            trials=trials,
-            tuning=tuning,
-        )
+        return replace(made, summary=f"{kind.summary}{where}", citation=kind.citation)
     policy = config.algo.upper().replace("_", " ")
-    return Entry(
-        file=f"{path.stem}.s{{seed}}.onnx",
+    return replace(
+        made,
         summary=f"{baseline} corrected by a {policy} policy, which sees its action{where}",
         knowledge=CLASSICAL[baseline].knowledge,
         citation=f"{KINDS[config.algo].citation}; {RESIDUAL}",
-        envs=(config.env,),
         kind="residual",
         baseline=baseline,
-        trials=trials,
-        tuning=tuning,
         found=CLASSICAL[baseline].found,
     )
 
@@ -243,13 +234,7 @@ def budget(config: Config) -> tuple[int | None, str]:
 
 
 def check_files(entries: Mapping[str, Entry]) -> None:
-    """Raise if a policy file has no preset, and would be left out of every comparison.
-
-    Raises
-    ------
-    PolicyFileError
-        Naming the file.
-    """
+    """Raise if a policy file has no preset, and would be left out of every comparison."""
     known = {entry.preset for entry in entries.values()}
     for path in sorted(FOLDER.glob("*.onnx")):
         named = re.fullmatch(r"(.+)\.s[0-9]+", path.stem)
@@ -269,8 +254,6 @@ OFFERED: dict[str, Entry] = offered()
 check_files(OFFERED)
 CONTROLLERS: dict[str, Entry] = {n: entry for n, entry in OFFERED.items() if entry.files()}
 """Entries with files."""
-PRETRAINED: dict[str, str] = {name: str(entry.first) for name, entry in CONTROLLERS.items()}
-"""File of the lowest training seed by name."""
 
 
 def load_pretrained(
@@ -294,7 +277,8 @@ def load_pretrained(
     ------
     ValueError
         If there is no such policy or training seed, the signals differ, or the card differs from
-        the file name in environment, algorithm, training seed or controller.
+        the
+        file name in environment, algorithm, training seed or controller.
     """
     if name not in CONTROLLERS:
         raise ValueError(f"no policy named {name!r}{near(name, CONTROLLERS)}")
@@ -303,22 +287,20 @@ def load_pretrained(
     if seed not in files:
         raise ValueError(f"{name} has no training seed {seed}; there are: {list(files)}")
     policy = OnnxPolicy.load(files[seed], signals, action_signals)
-    _check_name(policy, CONTROLLERS[name], seed)
-    return policy
-
-
-def _check_name(policy: OnnxPolicy, entry: Entry, seed: int) -> None:
-    """Raise unless a policy's card agrees with its file name."""
-    card = policy.card
-    found = (card["env"], card["algo"], card["seed"], policy.corrects)
+    card, entry = policy.card, CONTROLLERS[name]
     algo = entry.file.split(".")[1].partition("-")[0]
-    named = (entry.envs[0], algo, seed, entry.baseline)
-    for what, is_, should in zip(("env", "algo", "seed", "baseline"), found, named, strict=True):
+    for what, is_, should in (
+        ("env", card["env"], entry.envs[0]),
+        ("algo", card["algo"], algo),
+        ("seed", card["seed"], seed),
+        ("baseline", policy.corrects, entry.baseline),
+    ):
         if is_ != should:
             raise PolicyFileError(
                 f"{policy.name} is by its card of {what} {is_!r}, and should be of {should!r}; "
                 "name files as they were trained"
             )
+    return policy
 
 
 def make_controller(

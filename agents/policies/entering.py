@@ -31,17 +31,7 @@ class Finished:
 
 @dataclass(frozen=True)
 class Entered:
-    """Result of an entry.
-
-    Attributes
-    ----------
-    controller : str
-        Name of the policies on the leaderboard.
-    files : tuple of Path
-        The policies.
-    replaced : tuple of Path
-        Earlier files of the same preset, overwritten or removed.
-    """
+    """Result of an entry: name on the leaderboard, the policies, and the files they replace."""
 
     controller: str
     files: tuple[Path, ...]
@@ -51,20 +41,10 @@ class Entered:
 def enter(folders: Sequence[Path], author: str = "") -> Entered:
     """Copy the policies of finished runs to ``agents/pretrained``, in place of earlier ones.
 
-    Everything is checked before anything is written.
-
-    Parameters
-    ----------
-    folders : sequence of Path
-        Of the runs, in any order.
-    author : str
-        In BibTeX form; empty for the authors of this package.
-
-    Raises
-    ------
-    ValueError
-        If a folder holds no sound policy, or the runs are not training seeds 0 to n - 1 of one
-        preset with its present settings.
+    Everything is checked before anything is written. ``author`` is in BibTeX form, empty for the
+    authors of this package. A ValueError names a folder without a sound policy, or says that the
+    runs
+    are not training seeds 0 to n - 1 of one preset with its present settings.
     """
     runs = sorted(map(_checked, folders), key=lambda run: run.seed)
     _check_together(runs)

@@ -16,16 +16,43 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor, nn
 
-from agents.policies import inputs
 from agents.settings.parts import Network
 from agents.settings.presets import ON_POLICY, Config
 from agents.settings.schema import SettingsError
 from pam_envs.parameters import Signals
+from pam_envs.wording import near
 
 ACTIVATIONS: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU, "elu": nn.ELU}
 Matrix = tuple[tuple[float, ...], ...]
 CRITIC = ("value_net.", "mlp_extractor.value_net.", "lstm_critic.", "critic.")
 """Prefixes of the critic's parameters in policies of stable-baselines3."""
+
+
+def present_inputs(config: Config, signals: Signals, actions: Signals) -> tuple[str, ...]:
+    """Return the names of a network's inputs, in order, without the history."""
+    corrected = actions if config.residual.controller else ()
+    return (*signals.names(), *(f"controller_{action.name}" for action in corrected))
+
+
+def input_names(config: Config, signals: Signals, actions: Signals) -> tuple[str, ...]:
+    """Return the names of the present inputs and of the history."""
+    past = config.history.signals
+    frames = range(1, config.history.frames + 1)
+    return (*present_inputs(config, signals, actions), *(f"{n}@{k}" for k in frames for n in past))
+
+
+def kept_inputs(config: Config, signals: Signals, actions: Signals) -> tuple[int, ...]:
+    """Return the indices of the inputs in the history."""
+    known = present_inputs(config, signals, actions)
+    return tuple(_index(known, name, "history.signals") for name in config.history.signals)
+
+
+def _index(known: tuple[str, ...], name: str, where: str) -> int:
+    """Return an input's index, or raise naming the nearest."""
+    name = name.strip()
+    if name not in known:
+        raise SettingsError(f"{where}: no signal named {name!r}{near(name, known)}")
+    return known.index(name)
 
 
 def input_matrix(network: Network, names: tuple[str, ...]) -> Matrix:
@@ -40,8 +67,8 @@ def input_matrix(network: Network, names: tuple[str, ...]) -> Matrix:
         if not minus:
             raise SettingsError(f"network.differences: {difference!r} must read 'a - b'")
         row = [0.0] * n
-        row[inputs.index(names, a, "network.differences")] += network.gain
-        row[inputs.index(names, b, "network.differences")] -= network.gain
+        row[_index(names, a, "network.differences")] += network.gain
+        row[_index(names, b, "network.differences")] -= network.gain
         rows.append(row)
     return tuple(tuple(row) for row in rows)
 
@@ -63,14 +90,9 @@ class LinearFeatures(BaseFeaturesExtractor):
 class LayersAndInputs(nn.Module):
     """Layers of policy and critic; the policy's output is joined by the inputs themselves.
 
-    Parameters
-    ----------
-    inputs, hidden, activation
-        Number of inputs, widths and activation of the layers.
-    recurrent : int
-        Width of a recurrent layer's output before the inputs; 0 for none.
-    critic : int
-        Width of what the critic reads.
+    ``recurrent`` is the width of a recurrent layer's output before the inputs, 0 for none;
+    ``critic``
+    the width of what the critic reads.
     """
 
     def __init__(
@@ -113,10 +135,7 @@ def _layers(inputs: int, hidden: list[int], activation: type[nn.Module]) -> nn.S
 class _LinearPath(ActorCriticPolicy):
     """Part of both structured policies: ``hold`` inputs pass through the linear path at first.
 
-    Parameters
-    ----------
-    hold : tuple of int
-        For each action, the input that the untrained policy returns; empty for none.
+    ``hold`` gives, for each action, the input that the untrained policy returns; empty for none.
     """
 
     def __init__(self, *args: Any, hold: tuple[int, ...] = (), **kwargs: Any) -> None:
@@ -181,13 +200,10 @@ def critic_alone(policy: Any, alone: bool) -> None:
 def policy_arguments(config: Config, signals: Signals, actions: Signals) -> dict[str, Any]:
     """Return ``policy`` and ``policy_kwargs`` for stable-baselines3.
 
-    Raises
-    ------
-    SettingsError
-        If a name is not that of a signal, or a held signal has another range than the action.
+    A SettingsError names what is no signal, or a held signal of another range than the action.
     """
     network = config.network
-    names = inputs.names(config, signals, actions)
+    names = input_names(config, signals, actions)
     kwargs: dict[str, Any] = {
         "net_arch": list(network.hidden),
         "activation_fn": ACTIVATIONS[network.activation],
@@ -217,7 +233,7 @@ def _held(config: Config, signals: Signals, actions: Signals) -> tuple[int, ...]
         raise SettingsError(f"network.hold must name {len(actions)} signals, one for each action")
     found = []
     for name, action in zip(network.hold, actions, strict=True):
-        found.append(inputs.index(tuple(signals.names()), name, "network.hold"))
+        found.append(_index(tuple(signals.names()), name, "network.hold"))
         held = signals[found[-1]]
         scaled = config.normalize.observation
         if scaled or (held.low, held.high) != (action.low, action.high):

@@ -143,14 +143,9 @@ class OnnxPolicy:
         episode_start: Any = None,
         controller: NDArray[np.float32] | None = None,
     ) -> tuple[NDArray[np.float32], Any]:
-        """Return the action, given the action of the controller that the policy corrects.
+        """Return the action, given that of the controller that the policy corrects.
 
-        Parameters
-        ----------
-        observation, state, episode_start
-            See :meth:`predict`.
-        controller : array of float32, shape of the action, optional
-            The controller's action for the same observation.
+        The other parameters are those of :meth:`predict`.
         """
         made = np.asarray(observation, np.float32)
         rows = made if made.ndim == 2 else made[None]

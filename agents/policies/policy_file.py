@@ -56,13 +56,7 @@ class PolicyFile:
 
 
 def read(path: str | Path) -> PolicyFile:
-    """Return the checked file.
-
-    Raises
-    ------
-    PolicyFileError
-        If it is not a small ONNX graph of plain arithmetic with a card.
-    """
+    """Return the checked file; a PolicyFileError unless it is plain arithmetic with a card."""
     path = Path(path)
     try:
         with path.open("rb") as file:
@@ -84,19 +78,11 @@ def read(path: str | Path) -> PolicyFile:
 
 
 def write_policy(path: Path, data: bytes, record: Mapping[str, Any]) -> None:
-    """Write a policy and, before it, its record with the policy's SHA-256.
+    """Write a policy ``*.onnx`` and, before it, its training record ``*.json`` with its SHA-256.
 
     A process that is killed at any moment leaves no policy that :func:`finished` accepts without
-    its record.
-
-    Parameters
-    ----------
-    path : Path
-        ``*.onnx``; the record goes to ``*.json``.
-    data : bytes
-        Of the policy.
-    record : mapping
-        Of the training: cost, and the author if named.
+    its
+    record.
     """
     said = {**record, "sha256": hashlib.sha256(data).hexdigest()}
     text = json.dumps(said, indent=1, sort_keys=True) + "\n"

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.policies import controllers
 from agents.policies.policy import OnnxPolicy
 from agents.policies.policy_file import PolicyFileError
+from baselines.core.catalogue import make_controller
 from baselines.core.recorded_answers import RecordedAnswers
 
 TOLERANCE = 1e-3
@@ -18,13 +18,7 @@ TOLERANCE = 1e-3
 
 
 class ResidualState(NamedTuple):
-    """States of both.
-
-    Attributes
-    ----------
-    controller : tuple of ndarray
-    policy : ndarray, shape (n_env, memory), or None
-    """
+    """States of the controller, and of the policy, shape (n_env, memory), if it has one."""
 
     controller: Any
     policy: NDArray[np.float32] | None
@@ -33,11 +27,8 @@ class ResidualState(NamedTuple):
 class ResidualPolicy:
     """Controller with the action ``controller's action + scale * policy``, clipped to its range.
 
-    Attributes
-    ----------
-    policy : OnnxPolicy
-    controller : Controller
-        Of :data:`baselines.core.catalogue.CONTROLLERS`, built from the nominal plant.
+    The controller, of :data:`baselines.core.catalogue.CONTROLLERS`, is built from the nominal
+    plant.
     """
 
     def __init__(self, policy: OnnxPolicy, controller: Any) -> None:
@@ -72,20 +63,13 @@ class ResidualPolicy:
 def with_controller(policy: OnnxPolicy, plant: Any) -> OnnxPolicy | ResidualPolicy:
     """Return a policy together with the controller that it corrects, if any.
 
-    Parameters
-    ----------
-    policy : OnnxPolicy
-    plant : object
-        Nominal plant of the controller; not used by other policies.
-
-    Raises
-    ------
-    PolicyFileError
-        If the controller, built from a plant of the training, does not give its recorded answers.
+    The controller is built from the nominal plant. A PolicyFileError says that the controller,
+    built
+    from a plant of the training, does not give its recorded answers.
     """
     if not policy.corrects:
         return policy
-    controller = controllers.make(policy.corrects, plant, policy.signals, policy.action_signals)
+    controller = make_controller(policy.corrects, plant, policy.signals, policy.action_signals)
     recorded, tolerance = _recorded(policy)
     if plant.digest() in recorded:
         deviation = recorded[plant.digest()].deviation(controller)
@@ -102,12 +86,9 @@ def _recorded(policy: OnnxPolicy) -> tuple[dict[str, RecordedAnswers], float]:
     """Return the controller's recorded answers by the plant's digest, and their tolerance."""
     widths = len(policy.signals), len(policy.action_signals)
     try:
-        baseline = policy.card["baseline"]
-        recorded = {
-            entry["plant"]: RecordedAnswers.from_dict(entry, *widths)
-            for entry in baseline["recorded"]
-        }
-        return recorded, TOLERANCE * float(baseline["scale"])
+        held = policy.card["baseline"]
+        found = {e["plant"]: RecordedAnswers.from_dict(e, *widths) for e in held["recorded"]}
+        return found, TOLERANCE * float(held["scale"])
     except (KeyError, TypeError, ValueError) as error:
         raise PolicyFileError(
             f"{policy.name}: its card has no sound record of the controller {policy.corrects!r} "

@@ -10,21 +10,16 @@ from agents.settings.schema import choice, number
 
 @dataclass(frozen=True)
 class Network:
-    """Network of the policy.
+    """Network of the policy; ``hidden`` are widths of the layers of policy and critic alike.
 
     Attributes
     ----------
-    hidden : tuple of int
-        Widths of the hidden layers, of policy and critic alike.
-    activation : {"tanh", "relu", "elu"}
     log_std_init : float
         PPO: logarithm of the initial standard deviation of the action, in its range [-1, 1].
     differences : tuple of str
         ``"a - b"`` with names of inputs: fixed extra inputs ``gain * (a - b)``, which scale up a
         tracking error of a few hundredths of the range. Inputs are the signals, a residual's
         ``controller_<action>``, and ``<signal>@1`` for ``history`` one period ago.
-    gain : float
-        Factor of the differences.
     linear : bool
         PPO: a linear path from the inputs to the action beside the layers, as in structured
         control nets (Srouji, Zhang, Salakhutdinov, ICML 2018).
@@ -56,14 +51,11 @@ class Normalize:
 class _OnPolicy:
     """Settings of PPO and recurrent PPO, with the names of stable-baselines3.
 
-    Attributes
-    ----------
-    learning_rate : tuple of float
-        First and last value, linear over the training.
-    warm_up : int
-        Number of first rollouts in which the critic alone learns, so that an untrained critic does
-        not spoil a policy that starts as a controller (Silver et al., Residual policy learning,
-        arXiv:1812.06298, 2018). The rate rises from 0 in as many rollouts after them.
+    The learning rate goes from its first to its last value, linearly over the training. In the
+    first
+    ``warm_up`` rollouts the critic learns alone, so that an untrained critic does not spoil a
+    policy
+    that starts as a controller (silver2018); in as many rollouts after them the rate rises from 0.
     """
 
     n_steps: int = number(32, 2, 100_000)
@@ -82,19 +74,14 @@ class _OnPolicy:
 
 @dataclass(frozen=True)
 class PPO(_OnPolicy):
-    """Proximal policy optimisation (Schulman et al. 2017)."""
+    """Proximal policy optimisation (schulman2017)."""
 
 
 @dataclass(frozen=True)
 class RecurrentPPO(_OnPolicy):
     """PPO with an LSTM before the layers (sb3-contrib).
 
-    Attributes
-    ----------
-    lstm_size : int
-        Width of the LSTM.
-    critic_lstm : bool
-        Whether the critic has its own LSTM; otherwise it sees the present inputs only.
+    Without ``critic_lstm`` the critic has no LSTM of its own and sees the present inputs only.
     """
 
     n_steps: int = number(64, 2, 100_000)
@@ -119,12 +106,12 @@ class _OffPolicy:
 
 @dataclass(frozen=True)
 class SAC(_OffPolicy):
-    """Soft actor-critic (Haarnoja et al. 2018)."""
+    """Soft actor-critic (haarnoja2018)."""
 
 
 @dataclass(frozen=True)
 class TQC(_OffPolicy):
-    """Truncated quantile critics (Kuznetsov et al. 2020)."""
+    """Truncated quantile critics (kuznetsov2020)."""
 
     top_quantiles_to_drop_per_net: int = number(2, 0, 24)
 
@@ -133,12 +120,7 @@ class TQC(_OffPolicy):
 class History:
     """Past signals among the inputs, since hysteresis hides a state that one observation lacks.
 
-    Attributes
-    ----------
-    frames : int
-        Number of past control periods; 0 for none.
-    signals : tuple of str
-        Names of the signals.
+    ``frames`` is the number of past control periods, 0 for none.
     """
 
     frames: int = number(0, 0, 256)
@@ -149,13 +131,10 @@ class History:
 class Residual:
     """A policy that corrects a controller: controller's action + ``scale`` * policy, clipped.
 
-    Attributes
-    ----------
-    controller : str
-        Name in :data:`baselines.core.catalogue.CONTROLLERS`. It is built from the nominal plant,
-        and its action is an input of the policy.
-    scale : float
-        Largest correction, as a share of half the action's range.
+    The controller, by its name in :data:`baselines.core.catalogue.CONTROLLERS`, is built from the
+    nominal plant, and its action is an input of the policy. ``scale`` is the largest correction, as
+    a
+    share of half the action's range.
     """
 
     controller: str = ""
@@ -166,12 +145,9 @@ class Residual:
 class Plants:
     """Plants of the training.
 
-    Attributes
-    ----------
-    randomize : bool
-        Whether every episode draws the assumed parameters within their declared ranges.
-    hysteresis : tuple of str
-        Hysteresis models among which the rows are divided; empty for the environment's default.
+    With ``randomize`` every episode draws the assumed parameters within their declared ranges. The
+    rows
+    are divided among the models of ``hysteresis``; none for the environment's default.
     """
 
     randomize: bool = False
@@ -194,8 +170,8 @@ class Evaluation:
     gate : tuple of str
         Entries of ``info`` that are all 1 at evaluated instants; none for all instants.
     objective : {"rms", "geometric", "return"}
-        Criterion for policies and settings: the error's RMS, the geometric mean of the kinds' RMS
-        (which weights ratios), or the return, for tasks with more than one error.
+        The error's RMS, the geometric mean of the kinds' RMS (which weights ratios), or the return,
+        for tasks with more than one error.
     env_kwargs : dict
         Arguments of the environment that differ from the training's.
     """
@@ -212,18 +188,10 @@ class Evaluation:
 class Search:
     """Budget of the search that chose the settings, for fair comparisons.
 
-    Attributes
-    ----------
-    trials : int or None
-        Number of settings tried; None if they were set by hand and not counted.
-    earlier : int
-        Number tried by the searches whose result it started from.
-    steps : int
-        Control periods of each training of a trial.
-    seed : int
-        Of the sampler.
-    note : str
-        Method of the search.
+    ``trials`` is the number of settings tried, None if they were set by hand and not counted;
+    ``earlier`` the number tried by the searches that it started from, ``steps`` the control periods
+    of
+    each training of a trial, ``note`` the method.
     """
 
     trials: int | None = number(None, 0, 10**6)

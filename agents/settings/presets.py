@@ -40,13 +40,8 @@ class Config:
 
     Attributes
     ----------
-    env : str
-        Id of a registered environment of this package.
-    algo : {"ppo", "sac", "tqc", "recurrent_ppo"}
-    steps : int
-        Control periods of all rows together.
-    num_envs : int
-        Rows of the batched environment.
+    steps, num_envs : int
+        Control periods of all rows together, and rows of the batched environment.
     checkpoint_steps : int
         Control periods between checkpoints.
     env_kwargs : dict
@@ -166,13 +161,7 @@ class Config:
 
 
 def check_env(name: str) -> None:
-    """Raise unless ``name`` is an environment of this package.
-
-    Raises
-    ------
-    SettingsError
-        Naming the nearest.
-    """
+    """Raise unless ``name`` is an environment of this package; the message names the nearest."""
     if not (ENV.fullmatch(name) and name in gym.registry):
         known = [env for env in gym.registry if ENV.fullmatch(env)]
         raise SettingsError(f"env = {name!r} is no environment here{near(name, known)}")
@@ -209,23 +198,14 @@ def preset_path(env: str, algo: str, variant: str = "") -> Path:
 
 
 def preset(env: str, algo: str, variant: str = "") -> Config:
-    """Return the preset of an environment, algorithm and variant.
-
-    Raises
-    ------
-    SettingsError
-        If there is none, naming the nearest.
-    """
+    """Return the preset of an environment, algorithm and variant; an error names the nearest."""
     return read(preset_path(env, algo, variant))
 
 
 def read(path: str | Path) -> Config:
     """Return the configuration in a YAML file.
 
-    Raises
-    ------
-    SettingsError
-        If the file is no YAML mapping, or a setting is unknown or out of bounds.
+    A SettingsError says that it is no YAML mapping, or which setting is unknown or out of bounds.
     """
     path = Path(path)
     given = _mapping(path)
@@ -290,13 +270,7 @@ def _merged(under: Any, over: Any) -> Any:
 
 
 def changed(config: Config, assignments: Sequence[str]) -> Config:
-    """Return the configuration with assignments like ``"ppo.gamma=0.95"`` applied.
-
-    Raises
-    ------
-    SettingsError
-        If an assignment has no ``=`` or names no setting.
-    """
+    """Return the configuration with assignments like ``"ppo.gamma=0.95"`` applied."""
     plain = config.as_dict()
     for assignment in assignments:
         name, equals, text = assignment.partition("=")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import math
 import types
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from pam_envs.wording import near
@@ -26,21 +27,10 @@ def choice(default: Any, *choices: str) -> Any:
 
 
 def build(cls: type, given: Any, where: str = "") -> Any:
-    """Return ``cls`` made from a mapping, every entry checked.
+    """Return ``cls``, a frozen dataclass, made from a mapping, every entry checked.
 
-    Parameters
-    ----------
-    cls : type
-        A frozen dataclass; nested ones are built from nested mappings.
-    given : mapping
-        Values by field name; other fields keep their defaults.
-    where : str
-        Dotted name of the mapping, for messages.
-
-    Raises
-    ------
-    SettingsError
-        Naming the entry, its value and the remedy.
+    Nested dataclasses are built from nested mappings, ``where`` is the mapping's dotted name for
+    messages. A SettingsError names the entry, its value and the remedy.
     """
     if not isinstance(given, Mapping):
         raise SettingsError(f"{where or 'the settings'} must be a mapping, got {given!r}")
@@ -75,16 +65,18 @@ def _value(kind: Any, value: Any, place: str) -> Any:
     if origin is tuple:
         return _several(get_args(kind), value, place)
     if origin is Literal:
-        if value not in get_args(kind):
-            raise SettingsError(
-                f"{place} = {value!r} is not known{near(str(value), [*get_args(kind)])}"
-            )
-        return value
+        return _known(value, get_args(kind), place)
     if origin in (dict, Mapping):
         if not isinstance(value, Mapping) or not all(isinstance(k, str) for k in value):
             raise SettingsError(f"{place} = {value!r} must be a mapping from names to values")
         return dict(value)
     return _plain(kind, value, place)
+
+
+def _known(value: Any, known: Sequence[str], place: str) -> Any:
+    if value not in known:
+        raise SettingsError(f"{place} = {value!r} is not known{near(str(value), [*known])}")
+    return value
 
 
 def _one_of(kinds: tuple[Any, ...], value: Any, place: str) -> Any:
@@ -113,8 +105,9 @@ def _plain(kind: Any, value: Any, place: str) -> Any:
         return value
     if kind is int and isinstance(value, int) and not isinstance(value, bool):
         return value
-    if kind is float and isinstance(value, str):
-        value = _number_in(value)
+    if kind is float and isinstance(value, str):  # YAML 1.1 reads 1e-3 as text
+        with suppress(ValueError):
+            value = float(value)
     numeric = isinstance(value, (int, float)) and not isinstance(value, bool)
     if kind is float and numeric and math.isfinite(value):
         return float(value)
@@ -124,18 +117,9 @@ def _plain(kind: Any, value: Any, place: str) -> Any:
     raise SettingsError(f"{place} = {value!r} must be {names.get(kind, kind)}")
 
 
-def _number_in(text: str) -> float | str:
-    """Return the number in a text, if any: YAML 1.1 reads 1e-3 as text."""
-    try:
-        return float(text)
-    except ValueError:
-        return text
-
-
 def _check_field(field: dataclasses.Field[Any], value: Any, place: str) -> None:
-    if "choices" in field.metadata and value not in field.metadata["choices"]:
-        known = list(field.metadata["choices"])
-        raise SettingsError(f"{place} = {value!r} is not known{near(str(value), known)}")
+    if "choices" in field.metadata:
+        _known(value, field.metadata["choices"], place)
     if "bounds" not in field.metadata or value is None or isinstance(value, str):
         return
     low, high = field.metadata["bounds"]

@@ -18,13 +18,7 @@ def first_training(seed: int) -> int:
 
 
 def tuning(count: int) -> list[int]:
-    """Return the seeds of ``count`` tuning episodes.
-
-    Raises
-    ------
-    ValueError
-        If there are fewer.
-    """
+    """Return the seeds of ``count`` tuning episodes; a ValueError if there are fewer."""
     if not 1 <= count <= MOST_TUNING:
         raise ValueError(
             f"evaluation.episodes = {count} must be from 1 to {MOST_TUNING}, the number of tuning "

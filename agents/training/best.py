@@ -17,16 +17,11 @@ UNTRAINED = "no later evaluation was better than the untrained policy's"
 class Best:
     """Weights and normaliser at the best of the evaluations so far.
 
-    Attributes
-    ----------
-    steps : int
-        Control periods of training at that evaluation; -1 before the first.
-    value : float
-        Criterion of the choice (:func:`agents.training.evaluation.value_of`): less is better.
-    weights : dict of Tensor
-        Of the policy.
-    moments : dict of ndarray
-        Of the observation's normaliser; empty without one.
+    ``steps`` are control periods of training at that evaluation, -1 before the first; ``value`` is
+    the
+    criterion of the choice (:func:`agents.training.evaluation.value_of`), less is better;
+    ``moments``
+    are those of the observation's normaliser, empty without one.
     """
 
     steps: int = -1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import torch
@@ -11,15 +12,14 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
 from agents.export.export import ALGORITHMS
-from agents.policies import inputs
-from agents.policies.controllers import make
-from agents.policies.networks import policy_arguments, silence
+from agents.policies.networks import kept_inputs, policy_arguments, silence
 from agents.settings import seeds
 from agents.settings.presets import ON_POLICY, Config
 from agents.settings.schema import SettingsError
 from agents.vec_envs.batch import make_batch_vec_env
 from agents.vec_envs.history import HistoryVecEnv
 from agents.vec_envs.residual import ResidualVecEnv
+from baselines.core.catalogue import make_controller
 
 OWN = ("learning_rate", "lstm_size", "critic_lstm", "warm_up")
 """Settings that are converted before the algorithm gets them."""
@@ -33,15 +33,10 @@ def make_env(config: Config) -> VecEnv:
     signals, actions = signals_of(env)
     corrected, scale = config.residual.controller, config.residual.scale
     if corrected:
-        env = ResidualVecEnv(
-            env, corrected, lambda plant: make(corrected, plant, signals, actions), scale
-        )
+        made = partial(make_controller, corrected, signals=signals, action_signals=actions)
+        env = ResidualVecEnv(env, corrected, made, scale)
     if config.history.frames:
-        env = HistoryVecEnv(env, inputs.kept(config, signals, actions), config.history.frames)
-    return _normalized(env, config)
-
-
-def _normalized(env: VecEnv, config: Config) -> VecEnv:
+        env = HistoryVecEnv(env, kept_inputs(config, signals, actions), config.history.frames)
     normalize = config.normalize
     if not (normalize.observation or normalize.reward):
         return env
@@ -59,16 +54,11 @@ def make_model(config: Config, seed: int, env: VecEnv) -> BaseAlgorithm:
     """Return the untrained model of a run, with all random generators seeded."""
     torch.set_num_threads(1)
     random.seed(seed)
-    chosen = config.chosen
-    arguments = {k: v for k, v in vars(chosen).items() if k not in OWN}
+    arguments = {k: v for k, v in vars(config.chosen).items() if k not in OWN}
     arguments |= policy_arguments(config, *signals_of(env))
-    model = ALGORITHMS[config.algo](
-        env=env,
-        learning_rate=learning_rate(config),
-        seed=seed,
-        device="cpu",
-        **arguments,
-    )
+    rate = learning_rate(config)
+    made = ALGORITHMS[config.algo]
+    model = made(env=env, learning_rate=rate, seed=seed, device="cpu", **arguments)
     if config.residual.controller:
         silence(model.policy)
     env.seed(seeds.first_training(seed))
@@ -84,10 +74,7 @@ def warm_up_steps(config: Config) -> int:
 def learning_rate(config: Config) -> Callable[[float], float]:
     """Return the learning rate as a function of the remaining share of the training.
 
-    Raises
-    ------
-    SettingsError
-        If the critic warm-up lasts to the end.
+    A SettingsError says that the critic's warm-up lasts to the end.
     """
     start, end = config.chosen.learning_rate
     alone = warm_up_steps(config)

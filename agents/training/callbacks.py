@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from pathlib import Path
 from typing import Any
 
 from stable_baselines3.common.callbacks import BaseCallback
@@ -17,7 +16,7 @@ from agents.training import checkpoint, snapshot
 from agents.training.best import Best
 from agents.training.building import warm_up_steps
 from agents.training.evaluation import Score, evaluate, value_of
-from agents.training.record import Clock
+from agents.training.record import Clock, Run
 from sweeps.worker import is_needed
 
 PARTS, PASSES = 16, 10
@@ -91,14 +90,9 @@ class PeriodicCallback(RolloutCallback):
 class Evaluations(PeriodicCallback):
     """Evaluate the policy on tuning seeds, for TensorBoard, the card and the choice of the best.
 
-    The first evaluation is before any training: that of a residual is its controller's.
-
-    Attributes
-    ----------
-    found : list of dict
-        The card's entries.
-    best : Best
-        The best policy so far, which is exported at the end.
+    The first evaluation is before any training: that of a residual is its controller's. ``found``
+    are
+    the card's entries, ``best`` is the best policy so far, which is exported at the end.
     """
 
     def __init__(self, config: Config, found: list[dict[str, Any]], best: Best) -> None:
@@ -140,24 +134,12 @@ def score_of(model: Any, config: Config) -> Score:
 
 
 class Checkpoints(PeriodicCallback):
-    """Write checkpoints.
+    """Write checkpoints; the evaluations act before, so that one holds that of its step."""
 
-    Parameters
-    ----------
-    path : Path
-    config : Config
-    seed : int
-    clock : Clock
-    evaluations : Evaluations
-        Called before: a checkpoint holds the evaluation of its step.
-    """
-
-    def __init__(
-        self, path: Path, config: Config, seed: int, clock: Clock, evaluations: Evaluations
-    ) -> None:
-        super().__init__(config.checkpoint_steps)
-        self.path = path
-        self.settings = {"config": config.as_dict(), "seed": seed}
+    def __init__(self, run: Run, clock: Clock, evaluations: Evaluations) -> None:
+        super().__init__(run.config.checkpoint_steps)
+        self.path = run.checkpoint
+        self.settings = {"config": run.config.as_dict(), "seed": run.seed}
         self.clock = clock
         self.evaluations = evaluations
 

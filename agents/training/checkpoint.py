@@ -17,7 +17,6 @@ import torch
 from agents.policies.policy_file import TEMPORARY, write_atomically
 
 MARK = b"PAMCKPT1"
-NAME = "checkpoint.pt"
 
 
 class CheckpointError(ValueError):
@@ -39,13 +38,7 @@ def save(path: Path, content: dict[str, Any]) -> None:
 
 
 def load(path: Path) -> dict[str, Any]:
-    """Read a checkpoint of :func:`save`; arrays come back as tensors.
-
-    Raises
-    ------
-    CheckpointError
-        If there is none, it is damaged, or it is another kind of file.
-    """
+    """Read a checkpoint of :func:`save`, unless it is damaged; arrays come back as tensors."""
     try:
         data = path.read_bytes()
     except OSError as error:

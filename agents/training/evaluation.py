@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pam_envs  # noqa: F401  (registers the environments)
-from agents.policies import controllers
 from agents.policies.policy import OnnxPolicy
 from agents.policies.residual import with_controller
 from agents.settings import seeds
 from agents.settings.presets import Config
+from baselines.core.catalogue import make_controller
 
 TRAVEL = "effort/pressure_travel"
 MORE_TRAVEL = 1.05
@@ -70,14 +70,7 @@ def value_of(score: Score, config: Config, travel: float | None = None) -> float
     """Return the criterion of ``evaluation.objective``: less is better, infinite if unknown.
 
     Each episode that a limit ended adds the whole error again (a return includes such ends), and a
-    residual with more travel than its controller is penalised in proportion.
-
-    Parameters
-    ----------
-    score : Score
-    config : Config
-    travel : float, optional
-        The travel [Pa] of the controller that a residual corrects.
+    residual with more travel [Pa] than its controller's ``travel`` is penalised in proportion.
     """
     objective = config.evaluation.objective
     if objective == "return":
@@ -101,8 +94,9 @@ def evaluate(policy: OnnxPolicy | str, config: Config, episodes: int | None = No
     config : Config
         Its ``evaluation`` defines the evaluated instants.
     episodes : int, optional
-        Number of episodes, split evenly among the kinds of rows (at least one each), which have
-        the same seeds; default: that of ``evaluation``.
+        Split evenly among the kinds of rows (at least one each), which have the same seeds;
+        default:
+        that of ``evaluation``.
     """
     count = config.evaluation.episodes if episodes is None else episodes
     kinds = config.kinds()
@@ -122,16 +116,7 @@ def evaluate(policy: OnnxPolicy | str, config: Config, episodes: int | None = No
 
 
 class _Part:
-    """The episodes of one kind of rows, as one batch.
-
-    Attributes
-    ----------
-    returns : array, shape (n_episodes,)
-    squares, travel : float
-        Sums over the evaluated instants.
-    counted, failures : int
-        Numbers of evaluated instants and of failed episodes.
-    """
+    """The episodes of one kind of rows, as one batch, with sums over the evaluated instants."""
 
     def __init__(
         self, policy: OnnxPolicy | str, config: Config, kwargs: dict[str, Any], chosen: list[int]
@@ -141,7 +126,7 @@ class _Part:
         )
         base: Any = env.unwrapped
         controller: Any = (
-            controllers.make(policy, base.plant, base.signals, base.action_signals)
+            make_controller(policy, base.plant, base.signals, base.action_signals)
             if isinstance(policy, str)
             else with_controller(policy, base.plant)
         )

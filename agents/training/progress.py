@@ -11,15 +11,7 @@ from sweeps.progress import Advance, Start
 
 
 class TrainingProgress(RolloutCallback):
-    """Report steps, rate and the mean return of the last 100 episodes.
-
-    Parameters
-    ----------
-    total : int
-        Control periods of the whole training.
-    start : callable
-        Of :func:`sweeps.progress.progress`.
-    """
+    """Report steps, rate and the mean return of the last 100 episodes."""
 
     def __init__(self, total: int, start: Start) -> None:
         super().__init__()
@@ -32,13 +24,10 @@ class TrainingProgress(RolloutCallback):
         self.first = self.done = self.model.num_timesteps
         self.advance: Advance = self.start(self.total, self.first)
 
-    def _on_rollout_start(self) -> None:
-        self._report()
-
     def _on_training_end(self) -> None:
-        self._report()
+        self._on_rollout_start()
 
-    def _report(self) -> None:
+    def _on_rollout_start(self) -> None:
         fresh, self.done = self.model.num_timesteps - self.done, self.model.num_timesteps
         rate = (self.done - self.first) / max(time.perf_counter() - self.began, 1e-9)
         returns = [float(episode["r"]) for episode in self.model.ep_info_buffer or ()]

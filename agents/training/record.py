@@ -1,29 +1,110 @@
-"""Cost of a training: time, machine and the number of settings tried before it."""
+"""Training run: its settings and folder, how to repeat it, and what it cost."""
 
 from __future__ import annotations
 
+import dataclasses
+import hashlib
+import json
 import os
 import platform
 import time
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+from agents.policies.policy_file import POLICY, finished
+from agents.settings import presets as configs
 from agents.settings import seeds
 from agents.settings.presets import Config
+from agents.settings.schema import SettingsError
+from sweeps.versions import versions_of
 
+ROOT = Path(__file__).resolve().parents[2]
+SOURCES = ("agents", "baselines", "pam_envs")
+PACKAGES = (
+    *("numpy", "scipy", "numba", "gymnasium"),
+    *("torch", "stable_baselines3", "sb3_contrib", "onnx"),
+)
+CHECKPOINT = "checkpoint.pt"
 CPU_FILE = Path("/proc/cpuinfo")
+
+
+@dataclass(frozen=True)
+class Run:
+    """A training run in an absolute folder; ``seed`` is that of weights, exploration and episodes.
+
+    Workers of a cluster that share the folder continue from each other's checkpoints.
+    """
+
+    config: Config
+    seed: int
+    folder: Path
+
+    @property
+    def checkpoint(self) -> Path:
+        """Path of the checkpoint."""
+        return self.folder / CHECKPOINT
+
+    @property
+    def key(self) -> str:
+        """Digest of settings, seed, folder, package versions and code.
+
+        A worker with other code or packages computes another key and refuses the training.
+        """
+        parts = [self.config.as_dict(), self.seed, str(self.folder), versions_of(PACKAGES), code()]
+        return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:32]
+
+    def finished(self) -> bool:
+        """Return whether the folder holds the policy and its record, not of other settings."""
+        card = finished(self.folder / POLICY)
+        if card is None:
+            return False
+        if configs.from_mapping(card.get("config")) != self.config or card["seed"] != self.seed:
+            raise SettingsError(
+                f"{self.folder} holds a policy of other settings; give another --out"
+            )
+        return True
+
+    def command(self) -> str:
+        """Return the command that trains the same policy again.
+
+        Without a preset of these settings it takes them from ``policy.onnx``.
+        """
+        config = self.config
+        words = ["python -m agents train", config.env, "--algo", config.algo]
+        words += ["--steps", str(config.steps), "--seed", str(self.seed)]
+        variant = self._variant()
+        if variant is None:
+            words += ["--config", POLICY]
+        elif variant:
+            words += ["--variant", variant]
+        return " ".join(words)
+
+    def _variant(self) -> str | None:
+        """Return the variant of the preset with these settings, None without one."""
+        config = self.config
+        for env, algo, variant in configs.presets():
+            if (env, algo) == (config.env, config.algo):
+                preset = configs.preset(env, algo, variant)
+                if dataclasses.replace(preset, steps=config.steps, search=config.search) == config:
+                    return variant
+        return None
+
+
+@cache
+def code() -> str:
+    """Return a digest of the Python files that a training runs, as first read by this process."""
+    state = hashlib.sha256()
+    for path in sorted(path for name in SOURCES for path in (ROOT / name).rglob("*.py")):
+        state.update(path.relative_to(ROOT).as_posix().encode())
+        state.update(path.read_bytes())
+    return state.hexdigest()[:16]
 
 
 @dataclass
 class Clock:
-    """Time spent on a run, over all interruptions.
-
-    Attributes
-    ----------
-    wall, cpu : float
-        Spent before [s], from the checkpoint.
-    """
+    """Time spent on a run, over all interruptions: that before [s] is from the checkpoint."""
 
     wall: float = 0.0
     cpu: float = 0.0
@@ -51,24 +132,11 @@ def hardware() -> str:
     return f"{model} ({platform.machine()}), {os.cpu_count() or 1} cores, one used"
 
 
-def cost(
-    config: Config, seed: int, command: str, spent: dict[str, float], steps: int
-) -> dict[str, Any]:
+def cost(run: Run, spent: dict[str, float], steps: int) -> dict[str, Any]:
     """Return the entry ``training`` of the record beside a policy.
 
+    ``spent`` is of :meth:`Clock.spent`, ``steps`` are control periods done, in whole rollouts.
     ``tuning_trials`` is None for settings that were chosen by hand and not counted.
-
-    Parameters
-    ----------
-    config : Config
-    seed : int
-        Training seed.
-    command : str
-        Repeats this training.
-    spent : mapping
-        Of :meth:`Clock.spent`.
-    steps : int
-        Control periods done, in whole rollouts.
     """
     return {
         "steps": steps,
@@ -76,9 +144,9 @@ def cost(
         "cpu_seconds": round(spent["cpu"], 1),
         "frames_per_second": round(steps / max(spent["wall"], 1e-9)),
         "hardware": hardware(),
-        "seed": seed,
-        "first_env_seed": seeds.first_training(seed),
-        "tuning_seeds": [seeds.TUNING, max(config.evaluation.episodes, 0)],
-        "tuning_trials": config.search.trials,
-        "command": command,
+        "seed": run.seed,
+        "first_env_seed": seeds.first_training(run.seed),
+        "tuning_seeds": [seeds.TUNING, max(run.config.evaluation.episodes, 0)],
+        "tuning_trials": run.config.search.trials,
+        "command": run.command(),
     }

@@ -12,6 +12,7 @@ from rich.console import Console
 
 from agents.settings import presets as configs
 from agents.training import train
+from agents.training.record import Run
 
 QUIET = Console(quiet=True)
 
@@ -88,7 +89,7 @@ def kind(name: str, **changes: Any) -> configs.Config:
 
 def trained(folder: Path, config: configs.Config, seed: int = 3) -> Any:
     """Train and return the model; the folder holds checkpoint and policy."""
-    run = train.Run(config, seed, folder)
+    run = Run(config, seed, folder)
     model = train.start(run)
     train.train(run, model, QUIET)
     return model
@@ -98,7 +99,7 @@ class Killed(Exception):
     """Takes the place of a kill."""
 
 
-def killed_after(run: train.Run, steps: int) -> None:
+def killed_after(run: Run, steps: int) -> None:
     """Train, and stop without any clean-up once ``steps`` are passed."""
     model = train.start(run)
     ordinary = model.collect_rollouts

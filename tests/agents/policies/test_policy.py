@@ -32,7 +32,8 @@ from agents.policies.policy import OnnxPolicy
 from agents.policies.policy_file import CARD, MOST_BYTES, PolicyFileError, finished, write_policy
 from agents.settings import presets as configs
 from agents.settings.schema import SettingsError
-from agents.training import checkpoint, sweep
+from agents.training import checkpoint
+from agents.training.record import CHECKPOINT, Run
 from agents.training.train import saved_run
 from agents.vec_envs.batch import make_batch_vec_env
 from pam_envs.parameters import Signals
@@ -233,10 +234,10 @@ class Gift:
         (folder / "gift.py").write_text(f"open({str(self.marker)!r}, 'w')\n")
         config = {**tiny().as_dict(), "env": self.env}
         (folder / "config.yaml").write_text(yaml.safe_dump(config))
-        content = checkpoint.load(policy.with_name(checkpoint.NAME))
+        content = checkpoint.load(policy.with_name(CHECKPOINT))
         settings = json.loads(content["settings"])
         content["settings"] = json.dumps({**settings, "config": config})
-        checkpoint.save(folder / checkpoint.NAME, content)
+        checkpoint.save(folder / CHECKPOINT, content)
         model = onnx.load_model(policy)
         card = {**OnnxPolicy.load(policy).card, "env": self.env, "config": config}
         del model.metadata_props[:]
@@ -265,7 +266,7 @@ def test_settings_cannot_import_a_module(
     with pytest.raises(SettingsError, match="is no environment here"):
         saved_run(tmp_path)
     with pytest.raises(SettingsError, match="is no environment here"):
-        sweep.Training(tiny(), 3, tmp_path).finished()
+        Run(tiny(), 3, tmp_path).finished()
     assert main(["show", str(tmp_path / "policy.onnx")]) == 0
     assert not gift.marker.exists()
 

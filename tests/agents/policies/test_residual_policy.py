@@ -15,7 +15,7 @@ from short_runs import ID, kind, tiny
 
 from agents.export import recording
 from agents.export.export import facts
-from agents.policies import catalogue, controllers
+from agents.policies import catalogue
 from agents.policies.policy import OnnxPolicy
 from agents.policies.policy_file import PolicyFileError
 from agents.policies.residual import ResidualPolicy, ResidualState, with_controller
@@ -25,11 +25,14 @@ from agents.training import checkpoint
 from agents.training.building import make_env, signals_of
 from agents.vec_envs.residual import ResidualVecEnv, parts_of
 from baselines.core import catalogue as baselines
+from baselines.core.catalogue import make_controller
 from baselines.core.recorded_answers import RecordedAnswers
 
 LAWS = ("maxwell_slip", "preisach")
 BOTH_LAWS = ("PAM/MusclePositioning-v0", "PAM/KneeTension-v0")
 RESIDUALS = sorted(key for key in configs.presets() if "residual" in key[2])
+
+MAKE = "agents.policies.residual.make_controller"
 
 
 @pytest.fixture
@@ -56,7 +59,7 @@ def test_card_holds_the_controllers_answers_on_every_plant(file: OnnxPolicy) -> 
     assert [entry["plant"] for entry in known["recorded"]] == file.card["plants"]
     for law, entry in zip(LAWS, known["recorded"], strict=True):
         env = gym.make(ID, hysteresis=law).unwrapped
-        controller = controllers.make("inverse_pid", env.plant, env.signals, env.action_signals)
+        controller = make_controller("inverse_pid", env.plant, env.signals, env.action_signals)
         seen = RecordedAnswers.from_dict(entry, len(file.signals), len(file.action_signals))
         assert np.ptp(seen.observations, axis=0).max() > 1e-3
         assert seen.travel > 1e-2
@@ -78,20 +81,24 @@ class Shifted:
 def test_controller_with_other_answers_is_refused(
     law: str, file: OnnxPolicy, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plant, make = plant_with(law), controllers.make
+    plant, make = plant_with(law), make_controller
     assert isinstance(with_controller(file, plant), ResidualPolicy)
 
     def later(*told: Any) -> Any:
         made = make(*told)
         return dataclasses.replace(made, inverse=_with_horizon(made.inverse))
 
-    monkeypatch.setattr(controllers, "make", later)
+    monkeypatch.setattr(MAKE, later)
     with pytest.raises(PolicyFileError, match=r"answers otherwise: by 0.* of at most 0.0003"):
         with_controller(file, plant)
-    monkeypatch.setattr(controllers, "make", lambda *told: Shifted(make(*told), 1e-3))
+    monkeypatch.setattr(
+        "agents.policies.residual.make_controller", lambda *parts: Shifted(make(*parts), 1e-3)
+    )
     with pytest.raises(PolicyFileError, match="answers otherwise"):
         with_controller(file, plant)
-    monkeypatch.setattr(controllers, "make", lambda *told: Shifted(make(*told), 1e-7))
+    monkeypatch.setattr(
+        "agents.policies.residual.make_controller", lambda *parts: Shifted(make(*parts), 1e-7)
+    )
     assert isinstance(with_controller(file, plant), ResidualPolicy)
 
 
@@ -221,7 +228,7 @@ def test_residual_has_the_controllers_model_output() -> None:
     assert isinstance(state, ResidualState)
     assert made.model_output(state) == 14
     env = make_env(tiny())
-    plain = controllers.make("inverse", parts_of(env)[0][1], *signals_of(env))
+    plain = make_controller("inverse", parts_of(env)[0][1], *signals_of(env))
     assert not hasattr(ResidualPolicy(Adds(), plain), "model_output")  # type: ignore[arg-type]
 
 

@@ -9,8 +9,7 @@ import gymnasium as gym
 import pytest
 from short_runs import ID
 
-from agents.policies import inputs
-from agents.policies.networks import input_matrix
+from agents.policies.networks import input_matrix, input_names
 from agents.settings import presets as configs
 from agents.settings import seeds
 from agents.settings.parts import TQC, Network, Search
@@ -28,7 +27,7 @@ def test_preset_fits_its_environment(env: str, algo: str, variant: str) -> None:
     config = configs.preset(env, algo, variant)
     assert (config.env, config.algo) == (env, algo)
     made = gym.make(env, **config.env_kwargs).unwrapped
-    names = inputs.names(config, made.signals, made.action_signals)
+    names = input_names(config, made.signals, made.action_signals)
     matrix = input_matrix(config.network, names)
     assert len(matrix) == len(names) + len(config.network.differences)
     info = made.reset(seed=seeds.TUNING)[1]

@@ -15,6 +15,7 @@ from agents.policies.policy import OnnxPolicy
 from agents.settings import presets as configs
 from agents.training import best, callbacks, train
 from agents.training.evaluation import Score
+from agents.training.record import Run
 
 NORMALIZED = {"observation": True, "reward": True}
 WIDE = {"ppo": NARROW, "sac": NARROW, "tqc": NARROW, "recurrent_ppo": {"hidden": [16]}}
@@ -33,13 +34,13 @@ class Judge:
         return Score(rms=self.values[model.num_timesteps], mean_return=0.0, failures=0)
 
 
-def run_in(folder: Path, algo: str = "ppo", **changes: Any) -> train.Run:
+def run_in(folder: Path, algo: str = "ppo", **changes: Any) -> Run:
     config = tiny(algo, **{"network": WIDE[algo], "evaluation": LOOK, **changes})
-    return train.Run(config, 3, folder)
+    return Run(config, 3, folder)
 
 
 def judged(
-    run: train.Run, values: dict[int, float], monkeypatch: pytest.MonkeyPatch
+    run: Run, values: dict[int, float], monkeypatch: pytest.MonkeyPatch
 ) -> tuple[Judge, Any, dict[str, Any]]:
     """Train under a judge; return it, the model in the end and the card."""
     judge = Judge(values)
@@ -81,7 +82,7 @@ def test_command_prints_the_evaluations(
 def test_normaliser_is_that_of_the_best(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = run_in(tmp_path / "whole", normalize=NORMALIZED)
     _, model, _ = judged(run, {0: 5.0, 512: 1.0, 1024: 3.0}, monkeypatch)
-    half = train.Run(run.config, 3, tmp_path / "half")
+    half = Run(run.config, 3, tmp_path / "half")
     _, other, _ = judged(half, {0: 5.0, 512: 4.0, 1024: 3.0}, monkeypatch)
     mine, theirs = (m.get_vec_normalize_env().obs_rms for m in (model, other))
     assert mine.count == theirs.count

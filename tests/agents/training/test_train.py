@@ -30,6 +30,7 @@ from agents.settings.parts import Evaluation
 from agents.training import checkpoint, train
 from agents.training.building import make_env, make_model
 from agents.training.checkpoint import MARK, CheckpointError
+from agents.training.record import CHECKPOINT, Run
 from agents.vec_envs.batch import make_batch_vec_env
 from benchmarks.scenarios import scenario as scenarios
 from tests.sweeps.processes_of import wait_until
@@ -42,7 +43,7 @@ def test_resumed_run_equals_the_uninterrupted_one(
     name: str, tmp_path: Path, short_run: Callable[[str], tuple[Any, Path]]
 ) -> None:
     whole, folder = short_run(name)
-    run = train.Run(kind(name), 3, tmp_path)
+    run = Run(kind(name), 3, tmp_path)
     killed_after(run, 700)
     again = train.saved_run(tmp_path)
     assert again == run
@@ -58,7 +59,7 @@ def test_resumed_run_restores_the_normaliser(
     tmp_path: Path, normalized_ppo: tuple[Any, Path]
 ) -> None:
     whole, folder = normalized_ppo
-    run = train.Run(tiny(**_parts(whole, folder)), 3, tmp_path)
+    run = Run(tiny(**_parts(whole, folder)), 3, tmp_path)
     killed_after(run, 512)
     model = train.resume(train.saved_run(tmp_path))
     train.train(run, model, QUIET)
@@ -93,11 +94,11 @@ def test_a_killed_process_resumes_from_the_command_line(tmp_path: Path) -> None:
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    wait_until(lambda: (folder / checkpoint.NAME).exists() or process.poll() is not None)
+    wait_until(lambda: (folder / CHECKPOINT).exists() or process.poll() is not None)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
     (folder / "checkpoint.pt.1.tmp").write_bytes(b"half")
-    saved = checkpoint.load(folder / checkpoint.NAME)["snapshot"]["counters"]["num_timesteps"]
+    saved = checkpoint.load(folder / CHECKPOINT)["snapshot"]["counters"]["num_timesteps"]
     assert 0 < saved < 20_000
     assert not (folder / "policy.onnx").exists()
     assert main(["train", ID, "--resume", "--out", str(folder)]) == 0
@@ -109,7 +110,7 @@ def test_a_killed_process_resumes_from_the_command_line(tmp_path: Path) -> None:
 def test_an_interrupted_write_leaves_the_old_checkpoint(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    file = tmp_path / checkpoint.NAME
+    file = tmp_path / CHECKPOINT
     checkpoint.save(file, {"a": np.arange(3)})
     before = file.read_bytes()
 
@@ -124,7 +125,7 @@ def test_an_interrupted_write_leaves_the_old_checkpoint(
 
 
 def test_damaged_or_foreign_checkpoint_is_refused(tmp_path: Path) -> None:
-    file = tmp_path / checkpoint.NAME
+    file = tmp_path / CHECKPOINT
     checkpoint.save(file, {"a": np.arange(300)})
     good = file.read_bytes()
     for bad, message in (
@@ -149,7 +150,7 @@ def test_a_checkpoint_cannot_run_code(tmp_path: Path) -> None:
 
     torch.save({"settings": Doctored()}, tmp_path / "inner.pt")
     for payload in ((tmp_path / "inner.pt").read_bytes(), pickle.dumps(Doctored())):
-        file = tmp_path / checkpoint.NAME
+        file = tmp_path / CHECKPOINT
         file.write_bytes(MARK + hashlib.sha256(payload).digest() + payload)
         with pytest.raises(CheckpointError, match="was not opened"):
             checkpoint.load(file)
@@ -161,21 +162,21 @@ def test_a_run_is_neither_overwritten_nor_resumed_with_other_settings(
     ppo: tuple[Any, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = str(ppo[1])
-    before = (ppo[1] / checkpoint.NAME).read_bytes()
+    before = (ppo[1] / CHECKPOINT).read_bytes()
     assert main(["train", ID, "--out", folder]) == 2
     assert "already holds a training" in capsys.readouterr().err
     assert main(["train", ID, "--out", folder, "--resume", "--set", "ppo.gamma=0.5"]) == 2
     assert "keeps the settings" in capsys.readouterr().err
     assert main(["train", ID, "--out", str(tmp_path / "none"), "--resume"]) == 2
     assert "no checkpoint" in capsys.readouterr().err
-    assert (ppo[1] / checkpoint.NAME).read_bytes() == before
+    assert (ppo[1] / CHECKPOINT).read_bytes() == before
 
 
 def test_run_is_not_resumed_on_a_changed_plant(ppo: tuple[Any, Path], tmp_path: Path) -> None:
-    content = checkpoint.load(ppo[1] / checkpoint.NAME)
+    content = checkpoint.load(ppo[1] / CHECKPOINT)
     digest = ppo[0].get_env().get_attr("plant")[0].digest()
     content["settings"] = content["settings"].replace(digest, "0123456789abcdef")
-    checkpoint.save(tmp_path / checkpoint.NAME, content)
+    checkpoint.save(tmp_path / CHECKPOINT, content)
     with pytest.raises(CheckpointError, match=r"trained on the plants .*train anew"):
         train.resume(train.saved_run(tmp_path))
 
@@ -194,8 +195,8 @@ def test_policy_without_its_record_is_exported_again(
     tmp_path: Path, short_run: Callable[[str], tuple[Any, Path]]
 ) -> None:
     _, folder = short_run("ppo")
-    run = train.Run(kind("ppo"), 3, tmp_path)
-    for name in (checkpoint.NAME, "policy.onnx"):  # without its record
+    run = Run(kind("ppo"), 3, tmp_path)
+    for name in (CHECKPOINT, "policy.onnx"):  # without its record
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     assert train.train_to_the_end(run, QUIET) == tmp_path / "policy.onnx"
     assert (tmp_path / "policy.onnx").read_bytes() == (folder / "policy.onnx").read_bytes()
@@ -254,7 +255,7 @@ def test_evaluations_do_not_change_the_training(
 ) -> None:
     _, watched = short_run("history")
     trained(tmp_path, dataclasses.replace(kind("history"), evaluation=Evaluation()))
-    ends = [checkpoint.load(folder / checkpoint.NAME) for folder in (watched, tmp_path)]
+    ends = [checkpoint.load(folder / CHECKPOINT) for folder in (watched, tmp_path)]
     mine, theirs = (end["snapshot"]["parameters"]["policy"] for end in ends)
     assert all(torch.equal(mine[name], theirs[name]) for name in theirs)
     card = OnnxPolicy.load(tmp_path / "policy.onnx").card
@@ -266,19 +267,19 @@ def test_finished_run_is_kept_and_another_refused(
 ) -> None:
     _, folder = short_run("ppo")
     before = (folder / "policy.json").stat().st_mtime_ns
-    run = train.Run(kind("ppo"), 3, folder)
+    run = Run(kind("ppo"), 3, folder)
     assert train.train_to_the_end(run, QUIET) == folder / "policy.onnx"
     assert (folder / "policy.json").stat().st_mtime_ns == before
     with pytest.raises(CheckpointError, match="other settings"):
-        train.train_to_the_end(train.Run(kind("ppo"), 4, folder), QUIET)
+        train.train_to_the_end(Run(kind("ppo"), 4, folder), QUIET)
 
 
 def test_the_command_names_the_variant() -> None:
     preset = configs.preset(ID, "ppo", "residual")
-    command = train.Run(preset, 7, Path("x")).command()
+    command = Run(preset, 7, Path("x")).command()
     assert command.endswith(f"--steps {preset.steps} --seed 7 --variant residual")
     other = configs.changed(preset, ["residual.scale=0.123"])
-    assert train.Run(other, 7, Path("x")).command().endswith("--config policy.onnx")
+    assert Run(other, 7, Path("x")).command().endswith("--config policy.onnx")
 
 
 def test_learning_improves_the_return(tmp_path: Path) -> None:
@@ -286,7 +287,7 @@ def test_learning_improves_the_return(tmp_path: Path) -> None:
         configs.preset(ID, "ppo"),
         ["steps=200_000", "num_envs=64", "env_kwargs.load=2.55", "env_kwargs.episode_seconds=4.0"],
     )
-    run = train.Run(config, 1, tmp_path)
+    run = Run(config, 1, tmp_path)
     model = train.start(run)
     env = make_batch_vec_env(ID, 32, reference="mixed", episode_seconds=4.0)
 

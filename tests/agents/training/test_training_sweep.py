@@ -19,7 +19,8 @@ from agents.export import export
 from agents.policies import policy_file
 from agents.settings import presets as configs
 from agents.settings.schema import SettingsError
-from agents.training import callbacks, sweep, train
+from agents.training import callbacks, record, sweep, train
+from agents.training.record import Run
 from sweeps.engine import Cluster
 from tests.sweeps.dask_processes import DaskProcesses
 from tests.sweeps.processes_of import alive, new_family, start, wait_until
@@ -48,7 +49,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[int, bytes]:
     """Return the policies of undisturbed trainings, by seed."""
     policies = {}
     for seed in SEEDS:
-        run = train.Run(CONFIG, seed, tmp_path_factory.mktemp(f"seed{seed}"))
+        run = Run(CONFIG, seed, tmp_path_factory.mktemp(f"seed{seed}"))
         policies[seed] = train.train_to_the_end(run, QUIET).read_bytes()
     return policies
 
@@ -153,11 +154,11 @@ def test_policy_of_a_remote_worker_is_stored(
 
 
 def test_policy_of_other_settings_is_refused(tmp_path: Path, ppo: tuple[object, Path]) -> None:
-    def training(config: configs.Config, seed: int) -> sweep.Training:
-        return sweep.Training(config, seed, ppo[1])
+    def training(config: configs.Config, seed: int) -> Run:
+        return Run(config, seed, ppo[1])
 
     assert training(tiny(), 3).finished()
-    assert not sweep.Training(tiny(), 3, tmp_path).finished()
+    assert not Run(tiny(), 3, tmp_path).finished()
     for other in (training(tiny(steps=2048), 3), training(tiny(), 4)):
         with pytest.raises(SettingsError, match="give another --out"):
             other.finished()
@@ -167,14 +168,13 @@ def test_policy_without_its_record_is_trained_again(
     tmp_path: Path, whole: dict[int, bytes]
 ) -> None:
     """A process may be killed between the two files."""
-    run = train.Run(CONFIG, 3, tmp_path / "there")
-    train.train_to_the_end(run, QUIET)
-    training = sweep.Training(CONFIG, 3, run.folder)
-    record, policy = run.folder / "policy.json", run.folder / "policy.onnx"
+    training = Run(CONFIG, 3, tmp_path / "there")
+    train.train_to_the_end(training, QUIET)
+    beside, policy = (training.folder / f"policy.{end}" for end in ("json", "onnx"))
     assert training.finished()
-    record.write_text(json.dumps({**json.loads(record.read_text()), "sha256": "7"}))
+    beside.write_text(json.dumps({**json.loads(beside.read_text()), "sha256": "7"}))
     assert not training.finished()
-    for spoil in (record.unlink, policy.unlink):
+    for spoil in (beside.unlink, policy.unlink):
         spoil()
         assert not training.finished()
         report = sweep.run([training], Cluster())
@@ -194,10 +194,10 @@ def test_record_is_written_before_the_policy(
 
 def test_other_code_is_another_training(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A worker that computes another key than the driver's refuses the task."""
-    training = sweep.Training(CONFIG, 3, tmp_path)
+    training = Run(CONFIG, 3, tmp_path)
     key = training.key
-    assert sweep.Training(CONFIG, 3, tmp_path).key == key
-    monkeypatch.setattr(sweep, "code", lambda: "0")
+    assert Run(CONFIG, 3, tmp_path).key == key
+    monkeypatch.setattr(record, "code", lambda: "0")
     assert training.key != key
 
 
@@ -205,7 +205,7 @@ def test_other_code_is_another_training(tmp_path: Path, monkeypatch: pytest.Monk
 def test_other_versions_are_another_training(
     package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    training = sweep.Training(CONFIG, 3, tmp_path)
+    training = Run(CONFIG, 3, tmp_path)
     key, known = training.key, importlib.metadata.version
 
     def other(name: str) -> str:
@@ -218,12 +218,12 @@ def test_other_versions_are_another_training(
 def test_code_is_every_python_file_of_the_packages(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sweep, "ROOT", tmp_path)
+    monkeypatch.setattr(record, "ROOT", tmp_path)
     folders = [tmp_path / name for name in ("agents", "baselines", "pam_envs")]
 
     def digest() -> str:
-        sweep.code.cache_clear()
-        return sweep.code()
+        record.code.cache_clear()
+        return record.code()
 
     seen = {digest()}
     for folder in folders:
@@ -235,7 +235,7 @@ def test_code_is_every_python_file_of_the_packages(
     assert len(seen | {digest()}) == 4
     (folders[0] / "a.py").rename(folders[0] / "b.py")
     assert len(seen | {digest()}) == 5
-    sweep.code.cache_clear()
+    record.code.cache_clear()
 
 
 def test_failed_training_is_missing_with_the_reason(tmp_path: Path) -> None:

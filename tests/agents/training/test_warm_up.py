@@ -17,6 +17,7 @@ from agents.settings.schema import SettingsError
 from agents.training import train
 from agents.training.building import learning_rate, make_env, make_model, warm_up_steps
 from agents.training.callbacks import WarmUp
+from agents.training.record import Run
 
 ROLLOUT = 128
 KINDS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -107,8 +108,8 @@ def test_off_policy_algorithms_have_no_warm_up() -> None:
 @pytest.mark.parametrize("name", ["structured", "recurrent"])
 def test_run_killed_in_the_warm_up_resumes_exactly(name: str, tmp_path: Path) -> None:
     config = config_of(name, 4)
-    whole = train.train_to_the_end(train.Run(config, 3, tmp_path / "whole"), QUIET)
-    run = train.Run(config, 3, tmp_path / "killed")
+    whole = train.train_to_the_end(Run(config, 3, tmp_path / "whole"), QUIET)
+    run = Run(config, 3, tmp_path / "killed")
     killed_after(run, 3 * ROLLOUT)
     model = train.resume(run)
     assert 0 < model.num_timesteps < warm_up_steps(config)
