@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -303,47 +304,45 @@ def speed(
     return 1 if strict and missed else 0
 
 
+@dataclass(frozen=True)
+class Arguments:
+    """Arguments of an environment; those that are not given have its defaults."""
+
+    hysteresis: str | None = None
+    """Hysteresis model of the plant."""
+    reference: str | None = None
+    """Family of the reference."""
+    load: float | None = None
+    """Load [kg]."""
+    episode_seconds: float | None = None
+    """Duration [s]."""
+    load_disturbance: float | None = None
+    """Unmeasured change [kg] of the load."""
+    randomize: bool = False
+    """Draw the plant's assumed parameters."""
+
+
 def show(
     env: Positional[str],
     controller: str,
-    hysteresis: str | None = None,
-    reference: str | None = None,
-    load: float | None = None,
-    episode_seconds: float | None = None,
-    load_disturbance: float | None = None,
-    randomize: bool = False,
     seed: int = 101,
     plot: Path | None = None,
     video: Path | None = None,
+    arguments: Annotated[Arguments, arg(name="")] = Arguments(),
 ) -> int:
     """Run one episode and draw it: reference, output, setpoints, pressure, loop.
-
-    Arguments that are not given have the environment's defaults.
 
     Args:
         env: Id of the environment.
         controller: Name of a controller.
-        hysteresis: Which hysteresis the plant has.
-        reference: Family of the reference.
-        load: Load [kg].
-        episode_seconds: Duration [s].
-        load_disturbance: By how much [kg] the load changes, unannounced.
-        randomize: Draw the plant's assumed parameters.
         seed: Of the reset.
         plot: Picture to write.
         video: Film to write.
     """
     from benchmarks.runs import show as showing
 
-    options = {
-        "hysteresis": hysteresis,
-        "reference": reference,
-        "load": load,
-        "episode_seconds": episode_seconds,
-        "load_disturbance": load_disturbance,
-        "randomize": randomize or None,
-    }
-    kwargs = {name: value for name, value in options.items() if value is not None}
+    given = vars(arguments).items()
+    kwargs = {name: v for name, v in given if v is not None and v is not False}
     env_id = full_id(env)
     content = _tracks(env_id, ())[0].content
     episode, set_points = showing.play(env_id, controller, kwargs, seed, video)

@@ -26,17 +26,12 @@ VERIFIED = "verified"
 class Scores:
     """One metric of a row: a table with a row a training seed and a column an episode.
 
-    ``pairs`` are scenario and seed of each column, ``runs`` the training seeds, both ascending.
+    ``strata`` are the scenarios of the columns, ``runs`` the training seeds, both ascending.
     """
 
     table: Array
-    pairs: tuple[tuple[str, int], ...]
-    runs: tuple[int | None, ...] = (None,)
-
-    @property
-    def strata(self) -> list[str]:
-        """Scenario of each column."""
-        return [scenario for scenario, _ in self.pairs]
+    strata: list[str]
+    runs: list[int | None]
 
 
 def name_of(row: Mapping[str, Any]) -> str:
@@ -98,7 +93,7 @@ def scores(row: Mapping[str, Any], metric: str = "", split: str = "") -> Scores:
     runs = [episode["training_seed"] for episode in episodes]
     pairs = [(str(episode["scenario"]), int(episode["seed"])) for episode in episodes]
     table, order = statistics.crossed(values, runs, pairs)
-    return Scores(table, tuple(order), tuple(sorted(set(runs))))
+    return Scores(table, [scenario for scenario, _ in order], sorted(set(runs)))
 
 
 def mean_of(row: Mapping[str, Any], metric: str = "", split: str = "") -> float:

@@ -107,14 +107,9 @@ def _row_entry(row: Mapping[str, Any]) -> str:
         "note": ", ".join(map(_unbraced, said)),
         "howpublished": f"python -m benchmarks verify {row['row']}",
     }
-    return entry(f"{_key(row['row'])}-{row['controller']['artefact']['digest'][:8]}", fields)
+    return entry(f"{row['row']}-{row['controller']['artefact']['digest'][:8]}", fields)
 
 
 def _unbraced(text: str) -> str:
     """Return a text without the characters that BibTeX interprets."""
     return "".join(letter for letter in text if letter not in "{}\\")
-
-
-def _key(name: str) -> str:
-    """Return a BibTeX key: letters, digits, - and _ of a row's name."""
-    return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in name)

@@ -14,7 +14,7 @@ from benchmarks.board.words import Cells, by_controller, short_env
 from benchmarks.identity import audit
 from benchmarks.runs import rows, verified
 from benchmarks.runs.rows import Row
-from benchmarks.runs.store import write_text
+from benchmarks.runs.store import write_all
 
 BOARD = Path(__file__).parents[1] / "LEADERBOARD.md"
 PAGES = "leaderboard"
@@ -56,13 +56,8 @@ def write(folder: Path = rows.RESULTS, board: Path = BOARD) -> list[Path]:
     Pages and figures of an earlier board that are no longer part of it are removed.
     """
     texts = files(load(folder))
-    written = [board, *(board.parent / name for name in list(texts)[1:])]
-    stale = {path for end in ("*.md", "figures/*.svg") for path in (board.parent / PAGES).glob(end)}
-    for path, text in zip(written, texts.values(), strict=True):
-        write_text(path, text)
-    for path in stale - set(written):
-        path.unlink()
-    return written
+    named = {board.name if name == BOARD.name else name: text for name, text in texts.items()}
+    return write_all(board.parent, named, (f"{PAGES}/*.md", f"{PAGES}/figures/*.svg"))
 
 
 def times_text(all_rows: Sequence[Row]) -> str:

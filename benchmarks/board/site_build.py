@@ -11,7 +11,7 @@ from benchmarks.board import leaderboard, plots, site_data, standings
 from benchmarks.identity.hashing import plain
 from benchmarks.runs import rows
 from benchmarks.runs.rows import Row
-from benchmarks.runs.store import read_json, write_text
+from benchmarks.runs.store import read_json, write_all
 
 ASSETS = Path(__file__).parent / "site_assets"
 OUT = Path(__file__).parents[1] / "site"
@@ -28,13 +28,7 @@ def build(results: Path = rows.RESULTS, out: Path = OUT) -> list[Path]:
     for row in all_rows:
         stored = read_json(rows.path_of(str(row["row"]), results))
         texts[f"rows/{row['row']}.json"] = _json(stored) + "\n"
-    stale = {path for pattern in _OWNED for path in out.glob(pattern)}
-    written = [out / name for name in texts]
-    for path, text in zip(written, texts.values(), strict=True):
-        write_text(path, text)
-    for path in stale - set(written):
-        path.unlink()
-    return written
+    return write_all(out, texts, _OWNED)
 
 
 def page(all_rows: Sequence[Row]) -> dict[str, str]:

@@ -81,28 +81,23 @@ def _rows(
     listing: Listing, columns: Sequence[Column], made: Sequence[Claim]
 ) -> list[dict[str, Any]]:
     found = {views.name_of(entry.row): entry for entry in made}
-    places = dict(
-        zip(map(views.name_of, listing.ranked), standings.ranks(listing.ranked), strict=True)
+    ranks = dict(
+        zip((r["row"] for r in listing.ranked), standings.ranks(listing.ranked), strict=True)
     )
-    shown_rows = []
+    shown = []
     for group, rows in zip(GROUPS, (listing.ranked, listing.few, listing.outside), strict=True):
         for row in rows:
-            place = places.get(views.name_of(row))
-            shown_rows.append(
-                {
-                    "group": group,
-                    "rank": "-" if place is None else str(place),
-                    "place": None if place is None else place.first,
-                    **_row(row, columns, found.get(views.name_of(row))),
-                }
-            )
-    return shown_rows
+            place = ranks.get(row["row"])
+            placed = {"group": group, "rank": str(place or "-"), "place": place and place.first}
+            shown.append({**placed, **_row(row, columns, found.get(views.name_of(row)))})
+    return shown
 
 
 def _row(row: Row, columns: Sequence[Column], against: Claim | None) -> dict[str, Any]:
     controller, factor = row["controller"], views.unit_of(row)[1]
-    times = row["volatile"].get("predict_us") or {}
-    split = views.published_split(row)
+    times, cost = row["volatile"].get("predict_us") or {}, views.cost_of(row)
+    trainings = views.by_training_seed(row).items()
+    made, artefact = row["made_with"], controller.get("artefact") or {}
     return {
         "row": row["row"],
         "controller": controller["name"],
@@ -111,7 +106,7 @@ def _row(row: Row, columns: Sequence[Column], against: Claim | None) -> dict[str
         "knows": controller["knowledge"],
         "state": "audited" if views.is_audited(row) else "self-reported",
         "verified": views.verified_words(row),
-        "split": split,
+        "split": views.published_split(row),
         "preview": rounded(controller["preview_seconds"]),
         "score": _numbers(views.interval(row), factor),
         "iqm": _numbers(views.middle(row), factor),
@@ -123,22 +118,10 @@ def _row(row: Row, columns: Sequence[Column], against: Claim | None) -> dict[str
         "claim": words.full_verdict(against) if against else "",
         "metrics": [rounded(f * views.mean_of(row, metric)) for metric, _, f in columns],
         "settings": [rounded(factor * value) for value in views.by_setting(row).values()],
-        "trainings": {
-            str(seed): rounded(factor * value)
-            for seed, value in views.by_training_seed(row).items()
-        },
+        "trainings": {str(seed): rounded(factor * value) for seed, value in trainings},
         "failures": list(views.failures_of(row)),
         "step_us": [rounded(times.get("median")), rounded(times.get("p99"))],
         "traces": bool(row.get("traces")),
-        **_origin(row),
-    }
-
-
-def _origin(row: Row) -> dict[str, Any]:
-    """Return the origin of a row and the commands that reproduce it."""
-    controller, cost = row["controller"], views.cost_of(row)
-    made = row["made_with"]
-    return {
         "summary": controller["summary"],
         "citation": controller["citation"],
         "cost": {
@@ -150,7 +133,7 @@ def _origin(row: Row) -> dict[str, Any]:
         },
         "audit": _audit_words(row),
         "task": row.get("task", ""),
-        "artefact": controller["artefact"]["digest"] if controller.get("artefact") else "",
+        "artefact": artefact.get("digest", ""),
         "checksum": row.get(CHECKSUM, ""),
         "made_with": ", ".join(f"{name} {v}" for name, v in sorted(made["packages"].items())),
         "commit": made["commit"],

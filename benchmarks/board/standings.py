@@ -143,22 +143,16 @@ def ranks(best_first: Sequence[Row]) -> list[Place]:
     """
     groups: list[list[Row]] = []
     for row in best_first:
-        if groups and _tied(row, groups[-1][0]):
+        gap = difference(row, groups[-1][0]) if groups else None
+        if gap is not None and gap.low <= 0.0 <= gap.high:
             groups[-1].append(row)
         else:
             groups.append([row])
-    sizes = [len(group) for group in groups]
-    firsts = np.cumsum([1, *sizes[:-1]]) if sizes else ()
-    return [
-        Place(int(first), size > 1)
-        for first, size in zip(firsts, sizes, strict=True)
-        for _ in range(size)
-    ]
-
-
-def _tied(row: Row, leader: Row) -> bool:
-    found = difference(row, leader)
-    return found is not None and found.low <= 0.0 <= found.high
+    places, first = [], 1
+    for group in groups:
+        places += [Place(first, len(group) > 1)] * len(group)
+        first += len(group)
+    return places
 
 
 @dataclass(frozen=True)

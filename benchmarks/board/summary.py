@@ -9,7 +9,7 @@ from pathlib import Path
 from benchmarks.board import accessors as views
 from benchmarks.board import claims, standings
 from benchmarks.board.claims import Claim
-from benchmarks.board.format import chance, percent, tables
+from benchmarks.board.format import chance, number, percent, tables
 from benchmarks.board.standings import Track
 from benchmarks.board.words import change_cells, full_verdict, largest_cost, score_words, short_env
 from benchmarks.runs.rows import Row
@@ -94,18 +94,16 @@ def _line(found: Winner) -> list[str]:
     learned, entry = found.claim.row if found.claim else None, found.claim
     cells = [f"`{short_env(found.env)}`"]
     for row in (found.paper, learned):
-        name = "none" if row is None else f"`{views.name_of(row)}`"
-        cells.append(f"{name}<br>{_without_bounds(score_words(row, found.split))}")
+        if row is None:
+            cells.append("none<br>-")
+        else:
+            unit, factor = views.unit_of(row)
+            score = f"{number(factor * views.mean_of(row, split=found.split))} {unit}"
+            cells.append(f"`{views.name_of(row)}`<br>{score}")
     if entry is None:
         return [*cells, "-", "-", found.silence]
     bold = f"**{entry.verdict}**" if entry.verdict == claims.BETTER else entry.verdict
     return [*cells, f"{100.0 * entry.gain.value:+.2g} %", f"{entry.probability.value:.2f}", bold]
-
-
-def _without_bounds(words: str) -> str:
-    """Return a score without its interval."""
-    before, bracket, rest = words.partition(" [")
-    return before + rest.partition("]")[2] if bracket else words
 
 
 def _detail(found: Winner) -> str:

@@ -18,7 +18,8 @@ import hashlib
 import json
 import math
 import secrets
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -27,7 +28,6 @@ from typing import Any
 from filelock import FileLock
 
 from benchmarks.identity import artefacts, tasks, trainings
-from benchmarks.identity.artefacts import Artefact
 from benchmarks.identity.hashing import digest
 from benchmarks.runs import provenance
 from benchmarks.runs.controllers import Entrant
@@ -62,9 +62,13 @@ class Round:
         """Return the audit seeds of each of a track's scenarios."""
         each = max(PER_SCENARIO, math.ceil(EPISODES / len(names)))
         return {
-            name: tuple(seed_of(self.frozen, self.salt, name, k) for k in range(each))
+            name: tuple(self._seed(f"{self.frozen}|{self.salt}|{name}|{k}") for k in range(each))
             for name in names
         }
+
+    @staticmethod
+    def _seed(text: str) -> int:
+        return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big") >> 11
 
     def changes(self, entrant: Entrant, track: ScenarioSet) -> list[str]:
         """Return the differences of the present task and controller from the frozen ones."""
@@ -98,26 +102,21 @@ class Audit:
         }
 
 
-def seed_of(frozen: str, salt: str, scenario: str, number: int) -> int:
-    """Return a seed, 53 bits."""
-    text = "|".join((frozen, salt, scenario, str(number)))
-    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "big") >> 11
-
-
-def rounds(file: Path | None = None) -> list[Round]:
+def rounds() -> list[Round]:
     """Return the rounds in the order of their drawing; none where there is no file."""
-    path = FILE if file is None else file
-    if not path.exists():
+    if not FILE.exists():
         return []
     try:
-        found = list(_parsed(path.read_text("utf-8")))
+        found = list(_parsed(FILE.read_text("utf-8")))
     except (ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"{path}: not a list of rounds ({error}); restore it from git") from error
-    for number, entry in _numbered(found):
-        if entry.number != number:
+        raise ValueError(f"{FILE}: not a list of rounds ({error}); restore it from git") from error
+    seen: Counter[str] = Counter()
+    for entry in found:
+        seen[entry.track] += 1
+        if entry.number != seen[entry.track]:
             raise ValueError(
-                f"{path}: round {entry.number} of {entry.track} in place of round {number}; "
-                "restore the file from git"
+                f"{FILE}: round {entry.number} of {entry.track} in place of round "
+                f"{seen[entry.track]}; restore the file from git"
             )
     return found
 
@@ -127,23 +126,9 @@ def _parsed(text: str) -> tuple[Round, ...]:
     return tuple(Round(**entry) for entry in json.loads(text)["rounds"])
 
 
-def _numbered(found: Iterable[Round]) -> Iterable[tuple[int, Round]]:
-    """Yield rounds with the numbers that they must have."""
-    seen: dict[str, int] = {}
-    for entry in found:
-        seen[entry.track] = seen.get(entry.track, 0) + 1
-        yield seen[entry.track], entry
-
-
-def write(found: Iterable[Round]) -> None:
-    """Write the file of rounds."""
-    text = json.dumps({"rounds": [asdict(entry) for entry in found]}, indent=1)
-    write_text(FILE, text + "\n")
-
-
-def last(track: str, file: Path | None = None) -> Round | None:
+def last(track: str) -> Round | None:
     """Return the last round of a track, ``None`` where there was none."""
-    return next((entry for entry in rounds(file)[::-1] if entry.track == track), None)
+    return next((entry for entry in rounds()[::-1] if entry.track == track), None)
 
 
 def find(entrant: Entrant, track: ScenarioSet) -> Audit | None:
@@ -178,10 +163,15 @@ def draw(track: ScenarioSet, entrants: Sequence[Entrant]) -> Round:
         task = tasks.of(track).identity
         here = {entrant.name: artefacts.of(entrant, track) for entrant in entrants}
         there = last(track.name)
-        if there is not None and _same(there, task, here):
+        if (
+            there is not None
+            and not task.changes(there.task)
+            and set(there.entrants) == set(here)
+            and not any(made.changes(there.entrants[name]) for name, made in here.items())
+        ):
             return there
         records = {name: made.record() for name, made in here.items()}
-        made = Round(
+        drawn = Round(
             track=track.name,
             number=1 if there is None else there.number + 1,
             task=task.record(),
@@ -191,12 +181,6 @@ def draw(track: ScenarioSet, entrants: Sequence[Entrant]) -> Round:
             drawn=datetime.datetime.now(datetime.UTC).date().isoformat(),
             commit=provenance.commit(),
         )
-        write([*rounds(), made])
-    return made
-
-
-def _same(there: Round, task: tasks.Identity, here: Mapping[str, Artefact]) -> bool:
-    """Return whether a round froze this task and these controllers."""
-    if task.changes(there.task) or set(there.entrants) != set(here):
-        return False
-    return not any(made.changes(there.entrants[name]) for name, made in here.items())
+        text = json.dumps({"rounds": [asdict(entry) for entry in [*rounds(), drawn]]}, indent=1)
+        write_text(FILE, text + "\n")
+    return drawn

@@ -51,16 +51,14 @@ class Identity:
 
     def changes(self, record: Mapping[str, Any]) -> list[str]:
         """Return a sentence for every part that differs from a recorded identity."""
-        if record["digest"] == self.digest:
-            return []
-        own, found = asdict(self), []
-        for part, value in own.items():
-            old = record.get(part)
-            if not isinstance(value, Mapping) or not isinstance(old, Mapping):
-                found += [f"{part} changed"] if value != old else []
-                continue
-            names = [n for n in {**old, **value} if old.get(n) != value.get(n)]
-            found += [f"{part} changed: {', '.join(names)}"] if names else []
+        found = []
+        for part, value in asdict(self).items():
+            old = record[part]
+            if old != value and not isinstance(value, Mapping):
+                found.append(f"{part} changed")
+            elif old != value:
+                names = [n for n in {**old, **value} if old.get(n) != value.get(n)]
+                found.append(f"{part} changed: {', '.join(names)}")
         return found
 
 
@@ -91,9 +89,9 @@ def of(track: ScenarioSet) -> Task:
         observed.setdefault(key, []).append(found.observations)
         env.close()
     identity = Identity(track.digest, plants, models, trajectories, scores)
-    about = {"id": track.env, "version": env_version(track.env)}
+    version = int(gym.envs.registration.parse_env_id(track.env)[2] or 0)
     made = (Setting(*settings[key], _spread(found)) for key, found in observed.items())
-    return Task(about, identity, tuple(made))
+    return Task({"id": track.env, "version": version}, identity, tuple(made))
 
 
 def _spread(found: Sequence[behaviour.Sequences]) -> behaviour.Sequences:
@@ -102,23 +100,13 @@ def _spread(found: Sequence[behaviour.Sequences]) -> behaviour.Sequences:
     return tuple(found[k * len(found) // parts][k] for k in range(parts))
 
 
-def env_version(env: str) -> int:
-    """Return the version at the end of an id."""
-    return int(gym.envs.registration.parse_env_id(env)[2] or 0)
-
-
-def versions(env: str) -> list[str]:
-    """Return the ids of all versions of an environment that are registered."""
+def check_version(env: str, row: str) -> None:
+    """Raise unless this checkout has the version of an environment that a row is of."""
     import pam_envs  # noqa: F401  registers the ids
 
     space, name, _ = gym.envs.registration.parse_env_id(env)
-    found = gym.envs.registration.registry.values()
-    return sorted(spec.id for spec in found if (spec.namespace, spec.name) == (space, name))
-
-
-def check_version(env: str, row: str) -> None:
-    """Raise unless this checkout has the version of an environment that a row is of."""
-    there = versions(env)
+    specs = gym.envs.registration.registry.values()
+    there = sorted(spec.id for spec in specs if (spec.namespace, spec.name) == (space, name))
     if env not in there:
         here = ", ".join(there) or "no such environment"
         raise ValueError(

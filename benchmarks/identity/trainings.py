@@ -16,9 +16,7 @@ from benchmarks.identity import artefacts
 from benchmarks.identity.hashing import digest
 from benchmarks.runs.controllers import Entrant
 
-SETTINGS = (
-    *("algo", "env", "env_kwargs", "plant", "plants", "signals", "action_signals", "steps"),
-)
+SETTINGS = ("algo", "env", "env_kwargs", "plant", "plants", "signals", "action_signals", "steps")
 """Entries of a card that all seeds of one training share."""
 LEFT_OUT = ("search", "checkpoint_steps")
 """Entries of a configuration without effect on the training."""
@@ -28,16 +26,15 @@ def of(entrant: Entrant) -> list[dict[str, Any]] | None:
     """Return the training of each policy file from the record beside it, ``None`` without any."""
     if not entrant.files:
         return None
-    return [{"training_seed": seed, **_beside(path)} for seed, path in entrant.files]
+    found = []
+    for seed, path in entrant.files:
+        card = _card_beside(path)
+        known = {key: card[key] for key in ("command", "steps") if key in card}
+        found.append({"training_seed": seed, **known, **(card.get("training") or {})})
+    return found
 
 
-def _beside(policy: Path) -> dict[str, Any]:
-    said = _json(policy)
-    known: dict[str, Any] = {key: said[key] for key in ("command", "steps") if key in said}
-    return known | dict(said.get("training") or {})
-
-
-def _json(policy: Path) -> dict[str, Any]:
+def _card_beside(policy: Path) -> dict[str, Any]:
     card = artefacts.located(policy).with_suffix(".json")
     return dict(json.loads(card.read_text(encoding="utf-8"))) if card.is_file() else {}
 
@@ -67,9 +64,9 @@ def check_files(entrant: Entrant) -> None:
         other = first.setdefault(artefacts.file_record(path, seed)["sha256"], seed)
         if other != seed:
             raise ValueError(f"{entrant.name}: {_copies(other, seed)}")
-        beside = _json(path)
-        for said in (beside, beside.get("training") or {}):
-            _check_seed(entrant, seed, said.get("seed", seed))
+        card = _card_beside(path)
+        for record in (card, card.get("training") or {}):
+            _check_seed(entrant, seed, record.get("seed", seed))
 
 
 def check_cells(entrant: Entrant, cells: Sequence[Mapping[str, Any]]) -> None:

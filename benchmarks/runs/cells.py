@@ -66,14 +66,10 @@ class Cell:
         )[:32]
 
     @property
-    def first(self) -> bool:
-        """True if pictures of this cell may be kept: public, of the first training seed."""
-        return self.split == PUBLIC and self.training_seed == self.entrant.training_seeds[0]
-
-    @property
     def drawn(self) -> bool:
-        """True if a picture is kept."""
-        return self.first and self.scenario.name in traces.chosen(self.track)
+        """True if a picture is kept: of the first training seed, on public episodes."""
+        first = self.split == PUBLIC and self.training_seed == self.entrant.training_seeds[0]
+        return first and self.scenario.name in traces.chosen(self.track)
 
     def _policy(self) -> dict[str, Any] | None:
         files = dict(self.entrant.files)
@@ -133,8 +129,6 @@ def compute(group: Group) -> dict[str, dict[str, Any]]:
         "track": track.name,
         "scenario": first.scenario.name,
         "training_seed": first.training_seed,
-        "plant_digest": env.unwrapped.plant.digest(),
-        "model_digest": model.digest(),
         **knowledge.of_plant(entrant, controller, model, env),
     }
     if entrant.files:
@@ -146,8 +140,13 @@ def compute(group: Group) -> dict[str, dict[str, Any]]:
         own = [next(episodes) for _ in cell.seeds]
         numbered = zip(cell.seeds, own, strict=True)
         record["episodes"] = [episode_record(cell, seed, episode) for seed, episode in numbered]
-        if cell.first:
-            record |= _kept(cell, env, controller, cell.seeds[0], own[0])
+        if cell.drawn and len(own[0].actions):
+            picture = (cell.scenario.name, cell.seeds[0], own[0].signals, track.content)
+            record["traces"] = [traces.of_episode(*picture, cell.training_seed)]
+        if cell.probe:
+            part = replace(own[0], observations=own[0].observations[:PROBED_STEPS])
+            signals = env.unwrapped.signals
+            record["preview_used"] = rollout.preview_used(part, controller, signals)
         micro = 1e6 * np.concatenate([episode.seconds for episode in own])
         times = (np.median(micro), np.percentile(micro, 99)) if len(micro) else (None, None)
         record["volatile"] = {
@@ -165,20 +164,6 @@ def episodes_of(group: Group, env: Any, controller: Any) -> list[rollout.Episode
     batches = partial(make_batch, first.track.env, first.scenario.kwargs)
     seeds = [seed for cell in group.cells for seed in cell.seeds]
     return rollout.run_all(batches, env, controller, seeds)
-
-
-def _kept(
-    cell: Cell, env: Any, controller: Any, seed: int, episode: rollout.Episode
-) -> dict[str, Any]:
-    """Return the parts of a record from one episode: its picture, and the use of the preview."""
-    kept: dict[str, Any] = {}
-    if cell.drawn and len(episode.actions):
-        where = (cell.scenario.name, seed, episode.signals, cell.track.content)
-        kept["traces"] = [traces.of_episode(*where, cell.training_seed)]
-    if cell.probe:
-        part = replace(episode, observations=episode.observations[:PROBED_STEPS])
-        kept["preview_used"] = rollout.preview_used(part, controller, env.unwrapped.signals)
-    return kept
 
 
 def episode_record(cell: Cell, seed: int, episode: rollout.Episode) -> dict[str, Any]:

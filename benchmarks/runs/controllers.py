@@ -52,12 +52,12 @@ class Entrant:
     """
 
     name: str
-    summary: str
-    knowledge: str
-    citation: str
-    envs: tuple[str, ...]
-    kind: str
     source: str
+    kind: str = "classical"
+    summary: str = ""
+    knowledge: str = "nothing"
+    citation: str = ""
+    envs: tuple[str, ...] = ()
     files: tuple[tuple[int, Path], ...] = ()
     trials: int | None = 0
     tuning: str = BY_RULE
@@ -76,48 +76,33 @@ class Entrant:
         return not self.envs or env in self.envs
 
 
-SOURCES = (
-    ("baselines.core.catalogue", "baselines", "classical"),
-    ("agents.policies.catalogue", "agents", "learned"),
-)
-"""Module, its package, and the kind of its controllers. ``agents`` may be absent."""
+SOURCES = ("baselines.core.catalogue", "agents.policies.catalogue")
+"""Modules with ``CONTROLLERS``, entries by name; ``agents`` may be absent."""
+_DESCRIBED = ("summary", "knowledge", "citation", "envs", "kind", "trials", "tuning", "author")
 
 
-def _entrants(module: str, package: str, kind: str) -> dict[str, Entrant]:
+def _catalogue(module: str) -> dict[str, Any]:
     try:
-        found = importlib.import_module(module)
+        return dict(importlib.import_module(module).CONTROLLERS)
     except ModuleNotFoundError as error:
-        if error.name in (package, module):
+        if error.name in (module.partition(".")[0], module):
             return {}
         raise
-    made = (_entrant(name, entry, module, kind) for name, entry in found.CONTROLLERS.items())
-    return {entrant.name: entrant for entrant in made if entrant is not None}
 
 
-def _entrant(name: str, entry: Any, module: str, kind: str) -> Entrant | None:
+def _entrant(name: str, entry: Any, module: str) -> Entrant | None:
     """Return an entry of a catalogue, ``None`` for a policy that is not trained yet."""
     listed = getattr(entry, "files", None)
-    found = listed() if callable(listed) else {}
-    files = tuple((seed, _movable(path)) for seed, path in sorted(found.items()))
-    knobs = tuple(sorted(getattr(entry, "found", {}).items()))
-    if callable(listed) and not files:
-        return None
-    return Entrant(
-        name=name,
-        summary=str(getattr(entry, "summary", "")),
-        knowledge=str(getattr(entry, "knowledge", "nothing")),
-        citation=str(getattr(entry, "citation", "")),
-        envs=tuple(getattr(entry, "envs", ()) or ()),
-        kind=str(getattr(entry, "kind", kind)),
-        source=module,
-        files=files,
-        trials=getattr(entry, "trials", 0),
-        tuning=str(getattr(entry, "tuning", BY_RULE)),
-        author=str(getattr(entry, "author", "")),
-        tuned=str(getattr(entry, "baseline", "") or name) if knobs else "",
-        knobs=knobs,
-        trained_with=getattr(entry, "trained_with", None),
+    files = tuple(
+        (seed, _movable(path)) for seed, path in sorted(listed().items() if listed else ())
     )
+    if listed and not files:
+        return None
+    names = (*_DESCRIBED, "trained_with")
+    described = {key: getattr(entry, key) for key in names if hasattr(entry, key)}
+    if knobs := tuple(sorted(getattr(entry, "found", {}).items())):
+        described |= {"knobs": knobs, "tuned": getattr(entry, "baseline", "") or name}
+    return Entrant(name, module, files=files, **described)
 
 
 def _movable(path: Path) -> Path:
@@ -129,11 +114,14 @@ def _movable(path: Path) -> Path:
 def available() -> dict[str, Entrant]:
     """Return all controllers by name; raise ValueError if two sources use one name."""
     merged: dict[str, Entrant] = {}
-    for source in SOURCES:
-        for name, entrant in _entrants(*source).items():
-            if name in merged:
-                raise ValueError(f"controller {name!r} is in {merged[name].source} and {source[0]}")
-            merged[name] = entrant
+    for module in SOURCES:
+        for name, entry in _catalogue(module).items():
+            if entrant := _entrant(name, entry, module):
+                if name in merged:
+                    raise ValueError(
+                        f"controller {name!r} is in {merged[name].source} and {module}"
+                    )
+                merged[name] = entrant
     return merged
 
 
@@ -145,17 +133,15 @@ def find(name: str) -> Entrant:
     return known[name]
 
 
-def make(
-    entrant: Entrant, model: Any, env: Any, seed: int = 0, training_seed: int | None = None
-) -> Controller:
+def make(entrant: Entrant, model: Any, env: Any, training_seed: int | None = None) -> Controller:
     """Return a controller built from a nominal plant and the named signals of ``env``.
 
-    ``seed`` is for controllers that draw; ``training_seed`` chooses the policy of a learned one.
+    ``training_seed`` chooses the policy of a learned one.
     """
     maker = importlib.import_module(entrant.source).make_controller
     base = env.unwrapped
     given = {"plant": model, "signals": base.signals, "action_signals": base.action_signals}
     if training_seed is not None:
         given["training_seed"] = training_seed
-    made: Controller = maker(entrant.name, seed=seed, **given)
+    made: Controller = maker(entrant.name, **given)
     return made

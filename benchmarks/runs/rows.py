@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.identity import artefacts, tasks, trainings
 from benchmarks.identity.audit import Audit
 from benchmarks.runs import knowledge, provenance
-from benchmarks.runs.cells import PUBLIC, cells_of
+from benchmarks.runs.cells import PUBLIC
 from benchmarks.runs.controllers import Entrant
 from benchmarks.runs.store import read_record, write_record
 from benchmarks.scenarios import scenario as scenarios
@@ -63,8 +63,6 @@ def assemble(
     """Return the row of a controller from the records of :func:`cells.cells_of` in its order."""
     task = tasks.of(track)
     identity = task.identity
-    _check_complete(entrant, track, cells, found)
-    _check_plants(entrant, identity, cells)
     trainings.check_cells(entrant, cells)
     public = [cell for cell in cells if cell["split"] == PUBLIC]
     return {
@@ -99,35 +97,6 @@ def assemble(
             },
         },
     }
-
-
-def _check_complete(
-    entrant: Entrant, track: ScenarioSet, cells: Sequence[Record], found: Audit | None
-) -> None:
-    """Raise unless the records are those of the row's cells."""
-    expected = [
-        (cell.split, cell.training_seed, cell.scenario.name)
-        for cell in cells_of(entrant, track, found)
-    ]
-    if [(c["split"], c["training_seed"], c["scenario"]) for c in cells] != expected:
-        raise ValueError(f"{entrant.name}: the cells are not those of {track.name}")
-    others = sorted({str(cell["env"]) for cell in cells} - {track.env})
-    if others:
-        raise ValueError(
-            f"{entrant.name}: cells of {', '.join(others)} among those of {track.env}; results of "
-            "different versions are not mixed: run it again with --force"
-        )
-
-
-def _check_plants(entrant: Entrant, built: tasks.Identity, cells: Sequence[Record]) -> None:
-    """Raise unless the cells are of the plants and models that the track has now."""
-    for cell in cells:
-        name = cell["scenario"]
-        if (cell["plant_digest"], cell["model_digest"]) != (built.plants[name], built.models[name]):
-            raise ValueError(
-                f"{entrant.name}: a cell of {name} is of another plant or model; run it again with "
-                "--force"
-            )
 
 
 def _controller(

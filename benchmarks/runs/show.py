@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -32,14 +34,10 @@ def play(
         said = str(error).partition(" was raised from the environment creator")[0]
         raise ValueError(f"{env_id}: {said}") from error
     made = controllers.make(entrant, env.unwrapped.plant, env)
-    film = Film(video, env) if video else None
-    try:
-        episode = rollout.run(env, made, seed, film)
-        set_points = _set_points(env, episode.actions)
-    finally:
-        env.close()
-        if film:
-            film.close()
+    with _film(video, env) as watch:
+        episode = rollout.run(env, made, seed, watch)
+    set_points = _set_points(env, episode.actions)
+    env.close()
     return episode, set_points
 
 
@@ -50,36 +48,24 @@ def _set_points(env: Any, actions: NDArray[Any]) -> dict[str, NDArray[np.float64
     return {name: signals.decode(inside, name) for name in signals.names()}
 
 
-class Film:
-    """Film of an environment in real time, a frame every few steps."""
+@contextmanager
+def _film(path: Path | None, env: Any) -> Iterator[rollout.Watch | None]:
+    """Yield what adds a frame every few steps to a film in real time, if there is a path."""
+    if path is None:
+        yield None
+        return
+    import imageio.v2 as imageio
 
-    def __init__(self, path: Path, env: Any) -> None:
-        import imageio_ffmpeg  # type: ignore[import-untyped]
+    period, steps = env.unwrapped.control_period, itertools.count()
+    every = max(1, round(0.04 / period))
+    film: Any = imageio.get_writer(path, fps=1.0 / (every * period), macro_block_size=8)
+    with film:
 
-        self._open = imageio_ffmpeg.write_frames
-        self._path, self._step = path, 0
-        self._frames: Any = None
-        self._every = max(1, round(0.04 / env.unwrapped.control_period))
-        self._fps = 1.0 / (self._every * env.unwrapped.control_period)
+        def watch(env: Any) -> None:
+            if next(steps) % every == 0:
+                film.append_data(env.render())
 
-    def __call__(self, env: Any) -> None:
-        """Write a frame if one is due."""
-        if self._step % self._every == 0:
-            self._write(env.render())
-        self._step += 1
-
-    def _write(self, picture: Any) -> None:
-        height, width = (2 * (n // 2) for n in picture.shape[:2])  # the codec wants even sizes
-        if self._frames is None:
-            frames = self._open(str(self._path), (width, height), fps=self._fps, macro_block_size=2)
-            frames.send(None)
-            self._frames = frames
-        self._frames.send(np.ascontiguousarray(picture[:height, :width]))
-
-    def close(self) -> None:
-        """Finish the file."""
-        if self._frames is not None:
-            self._frames.close()
+        yield watch
 
 
 def summary(episode: rollout.Episode, content: Mapping[str, Any]) -> dict[str, float]:

@@ -1,11 +1,8 @@
-"""Records on disk, written atomically and with a checksum.
+"""Records on disk, written atomically and with a checksum over all but ``volatile``.
 
 A file is written under a temporary name, flushed to the disk and renamed, so that a killed process
-leaves the old file or the new one. Every record carries a checksum over its comparable part (all
-but ``volatile``); a cell whose checksum does not match is set aside and computed again.
-
-A file that ends in ``.xz`` is compressed JSON and holds the episodes as columns: of a list of
-episodes with the same keys, the list of values of each key. ``xz -dc FILE`` shows its text.
+leaves the old file or the new one. A file that ends in ``.xz`` is compressed JSON and holds the
+episodes as columns: of episodes with the same keys, the list of values of each key.
 """
 
 from __future__ import annotations
@@ -37,6 +34,16 @@ def comparable(record: Mapping[str, Any]) -> dict[str, Any]:
 def write_text(path: Path, text: str) -> None:
     """Replace a file by ``text``, atomically."""
     write_bytes(path, text.encode())
+
+
+def write_all(folder: Path, texts: Mapping[str, str], owned: Sequence[str]) -> list[Path]:
+    """Write texts by relative path, remove other files of the ``owned`` patterns, return paths."""
+    written = {folder / name: text for name, text in texts.items()}
+    for path, text in written.items():
+        write_text(path, text)
+    for path in {path for pattern in owned for path in folder.glob(pattern)} - written.keys():
+        path.unlink()
+    return list(written)
 
 
 def write_bytes(path: Path, content: bytes) -> None:
@@ -156,7 +163,11 @@ class Store:
         except FileNotFoundError:
             return None
         except ValueError:
-            self.quarantine(self.path(key))
+            aside, path = self.folder / "quarantine", self.path(key)
+            aside.mkdir(parents=True, exist_ok=True)
+            number = len(list(aside.iterdir()))
+            with suppress(FileNotFoundError):  # another run was faster
+                os.replace(path, aside / f"{path.stem}.{number}{path.suffix}")
             return None
 
     def sound(self, key: str) -> bool:
@@ -176,16 +187,6 @@ class Store:
     def save(self, key: str, record: Mapping[str, Any]) -> None:
         """Write a record under its key."""
         write_record(self.path(key), {**record, "key": key})
-
-    def quarantine(self, path: Path) -> Path:
-        """Move a corrupt file into ``quarantine`` and return its new place."""
-        aside = self.folder / "quarantine"
-        aside.mkdir(parents=True, exist_ok=True)
-        number = len(list(aside.iterdir()))
-        target = aside / f"{path.stem}.{number}{path.suffix}"
-        with suppress(FileNotFoundError):  # another run was faster
-            os.replace(path, target)
-        return target
 
     def quarantined(self) -> list[str]:
         """Return the names of the files that were set aside."""

@@ -163,7 +163,7 @@ class Course:
                 cells.episode_record(cell, seed, episode)
                 for seed, episode in zip(cell.seeds, episodes, strict=True)
             ]
-        return measured(kinds, self.track)
+        return measured(kinds, headline_of(self.track.content))
 
 
 def seeds_of(track: ScenarioSet, episodes: int) -> dict[str, tuple[int, ...]]:
@@ -174,9 +174,8 @@ def seeds_of(track: ScenarioSet, episodes: int) -> dict[str, tuple[int, ...]]:
     return {name: tuple(shared[i :: len(names)]) for i, name in enumerate(names)}
 
 
-def measured(kinds: Mapping[str, Sequence[Mapping[str, Any]]], track: ScenarioSet) -> Measured:
+def measured(kinds: Mapping[str, Sequence[Mapping[str, Any]]], headline: str) -> Measured:
     """Return the result of episodes, by kind of reference."""
-    headline = headline_of(track.content)
     records = [record for of_kind in kinds.values() for record in of_kind]
 
     def mean(metric: str, chosen: Sequence[Mapping[str, Any]]) -> float:

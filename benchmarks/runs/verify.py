@@ -9,7 +9,7 @@ is noted as verified elsewhere.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,8 @@ from typing import Any
 from benchmarks.identity import artefacts, audit, tasks
 from benchmarks.identity.audit import Audit
 from benchmarks.identity.hashing import plain
-from benchmarks.runs import cells, comparison, rows, verified
-from benchmarks.runs.cells import Cell, cells_of
+from benchmarks.runs import cells, comparison, rows, runner, verified
+from benchmarks.runs.cells import Cell
 from benchmarks.runs.comparison import differences
 from benchmarks.runs.controllers import Entrant, find
 from benchmarks.runs.store import CHECKSUM, comparable, fault, read_json
@@ -108,30 +108,24 @@ def _track(row: Record) -> ScenarioSet:
 def _check(stored: Record, cluster: engine.Cluster, verdict: Verdict) -> None:
     tasks.check_version(stored["env"]["id"], stored["row"])
     entrant, track = find(stored["controller"]["name"]), _track(stored)
-    other = _other_scenarios(stored, track)
-    if other:  # a stranger's scenarios are not run
-        verdict.drifted += other
-        return
-    found = audit.find(entrant, track)
-    verdict.drifted += _other_audit(stored, entrant, track, found)
-    requested = cells_of(entrant, track, found)
-    verdict.drifted += _other_episodes(stored, requested)
-    _compare(stored, _run_again(entrant, track, found, requested, cluster), verdict)
-
-
-def _other_scenarios(stored: Record, track: ScenarioSet) -> list[str]:
-    """Return in what the recorded scenarios differ from those of the checkout's file."""
-    said, file = stored["scenarios"], f"{track.name}.yaml, version {track.content['version']}"
-    found = []
-    if scenarios.identifying(said["content"]) != plain(scenarios.identifying(track.content)):
-        found.append(f"scenarios: the content is not that of {file}; run the row again")
-    if said["digest"] != track.digest:
-        found.append(
-            f"scenarios.digest: {str(said['digest'])[:16]} recorded, {track.digest[:16]} of {file}"
+    content = (stored["scenarios"]["content"], track.content)
+    theirs, ours = (plain(scenarios.identifying(each)) for each in content)
+    if theirs != ours:  # a stranger's scenarios are not run
+        verdict.drifted.append(
+            f"scenarios: the content is not that of {track.name}.yaml, version "
+            f"{track.content['version']}; run the row again"
         )
-    if stored["env"]["id"] != track.env:
-        found.append(f"env.id: {stored['env']['id']} recorded, {track.env} of {file}")
-    return found
+        return
+    (plan,) = runner.plans([(entrant, track)])
+    verdict.drifted += _other_audit(stored, entrant, track, plan.found)
+    verdict.drifted += _other_episodes(stored, plan.cells.values())
+    records: dict[str, Any] = {}
+    for done in engine.run(cells.compute, cells.grouped(plan.cells.values()), cluster):
+        if done.error is not None:
+            raise ValueError(done.error)
+        records |= done.value
+    made = rows.assemble(entrant, track, [records[key] for key in plan.cells], plan.found)
+    _compare(stored, plain(made), verdict)
 
 
 def _other_audit(
@@ -153,42 +147,22 @@ def _other_audit(
     return []
 
 
-def _other_episodes(stored: Record, requested: Sequence[Cell]) -> list[str]:
+def _other_episodes(stored: Record, requested: Iterable[Cell]) -> list[str]:
     """Return which episodes are missing or superfluous."""
     recorded = Counter(
         (e["split"], e["training_seed"], e["scenario"], e["seed"]) for e in stored["episodes"]
     )
     needed = Counter(
-        (cell.split, cell.training_seed, cell.scenario.name, seed)
-        for cell in requested
-        for seed in cell.seeds
+        (c.split, c.training_seed, c.scenario.name, seed) for c in requested for seed in c.seeds
     )
     found = []
     for what, which in (("missing", needed - recorded), ("superfluous", recorded - needed)):
         if which:
             split, run, scenario, seed = next(iter(which))
-            trained = "" if run is None else f", training seed {run}"
-            found.append(
-                f"episodes: {which.total()} {what}, the first: {split}, {scenario}, seed {seed}"
-                + trained
-            )
+            where = f"{split}, {scenario}, seed {seed}"
+            where += "" if run is None else f", training seed {run}"
+            found.append(f"episodes: {which.total()} {what}, the first: {where}")
     return found
-
-
-def _run_again(
-    entrant: Entrant,
-    track: ScenarioSet,
-    found: Audit | None,
-    requested: Sequence[Cell],
-    cluster: engine.Cluster,
-) -> dict[str, Any]:
-    keys = [cell.key for cell in requested]
-    records: dict[str, Any] = {}
-    for done in engine.run(cells.compute, cells.grouped(requested), cluster):
-        if done.error is not None:
-            raise ValueError(done.error)
-        records |= done.value
-    return dict(plain(rows.assemble(entrant, track, [records[key] for key in keys], found)))
 
 
 def _compare(stored: Record, again: Record, verdict: Verdict) -> None:

@@ -31,7 +31,7 @@ def anew() -> Iterator[None]:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The only scenario file is ``short``, and the only controllers are the fake ones."""
     (tmp_path / "short.yaml").write_text(yaml.safe_dump(CONTENT))
-    monkeypatch.setattr(controllers, "SOURCES", (("bench_fakes", "bench_fakes", "classical"),))
+    monkeypatch.setattr(controllers, "SOURCES", ("bench_fakes",))
     monkeypatch.setattr(scenarios, "FOLDER", tmp_path)
     monkeypatch.setattr(audit, "FILE", tmp_path / "rounds.json")
     return tmp_path

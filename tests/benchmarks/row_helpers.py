@@ -37,7 +37,7 @@ def place(folder: Path) -> Iterator[Path]:
     bench_fakes.write_policies(folder / "policies", *GAINS)
     bench_fakes.write_knobs(folder / "policies")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(controllers, "SOURCES", (("bench_fakes", "bench_fakes", "classical"),))
+        patch.setattr(controllers, "SOURCES", ("bench_fakes",))
         patch.setattr(bench_fakes, "POLICIES", folder / "policies")
         patch.setattr(scenarios, "FOLDER", folder)
         patch.setattr(audit, "FILE", folder / "rounds.json")

@@ -137,7 +137,7 @@ from benchmarks.runs import controllers
 from benchmarks.scenarios import scenario as scenarios
 from benchmarks.runs.controllers import find
 from benchmarks.runs.runner import Options, run
-controllers.SOURCES = (("bench_fakes", "bench_fakes", "classical"),)
+controllers.SOURCES = ("bench_fakes",)
 folder = Path(sys.argv[1])
 track = scenarios.load(folder / "short.yaml")
 options = Options(jobs=1, out=folder / "out", cells=folder / "cells")

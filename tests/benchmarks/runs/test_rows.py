@@ -14,7 +14,7 @@ import gymnasium as gym
 import pytest
 
 from benchmarks.identity import artefacts, tasks
-from benchmarks.runs import cells, rows
+from benchmarks.runs import rows
 from benchmarks.runs.cells import cells_of
 from benchmarks.runs.controllers import BY_RULE, available, find
 from benchmarks.runs.store import write_record
@@ -208,22 +208,6 @@ def test_what_a_row_lacks_is_named(classical: dict[str, Any], board: Path, tmp_p
     write_record(path, {**classical, "controller": "inverse"})
     with pytest.raises(ValueError, match=r"without controller\.name, "):
         rows.load(path)
-
-
-def test_cells_of_another_version_or_plant_are_not_assembled(board: Path) -> None:
-    entrant, track = find("low"), tiny(board)
-    groups = cells.grouped(cells_of(entrant, track))
-    records = [record for group in groups for record in cells.compute(group).values()]
-    row = rows.assemble(entrant, track, records)
-    assert not any(episode["failed"] for episode in row["episodes"])
-    with pytest.raises(ValueError, match="the cells are not those of tiny"):
-        rows.assemble(entrant, track, records[:1])
-    other = [records[0], {**records[1], "env": "PAM/MusclePositioning-v1"}]
-    with pytest.raises(ValueError, match="Positioning-v1 among those of PAM/MusclePositioning-v0"):
-        rows.assemble(entrant, track, other)
-    for name in ("plant_digest", "model_digest"):
-        with pytest.raises(ValueError, match="is of another plant or model"):
-            rows.assemble(entrant, track, [records[0], {**records[1], name: "0"}])
 
 
 def test_the_environments_of_a_track_are_built_once(

@@ -37,7 +37,7 @@ from benchmarks.runs import controllers
 from benchmarks.scenarios import scenario as scenarios
 from benchmarks.runs.controllers import find
 from benchmarks.runs.runner import Options, run
-controllers.SOURCES = (("bench_fakes", "bench_fakes", "classical"),)
+controllers.SOURCES = ("bench_fakes",)
 folder, jobs, address, *names = sys.argv[1:]
 folder = Path(folder)
 track = scenarios.load(folder / "short.yaml")
