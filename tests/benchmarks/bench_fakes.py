@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import signal
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,11 +47,11 @@ class Inverse:
             wait_at_the_gate()
         total = 0.0 if state is None or episode_start else state
         name = f"reference_{self.ahead}" if self.ahead else "reference"
-        wanted = float(self.signals.decode(observation, name))
+        setpoint = float(self.signals.decode(observation, name))
         load = float(self.signals.decode(observation, "load"))
         seen = float(self.signals.decode(observation, "contraction"))
         total += self.gain * (float(self.signals.decode(observation, "reference")) - seen)
-        pressure = 4e7 * (wanted + total) + 1e4 * load
+        pressure = 4e7 * (setpoint + total) + 1e4 * load
         return self.action_signals[0].encode([pressure]).astype(np.float32), total
 
 
@@ -62,18 +61,6 @@ class Refused:
 
     def predict(self, observation, state=None, episode_start=None, deterministic=True):
         return np.array([np.nan], np.float32), None
-
-
-@dataclass(frozen=True)
-class Killer:
-    """Kills its process once: the file ``BENCH_FAKES_MARK`` says that it has."""
-
-    def predict(self, observation, state=None, episode_start=None, deterministic=True):
-        mark = Path(os.environ["BENCH_FAKES_MARK"])
-        if not mark.exists():
-            mark.write_text("killed")
-            os.kill(os.getpid(), signal.SIGKILL)
-        return np.array([0.0], np.float32), None
 
 
 @dataclass(frozen=True)
@@ -98,11 +85,11 @@ class Trained:
 
     def predict(self, observation, state=None, episode_start=None, deterministic=True):
         total = 0.0 if state is None or episode_start else state
-        wanted = float(self.signals.decode(observation, "reference"))
+        setpoint = float(self.signals.decode(observation, "reference"))
         seen = float(self.signals.decode(observation, "contraction"))
-        total += self.card["gain"] * (wanted - seen)
+        total += self.card["gain"] * (setpoint - seen)
         load = float(self.signals.decode(observation, "load"))
-        pressure = self.card["slope"] * (wanted + total) + 1e4 * load
+        pressure = self.card["slope"] * (setpoint + total) + 1e4 * load
         return self.action_signals[0].encode([pressure]).astype(np.float32), total
 
     def digest(self):
@@ -158,7 +145,6 @@ CONTROLLERS = {
     "trained": PolicyEntry("a file", "nominal model", kind="learned"),
     "refused": Entry("not a number"),
     "raises": Entry("raises"),
-    "killer": Entry("kills its worker once"),
 }
 
 
@@ -180,9 +166,7 @@ def write_knobs(folder, **others):
     (folder / "tuned.yaml").write_text(yaml.safe_dump({"schema": 1, "tuned": found}))
 
 
-def make_controller(
-    name, plant=None, signals=None, action_signals=None, seed=0, training_seed=None
-):
+def make_controller(name, plant=None, signals=None, action_signals=None, training_seed=None):
     """Return a controller by name."""
     parts = (plant, signals, action_signals)
     if name == "trained":
@@ -196,6 +180,5 @@ def make_controller(
         "tuned": lambda: Inverse(*parts, gain=CONTROLLERS["tuned"].found["gain"]),
         "raises": Raises,
         "refused": Refused,
-        "killer": Killer,
     }
     return made[name]()

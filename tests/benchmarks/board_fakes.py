@@ -188,7 +188,7 @@ def board() -> list[dict[str, Any]]:
         row("inverse", 1.0e-3, audit=1.0e-3),
         row("pid", 2.0e-3, audit=2.6e-3),
         row("zero", 8.0e-3, audit=8.0e-3, citation="", knowledge="nothing"),
-        row("told", 3.0e-3),
+        row("outside", 3.0e-3),
         row("ppo", good, audit=good, kind="learned"),
         row("young", [0.3e-3], audit=0.3e-3, kind="learned"),
     ]

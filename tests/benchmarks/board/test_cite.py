@@ -30,31 +30,17 @@ PPO = "Schulman et al., Proximal policy optimization algorithms, arXiv:1707.0634
 def parsed(text: str) -> dict[str, dict[str, str]]:
     """Return BibTeX entries by key; anything but entries of braced fields is an error."""
     found: dict[str, dict[str, str]] = {}
-    while text := text.lstrip():
-        head = re.match(r"@([a-z]+)\{([A-Za-z0-9_-]+),\n", text)
-        assert head, text[:60]
-        fields = {"type": head[1]}
-        text = text[head.end() :]
-        while field := re.match(r"  ([a-z]+) = (?=\{)", text):
-            end = braced(text, field.end())
-            fields[field[1]] = text[field.end() + 1 : end - 1]
-            assert text[end : end + 2] == ",\n"
-            text = text[end + 2 :]
-        assert text.startswith("}\n")
-        assert head[2] not in found
-        found[head[2]] = fields
-        text = text[2:]
+    for head, fields in re.findall(ENTRY, text):
+        kind, key = re.fullmatch(r"@([a-z]+)\{([A-Za-z0-9_-]+),\n", head).groups()
+        assert key not in found
+        found[key] = {"type": kind, **dict(re.findall(FIELD, fields))}
+        assert all(value.count("{") == value.count("}") for value in found[key].values())
+    assert not re.sub(ENTRY, "", text).strip()
     return found
 
 
-def braced(text: str, start: int) -> int:
-    """Return where the group in braces that begins at ``start`` ends."""
-    depth = 0
-    for place in range(start, len(text)):
-        depth += {"{": 1, "}": -1}.get(text[place], 0)
-        if depth == 0:
-            return place + 1
-    raise AssertionError(f"a brace is not closed: {text[start : start + 60]}")
+FIELD = r"  ([a-z]+) = \{(.*)\},\n"
+ENTRY = r"(@.*\n)((?:  [a-z]+ = \{.*\},\n)+)\}\n"
 
 
 @pytest.mark.parametrize("name", sorted(available()))
@@ -71,7 +57,7 @@ def test_entries_are_bibtex() -> None:
         assert found["type"] in ("article", "inproceedings", "book", "misc")
 
 
-def test_a_method_without_an_entry_is_named() -> None:
+def test_method_without_an_entry_is_refused() -> None:
     assert cite.methods(f"{SIMC}; {PPO}; {SIMC}") == ["skogestad2003", "schulman2017"]
     assert cite.methods("") == []
     assert cite.methods("skogestad2003; schulman2017") == ["skogestad2003", "schulman2017"]
@@ -84,7 +70,7 @@ def test_special_letters_are_escaped() -> None:
     assert r"title = {{50 \% of A\_b \& C}}" in entry
 
 
-def test_the_package_is_cited_as_it_says() -> None:
+def test_package_is_cited_by_its_own_file() -> None:
     about = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     (entry,) = parsed(cite.package()).values()
     assert entry["type"] == "software"
@@ -92,7 +78,7 @@ def test_the_package_is_cited_as_it_says() -> None:
     assert entry["title"] == f"{{{about['title']}}}"
 
 
-def test_a_row_is_cited_with_what_runs_it_again(
+def test_row_is_cited_with_its_identity_and_command(
     track: ScenarioSet, folder: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (path,) = score(track, folder, "integral").rows
@@ -114,7 +100,7 @@ def test_a_row_is_cited_with_what_runs_it_again(
     assert rows.path_of("short--integral", options(folder).out) == path
 
 
-def test_the_author_is_the_one_that_the_catalogue_names(
+def test_author_is_that_of_the_catalogue(
     track: ScenarioSet, folder: Any, capsys: pytest.CaptureFixture[str], monkeypatch: Any
 ) -> None:
     entry = Entry("with an integrator", "nominal model", make_zero, author="Doe, J. and Roe, R.")
@@ -125,7 +111,7 @@ def test_the_author_is_the_one_that_the_catalogue_names(
     assert first["author"] == "{Doe, J. and Roe, R.}"
 
 
-def test_a_row_is_cited_with_its_score_its_round_and_its_author() -> None:
+def test_row_is_cited_with_score_round_and_author() -> None:
     row = fakes.row("pid", 2e-3, audit=2.6e-3)
     said = parsed(cite.bibtex(row | {"controller": row["controller"] | {"citation": ""}}))
     entry = said["short_nominal--pid-aaaaaaaa"]
@@ -137,7 +123,7 @@ def test_a_row_is_cited_with_its_score_its_round_and_its_author() -> None:
     assert "audit round 2, salt 5a17" in entry["note"]
 
 
-def test_the_words_of_a_stranger_stay_in_their_field() -> None:
+def test_braces_in_a_text_do_not_leave_their_field() -> None:
     row = fakes.row("pid", 2e-3)
     row["controller"]["author"] = r"A. B}}, note = {won} \input{x}"
     row["controller"]["citation"] = ""

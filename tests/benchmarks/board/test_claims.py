@@ -181,16 +181,16 @@ def test_without_a_round_nothing_is_better() -> None:
 
 
 def test_better_paper_controller_outside_the_round_prevents_claims() -> None:
-    told = fakes.row("inverse", 1e-3, constraint_cost=0.01, air_use=1e-5)
-    (found,) = claims.learned_claims(in_round(learned(audit=2.5e-3), told))
+    outside = fakes.row("inverse", 1e-3, constraint_cost=0.01, air_use=1e-5)
+    (found,) = claims.learned_claims(in_round(learned(audit=2.5e-3), outside))
     assert found.verdict == claims.NOT_SHOWN
     assert "inverse not audited" in found.reasons
 
 
 def test_paper_controller_without_audit_is_still_compared() -> None:
-    told = fakes.row("inverse", 0.1e-3)
+    outside = fakes.row("inverse", 0.1e-3)
     pid = fakes.row("pid", 1e-3, audit=1e-3, constraint_cost=0.01, air_use=1e-5)
-    (found,) = claims.learned_claims(in_round(pid, told, learned()))
+    (found,) = claims.learned_claims(in_round(pid, outside, learned()))
     assert views.name_of(found.paper) == "pid"
     assert found.reasons == ("inverse, not audited, is below pid on public episodes",)
     worse = fakes.row("inverse", 3e-3)

@@ -82,7 +82,7 @@ def test_rows_outside_the_round_and_with_few_seeds_are_apart(files: dict[str, st
     assert names == [
         [("1", "ppo"), ("2", "inverse"), ("3", "pid"), ("4", "zero")],
         [("-", "young")],
-        [("-", "told")],
+        [("-", "outside")],
     ]
     assert "P(improvement), audit episodes" in ranked
     assert "P(improvement), public episodes" in outside
@@ -208,7 +208,7 @@ def test_figure_is_deterministic() -> None:
     assert plots.track_figure(ordered) == first
     assert all(name in first for name in ("ppo", "inverse", "pid", "episodes with at most"))
     assert "audit episodes" in first
-    assert "told" not in first
+    assert "outside" not in first
 
 
 def test_all_learned_and_only_the_best_classical_controllers_are_drawn() -> None:
@@ -222,8 +222,8 @@ def test_all_learned_and_only_the_best_classical_controllers_are_drawn() -> None
 def test_every_cost_of_a_claim_is_a_column() -> None:
     for metrics in ([], ["range"], ["range", "gait"]):
         columns = columns_of({"metrics": metrics})
-        wanted = set(claims.COSTS) & set(of_track({"metrics": metrics}))
-        assert wanted <= {metric for metric, _, _ in columns}
+        expected = set(claims.COSTS) & set(of_track({"metrics": metrics}))
+        assert expected <= {metric for metric, _, _ in columns}
 
 
 def test_numbers_and_tables_are_formatted() -> None:

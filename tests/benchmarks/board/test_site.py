@@ -31,9 +31,9 @@ HOSTILE = "<img src=x onerror=\"document.title='taken'\"></script><b id=taken>bo
 
 DRIVER = """
 "use strict";
-const told = { faults: [] };
-addEventListener("error", (event) => told.faults.push(String(event.message)));
-addEventListener("securitypolicyviolation", (event) => told.faults.push(event.violatedDirective));
+const seen = { faults: [] };
+addEventListener("error", (event) => seen.faults.push(String(event.message)));
+addEventListener("securitypolicyviolation", (event) => seen.faults.push(event.violatedDirective));
 const all = (query) => [...document.querySelectorAll(query)];
 const one = (query) => document.querySelector(query);
 const names = () => all("#rows tr.pick td.name").map((cell) => cell.textContent);
@@ -47,66 +47,66 @@ const until = (seen) => new Promise((done) => {
   look();
 });
 async function drive() {
-  told.first = names();
-  told.winners = one("#winners tbody").textContent;
-  told.changes = one("#changes tbody").textContent;
-  told.places = all("#places svg path").length;
-  told.groups = all("#rows tr.apart").map((line) => line.textContent);
-  told.headings = all("#rows thead th").map((cell) => cell.textContent);
-  told.round = one("#round").textContent;
-  told.intervals = all("#rows tbody svg circle, #rows tbody svg path.dot").length;
+  seen.first = names();
+  seen.winners = one("#winners tbody").textContent;
+  seen.changes = one("#changes tbody").textContent;
+  seen.places = all("#places svg path").length;
+  seen.groups = all("#rows tr.apart").map((line) => line.textContent);
+  seen.headings = all("#rows thead th").map((cell) => cell.textContent);
+  seen.round = one("#round").textContent;
+  seen.intervals = all("#rows tbody svg circle, #rows tbody svg path.dot").length;
   for (const step of ["up", "down", "none"]) {
     click('#rows button[data-sort="controller"]');
-    told[step] = names();
+    seen[step] = names();
   }
   click('#rows button[data-sort="gap"]');
-  told.sorted = one("th[aria-sort]").textContent;
+  seen.sorted = one("th[aria-sort]").textContent;
   click('#rows button[data-sort="rank"]');
   choose("#knows", "nothing");
-  told.nothing = names();
+  seen.nothing = names();
   choose("#knows", "");
   click('#rows button[data-sort="kind"]');
-  told.kinds = names();
+  seen.kinds = names();
   click('#rows button[data-sort="kind"]');
   click('#rows button[data-sort="kind"]');
   choose("#state", "self-reported");
-  told.reported = names();
+  seen.reported = names();
   choose("#state", "");
   choose("#query", "pi");
-  told.query = names();
+  seen.query = names();
   choose("#query", "");
   choose("#track", "short_wrong_model");
-  told.other = names();
-  told.figure = one("#figure").getAttribute("src");
+  seen.other = names();
+  seen.figure = one("#figure").getAttribute("src");
   choose("#track", "short_nominal");
   click('tr[data-row="short_nominal--pid"]');
   await until(() => one(".pictures"));
-  told.address = location.hash;
-  told.charts = all(".pictures svg").length;
-  told.lines = all(".pictures path").map((line) => line.getAttribute("d"));
-  told.words = one(".pictures").textContent;
-  told.again = one("pre.again").textContent;
-  told.bibtex = one("pre.bibtex").textContent;
-  told.detail = one(".detail").textContent;
-  told.raw = one("a.raw").getAttribute("href");
+  seen.address = location.hash;
+  seen.charts = all(".pictures svg").length;
+  seen.lines = all(".pictures path").map((line) => line.getAttribute("d"));
+  seen.words = one(".pictures").textContent;
+  seen.again = one("pre.again").textContent;
+  seen.bibtex = one("pre.bibtex").textContent;
+  seen.detail = one(".detail").textContent;
+  seen.raw = one("a.raw").getAttribute("href");
   click('tr[data-row="short_nominal--pid"]');
-  told.closed = all(".detail").length;
+  seen.closed = all(".detail").length;
   click('tr[data-row="short_nominal--inverse"]');
   await until(() => one(".pictures"));
-  told.hostile = one(".detail").textContent;
+  seen.hostile = one(".detail").textContent;
   click('tr[data-row="short_nominal--ppo"]');
   await until(() => one(".pictures"));
-  told.learned = one(".detail").textContent;
+  seen.learned = one(".detail").textContent;
   click('tr[data-row="short_nominal--zero"]');
   await until(() => one(".traces .note"));
-  told.missing = one(".traces .note").textContent;
-  told.taken = Boolean(one("#taken") || one(".detail img")) || document.title === "taken";
-  told.loaded = all("script, link, img").map((part) => part.src || part.href);
+  seen.missing = one(".traces .note").textContent;
+  seen.taken = Boolean(one("#taken") || one(".detail img")) || document.title === "taken";
+  seen.loaded = all("script, link, img").map((part) => part.src || part.href);
 }
-drive().catch((fault) => told.faults.push(String(fault))).finally(() => {
+drive().catch((fault) => seen.faults.push(String(fault))).finally(() => {
   const result = document.createElement("pre");
   result.id = "result";
-  result.textContent = JSON.stringify(told);
+  result.textContent = JSON.stringify(seen);
   document.body.append(result);
 });
 """
@@ -143,7 +143,7 @@ def browse(address: str, folder: Path) -> str:
 
 
 @pytest.fixture(scope="module")
-def told(built: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def seen(built: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Observations of the browser's driver after each click on the page."""
     copy = tmp_path_factory.mktemp("driven")
     shutil.copytree(built, copy, dirs_exist_ok=True)
@@ -160,95 +160,95 @@ def told(built: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any
     return result
 
 
-ORDER = ["ppo", "inverse", "pid", "zero", "young", "told"]
+ORDER = ["ppo", "inverse", "pid", "zero", "young", "outside"]
 
 
 @needs_browser
-def test_nothing_fails_and_nothing_comes_from_elsewhere(told: dict[str, Any]) -> None:
-    assert told["faults"] == []
-    assert {"page.css", "board.js", "page.js"} <= {Path(name).name for name in told["loaded"]}
-    assert all(name.startswith("file:") for name in told["loaded"])
+def test_page_has_no_fault_and_loads_local_files(seen: dict[str, Any]) -> None:
+    assert seen["faults"] == []
+    assert {"page.css", "board.js", "page.js"} <= {Path(name).name for name in seen["loaded"]}
+    assert all(name.startswith("file:") for name in seen["loaded"])
 
 
 @needs_browser
-def test_verdicts_and_rank_changes_lead(told: dict[str, Any]) -> None:
-    assert "inverse" in told["winners"]
-    assert told["winners"].endswith("better (settings tried: 40, paper's 0)")
-    assert "inverse 2 → 3" in told["changes"]
-    assert told["places"] == 4
+def test_verdicts_and_rank_changes_are_shown(seen: dict[str, Any]) -> None:
+    assert "inverse" in seen["winners"]
+    assert seen["winners"].endswith("better (settings tried: 40, paper's 0)")
+    assert "inverse 2 → 3" in seen["changes"]
+    assert seen["places"] == 4
 
 
 @needs_browser
-def test_rows_stand_in_their_groups_with_their_intervals(told: dict[str, Any]) -> None:
-    assert told["first"] == ORDER
-    assert told["groups"] == [title for title in site_data.GROUPS.values() if title]
-    assert told["intervals"] == len(ORDER) - 1
-    assert told["round"].startswith("Audit round 2, drawn 2026-01-02: 6 episodes")
+def test_rows_are_in_their_groups_with_intervals(seen: dict[str, Any]) -> None:
+    assert seen["first"] == ORDER
+    assert seen["groups"] == [title for title in site_data.GROUPS.values() if title]
+    assert seen["intervals"] == len(ORDER) - 1
+    assert seen["round"].startswith("Audit round 2, drawn 2026-01-02: 6 episodes")
 
 
 @needs_browser
-def test_headings_say_of_which_episodes_and_what_is_not_verified(told: dict[str, Any]) -> None:
+def test_headings_name_episodes_and_unverified_columns(seen: dict[str, Any]) -> None:
     wanted = ["audit RMS [mm] [95 %]", "IQM [mm]", "public RMS [mm]", "audit - public [mm]"]
     wanted += ["P(improvement), audit episodes", "step [µs] *", "trained [steps] *"]
-    assert set(wanted) <= set(told["headings"])
+    assert set(wanted) <= set(seen["headings"])
 
 
 @needs_browser
-def test_a_heading_sorts_within_the_groups_up_and_down_and_lets_go(told: dict[str, Any]) -> None:
-    assert told["up"] == ["inverse", "pid", "ppo", "zero", "young", "told"]
-    assert told["down"] == ["zero", "ppo", "pid", "inverse", "young", "told"]
-    assert told["none"] == ORDER
-    assert told["sorted"].startswith("audit - public")
+def test_heading_sorts_within_groups_up_down_and_not(seen: dict[str, Any]) -> None:
+    assert seen["up"] == ["inverse", "pid", "ppo", "zero", "young", "outside"]
+    assert seen["down"] == ["zero", "ppo", "pid", "inverse", "young", "outside"]
+    assert seen["none"] == ORDER
+    assert seen["sorted"].startswith("audit - public")
 
 
 @needs_browser
-def test_filters_keep_what_they_name(told: dict[str, Any]) -> None:
-    assert told["kinds"] == ["inverse", "pid", "zero", "ppo", "young", "told"]
-    assert told["nothing"] == ["zero"]
-    assert told["reported"] == ["told"]
-    assert told["query"] == ["pid"]
-    assert told["other"] == ["ppo", "pid", "inverse", "zero"]
-    assert told["figure"] == "figures/short_wrong_model.svg"
+def test_filters_keep_matching_rows(seen: dict[str, Any]) -> None:
+    assert seen["kinds"] == ["inverse", "pid", "zero", "ppo", "young", "outside"]
+    assert seen["nothing"] == ["zero"]
+    assert seen["reported"] == ["outside"]
+    assert seen["query"] == ["pid"]
+    assert seen["other"] == ["ppo", "pid", "inverse", "zero"]
+    assert seen["figure"] == "figures/short_wrong_model.svg"
 
 
 @needs_browser
-def test_a_click_opens_trajectories_the_loop_and_what_runs_it_again(told: dict[str, Any]) -> None:
-    assert "row=short_nominal--pid" in told["address"]
-    assert told["charts"] == 4
+def test_click_opens_trajectories_loop_and_commands(seen: dict[str, Any]) -> None:
+    assert "row=short_nominal--pid" in seen["address"]
+    assert seen["charts"] == 4
     # two errors, two loops, one pressure; reference, output, and the paper controller's output
-    assert len(told["lines"]) == 8
-    assert all(line.count("L") > 200 and "NaN" not in line for line in told["lines"])
-    assert "the plant's loop" in told["words"]
-    assert "inverse" in told["words"]
-    assert "python -m benchmarks verify short_nominal--pid" in told["again"]
-    assert told["bibtex"].startswith("@")
-    assert "round 2, drawn 2026-01-02, salt 5a17; artefact number 1" in told["detail"]
-    assert "verified 2026-01-03" in told["detail"]
-    assert told["raw"] == "rows/short_nominal--pid.json"
-    assert told["closed"] == 0
+    assert len(seen["lines"]) == 8
+    assert all(line.count("L") > 200 and "NaN" not in line for line in seen["lines"])
+    assert "the plant's loop" in seen["words"]
+    assert "inverse" in seen["words"]
+    assert "python -m benchmarks verify short_nominal--pid" in seen["again"]
+    assert seen["bibtex"].startswith("@")
+    assert "round 2, drawn 2026-01-02, salt 5a17; artefact number 1" in seen["detail"]
+    assert "verified 2026-01-03" in seen["detail"]
+    assert seen["raw"] == "rows/short_nominal--pid.json"
+    assert seen["closed"] == 0
 
 
 @needs_browser
-def test_a_learned_row_shows_every_training_seed(told: dict[str, Any]) -> None:
-    assert "RMS [mm] by training seed, audit episodes" in told["learned"]
-    assert "seed 00.400" in told["learned"]
-    assert "seed 90.600" in told["learned"]
-    assert "As stated by its maker, not verified" in told["learned"]
+def test_learned_row_shows_every_training_seed(seen: dict[str, Any]) -> None:
+    assert "RMS [mm] by training seed, audit episodes" in seen["learned"]
+    assert "seed 00.400" in seen["learned"]
+    assert "seed 90.600" in seen["learned"]
+    assert "As stated by its maker, not verified" in seen["learned"]
 
 
 @needs_browser
-def test_trajectories_that_are_missing_are_not_waited_for(told: dict[str, Any]) -> None:
-    assert told["missing"].startswith("data/traces/short_nominal--zero.js cannot be read")
+def test_missing_trajectories_are_reported(seen: dict[str, Any]) -> None:
+    assert seen["missing"].startswith("data/traces/short_nominal--zero.js cannot be read")
 
 
 @needs_browser
-def test_words_of_a_stranger_are_shown_and_never_run(told: dict[str, Any]) -> None:
-    assert HOSTILE in told["hostile"]
-    assert not told["taken"]
+def test_texts_of_rows_are_shown_and_never_run(seen: dict[str, Any]) -> None:
+    assert HOSTILE in seen["hostile"]
+    assert not seen["taken"]
 
 
 @needs_browser
-def test_an_address_opens_a_row(built: Path) -> None:
+def test_address_opens_a_row(built: Path) -> None:
     address = f"{(built / 'index.html').as_uri()}#row=short_wrong_model--ppo"
     shown = browse(address, built)
     assert 'class="pictures"' in shown
@@ -256,15 +256,13 @@ def test_an_address_opens_a_row(built: Path) -> None:
 
 
 @needs_browser
-def test_a_page_without_rows_says_so(tmp_path: Path) -> None:
+def test_page_without_rows_has_a_message(tmp_path: Path) -> None:
     site_build.build(tmp_path, tmp_path / "out")
     shown = browse((tmp_path / "out" / "index.html").as_uri(), tmp_path)
     assert "There are no rows yet" in shown
 
 
-def test_the_page_is_the_same_when_it_is_built_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_equal_rows_give_an_equal_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made = {"rows": page_rows()}
     monkeypatch.setattr(leaderboard, "load", lambda folder: made["rows"])
     for row in made["rows"]:
@@ -282,10 +280,10 @@ def test_the_page_is_the_same_when_it_is_built_again(
     site_build.build(tmp_path, tmp_path / "out")
     for folder, end in (("data/traces", "js"), ("rows", "json")):
         left = {path.name for path in (tmp_path / "out" / folder).iterdir()}
-        assert left == {f"short_nominal--{n}.{end}" for n in ("inverse", "pid", "zero", "told")}
+        assert left == {f"short_nominal--{n}.{end}" for n in ("inverse", "pid", "zero", "outside")}
 
 
-def test_the_page_asks_for_nothing_from_elsewhere() -> None:
+def test_page_loads_nothing_from_the_network() -> None:
     for path in site_build.ASSETS.iterdir():
         links = re.findall(r"https?://[^\s\"']+", path.read_text())
         assert set(links) <= {"http://www.w3.org/2000/svg"}, path.name  # a name, not an address

@@ -60,7 +60,7 @@ def test_lists_keep_rows_outside_of_the_round_and_young_ones_apart() -> None:
     first, _ = standings.tracks(fakes.board()).values()
     found = standings.listing(first)
     assert [views.name_of(row) for row in found.ranked] == ["ppo", "inverse", "pid", "zero"]
-    assert [views.name_of(row) for row in found.outside] == ["told"]
+    assert [views.name_of(row) for row in found.outside] == ["outside"]
     assert [views.name_of(row) for row in found.few] == ["young"]
     assert (found.split, found.missing) == ("audit", ())
     shorter = standings.listing([row for row in first if views.name_of(row) != "pid"])
@@ -99,7 +99,7 @@ def test_score_of_row_in_round_is_its_audit_score() -> None:
     assert gap.value == pytest.approx(0.6e-3)
     assert views.is_worse_unseen(row)
     assert not views.is_worse_unseen(fakes.row("pid", 2e-3, audit=2e-3))
-    assert views.gap(fakes.row("told", 2e-3)) is None
+    assert views.gap(fakes.row("outside", 2e-3)) is None
 
 
 def test_policies_that_differ_do_not_hide_that_each_does_worse_unseen() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -40,41 +41,26 @@ def edit(board: Path, **changes: object) -> None:
     card(board, 1).write_text(json.dumps(said | changes))
 
 
+COPIES = "training seeds 0 and 1 are one policy"
+CARD = "training seed 1 has seed 7 on its card"
+OTHER = "training seed 1 was trained with other settings than seed 0"
 CHANGES: dict[str, tuple[Callable[[Path], object], str]] = {
-    "copied": (
-        lambda board: card(board, 1).write_bytes(card(board, 0).read_bytes()),
-        "training seeds 0 and 1 are one policy",
-    ),
-    "copied and renamed": (
-        lambda board: edit(board, gain=GAINS[0]),
-        "training seeds 0 and 1 are one policy",
-    ),
-    "renamed": (lambda board: edit(board, seed=7), "training seed 1 has seed 7 on its card"),
-    "renamed beside": (
-        lambda board: edit(board, training={"seed": 7}),
-        "training seed 1 has seed 7 on its card",
-    ),
+    "copied": (lambda board: shutil.copy(card(board, 0), card(board, 1)), COPIES),
+    "copied and renamed": (lambda board: edit(board, gain=GAINS[0]), COPIES),
+    "renamed": (lambda board: edit(board, seed=7), CARD),
+    "renamed beside": (lambda board: edit(board, training={"seed": 7}), CARD),
     "left out": (
         lambda board: card(board, 0).rename(card(board, 2)),
         "training seeds 1, 2, and they must be 0 to 1",
     ),
-    "longer": (
-        lambda board: edit(board, steps=2e6),
-        "training seed 1 was trained with other settings than seed 0",
-    ),
-    "tuned": (
-        lambda board: edit(board, config={"ppo": {"gamma": 0.9}}),
-        "training seed 1 was trained with other settings than seed 0",
-    ),
-    "of another plant": (
-        lambda board: edit(board, plants=["0" * 16]),
-        "training seed 1 was trained with other settings than seed 0",
-    ),
+    "longer": (lambda board: edit(board, steps=2e6), OTHER),
+    "tuned": (lambda board: edit(board, config={"ppo": {"gamma": 0.9}}), OTHER),
+    "of another plant": (lambda board: edit(board, plants=["0" * 16]), OTHER),
 }
 
 
 @pytest.mark.parametrize("what", CHANGES)
-def test_seeds_that_are_no_trainings_of_their_own_make_no_row(what: str, board: Path) -> None:
+def test_seeds_that_are_not_independent_trainings_make_no_row(what: str, board: Path) -> None:
     change, words = CHANGES[what]
     change(board)
     options = Options(jobs=1, out=board / "new", cells=board / "cells")
@@ -88,20 +74,20 @@ def test_seeds_that_are_no_trainings_of_their_own_make_no_row(what: str, board: 
     )
 
 
-def test_a_round_takes_no_copies(board: Path) -> None:
+def test_round_takes_no_copies(board: Path) -> None:
     CHANGES["copied"][0](board)
     with pytest.raises(ValueError, match="are one policy"):
         draw(board, "trained")
 
 
-def test_what_changes_nothing_that_is_learned_may_differ(board: Path) -> None:
+def test_settings_without_effect_on_the_training_may_differ(board: Path) -> None:
     edit(board, config={"checkpoint_steps": 10, "search": {"trials": 3}})
     edit(board, baseline={"probe": [0.1]})
     row = rows.load(run_row(board, "trained", out=board / "other"))
     assert row["training_seeds"] == [0, 1]
 
 
-def test_the_row_says_what_the_cards_say(board: Path) -> None:
+def test_row_has_the_trainings_of_the_cards(board: Path) -> None:
     found = trainings.of(find("trained"))
     assert found is not None
     assert [(run["training_seed"], run["command"]) for run in found] == [

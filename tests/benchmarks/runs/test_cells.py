@@ -17,7 +17,7 @@ from benchmarks.scenarios.scenario import ScenarioSet
 from sweeps import worker
 
 
-def test_the_key_of_a_cell_follows_plant_files_and_processor(
+def test_key_of_a_cell_depends_on_plant_files_and_processor(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shutil.copytree(making.PLANTS, tmp_path / "plants")
@@ -56,7 +56,7 @@ def test_only_plants_of_the_folder_of_plants_are_read(plant: str) -> None:
         ("manipulator_nominal", "joint_mfc_mu_ahead"),  # weights of many arms at once
     ],
 )
-def test_a_record_does_not_depend_on_what_was_computed_with_it(track: str, controller: str) -> None:
+def test_record_does_not_depend_on_the_cells_of_its_group(track: str, controller: str) -> None:
     chosen, entrant = scenarios.available()[track], find(controller)
     first = cells.cells_of(entrant, chosen)[0]
     audited = dataclasses.replace(first, split=cells.AUDIT, seeds=(910_001, 910_002), probe=False)
@@ -70,7 +70,7 @@ def test_a_record_does_not_depend_on_what_was_computed_with_it(track: str, contr
         assert [e["seed"] for e in alone["episodes"]] == list(cell.seeds)
 
 
-def test_a_group_is_of_one_policy_in_one_scenario(track: ScenarioSet) -> None:
+def test_group_is_of_one_policy_in_one_scenario(track: ScenarioSet) -> None:
     entrant, scenario = find("low"), track.scenarios()[0]
     plain = cells.Cell(entrant, track, scenario, seeds=(1,))
     other = [
@@ -83,9 +83,7 @@ def test_a_group_is_of_one_policy_in_one_scenario(track: ScenarioSet) -> None:
     assert [group.cells for group in made] == [*zip([plain, *other], audited, strict=True)]
 
 
-def test_a_cell_that_nobody_waits_for_ends(
-    track: ScenarioSet, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_cancelled_cell_ends(track: ScenarioSet, monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = track.scenarios()[0]
     cell = cells.Cell(find("low"), track, scenario, seeds=track.seeds[scenario.name])
     asked = iter([False])

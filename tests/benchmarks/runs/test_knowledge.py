@@ -1,4 +1,4 @@
-"""Model knowledge that the catalogues state, tried out on plants that are a little off."""
+"""Model knowledge that the catalogues state, checked on plants with other parameters."""
 
 from __future__ import annotations
 
@@ -71,16 +71,22 @@ def test_controller_of_a_model_depends_on_it() -> None:
     env.close()
 
 
-def test_labels() -> None:
-    told, drawn = {"knows_plant": True}, {"knows_plant": False}
-    assert knowledge.label("nominal model", [told, told]) == "true model"
-    assert knowledge.label("nominal model", [told, drawn]) == "nominal model"
-    assert knowledge.label("true model", [drawn]) == "nominal model"
-    met = drawn | {"trained_on_plant": True}
-    assert knowledge.label("nominal model", [drawn, met]) == knowledge.TRAINED
-    assert knowledge.label("nominal model", [told]) == "true model"
-    assert knowledge.label("tables", [told]) == "tables"
-    assert knowledge.label("nothing", [told]) == "nothing"
+KNOWS, DRAWN = {"knows_plant": True}, {"knows_plant": False}
+
+
+@pytest.mark.parametrize(
+    ("claimed", "cells", "label"),
+    [
+        ("nominal model", [KNOWS, KNOWS], "true model"),
+        ("nominal model", [KNOWS, DRAWN], "nominal model"),
+        ("nominal model", [DRAWN, DRAWN | {"trained_on_plant": True}], knowledge.TRAINED),
+        ("true model", [DRAWN], "nominal model"),
+        ("tables", [KNOWS], "tables"),
+        ("nothing", [KNOWS], "nothing"),
+    ],
+)
+def test_label_follows_from_the_cells(claimed: str, cells: list[Any], label: str) -> None:
+    assert knowledge.label(claimed, cells) == label
 
 
 class Policy:

@@ -20,13 +20,8 @@ def git(folder: Path, *arguments: str) -> None:
 
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:
-    for folder in (
-        *CODE,
-        "benchmarks/results",
-        "benchmarks/leaderboard",
-        "benchmarks/site",
-        "docs",
-    ):
+    written = (f"benchmarks/{name}" for name in ("results", "leaderboard", "site"))
+    for folder in (*CODE, *written, "docs"):
         (tmp_path / folder).mkdir(exist_ok=True)
         (tmp_path / folder / "page.txt").write_text("as it was")
     (tmp_path / "benchmarks/rounds.json").write_text("{}")
@@ -48,7 +43,7 @@ def test_files_that_a_run_writes_are_not_listed(checkout: Path) -> None:
     places = (
         "results/b.json.xz",
         "leaderboard/a.md",
-        "site/index.html",
+        "site/a.html",
         "rounds.json",
         "LEADERBOARD.md",
     )

@@ -1,4 +1,4 @@
-"""An episode: what is a failure of the controller, and what an error of ours."""
+"""Episodes: failures of the controller, errors of the environment, and rows of a batch."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def env():
     made.close()
 
 
-def test_an_episode_that_ends_by_its_time_is_no_failure(env):
+def test_episode_that_reaches_its_end_is_no_failure(env):
     episode = rollout.run(env, Gives(np.zeros(1, np.float32)), 1)
     assert (episode.failed, len(episode.actions)) == (False, 20)
 
@@ -49,21 +49,21 @@ def test_an_episode_that_ends_by_its_time_is_no_failure(env):
         (RuntimeError("line\n  two at 0x7f001122aabb"), "RuntimeError: line two at 0x..."),
     ],
 )
-def test_a_controller_that_fails_is_recorded_with_its_words(env, thing, words):
+def test_failure_of_a_controller_is_recorded_with_its_message(env, thing, words):
     episode = rollout.run(env, Gives(thing), 1)
     assert episode.failed
     assert episode.failure.startswith(words)
     assert len(episode.actions) == 0
 
 
-def test_a_long_message_is_cut(env):
+def test_long_message_is_cut(env):
     episode = rollout.run(env, Gives(RuntimeError("x" * 10_000)), 1)
     assert len(episode.failure) == rollout.LONGEST
     assert episode.failure.endswith("...")
 
 
 @pytest.mark.parametrize("error", [ValueError("ours"), KeyError("ours"), TypeError("ours")])
-def test_an_error_of_the_environment_is_raised(env, error, monkeypatch):
+def test_error_of_the_environment_is_raised(env, error, monkeypatch):
     def broken(action):
         raise error
 
@@ -108,10 +108,8 @@ def compared(env_id, kwargs, controller, seeds=SEEDS):
         assert list(episode.signals) == list(alone.signals)
         for name, signal in alone.signals.items():
             np.testing.assert_array_equal(episode.signals[name], signal, err_msg=name)
-        for mine, other in (
-            (episode.observations, alone.observations),
-            (episode.actions, alone.actions),
-        ):
+        for name in ("observations", "actions"):
+            mine, other = getattr(episode, name), getattr(alone, name)
             assert mine.dtype == other.dtype
             np.testing.assert_array_equal(mine, other)
     return together
@@ -133,7 +131,7 @@ def test_rows_of_a_batch_are_single_episodes_to_the_bit(env_id, name, kwargs, mo
     assert len(rollout.run_all(partial(make_batch, env_id, kwargs), env, controller, (3, 4))) == 2
 
 
-def test_who_draws_otherwise_in_other_rows_has_batches_of_one(monkeypatch):
+def test_controller_that_draws_by_row_gets_batches_of_one(monkeypatch):
     env_id = "PAM/MusclePositioning-v0"
     env = make_env(env_id, SHORT)
     controller = controllers.make(controllers.find("random"), env.unwrapped.plant, env)
@@ -151,12 +149,12 @@ def test_who_draws_otherwise_in_other_rows_has_batches_of_one(monkeypatch):
     [(Rows(), 20), (Rows(mixed=1.0), 20), (Rows(alone=False), 1)],
     ids=["rows", "mixed", "takes no batch"],
 )
-def test_a_controller_whose_rows_are_not_alone_is_run_alone(controller, batches):
+def test_controller_whose_rows_depend_on_each_other_is_run_alone(controller, batches):
     compared("PAM/MusclePositioning-v0", SHORT, controller)
     assert controller.batches == batches
 
 
-def test_rows_end_when_they_end():
+def test_rows_end_at_their_own_time():
     together = compared("PAM/RedundantManipulator-v0", SWINGS, Rows(swing=25))
     lengths = [len(episode.actions) for episode in together]
     assert all(episode.failed for episode in together)
@@ -164,18 +162,18 @@ def test_rows_end_when_they_end():
 
 
 @pytest.mark.parametrize("thing", [np.array([np.nan]), np.zeros(2), RuntimeError("no")])
-def test_what_fails_together_is_told_in_the_words_of_one(thing):
+def test_failure_in_a_batch_has_the_message_of_a_single_episode(thing):
     together = compared("PAM/MusclePositioning-v0", SHORT, Gives(thing))
     assert all(episode.failed for episode in together)
 
 
-def test_answers_are_timed_one_at_a_time():
+def test_answers_are_timed_for_single_observations():
     (episode, *_) = compared("PAM/MusclePositioning-v0", SHORT, Rows())
     assert len(episode.seconds) == 2 * 20
     assert (episode.seconds > 0.0).all()
 
 
-def test_a_fault_of_the_batch_is_raised_and_not_run_alone():
+def test_error_of_the_batch_is_raised():
     env_id = "PAM/MusclePositioning-v0"
 
     def broken(rows):
@@ -194,14 +192,13 @@ def test_a_fault_of_the_batch_is_raised_and_not_run_alone():
 @pytest.mark.parametrize(
     ("controller", "answers"), [(Rows(mixed=1.0), 3), (Rows(alone=False), 2)], ids=["rows", "alone"]
 )
-def test_it_is_asked_before_each_run_whether_somebody_waits(controller, answers, monkeypatch):
+def test_cancelled_run_ends_before_its_next_episode(controller, answers, monkeypatch):
     env_id = "PAM/MusclePositioning-v0"
     asked = iter([*[True] * answers, False])
     monkeypatch.setattr(rollout, "is_needed", lambda: next(asked))
+    batches = partial(make_batch, env_id, SHORT)
     with pytest.raises(RuntimeError, match="cancelled"):
-        rollout.run_all(
-            partial(make_batch, env_id, SHORT), make_env(env_id, SHORT), controller, SEEDS
-        )
+        rollout.run_all(batches, make_env(env_id, SHORT), controller, SEEDS)
     assert not [*asked]
 
 
@@ -213,7 +210,7 @@ def test_it_is_asked_before_each_run_whether_somebody_waits(controller, answers,
         ("PAM/RedundantManipulator-v0", "joint_mfc_mu_ahead", "path_1", 0.15),
     ],
 )
-def test_the_preview_is_told_in_seconds_of_the_environment(env_id, name, reference, seconds):
+def test_preview_in_use_is_measured_in_seconds(env_id, name, reference, seconds):
     kwargs = {"episode_seconds": 1.0, "reference": reference}
     env = make_env(env_id, kwargs)
     controller = controllers.make(controllers.find(name), env.unwrapped.plant, env)

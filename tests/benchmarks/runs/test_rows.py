@@ -1,4 +1,4 @@
-"""Rows: what they hold, and which are not put side by side."""
+"""Rows: their entries, refused ones, and those that are not compared."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def classical(board: Path) -> dict[str, Any]:
     return rows.load(run_row(board, "integral"))
 
 
-def test_a_row_names_environment_task_and_artefact(classical: dict[str, Any], board: Path) -> None:
+def test_row_names_environment_task_and_artefact(classical: dict[str, Any], board: Path) -> None:
     assert classical["schema"] == rows.SCHEMA
     assert classical["env"]["id"] == "PAM/MusclePositioning-v0"
     assert classical["env"]["version"] == 0
@@ -57,10 +57,10 @@ def test_a_row_names_environment_task_and_artefact(classical: dict[str, Any], bo
 def test_every_training_seed_is_run_in_every_episode(trained: dict[str, Any], board: Path) -> None:
     keys = [(e["split"], e["training_seed"], e["scenario"], e["seed"]) for e in trained["episodes"]]
     seeds = tiny(board).seeds
-    wanted = [
+    expected = [
         ("public", run, name, seed) for run in (0, 1) for name, own in seeds.items() for seed in own
     ]
-    assert keys == wanted
+    assert keys == expected
     assert trained["training_seeds"] == [0, 1]
     files = trained["controller"]["artefact"]["files"]
     assert [(file["name"], file["training_seed"]) for file in files] == [
@@ -89,31 +89,22 @@ def test_knowledge_follows_from_the_model(name: str, claimed: str, found: str, b
     assert (about["claimed"], about["knowledge"]) == (claimed, found)
 
 
-def test_a_policy_knows_the_plant_of_its_training(board: Path, trained: dict[str, Any]) -> None:
+def test_policy_knows_the_plant_of_its_training(board: Path, trained: dict[str, Any]) -> None:
     assert trained["controller"]["knowledge"] == "nominal model"
     (plant,) = set(trained["plants"].values())
     bench_fakes.write_policies(board / "policies", 0.02, 0.05, plant=plant)
-    again = rows.load(run_row(board, "trained", out=board / "told"))
+    again = rows.load(run_row(board, "trained", out=board / "same plant"))
     bench_fakes.write_policies(board / "policies", 0.02, 0.05)
     assert again["controller"]["knowledge"] == "true model"
     assert again["episodes"] == trained["episodes"]
 
 
-def test_an_entry_without_its_policies_is_no_controller(
+def test_entry_without_policies_is_no_controller(
     board: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     assert "trained" in available()
     monkeypatch.setattr(bench_fakes, "POLICIES", tmp_path)
     assert "trained" not in available()
-
-
-def test_a_row_of_the_former_schema_is_to_be_run_again(
-    classical: dict[str, Any], tmp_path: Path
-) -> None:
-    path = rows.path_of("tiny--integral", tmp_path)
-    write_record(path, {**classical, "schema": 1})
-    with pytest.raises(ValueError, match=r"schema 4, but of 1; run it again: .*--track tiny"):
-        rows.load(path)
 
 
 def of_version(row: dict[str, Any], number: int) -> dict[str, Any]:
@@ -148,7 +139,7 @@ def test_rows_of_two_tasks_are_not_mixed(classical: dict[str, Any]) -> None:
         rows.check_together([classical, other])
 
 
-def test_a_row_that_is_there_twice_is_refused(classical: dict[str, Any]) -> None:
+def test_duplicate_row_is_refused(classical: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match="tiny--integral is there twice"):
         rows.check_together([classical, classical])
 
@@ -157,40 +148,59 @@ def test_no_rows_are_no_error(tmp_path: Path) -> None:
     assert rows.load_all(tmp_path / "none") == []
 
 
-NAMED: dict[str, Callable[[dict[str, Any]], object]] = {
-    "row": lambda row: row.update(row="../../../escaped"),
-    "track": lambda row: row["scenarios"].update(name="../../evil"),
-    "controller": lambda row: row["controller"].update(name="integral/.."),
-    "file": lambda row: row.update(row="tiny--inverse"),
+def put(outer: str, key: str, value: object) -> Callable[[dict[str, Any]], None]:
+    """Return a change of an entry of a row; no value removes it."""
+
+    def change(row: dict[str, Any]) -> None:
+        record = row[outer] if outer else row
+        if value is None:
+            del record[key]
+        else:
+            record[key] = value
+
+    return change
+
+
+DISAGREE = "have to agree, in letters, digits and _"
+REFUSED: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
+    "path in the row's name": (put("", "row", "../../../escaped"), DISAGREE),
+    "path in the track's name": (put("scenarios", "name", "../../evil"), DISAGREE),
+    "path in the controller's name": (put("controller", "name", "integral/.."), DISAGREE),
+    "another file": (put("", "row", "tiny--inverse"), DISAGREE),
+    "former schema": (put("", "schema", 1), "schema 4, but of 1; run it again: .*--track tiny"),
+    "no episodes": (put("", "episodes", None), "a row without episodes; run it again"),
+    "no version": (put("env", "version", None), r"a row without env\.version; run it again"),
+    "no mapping": (put("", "controller", "inverse"), r"without controller\.name, "),
 }
 
 
-@pytest.mark.parametrize("what", sorted(NAMED))
-def test_names_that_lead_elsewhere_or_disagree_are_refused(
-    what: str, classical: dict[str, Any], board: Path, tmp_path: Path
+@pytest.mark.parametrize("what", REFUSED)
+def test_row_that_is_incomplete_or_misnamed_is_refused(
+    what: str, classical: dict[str, Any], tmp_path: Path
 ) -> None:
-    row = copy.deepcopy(classical)
-    NAMED[what](row)
-    write_record(rows.path_of("tiny--integral", tmp_path), row)
-    with pytest.raises(ValueError, match="have to agree, in letters, digits and _"):
-        rows.load(rows.path_of("tiny--integral", tmp_path))
-    row["scenarios"]["name"], row["controller"]["name"] = "a/b", "c"
-    path = rows.path_of("tiny--other", tmp_path)
-    write_record(path, {**row, "row": "a/b--c"})
-    with pytest.raises(ValueError, match="have to agree"):
+    row, path = copy.deepcopy(classical), rows.path_of("tiny--integral", tmp_path)
+    change, words = REFUSED[what]
+    change(row)
+    write_record(path, row)
+    with pytest.raises(ValueError, match=words):
         rows.load(path)
 
 
-def test_a_copy_under_another_name_is_no_row(
-    classical: dict[str, Any], board: Path, tmp_path: Path
+def test_row_in_a_file_of_another_name_is_refused(
+    classical: dict[str, Any], tmp_path: Path
 ) -> None:
     write_record(rows.path_of("tiny--mine", tmp_path), classical)
     with pytest.raises(ValueError, match="holds 'tiny--integral'"):
         rows.load_all(tmp_path)
+    row = copy.deepcopy(classical) | {"row": "a/b--c"}
+    row["scenarios"]["name"], row["controller"]["name"] = "a/b", "c"
+    write_record(rows.path_of("tiny--other", tmp_path), row)
+    with pytest.raises(ValueError, match="have to agree"):
+        rows.load(rows.path_of("tiny--other", tmp_path))
 
 
-def test_a_row_of_an_unknown_track_is_refused(
-    classical: dict[str, Any], board: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_row_of_an_unknown_track_is_refused(
+    classical: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_record(rows.path_of("tiny--integral", tmp_path), classical)
     monkeypatch.setattr(scenarios, "FOLDER", tmp_path)
@@ -198,19 +208,7 @@ def test_a_row_of_an_unknown_track_is_refused(
         rows.load(rows.path_of("tiny--integral", tmp_path))
 
 
-def test_what_a_row_lacks_is_named(classical: dict[str, Any], board: Path, tmp_path: Path) -> None:
-    path = rows.path_of("tiny--integral", tmp_path)
-    row = copy.deepcopy(classical)
-    del row["episodes"], row["env"]["version"]
-    write_record(path, row)
-    with pytest.raises(ValueError, match=r"a row without episodes, env\.version; run it again"):
-        rows.load(path)
-    write_record(path, {**classical, "controller": "inverse"})
-    with pytest.raises(ValueError, match=r"without controller\.name, "):
-        rows.load(path)
-
-
-def test_the_environments_of_a_track_are_built_once(
+def test_environments_of_a_track_are_built_once(
     board: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made: list[str] = []
@@ -227,7 +225,7 @@ def test_the_environments_of_a_track_are_built_once(
     assert len(made) == len(tiny(board).scenarios())
 
 
-def test_the_key_of_a_cell_follows_its_policy(board: Path) -> None:
+def test_key_of_a_cell_depends_on_its_policy(board: Path) -> None:
     track = tiny(board)
     before = [cell.key for cell in cells_of(find("trained"), track)]
     assert len(set(before)) == len(before) == 4
@@ -238,7 +236,7 @@ def test_the_key_of_a_cell_follows_its_policy(board: Path) -> None:
     assert not set(after[2:]) & set(before)
 
 
-def test_what_a_controller_raises_is_a_failure_with_its_words(board: Path) -> None:
+def test_error_of_a_controller_is_a_failure_with_its_message(board: Path) -> None:
     row = rows.load(run_row(board, "raises"))
     assert [episode["failed"] for episode in row["episodes"]] == [True] * 4
     worst = row["scenarios"]["content"]["worst_case"]["rms_error"]

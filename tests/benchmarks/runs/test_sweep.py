@@ -1,4 +1,4 @@
-"""Runs whose workers and whose driver are killed give the rows of one that was left in peace."""
+"""Runs whose workers or driver are killed give the rows of an undisturbed run."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("backend", ["loky", "dask"])
-def test_a_run_whose_driver_is_killed_goes_on_and_gives_the_same_bytes(
+def test_run_with_killed_driver_resumes_and_gives_the_same_bytes(
     backend: str, whole: dict[str, str], tmp_path: Path, request: pytest.FixtureRequest, gate: Path
 ) -> None:
     address = request.getfixturevalue("dask").address if backend == "dask" else ""
@@ -143,7 +143,7 @@ def test_a_run_whose_driver_is_killed_goes_on_and_gives_the_same_bytes(
 
 
 @pytest.mark.parametrize("backend", ["loky", "dask"])
-def test_a_worker_that_is_killed_in_the_middle_changes_nothing(
+def test_killed_worker_changes_no_row(
     backend: str, whole: dict[str, str], tmp_path: Path, request: pytest.FixtureRequest, gate: Path
 ) -> None:
     dask = request.getfixturevalue("dask") if backend == "dask" else None
@@ -185,7 +185,7 @@ def ask(track: ScenarioSet, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Ca
     return run
 
 
-def test_a_dry_run_lists_the_cells_and_runs_none(
+def test_dry_run_lists_cells_and_runs_none(
     ask: Callable[..., int], folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert ask("--dry-run") == 0
@@ -231,24 +231,18 @@ def test_exit_codes(
     assert "0 cells computed, 2 were there already" in capsys.readouterr().out
 
 
-def test_a_reader_that_has_seen_enough_is_no_error() -> None:
+def test_closed_output_is_no_error() -> None:
     command = [sys.executable, "-m", "benchmarks", "cite", "positioning_nominal--inverse"]
-    with subprocess.Popen(
-        command, cwd=HERE.parents[1], stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    ) as asked:
-        assert asked.stdout is not None and asked.stderr is not None
-        try:
-            asked.stdout.close()  # as `head` does
-            said = asked.stderr.read().decode()
-        except BaseException:
-            asked.kill()  # or what ends the test would wait for it
-            raise
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, cwd=HERE.parents[1], **streams) as asked:
+        asked.stdout.close()  # as `head` does
+        said = asked.stderr.read().decode()
     assert asked.returncode == 141
     assert "Traceback" not in said
     assert "Broken" not in said
 
 
-def test_a_cell_that_another_run_removes_is_told(
+def test_cell_removed_by_another_run_is_reported(
     track: ScenarioSet, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     options = Options(jobs=1, out=folder / "out", cells=folder / "cells")
@@ -268,7 +262,7 @@ def test_a_cell_that_another_run_removes_is_told(
     assert all("removed meanwhile" in line for line in report.missing)
 
 
-def test_a_row_is_written_as_soon_as_its_cells_are_there(
+def test_row_is_written_once_its_cells_are_there(
     track: ScenarioSet, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     written = []

@@ -1,4 +1,4 @@
-"""The search of knobs: by rule, resumable, never worse, and written as the catalogue reads it."""
+"""Search of knobs: repeatable, resumable, never worse, and written for the catalogue."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def tried(made: Job) -> list[tuple[Any, Any]]:
     return [(trial.params, trial.value) for trial in tuning._finished(tuning.open_study(made))]
 
 
-def test_a_search_is_repeatable_resumable_and_never_worse(tmp_path):
+def test_search_is_repeatable_resumable_and_never_worse(tmp_path):
     whole = tuning.search(job(tmp_path / "whole"), bowl)
     with pytest.raises(KeyboardInterrupt):
         tuning.search(job(tmp_path / "parts"), Stops(after=5))
@@ -72,18 +72,16 @@ def fails(knobs: Knobs) -> Measured:
     raise AssertionError("nothing is left to measure")
 
 
-def test_where_nothing_helps_the_published_numbers_stay(tmp_path):
-    found = tuning.search(job(tmp_path, trials=4), lambda knobs: at(len(knobs)))
-    assert found.after == found.before == 1.0
+def test_published_numbers_stay_where_no_trial_is_better(tmp_path):
+    def worse_if_changed(knobs: Knobs) -> Measured:
+        return dataclasses.replace(PLAIN, error=2.0 if knobs else 1.0)
+
+    found = tuning.search(job(tmp_path, trials=4), worse_if_changed)
+    assert (found.after, found.before, found.trials) == (1.0, 1.0, 4)
     assert set(found.knobs.values()) == {1.0}
-    assert found.trials == 4
 
 
-def at(turned: int) -> Measured:
-    return dataclasses.replace(PLAIN, error=2.0 if turned else 1.0)
-
-
-def test_progress_counts_what_was_done_before(tmp_path):
+def test_progress_counts_earlier_trials(tmp_path):
     tuning.search(job(tmp_path, trials=2), bowl)
     counted: list[int] = []
 
@@ -108,7 +106,7 @@ def test_progress_counts_what_was_done_before(tmp_path):
         ({"error": 3.0, "failures": 1}, 6.0),
     ],
 )
-def test_what_costs_more_is_worth_less_than_the_controller_as_published(change, value):
+def test_higher_cost_is_worse_than_the_published_controller(change, value):
     found = dataclasses.replace(PLAIN, error=0.6)
     assert worth(dataclasses.replace(found, **change), PLAIN) == pytest.approx(value)
 
@@ -136,7 +134,7 @@ def short() -> ScenarioSet:
     return ScenarioSet(content)
 
 
-def test_a_course_scores_as_the_board_does_and_turns_the_knobs(short):
+def test_course_scores_as_the_board_does_and_applies_knobs(short):
     course = Course("pid", short, episodes=4)
     plain = course.measure({})
     assert course.measure({}) == plain == course.measure({"reach": 1.0})
@@ -160,19 +158,19 @@ def test_a_course_scores_as_the_board_does_and_turns_the_knobs(short):
         ({"controller": "pid", "episodes": 501}, "episodes = 501 from 1 to 500"),
     ],
 )
-def test_what_cannot_be_searched_is_refused(arguments, message):
+def test_impossible_search_is_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         job_of(**arguments)
 
 
-def test_the_command_searches_again():
+def test_command_repeats_the_search():
     made = job_of("knee_pid", "KneeWalk-v0", seed=3)
     assert made.command == (
         "python -m benchmarks tune knee_pid --env PAM/KneeWalk-v0 --trials 20 --seed 3 --write"
     )
 
 
-def test_what_is_written_is_read_beside_what_was_there(tmp_path):
+def test_result_is_written_beside_earlier_ones(tmp_path):
     file = tmp_path / "tuned.yaml"
     file.write_text("# A head line.\nschema: 1\ntuned: {}\n")
     one = tuning.search(job(tmp_path, trials=3), bowl)

@@ -1,4 +1,4 @@
-"""Public seeds: every scenario has its own, so that intervals over scenarios are as wide as due."""
+"""Public seeds: every scenario has its own, so that intervals have their coverage."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.benchmarks.conftest import CONTENT
 TRACKS = sorted(available())
 
 
-def test_they_follow_from_the_name_of_the_scenario() -> None:
+def test_seeds_are_a_function_of_the_scenario_name() -> None:
     first = int.from_bytes(hashlib.sha256(b"public|steps|0").digest()[:8], "big")
     assert public_seeds("steps", 3)[0] == 1 + first % 899_999
     assert public_seeds("steps", 3) == public_seeds("steps", 5)[:3]
@@ -24,7 +24,7 @@ def test_they_follow_from_the_name_of_the_scenario() -> None:
     assert max(many) < 900_000
 
 
-def test_repeats_are_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_repeated_seeds_are_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(scenarios, "_drawn", lambda name: iter([4, 4, 7, 4, 1, 2]))
     assert public_seeds("steps", 3) == (4, 7, 1)
 
@@ -36,7 +36,7 @@ def test_no_two_scenarios_of_a_track_share_a_seed(name: str) -> None:
     assert len(set(drawn)) == len(drawn) == len(track.scenarios()) * track.content["seeds"]
 
 
-def test_a_scenario_has_the_same_seeds_in_all_tracks_of_an_environment() -> None:
+def test_scenario_has_the_same_seeds_in_all_tracks_of_an_environment() -> None:
     tracks = available()
     nominal, drawn = (tracks[f"positioning_{name}"].seeds for name in ("nominal", "randomised"))
     shared = set(nominal) & set(drawn)
@@ -45,7 +45,7 @@ def test_a_scenario_has_the_same_seeds_in_all_tracks_of_an_environment() -> None
 
 
 @pytest.mark.parametrize("seeds", [0, 1001, [101, 102], 2.0, True, "5"])
-def test_a_file_says_how_many(seeds: object) -> None:
+def test_file_gives_the_number_of_seeds(seeds: object) -> None:
     with pytest.raises(ValueError, match="seeds must be their number, from 1 to 1000"):
         ScenarioSet({**CONTENT, "seeds": seeds})
 
@@ -67,7 +67,7 @@ def covered(seeds: dict[str, tuple[int, ...]], trials: int = 150) -> float:
     return held / trials
 
 
-def test_intervals_hold_the_mean_as_often_as_they_say() -> None:
+def test_intervals_have_their_coverage() -> None:
     track = available()["positioning_nominal"]
     assert covered(track.seeds) > 0.88
     shared = dict.fromkeys(track.seeds, tuple(range(101, 106)))

@@ -17,6 +17,12 @@ TIME = PERIOD * np.arange(1, N + 1)
 WAVE = np.sin(2.0 * np.pi * TIME)
 
 
+STILL = (
+    *("state/torque_clipped", "state/stiffness_clipped", "state/slack", "cost/pressure"),
+    *("effort/pressure_travel", "effort/air", "effort/switchings"),
+)
+
+
 def signals(**changes: Any) -> dict[str, np.ndarray]:
     """Return a record in which everything is as it should be."""
     made = {
@@ -29,14 +35,8 @@ def signals(**changes: Any) -> dict[str, np.ndarray]:
         "state/felt": -WAVE,
         "state/object_torque": -WAVE,
         "state/object": np.full(N, 2.0),
-        "state/torque_clipped": np.zeros(N),
-        "state/stiffness_clipped": np.zeros(N),
-        "state/slack": np.zeros(N),
-        "cost/pressure": np.zeros(N),
-        "effort/pressure_travel": np.zeros(N),
-        "effort/air": np.zeros(N),
-        "effort/switchings": np.zeros(N),
     }
+    made |= {name: np.zeros(N) for name in STILL}
     return made | changes
 
 
@@ -88,7 +88,7 @@ def test_each_metric_responds_to_its_own_error() -> None:
 @pytest.mark.parametrize("name", [n for n in available() if n.startswith("elbow")])
 def test_tracks_have_a_worst_case_of_every_metric_and_columns_of_theirs(name: str) -> None:
     content = available()[name].content
-    wanted = set(metrics.of_track(content))
-    assert set(content["worst_case"]) == wanted
-    assert {column for column, *_ in metrics.columns_of(content)} <= wanted
+    expected = set(metrics.of_track(content))
+    assert set(content["worst_case"]) == expected
+    assert {column for column, *_ in metrics.columns_of(content)} <= expected
     assert metrics.headline_of(content) == "impedance_rms"
