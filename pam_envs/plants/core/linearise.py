@@ -22,7 +22,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -102,8 +101,7 @@ def equilibrium(plant: Plant, **point: Any) -> Equilibrium:
             "effects are on, and the linear model is that of the plain equations: linearise "
             "plant.replace(plant.neutral)"
         )
-    folder = type(plant).__module__.rpartition(".")[0]
-    made: Equilibrium = import_module(f"{folder}.at_rest").at_rest(plant, **point)
+    made: Equilibrium = plant.module("at_rest").at_rest(plant, **point)
     return made
 
 

@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -133,7 +134,8 @@ class Plant:
         changed: dict[str, dict[str, Any]] = {}
         for name, value in values.items():
             component, _, entry = name.partition(".")
-            if name not in self.names and name != "hysteresis.operator":
+            known = component in self.components and entry in declarations(getattr(self, component))
+            if not known and name != "hysteresis.operator":
                 raise ValueError(f"no parameter named {name!r}; there are: {', '.join(self.names)}")
             changed.setdefault(component, {})[entry] = value
         parts: dict[str, Any] = {
@@ -200,6 +202,11 @@ class Plant:
     @property
     def _model(self) -> HysteresisModel:
         return self._component.model
+
+    @classmethod
+    def module(cls, name: str) -> Any:
+        """Return a module of the plant's folder: ``"rollout"`` or ``"at_rest"``."""
+        return import_module(f"{cls.__module__.rpartition('.')[0]}.{name}")
 
     def linearise(self, **point: Any) -> Any:
         """Return the ``control.StateSpace`` about a point of rest (``core.linearise``)."""

@@ -7,8 +7,6 @@ The module ``rollout`` beside a plant declares its inputs (``channels_of``), its
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import import_module
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,14 +18,9 @@ from pam_envs.plants.core.tiles import drives_of
 Array = NDArray[np.float64]
 
 
-def family_of(plant: Plant) -> Any:
-    """Return the module with the loop of a plant's family."""
-    return import_module(f"pam_envs.plants.{plant.family}.rollout")
-
-
 def drives_for(plant: Plant, channels: Mapping[str, ArrayLike]) -> Array:
     """Return the given channels and the defaults of the others, shape (channels, T, 1)."""
-    defaults = family_of(plant).channels_of(plant)
+    defaults = plant.module("rollout").channels_of(plant)
     unknown = set(channels) - set(defaults)
     if unknown:
         raise ValueError(
@@ -68,7 +61,7 @@ def replay_plant(
     ValueError
         If a channel is unknown.
     """
-    family, drives = family_of(plant), drives_for(plant, channels)
+    family, drives = plant.module("rollout"), drives_for(plant, channels)
     flags = np.zeros(drives.shape[1], np.int64)
     flags[np.asarray(fresh, int)] = BEGIN
     made = run(
@@ -83,7 +76,7 @@ class Stepper:
 
     def __init__(self, plant: Plant) -> None:
         self.plant = plant
-        family = family_of(plant)
+        family = plant.module("rollout")
         self._names = tuple(family.readings_of(plant))
         self._loop = family.loop_of(plant, True, readings=True)
         self._fixed = plant.parameter_rows()[None, :, None]
