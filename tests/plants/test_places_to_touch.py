@@ -48,9 +48,6 @@ class Isometric(Plant, rows=K):
     hysteresis: JointHysteresis = field(default_factory=JointHysteresis)
     muscle: ForceMap = field(default_factory=ForceMap)
     pressure: GaugeSensor = field(default_factory=GaugeSensor)
-
-    def __post_init__(self):
-        self.check_components()
 """
 ROLLOUT = """
 from isometric import rows as K

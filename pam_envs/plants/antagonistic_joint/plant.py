@@ -15,13 +15,13 @@ bearing and of the sensors; in the reduced plant only pressures and sensors have
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.hysteresis.protocol import Usage
 from pam_envs.mechanics.antagonistic_lever import AntagonisticLever
 from pam_envs.muscle.force_map import FULL_PRESSURE, ForceMap, paper_stretch
 from pam_envs.plants.antagonistic_joint import rows as K
@@ -58,7 +58,7 @@ class AntagonisticJoint(PairPlant, rows=K):
     """
 
     family: ClassVar[str] = "antagonistic_joint"
-    choices: ClassVar[tuple[str, ...]] = ("dynamics",)
+    makes: ClassVar[Mapping[str, tuple[str, ...]]] = {"dynamics": ("muscles", "reduced")}
     stages: ClassVar[int] = 1
 
     dynamics: Dynamics = "muscles"
@@ -71,17 +71,9 @@ class AntagonisticJoint(PairPlant, rows=K):
     angle: JointEncoder = field(default_factory=JointEncoder)
     pressure: GaugeSensor = field(default_factory=GaugeSensor)
 
-    def __post_init__(self) -> None:
-        """Check every parameter, and that the motion can be followed."""
-        if self.dynamics not in ("muscles", "reduced"):
-            raise ValueError(f"dynamics = {self.dynamics!r}; choose one of muscles, reduced")
-        self.check_components()
-        self._model.check(Usage("a joint", "virgin"))
-        self._check_angles()
-        self._check_motion()
-
-    def _check_motion(self) -> None:
-        """Refuse a motion that the sub-steps cannot follow."""
+    def _check(self) -> None:
+        """Refuse angles out of reach, and a motion that the sub-steps cannot follow."""
+        super()._check()
         link = self.link
         full = float(np.max(self.stiffness(link.stop, FULL_PRESSURE, FULL_PRESSURE)))
         self.check_phase(

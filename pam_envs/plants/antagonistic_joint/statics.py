@@ -31,7 +31,7 @@ class PairPlant(Plant):
     link: Stage
     nominal: StagePoint
 
-    def _check_angles(self) -> None:
+    def _check(self) -> None:
         """Refuse a stop past the toggle, and a limit past the stop."""
         limits, toggle = self.link, self.lever.toggle
         if limits.stop >= toggle:

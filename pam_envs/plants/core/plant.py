@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.hysteresis.protocol import HysteresisModel, tables_of
+from pam_envs.hysteresis.protocol import HysteresisModel, Usage, tables_of
 from pam_envs.kernels.motion import LARGEST_PHASE
 from pam_envs.parameters import check, declarations
 from pam_envs.plants.core import plant_file
@@ -42,8 +42,10 @@ class Plant:
         Names of the components, in the order of a file.
     names : tuple of str
         Dotted names of the parameters that the kernels read.
+    makes : mapping
+        Allowed values of each field that selects a make.
     choices : tuple of str
-        Further keys of a file, of families with several makes.
+        Further keys of a file: by default the fields of ``makes``.
     effects : tuple of tuple of str
         Parameters that switch an effect on, each with those that shape it. A file leaves out what
         is off, so that a plant's digest stays when a new effect is added.
@@ -65,6 +67,7 @@ class Plant:
     control_period: ClassVar[float] = 0.01
     components: ClassVar[tuple[str, ...]]
     names: ClassVar[tuple[str, ...]]
+    makes: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     choices: ClassVar[tuple[str, ...]] = ()
     effects: ClassVar[tuple[tuple[str, ...], ...]] = ()
     shared_effects: ClassVar[tuple[tuple[str, ...], ...]] = ()
@@ -87,6 +90,7 @@ class Plant:
             if isinstance(entry, dataclasses.Field) and callable(entry.default_factory)
         }
         cls.components, cls.names = tuple(parts), rows.NAMES
+        cls.choices = cls.choices or tuple(cls.makes)
         cls.effects = (
             *(
                 tuple(f"{part}.{name}" for name in group)
@@ -103,8 +107,13 @@ class Plant:
         neutral = {name: declared[name] for name in rows.EFFECTS}
         cls.neutral = {name: value for name, value in neutral.items() if value is not None}
 
-    def check_components(self) -> None:
-        """Raise if a parameter is out of bounds, or the number of sub-steps is none."""
+    def __post_init__(self) -> None:
+        """Raise if a choice, a parameter, the hysteresis or the number of sub-steps is invalid."""
+        for name, allowed in self.makes.items():
+            if getattr(self, name) not in allowed:
+                raise ValueError(
+                    f"{name} = {getattr(self, name)!r}; choose one of {', '.join(allowed)}"
+                )
         for name in self.components:
             check(getattr(self, name), name)
         if not isinstance(self.substeps, int) or not 1 <= self.substeps <= 100:
@@ -112,6 +121,15 @@ class Plant:
                 f"substeps = {self.substeps!r} must be a whole number from 1 to 100; "
                 "4 is the default"
             )
+        self._model.check(self._usage())
+        self._check()
+
+    def _usage(self) -> Usage:
+        """Return the demands on the hysteresis operator."""
+        return Usage(f"a {self.family}", "virgin")
+
+    def _check(self) -> None:
+        """Raise if the plant cannot be built or simulated: what only a family can say."""
 
     def check_phase(self, stiffness: float, damping: float, motion: str) -> None:
         """Refuse a motion that the sub-steps cannot follow (see ``kernels.motion``).

@@ -16,6 +16,7 @@ both bundles, of the bearing and of the sensors.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
@@ -59,7 +60,7 @@ class ElbowOrthosis(Plant, rows=K):
     """
 
     family: ClassVar[str] = "elbow_orthosis"
-    choices: ClassVar[tuple[str, ...]] = ("valves",)
+    makes: ClassVar[Mapping[str, tuple[str, ...]]] = {"valves": MAKES}
 
     valves: Valves = "proportional"
     bundle_a: QuadraticBundle = field(default_factory=QuadraticBundle)
@@ -73,12 +74,10 @@ class ElbowOrthosis(Plant, rows=K):
     angle: AngleSensor = field(default_factory=AngleSensor)
     pressure: GaugeSensor = field(default_factory=GaugeSensor)
 
-    def __post_init__(self) -> None:
-        """Check every parameter, and that the motion can be followed."""
-        if self.valves not in MAKES:
-            raise ValueError(f"valves = {self.valves!r}; choose one of {', '.join(MAKES)}")
-        self.check_components()
-        self._model.check(Usage("an elbow", "virgin", reach=0.55 * self.pulley.stroke))
+    def _usage(self) -> Usage:
+        return Usage("an elbow", "virgin", reach=0.55 * self.pulley.stroke)
+
+    def _check(self) -> None:
         self._check_bundles()
         self._check_range()
         self._check_motion()

@@ -99,7 +99,7 @@ class KneeOrthosis(Plant, rows=K):
     """
 
     family: ClassVar[str] = "knee_orthosis"
-    choices: ClassVar[tuple[str, ...]] = tuple(MAKES)
+    makes: ClassVar[Mapping[str, tuple[str, ...]]] = MAKES
 
     mounting: Mounting = "no_load"
     dynamics: Dynamics = "lag"
@@ -121,16 +121,10 @@ class KneeOrthosis(Plant, rows=K):
     cop: CopSensor = field(default_factory=CopSensor)
     ankle: AngleSensor = field(default_factory=AngleSensor)
 
-    def __post_init__(self) -> None:
-        """Check every parameter, and that the motion can be followed."""
-        for name, allowed in MAKES.items():
-            if getattr(self, name) not in allowed:
-                raise ValueError(
-                    f"{name} = {getattr(self, name)!r}; choose one of {', '.join(allowed)}"
-                )
-        self.check_components()
-        full = self.regulator.max_pressure
-        self._model.check(Usage("the orthosis", "low", full, unit_slope=False))
+    def _usage(self) -> Usage:
+        return Usage("the orthosis", "low", self.regulator.max_pressure, unit_slope=False)
+
+    def _check(self) -> None:
         self._check_motion()
         self._check_toggle()
 

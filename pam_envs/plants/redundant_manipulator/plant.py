@@ -29,7 +29,6 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.hysteresis.protocol import Usage
 from pam_envs.mechanics.antagonistic_lever import AntagonisticLever
 from pam_envs.mechanics.serial_chain.chain import SerialChain
 from pam_envs.muscle.force_map import ForceMap, paper_stretch
@@ -109,9 +108,11 @@ class RedundantManipulator(PairPlant, rows=M):
             object.__setattr__(self, name, _numbers(name, getattr(self, name)))
         if len(self.gravity) != 3:
             raise ValueError(f"gravity = {self.gravity!r}; give three numbers [m/s2]")
-        self.check_components()
-        self._model.check(Usage("an arm", "virgin"))
-        self._check_angles()
+        super().__post_init__()
+
+    def _check(self) -> None:
+        """Refuse angles out of reach, too many joints, and other than a damping for each."""
+        super()._check()
         if self.chain.stages > M.MOST_STAGES:
             raise ValueError(
                 f"axes = {self.axes!r}: {self.chain.stages} joints; at most {M.MOST_STAGES} are "

@@ -60,13 +60,10 @@ class SingleMuscle(Plant, rows=R):
     position: PositionSensor = field(default_factory=PositionSensor)
     pressure: PressureSensor = field(default_factory=PressureSensor)
 
-    def __post_init__(self) -> None:
-        """Check every parameter, and that the motion can be followed."""
-        self.check_components()
-        self._model.check(Usage("a muscle", "virgin", self.regulator.max_pressure))
-        self._check_motion()
+    def _usage(self) -> Usage:
+        return Usage("a muscle", "virgin", self.regulator.max_pressure)
 
-    def _check_motion(self) -> None:
+    def _check(self) -> None:
         """Refuse a motion that the sub-steps cannot follow."""
         m, law = self.mass, self.muscle
         strains = np.linspace(-0.02, 0.2, 45)
