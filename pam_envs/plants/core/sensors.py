@@ -22,6 +22,12 @@ READINGS = 0
 
 
 @kernel
+def full_scale(fixed: Any, k: int, j: int) -> float:
+    """Return the full scale of sensor ``k``."""
+    return FULL_SCALES[k]
+
+
+@kernel
 def read_sensors(rows: Any, fixed: Any, j: int, step: int, period: float) -> None:
     """Write readings with the effects of the sensors: a plain plant has none."""
 
@@ -34,7 +40,7 @@ def read_with_effects(rows: Any, fixed: Any, j: int, step: int, period: float) -
     """
     for k in range(len(MEASURED)):
         ring = READINGS + len(MEASURED) + k * N_HISTORY
-        value, effects, full = rows[MEASURED[k]][j], SENSOR_EFFECTS[k], FULL_SCALES[k]
+        value, effects, full = rows[MEASURED[k]][j], SENSOR_EFFECTS[k], full_scale(fixed, k, j)
         if step == 0:
             begin_sensor(rows, fixed, j, READINGS + k, ring, effects, value, full)
         else:
@@ -67,11 +73,12 @@ def effect_kernels(
         "READINGS": sensors,
         "read_sensors": read_with_effects,
         "EFFECTS_AT": first,
-        "EFFECTIVE": first + layout.STATE.effective,
         "SENSED": tuple(range(sensors, sensors + len(measured))),
         "SENSED_ANGLE": sensors,
         "SENSED_PRESSURE": sensors + angles,
     }
+    if "effective" in layout.STATE._fields:
+        found["EFFECTIVE"] = first + layout.STATE.effective
     if "bearing" in layout.EFFECT._fields:
         stuck = first + layout.STATE.stuck
         found |= {"STUCK": stuck, "BEARING": layout.EFFECT.bearing, "turn": turn_on_bearing}

@@ -26,6 +26,7 @@ from pam_envs.mechanics.support import MOUNT_STATE, load_fraction, mount_step
 from pam_envs.muscle.effective_area import fine_slope, fine_tension, tension, tension_slope
 from pam_envs.muscle.effects import stiffening, temperature_factor, viscous_damping
 from pam_envs.muscle.strands import slip_strands, strand_forces, strands_on
+from pam_envs.plants.core.sensors import effect_kernels, read_with_effects
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.single_muscle.rows import STATE as S
@@ -36,7 +37,6 @@ from pam_envs.pneumatics.regulator import (
     line_effects_on,
     valve_effects_on,
 )
-from pam_envs.sensing.sensor import begin_sensor, sense
 
 EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
 plain_hysteresis: Any = None  # placeholder: one of the three hysteresis models
@@ -116,39 +116,53 @@ def settled(
     )
 
 
+@kernel
+def carried(fixed: Any, j: int, load: float) -> tuple[float, float, float, float]:
+    """Return the mass [kg] of a load, its weight [N], the stiffness factor and the shift [Pa]."""
+    mass = load + (fixed[R.MASS_LOAD_ERROR][j] if load > 0.0 else 0.0)
+    weight = mass * GRAVITY
+    stiffer = stiffening(
+        weight,
+        fixed[R.MUSCLE_LOAD_STIFFENING][j],
+        fixed[R.MUSCLE_LOAD_STIFFENING_2][j],
+        fixed[R.MUSCLE_LOAD_STIFFENING_ROOT][j],
+    )
+    return mass, weight, stiffer, fixed[R.MUSCLE_LOAD_CURVE][j] * weight * weight
+
+
+@kernel
+def law_force(fixed: Any, j: int, drive: float, e: float, bend: float, stiffer: float) -> float:
+    """Return the force [N] of the static law with its finer terms."""
+    area, taper = fixed[R.MUSCLE_AREA][j], fixed[R.MUSCLE_AREA_TAPER][j]
+    force, k1 = fixed[R.MUSCLE_BRAID_FORCE][j] * stiffer, fixed[R.MUSCLE_STIFFNESS][j] * stiffer
+    k3, curve = fixed[R.MUSCLE_HARDENING][j] * stiffer, fixed[R.MUSCLE_AREA_CURVE][j]
+    k2, k4 = fixed[R.MUSCLE_SOFTENING][j] * stiffer, fixed[R.MUSCLE_STIFFENING][j] * stiffer
+    pull = tension(drive, e, bend, area, taper, force, k1, k3)
+    return pull + fine_tension(drive, e, area, curve, k2, k4)
+
+
+@kernel
+def law_slope(fixed: Any, j: int, drive: float, e: float, bend: float, stiffer: float) -> float:
+    """Return minus the derivative of :func:`law_force` by the contraction [N]."""
+    area, taper = fixed[R.MUSCLE_AREA][j], fixed[R.MUSCLE_AREA_TAPER][j]
+    force, k1 = fixed[R.MUSCLE_BRAID_FORCE][j] * stiffer, fixed[R.MUSCLE_STIFFNESS][j] * stiffer
+    k3, curve = fixed[R.MUSCLE_HARDENING][j] * stiffer, fixed[R.MUSCLE_AREA_CURVE][j]
+    k2, k4 = fixed[R.MUSCLE_SOFTENING][j] * stiffer, fixed[R.MUSCLE_STIFFENING][j] * stiffer
+    per_strain = force / fixed[R.MUSCLE_BRAID_STRAIN][j]
+    slope = tension_slope(drive, e, bend, area, taper, per_strain, k1, k3)
+    return slope + fine_slope(drive, e, area, curve, k2, k4)
+
+
 @routine
 def balance(fixed: Any, lane: int, drive: float, load: float, hangs: float) -> float:
     """Return the position [m] at rest of one lane, by bisection."""
     length = fixed[R.MUSCLE_REST_LENGTH][lane]
-    mass = load + (fixed[R.MASS_LOAD_ERROR][lane] if load > 0.0 else 0.0)
-    weight = mass * GRAVITY
-    stiffer = stiffening(
-        weight,
-        fixed[R.MUSCLE_LOAD_STIFFENING][lane],
-        fixed[R.MUSCLE_LOAD_STIFFENING_2][lane],
-        fixed[R.MUSCLE_LOAD_STIFFENING_ROOT][lane],
-    )
-    shifted = drive - fixed[R.MUSCLE_LOAD_CURVE][lane] * weight * weight
+    _, weight, stiffer, shift = carried(fixed, lane, load)
     low, high = -0.3, 0.6
     for _ in range(56):
         e = 0.5 * (low + high)
-        pull = tension(
-            shifted,
-            e,
-            decay(e / fixed[R.MUSCLE_BRAID_STRAIN][lane]),
-            fixed[R.MUSCLE_AREA][lane],
-            fixed[R.MUSCLE_AREA_TAPER][lane],
-            fixed[R.MUSCLE_BRAID_FORCE][lane] * stiffer,
-            fixed[R.MUSCLE_STIFFNESS][lane] * stiffer,
-            fixed[R.MUSCLE_HARDENING][lane] * stiffer,
-        ) + fine_tension(
-            shifted,
-            e,
-            fixed[R.MUSCLE_AREA][lane],
-            fixed[R.MUSCLE_AREA_CURVE][lane],
-            fixed[R.MUSCLE_SOFTENING][lane] * stiffer,
-            fixed[R.MUSCLE_STIFFENING][lane] * stiffer,
-        )
+        bend = decay(e / fixed[R.MUSCLE_BRAID_STRAIN][lane])
+        pull = law_force(fixed, lane, drive - shift, e, bend, stiffer)
         if pull > weight * load_fraction(e * length, hangs, fixed[R.MASS_SLACK][lane]):
             low = e
         else:
@@ -185,36 +199,15 @@ def begin_effects(rows: Any, fixed: Any, j: int) -> None:
     rows[EFFECTS_AT + S.hangs][j] = balance(fixed, j, 0.0, rows[R.LOAD][j], NO_SUPPORT)
     position = x * (1.0 + crept) - rows[R.REST][j]
     rows[EFFECTS_AT + S.position][j] = position
-    full = FULL_STRAIN * fixed[R.MUSCLE_REST_LENGTH][j]
-    begin_sensor(
-        rows,
-        fixed,
-        j,
-        EFFECTS_AT + S.position_reading,
-        EFFECTS_AT + S.position_ring,
-        R.EFFECT.position,
-        position,
-        full,
-    )
-    begin_sensor(
-        rows, fixed, j, EFFECTS_AT + S.pressure_reading, EFFECTS_AT + S.pressure_ring,
-        R.EFFECT.pressure, rows[R.PRESSURE][j], fixed[R.REGULATOR_MAX_PRESSURE][j],
-    )  # fmt: skip
+    read_with_effects(rows, fixed, j, 0, 0.0)
 
 
 @kernel
-def sense_muscle(rows: Any, fixed: Any, j: int, step: int, period: float) -> None:
-    """Write the undisturbed readings of lane ``j`` at a control period."""
-    time, full = step * period, FULL_STRAIN * fixed[R.MUSCLE_REST_LENGTH][j]
-    sense(
-        rows, fixed, j, EFFECTS_AT + S.position_reading, EFFECTS_AT + S.position_ring,
-        R.EFFECT.position, rows[EFFECTS_AT + S.position][j], full, step, time, period,
-    )  # fmt: skip
-    sense(
-        rows, fixed, j, EFFECTS_AT + S.pressure_reading, EFFECTS_AT + S.pressure_ring,
-        R.EFFECT.pressure, rows[R.PRESSURE][j], fixed[R.REGULATOR_MAX_PRESSURE][j], step, time,
-        period,
-    )  # fmt: skip
+def full_scale(fixed: Any, k: int, j: int) -> float:
+    """Return the full scale of the sensors of position [m] and pressure [Pa]."""
+    if k == 0:
+        return FULL_STRAIN * fixed[R.MUSCLE_REST_LENGTH][j]  # type: ignore[no-any-return]
+    return fixed[R.REGULATOR_MAX_PRESSURE][j]  # type: ignore[no-any-return]
 
 
 @kernel
@@ -226,13 +219,13 @@ def true_position(rows: Any, j: int) -> float:
 @kernel
 def seen_position(rows: Any, j: int) -> float:
     """Return the undisturbed reading of the position sensor [m]."""
-    return rows[EFFECTS_AT + S.position_reading][j]  # type: ignore[no-any-return]
+    return rows[EFFECTS_AT + S.sensors][j]  # type: ignore[no-any-return]
 
 
 @kernel
 def seen_pressure(rows: Any, j: int) -> float:
     """Return the undisturbed reading of the pressure sensor [Pa]."""
-    return rows[EFFECTS_AT + S.pressure_reading][j]  # type: ignore[no-any-return]
+    return rows[EFFECTS_AT + S.sensors + 1][j]  # type: ignore[no-any-return]
 
 
 @kernel
@@ -257,42 +250,13 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) ->
         )  # fmt: skip
     for j in range(LANES):
         per_length = 1.0 / fixed[R.MUSCLE_REST_LENGTH][j]
-        mass = load[j] + (fixed[R.MASS_LOAD_ERROR][j] if load[j] > 0.0 else 0.0)
-        weight = mass * GRAVITY
-        stiffer = stiffening(
-            weight,
-            fixed[R.MUSCLE_LOAD_STIFFENING][j],
-            fixed[R.MUSCLE_LOAD_STIFFENING_2][j],
-            fixed[R.MUSCLE_LOAD_STIFFENING_ROOT][j],
-        )
-        shift = fixed[R.MUSCLE_LOAD_CURVE][j] * weight * weight
+        mass, weight, stiffer, shift = carried(fixed, j, load[j])
         ahead = 0.5 * h * v[j]
         e = (x[j] + ahead) * per_length
         bend = decay(e / fixed[R.MUSCLE_BRAID_STRAIN][j])
-        area, taper = fixed[R.MUSCLE_AREA][j], fixed[R.MUSCLE_AREA_TAPER][j]
-        force = fixed[R.MUSCLE_BRAID_FORCE][j] * stiffer
-        k1, k3 = fixed[R.MUSCLE_STIFFNESS][j] * stiffer, fixed[R.MUSCLE_HARDENING][j] * stiffer
-        curve, k2 = fixed[R.MUSCLE_AREA_CURVE][j], fixed[R.MUSCLE_SOFTENING][j] * stiffer
-        k4 = fixed[R.MUSCLE_STIFFENING][j] * stiffer
-        pull = (
-            tension(was[j] - shift, e, bend, area, taper, force, k1, k3)
-            + fine_tension(was[j] - shift, e, area, curve, k2, k4)
-            - friction[j]
-        )
-        slope = (
-            tension_slope(
-                0.5 * (was[j] + drive[j]) - shift,
-                e,
-                bend,
-                area,
-                taper,
-                force / fixed[R.MUSCLE_BRAID_STRAIN][j],
-                k1,
-                k3,
-            )
-            + fine_slope(0.5 * (was[j] + drive[j]) - shift, e, area, curve, k2, k4)
-            + sticking[j]
-        )
+        pull = law_force(fixed, j, was[j] - shift, e, bend, stiffer) - friction[j]
+        middle = 0.5 * (was[j] + drive[j]) - shift
+        slope = law_slope(fixed, j, middle, e, bend, stiffer) + sticking[j]
         slack = fixed[R.MASS_SLACK][j]
         hangs = load_fraction(x[j] + ahead, rows[EFFECTS_AT + S.hangs][j], slack)
         eased = weight * fixed[R.MUSCLE_REST_LENGTH][j] / max(slack, 1e-6)
@@ -306,7 +270,8 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) ->
         per_mass = 1.0 / max(moved, loss * h * FASTEST_DECAY, stiff * h * h * FASTEST_TURN)
         springs[j] = stiff * per_mass
         pushes[j] = (pull - weight * hangs) * per_mass
-        jerks[j] = area * (1.0 - (taper + curve * e) * e) * (drive[j] - was[j]) * per_mass / h
+        taper = fixed[R.MUSCLE_AREA_TAPER][j] + fixed[R.MUSCLE_AREA_CURVE][j] * e
+        jerks[j] = fixed[R.MUSCLE_AREA][j] * (1.0 - taper * e) * (drive[j] - was[j]) * per_mass / h
         drags[j] = per_mass * loss
         lightness[j] = per_mass
 
@@ -429,13 +394,16 @@ def advance_extended(
             for j in range(LANES):
                 was[j] = drive[j]
     for j in range(LANES):
-        sense_muscle(rows, fixed, j, counts[R.STEP][j] + 1, period)
+        read_with_effects(rows, fixed, j, counts[R.STEP][j] + 1, period)
 
 
 def replacements(kind: str, first: int) -> dict[str, Any]:
     """Return the kernels of the extended plant; ``first`` is the row after the hysteresis state."""
+    measured = (first + S.position, R.PRESSURE)
+    effects = (R.EFFECT.position, R.EFFECT.pressure)
     return {
-        "EFFECTS_AT": first,
+        **effect_kernels(first, R, measured, effects, ()),
+        "full_scale": full_scale,
         **hysteresis_kernels(kind, "plain_hysteresis"),
         "remember": settled,
         "advance": advance_extended,

@@ -15,6 +15,7 @@ from pam_envs.kernels.build import LANES, kernel
 from pam_envs.kernels.history import N_HISTORY
 from pam_envs.kernels.motion import oscillator_wide
 from pam_envs.plants.core.rollout import Loop, loop_for, run
+from pam_envs.plants.core.sensors import reading_rows
 from pam_envs.plants.core.tiles import drives_of
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.effects import (
@@ -114,10 +115,8 @@ def channels_of(plant: SingleMuscle) -> dict[str, float]:
 
 def readings_of(plant: SingleMuscle) -> dict[str, tuple[int, int]]:
     """Return row and bias of each sensor's reading, by name."""
-    return {
-        "contraction": (R.STATE.position_reading, R.POSITION_BIAS),
-        "pressure": (R.STATE.pressure_reading, R.PRESSURE_BIAS),
-    }
+    biases = {"contraction": R.POSITION_BIAS, "pressure": R.PRESSURE_BIAS}
+    return reading_rows(R.STATE.sensors, biases)
 
 
 def _replacements(kind: str, effects: int | None) -> dict[str, Any]:

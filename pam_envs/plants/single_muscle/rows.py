@@ -24,6 +24,7 @@ from pam_envs.muscle.effects import (
 from pam_envs.muscle.strands import StrandEffects
 from pam_envs.parameters import declarations
 from pam_envs.plants.core.rows import dotted, each, layout
+from pam_envs.plants.core.sensors import sensor_rows
 from pam_envs.pneumatics.regulator import AIR, AIR_STATE
 from pam_envs.sensing.sensor import SENSOR
 
@@ -68,10 +69,8 @@ _ROWS = layout(
         **each("creep stretch strands", 4),
         **each("stuck shown"),
         "mount": len(MOUNT_STATE),
-        **each("kelvin hung hangs position position_reading"),
-        "position_ring": N_HISTORY,
-        "pressure_reading": 1,
-        "pressure_ring": N_HISTORY,
+        **each("kelvin hung hangs position"),
+        "sensors": sensor_rows(2),
     },
     {"tall": 1, "cosine": 1, "model": NUMBERS},
 )
