@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.preisach import Preisach
-from pam_envs.hysteresis.protocol import kinds
 from pam_envs.identification.joint_static import fit_angle_plays
-from pam_envs.plants.antagonistic_joint import rows as K
 from pam_envs.plants.antagonistic_joint.hysteresis import contraction_plays, joint_hysteresis
 from pam_envs.plants.antagonistic_joint.pair import feed_forward
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
@@ -78,7 +75,7 @@ def test_exchanging_the_pressures_mirrors_the_joint(plant: AntagonisticJoint) ->
 
 
 @pytest.mark.parametrize("plant", MADE)
-def test_forces_have_the_co_contraction_and_the_torque_that_were_asked_for(
+def test_forces_have_the_given_co_contraction_and_torque(
     plant: AntagonisticJoint,
 ) -> None:
     angles, torques = ANGLES[:, None] * 0.7, np.array([-0.5, 0.0, 0.8])
@@ -93,7 +90,7 @@ def test_forces_have_the_co_contraction_and_the_torque_that_were_asked_for(
 
 
 @pytest.mark.parametrize("plant", MADE)
-def test_the_feed_forward_has_gain_one_without_hysteresis_and_load(
+def test_feedforward_has_gain_one_without_hysteresis_and_load(
     plant: AntagonisticJoint,
 ) -> None:
     low, high = plant.angle_range
@@ -103,7 +100,7 @@ def test_the_feed_forward_has_gain_one_without_hysteresis_and_load(
 
 
 @pytest.mark.parametrize("plant", MADE)
-def test_the_kernel_feeds_forward_what_the_plant_says(plant: AntagonisticJoint) -> None:
+def test_kernel_feedforward_equals_that_of_the_plant(plant: AntagonisticJoint) -> None:
     fixed = plant.parameter_rows()[:, None].tolist()
     for angle in np.linspace(*plant.angle_range, 13):
         for prestress in (20.0, 50.0, 120.0):
@@ -113,7 +110,7 @@ def test_the_kernel_feeds_forward_what_the_plant_says(plant: AntagonisticJoint) 
             assert bool(short) == bool(wanted[2]) is False
 
 
-def test_a_set_point_out_of_reach_is_told() -> None:
+def test_set_point_out_of_reach_is_reported() -> None:
     plant = AntagonisticJoint.measured("none", link__limit=0.5)
     fixed = plant.parameter_rows()[:, None].tolist()
     assert feed_forward(fixed, 0, 0.49, 50.0)[2] == 1.0  # no force is left at 28 degrees
@@ -225,34 +222,7 @@ def test_the_reduced_hysteresis_is_identified_on_the_plant_with_muscles() -> Non
 # --- files, rows, bad values ---------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", kinds())
-@pytest.mark.parametrize("preset", PRESETS)
-def test_files_hold_the_whole_plant(tmp_path: Path, kind, preset: str) -> None:  # type: ignore[no-untyped-def]
-    plant = getattr(AntagonisticJoint, preset)(kind, muscle__viscosity=1e-4)
-    plant.to_yaml(tmp_path / "plant.yaml")
-    read = AntagonisticJoint.from_yaml(tmp_path / "plant.yaml")
-    assert read == plant
-    assert read.digest() == plant.digest()
-
-
-def test_the_digest_tells_plants_apart() -> None:
-    plants = [getattr(AntagonisticJoint, p)(kind) for p in PRESETS for kind in kinds()]
-    plants.append(AntagonisticJoint.paper(link__mass=0.4))
-    assert len({plant.digest() for plant in plants}) == len(plants)
-
-
-def test_rows_stand_where_their_names_say() -> None:
-    plant = AntagonisticJoint.paper()
-    column = plant.parameter_rows()
-    assert len(column) == K.N_PARAMETERS
-    for name in K.NAMES:
-        assert column[K.place(name)] == plant.value(name)
-    assert column[K.REGULATOR_MAX_PRESSURE] == 6.5e5 and column[K.LINK_LENGTH] == plant.link.length
-    quiet = plant.without_noise()
-    assert quiet.angle.noise == quiet.pressure.resolution == 0.0
-
-
-def test_the_assumed_stretch_says_so() -> None:
+def test_stretch_of_the_paper_preset_is_declared_assumed() -> None:
     assert AntagonisticJoint.paper().provenance["muscle.stretch"][0] == "assumed"
     assert AntagonisticJoint.measured().muscle.stretch == 1.0
 

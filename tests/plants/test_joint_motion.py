@@ -13,7 +13,6 @@ from pam_envs.hysteresis.protocol import kinds
 from pam_envs.kernels.build import COMPILED
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 from pam_envs.plants.antagonistic_joint.rollout import (
-    OUTPUTS,
     simulate_joint,
 )
 
@@ -130,7 +129,7 @@ def test_the_reduced_plant_has_the_published_poles() -> None:
 
 
 @pytest.mark.parametrize("kind", kinds())
-def test_how_far_the_reduced_plant_is_from_the_muscles(kind) -> None:  # type: ignore[no-untyped-def]
+def test_reduced_plant_is_near_the_plant_with_muscles(kind) -> None:  # type: ignore[no-untyped-def]
     """Steps and sines within +-20 degrees: about 0.3 degrees RMS; over 1 without hysteresis."""
     t = PERIOD * np.arange(600)
     still = {"link__gravity": 0.0}
@@ -233,25 +232,3 @@ def test_slow_commands_come_to_the_quasi_static_angles(make: str, kind) -> None:
     commands = DEGREE * np.array([0.0, 15.0, -5.0, 10.0, 2.0])
     held = simulate_joint(plant, np.repeat(commands, 80))["angle"][79::80]
     assert np.allclose(held, plant.rest_angles(commands), atol=0.05 * DEGREE)
-
-
-@pytest.mark.skipif(not COMPILED, reason="needs the compiler")
-@pytest.mark.parametrize("make", ["paper", "reduced"])
-@pytest.mark.parametrize("kind", kinds())
-def test_compiled_bits_are_those_of_plain_python(make: str, kind) -> None:  # type: ignore[no-untyped-def]
-    plant = getattr(AntagonisticJoint, make)(kind)
-    commands, shoves = steps(60, 29.0 * DEGREE, 6), steps(60, 4.0, 9, 2)
-    compiled = simulate_joint(plant, commands, disturbance=shoves, payload=0.3)
-    plain = simulate_joint(plant, commands, disturbance=shoves, payload=0.3, compiled=False)
-    for name in OUTPUTS:
-        assert np.array_equal(plain[name], compiled[name]), name
-
-
-def test_records_side_by_side_are_those_alone() -> None:
-    plants = [AntagonisticJoint.paper(link__mass=m) for m in (0.2, 0.3, 0.5)]
-    commands = steps(30, 20.0 * DEGREE)
-    together = simulate_joint(plants, commands)["angle"]
-    for k, plant in enumerate(plants):
-        assert np.array_equal(together[:, k], simulate_joint(plant, commands)["angle"])
-    with pytest.raises(ValueError, match="one make"):
-        simulate_joint([plants[0], AntagonisticJoint.reduced()], commands)

@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 from pam_envs.hysteresis.preisach import Preisach
-from pam_envs.hysteresis.protocol import kinds
-from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.hysteresis import FULL_STIFFNESS, knee_hysteresis
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 
@@ -76,58 +74,12 @@ def test_preisach_of_a_bent_spring_is_passive() -> None:
     assert Preisach.resembling(bent, 0.0, 4.5e5, 46, "low").table[-1][0] > 0.0  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("kind", kinds())
-@pytest.mark.parametrize("mounting", ["rig", "no_load", "walk", "stairs_up"])
-def test_files_hold_the_whole_plant(tmp_path: Path, kind, mounting: str) -> None:  # type: ignore[no-untyped-def]
-    if mounting in ("rig", "no_load"):
-        plant = getattr(KneeOrthosis, mounting)(kind, "measured", lever__damping=1.25)
-    else:
-        plant = KneeOrthosis.on_leg(mounting, 1.5, kind, hysteresis__width=0.7)  # type: ignore[arg-type]
-    plant.to_yaml(tmp_path / "plant.yaml")
-    read = KneeOrthosis.from_yaml(tmp_path / "plant.yaml")
-    assert read == plant
-    assert read.digest() == plant.digest()
-
-
-def test_the_digest_tells_plants_apart() -> None:
-    plants = [
-        KneeOrthosis.rig(),
-        KneeOrthosis.no_load(),
-        KneeOrthosis.no_load(dynamics="measured"),
-        KneeOrthosis.no_load("preisach"),
-        KneeOrthosis.no_load("none"),
-        KneeOrthosis.on_leg("walk"),
-        KneeOrthosis.on_leg("walk", 1.224),
-        KneeOrthosis.on_leg("stairs_up"),
-        KneeOrthosis.no_load(lever__stiffness=31.0),
-    ]
-    assert len({plant.digest() for plant in plants}) == len(plants)
-
-
-def test_every_parameter_has_its_row() -> None:
-    plant = KneeOrthosis.on_leg("walk", 1.7)
-    column = plant.parameter_rows()
-    assert column.shape == (K.N_PARAMETERS,)
-    for name in K.NAMES:
-        assert column[K.place(name)] == plant.value(name)
-    assert column[K.STRIDE_TIME] == 1.7
-    assert column[K.LEVER_STIFFNESS] == plant.lever.stiffness
-    assert column[K.ANKLE_BIAS] == plant.ankle.bias
-
-
 def test_members_may_have_hysteresis_models_of_their_own() -> None:
     other = knee_hysteresis("maxwell_slip").operator.scaled(0.5)  # type: ignore[union-attr]
     plant = dataclasses.replace(KneeOrthosis.rig(), ensemble=({"hysteresis.operator": other},))
     tables = plant.hysteresis_tables()
     assert tables.shape == (2, 4, plant.elements)
     assert tables[1, 1, 0] == pytest.approx(0.5 * tables[0, 1, 0])
-
-
-def test_noise_can_be_switched_off() -> None:
-    plant = KneeOrthosis.no_load()
-    assert plant.tension.noise > 0.0
-    quiet = plant.without_noise()
-    assert quiet.tension.noise == quiet.cop.noise == quiet.pressure.resolution == 0.0
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ def inputs(samples: int = SAMPLES) -> Inputs:
     )
 
 
-def test_a_plant_moves_alike_whatever_is_replayed_beside_it() -> None:
+def test_replay_does_not_depend_on_the_plants_beside_it() -> None:
     plants = [PLANT] + [PLANT.replace({name: value}) for name, value in EVERY_EFFECT.items()]
     plants.append(PLANT.replace(EVERY_EFFECT))
     columns = np.stack([p.parameter_rows() for p in plants])
@@ -53,7 +53,7 @@ def test_every_column_is_replayed_once() -> None:
 
 
 @pytest.mark.parametrize("name", ["regulator.slew_bend", "hysteresis.pressure_slope", "mass.slack"])
-def test_an_effect_that_is_off_costs_no_bit(name: str) -> None:
+def test_effect_that_is_off_changes_no_bit(name: str) -> None:
     off = PLANT.replace({"mass.ring_share": 0.0, name: 0.0})
     a, b = replay(PLANT, inputs()), replay(off, inputs())
     assert all(np.array_equal(a[k], b[k]) for k in a)
