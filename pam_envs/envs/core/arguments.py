@@ -103,10 +103,9 @@ class Common:
                 f"plant = {str(plant)[:60]!r} must be a {kind.__name__}, the path of a plant file, "
                 "or None"
             )
-        found: Any = made
+        own = made.hysteresis.choice  # type: ignore[attr-defined]
         if hysteresis is not None and model_of(hysteresis).identity:
-            return found.replace({"hysteresis.operator": None})  # type: ignore[no-any-return]
-        own = found.hysteresis.choice
+            return made.replace({"hysteresis.operator": None})  # type: ignore[attr-defined, no-any-return]
         if hysteresis is not None and hysteresis != own:
             raise ValueError(
                 f"hysteresis = {hysteresis!r} but the plant's hysteresis is {own!r}; leave "
@@ -120,21 +119,23 @@ class Common:
         unit: str,
         largest: float | Sequence[float],
         channels: int = 1,
+        own: Sequence[str] = (),
     ) -> tuple[int, NDArray[np.float64]]:
         """Return the number of the reference's family, and samples of shape (channels, n).
 
         ``len(families)`` is the number of given samples, shape (n,) or (n, channels), each of at
-        most ``largest`` in magnitude; units of several channels are separated by commas.
+        most ``largest`` in magnitude; those of the environment's ``own`` families follow. Units of
+        several channels are separated by commas.
         """
         reference = self.reference
         if isinstance(reference, str):
-            check_choice("reference", reference, tuple(families))
-            return list(families).index(reference), np.zeros((channels, 1))
+            check_choice("reference", reference, (*families, *own))
+            return [*families, None, *own].index(reference), np.zeros((channels, 1))
         try:
             samples = np.array(reference, np.float64)
         except (TypeError, ValueError) as error:
             raise ValueError(
-                f"reference = {str(reference)[:60]!r} must be one of {', '.join(families)} or "
+                f"reference = {str(reference)[:60]!r} must be one of {', '.join((*families, *own))} or "
                 "samples"
             ) from error
         shaped = samples[:, None] if samples.ndim == channels == 1 else samples
@@ -149,10 +150,10 @@ class Common:
                 "period"
             )
         sizes, bounds = np.abs(shaped).max(axis=0), np.broadcast_to(largest, channels)
-        for size, bound, own in zip(sizes, bounds, unit.split(", "), strict=True):
+        for size, bound, word in zip(sizes, bounds, unit.split(", "), strict=True):
             if size > bound:
                 raise ValueError(
-                    f"reference reaches {size:g} {own}; at most {bound:g} {own} is accepted"
+                    f"reference reaches {size:g} {word}; at most {bound:g} {word} is accepted"
                 )
         return len(families), np.ascontiguousarray(shaped.T)
 
@@ -171,10 +172,8 @@ class Common:
 
     def spread_of(self, plant: Any, which: Randomisation) -> NDArray[np.float64]:
         """Return (row, low, high) of each parameter that every episode draws, checked."""
-        names, corner = list(which.parameters), which.corner
-        ranges = self._ranges(plant, which)
-        allowed = tuple(name for name in names if name not in which.fixed)
-        table = []
+        names, ranges, table = list(which.parameters), self._ranges(plant, which), []
+        allowed = [name for name in names if name not in which.fixed]
         for name, span in ranges.items():
             if name not in allowed:
                 raise ValueError(
@@ -195,7 +194,7 @@ class Common:
             for end in (low, high):
                 plant.replace({name: end})  # refuses values out of bounds and unstable plants
             table.append((names.index(name), low, high))
-        worst = {name: pick(ranges[name]) for name, pick in corner.items() if name in ranges}
+        worst = {n: pick(ranges[n]) for n, pick in which.corner.items() if n in ranges}
         for member in plant.members() if ranges else ():
             member.replace(worst)  # refuses a corner that the sub-steps cannot follow
         return np.array(table, float).reshape(-1, 3)

@@ -25,7 +25,7 @@ Observation (float32; scaled to [-1, 1] over the range, or SI with ``normalize=F
 | then | stiffness_reference_1 .., along the intended motion | N m/rad | 0 .. 15 |
 
 With more muscles than three and seven the ranges of torque and stiffness are larger
-(:func:`~pam_envs.envs.elbow.ranges.signal_ranges`).
+(:func:`signal_ranges`).
 
 Action: pressure_a_set_point and pressure_b_set_point, 0 .. 6e5 Pa; with on/off valves pulse_a and
 pulse_b, -0.05 .. 0.05 s, of which one in 50 ms is taken, positive to fill; or torque and stiffness.
@@ -56,14 +56,15 @@ from pam_envs.envs.core.arguments import Common, Randomisation, environment_argu
 from pam_envs.envs.core.setup import Part, Setup, check_choice, check_number, compose
 from pam_envs.envs.elbow import layout as L
 from pam_envs.envs.elbow.kernels import kernels_for
-from pam_envs.envs.elbow.ranges import largest_errors, signal_ranges
+from pam_envs.parameters import declarations
 from pam_envs.plants.elbow_orthosis import rows as R
-from pam_envs.plants.elbow_orthosis.plant import MAKES, ElbowOrthosis, Valves
-from pam_envs.plants.single_muscle.hysteresis import Kind
+from pam_envs.plants.elbow_orthosis.plant import MAKES, ElbowOrthosis
 from pam_envs.references.reaches import MOTIONS
 from pam_envs.tasks.torque_stiffness import MIXED, OBJECTS, WEIGHT, TorqueStiffness
 
 ANGLES, RATES = (-0.2, 2.4), (-10.0, 10.0)
+LEAST_RANGES, ROUND = (30.0, 15.0), 5.0
+"""Smallest ranges of torque [N m] and stiffness [N m/rad], and the step of rounding."""
 MARGIN = math.radians(5.0)
 """Smallest distance [rad] of intended motions from the ends of the range."""
 RANDOMISATION = Randomisation(
@@ -86,16 +87,14 @@ RANDOMISATION = Randomisation(
 )
 
 
-@lru_cache(maxsize=8)
-def _default(valves: Valves, hysteresis: Kind) -> ElbowOrthosis:
-    return ElbowOrthosis.paper(hysteresis, valves=valves)
+default_plant = lru_cache(maxsize=8)(ElbowOrthosis.paper)
 
 
 def _plant(given: Common, valves: Any) -> ElbowOrthosis:
     """Return the orthosis that the arguments name."""
     if valves is not None:
         check_choice("valves", valves, MAKES)
-    made = given.plant_of(ElbowOrthosis, partial(_default, valves or MAKES[0]))
+    made = given.plant_of(ElbowOrthosis, partial(default_plant, valves=valves or MAKES[0]))
     if valves is not None and made.valves != valves:
         raise ValueError(
             f"valves = {valves!r} but the plant's are {made.valves!r}; leave valves out, or give "
@@ -127,55 +126,61 @@ def model_row(plant: ElbowOrthosis) -> NDArray[np.float64]:
     return np.array([model[name] for name in L.MODEL._fields])
 
 
-def _own(plant: ElbowOrthosis, samples: NDArray[np.float64]) -> NDArray[np.float64]:
-    model = model_row(plant)
-    rows = np.zeros((3, max(len(model), samples.shape[1])))
-    rows[0, : len(model)] = model
-    rows[1:, : samples.shape[1]] = samples
-    return rows
+def signal_ranges(plant: ElbowOrthosis) -> tuple[float, float]:
+    """Return the ranges of the signals of torque [N m] and stiffness [N m/rad].
+
+    The largest values at any corner of the pressures, rounded up.
+    """
+    return tuple(  # type: ignore[return-value]
+        max(least, ROUND * math.ceil(float(np.abs(values).max()) / ROUND))
+        for values, least in zip(_corners(plant), LEAST_RANGES, strict=True)
+    )
 
 
-def _commands(plant: ElbowOrthosis) -> Part:
-    """Return name, unit and range of the command of a bundle's valves."""
-    if plant.valves == "on_off":
-        return "pulse", "s", -plant.cycle, plant.cycle
-    return "set_point", "Pa", 0.0, plant.full_pressure
+def largest_errors(plant: ElbowOrthosis) -> tuple[float, float]:
+    """Return upper bounds of the errors of torque [N m] and stiffness [N m/rad].
+
+    References are between the corners of the nominal bundles; the true bundles can be stronger by
+    the largest allowed gain.
+    """
+    torques, stiffnesses = _corners(plant)
+    strongest = declarations(plant.bundle_a)["gain"].high
+    return strongest * float(np.ptp(torques)), strongest * float(stiffnesses.max())
 
 
-def _spans(plant: ElbowOrthosis) -> tuple[tuple[float, float], tuple[float, float]]:
+def _corners(plant: ElbowOrthosis) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return torque and stiffness at the corners of the pressures, over all angles."""
+    return plant.corners(np.linspace(*plant.hard_limits, 49))
+
+
+def _signals(plant: ElbowOrthosis, action: str) -> dict[str, list[Part]]:
+    """Return the signals of the observation, its references and the action."""
+    pulsed, pressures = plant.valves == "on_off", ("Pa", 0.0, plant.full_pressure)
     torque, stiffness = signal_ranges(plant)
-    return (-torque, torque), (0.0, stiffness)
-
-
-def _actions(plant: ElbowOrthosis, action: str) -> list[Part]:
-    word, unit, low, high = _commands(plant)
-    form = "pulse_{}" if word == "pulse" else "pressure_{}_set_point"
-    if action != "torque_stiffness":
-        return [(form.format(bundle), unit, low, high) for bundle in "ab"]
-    torques, stiffnesses = _spans(plant)
-    return [
-        ("torque_set_point", "N m", *torques),
-        ("stiffness_set_point", "N m/rad", *stiffnesses),
-    ]
-
-
-def _observation(plant: ElbowOrthosis) -> list[Part]:
-    """Return the signals of the observation without references."""
-    pressures, (torques, stiffnesses) = (0.0, plant.full_pressure), _spans(plant)
-    word, unit, low, high = _commands(plant)
-    parts: list[Part] = [
+    torques, stiffnesses = ("N m", -torque, torque), ("N m/rad", 0.0, stiffness)
+    pulses = ("s", -plant.cycle, plant.cycle)
+    word, span = ("pulse", pulses) if pulsed else ("set_point", pressures)
+    observation: list[Part] = [
         ("angle", "rad", *ANGLES),
         ("rate", "rad/s", *RATES),
-        ("pressure_a", "Pa", *pressures),
-        ("pressure_b", "Pa", *pressures),
-        (f"{word}_a", unit, low, high),
-        (f"{word}_b", unit, low, high),
-        ("torque", "N m", *torques),
-        ("stiffness", "N m/rad", *stiffnesses),
+        ("pressure_a", *pressures),
+        ("pressure_b", *pressures),
+        (f"{word}_a", *span),
+        (f"{word}_b", *span),
+        ("torque", *torques),
+        ("stiffness", *stiffnesses),
     ]
-    if word == "pulse":
-        parts.append(("to_pulse", "s", 0.0, plant.cycle))
-    return parts
+    if pulsed:
+        observation.append(("to_pulse", "s", 0.0, plant.cycle))
+    form = "pulse_{}" if pulsed else "pressure_{}_set_point"
+    actions: list[Part] = [(form.format(bundle), *span) for bundle in "ab"]
+    if action == "torque_stiffness":
+        actions = [("torque_set_point", *torques), ("stiffness_set_point", *stiffnesses)]
+    return {
+        "observation": observation,
+        "references": [("reference", *torques), ("stiffness_reference", *stiffnesses)],
+        "action": actions,
+    }
 
 
 def _span(plant: ElbowOrthosis, span: Any) -> tuple[float, float]:
@@ -192,17 +197,6 @@ def _span(plant: ElbowOrthosis, span: Any) -> tuple[float, float]:
     if a >= b:
         raise ValueError(f"span = {span!r} must begin below its end; swap them")
     return a, b
-
-
-def _reference(plant: ElbowOrthosis, given: Common) -> tuple[int, NDArray[np.float64]]:
-    """Return the number of the object, and torque and stiffness if they are given as samples."""
-    most = tuple(2.0 * largest for largest in signal_ranges(plant))
-    kind, samples = given.reference_of(OBJECTS, "N m, N m/rad", most, channels=L.CHANNELS)
-    if samples.min(axis=1)[1] < 0.0:
-        raise ValueError(
-            f"reference has a stiffness of {samples.min(axis=1)[1]:g} N m/rad; give 0 or more"
-        )
-    return kind, samples
 
 
 def _weights(task: TorqueStiffness, weight: Any, kind: int) -> tuple[float, float]:
@@ -260,7 +254,12 @@ def make_setup(
         Under the pressures for the references, or under random ones.
     """
     made = _plant(given, valves)
-    kind, samples = _reference(made, given)
+    most = tuple(2.0 * largest for largest in signal_ranges(made))
+    kind, samples = given.reference_of(OBJECTS, "N m, N m/rad", most, channels=L.CHANNELS)
+    if samples[1].min() < 0.0:
+        raise ValueError(
+            f"reference has a stiffness of {samples[1].min():g} N m/rad; give 0 or more"
+        )
     check_choice("action", action, L.ACTIONS)
     check_choice("motion", motion, MOTIONS)
     check_choice("start", start, ("ready", "random"))
@@ -274,7 +273,8 @@ def make_setup(
     task, full = given.task_of(TorqueStiffness), made.full_pressure
     lightest, heaviest = _weights(task, weight, kind)
     low, high = _span(made, span)
-    torques, stiffnesses = _spans(made)
+    own = np.zeros((3, max(len(L.MODEL), samples.shape[1])))
+    own[0, : len(L.MODEL)], own[1:, : samples.shape[1]] = model_row(made), samples
     config = {
         **vars(task),
         "lightest": lightest,
@@ -301,16 +301,11 @@ def make_setup(
         made,
         kernels_for(made.hysteresis.kind, made.valves, made.needs_effects(spread)),
         given,
-        observation=_observation(made),
-        references=[
-            ("reference", "N m", *torques),
-            ("stiffness_reference", "N m/rad", *stiffnesses),
-        ],
-        action=_actions(made, action),
+        **_signals(made, action),
         config=config,
         choices=choices,
         reference=kind,
-        own=_own(made, samples),
+        own=own,
         samples=samples,
         tables=made.hysteresis_tables(),
         spread=spread,

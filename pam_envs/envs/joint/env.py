@@ -57,8 +57,6 @@ MOST_PAYLOAD = 2.0
 """Largest payload [kg]."""
 USUAL_SHARE = 2.0 / 3.0
 """Share of the joint's limit that references and random starts reach."""
-NUMBERS = {len(L.REFERENCES): SAMPLES, len(FAMILIES): L.SINE, len(FAMILIES) + 1: L.STEP}
-"""Numbers of references, by their position in ``REFERENCES``."""
 RANDOMISATION = Randomisation(
     R.NAMES,
     ("regulator.max_pressure", "link.limit", "link.stop", "nominal.prestress"),
@@ -151,8 +149,7 @@ def make_setup(
     """
     made = given.plant_of(AntagonisticJoint, default_plant)
     most = made.angle_range[1]
-    place, samples = given.reference_of(L.REFERENCES, "rad", most)
-    family = NUMBERS.get(place, place)
+    family, samples = given.reference_of(FAMILIES, "rad", most, own=("sine", "step"))
     check_choice("action", action, L.MODES)
     check_choice("start", start, ("random", "straight"))
     if action == "pressures" and made.dynamics == "reduced":

@@ -79,12 +79,10 @@ OWN = indices(("mode", "payloads"), FIRST_CHOICE)
 MODES = ("angle", "angle_stiffness", "pressures")
 BY_ANGLE, BY_BOTH, BY_PRESSURE = range(len(MODES))
 """Meaning of the actions."""
-REFERENCES = (*T.FAMILIES, "sine", "step")
 SINE, STEP = T.SAMPLES + 1, T.SAMPLES + 2
 """Numbers of the references that only this family has."""
 STEP_SECONDS = 1.0
 """Time of the step of the reference "step"."""
-
 PULSE_WINDOW, PULSE = 500, 100
 """Control periods between pulses of the disturbance, and duration of a pulse."""
 NOISE_ANGLE, NOISE_A, NOISE_B, START, PULSES = 1, 2, 3, 5, 6

@@ -31,19 +31,16 @@ Arguments: :func:`make_setup`, and those of every environment
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+from functools import lru_cache
 
 from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose
 from pam_envs.envs.knee import brace_kernels as L
 from pam_envs.plants.knee_orthosis import rows as R
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
-from pam_envs.plants.single_muscle.hysteresis import Kind
-from pam_envs.references.trajectory import FAMILIES, SAMPLES, sines_needed
+from pam_envs.references.trajectory import FAMILIES, sines_needed
 from pam_envs.tasks.gait_assistance import BraceTracking
 
-REFERENCES = (*FAMILIES, "sine")
-"""References of all environments, and that of yeh2010: a sine that begins at its lowest value."""
 UNITS = ("N", "N/m")
 RANGES = ((0.0, 400.0), (0.0, 1e4))
 """Ranges of the signals, by quantity."""
@@ -61,11 +58,10 @@ RANDOMISATION = Randomisation(
 )
 
 
-@lru_cache(maxsize=16)
-def _default(mounting: str, hysteresis: Kind) -> KneeOrthosis:
-    if mounting == "rig":
-        return KneeOrthosis.rig(hysteresis)
-    return KneeOrthosis.no_load(hysteresis)
+default_plants = {
+    "rig": lru_cache(maxsize=8)(KneeOrthosis.rig),
+    "no_load": lru_cache(maxsize=8)(KneeOrthosis.no_load),
+}
 
 
 @environment_arguments(reference="sine", preview=5, preview_stride=4, episode_seconds=20.0)
@@ -89,14 +85,13 @@ def make_setup(
     start : {"random", "paper"}
         At rest under a random pressure, or at about 55 N.
     """
-    made = given.plant_of(KneeOrthosis, partial(_default, mounting))
+    made = given.plant_of(KneeOrthosis, default_plants[mounting])
     if made.mounting == "leg":
         raise ValueError(
             "plant: this orthosis is on a leg; give KneeOrthosis.no_load() or KneeOrthosis.rig()"
         )
     unit, largest = UNITS[quantity], RANGES[quantity][1]
-    family, samples = given.reference_of(REFERENCES, unit, largest)
-    family = {len(REFERENCES): SAMPLES, len(FAMILIES): L.PAPER}.get(family, family)
+    family, samples = given.reference_of(FAMILIES, unit, largest, own=("sine",))
     check_choice("start", start, ("random", "paper"))
     task, full = given.task_of(BraceTracking), made.regulator.max_pressure
     low, high = REFERENCE_RANGES[L.QUANTITIES[quantity]][made.mounting]

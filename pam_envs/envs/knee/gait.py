@@ -42,7 +42,7 @@ Arguments: :func:`make_setup`, and those of every environment
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
@@ -52,7 +52,6 @@ from pam_envs.envs.knee.gait_layout import SOURCES
 from pam_envs.muscle.emg import calibration
 from pam_envs.plants.knee_orthosis import rows as R
 from pam_envs.plants.knee_orthosis.plant import Activity, KneeOrthosis
-from pam_envs.plants.single_muscle.hysteresis import Kind
 from pam_envs.references.gait import NATURAL_STRIDE, PAPER_STRIDE
 from pam_envs.tasks.gait_assistance import GaitAssistance
 
@@ -72,23 +71,18 @@ RANDOMISATION = Randomisation(
 )
 
 
-@lru_cache(maxsize=16)
-def _default(activity: Activity, pace: float, hysteresis: Kind) -> KneeOrthosis:
-    return KneeOrthosis.on_leg(activity, stride=pace, hysteresis=hysteresis)
-
-
-def _pace(pace: Any) -> float:
-    """Return the duration of a stride [s]."""
-    if isinstance(pace, str):
-        check_choice("pace", pace, tuple(PACES))
-        return PACES[pace]
-    return check_number("pace", pace, 0.8, 20.0, "s a stride")
+default_plant = lru_cache(maxsize=16)(KneeOrthosis.on_leg)
 
 
 def _plant(activity: Activity, given: Common, pace: Any) -> KneeOrthosis:
     """Return the orthosis on a leg that the arguments name."""
-    seconds = PAPER_STRIDE if pace is None else _pace(pace)
-    made = given.plant_of(KneeOrthosis, partial(_default, activity, seconds))
+    if isinstance(pace, str):
+        check_choice("pace", pace, tuple(PACES))
+    stride = PACES.get("slow" if pace is None else pace, pace)
+    seconds = check_number("pace", stride, 0.8, 20.0, "s a stride")
+    made = given.plant_of(
+        KneeOrthosis, lambda kind: default_plant(activity, stride=seconds, hysteresis=kind)
+    )
     if made.mounting != "leg" or made.activity != activity:
         raise ValueError(
             f"plant: mounting {made.mounting!r} with activity {made.activity!r}; give "

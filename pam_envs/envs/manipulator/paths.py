@@ -36,28 +36,10 @@ USUAL_PAYLOAD = 0.03
 
 
 def paths_for(plant: RedundantManipulator, reference: Any, weighted: bool) -> dict[str, Array]:
-    """Return poses and planned angles of all paths from which episodes draw, by name.
+    """Return all paths from which episodes draw, by name, shape (6 + n, points) each.
 
-    Parameters
-    ----------
-    plant : RedundantManipulator
-        The arm; no planned angle is beyond ``plant.angle_range``.
-    reference : str or array_like, shape (k, 6)
-        As given by the user.
-    weighted : bool
-        Whether angles are planned with the weight of Eq. (2.1).
-
-    Returns
-    -------
-    dict of ndarray, shape (6 + n, points)
-        x, y, z [m], the direction [1], and the planned angles [rad].
-
-    Raises
-    ------
-    UnreachablePose
-        If there are no joint angles for a given pose.
-    ValueError
-        If the reference is none, or one that is not for this arm.
+    Poses, x, y, z [m] and the direction [1], then planned angles [rad], none beyond
+    ``plant.angle_range``; ``weighted`` with the weight of Eq. (2.1).
     """
     chain, limit = plant.nominal_chain, plant.angle_range[1]
     if not isinstance(reference, str):
@@ -131,16 +113,14 @@ def _drawn(plant: RedundantManipulator, weighted: bool) -> dict[str, Array]:
 @lru_cache(maxsize=128)
 def _drawn_path(chain: SerialChain, limit: float, i: int) -> Array | None:
     """Return path ``i`` of those drawn, or None if its plan is not continuous."""
-    first, last = (ends[i] for ends in _ends(chain.stages, limit))
+    first, last = (ends[i] for ends in _ends(DRAW_SEED, TRIED, chain.stages, limit))
     line = joint_line(first, last)
     found = planned(chain, poses_of(chain, line), limit, True)
     even = np.abs(last - first).max() / (len(line) - 1)
     return found if np.abs(np.diff(found[N_POSE:])).max() <= LEAP * even else None
 
 
-@lru_cache(maxsize=16)
-def _ends(stages: int, limit: float) -> tuple[Array, Array]:
-    return draw_ends(DRAW_SEED, TRIED, stages, limit)
+_ends = lru_cache(maxsize=16)(draw_ends)
 
 
 def planned(chain: SerialChain, poses: Array, limit: float, weighted: bool) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,14 +15,8 @@ from pam_envs.envs.rendering.scene import Point
 class Camera:
     """Parallel projection of a world whose z points down.
 
-    Attributes
-    ----------
-    azimuth, elevation : float
-        Direction of the camera [rad]: around the vertical, and above the horizontal.
-    scale : float
-        Pixels per metre.
-    middle : tuple of float
-        Position of the world's origin [pixels].
+    ``azimuth`` around the vertical and ``elevation`` above the horizontal are the direction of the
+    camera [rad], ``scale`` pixels per metre, ``middle`` the position of the origin [pixels].
     """
 
     azimuth: float
@@ -44,19 +37,8 @@ class Camera:
         """Return points (n, 3) [m] as a list of positions [pixels]."""
         return [(float(x), float(y)) for x, y in self.flat(points)]
 
-    def at(self, point: Iterable[float]) -> Point:
-        """Return the position [pixels] of one point [m]."""
-        return self.line([tuple(point)])[0]
-
     def fitted(self, points: ArrayLike, box: tuple[float, float, float, float]) -> Camera:
-        """Return the camera with the largest scale at which points (n, 3) [m] fit a box.
-
-        Parameters
-        ----------
-        points : array_like, shape (n, 3)
-        box : tuple of float
-            Left, top, width and height [pixels].
-        """
+        """Return the camera with the largest scale at which points (n, 3) [m] fit a box [pixels]."""
         plain = Camera(self.azimuth, self.elevation).flat(points)
         low, high = plain.min(axis=0), plain.max(axis=0)
         scale = float(min(np.array(box[2:]) / np.maximum(high - low, 1e-9)))

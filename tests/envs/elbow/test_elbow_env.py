@@ -12,9 +12,8 @@ import pam_envs  # noqa: F401 (registers)
 from baselines.core.catalogue import make_controller
 from benchmarks.scoring.groups.elbow import NEAR
 from pam_envs.constants import GRAVITY
-from pam_envs.envs.elbow.env import model_row
+from pam_envs.envs.elbow.env import largest_errors, model_row, signal_ranges
 from pam_envs.envs.elbow.program import estimate, pressures_for, within_reach
-from pam_envs.envs.elbow.ranges import largest_errors, signal_ranges
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 from pam_envs.tasks.torque_stiffness import TorqueStiffness
 
