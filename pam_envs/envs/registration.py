@@ -15,19 +15,10 @@ FAMILIES = "PAM_ENVS_FAMILIES"
 
 
 def register_family(family: ModuleType | str) -> tuple[str, ...]:
-    """Register the environments of a family and return their ids.
+    """Register the environments of a family, a package or its import name; return their ids.
 
-    Parameters
-    ----------
-    family : module or str
-        A package, or its import name. Its ``ENVIRONMENTS`` maps each id to
-        ``module:Name``: ``NameEnv`` in that module is the single environment and
-        ``NameVectorEnv`` the batch. Ids that are registered already stay as they are.
-
-    Raises
-    ------
-    ValueError
-        If the package declares no environments.
+    Its ``ENVIRONMENTS`` maps each id to ``module:Name``: ``NameEnv`` in that module is the single
+    environment and ``NameVectorEnv`` the batch. Ids that are registered already stay as they are.
     """
     package = importlib.import_module(family) if isinstance(family, str) else family
     declared: dict[str, str] = getattr(package, "ENVIRONMENTS", {})
@@ -49,12 +40,10 @@ def register_family(family: ModuleType | str) -> tuple[str, ...]:
 
 def register_all() -> None:
     """Register every family: each folder beside this module, and those of ``FAMILIES``."""
-    package = __name__.rpartition(".")[0]
-    for found in pkgutil.iter_modules(importlib.import_module(package).__path__, f"{package}."):
-        if found.ispkg:
-            family = importlib.import_module(found.name)
-            if hasattr(family, "ENVIRONMENTS"):
-                register_family(family)
+    package = importlib.import_module(__name__.rpartition(".")[0])
+    for found in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+        if found.ispkg and hasattr(importlib.import_module(found.name), "ENVIRONMENTS"):
+            register_family(found.name)
     for name in filter(None, os.environ.get(FAMILIES, "").split(",")):
         register_family(name)
 

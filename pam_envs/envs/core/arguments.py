@@ -135,8 +135,8 @@ class Common:
             samples = np.array(reference, np.float64)
         except (TypeError, ValueError) as error:
             raise ValueError(
-                f"reference = {str(reference)[:60]!r} must be one of {', '.join((*families, *own))} or "
-                "samples"
+                f"reference = {str(reference)[:60]!r} must be one of "
+                f"{', '.join((*families, *own))} or samples"
             ) from error
         shaped = samples[:, None] if samples.ndim == channels == 1 else samples
         if shaped.ndim != 2 or not len(shaped) or not np.isfinite(shaped).all():

@@ -18,56 +18,39 @@ NONE = indices(())
 
 @dataclass(frozen=True, eq=False)
 class Kernels:
-    """Kernels of one family, built on first use.
-
-    Attributes
-    ----------
-    family : str
-        Name, also of the machine code on disk.
-    maker, key : callable, tuple
-        ``maker(*key)`` returns these kernels again: machine code is not pickled.
-    report : Report
-        Entries of ``info`` and signals of the observation.
-    evaluate : kernel
-        Writes what is computed of both.
-    begin : routine
-        Starts an episode.
-    rows, parameters, counts : int
-        Rows of the state, of the parameters, and of the integers without those of the seed.
-    set_points, old_set_points : int
-        First row of the set-points, and of those of the previous period.
-    channels : int
-        References that are tracked at once.
-    config, choices : named tuple of int
-        Index of each of the family's own numbers and whole numbers in the configuration.
-    apply : kernel
-        Applies actions and disturbances at the start of a control period; default: nothing.
-    advance : kernel
-        Advances the plant by a control period; default: by the placeholder ``plant_advance``.
-    reference : kernel
-        Returns a reference at a control period; default: a drawn trajectory, or given samples.
-    placeholders : mapping
-        Values of further global names in the call graph, such as those of the plant's kernels.
-    """
+    """Kernels of one family, built on first use."""
 
     family: str
+    """Name, also of the machine code on disk."""
     maker: Callable[..., Any]
     key: tuple[Any, ...]
+    """``maker(*key)`` returns these kernels again: machine code is not pickled."""
     report: Report
+    """Entries of ``info`` and signals of the observation."""
     evaluate: Kernel
+    """Writes what is computed of both."""
     begin: Kernel
+    """Starts an episode."""
     rows: int
     parameters: int
     counts: int
+    """Rows of state and parameters, and integer rows without those of the seed."""
     set_points: int
     old_set_points: int
+    """First row of the set-points, and of those of the previous period."""
     channels: int = 1
+    """References that are tracked at once."""
     config: Any = NONE
     choices: Any = NONE
+    """Index of each of the family's own numbers and whole numbers in the configuration."""
     apply: Kernel = do_nothing
+    """Applies actions and disturbances at the start of a control period."""
     advance: Kernel = advance_plant
+    """Advances the plant by a control period."""
     reference: Kernel = trajectory_at
+    """Returns a reference at a control period."""
     placeholders: Mapping[str, Any] = field(default_factory=dict)
+    """Values of further global names in the call graph, such as those of the plant's kernels."""
 
     @property
     def n_counts(self) -> int:

@@ -1,8 +1,6 @@
-"""The ``info`` of a step: a dict that is filled when it is first looked at.
+"""The ``info`` of a step: a dict that is filled when it is first read.
 
-Filling a dict with twenty numbers takes longer than simulating the plant, and most steps of a
-learning run never look. So a step hands out an :class:`Info`, which holds the numbers and becomes
-an ordinary dict with the first access of any kind.
+Filling it takes longer than simulating the plant, and most steps of a learning run never read it.
 """
 
 from __future__ import annotations
@@ -12,7 +10,7 @@ from typing import Any
 
 
 def _filling(name: str) -> Callable[..., Any]:
-    """Return the dict's method of that name, preceded by the filling."""
+    """Return the dict's method of that name, which fills the dict first."""
     method = getattr(dict, name)
 
     def touched(self: Info, *arguments: Any, **named: Any) -> Any:
@@ -29,17 +27,10 @@ def _filling(name: str) -> Callable[..., Any]:
 
 
 class Info(dict[str, Any]):
-    """A dict of ``keys`` and ``numbers`` that is filled on first access.
+    """A dict of ``keys`` and ``numbers``, one double each, that is filled on first access.
 
-    Parameters
-    ----------
-    keys : tuple of str
-        The keys, in order.
-    first : float
-        Value of the first key. It is in the dict from the start: C code that asks a dict for its
-        size before it asks for its items would otherwise take it for empty.
-    numbers : bytes
-        One double for each key.
+    The ``first`` value is in the dict from the start: C code that asks a dict for its size before
+    it asks for its items would otherwise take it for empty.
     """
 
     __slots__ = ("_names", "_numbers")

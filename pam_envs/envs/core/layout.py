@@ -37,16 +37,6 @@ class Report:
         Work rows of the plant, which come before the report.
     observed : sequence of int or None
         Likewise of the signals of the observation, without references.
-
-    Attributes
-    ----------
-    keys, rows : tuple of str, named tuple of int
-        All keys in order, and the work row of each: ``rows.reward_tracking``.
-    copied : tuple of (int, int)
-        Work row and state row of each copy.
-    ended, signals, end : int
-        Work row of the flag of a broken limit, the first one of the observation, and the first one
-        behind its ``observed`` signals.
     """
 
     def __init__(
@@ -54,8 +44,8 @@ class Report:
     ) -> None:
         self.keys = ("time", "reference", "output", *entries, "saturated")
         self.scratch = scratch
-        self.rows = indices(self.keys, scratch)
-        self.ended = scratch + len(self.keys)
+        self.rows = indices(self.keys, scratch)  # rows.reward_tracking
+        self.ended = scratch + len(self.keys)  # flag of a broken limit
         self.signals = self.ended + 1
         self.end = self.signals + len(observed)
         sources = (*entries.values(), None, None, *observed)

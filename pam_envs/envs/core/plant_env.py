@@ -53,8 +53,7 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _use(self, function: Any, compiled: bool) -> None:
         """Use ``function`` for all further steps: plain Python on lists, or machine code on arrays.
 
-        A new environment starts in plain Python, which is ready at once, and changes to machine
-        code, which takes time to load or to compile, after a few steps. The bits are the same.
+        Plain Python is ready at once; machine code takes time to load or to compile.
         """
         setup = self.setup
         arrays = [
@@ -104,13 +103,7 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, Info]:
-        """Apply an action for one control period; see Gymnasium.
-
-        Raises
-        ------
-        ValueError
-            If the action is not finite or has the wrong shape; nothing has changed then.
-        """
+        """Apply an action for one control period; a bad one is refused and changes nothing."""
         if self._steps < 0:
             raise gym.error.ResetNeeded("call reset() before step()")
         self._take(action)
@@ -124,7 +117,9 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _take(self, action: Any) -> None:
         """Check an action and pass it to the kernel."""
         if self._warming:
-            self._warm()
+            self._warming -= 1
+            if not self._warming:
+                self._use(self.setup.kernels.single, compiled=True)
         cells, i = self._action_cells, 0
         try:
             for value in action.tolist():
@@ -138,12 +133,6 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             for i, value in enumerate(self._numbers(action, (self._n_actions,), "action").tolist()):
                 cells[i] = value
 
-    def _warm(self) -> None:
-        """Count a step in plain Python; change to machine code after ``INTERPRETED_CALLS``."""
-        self._warming -= 1
-        if not self._warming:
-            self._use(self.setup.kernels.single, compiled=True)
-
     def _read(self) -> tuple[NDArray[np.float32], Info, float, bool, bool]:
         """Return observation, info, reward and flags of the last call."""
         if self._compiled:
@@ -153,9 +142,8 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             return self._observation.copy(), info, reward, flags[0] == 1, flags[1] == 1
         reward, *values = (float(row[0]) for row in self._infos[0])
         observation = np.array(self._observations[0][0], np.float32)
-        ended = [row[0] == 1 for row in self._flags]
         info = Info(self._keys, values[0], np.array(values).tobytes())
-        return observation, info, reward, ended[0], ended[1]
+        return observation, info, reward, self._flags[0][0] == 1, self._flags[1][0] == 1
 
     def _draw(self, info: Info, start: bool = False) -> None:
         """Record a step for pictures; show the picture at once in the ``human`` mode."""
@@ -198,13 +186,7 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         }
 
     def set_state(self, state: dict[str, NDArray[Any]]) -> None:
-        """Restore a state of :meth:`get_state`, to the last bit.
-
-        Raises
-        ------
-        ValueError
-            If the state is of another kind of environment; nothing has changed then.
-        """
+        """Restore a state of :meth:`get_state`; one of other arguments is a ``ValueError``."""
         parts = check_state(state, self.setup.state(1, 1))
         try:
             steps = int(state["steps"])
@@ -222,11 +204,7 @@ class PlantEnv(Configured, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def __getstate__(self) -> dict[str, Any]:
         """Pickle and deepcopy through :meth:`get_state`."""
-        return {
-            "setup": self.setup,
-            "state": self.get_state(),
-            "spec": self.spec,
-        }
+        return {"setup": self.setup, "state": self.get_state(), "spec": self.spec}
 
     def __setstate__(self, pickled: dict[str, Any]) -> None:
         """Rebuild the environment in the pickled state."""

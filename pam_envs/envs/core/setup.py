@@ -22,37 +22,18 @@ STEP, STEP_AND_RESTART, BEGIN = 0, 1, 2
 
 @dataclass(frozen=True)
 class Setup:
-    """Checked configuration that the single environment and the batch share.
-
-    Attributes
-    ----------
-    plant : plant
-        The plant that is simulated.
-    signals, action_signals : Signals
-        Signals of observation and action.
-    kernels : Kernels
-        Kernels of the family.
-    drawn : bool
-        Whether environments differ in their parameters; otherwise all tiles share them.
-    ring : int
-        Length of the ring buffers of previewed references: a power of two for each channel.
-    shared : tuple of arrays
-        Arrays that all environments share, in the order of the kernels' arguments.
-    control_period, episode_seconds : float
-        Seconds.
-    render_mode : str or None
-        As in Gymnasium.
-    view : str
-        Import name of the view that draws pictures.
-    """
+    """Checked configuration that the single environment and the batch share."""
 
     plant: Any
     signals: Signals
     action_signals: Signals
     kernels: Any
     drawn: bool
+    """Whether environments differ in their parameters; otherwise all tiles share them."""
     ring: int
+    """Length of the ring buffers of previewed references: a power of two for each channel."""
     shared: tuple[Any, ...]
+    """Arrays that all environments share, in the order of the kernels' arguments."""
     control_period: float
     episode_seconds: float
     render_mode: str | None = None
@@ -61,8 +42,7 @@ class Setup:
     @property
     def info_keys(self) -> tuple[str, ...]:
         """Keys of ``info``, in the order in which the kernels write them."""
-        keys: tuple[str, ...] = self.kernels.report.keys
-        return keys
+        return self.kernels.report.keys  # type: ignore[no-any-return]
 
     @property
     def seed_rows(self) -> tuple[int, int, int]:
@@ -259,13 +239,7 @@ def saved(parts: tuple[Any, ...]) -> dict[str, NDArray[Any]]:
 
 
 def check_state(state: Any, like: tuple[NDArray[Any], ...]) -> list[NDArray[Any]]:
-    """Return the parts of a saved state as new arrays.
-
-    Raises
-    ------
-    ValueError
-        If a part is missing, has another shape, or holds values that no state has.
-    """
+    """Return the parts of a saved state as new arrays, checked."""
     parts = []
     for name, zeros in zip(STATE_KEYS, like, strict=True):
         if name not in state:

@@ -153,7 +153,7 @@ def _corners(plant: ElbowOrthosis) -> tuple[NDArray[np.float64], NDArray[np.floa
     return plant.corners(np.linspace(*plant.hard_limits, 49))
 
 
-def _signals(plant: ElbowOrthosis, action: str) -> dict[str, list[Part]]:
+def _signals(plant: ElbowOrthosis, action: str) -> tuple[list[Part], list[Part], list[Part]]:
     """Return the signals of the observation, its references and the action."""
     pulsed, pressures = plant.valves == "on_off", ("Pa", 0.0, plant.full_pressure)
     torque, stiffness = signal_ranges(plant)
@@ -176,11 +176,8 @@ def _signals(plant: ElbowOrthosis, action: str) -> dict[str, list[Part]]:
     actions: list[Part] = [(form.format(bundle), *span) for bundle in "ab"]
     if action == "torque_stiffness":
         actions = [("torque_set_point", *torques), ("stiffness_set_point", *stiffnesses)]
-    return {
-        "observation": observation,
-        "references": [("reference", *torques), ("stiffness_reference", *stiffnesses)],
-        "action": actions,
-    }
+    references: list[Part] = [("reference", *torques), ("stiffness_reference", *stiffnesses)]
+    return observation, references, actions
 
 
 def _span(plant: ElbowOrthosis, span: Any) -> tuple[float, float]:
@@ -188,12 +185,9 @@ def _span(plant: ElbowOrthosis, span: Any) -> tuple[float, float]:
     low, high = plant.angle_range
     if span is None:
         return low + 3.0 * MARGIN, high - 3.0 * MARGIN
-    try:
-        first, last = span
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"span = {span!r} must be two angles [rad]") from error
-    lowest, highest = low + MARGIN, high - MARGIN
-    a, b = (check_number("span", angle, lowest, highest, "rad") for angle in (first, last))
+    if np.shape(span) != (2,):
+        raise ValueError(f"span = {span!r} must be two angles [rad]")
+    a, b = (check_number("span", angle, low + MARGIN, high - MARGIN, "rad") for angle in span)
     if a >= b:
         raise ValueError(f"span = {span!r} must begin below its end; swap them")
     return a, b
@@ -297,11 +291,14 @@ def make_setup(
         "samples": samples.shape[1],
     }
     spread = given.spread_of(made, RANDOMISATION)
+    observation, references, actions = _signals(made, action)
     return compose(
         made,
         kernels_for(made.hysteresis.kind, made.valves, made.needs_effects(spread)),
         given,
-        **_signals(made, action),
+        observation=observation,
+        references=references,
+        action=actions,
         config=config,
         choices=choices,
         reference=kind,

@@ -1,9 +1,7 @@
 """Kernels of ``PAM/KneeWalk-v0`` and of stairs: sensors, references, wearer, report, start.
 
-In each control period, after the plant has moved, the sensors are read, the estimate of the knee
-torque passes the low-pass filter, the load on the heel distinguishes stance from swing, and the
-references follow from these. :mod:`gait_plan <pam_envs.envs.knee.gait_plan>` computes the same in
-advance for the planned stride: the preview.
+:mod:`gait_plan <pam_envs.envs.knee.gait_plan>` computes the references in advance for the planned
+stride: the preview.
 """
 
 from __future__ import annotations
@@ -16,12 +14,17 @@ from pam_envs.envs.core.kernels import change_of, sense
 from pam_envs.envs.core.step import CHOICE, PERIOD
 from pam_envs.envs.knee import gait_layout as L
 from pam_envs.envs.knee.brace_kernels import advance_knee, report_brace
-from pam_envs.envs.knee.gait_plan import lean, planned_reference, pressure_for, prime
+from pam_envs.envs.knee.gait_plan import (
+    lean,
+    nominal_tension,
+    planned_reference,
+    pressure_for,
+    prime,
+)
 from pam_envs.hysteresis.protocol import state_rows
 from pam_envs.kernels.arithmetic import sine_and_cosine
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import uniform
-from pam_envs.mechanics.knee_lever import required_tension as tension_for
 from pam_envs.muscle.emg import activation, excitation, left_of_gap
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.step import SENSED, begin_lane, replacements
@@ -61,10 +64,8 @@ def share_of_torque(rows: Any, fixed: Any, settings: Any, choices: Any, j: int) 
 def set_references(rows: Any, fixed: Any, settings: Any, j: int) -> None:
     """Write the references of tension and angle of lane ``j``.
 
-    In stance the tension gives the desired torque at the sensed angle, and the reference of the
-    angle is the sensed angle. In swing the reference of the angle is the wearer's path, and that of
-    the tension is for no assistance, plus a mismatch. The tension is computed for the nominal
-    brace, also where the true one is drawn.
+    Stance: the tension of the nominal brace for the desired torque, and the sensed angle. Swing:
+    that for no torque, plus a mismatch, and the wearer's path.
     """
     config, torque, shift = settings[0], rows[L.DESIRED_TORQUE][j], 0.0
     angle = rows[L.READ_ANGLE][j]
@@ -72,21 +73,13 @@ def set_references(rows: Any, fixed: Any, settings: Any, j: int) -> None:
         torque, shift = 0.0, config[L.CONFIG.mismatch]
         angle = fixed[K.LEVER_MOUNT_ANGLE][j] + rows[K.KNEE][j]
     rows[L.DESIRED_ANGLE][j] = angle
-    rows[L.DESIRED_TENSION][j] = shift + tension_for(
-        rows[L.READ_ANGLE][j],
-        torque,
-        config[L.CONFIG.known_arm],
-        config[L.CONFIG.known_wire],
-        config[L.CONFIG.known_relaxed],
-    )
+    tension = nominal_tension(config, rows[L.READ_ANGLE][j], torque)
+    rows[L.DESIRED_TENSION][j] = shift + tension
 
 
 @kernel
 def work_of_wearer(rows: Any, fixed: Any, settings: Any, period: float, j: int) -> None:
-    """Move the calibrated activation of lane ``j``'s extensors: a share of the paper's estimate.
-
-    It counts from the muscle's resting level, as the calibration does.
-    """
+    """Move the calibrated activation of lane ``j``'s extensors, counted from the resting level."""
     demand = settings[0][L.CONFIG.demand_share] * rows[K.ESTIMATE][j]
     largest = fixed[K.ACTIVATION_LARGEST_TORQUE][j]
     risen = left_of_gap(period, fixed[K.ACTIVATION_RISE_TIME][j])
@@ -180,9 +173,8 @@ def begin_leg(
     for k in range(len(L.SENSORS)):
         read(rows, fixed, counts, k, 0, j)
     share_of_torque(rows, fixed, settings, choices, j)
-    rows[L.DESIRED_TORQUE][j] = torque
-    if choices[CHOICE.reference] == L.SAMPLES:
-        rows[L.DESIRED_TORQUE][j] = samples[0][0]
+    given = choices[CHOICE.reference] == L.SAMPLES
+    rows[L.DESIRED_TORQUE][j] = samples[0][0] if given else torque
     set_references(rows, fixed, settings, j)
     largest = fixed[K.ACTIVATION_LARGEST_TORQUE][j]
     demand = config[L.CONFIG.demand_share] * rows[K.ESTIMATE][j]

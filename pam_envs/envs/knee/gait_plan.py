@@ -32,6 +32,18 @@ def lean(shank: float, ankle: float, flat_foot: float) -> float:
 
 
 @kernel
+def nominal_tension(config: Any, angle: float, torque: float) -> float:
+    """Return the tension [N] of the nominal brace for a torque at an angle."""
+    return tension_for(  # type: ignore[no-any-return]
+        angle,
+        torque,
+        config[L.CONFIG.known_arm],
+        config[L.CONFIG.known_wire],
+        config[L.CONFIG.known_relaxed],
+    )
+
+
+@kernel
 def planned_sole(
     fixed: Any, gait: Any, phase: float, body_mass: float, j: int
 ) -> tuple[float, float]:
@@ -53,11 +65,7 @@ def planned_sole(
 def planned_torque(
     fixed: Any, settings: Any, choices: Any, phase: float, body_mass: float, j: int
 ) -> tuple[float, bool]:
-    """Return the planned assistance [N m] before the low-pass, and whether it is stance.
-
-    From the sensors' estimate for a wearer of ``body_mass`` [kg], since the true demand is not
-    planned.
-    """
+    """Return the planned assistance [N m] before the low-pass, and whether it is stance."""
     gait, config = settings[choices[CHOICE.at_own] :], settings[0]
     ground, cop = planned_sole(fixed, gait, phase, body_mass, j)
     inclination = lean(
@@ -67,9 +75,8 @@ def planned_torque(
     estimate = estimated_torque(ground, cop, sine, config[L.CONFIG.known_shank])
     heel = heel_load(ground, cop, fixed[K.SHOE_HEEL][j], fixed[K.SHOE_TIP][j])
     stance = heel > fixed[K.SHOE_THRESHOLD][j]
-    return desired_assistance(
-        estimate, config[L.CONFIG.ratio], config[L.CONFIG.lowest_torque]
-    ), stance
+    ratio, lowest = config[L.CONFIG.ratio], config[L.CONFIG.lowest_torque]
+    return desired_assistance(estimate, ratio, lowest), stance
 
 
 @kernel
@@ -97,13 +104,7 @@ def planned_reference(
         torque = samples[0][min(step, len(samples[0]) - 1)]
     if not stance:
         torque, shift = 0.0, config[L.CONFIG.mismatch]
-    return shift + tension_for(  # type: ignore[no-any-return]
-        angle,
-        torque,
-        config[L.CONFIG.known_arm],
-        config[L.CONFIG.known_wire],
-        config[L.CONFIG.known_relaxed],
-    )
+    return shift + nominal_tension(config, angle, torque)  # type: ignore[no-any-return]
 
 
 @routine

@@ -175,10 +175,8 @@ def make_setup(
     payloads = _payloads(made, payload, change, paths, action == "pressures")
     if not weighted:
         paths = paths_for(made, given.reference, weighted)
-    references = _pose(made, "reference_")
-    if plan:
-        names = joint_names("joint_reference", made.stages)
-        references += [(name, "rad", *ANGLES) for name in names]
+    names = joint_names("joint_reference", made.stages) if plan else []
+    references = [*_pose(made, "reference_"), *((name, "rad", *ANGLES) for name in names)]
     config = {
         **vars(task),
         "soft_angle": task.soft_share * made.angle_range[1],
@@ -198,11 +196,7 @@ def make_setup(
         references=references,
         action=_actions(made, action),
         config=config,
-        choices={
-            "mode": MODES.index(action),
-            "payloads": payloads.size,
-            "paths": len(paths),
-        },
+        choices={"mode": MODES.index(action), "payloads": payloads.size, "paths": len(paths)},
         own=payloads,
         samples=np.concatenate(list(paths.values())),
         tables=made.hysteresis_tables(),

@@ -38,7 +38,7 @@ class Camera:
         return [(float(x), float(y)) for x, y in self.flat(points)]
 
     def fitted(self, points: ArrayLike, box: tuple[float, float, float, float]) -> Camera:
-        """Return the camera with the largest scale at which points (n, 3) [m] fit a box [pixels]."""
+        """Return the camera with the largest scale at which points (n, 3) [m] fit a box."""
         plain = Camera(self.azimuth, self.elevation).flat(points)
         low, high = plain.min(axis=0), plain.max(axis=0)
         scale = float(min(np.array(box[2:]) / np.maximum(high - low, 1e-9)))
