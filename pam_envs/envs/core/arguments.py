@@ -8,7 +8,7 @@ import functools
 import inspect
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -37,8 +37,9 @@ class Randomisation:
     """Those that cannot be drawn: they scale the action or enter derived numbers."""
     example: str
     """A valid mapping, for the error message."""
-    corner: Mapping[str, Callable[..., float]] = field(default_factory=dict)
-    """``min`` or ``max``: the end of a range at which the motion is fastest or a limit nearest."""
+    lowest: Sequence[str] = ()
+    highest: Sequence[str] = ()
+    """Those at the lower and the upper end of whose range the sub-steps or a limit are nearest."""
 
 
 @dataclass(frozen=True)
@@ -194,7 +195,8 @@ class Common:
             for end in (low, high):
                 plant.replace({name: end})  # refuses values out of bounds and unstable plants
             table.append((names.index(name), low, high))
-        worst = {n: pick(ranges[n]) for n, pick in which.corner.items() if n in ranges}
+        worst = {name: min(ranges[name]) for name in which.lowest if name in ranges}
+        worst |= {name: max(ranges[name]) for name in which.highest if name in ranges}
         for member in plant.members() if ranges else ():
             member.replace(worst)  # refuses a corner that the sub-steps cannot follow
         return np.array(table, float).reshape(-1, 3)

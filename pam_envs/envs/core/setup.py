@@ -78,34 +78,15 @@ def compose(
     tables: NDArray[np.float64] | None = None,
     view: str = "",
 ) -> Setup:
-    """Return the setup of an environment.
+    """Return the setup of an environment, from its plant, kernels and common arguments ``given``.
 
-    Parameters
-    ----------
-    plant : plant
-        With ``control_period``, ``substeps``, ``members``, ``parameter_rows`` and, where it has
-        hysteresis, ``elements``.
-    kernels : Kernels
-        Of :mod:`pam_envs.envs.core.families`.
-    given : Common
-        Of :mod:`pam_envs.envs.core.arguments`.
-    observation, references, action : sequence of (name, unit, low, high)
-        Signals of the observation without references; references, each of which its preview
-        follows; signals of the action.
-    config, choices : mapping of numbers
-        The family's own, by the names that ``kernels`` declares.
-    spread : ndarray, shape (n, 3)
-        Row, low and high of each parameter that every episode draws.
-    reference, sines : int
-        Number of the reference's family, and how many sines its evaluation sums.
-    own : ndarray, shape (n, m), optional
-        The family's own rows of the settings.
-    samples : ndarray, shape (channels, n), optional
-        References that are given as samples.
-    tables : ndarray, shape (members, n, m), optional
-        Tables of the hysteresis models of the plant and its members.
-    view : str
-        Import name of the :class:`~pam_envs.envs.rendering.scene.View`: ``my_family.view:VIEW``.
+    ``observation`` holds the signals without references; the preview of each reference follows it.
+    ``config`` and ``choices`` are the family's own numbers, by the names that ``kernels`` declares,
+    ``own`` its own rows of the settings. ``spread`` holds row, low and high of each parameter that
+    every episode draws, ``samples`` references that are given, shape (channels, n). ``reference``
+    is the number of the reference's family, ``sines`` how many sines its evaluation sums.
+    ``tables`` are those of the hysteresis of the plant and its members, shape (members, n, m), and
+    ``view`` is the import name of a :class:`~pam_envs.envs.rendering.scene.View`.
     """
     parts = [(part, 0.0) for part in observation]
     for name, *span in references:

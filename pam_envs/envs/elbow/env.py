@@ -74,16 +74,11 @@ RANDOMISATION = Randomisation(
         *("pulley.highest", "bundle_a.muscles", "bundle_b.muscles", "wearer.handle"),
     ),
     "{'wearer.stiffness': (15, 30)}",
-    {
-        "link.inertia": min,
-        "link.damping": max,
-        "wearer.inertia": min,
-        "wearer.damping": max,
-        "wearer.stiffness": max,
-        "pulley.stop_stiffness": max,
-        "bundle_a.gain": max,
-        "bundle_b.gain": max,
-    },
+    lowest=("link.inertia", "wearer.inertia"),
+    highest=(
+        *("link.damping", "wearer.damping", "wearer.stiffness", "pulley.stop_stiffness"),
+        *("bundle_a.gain", "bundle_b.gain"),
+    ),
 )
 
 
@@ -106,23 +101,13 @@ def _plant(given: Common, valves: Any) -> ElbowOrthosis:
 def model_row(plant: ElbowOrthosis) -> NDArray[np.float64]:
     """Return the nominal model of the bundles, in the order of ``MODEL``."""
     full, pulley = plant.full_pressure, plant.pulley
-    low_a, low_b = (float(x) for x in plant.coefficients(0.0, 0.0))
-    high_a, high_b = (float(x) for x in plant.coefficients(full, full))
-    model = {
-        "radius": pulley.radius,
-        "lowest": pulley.lowest,
-        "highest": pulley.highest,
-        "length_a": plant.bundle_a.nominal_length,
-        "reach_a": plant.bundle_a.reach,
-        "length_b": plant.bundle_b.nominal_length,
-        "reach_b": plant.bundle_b.reach,
-        "low_a": low_a,
-        "high_a": high_a,
-        "low_b": low_b,
-        "high_b": high_b,
-        "full_pressure": full,
-        "weight": float(plant.weight_torque(0.5 * math.pi)),
-    }
+    model = {name: getattr(pulley, name) for name in ("radius", "lowest", "highest")}
+    lows, highs = plant.coefficients(0.0, 0.0), plant.coefficients(full, full)
+    bundles = (plant.bundle_a, plant.bundle_b)
+    for side, bundle, low, high in zip("ab", bundles, lows, highs, strict=True):
+        model |= {f"length_{side}": bundle.nominal_length, f"reach_{side}": bundle.reach}
+        model |= {f"low_{side}": float(low), f"high_{side}": float(high)}
+    model |= {"full_pressure": full, "weight": float(plant.weight_torque(0.5 * math.pi))}
     return np.array([model[name] for name in L.MODEL._fields])
 
 

@@ -142,10 +142,9 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
         work[L.INFO.reward_torque][j] = error_reward(
             torque - reference, config[L.CONFIG.torque_scale], config[L.CONFIG.torque_weight]
         )
+        error, scale = rows[K.STIFFNESS][j] - stiffness, config[L.CONFIG.stiffness_scale]
         work[L.INFO.reward_stiffness][j] = error_reward(
-            rows[K.STIFFNESS][j] - stiffness,
-            config[L.CONFIG.stiffness_scale],
-            config[L.CONFIG.stiffness_weight],
+            error, scale, config[L.CONFIG.stiffness_weight]
         )
         a, b = rows[K.PRESSURE_A][j], rows[K.PRESSURE_B][j]
         moved, full = effort_of(rows, choices, j), config[L.CONFIG.command_range]

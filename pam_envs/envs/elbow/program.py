@@ -18,10 +18,8 @@ from pam_envs.tasks.torque_stiffness import object_stiffness, object_torque
 @kernel
 def shapes_at(model: Any, angle: float) -> tuple[float, float, float, float]:
     """Return phi_a, phi_b [m^2], psi_a, psi_b [m] of the nominal bundles at an angle [rad]."""
-    a, b = (
-        model[L.MODEL.radius] * (model[L.MODEL.highest] - angle),
-        model[L.MODEL.radius] * (angle - model[L.MODEL.lowest]),
-    )
+    a = model[L.MODEL.radius] * (model[L.MODEL.highest] - angle)
+    b = model[L.MODEL.radius] * (angle - model[L.MODEL.lowest])
     phi_a = (model[L.MODEL.length_a] - a) * (model[L.MODEL.reach_a] - a)
     phi_b = (model[L.MODEL.length_b] - b) * (model[L.MODEL.reach_b] - b)
     psi_a = 2.0 * a - model[L.MODEL.length_a] - model[L.MODEL.reach_a]

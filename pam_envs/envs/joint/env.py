@@ -61,37 +61,18 @@ RANDOMISATION = Randomisation(
     R.NAMES,
     ("regulator.max_pressure", "link.limit", "link.stop", "nominal.prestress"),
     "{'regulator.time_constant': (0.03, 0.06)}",
-    {
-        "link.mass": min,
-        "link.gyration": min,
-        "link.damping": max,
-        "link.stop_stiffness": max,
-        "muscle.gain": max,
-        "lever.r_u": min,
-        "lever.r_o": min,
-        "lever.l_u": max,
-        "lever.l_o": max,
-    },
+    lowest=("link.mass", "link.gyration", "lever.r_u", "lever.r_o"),
+    highest=("link.damping", "link.stop_stiffness", "muscle.gain", "lever.l_u", "lever.l_o"),
 )
 
 
 default_plant = lru_cache(maxsize=8)(AntagonisticJoint.paper)
 
 
-def _actions(plant: AntagonisticJoint, action: str) -> list[Part]:
-    full = plant.regulator.max_pressure
-    angle = ("angle_set_point", "rad", *plant.angle_range)
-    return {
-        "angle": [angle],
-        "angle_stiffness": [angle, ("prestress", "N", *plant.prestress_range)],
-        "pressures": [(f"pressure_{muscle}_set_point", "Pa", 0.0, full) for muscle in "ab"],
-    }[action]
-
-
-def _signals(plant: AntagonisticJoint, action: str) -> list[Part]:
-    """Return the present signals of the observation."""
+def _signals(plant: AntagonisticJoint, action: str) -> tuple[list[Part], list[Part]]:
+    """Return the present signals of the observation, and those of the action."""
     pressures = ("Pa", 0.0, plant.regulator.max_pressure)
-    parts: list[Part] = [
+    observation: list[Part] = [
         ("angle", "rad", *ANGLES),
         ("pressure_a", *pressures),
         ("pressure_b", *pressures),
@@ -99,11 +80,12 @@ def _signals(plant: AntagonisticJoint, action: str) -> list[Part]:
         ("set_point_b", *pressures),
         ("payload", "kg", 0.0, MOST_PAYLOAD),
     ]
-    if action != "pressures":
-        parts.append(("set_point", "rad", *plant.angle_range))
-    if action == "angle_stiffness":
-        parts.append(("prestress", "N", *plant.prestress_range))
-    return parts
+    if action == "pressures":
+        return observation, [(f"pressure_{muscle}_set_point", *pressures) for muscle in "ab"]
+    angles = ("rad", *plant.angle_range)
+    prestress: list[Part] = [("prestress", "N", *plant.prestress_range)]
+    stiff = prestress if action == "angle_stiffness" else []
+    return [*observation, ("set_point", *angles), *stiff], [("angle_set_point", *angles), *stiff]
 
 
 @environment_arguments(reference="steps", preview=5, preview_stride=4, episode_seconds=20.0)
@@ -177,14 +159,15 @@ def make_setup(
         "disturbance": check_number("disturbance", disturbance, 0.0, 100.0, "N m"),
         "worst_period": task.worst(made.largest_angle + most),
     }
+    observation, actions = _signals(made, action)
     spread = given.spread_of(made, RANDOMISATION)
     return compose(
         made,
         L.kernels_for(made.hysteresis.kind, made.dynamics, made.needs_effects(spread)),
         given,
-        observation=_signals(made, action),
+        observation=observation,
         references=[("reference", "rad", *ANGLES)],
-        action=_actions(made, action),
+        action=actions,
         config=config,
         choices={"mode": L.MODES.index(action), "payloads": payloads.size},
         reference=family,

@@ -110,8 +110,7 @@ def apply_joint(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any,
     step, config, mode = counts[K.STEP], settings[0], choices[OWN.mode]
     change_payload(rows, step, config[PERIOD], DECLARED_PAYLOAD, K.PAYLOAD)
     for j in range(LANES):
-        rows[OLD_SET_A][j] = rows[K.SET_POINT_A][j]
-        rows[OLD_SET_B][j] = rows[K.SET_POINT_B][j]
+        rows[OLD_SET_A][j], rows[OLD_SET_B][j] = rows[K.SET_POINT_A][j], rows[K.SET_POINT_B][j]
     if config[CONFIG.disturbance] > 0.0:
         for j in range(LANES):
             rows[K.DISTURBANCE][j] = pulse(
@@ -119,8 +118,7 @@ def apply_joint(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any,
             )
     for j in range(LANES):
         if mode == BY_PRESSURE:
-            rows[K.SET_POINT_A][j] = rows[ACTION][j]
-            rows[K.SET_POINT_B][j] = rows[ACTION + 1][j]
+            rows[K.SET_POINT_A][j], rows[K.SET_POINT_B][j] = rows[ACTION][j], rows[ACTION + 1][j]
         else:
             prestress = rows[ACTION + 1][j] if mode == BY_BOTH else config[CONFIG.prestress]
             short = command(
@@ -202,8 +200,7 @@ def begin_joint(
     by_pressure = choices[OWN.mode] == BY_PRESSURE
     rows[ACTION][j] = rows[K.SET_POINT_A][j] if by_pressure else angle
     rows[ACTION + 1][j] = rows[K.SET_POINT_B][j] if by_pressure else prestress
-    rows[OLD_SET_A][j] = rows[K.SET_POINT_A][j]
-    rows[OLD_SET_B][j] = rows[K.SET_POINT_B][j]
+    rows[OLD_SET_A][j], rows[OLD_SET_B][j] = rows[K.SET_POINT_A][j], rows[K.SET_POINT_B][j]
     rows[OLD_A][j], rows[OLD_B][j] = rows[K.PRESSURE_A][j], rows[K.PRESSURE_B][j]
     rows[OLD_AIR][j] = rows[K.AIR][j]
     if choices[CHOICE.reference] < T.SAMPLES:

@@ -67,7 +67,8 @@ RANDOMISATION = Randomisation(
     R.NAMES,
     ("regulator.max_pressure", "link.limit", "link.stop", "nominal.prestress"),
     "{'regulator.time_constant': (0.03, 0.06)}",
-    {"lever.r_u": min, "lever.r_o": min, "lever.l_u": max, "lever.l_o": max},
+    lowest=("lever.r_u", "lever.r_o"),
+    highest=("lever.l_u", "lever.l_o"),
 )
 
 

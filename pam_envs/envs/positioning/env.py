@@ -48,15 +48,8 @@ RANDOMISATION = Randomisation(
     R.NAMES,
     ("mass.load", "regulator.max_pressure", "muscle.diameter", "muscle.braid_angle"),
     "{'mass.damping': (100, 500)}",
-    {
-        "mass.moving_mass": min,
-        "mass.damping": max,
-        "muscle.stiffness": max,
-        "muscle.hardening": max,
-        "muscle.braid_force": max,
-        "muscle.braid_strain": min,
-        "muscle.rest_length": min,
-    },
+    lowest=("mass.moving_mass", "muscle.braid_strain", "muscle.rest_length"),
+    highest=("mass.damping", "muscle.stiffness", "muscle.hardening", "muscle.braid_force"),
 )
 
 
