@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,32 +62,33 @@ class Setup:
 
 def compose(
     plant: Any,
-    kernels: Any,
+    kernels_for: Callable[[bool], Any],
     given: Any,
+    drawn: Any,
     *,
     observation: Sequence[Part],
     references: Iterable[Part],
     action: Iterable[Part],
     config: Mapping[str, float],
-    spread: NDArray[np.float64],
     choices: Mapping[str, int] | None = None,
     reference: int = 0,
     sines: int = 0,
     own: NDArray[np.float64] | None = None,
     samples: NDArray[np.float64] | None = None,
-    tables: NDArray[np.float64] | None = None,
     view: str = "",
 ) -> Setup:
-    """Return the setup of an environment, from its plant, kernels and common arguments ``given``.
+    """Return the setup of an environment with the common arguments ``given``.
 
-    ``observation`` holds the signals without references; the preview of each reference follows it.
-    ``config`` and ``choices`` are the family's own numbers, by the names that ``kernels`` declares,
-    ``own`` its own rows of the settings. ``spread`` holds row, low and high of each parameter that
-    every episode draws, ``samples`` references that are given, shape (channels, n). ``reference``
-    is the number of the reference's family, ``sines`` how many sines its evaluation sums.
-    ``tables`` are those of the hysteresis of the plant and its members, shape (members, n, m), and
-    ``view`` is the import name of a :class:`~pam_envs.envs.rendering.scene.View`.
+    ``kernels_for`` returns the kernels without or with effects, ``drawn`` declares what
+    ``randomize`` may draw. ``observation`` holds the signals without references; the preview of
+    each reference follows it. ``config`` and ``choices`` are the family's own numbers, by the names
+    that the kernels declare, ``own`` its own rows of the settings. ``samples`` are references that
+    are given, shape (channels, n), ``reference`` is the number of the reference's family, ``sines``
+    how many sines its evaluation sums, and ``view`` the import name of a
+    :class:`~pam_envs.envs.rendering.scene.View`.
     """
+    spread = given.spread_of(plant, drawn)
+    kernels = kernels_for(plant.needs_effects(spread))
     parts = [(part, 0.0) for part in observation]
     for name, *span in references:
         parts.append(((name, *span), 0.0))  # type: ignore[arg-type]
@@ -96,8 +97,8 @@ def compose(
             parts.append(((f"{name}_{i}", *span), ahead))  # type: ignore[arg-type]
     signals = Signals(Signal(*p, i, given.normalize, ahead) for i, (p, ahead) in enumerate(parts))
     actions = Signals(Signal(*part, i, given.normalize) for i, part in enumerate(action))
-    drawn = given.randomize is not False
-    members = plant.members() if drawn else (plant,)
+    varied = given.randomize is not False
+    members = plant.members() if varied else (plant,)
     own_numbers = [config[name] for name in kernels.config._fields]
     blocks = [
         np.array([(plant.control_period, given.episode_seconds, *own_numbers)], np.float64),
@@ -133,10 +134,10 @@ def compose(
         signals=signals,
         action_signals=actions,
         kernels=kernels,
-        drawn=drawn,
+        drawn=varied,
         ring=kernels.channels * ring,
         shared=(
-            np.zeros((len(members), 1, 1)) if tables is None else tables[: len(members)],
+            plant.hysteresis_tables()[: len(members)],
             np.zeros((kernels.channels, 1)) if samples is None else samples,
             settings,
             np.array(numbers, np.int64),

@@ -9,7 +9,7 @@ Arguments of the kernels, of every family:
 * ``rows``, shape (n, lanes): the state. The set-points are one block of rows, those of the previous
   period another.
 * ``fixed``, shape (n, lanes): the parameters.
-* ``counts``, shape (n, lanes): integers. KEY_A, KEY_B, EPISODE, STEP, the family's own, and last
+* ``counts``, shape (n, lanes): integers. KEY_A, ... MEMBER, the family's own, and last
   the two words of the seed.
 * ``ahead``, shape (n, lanes): ring buffer of references up to the preview horizon.
 * ``tables``: hysteresis models of the members; ``samples``, shape (channels, n): references given
@@ -31,7 +31,7 @@ from pam_envs.envs.core.layout import indices
 from pam_envs.kernels.build import LANES, array_at, kernel, prange, routine, scratch, tile_view
 from pam_envs.kernels.random import episode_key, uniform
 
-KEY_A, KEY_B, EPISODE, STEP = range(4)
+KEY_A, KEY_B, EPISODE, STEP, MEMBER = range(5)
 """Integer rows that come first in every family."""
 N_SEED = 2
 """Integer rows that come last in every family: the key words of the seed."""
@@ -139,8 +139,8 @@ def reset_lane(
     seed = N_COUNTS - N_SEED
     key_a = episode_key(counts[seed][j], counts[EPISODE][j])
     key_b = episode_key(counts[seed + 1][j], counts[EPISODE][j])
-    counts[KEY_A][j], counts[KEY_B][j], counts[STEP][j] = key_a, key_b, 0
     member = int(uniform(key_a, key_b, RANDOM, 0) * choices[CHOICE.members])
+    counts[KEY_A][j], counts[KEY_B][j], counts[STEP][j], counts[MEMBER][j] = key_a, key_b, 0, member
     for k in range(N_PARAMETERS):
         fixed[k][j] = settings[choices[CHOICE.at_members] + member][k]
     for k in range(choices[CHOICE.spread]):
@@ -148,7 +148,7 @@ def reset_lane(
         u = uniform(key_a, key_b, RANDOM, 1 + k)
         fixed[int(drawn[0])][j] = drawn[1] + (drawn[2] - drawn[1]) * u
     work[FIRST_INFO + N_INFO - 1][j] = 0.0
-    env_begin(rows, fixed, counts, tables, samples, settings, choices, work, member, j)
+    env_begin(rows, fixed, counts, tables, samples, settings, choices, work, j)
     ring = len(ahead) // CHANNELS
     for channel in range(CHANNELS):
         for k in range(choices[CHOICE.preview] * choices[CHOICE.stride] + 1):

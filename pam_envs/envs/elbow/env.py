@@ -275,12 +275,12 @@ def make_setup(
         "pulsed": int(pulsed),
         "samples": samples.shape[1],
     }
-    spread = given.spread_of(made, RANDOMISATION)
     observation, references, actions = _signals(made, action)
     return compose(
         made,
-        kernels_for(made.hysteresis.kind, made.valves, made.needs_effects(spread)),
+        partial(kernels_for, made.hysteresis.kind, made.valves),
         given,
+        RANDOMISATION,
         observation=observation,
         references=references,
         action=actions,
@@ -289,8 +289,6 @@ def make_setup(
         reference=kind,
         own=own,
         samples=samples,
-        tables=made.hysteresis_tables(),
-        spread=spread,
         view="pam_envs.envs.elbow.view:VIEW",
     )
 

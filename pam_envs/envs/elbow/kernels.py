@@ -200,12 +200,11 @@ def draw_object(rows: Any, counts: Any, settings: Any, choices: Any, j: int) -> 
 @routine
 def begin_elbow(
     rows: Any, fixed: Any, counts: Any, tables: Any, samples: Any, settings: Any, choices: Any,
-    work: Any, member: int, j: int,
+    work: Any, j: int,
 ) -> None:  # fmt: skip
     """Bring lane ``j`` to rest where the wearer holds it, and draw motion and object."""
     key_a, key_b, config = counts[K.KEY_A][j], counts[K.KEY_B][j], settings[0]
     model = settings[choices[CHOICE.at_own]]
-    counts[K.MEMBER][j] = member
     low, high, window = (
         config[L.CONFIG.motion_low],
         config[L.CONFIG.motion_high],

@@ -37,7 +37,7 @@ Arguments: :func:`make_setup`, and those of every environment
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -160,11 +160,11 @@ def make_setup(
         "worst_period": task.worst(made.largest_angle + most),
     }
     observation, actions = _signals(made, action)
-    spread = given.spread_of(made, RANDOMISATION)
     return compose(
         made,
-        L.kernels_for(made.hysteresis.kind, made.dynamics, made.needs_effects(spread)),
+        partial(L.kernels_for, made.hysteresis.kind, made.dynamics),
         given,
+        RANDOMISATION,
         observation=observation,
         references=[("reference", "rad", *ANGLES)],
         action=actions,
@@ -174,8 +174,6 @@ def make_setup(
         sines=sines_needed(family),
         own=payloads,
         samples=samples,
-        tables=made.hysteresis_tables(),
-        spread=spread,
         view="pam_envs.envs.joint.view:VIEW",
     )
 

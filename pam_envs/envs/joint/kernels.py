@@ -183,11 +183,10 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
 @routine
 def begin_joint(
     rows: Any, fixed: Any, counts: Any, tables: Any, samples: Any, settings: Any, choices: Any,
-    work: Any, member: int, j: int,
+    work: Any, j: int,
 ) -> None:  # fmt: skip
     """Bring lane ``j`` to rest at a drawn angle under a drawn payload, and draw its reference."""
     key_a, key_b, config = counts[K.KEY_A][j], counts[K.KEY_B][j], settings[0]
-    counts[K.MEMBER][j] = member
     draw_payload(
         rows, counts, settings, choices, START, choices[OWN.payloads],
         config[CONFIG.payload_change], DECLARED_PAYLOAD, K.PAYLOAD, j,

@@ -31,7 +31,7 @@ Arguments: :func:`make_setup`, and those of every environment
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 
 from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
 from pam_envs.envs.core.setup import Setup, check_choice, check_number, compose
@@ -104,12 +104,11 @@ def make_setup(
         "start_low": PAPER_PRESSURE if start == "paper" else 0.0,
         "start_high": PAPER_PRESSURE if start == "paper" else 0.9 * full,
     }
-    spread = given.spread_of(made, RANDOMISATION)
-    effects = made.needs_effects(spread)
     return compose(
         made,
-        L.kernels_for(made.hysteresis.kind, made.mounting, made.dynamics, effects),
+        partial(L.kernels_for, made.hysteresis.kind, made.mounting, made.dynamics),
         given,
+        RANDOMISATION,
         observation=[
             ("tension", "N", *RANGES[L.TENSION]),
             ("stiffness", "N/m", *RANGES[L.STIFFNESS]),
@@ -125,8 +124,6 @@ def make_setup(
         sines=1 if family == L.PAPER else sines_needed(family),
         own=made.gait_table(),
         samples=samples,
-        tables=made.hysteresis_tables(),
-        spread=spread,
         view=f"pam_envs.envs.knee.view:{L.QUANTITIES[quantity].upper()}_VIEW",
     )
 

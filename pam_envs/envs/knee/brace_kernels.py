@@ -118,11 +118,10 @@ def report_brace(rows: Any, fixed: Any, config: Any, work: Any, info: Any, at: A
 @routine
 def begin_brace(
     rows: Any, fixed: Any, counts: Any, tables: Any, samples: Any, settings: Any, choices: Any,
-    work: Any, member: int, j: int,
+    work: Any, j: int,
 ) -> None:  # fmt: skip
     """Bring lane ``j`` to rest under a drawn pressure, and draw its reference."""
     key_a, key_b, config = counts[K.KEY_A][j], counts[K.KEY_B][j], settings[0]
-    counts[K.MEMBER][j] = member
     span = config[CONFIG.start_high] - config[CONFIG.start_low]
     pressure = config[CONFIG.start_low] + span * uniform(key_a, key_b, START, 0)
     gait, elements = settings[choices[CHOICE.at_own] :], choices[CHOICE.elements]

@@ -42,7 +42,7 @@ Arguments: :func:`make_setup`, and those of every environment
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
@@ -146,11 +146,11 @@ def make_setup(
         "known_shank": made.leg.shank,
         "known_mass": made.leg.body_mass,
     }
-    spread = given.spread_of(made, RANDOMISATION)
     return compose(
         made,
-        kernels_for(made.hysteresis.kind, made.dynamics, made.needs_effects(spread)),
+        partial(kernels_for, made.hysteresis.kind, made.dynamics),
         given,
+        RANDOMISATION,
         observation=[
             ("tension", "N", *TENSIONS),
             ("angle", "rad", *ANGLES),
@@ -166,8 +166,6 @@ def make_setup(
         reference=source,
         own=made.gait_table(),
         samples=samples,
-        tables=made.hysteresis_tables(),
-        spread=spread,
         view="pam_envs.envs.knee.view:GAIT_VIEW",
     )
 

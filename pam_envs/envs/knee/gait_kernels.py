@@ -157,11 +157,10 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
 @routine
 def begin_leg(
     rows: Any, fixed: Any, counts: Any, tables: Any, samples: Any, settings: Any, choices: Any,
-    work: Any, member: int, j: int,
+    work: Any, j: int,
 ) -> None:  # fmt: skip
     """Start lane ``j`` at a phase of the stride, near the pressure that the reference needs."""
     key_a, key_b, config = counts[K.KEY_A][j], counts[K.KEY_B][j], settings[0]
-    counts[K.MEMBER][j] = member
     gait = settings[choices[CHOICE.at_own] :]
     start = config[L.CONFIG.start_phase]
     phase = uniform(key_a, key_b, L.START, 0) if start < 0.0 else start

@@ -41,7 +41,7 @@ Arguments: :func:`make_setup`, and those of every environment
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -188,11 +188,11 @@ def make_setup(
         "rest_seconds": check_number("rest_seconds", rest_seconds, 0.0, 600.0, "s"),
         "worst_period": task.worst(float(made.chain.reach)),
     }
-    spread = given.spread_of(made, RANDOMISATION)
     return compose(
         made,
-        kernels_for(made.hysteresis.kind, made.stages, made.needs_effects(spread)),
+        partial(kernels_for, made.hysteresis.kind, made.stages),
         given,
+        RANDOMISATION,
         observation=_observation(made, action),
         references=references,
         action=_actions(made, action),
@@ -200,8 +200,6 @@ def make_setup(
         choices={"mode": MODES.index(action), "payloads": payloads.size, "paths": len(paths)},
         own=payloads,
         samples=np.concatenate(list(paths.values())),
-        tables=made.hysteresis_tables(),
-        spread=spread,
         view="pam_envs.envs.manipulator.view:view",
     )
 

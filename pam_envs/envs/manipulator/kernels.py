@@ -101,11 +101,10 @@ def path_at(
 @routine
 def begin_chain(
     rows: Any, fixed: Any, counts: Any, tables: Any, samples: Any, settings: Any, choices: Any,
-    work: Any, member: int, j: int,
+    work: Any, j: int,
 ) -> None:  # fmt: skip
     """Bring lane ``j`` to rest at the beginning of a drawn path, under a drawn payload."""
     key_a, key_b, config = counts[M.KEY_A][j], counts[M.KEY_B][j], settings[0]
-    counts[M.MEMBER][j] = member
     draw_payload(
         rows, counts, settings, choices, L.START, choices[L.CHOICE.payloads],
         config[L.CONFIG.payload_change], L.DECLARED_PAYLOAD, M.PAYLOAD, j,

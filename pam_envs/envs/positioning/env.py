@@ -29,7 +29,7 @@ Arguments: :func:`make_setup`, and those of every environment
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 from pam_envs.envs.core.arguments import Common, Randomisation, environment_arguments, environments
@@ -88,13 +88,13 @@ def make_setup(
         "start_share": 0.9 if start == "random" else 0.0,
         "load_change": check_number("load_disturbance", load_disturbance, 0.0, HIGHEST_LOAD, "kg"),
     }
-    spread = given.spread_of(made, RANDOMISATION)
     position = ("m", task.lowest_contraction, task.highest_contraction)
     pressure = ("Pa", 0.0, full)
     return compose(
         made,
-        kernels_for(made.hysteresis.kind, made.needs_effects(spread)),
+        partial(kernels_for, made.hysteresis.kind),
         given,
+        RANDOMISATION,
         observation=[
             ("contraction", *position),
             ("pressure", *pressure),
@@ -109,8 +109,6 @@ def make_setup(
         sines=sines_needed(family),
         own=loads,
         samples=samples,
-        tables=made.hysteresis_tables(),
-        spread=spread,
         view="pam_envs.envs.positioning.view:VIEW",
     )
 

@@ -117,11 +117,10 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
 @routine
 def begin_muscle(
     rows: Any, fixed: Any, counts: Any, tables: Any, samples: Any, settings: Any, choices: Any,
-    work: Any, member: int, j: int,
+    work: Any, j: int,
 ) -> None:  # fmt: skip
     """Bring lane ``j`` to rest under a drawn load and pressure history, and draw its reference."""
     key_a, key_b, config = counts[R.KEY_A][j], counts[R.KEY_B][j], settings[0]
-    counts[R.MEMBER][j] = member
     drawn = int(uniform(key_a, key_b, START, 0) * choices[OWN.loads])
     load, change = settings[choices[CHOICE.at_own]][drawn], config[CONFIG.load_change]
     rows[R.DECLARED_LOAD][j] = rows[R.LOAD][j] = load

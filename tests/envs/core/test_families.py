@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import copy
 import hashlib
-import pickle
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,13 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pam_envs.envs.core.arguments import Common
+from pam_envs.envs.core.arguments import Common, Randomisation
 from pam_envs.envs.core.families import Kernels
 from pam_envs.envs.core.layout import Report, computed
 from pam_envs.envs.core.plant_env import PlantEnv
 from pam_envs.envs.core.setup import Setup, compose
 from pam_envs.envs.core.step import PERIOD
-from pam_envs.envs.core.vector_env import PlantVectorEnv
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.kernels.random import normal, uniform
 
@@ -74,7 +71,7 @@ def judge(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, work:
 @routine
 def begin(
     rows: Any, fixed: Any, counts: Any, tables: Any, samples: Any, settings: Any, choices: Any,
-    work: Any, member: int, j: int,
+    work: Any, j: int,
 ) -> None:  # fmt: skip
     for k in range(len(rows)):
         rows[k][j] = 0.0
@@ -92,7 +89,7 @@ def carts() -> Kernels:
         begin,
         rows=3 * CARTS + 1,
         parameters=1,
-        counts=4,
+        counts=5,
         set_points=PUSH,
         old_set_points=OLD_PUSH,
         channels=2,
@@ -108,21 +105,31 @@ class Plant(SimpleNamespace):
     def members(self) -> tuple[Any, ...]:
         return (self,)
 
+    def replace(self, changes: dict[str, float]) -> Any:
+        return self
+
+    def needs_effects(self, spread: Any) -> bool:
+        return False
+
+    def hysteresis_tables(self) -> np.ndarray:
+        return np.zeros((1, 1, 1))
+
     def parameter_rows(self) -> np.ndarray:
         return np.array([self.mass])
 
 
 def setup(normalize: bool = True, seconds: float = 0.4) -> Setup:
-    given = Common(None, 4, 3, seconds, normalize=normalize, randomize=True)
+    drawn = {"cart.mass": (1.0, 3.0)}
+    given = Common(None, 4, 3, seconds, normalize=normalize, randomize=drawn)
     return compose(
         Plant(mass=2.0),
-        carts(),
+        lambda effects: carts(),
         given,
+        Randomisation(("cart.mass",), (), ""),
         observation=[(f"place_{k}", "m", -5.0, 5.0) for k in range(CARTS)],
         references=[(name, "m", -5.0, 5.0) for name in ("first", "second")],
         action=[(f"push_{k}", "N", -10.0, 10.0 * (k + 1)) for k in range(CARTS)],
         config={},
-        spread=np.array([[MASS, 1.0, 3.0]]),
     )
 
 
@@ -173,29 +180,6 @@ def test_wrong_number_of_actions_lists_their_names() -> None:
         env.step(np.array([0.0, np.nan, 0.0]))
 
 
-def test_rows_of_a_batch_are_single_environments_through_ends_and_restarts() -> None:
-    number = 40
-    batch = PlantVectorEnv(number, setup=setup())
-    singles = {i: PlantEnv(setup()) for i in (0, 31, 32, 39)}
-    observations, _ = batch.reset(seed=5)
-    for i, env in singles.items():
-        assert np.array_equal(env.reset(seed=5 + i)[0], observations[i])
-    random, ends = np.random.default_rng(0), 0
-    for _ in range(120):
-        actions = random.uniform(-1.0, 1.0, (number, CARTS)).astype(np.float32)
-        observations, rewards, terminated, truncated, infos = batch.step(actions)
-        for i, env in singles.items():
-            observation, reward, ended, cut, info = env.step(actions[i])
-            assert (reward, ended, cut) == (rewards[i], terminated[i], truncated[i])
-            if ended or cut:
-                ends += 1
-                assert np.array_equal(observation, infos["final_obs"][i])
-                observation, info = env.reset()
-            assert np.array_equal(observation, observations[i])
-            assert {k: infos[k][i] for k in info} == info
-    assert ends >= 3 * len(singles)
-
-
 def test_limit_ends_the_episode() -> None:
     env = PlantEnv(setup(seconds=60.0))
     env.reset(seed=0)
@@ -207,14 +191,3 @@ def test_limit_ends_the_episode() -> None:
         steps += 1
     assert info["output"] > FARTHEST
     assert steps < 200
-
-
-def test_copies_continue_with_equal_bits() -> None:
-    env = PlantEnv(setup())
-    env.reset(seed=4)
-    for _ in range(60):
-        env.step(np.full(CARTS, 0.2, np.float32))
-    others = [copy.deepcopy(env), pickle.loads(pickle.dumps(env))]
-    action = np.array([0.3, -0.4, 0.5], np.float32)
-    wanted = env.step(action)[0]
-    assert all(np.array_equal(other.step(action)[0], wanted) for other in others)

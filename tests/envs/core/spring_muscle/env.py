@@ -72,6 +72,14 @@ class Muscle:
         """Component of the parameters' names."""
         return self
 
+    def needs_effects(self, spread: Any) -> bool:
+        """Return whether the extended step is needed: there is none."""
+        return False
+
+    def hysteresis_tables(self) -> NDArray[np.float64]:
+        """Return the tables of hysteresis: there is none."""
+        return np.zeros((1, 1, 1))
+
     def members(self) -> tuple[Muscle, ...]:
         """Return the equally good fits: this one."""
         return (self,)
@@ -119,7 +127,7 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
 @routine
 def begin(
     rows: Any, fixed: Any, counts: Any, tables: Any, samples: Any, settings: Any, choices: Any,
-    work: Any, member: int, j: int,
+    work: Any, j: int,
 ) -> None:  # fmt: skip
     """Bring lane ``j`` to rest without pressure, and draw its reference."""
     for k in range(REFERENCE):
@@ -140,7 +148,7 @@ def kernels() -> Kernels:
         begin,
         rows=REFERENCE + ROWS,
         parameters=2,
-        counts=4,
+        counts=5,
         set_points=SET_POINT,
         old_set_points=OLD_SET_POINT,
         config=CONFIG,
@@ -159,8 +167,9 @@ def make_setup(given: Common) -> Setup:
     drawn = Randomisation(("muscle.lag", "muscle.gain"), (), "{'muscle.lag': (0.05, 0.2)}")
     return compose(
         plant,
-        kernels(),
+        lambda effects: kernels(),
         given,
+        drawn,
         observation=[("contraction", *span), ("pressure", *pressure)],
         references=[("reference", *span)],
         action=[("pressure_set_point", *pressure)],
@@ -168,7 +177,6 @@ def make_setup(given: Common) -> Setup:
         reference=family,
         sines=sines_needed(family),
         samples=samples,
-        spread=given.spread_of(plant, drawn),
         view=f"{__package__}.view:VIEW",
     )
 
