@@ -63,3 +63,40 @@ def trajectory(env: gym.Env, seed: int, steps: int = 60) -> list[str]:
             observation, info = env.reset()
             lines.append(observation.tobytes().hex())
     return lines
+
+
+def record(env: gym.Env, actions: Any, seed: int = 0) -> dict[str, np.ndarray]:
+    """Return ``info`` as arrays, the reset first, and the observations as ``seen``."""
+    observation, info = env.reset(seed=seed)
+    infos, seen = [dict(info)], [observation]
+    for action in actions:
+        observation, _, ended, truncated, info = env.step(np.asarray(action, np.float32))
+        infos.append(dict(info))
+        seen.append(observation)
+        if ended or truncated:
+            break
+    found = {key: np.array([row[key] for row in infos]) for key in infos[0]}
+    return found | {"seen": np.array(seen)}
+
+
+def check_rows(batch: Any, singles: dict[int, gym.Env], steps: int, seed: int) -> int:
+    """Assert that rows of a batch are single environments bit for bit; return their restarts."""
+    observations, infos = batch.reset(seed=seed)
+    for i, env in singles.items():
+        observation, info = env.reset(seed=seed + i)
+        assert np.array_equal(observation, observations[i])
+        assert {k: v[i] for k, v in infos.items()} == info
+    restarts = 0
+    for actions in actions_for(batch.action_space, steps, 2):
+        observations, rewards, terminated, truncated, infos = batch.step(actions)
+        for i, env in singles.items():
+            observation, reward, ended, cut, info = env.step(actions[i])
+            assert (reward, ended, cut) == (rewards[i], terminated[i], truncated[i])
+            if ended or cut:
+                restarts += 1
+                assert np.array_equal(observation, infos["final_obs"][i])
+                assert {k: infos["final_info"][k][i] for k in info} == info
+                observation, info = env.reset()
+            assert np.array_equal(observation, observations[i])
+            assert {k: infos[k][i] for k in info} == info
+    return restarts

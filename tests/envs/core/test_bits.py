@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from pam_envs.kernels.build import COMPILED
-from tests.envs.cases import CASES, IDS, SHARED, VARIANTS, actions_for, trajectory
+from tests.envs.cases import CASES, IDS, SHARED, VARIANTS, actions_for, check_rows, trajectory
 
 ROOT = Path(__file__).resolve().parents[3]
 EVERY = pytest.mark.parametrize("name", IDS)
@@ -34,29 +34,9 @@ def batch(name: str, number: int, **arguments: object) -> gym.vector.VectorEnv:
 def test_rows_of_a_batch_are_single_environments(name: str, variant: str, number: int) -> None:
     arguments = {"episode_seconds": SECONDS, **VARIANTS[name][variant]}
     envs = batch(name, number, **arguments)
-    drive, seed = actions_for(envs.action_space, STEPS, 2), 17
     rows = sorted({0, number // 2, number - 1})
     singles = {i: gym.make(name, **arguments) for i in rows}
-    observations, infos = envs.reset(seed=seed)
-    for i, env in singles.items():
-        observation, info = env.reset(seed=seed + i)
-        assert np.array_equal(observation, observations[i])
-        assert {k: v[i] for k, v in infos.items()} == info
-    restarts = 0
-    for actions in drive:
-        observations, rewards, terminated, truncated, infos = envs.step(actions)
-        for i, env in singles.items():
-            observation, reward, ended, cut, info = env.step(actions[i])
-            assert (reward, ended, cut) == (rewards[i], terminated[i], truncated[i])
-            if ended or cut:
-                restarts += 1
-                assert np.array_equal(observation, infos["final_obs"][i])
-                final = infos["final_info"]
-                assert {k: final[k][i] for k in info} == info
-                observation, info = env.reset()
-            assert np.array_equal(observation, observations[i])
-            assert {k: infos[k][i] for k in info} == info
-    assert restarts >= len(rows) * 2
+    assert check_rows(envs, singles, STEPS, 17) >= len(rows) * 2
 
 
 @pytest.mark.parametrize("name", TILED)

@@ -16,6 +16,7 @@ from pam_envs.envs.elbow.env import largest_errors, model_row, signal_ranges
 from pam_envs.envs.elbow.program import estimate, pressures_for, within_reach
 from pam_envs.plants.elbow_orthosis.plant import ElbowOrthosis
 from pam_envs.tasks.torque_stiffness import TorqueStiffness
+from tests.envs.cases import record
 
 ID = "PAM/ElbowOrthosis-v0"
 PLANT = ElbowOrthosis.paper()
@@ -29,14 +30,7 @@ def made(**arguments: Any) -> Any:
 
 def driven(env: Any, action: Any, steps: int, seed: int = 0) -> dict[str, np.ndarray]:
     """Return ``info`` as arrays, and the observations, under one action."""
-    observation, info = env.reset(seed=seed)
-    infos, seen = [dict(info)], [observation]
-    for _ in range(steps):
-        observation, *_, info = env.step(np.asarray(action, np.float32))
-        infos.append(dict(info))
-        seen.append(observation)
-    record = {key: np.array([row[key] for row in infos]) for key in infos[0]}
-    return record | {"seen": np.array(seen)}
+    return record(env, [action] * steps, seed)
 
 
 def test_estimate_equals_the_law_of_the_nominal_bundles() -> None:
@@ -100,13 +94,13 @@ def test_unreachable_references_are_clipped_torque_first_and_reported() -> None:
     info = driven(env, [0.0, 0.0], 39)
     torques, stiffnesses = env.plant.corners(info["state/angle"])
     late = np.arange(40) >= 20
-    wanted = np.where(late, torques.min(axis=1), torques.max(axis=1))
-    assert np.allclose(info["reference"], wanted)
+    nearest = np.where(late, torques.min(axis=1), torques.max(axis=1))
+    assert np.allclose(info["reference"], nearest)
     corner = np.where(late, stiffnesses[:, 1], stiffnesses[:, 3])
     assert np.allclose(info["state/stiffness_reference"], corner)
     asked = np.where(late, -30.0, 40.0)
-    assert np.allclose(info["state/torque_clipped"], asked - wanted)
-    assert (info["saturated"] == 0.0).all()  # nobody was told to do it
+    assert np.allclose(info["state/torque_clipped"], asked - nearest)
+    assert (info["saturated"] == 0.0).all()
 
 
 def test_signal_ranges_cover_the_bundles() -> None:
@@ -141,12 +135,10 @@ def test_reward_weighs_torque_and_stiffness_as_the_headline() -> None:
 
 def test_torque_and_stiffness_as_actions() -> None:
     env = made(plant=QUIET, action="torque_stiffness", motion="still", normalize=False)
-    env.reset(seed=3)
-    for _ in range(60):
-        *_, info = env.step(np.array([1.0, 4.0], np.float32))
-    assert info["saturated"] == 0.0
-    assert info["state/torque"] == pytest.approx(1.0, abs=2e-3)
-    assert info["state/stiffness"] == pytest.approx(4.0, abs=2e-3)
+    held = driven(env, [1.0, 4.0], 60, 3)
+    assert held["saturated"][-1] == 0.0
+    assert held["state/torque"][-1] == pytest.approx(1.0, abs=2e-3)
+    assert held["state/stiffness"][-1] == pytest.approx(4.0, abs=2e-3)
     *_, info = env.step(np.array([1.0, 14.0], np.float32))
     assert info["saturated"] == 1.0
     full = env.plant.full_pressure
@@ -158,10 +150,10 @@ def test_observed_references_are_those_at_the_sensed_angle() -> None:
     info = driven(env, [0.0, -0.5], 100)
     seen = env.signals.decode(info["seen"], "reference")
     handle = env.plant.wearer.handle
-    wanted = -GRAVITY * handle * np.sin(info["sensor/angle"])
+    desired = -GRAVITY * handle * np.sin(info["sensor/angle"])
     reached = np.abs(info["state/torque_clipped"]) < 1e-12
     assert reached.sum() > 50
-    assert np.allclose(seen[reached], wanted[reached], atol=1e-5)
+    assert np.allclose(seen[reached], desired[reached], atol=1e-5)
     assert not np.allclose(seen, info["reference"], atol=1e-5)
 
 
@@ -170,9 +162,9 @@ def test_previews_follow_the_intended_motion() -> None:
     info = driven(env, [0.0, -0.5], 120)
     ahead = env.signals.decode(info["seen"], "reference_2")[:-10]
     intended = info["state/intent"][10:]
-    wanted = -GRAVITY * env.plant.wearer.handle * np.sin(intended)
+    desired = -GRAVITY * env.plant.wearer.handle * np.sin(intended)
     lowest = np.array([env.plant.corners(q)[0].min() for q in intended])
-    assert np.allclose(ahead, np.maximum(wanted, lowest), atol=1e-5)
+    assert np.allclose(ahead, np.maximum(desired, lowest), atol=1e-5)
 
 
 def test_one_pulse_is_taken_per_cycle() -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from pam_envs.plants.antagonistic_joint.bearing import UnbearableLoad
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from tests.envs.cases import record
 
 NAME = "PAM/AntagonisticJoint-v0"
 STILL: dict[str, Any] = {
@@ -29,11 +30,7 @@ def make(**arguments: Any) -> Any:
 
 def run(env: Any, action: list[float], seconds: float) -> dict[str, np.ndarray]:
     """Return ``info`` as arrays under a held action, from the reset on."""
-    _, info = env.reset(seed=0)
-    infos = [dict(info)]
-    for _ in range(round(100 * seconds)):
-        infos.append(dict(env.step(np.array(action, np.float32))[4]))
-    return {k: np.array([i[k] for i in infos]) for k in infos[0]}
+    return record(env, [action] * round(100 * seconds))
 
 
 def test_angle_at_rest_equals_set_point_without_hysteresis_and_weight() -> None:
@@ -48,12 +45,8 @@ def test_angle_at_rest_equals_set_point_without_hysteresis_and_weight() -> None:
 
 def test_hysteresis_makes_the_angle_depend_on_its_history() -> None:
     env = make()
-    env.reset(seed=0)
-    rests = []
-    for target in (0.25, 0.0, -0.25, 0.0):
-        for _ in range(200):
-            *_, info = env.step(np.array([target], np.float32))
-        rests.append(info["output"])
+    targets = np.repeat([0.25, 0.0, -0.25, 0.0], 200)[:, None]
+    rests = record(env, targets)["output"][200::200]
     assert rests[1] > 0.005
     assert rests[3] < -0.005
     assert rests[3] == pytest.approx(-rests[1], abs=2e-3)  # the joint's loop is symmetric
@@ -65,8 +58,8 @@ def test_prestress_as_action_changes_the_stiffness() -> None:
         info = run(make(plant=IDEAL, action="angle_stiffness"), [0.1, prestress], 2.0)
         assert info["output"][-1] == pytest.approx(0.1, abs=1e-4)
         stiff[prestress] = info["state/stiffness"][-1]
-        wanted = IDEAL.stiffness_at(0.1, prestress)
-        assert stiff[prestress] == pytest.approx(float(wanted), rel=1e-3)
+        expected = IDEAL.stiffness_at(0.1, prestress)
+        assert stiff[prestress] == pytest.approx(float(expected), rel=1e-3)
     assert stiff[20.0] / stiff[120.0] > 1.2  # the lever buckles under co-contraction
 
 
@@ -126,18 +119,12 @@ def test_one_disturbance_pulse_in_five_seconds() -> None:
 
 def test_payload_is_observed_and_its_change_is_not() -> None:
     env = make(payload=0.5, payload_change=0.25, episode_seconds=4.0)
-    observation, first = env.reset(seed=3)
-    told, true = [float(env.signals.decode(observation, "payload"))], [first["state/payload"]]
-    while True:
-        observation, _, _, over, info = env.step(np.array([0.2], np.float32))
-        told.append(float(env.signals.decode(observation, "payload")))
-        true.append(info["state/payload"])
-        if over:
-            break
-    assert set(told) == {0.5}
+    info = record(env, [[0.2]] * 400, 3)
+    true = info["state/payload"]
+    assert set(env.signals.decode(info["seen"], "payload")) == {0.5}
     assert true[0] == 0.5
     assert abs(true[-1] - 0.5) == 0.25
-    at = int(np.argmax(np.array(true) != 0.5))
+    at = int(np.argmax(true != 0.5))
     assert 120 <= at <= 281
 
 
@@ -146,10 +133,8 @@ def test_payload_smaller_than_its_change_only_increases(payload: float, ends: se
     env = make(payload=payload, payload_change=0.25, episode_seconds=1.0)
     found = set()
     for seed in range(12):
-        env.reset(seed=seed)
-        for _ in range(100):
-            info = env.step(np.zeros(1, np.float32))[4]
-        found.add(round(info["state/payload"], 12))
+        info = record(env, np.zeros((100, 1)), seed)
+        found.add(round(info["state/payload"][-1], 12))
     assert found == ends
 
 
@@ -159,15 +144,11 @@ def test_payload_reduces_the_angle() -> None:
 
 
 def test_mechanical_stop_ends_the_episode() -> None:
-    env = make(disturbance=80.0)
-    env.reset(seed=0)
-    for _ in range(600):
-        _, _, ended, _, info = env.step(np.zeros(1, np.float32))
-        assert ended == (abs(info["output"]) > math.radians(35.0))
-        assert ended == (info["margin/angle"] < 0.0)
-        if ended:
-            break
-    assert ended
+    info = run(make(disturbance=80.0), [0.0], 6.0)
+    broken = np.abs(info["output"]) > math.radians(35.0)
+    assert len(broken) < 600
+    assert broken.tolist() == [False] * (len(broken) - 1) + [True]
+    assert np.array_equal(broken, info["margin/angle"] < 0.0)
 
 
 def test_angles_beyond_the_capacity_are_refused_at_construction() -> None:
@@ -181,8 +162,8 @@ def test_angles_beyond_the_capacity_are_refused_at_construction() -> None:
 
 def test_sine_and_step_references() -> None:
     sine = run(make(reference="sine", amplitude=0.2, frequency=0.5), [0.0], 2.0)
-    wanted = 0.2 * np.sin(np.pi * sine["time"])
-    assert np.allclose(sine["reference"], wanted, atol=1e-12)
+    expected = 0.2 * np.sin(np.pi * sine["time"])
+    assert np.allclose(sine["reference"], expected, atol=1e-12)
     step = run(make(reference="step", amplitude=0.1), [0.0], 2.0)
     assert np.array_equal(step["reference"], np.where(step["time"] < 1.0, 0.0, 0.1))
     assert run(make(reference="steps"), [0.0], 6.0)["reference"].max() <= math.radians(20.0)

@@ -9,17 +9,13 @@ import numpy as np
 import pytest
 
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
+from tests.envs.cases import record
 
 
 def series(name: str, seconds: float, pressure: float, **arguments: Any) -> dict[str, np.ndarray]:
     """Return ``info`` as arrays under a constant set-point [Pa]."""
     env = gym.make(name, normalize=False, episode_seconds=60.0, **arguments)
-    _, info = env.reset(seed=0)
-    infos = [dict(info)]
-    for _ in range(round(100 * seconds)):
-        *_, info = env.step(np.array([pressure], np.float32))
-        infos.append(dict(info))
-    return {k: np.array([i[k] for i in infos]) for k in infos[0]}
+    return record(env, [[pressure]] * round(100 * seconds))
 
 
 @pytest.mark.parametrize(
@@ -30,8 +26,8 @@ def test_default_reference_is_a_sine_of_a_tenth_hertz_from_its_lowest_value(
     name: str, low: float, high: float
 ) -> None:
     info = series(name, 10.0, 1e5)
-    wanted = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(0.2 * np.pi * info["time"])
-    assert np.allclose(info["reference"], wanted, rtol=1e-9)
+    expected = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(0.2 * np.pi * info["time"])
+    assert np.allclose(info["reference"], expected, rtol=1e-9)
 
 
 def test_paper_start_has_a_tension_of_55_newtons() -> None:
@@ -60,8 +56,8 @@ def test_output_is_tension_or_stiffness() -> None:
 def test_sensed_stiffness_follows_from_sensed_tension_and_angle() -> None:
     info = series("PAM/KneeTension-v0", 1.0, 2e5)
     plant = KneeOrthosis.no_load()
-    wanted = plant.stiffness_for(info["sensor/tension"], info["sensor/angle"])
-    assert np.allclose(info["sensor/stiffness"], wanted, rtol=1e-9)
+    expected = plant.stiffness_for(info["sensor/tension"], info["sensor/angle"])
+    assert np.allclose(info["sensor/stiffness"], expected, rtol=1e-9)
     assert not np.array_equal(info["sensor/stiffness"], info["state/stiffness"])
 
 

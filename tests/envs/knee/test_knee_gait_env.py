@@ -11,7 +11,7 @@ import pytest
 from pam_envs.muscle.emg import calibration, emg_proxy
 from pam_envs.plants.knee_orthosis.plant import KneeOrthosis
 from pam_envs.sensing.butterworth import filtered
-from tests.envs.cases import actions_for
+from tests.envs.cases import actions_for, record
 
 GAITS = {
     "PAM/KneeWalk-v0": "walk",
@@ -25,19 +25,12 @@ def quiet(name: str) -> KneeOrthosis:
     return KneeOrthosis.on_leg(GAITS[name], stride=2.0).without_noise()
 
 
-def record(
-    name: str, steps: int = 300, **arguments: Any
-) -> tuple[Any, dict[str, np.ndarray], np.ndarray]:
-    """Return the environment, ``info`` as arrays and the observations in SI, the reset first."""
+def driven(name: str, steps: int = 300, **arguments: Any) -> tuple[Any, dict[str, np.ndarray]]:
+    """Return the environment, and ``info`` and observations in SI under held random actions."""
     env = gym.make(name, normalize=False, episode_seconds=60.0, **arguments).unwrapped
-    observation, info = env.reset(seed=3)
-    infos, observations = [dict(info)], [observation]
-    for action in actions_for(env.action_space, steps, 1):
-        observation, _, terminated, _, info = env.step(0.5 * action)
-        assert not terminated
-        infos.append(dict(info))
-        observations.append(observation)
-    return env, {k: np.array([i[k] for i in infos]) for k in infos[0]}, np.array(observations)
+    info = record(env, 0.5 * actions_for(env.action_space, steps, 1), 3)
+    assert len(info["time"]) == steps + 1
+    return env, info
 
 
 @EACH_GAIT
@@ -45,7 +38,7 @@ def record(
 def test_tension_reference_gives_the_desired_torque_in_stance_and_the_mismatch_in_swing(
     name: str, mismatch: float
 ) -> None:
-    env, info, _ = record(name, mismatch=mismatch)
+    env, info = driven(name, mismatch=mismatch)
     stance = info["sensor/stance"] > 0.5
     assert 0 < stance.mean() < 1
     torque = np.where(stance, info["state/torque_reference"], 0.0)
@@ -58,11 +51,11 @@ def test_tension_reference_gives_the_desired_torque_in_stance_and_the_mismatch_i
 def test_angle_reference_is_the_path_in_swing_and_the_sensed_angle_in_stance(
     name: str,
 ) -> None:
-    env, info, _ = record(name)
+    env, info = driven(name)
     stance = info["sensor/stance"] > 0.5
     path = env.plant.lever.mount_angle + info["state/knee"]
-    wanted = np.where(stance, info["sensor/angle"], path)
-    assert np.allclose(info["state/angle_reference"], wanted, atol=1e-12)
+    expected = np.where(stance, info["sensor/angle"], path)
+    assert np.allclose(info["state/angle_reference"], expected, atol=1e-12)
     assert np.allclose(info["state/angle"], path + info["state/deviation"], atol=1e-12)
 
 
@@ -73,7 +66,7 @@ def test_desired_torque_is_a_low_passed_share_of_the_estimate(
     name: str, assistance: str, lowest: float, source: str, key: str
 ) -> None:
     arguments = {"assistance": assistance, "reference": source, "ratio": 0.3}
-    _, info, _ = record(name, 450, plant=quiet(name), **arguments)
+    _, info = driven(name, 450, plant=quiet(name), **arguments)
     share = np.maximum(lowest, 0.3 * info[f"state/{key}"])
     settled = slice(200, None)  # what was before the episode has faded by then
     assert np.ptp(share[settled]) > 1.0
@@ -82,7 +75,7 @@ def test_desired_torque_is_a_low_passed_share_of_the_estimate(
 
 def test_samples_are_the_desired_torque_without_low_pass() -> None:
     samples = 3.0 * np.sin(0.05 * np.arange(100))
-    _, info, _ = record("PAM/KneeWalk-v0", 150, reference=samples)
+    _, info = driven("PAM/KneeWalk-v0", 150, reference=samples)
     later = samples[np.minimum(np.arange(151), 99)]
     assert np.allclose(info["state/torque_reference"], later, atol=1e-12)
 
@@ -90,8 +83,8 @@ def test_samples_are_the_desired_torque_without_low_pass() -> None:
 @EACH_GAIT
 def test_preview_equals_later_references_without_disturbance(name: str) -> None:
     plant = quiet(name).replace({"leg.hold_stiffness": 500.0, "leg.stance_stiffness": 2e3})
-    env, info, seen = record(name, plant=plant, preview=3, preview_stride=5)
-    signals = env.signals
+    env, info = driven(name, plant=plant, preview=3, preview_stride=5)
+    signals, seen = env.signals, info["seen"]
     now, ahead = signals["reference"].index, signals["reference_3"].index
     assert signals["reference_3"].ahead == pytest.approx(0.15)
     stiff = np.abs(info["state/deviation"][15:]) < 0.01
@@ -106,14 +99,14 @@ def test_preview_equals_later_references_without_disturbance(name: str) -> None:
 
 @EACH_GAIT
 def test_emg_proxies_follow_from_recorded_torques(name: str) -> None:
-    env, info, _ = record(name)
+    env, info = driven(name)
     period, muscle = env.control_period, env.plant.activation
     helped = info["state/torque"]
     plain = emg_proxy(info["state/demand"], helped, period, muscle)
     share = calibration(GAITS[name], "A")
     fitted = emg_proxy(info["state/estimate"], helped, period, muscle, "A", share)
     settled = slice(50, None)
-    for key, wanted in (
+    for key, expected in (
         ("extensors", plain.extensors),
         ("extensors_free", plain.extensors_free),
         ("flexors", plain.flexors),
@@ -121,11 +114,11 @@ def test_emg_proxies_follow_from_recorded_torques(name: str) -> None:
         ("extensors_calibrated", fitted.extensors),
         ("extensors_free_calibrated", fitted.extensors_free),
     ):
-        assert np.allclose(info[f"effort/{key}"][settled], wanted[settled], atol=1e-6), key
+        assert np.allclose(info[f"effort/{key}"][settled], expected[settled], atol=1e-6), key
 
 
 def test_over_assistance_is_torque_beyond_the_demand_or_against_it() -> None:
-    _, info, _ = record("PAM/KneeWalk-v0")
+    _, info = driven("PAM/KneeWalk-v0")
     torque, demand = info["state/torque"], info["state/demand"]
     between = np.clip(torque, np.minimum(0.0, demand), np.maximum(0.0, demand))
     assert np.allclose(info["effort/over_assistance"], np.abs(torque - between), atol=1e-12)
@@ -135,7 +128,7 @@ def test_over_assistance_is_torque_beyond_the_demand_or_against_it() -> None:
 @EACH_GAIT
 def test_references_use_nominal_and_not_drawn_parameters(name: str) -> None:
     drawn = {"lever.stiffness": (33.0, 34.0), "lever.relaxed_angle": (2.2, 2.25)}
-    env, info, _ = record(name, randomize=drawn)
+    env, info = driven(name, randomize=drawn)
     stance = info["sensor/stance"] > 0.5
     torque = np.where(stance, info["state/torque_reference"], 0.0)
     tension = env.plant.tension_for(info["sensor/angle"], torque)
@@ -148,8 +141,10 @@ def test_planned_references_use_the_nominal_body_mass(name: str) -> None:
     for mass in (60.0, 85.0):
         heavy = {"leg.body_mass": (mass, mass + 1e-6)}
         arguments = {"plant": plant, "randomize": heavy, "preview": 3, "preview_stride": 40}
-        env, _, observed = record(name, 60, start="heel_contact", **arguments)
-        seen.append(observed[:, [env.signals[k].index for k in ("ground_force", "reference_3")]])
+        env, info = driven(name, 60, start="heel_contact", **arguments)
+        seen.append(
+            info["seen"][:, [env.signals[k].index for k in ("ground_force", "reference_3")]]
+        )
     assert np.abs(seen[0][:, 0] - seen[1][:, 0]).max() > 100.0
     assert np.abs(seen[0][:, 1] - seen[1][:, 1]).max() < 1.0
 
@@ -164,7 +159,7 @@ def test_ambient_air_is_not_counted_as_effort() -> None:
 
 def test_rewards_are_gated_where_sensed_and_true_phase_agree() -> None:
     noisy = KneeOrthosis.on_leg("walk", stride=2.0).replace({"heel.noise": 2.0})
-    _, info, _ = record("PAM/KneeWalk-v0", plant=noisy)
+    _, info = driven("PAM/KneeWalk-v0", plant=noisy)
     true, seen = info["state/stance"] > 0.5, info["sensor/stance"] > 0.5
     assert (true != seen).any()
     stance = true & seen
@@ -177,7 +172,7 @@ def test_rewards_are_gated_where_sensed_and_true_phase_agree() -> None:
 @EACH_GAIT
 def test_pace_sets_the_stride_time(name: str) -> None:
     for pace, seconds in (("slow", 5.0), ("normal", 1.224), (2.5, 2.5)):
-        _, info, _ = record(name, 20, pace=pace, start="heel_contact")
+        _, info = driven(name, 20, pace=pace, start="heel_contact")
         assert info["state/phase"][0] == 0.0
         assert info["state/phase"][20] == pytest.approx(0.2 / seconds)
 

@@ -43,8 +43,8 @@ def follow(env: Any, seconds: float, seed: int = 0) -> list[dict[str, float]]:
     observation, info = env.reset(seed=seed)
     infos = [dict(info)]
     for _ in range(round(100 * seconds)):
-        wanted = [env.signals.decode(observation, f"joint_reference_{k}") for k in range(6)]
-        observation, *_, info = env.step(np.array(wanted, np.float32))
+        expected = [env.signals.decode(observation, f"joint_reference_{k}") for k in range(6)]
+        observation, *_, info = env.step(np.array(expected, np.float32))
         infos.append(dict(info))
     return infos
 
@@ -52,13 +52,13 @@ def follow(env: Any, seconds: float, seed: int = 0) -> list[dict[str, float]]:
 def test_reference_rests_follows_the_path_rests_and_returns() -> None:
     env = make(path_seconds=1.0, rest_seconds=0.25, reference="path_3")
     infos = follow(env, 2.5)
-    wanted = np.array([pose(info, "reference_") for info in infos])
+    expected = np.array([pose(info, "reference_") for info in infos])
     chain, ends = PLANT.chain, PATHS[2].angles()
-    assert np.allclose(wanted[:26], chain.pose(ends[0]), atol=1e-12)
-    assert np.allclose(wanted[125:151], chain.pose(ends[-1]), atol=1e-12)
-    assert np.allclose(wanted[250], chain.pose(ends[0]), atol=1e-12)
-    assert np.allclose(wanted[25:126], wanted[150:251][::-1], atol=1e-9)
-    fastest = np.linalg.norm(np.diff(wanted[:126, :3], axis=0), axis=1)
+    assert np.allclose(expected[:26], chain.pose(ends[0]), atol=1e-12)
+    assert np.allclose(expected[125:151], chain.pose(ends[-1]), atol=1e-12)
+    assert np.allclose(expected[250], chain.pose(ends[0]), atol=1e-12)
+    assert np.allclose(expected[25:126], expected[150:251][::-1], atol=1e-9)
+    fastest = np.linalg.norm(np.diff(expected[:126, :3], axis=0), axis=1)
     assert 70 < np.argmax(fastest) < 80  # in the middle of the way, as least jerk has it
 
 
@@ -67,9 +67,9 @@ def test_planned_angles_follow_the_path_within_joint_limits() -> None:
     for number, path in enumerate(PATHS):
         infos = follow(make(reference=path.name, **quick), 0.54)
         planned = np.array([vector(info, "state/joint_reference") for info in infos])
-        wanted = np.array([pose(info, "reference_") for info in infos])
+        expected = np.array([pose(info, "reference_") for info in infos])
         assert np.abs(planned).max() < math.radians(30.0), number
-        assert np.allclose(PLANT.chain.pose(planned), wanted, atol=2e-4)
+        assert np.allclose(PLANT.chain.pose(planned), expected, atol=2e-4)
     free = follow(make(reference="path_3", weighted=False, **quick), 0.54)
     peak = max(np.abs(vector(info, "state/joint_reference")).max() for info in free)
     assert peak == pytest.approx(math.radians(37.12), abs=math.radians(0.02))
@@ -89,11 +89,11 @@ def test_weight_and_payload_increase_the_position_error() -> None:
 
 def test_output_and_pointing_error_follow_from_true_angles() -> None:
     for info in follow(make(), 1.5)[::30]:
-        true, wanted = PLANT.chain.pose(vector(info, "state/angle")), pose(info, "reference_")
+        true, expected = PLANT.chain.pose(vector(info, "state/angle")), pose(info, "reference_")
         assert np.allclose(pose(info), true, atol=1e-12)
-        assert info["output"] == pytest.approx(float(np.linalg.norm((true - wanted)[:3])))
+        assert info["output"] == pytest.approx(float(np.linalg.norm((true - expected)[:3])))
         assert info["state/pointing_error"] == pytest.approx(
-            float(np.linalg.norm((true - wanted)[3:]))
+            float(np.linalg.norm((true - expected)[3:]))
         )
         off = vector(info, "state/angle") - vector(info, "state/joint_reference")
         assert info["state/joint_error"] == pytest.approx(float(np.sqrt(np.mean(off**2))))

@@ -6,12 +6,10 @@ import copy
 import os
 import subprocess
 import sys
-import warnings
 
 import gymnasium as gym
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
 
 from tests.envs.cases import IDS, actions_for
 
@@ -100,13 +98,6 @@ def test_pictures_need_no_display_and_change_no_environment_variable() -> None:
     variables = {k: v for k, v in os.environ.items() if not k.startswith("SDL_")}
     variables["DISPLAY"] = ":none"  # a display that cannot be opened
     subprocess.run([sys.executable, "-c", HEADLESS, *IDS], env=variables, check=True)
-
-
-@EVERY
-def test_checker_accepts_rendering(name: str) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        check_env(gym.make(name, render_mode="rgb_array").unwrapped)
 
 
 @EVERY
