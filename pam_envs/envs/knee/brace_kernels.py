@@ -106,10 +106,8 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
 @kernel
 def report_brace(rows: Any, fixed: Any, config: Any, work: Any, info: Any, at: Any, j: int) -> None:
     """Write costs, margins and efforts of the muscle's pressure."""
-    moved, full = (
-        rows[K.SET_POINT][j] - rows[K.OLD_SET_POINT][j],
-        fixed[K.REGULATOR_MAX_PRESSURE][j],
-    )
+    full = fixed[K.REGULATOR_MAX_PRESSURE][j]
+    moved = rows[K.SET_POINT][j] - rows[K.OLD_SET_POINT][j]
     report_pressure(work, config, info, at, rows[K.PRESSURE][j], moved, full, j)
     travel = change_of(rows, K.PRESSURE, K.OLD_PRESSURE, j)
     work[info.effort_pressure_travel][j] = abs(travel)
