@@ -22,10 +22,8 @@ Interval = tuple[float, float]
 
 PRESSURE_FOLDS = 6
 """Number of folds of cells without repeats."""
-DRAWS = 2000
-"""Bootstrap samples of the blocks for an interval of an error."""
-REFITS = 200
-"""Refits to resampled residuals for an interval of a parameter."""
+DRAWS, REFITS = 2000, 200
+"""Bootstrap samples for an interval of an error, and refits for one of a parameter."""
 REFIT_GOOD = 1e-5
 """Tolerance of such a refit, see :func:`improve`."""
 
@@ -47,21 +45,6 @@ class Lanes:
     loads: int
 
 
-def lanes_of(cells: Cells) -> Lanes:
-    """Return the data sets of a table."""
-    mean, root = cells.mean, np.sqrt(cells.counts) * cells.used
-    kind, data, weight, target = _folds(cells, root)
-    groups = range(len(cells.loads)) if len(cells.loads) >= 3 else range(0)
-    without = np.array([root * (cells.group != g) for g in groups]).reshape(-1, len(mean))
-    return Lanes(
-        kind,
-        np.concatenate([mean[None], data, np.broadcast_to(mean, without.shape)]),
-        np.concatenate([root[None], weight, without]),
-        target,
-        len(without),
-    )
-
-
 def _folds(cells: Cells, root: Array) -> tuple[str, Array, Array, Array]:
     """Return kind, data, weights and targets of the held-out repeats, or cells without repeats."""
     if np.all(cells.counts[cells.used] > 1):
@@ -78,18 +61,11 @@ def _folds(cells: Cells, root: Array) -> tuple[str, Array, Array, Array]:
 
 @dataclass(frozen=True)
 class Model:
-    """A fitted model with its errors on held-out data.
+    """A fitted model with its errors on held-out data; the fit has the lanes of :class:`Lanes`.
 
-    Attributes
-    ----------
-    fit : Fit
-        Lanes as in :class:`Lanes`.
-    residual : ndarray, shape (C,)
-        Mean reading minus model fitted to all data [mm]; NaN if not used.
-    held : ndarray, shape (C,)
-        Mean squared error of each cell on held-out data [mm2].
-    load_errors : ndarray, shape (G, C)
-        Mean reading minus model on a held-out load [mm]; NaN elsewhere.
+    ``residual`` is mean reading minus model fitted to all data [mm], shape (C,), NaN if not used;
+    ``held`` the mean squared error of each cell on held-out data [mm2], shape (C,); ``load_errors``
+    mean reading minus model on a held-out load [mm], shape (G, C), NaN elsewhere.
     """
 
     fit: Fit
@@ -133,7 +109,18 @@ class Study:
     @cached_property
     def lanes(self) -> Lanes:
         """Data sets with the folds."""
-        return lanes_of(self.cells)
+        cells = self.cells
+        mean, root = cells.mean, np.sqrt(cells.counts) * cells.used
+        kind, data, weight, target = _folds(cells, root)
+        groups = range(len(cells.loads)) if len(cells.loads) >= 3 else range(0)
+        without = np.array([root * (cells.group != g) for g in groups]).reshape(-1, len(mean))
+        return Lanes(
+            kind,
+            np.concatenate([mean[None], data, np.broadcast_to(mean, without.shape)]),
+            np.concatenate([root[None], weight, without]),
+            target,
+            len(without),
+        )
 
     @cached_property
     def base(self) -> Model:
@@ -165,10 +152,14 @@ class Study:
         held = np.square(lanes.target - made[1:inside])
         missed = np.where(cells.used, cells.mean - made, np.nan) * mm
         out = np.arange(lanes.loads)[:, None] == cells.group
-        seen = np.isfinite(held).sum(axis=0)
-        mean = np.where(seen > 0, np.nansum(held, axis=0) / np.maximum(seen, 1), np.nan)
         left = np.where(out, missed[inside:], np.nan)
-        return Model(fitted, missed[0], mm**2 * mean, left)
+        return Model(fitted, missed[0], mm**2 * _finite_mean(held), left)
+
+
+def _finite_mean(values: Array) -> Array:
+    """Return the mean of the finite values of each column, NaN without any."""
+    seen = np.isfinite(values).sum(axis=0)
+    return np.where(seen > 0, np.nansum(values, axis=0) / np.maximum(seen, 1), np.nan)
 
 
 def blocked(cells: Cells, values: Array) -> Array:
@@ -186,12 +177,12 @@ def _resampled(study: Study, values: Array, name: str) -> Array:
     n = sums.shape[-1]
     random = np.random.default_rng([study.seed, *name.encode()])
     counts = random.multinomial(n, np.full(n, 1.0 / n), DRAWS)
-    return np.asarray(counts @ np.moveaxis(sums, -1, 0).reshape(n, -1)).reshape(
-        DRAWS, *sums.shape[:-1]
-    )
+    drawn = counts @ np.moveaxis(sums, -1, 0).reshape(n, -1)
+    return np.asarray(drawn).reshape(DRAWS, *sums.shape[:-1])
 
 
-def _middle(draws: Array) -> Interval:
+def interval(draws: Array) -> Interval:
+    """Return the 95 % interval of samples."""
     low, high = np.quantile(draws, [0.025, 0.975])
     return float(low), float(high)
 
@@ -200,7 +191,7 @@ def error_interval(study: Study, squares: Array) -> Interval:
     """Return the 95 % block-bootstrap interval of the root mean of squares (C,)."""
     both = np.array([np.nan_to_num(squares), np.isfinite(squares)])
     sums = _resampled(study, both, "error")
-    return _middle(np.sqrt(sums[:, 0] / np.maximum(sums[:, 1], 1e-12)))
+    return interval(np.sqrt(sums[:, 0] / np.maximum(sums[:, 1], 1e-12)))
 
 
 def gain(study: Study, before: Model, after: Model) -> tuple[float, Interval]:
@@ -208,7 +199,7 @@ def gain(study: Study, before: Model, after: Model) -> tuple[float, Interval]:
     both = np.array([before.held, after.held])
     sums = _resampled(study, both, "gain")
     value = float(np.log(np.nanmean(before.held) / np.nanmean(after.held)))
-    return value, _middle(np.log(sums[:, 0] / sums[:, 1]))
+    return value, interval(np.log(sums[:, 0] / sums[:, 1]))
 
 
 def load_cut(study: Study, before: Model, after: Model) -> tuple[float, Interval]:
@@ -217,7 +208,7 @@ def load_cut(study: Study, before: Model, after: Model) -> tuple[float, Interval
     both = np.array([np.nan_to_num(np.square(errors)), np.isfinite(errors)])
     sums = _resampled(study, both, "loads")
     means = np.sqrt(sums[:, 0] / np.maximum(sums[:, 1], 1e-12)).mean(axis=-1)
-    return 1.0 - after.left_load / before.left_load, _middle(1.0 - means[:, 1] / means[:, 0])
+    return 1.0 - after.left_load / before.left_load, interval(1.0 - means[:, 1] / means[:, 0])
 
 
 def slopes(study: Study, model: Model) -> Array:
@@ -281,11 +272,6 @@ def parameter_draws(study: Study, model: Model) -> Array:
     return improve(cells, model.fit.numbers, begin, data, weights, REFIT_GOOD)[0]
 
 
-def intervals(draws: Array) -> list[Interval]:
-    """Return the 95 % interval of each column."""
-    return [_middle(column) for column in draws.T]
-
-
 def lack_of_fit(study: Study, model: Model) -> tuple[float, float, float]:
     """Return F, p-value and size [mm] of the lack of fit against the repeats.
 
@@ -324,6 +310,4 @@ def floor(study: Study) -> Array:
     if lanes.kind != "repeats" or np.isnan(pure_error(cells)[0]):
         return np.full(len(cells.load), np.nan)
     apart = np.square(lanes.target - lanes.data[1 : 1 + len(lanes.target)])
-    seen = np.isfinite(apart).sum(axis=0)
-    mean = np.nansum(apart, axis=0) / np.maximum(seen, 1)
-    return np.asarray(np.where(seen > 0, mean, np.nan) * cells.millimetres**2)
+    return np.asarray(_finite_mean(apart) * cells.millimetres**2)

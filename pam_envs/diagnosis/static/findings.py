@@ -14,7 +14,7 @@ from pam_envs.diagnosis.static.compare import (
     Model,
     Study,
     floor,
-    intervals,
+    interval,
     parameter_draws,
 )
 from pam_envs.diagnosis.static.law import Law, NextLoads, load_laws, next_loads
@@ -60,7 +60,7 @@ class Findings:
     def estimate(self, name: str) -> tuple[float, Interval]:
         """Return a parameter of the model and its 95 % interval, in relative units."""
         k = self.model.fit.names.index(name)
-        return float(self.model.fit.theta[0, k]), intervals(self.draws[:, [k]])[0]
+        return float(self.model.fit.theta[0, k]), interval(self.draws[:, k])
 
     @property
     def bent(self) -> bool:

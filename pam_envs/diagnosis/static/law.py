@@ -19,7 +19,7 @@ from pam_envs.diagnosis.static.compare import (
     Model,
     Study,
     gain,
-    intervals,
+    interval,
     p_value,
     parameter_draws,
     pure_error,
@@ -62,7 +62,7 @@ def _law(study: Study, model: Model, term: Term) -> Law:
     free = study.extended([model], (*model.terms, term))
     scale = units(term.number, study.cells.scale)
     draws = parameter_draws(study, free)
-    (low, high), value = intervals(draws[:, -1:])[0], float(free.fit.theta[0, -1])
+    (low, high), value = interval(draws[:, -1]), float(free.fit.theta[0, -1])
     seen = len(study.cells.loads) < LOADS_FOR_A_LAW
     judged = _fixed(study, model, free, term, value) if seen else free
     return Law(

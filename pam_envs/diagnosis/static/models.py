@@ -50,10 +50,14 @@ class Term:
 
     cause: str
     form: str
-    title: str
     number: Number
     loads: int = 1
     both_ways: bool = False
+
+    @property
+    def title(self) -> str:
+        """A short sentence."""
+        return TITLES[self.form]
 
 
 BASE = (
@@ -66,76 +70,45 @@ BASE = (
 """Parameters of the load-blind base."""
 
 COMPLIANCE = "load_dependent_compliance"
-SHIFT = Term(
-    COMPLIANCE,
-    "pressure shift",
-    "The load acts as a pressure shift, with a zero common to all loads",
-    Number("shift", 0.0, -1.0, 1.0, 0.05, "bar/kg"),
-    loads=2,
+TITLES = {
+    "pressure shift": "The load acts as a pressure shift, with a zero common to all loads",
+    "pressure shift, zeroed at each load": (
+        "The load acts as a pressure shift, with the rest length of each load as its zero"
+    ),
+    "stretch at rest": "The load lengthens the muscle equally at every pressure",
+    "smaller stroke": "The contraction is divided by a factor that grows with the load",
+    "stiffness growing with load": "The spring stiffens with the load",
+    "width linear in load": "The hysteresis loop widens or narrows with the load",
+    "bent pressure scale": (
+        "Friction changes along the pressure range, uniform on a bent pressure scale"
+    ),
+    "residual creep over readings": "A part of each step appears only in the next readings",
+    "soft threshold": "The first part of the pressure has no effect",
+}
+
+
+def _compliance(form: str, name: str, low: float, high: float, unit: str) -> Term:
+    return Term(COMPLIANCE, form, Number(name, 0.0, low, high, 0.05, unit), loads=2)
+
+
+_WIDTH = Number("width", 0.0, -0.95, 2.0, 0.1, "1/kg")
+_BEND = Number("bend", 0.0, -0.8, 0.8, 0.1)
+_CREEP = Number("creep", 0.0, -0.5, 0.5, 0.02)
+_THRESHOLD = Number("threshold", 0.0, 0.0, 0.3, 0.03, "bar")
+TERMS = (
+    _compliance("pressure shift", "shift", -1.0, 1.0, "bar/kg"),
+    _compliance("pressure shift, zeroed at each load", "zeroed_shift", -1.0, 1.0, "bar/kg"),
+    _compliance("stretch at rest", "stretch", -2.0, 2.0, "mm/kg"),
+    _compliance("smaller stroke", "stroke", -0.4, 2.0, "1/kg"),
+    _compliance("stiffness growing with load", "stiffening", -0.4, 2.0, "1/kg"),
+    Term("load_dependent_hysteresis", "width linear in load", _WIDTH, loads=2, both_ways=True),
+    Term("pressure_dependent_friction", "bent pressure scale", _BEND, both_ways=True),
+    Term("creep", "residual creep over readings", _CREEP),
+    Term("threshold_pressure", "soft threshold", _THRESHOLD),
 )
-SHIFT_ZEROED = Term(
-    COMPLIANCE,
-    "pressure shift, zeroed at each load",
-    "The load acts as a pressure shift, with the rest length of each load as its zero",
-    Number("zeroed_shift", 0.0, -1.0, 1.0, 0.05, "bar/kg"),
-    loads=2,
-)
-STRETCH = Term(
-    COMPLIANCE,
-    "stretch at rest",
-    "The load lengthens the muscle equally at every pressure",
-    Number("stretch", 0.0, -2.0, 2.0, 0.05, "mm/kg"),
-    loads=2,
-)
-STROKE = Term(
-    COMPLIANCE,
-    "smaller stroke",
-    "The contraction is divided by a factor that grows with the load",
-    Number("stroke", 0.0, -0.4, 2.0, 0.05, "1/kg"),
-    loads=2,
-)
-STIFFENING = Term(
-    COMPLIANCE,
-    "stiffness growing with load",
-    "The spring stiffens with the load",
-    Number("stiffening", 0.0, -0.4, 2.0, 0.05, "1/kg"),
-    loads=2,
-)
-WIDTH = Term(
-    "load_dependent_hysteresis",
-    "width linear in load",
-    "The hysteresis loop widens or narrows with the load",
-    Number("width", 0.0, -0.95, 2.0, 0.1, "1/kg"),
-    loads=2,
-    both_ways=True,
-)
-FRICTION = Term(
-    "pressure_dependent_friction",
-    "bent pressure scale",
-    "Friction changes along the pressure range, uniform on a bent pressure scale",
-    Number("bend", 0.0, -0.8, 0.8, 0.1),
-    both_ways=True,
-)
-CREEP = Term(
-    "creep",
-    "residual creep over readings",
-    "A part of each step appears only in the next readings",
-    Number("creep", 0.0, -0.5, 0.5, 0.02),
-)
-THRESHOLD = Term(
-    "threshold_pressure",
-    "soft threshold",
-    "The first part of the pressure has no effect",
-    Number("threshold", 0.0, 0.0, 0.3, 0.03, "bar"),
-)
-TERMS = (SHIFT, SHIFT_ZEROED, STRETCH, STROKE, STIFFENING, WIDTH, FRICTION, CREEP, THRESHOLD)
 """All forms of causes that a table of readings can show, the best established first."""
-
-EXPONENT = Term("load law", "power", "", Number("exponent", 1.0, 0.3, 6.0, 0.3), loads=3)
-DEAD_LOAD = Term(
-    "load law", "dead zone", "", Number("dead_load", 0.0, 0.0, 0.95, 0.1, "kg"), loads=3
-)
-
+EXPONENT = Term("load law", "power", Number("exponent", 1.0, 0.3, 6.0, 0.3), loads=3)
+DEAD_LOAD = Term("load law", "dead zone", Number("dead_load", 0.0, 0.0, 0.95, 0.1, "kg"), loads=3)
 
 Values = Mapping[str, Array]
 """Parameters by name, each of shape (L, 1); missing ones are neutral."""

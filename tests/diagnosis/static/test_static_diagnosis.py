@@ -13,7 +13,7 @@ from pam_envs.diagnosis.static.cells import THRESHOLDS, cells_of, stops
 from pam_envs.diagnosis.static.compare import Study
 from pam_envs.diagnosis.static.diagnosis import audit_polynomials, diagnose_readings
 from pam_envs.diagnosis.static.fit import Fit, check_nested
-from pam_envs.diagnosis.static.models import SHIFT, TERMS, predict, units
+from pam_envs.diagnosis.static.models import TERMS, predict, units
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from tests.diagnosis.static.synthetic_readings import PRESSURES, table
 
@@ -273,10 +273,10 @@ def test_every_term_is_neutral_at_its_neutral_value():
 
 def test_fit_worse_than_nested_model_is_refused():
     parent = Fit((), np.zeros((1, 9)), np.array([1.0]))
-    child = Fit((SHIFT,), np.zeros((1, 10)), np.array([1.1]))
+    child = Fit(TERMS[:1], np.zeros((1, 10)), np.array([1.1]))
     with pytest.raises(RuntimeError, match="fits worse"):
         check_nested([parent], child)
 
 
 def test_units_lead_back_to_bar_and_kg():
-    assert units(SHIFT.number, (4.55, 6e5, 0.0151)) == pytest.approx(6.0 / 4.55)
+    assert units(TERMS[0].number, (4.55, 6e5, 0.0151)) == pytest.approx(6.0 / 4.55)
