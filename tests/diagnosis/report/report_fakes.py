@@ -11,27 +11,17 @@ import numpy as np
 SEGMENTS = ("holds", "staircase", "sine", "ramp", "steps_held", "sine_held")
 HELD = ("steps_held", "sine_held")
 LOADS = (25.0, 25.0, 25.0, 45.0, 45.0, 25.0)
-CAUSES = (
-    "creep",
-    "leak",
-    "valve_dead_band",
-    "dead_time",
-    "sensor_drift",
-    "sensor_delay",
-    "viscous_loss",
-    "temperature",
-    "first_cycle_softening",
-    "load_dependent_hysteresis",
-    "stick_slip",
-    "threshold_pressure",
-    "slip_step",
-    "wire_slack",
+_NAMES = (
+    "creep leak valve_dead_band dead_time sensor_drift sensor_delay viscous_loss temperature "
+    "first_cycle_softening load_dependent_hysteresis stick_slip threshold_pressure slip_step "
+    "wire_slack"
 )
+CAUSES = _NAMES.split()
 VARIABLES = ("direction", "rate", "pressure", "load", "time_since_reversal", "time", "cycle")
 
 
 class Plant:
-    """Writes what it is told."""
+    """Writes a fixed text."""
 
     def __init__(self, text: str = "schema: 1\n") -> None:
         self.text = text
@@ -42,22 +32,18 @@ class Plant:
 
 def command_of(t: np.ndarray, kind: int) -> np.ndarray:
     """Return a commanded pressure [bar] over one segment."""
-    n = len(t)
-    if kind in (0, 1):
-        levels = (
-            np.array([0.5, 2.5, 4.5, 2.0, 1.0])
-            if kind == 0
-            else np.array([1, 2, 3, 4, 5, 4, 3, 2, 1])
-        )
-        return levels[np.minimum((np.arange(n) * len(levels)) // n, len(levels) - 1)].astype(float)
+    rng = np.random.default_rng(5)
+    levels = {
+        0: np.array([0.5, 2.5, 4.5, 2.0, 1.0]),
+        1: np.array([1.0, 2, 3, 4, 5, 4, 3, 2, 1]),
+        4: rng.uniform(0.5, 5.0, 14),
+    }
     if kind in (2, 5):
         f = 0.1 if kind == 2 else 0.07
         return 2.5 + 2.0 * np.sin(2 * np.pi * f * t - np.pi / 2)
     if kind == 3:
         return 0.3 + 5.0 * (1 - np.abs(2 * t / t[-1] - 1))
-    rng = np.random.default_rng(5)
-    levels = rng.uniform(0.5, 5.0, 14)
-    return levels[np.minimum((np.arange(n) * 14) // n, 13)]
+    return levels[kind][(np.arange(len(t)) * len(levels[kind])) // len(t)]
 
 
 def lag(u: np.ndarray, period: float, tau: float) -> np.ndarray:
@@ -142,17 +128,10 @@ def structure(scale: float) -> dict[str, Any]:
 
 
 def rivals(verdict: str) -> list[dict[str, Any]]:
-    gains = np.array(
-        [2.9, 2.41, 1.12, 0.83, 0.61, 0.4, 0.22, 0.1, 0.06, 0.02, 0.01, 0.0, -0.01, -0.04]
-    )
+    gains = [2.9, 2.41, 1.12, 0.83, 0.61, 0.4, 0.22, 0.1, 0.06, 0.02, 0.01, 0.0, -0.01, -0.04]
     if verdict == "ambiguous":
         gains[1] = 2.78
-    names = (
-        "creep",
-        "first_cycle_softening",
-        "sensor_drift",
-        *(c for c in CAUSES if c not in ("creep", "first_cycle_softening", "sensor_drift")),
-    )
+    names = list(dict.fromkeys(["creep", "first_cycle_softening", "sensor_drift", *CAUSES]))
     return [
         {
             "name": name,
@@ -195,29 +174,19 @@ def isolability() -> dict[str, Any]:
     }
 
 
+def parameter(name: str, unit: str, **values: Any) -> dict[str, Any]:
+    flags = {"at_bound": False, "not_identified": False}
+    return {"name": name, "unit": unit, **values, **flags}
+
+
 CREEP = {
     "name": "creep",
     "title": "creep of the muscle",
     "form": "three Kelvin-Voigt elements",
     "parameters": [
-        {
-            "name": "muscle.creep_fast",
-            "value": 0.031,
-            "unit": "1",
-            "interval": [0.027, 0.035],
-            "neutral": 0.0,
-            "at_bound": False,
-            "not_identified": False,
-        },
-        {
-            "name": "muscle.creep_slow",
-            "value": 0.092,
-            "unit": "1",
-            "interval": [None, 0.104],
-            "neutral": 0.0,
-            "at_bound": True,
-            "not_identified": np.bool_(True),
-        },
+        parameter("muscle.creep_fast", "1", value=0.031, interval=[0.027, 0.035], neutral=0.0),
+        parameter("muscle.creep_slow", "1", value=0.092, interval=[None, 0.104], neutral=0.0)
+        | {"at_bound": True, "not_identified": np.bool_(True)},
     ],
     "gain": {"value": 2.9, "interval": [2.6, 3.1]},
     "effect": {
@@ -292,36 +261,12 @@ def report(verdict: str = "named") -> dict[str, Any]:
         "closed_loop": CLOSED_LOOP if fixed else None,
         "closed_loop_reason": None if fixed else "no cause was added to the plant",
         "calibration": [
-            {
-                "name": "muscle.area",
-                "unit": "m2",
-                "before": 8.7e-4,
-                "after": 8.83e-4,
-                "interval": [8.8e-4, 8.9e-4],
-                "at_bound": False,
-                "not_identified": False,
-                "outside_tolerance": np.bool_(False),
-            },
-            {
-                "name": "regulator.time_constant",
-                "unit": "s",
-                "before": 0.08,
-                "after": 0.25,
-                "interval": [0.24, 0.26],
-                "at_bound": False,
-                "not_identified": False,
-                "outside_tolerance": True,
-            },
-            {
-                "name": "mass.moving_mass",
-                "unit": "kg",
-                "before": 0.5,
-                "after": 0.1,
-                "interval": [None, 3.0],
-                "at_bound": True,
-                "not_identified": True,
-                "outside_tolerance": False,
-            },
+            parameter("muscle.area", "m2", before=8.7e-4, after=8.83e-4, interval=[8.8e-4, 8.9e-4])
+            | {"outside_tolerance": np.bool_(False)},
+            parameter("regulator.time_constant", "s", before=0.08, after=0.25, interval=[0.2, 0.3])
+            | {"outside_tolerance": True},
+            parameter("mass.moving_mass", "kg", before=0.5, after=0.1, interval=[None, 3.0])
+            | {"at_bound": True, "not_identified": True, "outside_tolerance": False},
         ],
         "not_testable": [
             {"name": "supply_droop", "reason": "the recording has no column supply_pressure_bar"},
