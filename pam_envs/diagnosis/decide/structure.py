@@ -5,6 +5,7 @@ None of this names a cause; it shows whether anything is left to explain.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -210,11 +211,14 @@ def _heights(signal: Array, period: float) -> tuple[Array, Array]:
 def ljung_box(residual: Array, lags: int = LAGS) -> float:
     """Return the p-value of the Ljung-Box test of whiteness."""
     r = residual[np.isfinite(residual)]
-    n = len(r)
-    if n < 10 * lags:
-        return float("nan")
-    r = r - r.mean()
-    power = float(r @ r)
-    rho = np.array([float(r[k:] @ r[:-k]) for k in range(1, lags + 1)]) / max(power, 1e-300)
+    return pooled_ljung_box([r], lags) if len(r) >= 10 * lags else float("nan")
+
+
+def pooled_ljung_box(parts: Sequence[Array], lags: int) -> float:
+    """Return the p-value of the Ljung-Box test over several parts of a series."""
+    parts = [part - part.mean() for part in parts]
+    n, power = sum(map(len, parts)), sum(float(part @ part) for part in parts)
+    sums = [sum(float(part[k:] @ part[:-k]) for part in parts) for k in range(1, lags + 1)]
+    rho = np.array(sums) / max(power, 1e-300)
     statistic = n * (n + 2) * np.sum(rho**2 / (n - np.arange(1, lags + 1)))
     return float(chi2.sf(statistic, lags))

@@ -37,8 +37,7 @@ class Law:
     """A load law other than linear, common to all effects of the load.
 
     ``value`` and its 95 % interval are those of its parameter in its own unit, ``p`` is the p-value
-    against the linear law, ``left_load`` the mean error on held-out loads [mm]. It is ``post_hoc``
-    if its parameter was fitted to the held-out loads.
+    against the linear law. It is ``post_hoc`` if its parameter was fitted to the held-out loads.
     """
 
     term: Term
@@ -46,7 +45,6 @@ class Law:
     value: float
     interval: Interval
     p: float
-    left_load: float
     post_hoc: bool
 
 
@@ -61,27 +59,15 @@ def load_laws(study: Study, model: Model) -> tuple[Law, ...]:
 def _law(study: Study, model: Model, term: Term) -> Law:
     free = study.extended([model], (*model.terms, term))
     scale = units(term.number, study.cells.scale)
-    draws = parameter_draws(study, free)
-    (low, high), value = interval(draws[:, -1]), float(free.fit.theta[0, -1])
+    low, high = interval(parameter_draws(study, free)[:, -1])
+    value, judged = float(free.fit.theta[0, -1]), free
     seen = len(study.cells.loads) < LOADS_FOR_A_LAW
-    judged = _fixed(study, model, free, term, value) if seen else free
-    return Law(
-        term,
-        judged,
-        value * scale,
-        (low * scale, high * scale),
-        p_value(study, model, free),
-        judged.left_load,
-        seen,
-    )
-
-
-def _fixed(study: Study, model: Model, free: Model, term: Term, value: float) -> Model:
-    """Return the model with the law's parameter fixed at its fit to all data."""
-    number = replace(term.number, neutral=value, low=value, high=value)
-    start = free.fit.theta.copy()
-    start[:, -1] = value
-    return study.refitted((*model.terms, replace(term, number=number)), start)
+    if seen:  # the law's parameter is fixed at its fit to all data
+        number, start = replace(term.number, low=value, high=value), free.fit.theta.copy()
+        start[:, -1] = value
+        judged = study.refitted((*model.terms, replace(term, number=number)), start)
+    p = p_value(study, model, free)
+    return Law(term, judged, value * scale, (low * scale, high * scale), p, seen)
 
 
 def separated(study: Study, laws: Sequence[Law]) -> bool:
@@ -94,16 +80,15 @@ def separated(study: Study, laws: Sequence[Law]) -> bool:
 
 @dataclass(frozen=True)
 class NextLoads:
-    """Separation of two models at other loads [kg], shape (GRID,).
+    """Largest difference of two models over a cycle, and the ``best`` loads [kg] to measure next.
 
-    ``separation`` is the mean square difference over a cycle in variances of a cell's mean with the
-    table's number of repeats, ``apart`` the root mean square difference [mm]; ``best`` are the
-    loads [kg] to measure next, best first.
+    ``apart`` is the root mean square difference [mm] at ``load`` [kg], ``separation`` its square in
+    variances of a cell's mean with the table's number of repeats.
     """
 
-    loads: Array
-    separation: Array
-    apart: Array
+    load: float
+    apart: float
+    separation: float
     best: tuple[float, ...]
 
 
@@ -113,10 +98,10 @@ def next_loads(study: Study, one: Model, other: Model) -> NextLoads:
     heaviest = cells.scale[0]
     loads = heaviest * np.arange(1, GRID + 1) / GRID
     apart = np.array([_apart(cells, one, other, load / heaviest) for load in loads])
-    noise, _ = pure_error(cells)
-    repeats = float(np.mean(cells.counts[cells.used]))
-    separation = repeats * (apart / noise) ** 2
-    return NextLoads(loads, separation, apart, _peaks(cells.loads, loads, apart))
+    repeats, at = float(np.mean(cells.counts[cells.used])), int(np.argmax(apart))
+    separation = repeats * float(apart[at] / pure_error(cells)[0]) ** 2
+    best = _peaks(cells.loads, loads, apart)
+    return NextLoads(float(loads[at]), float(apart[at]), separation, best)
 
 
 def _apart(cells: Cells, one: Model, other: Model, load: float) -> float:

@@ -173,20 +173,18 @@ def experiment(f: Findings) -> Json | None:
     names = (
         [law.term.form for law in f.laws] if f.bent else [t.term.cause for t in f.search.ties[0]]
     )
-    at = int(np.argmax(f.next.apart))
     loads = " and ".join(f"{load:.1f} kg" for load in f.next.best)
-    separation = float(f.next.separation[at])
     return {
         "between": names[:2],
         "name": "more loads",
         "description": (
             f"measure {loads} with the same cycles and repeats: the largest difference of the two "
-            f"is {f.next.apart[at]:.2f} mm RMS over a cycle at {f.next.loads[at]:.1f} kg (the "
+            f"is {f.next.apart:.2f} mm RMS over a cycle at {f.next.load:.1f} kg (the "
             "separation is in variances of a cell's mean)"
         ),
         "segments": [],
-        "separation": separation,
-        "enough": bool(separation >= 1.0),
+        "separation": f.next.separation,
+        "enough": bool(f.next.separation >= 1.0),
         "sensor": None,
     }
 

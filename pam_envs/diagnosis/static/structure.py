@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from pam_envs.diagnosis.arrays import Array
+from pam_envs.diagnosis.decide.structure import pooled_ljung_box, since
 from pam_envs.diagnosis.static.cells import Cells
 from pam_envs.diagnosis.static.compare import Model, Study, beyond, slopes
 from pam_envs.diagnosis.static.models import Term, predict
@@ -25,15 +25,8 @@ DEGREE = 3
 def whiteness(cells: Cells, model: Model) -> float:
     """Return the p-value of uncorrelated residuals along the paths (Ljung-Box test)."""
     paths = [model.residual[(cells.path == k) & cells.used] for k in np.unique(cells.path)]
-    paths = [path - path.mean() for path in paths if len(path) > LAGS]
-    n = sum(len(path) for path in paths)
-    power = sum(float(path @ path) for path in paths)
-    if power <= 0.0:
-        return float("nan")
-    lags = range(1, LAGS + 1)
-    rho = [sum(float(path[k:] @ path[:-k]) for path in paths) / power for k in lags]
-    statistic = sum(n * (n + 2) * r**2 / (n - k) for k, r in zip(lags, rho, strict=True))
-    return float(chi2.sf(statistic, LAGS))
+    paths = [path for path in paths if len(path) > LAGS]
+    return pooled_ljung_box(paths, LAGS) if paths else float("nan")
 
 
 def explained(values: Array, labels: NDArray[Any]) -> float:
@@ -65,26 +58,20 @@ def explained_by_polynomials(cells: Cells, residual: Array) -> float:
     return _adjusted(left, fitted, residual[cells.used])
 
 
-def since_reversal(cells: Cells) -> NDArray[np.int64]:
-    """Return the number of readings since the last reversal or start of the path, shape (C,)."""
-    fresh = np.ones(len(cells.path), bool)
-    fresh[1:] = (np.diff(cells.path) != 0) | (cells.falling[1:] != cells.falling[:-1])
-    start = np.maximum.accumulate(np.where(fresh, np.arange(len(fresh)), 0))
-    return np.asarray(np.arange(len(fresh)) - start)
-
-
 def structure(cells: Cells, model: Model) -> Json:
     """Return the ``residual_structure`` of a model: whiteness and shares of variance."""
     used, residual = cells.used, model.residual[cells.used]
     readings = (cells.readings - cells.mean)[:, used] * cells.millimetres + residual
     number = np.broadcast_to(np.arange(len(readings))[:, None], readings.shape)
     seen = np.isfinite(readings)
+    turned = np.ones(len(cells.path), bool)  # reversals and starts of paths
+    turned[1:] = (np.diff(cells.path) != 0) | (cells.falling[1:] != cells.falling[:-1])
     r2 = {
         "direction": explained(residual, cells.falling[used]),
         "rate": None,
         "pressure": explained(residual, cells.pressure[used]),
         "load": explained(residual, cells.load[used]),
-        "time_since_reversal": explained(residual, since_reversal(cells)[used]),
+        "time_since_reversal": explained(residual, since(turned, 1.0)[used]),
         "time": None,
         "temperature": None,
         "cycle": explained(readings[seen], number[seen]),

@@ -70,8 +70,8 @@ def _loads(f: Findings) -> str:
     power = f.laws[0]
     label = "post hoc, not held out" if power.post_hoc else "held out"
     return (
-        f"{text} with effects linear in load, as fixed beforehand; {power.left_load:.2f} mm with "
-        f"the exponent {power.value:.1f} ({label})."
+        f"{text} with effects linear in load, as fixed beforehand; {power.model.left_load:.2f} mm "
+        f"with the exponent {power.value:.1f} ({label})."
     )
 
 
