@@ -1,32 +1,41 @@
-"""Measured contraction of one muscle over pressure cycles, checked while reading.
+"""Settled readings without time: a quasi-static table, checked while reading.
 
-375 readings of a Festo MAS-10-N-100 (positioning2021, Tables 3 to 5): three hanging loads, five
-cycles each, one cycle 0 to 6 bar and back in steps of 0.5 bar, a minute of rest before each
-reading. Hysteresis makes a reading depend on those before it: the arrays keep their order.
+    load_kg,pressure_bar,direction,repeat,contraction_mm
+    2.55,0.5,inflating,1,0.31
+
+The shipped table has 375 readings of a Festo MAS-10-N-100 (positioning2021, Tables 3 to 5): three
+hanging loads, five cycles each, one cycle 0 to 6 bar and back in steps of 0.5 bar, a minute of rest
+before each reading. Hysteresis makes a reading depend on those before it: the arrays keep their
+order.
 """
 
 from __future__ import annotations
 
-import csv
 import dataclasses
-from collections.abc import Callable, Mapping
 from importlib import resources
-from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pam_envs.data.recording.columns import RecordingError, Sheet, read_sheet, refuse, rows_text
+
 Array = NDArray[np.float64]
-Parser = Callable[[str], Any]
-"""Makes a value of a cell, or raises ``ValueError`` with a sentence."""
-N = TypeVar("N", int, float)
 
 BAR = 1e5
 MM = 1e-3
 LOAD_TOLERANCE = 1e-6
 """Two loads [kg] closer than this are the same load."""
+READINGS = ("load_kg", "pressure_bar", "direction", "repeat", "contraction_mm")
+"""The columns of a table of settled readings."""
+UP = ("inflating", "inflation", "up")
+DOWN = ("deflating", "deflation", "down")
+BOUNDS = {
+    "load_kg": (0.0, 1000.0),
+    "pressure_bar": (-1.0, 20.0),
+    "repeat": (0, 100_000),
+    "contraction_mm": (-1000.0, 1000.0),
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -123,144 +132,132 @@ class ContractionTable:
         return rows
 
 
-def number(low: float, high: float, unit: float = 1.0) -> Parser:
-    """Return a parser of numbers within [low, high], in the file's ``unit`` (1e5 Pa for bar)."""
-    return lambda cell: unit * _within(_converted(cell, float, "a number"), low, high)
-
-
-def whole_number(low: int, high: int) -> Parser:
-    """Return a parser of whole numbers within [low, high]."""
-    return lambda cell: _within(_converted(cell, int, "a whole number"), low, high)
-
-
-def one_of(*choices: str) -> Parser:
-    """Return a parser of one of these words."""
-
-    def parse(cell: str) -> str:
-        if cell not in choices:
-            allowed = " or ".join(map(repr, choices))
-            raise ValueError(f"{cell!r} is not {allowed}; correct the cell")
-        return cell
-
-    return parse
-
-
-COLUMNS: dict[str, Parser] = {
-    "load_kg": number(0.0, 1000.0),
-    "direction": one_of("inflation", "deflation"),
-    "pressure_bar": number(0.0, 20.0, BAR),
-    "repeat": whole_number(1, 100_000),
-    "contraction_mm": number(-1000.0, 1000.0, MM),
-}
-"""The columns of a table of contractions."""
-
-
-def read_columns(source: Path | Traversable, columns: Mapping[str, Parser]) -> dict[str, list[Any]]:
-    """Read a CSV file whose every cell is checked, in the file's order.
-
-    The first row holds exactly the names of ``columns``, in their order; their parsers make the
-    values, see :func:`number`, :func:`whole_number` and :func:`one_of`.
-
-    Raises
-    ------
-    ValueError
-        For wrong columns, a row of the wrong length, a bad cell or no rows at all, naming file,
-        row (the header is row 1), column and value.
-    """
-    # utf-8-sig: spreadsheets put a byte order mark before the first column's name.
-    rows = csv.reader(source.read_text(encoding="utf-8-sig").splitlines())
-    header = [cell.strip() for cell in next(rows, [])]
-    if header != list(columns):
-        raise ValueError(
-            f"{source}, row 1: the columns must be {', '.join(columns)}, got {', '.join(header)!r}"
-        )
-    values: dict[str, list[Any]] = {name: [] for name in columns}
-    for row, cells in enumerate(rows, 2):
-        if cells:
-            _add(values, cells, columns, f"{source}, row {row}")
-    if not values[header[0]]:
-        raise ValueError(f"{source} holds no readings; give at least one row below the header")
-    return values
-
-
-def load_contraction_table(path: str | Path | None = None) -> ContractionTable:
-    """Read and check a table of contractions.
+def load_readings(path: str | Path) -> ContractionTable:
+    """Read settled readings; the repeats may take different paths, with any number of reversals.
 
     Parameters
     ----------
-    path : str or Path, optional
-        A CSV file with the columns ``load_kg, direction, pressure_bar, repeat, contraction_mm``,
-        each cycle's rows in the order of its readings; cycles may be mixed. Default: the published
-        375 readings.
+    path : str or Path
+        A CSV file with the columns of :data:`READINGS` in any order, ``repeat`` optional; each
+        repeat's rows in the order in which they were taken.
+
+    Returns
+    -------
+    ContractionTable
+        In SI, sorted by load and repeat; ``cycles``, ``means`` and ``branch`` need
+        :func:`one_path`.
 
     Raises
     ------
-    ValueError
-        For a bad cell, naming file, row (the header is row 1), column and value; for a cycle whose
-        pressures do not rise and then fall, or differ from those of the load's other cycles.
+    RecordingError
+        With all problems, naming column, rows and remedy.
     """
-    source = resources.files(__package__) / "mas10_contraction.csv" if path is None else Path(path)
-    columns = {name: np.array(values) for name, values in read_columns(source, COLUMNS).items()}
-    table = sorted_table(columns, columns["direction"] == "inflation")
-    _check_cycles(table, str(source))
+    required = [name for name in READINGS if name != "repeat"]
+    sheet = read_sheet(path, READINGS, required, "a table of readings")
+    numbers = _numbers(sheet)
+    inflating = _directions(sheet)
+    order = np.lexsort((numbers["repeat"], numbers["load_kg"]))
+    table = ContractionTable(
+        load_kg=numbers["load_kg"][order],
+        inflating=inflating[order],
+        pressure_pa=BAR * numbers["pressure_bar"][order],
+        repeat=numbers["repeat"][order].astype(np.int64),
+        contraction_m=MM * numbers["contraction_mm"][order],
+    )
+    _check_order(table, sheet.rows[order], sheet.where)
     return table
 
 
-def _add(
-    values: dict[str, list[Any]], cells: list[str], columns: Mapping[str, Parser], where: str
-) -> None:
-    """Add the values of one row to the columns."""
-    if len(cells) != len(columns):
-        raise ValueError(f"{where}: {len(columns)} cells are needed, got {len(cells)}: {cells!r}")
-    for (name, parse), cell in zip(columns.items(), cells, strict=True):
-        try:
-            values[name].append(parse(cell.strip()))
-        except ValueError as error:
-            raise ValueError(f"{where}, column {name}: {error}") from None
+def load_contraction_table(path: str | Path | None = None) -> ContractionTable:
+    """Read a table of which all repeats at a load are one cycle over the same pressures.
+
+    ``path`` is a file as for :func:`load_readings`; default: the published 375 readings. Raises
+    RecordingError, a ValueError, with all problems, naming column, rows and remedy.
+    """
+    source = resources.files(__package__) / "mas10_contraction.csv" if path is None else path
+    table = load_readings(Path(str(source)))
+    fault = _path_fault(table)
+    if fault:
+        raise RecordingError(str(source), [fault])
+    return table
 
 
-def _converted(cell: str, kind: Callable[[str], N], allowed: str) -> N:
-    try:
-        return kind(cell)
-    except ValueError:
-        raise ValueError(f"{cell!r} is not {allowed}; correct the cell") from None
+def one_path(table: ContractionTable) -> bool:
+    """Return whether all repeats at a load went up once and down once, over the same pressures."""
+    return not _path_fault(table)
 
 
-def _within(value: N, low: float, high: float) -> N:
-    if not low <= value <= high:
-        raise ValueError(f"{value!r} is outside [{low:g}, {high:g}]; correct the cell or its unit")
-    return value
-
-
-def sorted_table(columns: Mapping[str, Array], inflating: NDArray[np.bool_]) -> ContractionTable:
-    """Return readings in SI sorted by load and repeat; within a cycle the given order stays."""
-    order = np.lexsort((columns["repeat"], columns["load_kg"]))
-    return ContractionTable(
-        load_kg=np.asarray(columns["load_kg"], np.float64)[order],
-        inflating=inflating[order],
-        pressure_pa=np.asarray(columns["pressure_bar"], np.float64)[order],
-        repeat=np.asarray(columns["repeat"], np.int64)[order],
-        contraction_m=np.asarray(columns["contraction_mm"], np.float64)[order],
-    )
-
-
-def _check_cycles(table: ContractionTable, name: str) -> None:
-    """Raise if a cycle is not one way up and one way down, or not the path of its load."""
+def _path_fault(table: ContractionTable) -> str:
+    """Return what is wrong with the paths of a table, in a sentence, or an empty string."""
     for load in table.loads:
         path, _ = table.cycle(load, table.repeats(load)[0])
         for repeat in table.repeats(load):
-            rows = table._at(load) & (table.repeat == repeat)
-            pressure, inflating = table.pressure_pa[rows], table.inflating[rows]
-            where = f"{name}: load {load:g} kg, repeat {repeat}"
-            ways = np.where(inflating[1:], np.diff(pressure) > 0.0, np.diff(pressure) < 0.0)
-            if not inflating[0] or not ways.all() or np.any(np.diff(inflating.astype(int)) > 0):
-                raise ValueError(
+            pressure, _ = table.cycle(load, repeat)
+            top = int(np.argmax(pressure))
+            where = f"load {load:g} kg, repeat {repeat}"
+            if np.any(np.diff(pressure[: top + 1]) <= 0.0) or np.any(
+                np.diff(pressure[top:]) >= 0.0
+            ):
+                return (
                     f"{where}: the pressures must rise along the inflation rows and then fall "
                     "along the deflation rows; put the rows in the order of the readings, each "
                     "pressure once a way"
                 )
             if not np.array_equal(pressure, path):
-                raise ValueError(
+                return (
                     f"{where}: its pressures differ from those of the load's first repeat; "
                     "measure every repeat at the same pressures, in the same order"
                 )
+    return ""
+
+
+def _numbers(sheet: Sheet) -> dict[str, Array]:
+    numbers, problems = {}, []
+    for name, (low, high) in BOUNDS.items():
+        if name not in sheet.cells:
+            numbers[name] = np.ones(len(sheet.rows))
+            continue
+        values, empty, wrong = sheet.numbers(name)
+        problems += wrong
+        if empty.any():
+            at = rows_text(sheet.rows[empty])
+            problems.append(f"column {name} is empty in {at}; fill the cells or leave the rows out")
+        outside = (values < low) | (values > high)
+        if name == "repeat":
+            outside |= np.isfinite(values) & (values != np.round(values))
+        if outside.any():
+            first = values[outside][0]
+            kind = "a whole number from" if name == "repeat" else "a number from"
+            problems.append(
+                f"column {name} holds {first:g} and the like in {rows_text(sheet.rows[outside])}; "
+                f"{kind} {low:g} to {high:g} is needed: correct the cells or their unit"
+            )
+        numbers[name] = values
+    if problems:
+        refuse(sheet.where, *problems)
+    return numbers
+
+
+def _directions(sheet: Sheet) -> NDArray[np.bool_]:
+    words = [word.lower() for word in sheet.text("direction")]
+    wrong = [i for i, word in enumerate(words) if word not in UP + DOWN]
+    if wrong:
+        refuse(
+            sheet.where,
+            f"column direction holds {words[wrong[0]]!r} and the like in "
+            f"{rows_text(sheet.rows[wrong])}; write inflating or deflating (or up, down)",
+        )
+    return np.array([word in UP for word in words], dtype=bool)
+
+
+def _check_order(table: ContractionTable, rows: NDArray[np.int64], where: str) -> None:
+    """Raise where a pressure moves against the direction of its row."""
+    same = (np.diff(table.load_kg) == 0.0) & (np.diff(table.repeat) == 0)
+    step = np.where(table.inflating[1:], 1.0, -1.0) * np.diff(table.pressure_pa)
+    wrong = same & (step < 0.0)
+    if wrong.any():
+        refuse(
+            where,
+            f"the pressure moves against the direction in {rows_text(rows[1:][wrong])}; within a "
+            "load and repeat, put the rows in the order of the readings",
+        )

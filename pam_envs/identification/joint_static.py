@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares, nnls
 
-from pam_envs.data.tables import number, read_columns
 from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.muscle.force_map import ForceMap
 from pam_envs.plants.antagonistic_joint.hysteresis import ANGLE_THRESHOLDS
@@ -26,11 +25,6 @@ Array = NDArray[np.float64]
 MAP_LENGTH = 0.25
 """Length [m] of the muscle that was measured, at rest."""
 FITTED = ("area", "taper", "threshold", "braid_force", "braid_strain", "stiffness")
-COLUMNS = {
-    "pressure_pa": number(0.0, 1.2e6),
-    "length_m": number(0.1, MAP_LENGTH),
-    "force_n": number(0.0, 1e3),
-}
 AMPLITUDES = (25.0, 20.0, 15.0, 10.0, 7.0, 5.0, 3.0)
 """Of the loops on which the reduced hysteresis is identified [degrees]."""
 
@@ -52,8 +46,7 @@ class MeasuredMap:
 def measured_map() -> MeasuredMap:
     """Return the measured map."""
     source = resources.files("pam_envs.data") / "dmsp10_force_map.csv"
-    read = read_columns(source, COLUMNS)
-    columns = {name: np.array(values) for name, values in read.items()}
+    columns = np.genfromtxt(str(source), delimiter=",", names=True)
     contraction = 1.0 - columns["length_m"] / MAP_LENGTH
     return MeasuredMap(columns["pressure_pa"], contraction, columns["force_n"])
 

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pam_envs.data.readings import one_path
 from pam_envs.data.recording.recording import (
     COLUMNS,
     Recording,
@@ -20,7 +19,7 @@ from pam_envs.data.recording.recording import (
     repeat_rows,
 )
 from pam_envs.data.rig_file import KEYS
-from pam_envs.data.tables import load_contraction_table
+from pam_envs.data.tables import load_contraction_table, one_path
 
 BASE = ("time_s", "segment", "pressure_command_bar", "pressure_bar", "contraction_mm", "load_N")
 

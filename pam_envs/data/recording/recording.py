@@ -3,7 +3,7 @@
     time_s,segment,pressure_command_bar,pressure_bar,contraction_mm,load_N
     0.00,staircase,0.0,0.004,0.01,25.0
 
-:func:`read_input` also takes settled readings without time, see :mod:`pam_envs.data.readings`.
+:func:`read_input` also takes settled readings without time, see :mod:`pam_envs.data.tables`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pam_envs.data.readings import READINGS, load_readings
 from pam_envs.data.recording import clock as clocks
 from pam_envs.data.recording.columns import (
     RecordingError,
@@ -29,7 +28,7 @@ from pam_envs.data.recording.columns import (
 )
 from pam_envs.data.recording.segments import check_rig, load_changes, repeat_rows, returns
 from pam_envs.data.rig_file import BAR, MM, Rig
-from pam_envs.data.tables import ContractionTable
+from pam_envs.data.tables import READINGS, ContractionTable, load_readings
 from pam_envs.wording import near
 
 __all__ = [

@@ -7,8 +7,7 @@ import dataclasses
 import numpy as np
 from scipy import stats
 
-from pam_envs.data.readings import one_path
-from pam_envs.data.tables import ContractionTable
+from pam_envs.data.tables import ContractionTable, one_path
 from pam_envs.diagnosis.arrays import Array
 
 MM = 1e-3

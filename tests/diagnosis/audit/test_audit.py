@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pam_envs.data.readings import load_readings
 from pam_envs.data.recording.recording import Recording, Rig
-from pam_envs.data.tables import ContractionTable, load_contraction_table
+from pam_envs.data.tables import ContractionTable, load_contraction_table, load_readings
 from pam_envs.diagnosis.audit.audit import audit, undecidable
 from pam_envs.diagnosis.audit.noise import hold_ends, noise_floor, resolution, white_noise
 from pam_envs.diagnosis.audit.tables import repeat_trend, scatter, scatter_homogeneity
