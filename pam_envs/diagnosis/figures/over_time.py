@@ -80,55 +80,45 @@ def places(view: View) -> list[tuple[float, int, str, bool]]:
     return found
 
 
-class Strips:
-    """Axes over the whole recording, stacked."""
+def strips(
+    view: View, rows: Sequence[tuple[str, float]], gap: float = ROW, titles: Sequence[str] = ()
+) -> tuple[Canvas, list[Any]]:
+    """Return stacked axes over the whole recording, one for each label and height.
 
-    def __init__(self, view: View, heights: Sequence[float], gap: float = ROW) -> None:
-        self.view, self.gap = view, gap
-        self.names = places(view)
-        rows = 1 + max((row for _, row, _, _ in self.names), default=0)
-        self.top = LEGEND + ROW * rows + (gap - ROW)
-        self.canvas = Canvas(self.top + sum(heights) + gap * (len(heights) - 1) + BOTTOM)
-        self.heights = list(heights)
-        self.axes: list[Any] = []
-
-    def next(self, label: str) -> Any:
-        """Return the next axes, with held-out segments shaded, and named on the first."""
-        first = self.axes[0] if self.axes else None
-        height = self.heights[len(self.axes)]
-        ax = self.canvas.axes(LEFT, self.top, INSIDE, height, first)
-        self._shade(ax)
-        if first is None:
-            for time, row, name, held_out in self.names:
-                ax.annotate(
-                    name,
-                    (time, 1.0),
-                    xycoords=("data", "axes fraction"),
-                    xytext=(3.0, 4.0 + (ROW - 1.0) * row),
-                    textcoords="offset points",
-                    fontsize=10.5,
-                    color=INK if held_out else MUTED,
-                )
-        self.axes.append(ax)
-        self.top += height + self.gap
+    Held-out segments are shaded, and named on the first axes.
+    """
+    names = places(view)
+    above = ROW * (1 + max((row for _, row, _, _ in names), default=0))
+    top = LEGEND + above + (gap - ROW)
+    canvas = Canvas(top + sum(h for _, h in rows) + gap * (len(rows) - 1) + BOTTOM)
+    axes: list[Any] = []
+    for k, (label, height) in enumerate(rows):
+        if titles:
+            canvas.title(LEFT, top - (7.0 if k else 8.0 + above), titles[k])
+        ax = canvas.axes(LEFT, top, INSIDE, height, axes[0] if axes else None)
+        _shade(ax, view)
         ax.set_ylabel(label)
-        last = len(self.axes) == len(self.heights)
-        ax.tick_params(labelbottom=last)
-        if last:
-            ax.set_xlabel("time [s]")
-        return ax
+        ax.tick_params(labelbottom=k == len(rows) - 1)
+        axes.append(ax)
+        top += height + gap
+    for time, row, name, held_out in names:
+        style = {"fontsize": 10.5, "color": INK if held_out else MUTED}
+        place = {"xytext": (3.0, 4.0 + (ROW - 1.0) * row), "textcoords": "offset points"}
+        axes[0].annotate(name, (time, 1.0), xycoords=("data", "axes fraction"), **place, **style)
+    axes[-1].set_xlabel("time [s]")
+    return canvas, axes
 
-    def _shade(self, ax: Any) -> None:
-        view = self.view
-        for span in view.spans:
-            start = view.clock[span.start]
-            stop = view.end if span.stop == len(view.clock) else view.clock[span.stop]
-            if span.held_out:
-                ax.axvspan(start, stop, color=HELD, linewidth=0, zorder=0)
-            if span.start:
-                ax.axvline(start, color=RULE, linewidth=0.8, zorder=0.5)
-        ax.grid(axis="x", visible=False)
-        ax.set_xlim(view.clock[0], view.end)
+
+def _shade(ax: Any, view: View) -> None:
+    for span in view.spans:
+        start = view.clock[span.start]
+        stop = view.end if span.stop == len(view.clock) else view.clock[span.stop]
+        if span.held_out:
+            ax.axvspan(start, stop, color=HELD, linewidth=0, zorder=0)
+        if span.start:
+            ax.axvline(start, color=RULE, linewidth=0.8, zorder=0.5)
+    ax.grid(axis="x", visible=False)
+    ax.set_xlim(view.clock[0], view.end)
 
 
 def replay(report: Report, view: View) -> Picture | None:
@@ -138,16 +128,16 @@ def replay(report: Report, view: View) -> Picture | None:
         below.append(("load\n[N]", view.load))
     if view.temperature is not None:
         below.append(("temp.\n[°C]", view.temperature))
-    strips = Strips(view, [170.0] * len(view.channels) + [52.0] * len(below))
-    for channel in view.channels:
-        models(strips.next(tv.unit_label(channel)), view, channel, slice(None))
-    for label, values in below:
-        ax = strips.next(label)
+    rows = [(tv.unit_label(channel), 170.0) for channel in view.channels]
+    canvas, axes = strips(view, [*rows, *((label, 52.0) for label, _ in below)])
+    for channel, ax in zip(view.channels, axes, strict=False):
+        models(ax, view, channel, slice(None))
+    for (_, values), ax in zip(below, axes[len(rows) :], strict=True):
         line(ax, view.clock, values, color=INK)
         ax.set_ylim(limits([values], 0.15))
         ax.locator_params(axis="y", nbins=2)
-    strips.canvas.legend([*model_legend(view), *held_out_legend(view)])
-    return strips.canvas.picture(
+    canvas.legend([*model_legend(view), *held_out_legend(view)])
+    return canvas.picture(
         "replay",
         f"{' and '.join(view.channels)} over {len(view.spans)} segments, measured and simulated "
         f"before{' and after' if view.extended else ''} the extension",
@@ -191,10 +181,9 @@ def zoom(report: Report, view: View) -> Picture | None:
 
 def residual(report: Report, view: View) -> Picture | None:
     """Draw the residual of each output over time, with the noise band."""
-    strips = Strips(view, [150.0] * len(view.channels))
+    canvas, axes = strips(view, [(tv.unit_label(channel), 150.0) for channel in view.channels])
     banded = False
-    for channel in view.channels:
-        ax = strips.next(tv.unit_label(channel))
+    for channel, ax in zip(view.channels, axes, strict=True):
         shown = view.residuals(channel)
         for rest, colour in zip(shown, (BASE, EXTENDED), strict=False):
             line(ax, view.clock, rest, color=colour, linewidth=0.9)
@@ -210,8 +199,8 @@ def residual(report: Report, view: View) -> Picture | None:
     entries = legend_of(both, f"{word} simulated", f"{word} before", f"{word} after")
     if banded:
         entries.append(("line", f"±2 {TIMES} noise floor", {"color": FLOOR, "linewidth": 1.8}))
-    strips.canvas.legend([*entries, *held_out_legend(view)])
-    return strips.canvas.picture(
+    canvas.legend([*entries, *held_out_legend(view)])
+    return canvas.picture(
         "residual",
         f"residual of {' and '.join(view.channels)} over time against the noise band",
         "A residual of noise alone fills the band between the green lines evenly; larger or slow "
@@ -229,26 +218,23 @@ def effects(report: Report, view: View) -> Picture | None:
     ]
     if not rows:
         return None
-    strips = Strips(view, [120.0] * len(rows), gap=ROW + 16.0)
-    for title, channel, trace in rows:
-        strips.canvas.title(LEFT, _title_height(strips), f"{title}: {channel}")
-        ax = strips.next(tv.unit_label(channel))
+    canvas, axes = strips(
+        view,
+        [(tv.unit_label(channel), 120.0) for _, channel, _ in rows],
+        ROW + 16.0,
+        [f"{title}: {channel}" for title, channel, _ in rows],
+    )
+    for (_, _, trace), ax in zip(rows, axes, strict=True):
         ax.axhline(0.0, color=MUTED, linewidth=0.8)
         line(ax, view.clock, trace, color=EXTENDED, linewidth=1.3)
-    strips.canvas.legend(
+    canvas.legend(
         [("line", "effect", {"color": EXTENDED, "linewidth": 1.8}), *held_out_legend(view)]
     )
-    return strips.canvas.picture(
+    return canvas.picture(
         "effects",
         "contribution over time of " + ", ".join(c["name"] for c in report["causes"]),
         "The extended simulation less the same simulation with this one cause switched off.",
     )
-
-
-def _title_height(strips: Strips) -> float:
-    if strips.axes:
-        return strips.top - 7.0
-    return strips.top - 8.0 - ROW * (1 + max((row for _, row, _, _ in strips.names), default=0))
 
 
 def _seen(report: Report, effect: dict[str, Array]) -> list[str]:
