@@ -20,7 +20,7 @@ import dataclasses
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -29,7 +29,6 @@ import yaml
 from pam_envs.wording import near
 
 Load = Literal["hanging_mass", "constant_force"]
-LOADS: tuple[str, ...] = get_args(Load)
 
 BAR = 1e5
 MM = 1e-3
@@ -120,16 +119,16 @@ class Rig:
             value = getattr(self, field)
             if value is not None:
                 _check_number(value / bounds.scale, bounds)
-        if self.load not in LOADS:
-            raise ValueError(
-                f"load is {self.load!r}; choose hanging_mass or constant_force (what hangs, in "
-                "newton, belongs into the recording's column load_N)"
-            )
-        if not 0 <= self.cycles_since_rest <= 1_000_000:
-            raise ValueError(
-                f"history.cycles_since_rest = {self.cycles_since_rest} is outside [0, 1000000]; "
-                "count the cycles since the muscle last rested"
-            )
+        _require(
+            self.load in get_args(Load),
+            f"load is {self.load!r}; choose hanging_mass or constant_force (the load in newton "
+            "belongs into the recording's column load_N)",
+        )
+        _require(
+            0 <= self.cycles_since_rest <= 1_000_000,
+            f"history.cycles_since_rest = {self.cycles_since_rest} is outside [0, 1000000]; count "
+            "the cycles since the muscle last rested",
+        )
         _check_groups(self.repeats)
         _check_tolerance(self.tolerance)
 
@@ -162,11 +161,11 @@ def _fields(data: Mapping[str, Any]) -> dict[str, Any]:
     _refuse_unknown(data, KEYS, "")
     sections = {name: _section(data.get(name), name, keys) for name, keys in SECTIONS.items()}
     plant = data.get("plant")
-    if not isinstance(plant, str) or not plant.strip():
-        raise ValueError(
-            f"plant is {plant!r}; name the plant's family, for example plant: single_muscle"
-        )
-    given: dict[str, Any] = {"plant": plant.strip()}
+    _require(
+        isinstance(plant, str) and bool(plant.strip()),
+        f"plant is {plant!r}; name the plant's family, for example plant: single_muscle",
+    )
+    given: dict[str, Any] = {"plant": str(plant).strip()}
     for field, bounds in NUMBERS.items():
         section, _, key = bounds.key.partition(".")
         if sections[section].get(key) is not None:
@@ -182,8 +181,7 @@ def _fields(data: Mapping[str, Any]) -> dict[str, Any]:
     return given
 
 
-def _refuse_unknown(data: Mapping[Any, Any], known: Iterable[str], prefix: str) -> None:
-    known = tuple(known)
+def _refuse_unknown(data: Mapping[Any, Any], known: Sequence[str], prefix: str) -> None:
     for key in data:
         if key not in known:
             home = [f"{s}.{k}" for s, keys in SECTIONS.items() for k in keys if k == key]
@@ -191,100 +189,96 @@ def _refuse_unknown(data: Mapping[Any, Any], known: Iterable[str], prefix: str) 
             raise ValueError(f"unknown key {prefix + str(key)!r}{hint}")
 
 
+def _require(good: bool, message: str) -> None:
+    if not good:
+        raise ValueError(message)
+
+
 def _section(value: Any, name: str, keys: tuple[str, ...]) -> Mapping[str, Any]:
-    if value is None:
-        return {}
-    if not isinstance(value, Mapping):
-        raise ValueError(f"{name} must be a mapping with the keys {', '.join(keys)}, got {value!r}")
-    _refuse_unknown(value, keys, f"{name}.")
-    return value
+    keyed = f"{name} must be a mapping with the keys {', '.join(keys)}, got {value!r}"
+    _require(value is None or isinstance(value, Mapping), keyed)
+    _refuse_unknown(value or {}, keys, f"{name}.")
+    return value or {}
 
 
 def _number(value: Any, key: str, unit: str) -> float:
     if isinstance(value, str):  # YAML reads 1e5 without a sign as text
         with contextlib.suppress(ValueError):
             value = float(value)
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ValueError(f"{key} must be a number in {unit}, got {value!r}")
+    good = isinstance(value, (int, float)) and not isinstance(value, bool)
+    _require(good, f"{key} must be a number in {unit}, got {value!r}")
     return float(value)
 
 
 def _check_number(value: float, bounds: Bounds) -> None:
     slack = 1e-9 * bounds.high  # from SI and back
-    if not math.isfinite(value) or not bounds.low - slack <= value <= bounds.high + slack:
-        raise ValueError(
-            f"{bounds.key} = {value:g} {bounds.unit} is outside [{bounds.low:g}, "
-            f"{bounds.high:g}] {bounds.unit}; correct the value or its unit, or leave it out"
-        )
+    _require(
+        math.isfinite(value) and bounds.low - slack <= value <= bounds.high + slack,
+        f"{bounds.key} = {value:g} {bounds.unit} is outside [{bounds.low:g}, {bounds.high:g}] "
+        f"{bounds.unit}; correct the value or its unit, or leave it out",
+    )
 
 
 def _history(section: Mapping[str, Any]) -> dict[str, Any]:
     given = {key: value for key, value in section.items() if value is not None}
-    cycles = given.get("cycles_since_rest", 0)
-    if isinstance(cycles, bool) or not isinstance(cycles, int):
-        raise ValueError(f"history.cycles_since_rest must be a whole number, got {cycles!r}")
-    rezeroed = given.get("rezeroed", False)
-    if not isinstance(rezeroed, bool):
-        raise ValueError(f"history.rezeroed must be true or false, got {rezeroed!r}")
+    for key, kind, what in (
+        ("cycles_since_rest", int, "a whole number"),
+        ("rezeroed", bool, "true or false"),
+    ):
+        good = key not in given or type(given[key]) is kind
+        _require(good, f"history.{key} must be {what}, got {given.get(key)!r}")
     return given
 
 
 def _labels(value: Any, key: str) -> tuple[str, ...]:
     """Return segment labels; YAML makes numbers of those that look like numbers."""
-    if value is None:
-        return ()
-    good = (str, int, float)
-    if not isinstance(value, list) or not all(
-        isinstance(v, good) and not isinstance(v, bool) for v in value
-    ):
-        raise ValueError(f"{key} must be a list of segments, for example [holds_a], got {value!r}")
-    return tuple(str(label).strip() for label in value)
+    labels = [] if value is None else value
+    good = isinstance(labels, list) and all(type(v) in (str, int, float) for v in labels)
+    _require(good, f"{key} must be a list of segments, for example [holds_a], got {value!r}")
+    return tuple(str(label).strip() for label in labels)
 
 
 def _repeats(value: Any) -> tuple[tuple[str, ...], ...]:
-    if value is None:
-        return ()
-    if not isinstance(value, list):
-        raise ValueError(
-            "repeats must be a list of groups of segments, for example "
-            f"[[holds_a, holds_b]], got {value!r}"
-        )
-    return tuple(_labels(group, "each group of repeats") for group in value)
+    _require(
+        value is None or isinstance(value, list),
+        "repeats must be a list of groups of segments, for example [[holds_a, holds_b]], got "
+        f"{value!r}",
+    )
+    return tuple(_labels(group, "each group of repeats") for group in value or [])
 
 
 def _check_groups(repeats: tuple[tuple[str, ...], ...]) -> None:
     named = [label for group in repeats for label in group]
     for group in repeats:
-        if len(group) < 2:
-            raise ValueError(
-                f"repeats holds the group {list(group)!r}; name at least two segments that repeat "
-                "one another, or leave the group out"
-            )
+        _require(
+            len(group) >= 2,
+            f"repeats holds the group {list(group)!r}; name at least two segments that repeat one "
+            "another, or leave the group out",
+        )
     for label in named:
-        if named.count(label) > 1:
-            raise ValueError(f"repeats names the segment {label!r} twice; name it once")
+        once = named.count(label) == 1
+        _require(once, f"repeats names the segment {label!r} twice; name it once")
 
 
 def _tolerance(value: Any) -> dict[str, float]:
-    if value is None:
-        return {}
-    if not isinstance(value, Mapping):
-        raise ValueError(
-            "tolerance must be a mapping from parameter to relative error, for example "
-            f"{{mass.load: 0.02}}, got {value!r}"
-        )
-    return {str(k): _number(v, f"tolerance of {k}", "parts of one") for k, v in value.items()}
+    _require(
+        value is None or isinstance(value, Mapping),
+        "tolerance must be a mapping from parameter to relative error, for example "
+        f"{{mass.load: 0.02}}, got {value!r}",
+    )
+    given = (value or {}).items()
+    return {str(k): _number(v, f"tolerance of {k}", "parts of one") for k, v in given}
 
 
 def _check_tolerance(tolerance: Mapping[str, float]) -> None:
     for name, value in tolerance.items():
-        if name.count(".") != 1:
-            raise ValueError(
-                f"tolerance names {name!r}; name a parameter of the plant with its component, "
-                "for example mass.load"
-            )
-        if not 0.0 < value <= 1.0:
-            raise ValueError(
-                f"tolerance of {name} = {value:g} is outside (0, 1]; it is relative: give 0.02 "
-                "for two per cent"
-            )
+        _require(
+            name.count(".") == 1,
+            f"tolerance names {name!r}; name a parameter of the plant with its component, for "
+            "example mass.load",
+        )
+        _require(
+            0.0 < value <= 1.0,
+            f"tolerance of {name} = {value:g} is outside (0, 1]; it is relative: give 0.02 for two "
+            "per cent",
+        )

@@ -19,7 +19,7 @@ from pam_envs.data.recording.recording import (
     repeat_rows,
 )
 from pam_envs.data.rig_file import KEYS
-from pam_envs.data.tables import load_contraction_table, one_path
+from pam_envs.data.tables import one_path
 
 BASE = ("time_s", "segment", "pressure_command_bar", "pressure_bar", "contraction_mm", "load_N")
 
@@ -508,16 +508,6 @@ def table_file(folder: Path, *rows: str) -> Path:
     return path
 
 
-def test_the_published_table_is_read_as_any_other(tmp_path):
-    path = Path(load_contraction_table.__code__.co_filename).with_name("mas10_contraction.csv")
-    table, published = read_input(path), load_contraction_table()
-    for load in published.loads:
-        for repeat in published.repeats(load):
-            np.testing.assert_array_equal(table.cycle(load, repeat), published.cycle(load, repeat))
-    np.testing.assert_array_equal(table.inflating, published.inflating)
-    assert one_path(table)
-
-
 def test_tables_of_other_rigs_are_read(tmp_path):
     """Minor loops, other pressures in the second repeat, no column of repeats."""
     rows = ["2.5,up,3,1,5", "2.5,down,2,1,4", "2.5,inflating,6,1,14", "2.5,up,0,2,0.1"]
@@ -527,24 +517,6 @@ def test_tables_of_other_rigs_are_read(tmp_path):
     assert not one_path(table)
     single = table_file(tmp_path, "pressure_bar,load_kg,contraction_mm,direction", "1,0,2.5,UP")
     assert read_input(single).repeats(0.0) == (1,)
-
-
-@pytest.mark.parametrize(
-    ("row", "problem"),
-    [
-        ("2.5,sideways,2,1,3", "column direction holds 'sideways' and the like in row 4"),
-        ("2.5,up,,1,3", "column pressure_bar is empty in row 4"),
-        ("2.5,up,200,1,3", "column pressure_bar holds 200 and the like in row 4; a number from"),
-        ("2.5,up,2,1.5,3", "column repeat holds 1.5 and the like in row 4; a whole number"),
-        ("2.5,up,2,1,tall", "column contraction_mm holds no number in row 4"),
-        ("2.5,up,0.5,1,3", "the pressure moves against the direction in row 4"),
-        ("2.5,down,2,1,3", "the pressure moves against the direction in row 4"),
-    ],
-)
-def test_wrong_readings_are_named(tmp_path, row, problem):
-    with pytest.raises(RecordingError) as caught:
-        load_readings(table_file(tmp_path, *READINGS, row))
-    assert problem in str(caught.value)
 
 
 def test_columns_determine_the_kind_of_file(tmp_path):

@@ -105,8 +105,9 @@ class Sheet:
             values = np.array([cell or "nan" for cell in cells], dtype=np.float64)
             words: list[int] = []
         except ValueError:
-            values = np.array([_number(cell) for cell in cells])
-            words = [i for i, cell in enumerate(cells) if cell and not _is_number(cell)]
+            found = [_number(cell or "nan") for cell in cells]
+            values = np.array([np.nan if value is None else value for value in found])
+            words = [i for i, value in enumerate(found) if value is None]
         wrong = ~np.isfinite(values) & ~empty
         wrong[words] = True
         values[wrong] = np.nan
@@ -200,13 +201,8 @@ def _lines(path: Path, where: str) -> list[str]:
     return lines
 
 
-def _is_number(cell: str) -> bool:
+def _number(cell: str) -> float | None:
     try:
-        float(cell)
+        return float(cell)
     except ValueError:
-        return False
-    return True
-
-
-def _number(cell: str) -> float:
-    return float(cell) if _is_number(cell) else float("nan")
+        return None

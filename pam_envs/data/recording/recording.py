@@ -241,7 +241,11 @@ def load_recording(path: str | Path, rig: Rig | None = None) -> Recording:
         With all problems, naming column, rows and remedy.
     """
     sheet = read_sheet(path, COLUMNS, REQUIRED, "a recording")
-    _need_output(sheet)
+    if not {"pressure_bar", "contraction_mm"} & set(sheet.cells):
+        text = "give at least one of the columns pressure_bar and contraction_mm"
+        if "force_N" in sheet.cells:
+            text += "; force_N is not supported as the only output"
+        refuse(sheet.where, text)
     n = len(sheet.rows)
     labels = sheet.text("segment") if "segment" in sheet.cells else ["all"] * n
     columns, notes = _columns(sheet)
@@ -263,15 +267,6 @@ def read_input(path: str | Path, rig: Rig | None = None) -> Recording | Contract
     return load_recording(path, rig)
 
 
-def _need_output(sheet: Sheet) -> None:
-    if "pressure_bar" in sheet.cells or "contraction_mm" in sheet.cells:
-        return
-    text = "give at least one of the columns pressure_bar and contraction_mm"
-    if "force_N" in sheet.cells:
-        text += "; force_N is not supported as the only output"
-    refuse(sheet.where, text)
-
-
 def _columns(sheet: Sheet) -> tuple[dict[str, Array], list[str]]:
     """Return the columns that are numbers, by field and in SI, and the repairs."""
     columns, notes, problems = {}, [], []
@@ -285,7 +280,11 @@ def _columns(sheet: Sheet) -> tuple[dict[str, Array], list[str]]:
                 there = np.flatnonzero(~empty)
                 values = np.interp(np.arange(len(values)), there, values[there])
             else:
-                problems.append(f"column {name} is empty in {where}; {_remedy(name)}")
+                remedy = "fill the cells or leave the rows out"
+                if name in FORGIVEN:
+                    most = f"fewer than {FORGIVEN_SHARE:.0%} may be"
+                    remedy = f"{most}; fill the cells or leave the column out"
+                problems.append(f"column {name} is empty in {where}; {remedy}")
         field, unit = FIELDS[name]
         columns[field] = values * unit
     if problems:
@@ -294,12 +293,6 @@ def _columns(sheet: Sheet) -> tuple[dict[str, Array], list[str]]:
         columns["load"] = np.zeros(len(sheet.rows))
         notes.append("there is no column load_N; the load is taken as 0 N throughout")
     return columns, notes
-
-
-def _remedy(name: str) -> str:
-    if name in FORGIVEN:
-        return f"fewer than {FORGIVEN_SHARE:.0%} may be; fill the cells or leave the column out"
-    return "fill the cells or leave the rows out"
 
 
 def _recording(
