@@ -4,7 +4,7 @@
 
 ``H^-1`` is the exact recursive inverse of the hysteresis identified on the nominal plant, for the
 history of commands: ``E(u_next, u_turn) = f_next - f_turn``. The printed sum (3.5) is exact only up
-to the first reversal (:mod:`pam_envs.identification.everett_series`).
+to the first reversal (:mod:`pam_envs.identification.joint_forc`).
 """
 
 from __future__ import annotations

@@ -11,8 +11,12 @@ from numpy.typing import NDArray
 from baselines.joint.model import JointModel, joint_model
 from benchmarks.papers.joint_studies import DEGREE, RANGE
 from pam_envs.hysteresis.preisach import Preisach
-from pam_envs.identification.everett_series import series_inverse
-from pam_envs.identification.joint_forc import JointHysteresis, measure_hysteresis, measure_joint
+from pam_envs.identification.joint_forc import (
+    JointHysteresis,
+    measure_hysteresis,
+    measure_joint,
+    series_inverse,
+)
 from pam_envs.identification.joint_muscle import HangingMuscle
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
 

@@ -44,12 +44,10 @@ from pam_envs.diagnosis.fit.tolerance import (
     may_be_load,
     refit_load,
 )
-from pam_envs.diagnosis.report.outcome import Diagnosis
-from pam_envs.diagnosis.report.progress import steps
+from pam_envs.diagnosis.report.outcome import Diagnosis, Traces, steps
 from pam_envs.diagnosis.report.report import plain
 from pam_envs.diagnosis.report.summary import report_of
 from pam_envs.diagnosis.report.summary_causes import judged
-from pam_envs.diagnosis.report.traces import Traces
 from pam_envs.plants.core.plant import UnstableParameters
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 

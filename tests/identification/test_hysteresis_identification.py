@@ -18,8 +18,8 @@ from pam_envs.identification.preisach_forc import (
     descending_curves,
     fit_preisach,
     preisach_from_curves,
+    relay_regressors,
 )
-from pam_envs.identification.relay_regressors import relay_regressors
 
 Array = NDArray[np.float64]
 LADDER = (0.2, 0.5, 0.9, 1.4)

@@ -9,8 +9,12 @@ from baselines.positioning.nominal import LoadedMuscle
 from benchmarks.papers.joint_hysteresis import inhomogeneous, inverse_error
 from benchmarks.papers.joint_studies import RANGE, assumed_hysteresis
 from pam_envs.hysteresis.preisach import Preisach
-from pam_envs.identification.everett_series import series_inverse
-from pam_envs.identification.joint_forc import measure_hysteresis, measure_joint, symmetrised
+from pam_envs.identification.joint_forc import (
+    measure_hysteresis,
+    measure_joint,
+    series_inverse,
+    symmetrised,
+)
 from pam_envs.plants.single_muscle.plant import SingleMuscle
 
 

@@ -9,9 +9,9 @@ from pam_envs.diagnosis.figures.canvas import Picture, drawing
 from pam_envs.diagnosis.figures.loops import loops, scatter
 from pam_envs.diagnosis.figures.matrix import isolability
 from pam_envs.diagnosis.figures.over_time import effects, replay, residual, zoom
+from pam_envs.diagnosis.figures.quantities import View
 from pam_envs.diagnosis.figures.ranked import kinds, rivals, structure
 from pam_envs.diagnosis.figures.readings import Curves, cell_effects, cycles, left_over
-from pam_envs.diagnosis.figures.traces import View
 
 __all__ = ["Picture", "draw"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pam_envs.diagnosis.figures import traces as tv
+from pam_envs.diagnosis.figures import quantities as tv
 from pam_envs.diagnosis.figures.canvas import (
     BASE,
     EXTENDED,
@@ -19,8 +19,7 @@ from pam_envs.diagnosis.figures.canvas import (
     dots,
 )
 from pam_envs.diagnosis.figures.over_time import model_legend
-from pam_envs.diagnosis.figures.quantities import Report, short
-from pam_envs.diagnosis.figures.traces import UNITS, View, limits
+from pam_envs.diagnosis.figures.quantities import UNITS, Report, View, limits, short
 
 PANELS = 3
 """Number of loops side by side."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pam_envs.diagnosis.arrays import Array
-from pam_envs.diagnosis.figures import traces as tv
+from pam_envs.diagnosis.figures import quantities as tv
 from pam_envs.diagnosis.figures.canvas import (
     BASE,
     EXTENDED,
@@ -27,8 +27,16 @@ from pam_envs.diagnosis.figures.canvas import (
     Picture,
     legend_of,
 )
-from pam_envs.diagnosis.figures.quantities import MINUS, TIMES, Report, floor, short
-from pam_envs.diagnosis.figures.traces import CHANNELS, View, limits
+from pam_envs.diagnosis.figures.quantities import (
+    CHANNELS,
+    MINUS,
+    TIMES,
+    Report,
+    View,
+    floor,
+    limits,
+    short,
+)
 
 ROW = 14.0
 """Height of a row of segment names; gap between axes with a common time axis."""

@@ -28,6 +28,7 @@ from pam_envs.diagnosis.figures.canvas import (
     legend_of,
 )
 from pam_envs.diagnosis.figures.quantities import (
+    UNITS,
     Report,
     changed,
     floor,
@@ -37,7 +38,6 @@ from pam_envs.diagnosis.figures.quantities import (
     value,
     written,
 )
-from pam_envs.diagnosis.figures.traces import UNITS
 
 AGAINST = {
     "direction": "direction of motion",

@@ -20,8 +20,16 @@ from pam_envs.diagnosis.figures.canvas import (
     Picture,
     legend_of,
 )
-from pam_envs.diagnosis.figures.quantities import MINUS, TIMES, Report, changed, floor, short
-from pam_envs.diagnosis.figures.traces import limits, thin
+from pam_envs.diagnosis.figures.quantities import (
+    MINUS,
+    TIMES,
+    Report,
+    changed,
+    floor,
+    limits,
+    short,
+    thin,
+)
 
 PANELS = 4
 """Largest number of loads side by side."""

@@ -1,13 +1,71 @@
-"""Outcome of a diagnosis."""
+"""Outcome of a diagnosis, its time series, and the progress bar."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pam_envs.diagnosis.report.traces import Traces
+import numpy as np
+from numpy.typing import NDArray
+
+from pam_envs.diagnosis.arrays import Array
 from pam_envs.plants.single_muscle.plant import SingleMuscle
+
+
+@contextmanager
+def steps(progress: bool) -> Iterator[Callable[[str], None]]:
+    """Provide a function that shows the present stage."""
+    if not progress:
+        yield lambda text: None
+        return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, transient=True) as bar:
+        task = bar.add_task("reading", total=7)
+
+        def step(text: str) -> None:
+            bar.update(task, description=text, advance=1)
+
+        yield step
+
+
+@dataclass(frozen=True)
+class Traces:
+    """Time series of a report; arrays of shape (T,) in SI.
+
+    Attributes
+    ----------
+    time, command, load : ndarray
+        Time [s], command [Pa] and load [N].
+    segment : ndarray of int
+        Index into ``segments``.
+    segments : tuple of str
+        Labels of the segments.
+    held_out : ndarray of bool
+        Held-out samples, of which the errors are reported.
+    temperature : ndarray or None
+        Temperature [deg C].
+    measured, base, extended : dict of str to ndarray
+        Readings and simulations, by output.
+    effects : dict of str to dict of str to ndarray
+        Contribution of each named cause, by output.
+    """
+
+    time: Array
+    segment: NDArray[np.int64]
+    segments: tuple[str, ...]
+    held_out: NDArray[np.bool_]
+    command: Array
+    load: Array
+    temperature: Array | None
+    measured: dict[str, Array]
+    base: dict[str, Array]
+    extended: dict[str, Array]
+    effects: dict[str, dict[str, Array]]
 
 
 @dataclass(frozen=True)

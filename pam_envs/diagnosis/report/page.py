@@ -9,14 +9,19 @@ from typing import Any
 
 from pam_envs.diagnosis.figures import Picture, draw
 from pam_envs.diagnosis.figures.quantities import TIMES, changed
-from pam_envs.diagnosis.report.page_details import (
+from pam_envs.diagnosis.report.page_parts import (
+    DASH,
     DETAILS,
+    at,
+    enumeration,
     held_out,
+    number,
     provenance,
+    spread,
     structure_table,
     why,
+    words,
 )
-from pam_envs.diagnosis.report.page_parts import DASH, at, enumeration, number, spread, words
 
 CSS = Path(__file__).with_name("page.css")
 VERDICTS = {

@@ -18,12 +18,11 @@ from pam_envs.diagnosis.static.compare import (
     load_cut,
     pure_error,
 )
-from pam_envs.diagnosis.static.findings import Findings
+from pam_envs.diagnosis.static.findings import Findings, sentences
 from pam_envs.diagnosis.static.law import Law, separated
 from pam_envs.diagnosis.static.models import TERMS, Number, Term, predict, units
 from pam_envs.diagnosis.static.search import RULE, Stage, Trial
 from pam_envs.diagnosis.static.structure import isolability, structure
-from pam_envs.diagnosis.static.text import sentences
 from pam_envs.wording import package
 
 Json = dict[str, Any]

@@ -12,7 +12,7 @@ import pytest
 
 from pam_envs.diagnosis.figures import draw
 from pam_envs.diagnosis.figures.matrix import alike
-from pam_envs.diagnosis.figures.traces import View, elapsed, envelope, worst_window
+from pam_envs.diagnosis.figures.quantities import View, elapsed, envelope, worst_window
 from pam_envs.diagnosis.report import page as page_module
 from pam_envs.diagnosis.report.page import headline, page
 from pam_envs.diagnosis.report.page_parts import number

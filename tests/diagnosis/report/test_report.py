@@ -15,7 +15,7 @@ import pytest
 from pam_envs.diagnosis.decide.rule import Rule
 from pam_envs.diagnosis.report import page as page_module
 from pam_envs.diagnosis.report.report import dumps, plain, report_json, write
-from pam_envs.diagnosis.report.summary_text import sentence
+from pam_envs.diagnosis.report.summary import sentence
 from tests.diagnosis.report import report_fakes as fakes
 from tests.diagnosis.report.page_reader import SECTIONS, Page
 
