@@ -54,7 +54,12 @@ def read_clock(
     restart = np.r_[True, new & (step < 0.0)]
     stuck = (step <= 0.0) & ~restart[1:]
     if stuck.any():
-        return None, [_backwards(time, stuck, rows)]
+        at = np.flatnonzero(stuck)
+        return None, [
+            f"time_s does not go up inside a segment at {rows_text(rows[at + 1])} (the first from "
+            f"{time[at[0]]:g} s to {time[at[0] + 1]:g} s); sort the rows, or give what was "
+            "recorded from rest with a clock of its own a new segment"
+        ]
     inside = step[~new]
     if not len(inside):
         return None, ["no segment has two rows; give the samples of one experiment one label"]
@@ -79,15 +84,6 @@ def _period(time: Array, inside: Array, restart: Flags) -> float:
     x = places - (np.bincount(stretch, places) / size)[stretch]
     y = time - (np.bincount(stretch, time) / size)[stretch]
     return float(np.round(np.sum(x * y) / np.sum(x * x), 9))
-
-
-def _backwards(time: Array, stuck: Flags, rows: Indices) -> str:
-    at = np.flatnonzero(stuck)
-    return (
-        f"time_s does not go up inside a segment at {rows_text(rows[at + 1])} (the first from "
-        f"{time[at[0]]:g} s to {time[at[0] + 1]:g} s); sort the rows, or give what was recorded "
-        "from rest with a clock of its own a new segment"
-    )
 
 
 def _pace(period: float) -> list[str]:

@@ -232,13 +232,10 @@ def _path(text: str) -> str:
 
 def _style(text: str) -> str:
     text = re.sub(r"font: (?:(\w+) )?([\d.]+)px [^;\"]*", _font, text)
-    return re.sub(r"#[0-9a-f]{6}", lambda found: _colour(found[0]), text)
+    names = {colour: f"var(--{name})" for colour, name in VARIABLES.items()}
+    return re.sub(r"#[0-9a-f]{6}", lambda found: names.get(found[0], found[0]), text)
 
 
 def _font(found: re.Match[str]) -> str:
     weight = f"font-weight: {found[1]}; " if found[1] else ""
     return f"{weight}font-size: {found[2]}px"
-
-
-def _colour(value: str) -> str:
-    return f"var(--{VARIABLES[value]})" if value in VARIABLES else value

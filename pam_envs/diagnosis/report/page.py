@@ -142,7 +142,11 @@ def _big(kind: str, value: Report | None, note: str) -> str:
 
 def _sections(report: Report, pictures: Mapping[str, Picture]) -> Iterable[tuple[str, str, str]]:
     def shown(*names: str) -> str:
-        found = [_figure(pictures[n]) for n in names if n in pictures]
+        found = [
+            f'<figure id="figure-{p.name}">\n<div class="scroll">{p.svg}</div>\n'
+            f"<figcaption>{escape(p.caption)}</figcaption>\n</figure>"
+            for p in (pictures[n] for n in names if n in pictures)
+        ]
         return "\n".join(found) or f'<p class="none">{NOTHING[names[0]]}</p>'
 
     yield "replay", "Replay", shown("replay", "zoom")
@@ -158,10 +162,3 @@ def _sections(report: Report, pictures: Mapping[str, Picture]) -> Iterable[tuple
     yield "isolability", "Isolability of causes in this recording", shown("isolability")
     yield "details", "Details", "\n".join(part(report) for part in DETAILS)
     yield "provenance", "Provenance", provenance(report)
-
-
-def _figure(picture: Picture) -> str:
-    return (
-        f'<figure id="figure-{picture.name}">\n<div class="scroll">{picture.svg}</div>\n'
-        f"<figcaption>{escape(picture.caption)}</figcaption>\n</figure>"
-    )

@@ -22,13 +22,17 @@ def report_of(study: Any, rule: Rule, warnings: tuple[str, ...]) -> dict[str, An
     """Return the report of a study, in the order of the documented keys."""
     decision, held = study.decision, study.held
     compared = rivals(study, rule)
+    floors = {c: study.floor_of(c) for _, c in seen(study)}
     report = {
         "schema": 1,
         "verdict": decision.verdict,
         "text": "",
         "causes": causes(study),
         "rivals": compared,
-        "noise_floor": _floors(study),
+        "noise_floor": {
+            c: {"value": value / SCALE[c], "unit": UNITS[c], "from": source}
+            for c, (value, source) in floors.items()
+        },
         "held_out": {
             "by": held.choice.by,
             "kinds": list(held.choice.kinds),
@@ -59,14 +63,6 @@ def report_of(study: Any, rule: Rule, warnings: tuple[str, ...]) -> dict[str, An
     }
     report["text"] = sentence(report, rule)
     return report
-
-
-def _floors(study: Any) -> dict[str, Any]:
-    made = {}
-    for _, c in seen(study):
-        value, source = study.floor_of(c)
-        made[c] = {"value": value / SCALE[c], "unit": UNITS[c], "from": source}
-    return made
 
 
 def _errors(study: Any, candidate: Candidate) -> dict[str, Any]:

@@ -54,7 +54,14 @@ def causes(study: Any) -> list[Json]:
                 "title": cause.title,
                 "form": form.name,
                 "parameters": [
-                    _parameter(family, t.name, values[t.name], found[t.name]) for t in form.terms
+                    {
+                        "name": t.name,
+                        "value": values[t.name],
+                        "unit": declared(family.plant, t.name).unit,
+                        "neutral": declared(family.plant, t.name).neutral,
+                        **found[t.name],
+                    }
+                    for t in form.terms
                 ],
                 "gain": held.gain(held.without.get(cause.name, held.base), held.model),
                 "effect": {
@@ -68,11 +75,6 @@ def causes(study: Any) -> list[Json]:
             }
         )
     return sorted(made, key=lambda c: -c["gain"]["value"])
-
-
-def _parameter(family: Any, name: str, value: float, found: Json) -> Json:
-    d = declared(family.plant, name)
-    return {"name": name, "value": value, "unit": d.unit, "neutral": d.neutral, **found}
 
 
 def calibration(study: Any) -> list[Json]:
@@ -154,10 +156,11 @@ def _reason(
 
 def rivals(study: Any, rule: Rule) -> list[Json]:
     """Return the rivals of the model, in the order of the decision."""
-    found, words = judged(study.decision), reasons(study.decision, rule)
     return [
         _rival(study, k, rival, row, word)
-        for k, ((rival, row), word) in enumerate(zip(found, words, strict=True))
+        for k, ((rival, row), word) in enumerate(
+            zip(judged(study.decision), reasons(study.decision, rule), strict=True)
+        )
     ]
 
 

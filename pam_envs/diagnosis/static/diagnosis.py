@@ -16,7 +16,7 @@ from pam_envs.data.tables import ContractionTable
 from pam_envs.diagnosis.static.audit import audit_polynomials
 from pam_envs.diagnosis.static.cells import cells_of
 from pam_envs.diagnosis.static.compare import Study
-from pam_envs.diagnosis.static.findings import find
+from pam_envs.diagnosis.static.findings import Findings
 from pam_envs.diagnosis.static.report import report
 
 __all__ = ["audit_polynomials", "diagnose_readings"]
@@ -52,7 +52,7 @@ def diagnose_readings(table: ContractionTable, *, seed: int = 0) -> dict[str, An
             f"the table has {int(cells.used.sum())} cells that are not zero by definition; a "
             "diagnosis needs readings at several pressures"
         )
-    made = report(find(table, Study(cells, seed)), seed)
+    made = report(Findings(table, Study(cells, seed)), seed)
     return {**_finite(made), "runtime_s": time.perf_counter() - start}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -20,7 +21,8 @@ from pam_envs.diagnosis.static.compare import (
 )
 from pam_envs.diagnosis.static.law import Law, NextLoads, load_laws, next_loads
 from pam_envs.diagnosis.static.models import Number, Term, units
-from pam_envs.diagnosis.static.search import LEVEL, Search, Trial, search
+from pam_envs.diagnosis.static.search import LEVEL, Search
+from pam_envs.diagnosis.static.search import search as find_causes
 from pam_envs.diagnosis.static.structure import whiteness
 
 FLOOR_REACHED = 1.1
@@ -31,15 +33,38 @@ WHITE = 0.01
 
 @dataclass(frozen=True)
 class Findings:
-    """Results of all stages."""
+    """Results of all stages, each computed when it is first read."""
 
     table: ContractionTable
     study: Study
-    search: Search
-    draws: Array
-    laws: tuple[Law, ...]
-    set_points: tuple[SetPoint, ...]
-    next: NextLoads | None
+
+    @cached_property
+    def search(self) -> Search:
+        """Search for causes."""
+        return find_causes(self.study)
+
+    @cached_property
+    def draws(self) -> Array:
+        """Bootstrap samples of the parameters."""
+        return parameter_draws(self.study, self.model)
+
+    @cached_property
+    def laws(self) -> tuple[Law, ...]:
+        """Load laws other than linear."""
+        return load_laws(self.study, self.model)
+
+    @cached_property
+    def set_points(self) -> tuple[SetPoint, ...]:
+        """Pressures with implausible readings."""
+        return missed_set_points(self.study, self.model)
+
+    @cached_property
+    def next(self) -> NextLoads | None:
+        """Loads that separate two load laws, or two causes, if they are not separated."""
+        tied = [trial.model for tie in self.search.ties for trial in tie]
+        rivals = [law.model for law in self.laws] if self.bent else tied
+        several = len(rivals) > 1 and len(self.study.cells.loads) > 1
+        return next_loads(self.study, *rivals[:2]) if several else None
 
     @property
     def base(self) -> Model:
@@ -66,7 +91,7 @@ class Findings:
     @property
     def bent(self) -> bool:
         """True if a load law other than linear fits significantly better."""
-        return bent(self.laws)
+        return any(law.p * len(self.laws) <= LEVEL for law in self.laws)
 
     @property
     def verdict(self) -> str:
@@ -91,29 +116,6 @@ class Findings:
             if term.cause in masked and together:
                 return first
         return ""
-
-
-def bent(laws: tuple[Law, ...]) -> bool:
-    """Return whether a load law other than linear fits significantly better."""
-    return any(law.p * len(laws) <= LEVEL for law in laws)
-
-
-def find(table: ContractionTable, study: Study) -> Findings:
-    """Run every stage."""
-    found = search(study)
-    laws = load_laws(study, found.model)
-    tied = [trial.model for tie in found.ties for trial in tie]
-    rivals = [law.model for law in laws] if bent(laws) else tied
-    several = len(rivals) > 1 and len(study.cells.loads) > 1
-    return Findings(
-        table,
-        study,
-        found,
-        parameter_draws(study, found.model),
-        laws,
-        missed_set_points(study, found.model),
-        next_loads(study, *rivals[:2]) if several else None,
-    )
 
 
 def sentences(f: Findings) -> str:
@@ -143,16 +145,14 @@ def _missed(f: Findings) -> str:
 
 
 def _named(f: Findings) -> str:
-    parts = [_cause(f, trial) for trial in f.search.accepted]
+    parts = []
+    for term in (trial.term for trial in f.search.accepted):
+        masking = f.shown_by(term)
+        hidden = f" (significant only beside {masking})" if masking else ""
+        parts.append(f"{term.cause} as {term.form}, {_number(f, term.number)}{hidden}")
     rivals = sorted({rival.term.cause for _, rival in f.search.ties})
     text = f"Named: {'; '.join(parts)}."
     return f"{text} Not separated from {' and '.join(rivals)}." if rivals else text
-
-
-def _cause(f: Findings, trial: Trial) -> str:
-    masking = f.shown_by(trial.term)
-    hidden = f" (significant only beside {masking})" if masking else ""
-    return f"{trial.term.cause} as {trial.term.form}, {_number(f, trial.term.number)}{hidden}"
 
 
 def _number(f: Findings, number: Number) -> str:

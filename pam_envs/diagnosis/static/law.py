@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pam_envs.diagnosis.arrays import Array
-from pam_envs.diagnosis.static.cells import Cells
 from pam_envs.diagnosis.static.compare import (
     Interval,
     Model,
@@ -97,17 +96,13 @@ def next_loads(study: Study, one: Model, other: Model) -> NextLoads:
     cells = study.cells
     heaviest = cells.scale[0]
     loads = heaviest * np.arange(1, GRID + 1) / GRID
-    apart = np.array([_apart(cells, one, other, load / heaviest) for load in loads])
+    there = [replace(cells, load=np.full(len(cells.load), load / heaviest)) for load in loads]
+    misses = [(one.fit.predict(c)[0] - other.fit.predict(c)[0])[cells.used] for c in there]
+    apart = np.array([np.sqrt(np.mean(miss**2)) * cells.millimetres for miss in misses])
     repeats, at = float(np.mean(cells.counts[cells.used])), int(np.argmax(apart))
     separation = repeats * float(apart[at] / pure_error(cells)[0]) ** 2
     best = _peaks(cells.loads, loads, apart)
     return NextLoads(float(loads[at]), float(apart[at]), separation, best)
-
-
-def _apart(cells: Cells, one: Model, other: Model, load: float) -> float:
-    there = replace(cells, load=np.full(len(cells.load), load))
-    difference = (one.fit.predict(there)[0] - other.fit.predict(there)[0])[cells.used]
-    return float(np.sqrt(np.mean(difference**2)) * cells.millimetres)
 
 
 def _peaks(measured: Sequence[float], loads: Array, apart: Array) -> tuple[float, ...]:
