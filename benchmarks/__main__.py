@@ -373,7 +373,7 @@ def diagnosis(
     loops: int = 0,
     next: bool = False,
     force: bool = False,
-    retell: bool = False,
+    rejudge: bool = False,
     timed: bool = False,
     cells: Path | None = None,
     out: Path | None = None,
@@ -391,7 +391,7 @@ def diagnosis(
         loops: Cases of every cause that are run in closed loop on the hidden rig.
         next: Carry out the experiments that are proposed.
         force: Compute again what is there already.
-        retell: Run nothing; judge what earlier runs recorded by the present rule.
+        rejudge: Run nothing; judge what earlier runs recorded by the present rule.
         timed: Also time whole reports of ten minutes at 50 Hz on two cores, afterwards.
         cells: Folder of the records, the checkpoint.
         out: Folder of the page, of its numbers and of its figure. By default benchmarks/results for
@@ -407,10 +407,10 @@ def diagnosis(
     cases = (chosen, offset, fraction, kind, name, limit, loops, next)
     where = (computing.jobs, force, folder, computing.backend, computing.address)
     options = running.Options(*cases, *where)
-    if retell:
-        records = running.retold(options)
+    if rejudge:
+        records = running.rejudged(options)
         print(f"{len(records)} records judged anew")
-        for path in telling.write(records, out or folder / "pages" / "retold", "--retell"):
+        for path in telling.write(records, out or folder / "pages" / "rejudged", "--rejudge"):
             print(path)
         return 0
     with progress("cases") as start:

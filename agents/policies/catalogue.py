@@ -30,24 +30,11 @@ BY_HAND = "by hand"
 class Entry:
     """Policies of one preset.
 
-    Attributes
-    ----------
-    file : str
-        Name in ``agents/pretrained``, with ``{seed}`` for the training seed.
-    knowledge : str
-        Model knowledge: "nominal model" for a policy that was trained in simulation of it.
-    envs : tuple of str
-        Environment ids.
-    kind : {"learned", "residual"}
-    baseline : str
-        Name of the controller that a residual corrects.
-    trials : int or None
-        Number of settings tried for the preset, including earlier searches and those of a
-        residual's controller; None if not counted.
-    tuning : str
-        Origin of that number.
-    found : mapping
-        Knobs of that controller found by a search.
+    ``file`` is their name in ``agents/pretrained``, with ``{seed}`` for the training seed.
+    Knowledge is "nominal model" for a policy that was trained in simulation of it. A residual
+    corrects the controller ``baseline``; ``found`` are the knobs of that controller found by a
+    search. ``trials`` is the number of settings tried for the preset, including earlier searches
+    and those of a residual's controller, None if not counted; ``tuning`` says where they come from.
     """
 
     file: str

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from agents.policies import catalogue
 from agents.policies.policy import OnnxPolicy
@@ -20,8 +20,7 @@ from agents.settings import presets as configs
 from agents.settings.schema import SettingsError
 
 
-@dataclass(frozen=True)
-class Finished:
+class Finished(NamedTuple):
     """A run that may be entered: its folder, preset (``KneeWalk-v0.ppo``) and training seed."""
 
     folder: Path
@@ -29,8 +28,7 @@ class Finished:
     seed: int
 
 
-@dataclass(frozen=True)
-class Entered:
+class Entered(NamedTuple):
     """Result of an entry: name on the leaderboard, the policies, and the files they replace."""
 
     controller: str
@@ -43,8 +41,7 @@ def enter(folders: Sequence[Path], author: str = "") -> Entered:
 
     Everything is checked before anything is written. ``author`` is in BibTeX form, empty for the
     authors of this package. A ValueError names a folder without a sound policy, or says that the
-    runs
-    are not training seeds 0 to n - 1 of one preset with its present settings.
+    runs are not training seeds 0 to n - 1 of one preset with its present settings.
     """
     runs = sorted(map(_checked, folders), key=lambda run: run.seed)
     _check_together(runs)

@@ -91,8 +91,7 @@ class LayersAndInputs(nn.Module):
     """Layers of policy and critic; the policy's output is joined by the inputs themselves.
 
     ``recurrent`` is the width of a recurrent layer's output before the inputs, 0 for none;
-    ``critic``
-    the width of what the critic reads.
+    ``critic`` the width of what the critic reads.
     """
 
     def __init__(

@@ -81,8 +81,7 @@ def write_policy(path: Path, data: bytes, record: Mapping[str, Any]) -> None:
     """Write a policy ``*.onnx`` and, before it, its training record ``*.json`` with its SHA-256.
 
     A process that is killed at any moment leaves no policy that :func:`finished` accepts without
-    its
-    record.
+    its record.
     """
     said = {**record, "sha256": hashlib.sha256(data).hexdigest()}
     text = json.dumps(said, indent=1, sort_keys=True) + "\n"

@@ -64,8 +64,7 @@ def with_controller(policy: OnnxPolicy, plant: Any) -> OnnxPolicy | ResidualPoli
     """Return a policy together with the controller that it corrects, if any.
 
     The controller is built from the nominal plant. A PolicyFileError says that the controller,
-    built
-    from a plant of the training, does not give its recorded answers.
+    built from a plant of the training, does not give its recorded answers.
     """
     if not policy.corrects:
         return policy

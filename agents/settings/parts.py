@@ -52,10 +52,9 @@ class _OnPolicy:
     """Settings of PPO and recurrent PPO, with the names of stable-baselines3.
 
     The learning rate goes from its first to its last value, linearly over the training. In the
-    first
-    ``warm_up`` rollouts the critic learns alone, so that an untrained critic does not spoil a
-    policy
-    that starts as a controller (silver2018); in as many rollouts after them the rate rises from 0.
+    first ``warm_up`` rollouts the critic learns alone, so that an untrained critic does not spoil a
+    policy that starts as a controller (silver2018); in as many rollouts after them the rate rises
+    from 0.
     """
 
     n_steps: int = number(32, 2, 100_000)
@@ -133,8 +132,7 @@ class Residual:
 
     The controller, by its name in :data:`baselines.core.catalogue.CONTROLLERS`, is built from the
     nominal plant, and its action is an input of the policy. ``scale`` is the largest correction, as
-    a
-    share of half the action's range.
+    a share of half the action's range.
     """
 
     controller: str = ""
@@ -146,8 +144,7 @@ class Plants:
     """Plants of the training.
 
     With ``randomize`` every episode draws the assumed parameters within their declared ranges. The
-    rows
-    are divided among the models of ``hysteresis``; none for the environment's default.
+    rows are divided among the models of ``hysteresis``; none for the environment's default.
     """
 
     randomize: bool = False
@@ -190,8 +187,7 @@ class Search:
 
     ``trials`` is the number of settings tried, None if they were set by hand and not counted;
     ``earlier`` the number tried by the searches that it started from, ``steps`` the control periods
-    of
-    each training of a trial, ``note`` the method.
+    of each training of a trial, ``note`` the method.
     """
 
     trials: int | None = number(None, 0, 10**6)

@@ -38,26 +38,12 @@ ENV = re.compile(r"PAM/[A-Za-z0-9]+-v[0-9]+")
 class Config:
     """Settings of a training.
 
-    Attributes
-    ----------
-    steps, num_envs : int
-        Control periods of all rows together, and rows of the batched environment.
-    checkpoint_steps : int
-        Control periods between checkpoints.
-    env_kwargs : dict
-        Arguments of the environment.
-    share : dict
-        Arguments of the environment that differ among the rows, each a list: the rows are divided
-        evenly among all combinations, the kinds of rows.
-    per_reference : dict
-        Further arguments by the kind's reference, for example reward weights that balance
-        references with small and with large errors.
-    network, normalize, history, residual, plants, evaluation, search
-        Parts; see :mod:`agents.settings.parts`.
-    ppo, sac, tqc, recurrent_ppo
-        Parts of the algorithms; only that of ``algo`` is used.
-    schema : int
-        Version of this schema.
+    ``steps`` and ``checkpoint_steps`` count control periods of all rows of the batched environment
+    together. ``share`` has arguments of the environment that differ among the rows, each a list:
+    the rows are divided evenly among all combinations, the kinds of rows. ``per_reference`` has
+    further arguments by the kind's reference, for example reward weights that balance references
+    with small and with large errors. The parts are described in :mod:`agents.settings.parts`; of
+    those of the algorithms only that of ``algo`` is used. ``schema`` is the version of this schema.
     """
 
     env: str

@@ -18,10 +18,8 @@ class Best:
     """Weights and normaliser at the best of the evaluations so far.
 
     ``steps`` are control periods of training at that evaluation, -1 before the first; ``value`` is
-    the
-    criterion of the choice (:func:`agents.training.evaluation.value_of`), less is better;
-    ``moments``
-    are those of the observation's normaliser, empty without one.
+    the criterion of the choice (:func:`agents.training.evaluation.value_of`), less is better;
+    ``moments`` are those of the observation's normaliser, empty without one.
     """
 
     steps: int = -1

@@ -91,8 +91,7 @@ class Evaluations(PeriodicCallback):
     """Evaluate the policy on tuning seeds, for TensorBoard, the card and the choice of the best.
 
     The first evaluation is before any training: that of a residual is its controller's. ``found``
-    are
-    the card's entries, ``best`` is the best policy so far, which is exported at the end.
+    are the card's entries, ``best`` is the best policy so far, which is exported at the end.
     """
 
     def __init__(self, config: Config, found: list[dict[str, Any]], best: Best) -> None:

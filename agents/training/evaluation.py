@@ -30,18 +30,11 @@ MORE_TRAVEL = 1.05
 class Score:
     """Result of an evaluation.
 
-    Attributes
-    ----------
-    rms : float
-        RMS of ``output - reference`` (SI) over the evaluated instants of all episodes.
-    mean_return : float
-        Sum of rewards of an episode, mean over episodes.
-    failures : int
-        Number of episodes that a limit ended.
-    travel : float
-        Change of the pressure setpoints in a control period [Pa], mean over the same instants.
-    kinds : tuple of float
-        ``rms`` of each kind of row (see :meth:`agents.settings.presets.Config.kinds`).
+    ``rms`` is of ``output - reference`` (SI) over the evaluated instants of all episodes, ``kinds``
+    of each kind of row (see :meth:`agents.settings.presets.Config.kinds`); ``mean_return`` the sum
+    of rewards of an episode, mean over episodes; ``failures`` the number of episodes that a limit
+    ended; ``travel`` the change of the pressure setpoints in a control period [Pa], mean over these
+    instants.
     """
 
     rms: float
@@ -87,16 +80,9 @@ def value_of(score: Score, config: Config, travel: float | None = None) -> float
 def evaluate(policy: OnnxPolicy | str, config: Config, episodes: int | None = None) -> Score:
     """Return the score of a policy on tuning seeds, on the plants of its training.
 
-    Parameters
-    ----------
-    policy : OnnxPolicy or str
-        A trained policy, or the name of a classical controller, built from the nominal plant.
-    config : Config
-        Its ``evaluation`` defines the evaluated instants.
-    episodes : int, optional
-        Split evenly among the kinds of rows (at least one each), which have the same seeds;
-        default:
-        that of ``evaluation``.
+    A text is the name of a classical controller, built from the nominal plant. The episodes, by
+    default those of ``config.evaluation``, are split evenly among the kinds of rows (at least one
+    each), which have the same seeds.
     """
     count = config.evaluation.episodes if episodes is None else episodes
     kinds = config.kinds()

@@ -51,23 +51,10 @@ ROUNDS, DRAWS = 16, 12
 class Case:
     """Specification of a case; equal cases give equal recordings.
 
-    Attributes
-    ----------
-    kind : {"single", "weak", "loud", "clean", "decoy", "pair", "unknown", "idle", "brief"}
-        ``loud`` is a single effect under three times the noise with the same absolute size;
-        ``idle`` a
-        clean rig without motion, which cannot be decided; ``brief`` a short recording of a clean
-        rig.
-    names : tuple of str
-        Effects to hide.
-    sizes : tuple of float
-        Target sizes over the usual noise.
-    campaign : str
-        One of :data:`CAMPAIGNS`.
-    noise : float
-        Noise over the usual noise.
-    seconds : float
-        Recorded duration of the campaign [s]; 0 for all of it.
+    Kind ``loud`` is a single effect under three times the noise with the same absolute size;
+    ``idle`` a clean rig without motion, which cannot be decided; ``brief`` a recording of a clean
+    rig of some ``seconds``, 0 for the whole campaign. ``sizes`` and ``noise`` are over the usual
+    noise.
     """
 
     kind: str
@@ -114,8 +101,8 @@ class Ground:
     """A clean rig under a campaign, with the subspace that a refit of the plant spans.
 
     ``clean`` are its outputs without effect and noise [m], [Pa], shape (2, T). ``basis`` is
-    orthonormal
-    and spans the changes that a refit can make; ``order`` is that of a flattened trace in it.
+    orthonormal and spans the changes that a refit can make; ``order`` is that of a flattened trace
+    in it.
     """
 
     base: hidden.Base

@@ -42,7 +42,7 @@ class Answer:
 
     kind: str
     truth: tuple[str, ...]
-    wanted: tuple[float, ...]
+    sizes: tuple[float, ...]
     verdict: str
     names: tuple[str, ...]
     others: tuple[frozenset[str], ...]
@@ -65,7 +65,7 @@ class Answer:
     @property
     def size(self) -> float:
         """Size of the first effect over the usual noise."""
-        return self.wanted[0]
+        return self.sizes[0]
 
     @property
     def claims(self) -> bool:
@@ -388,7 +388,7 @@ def closed_loops(answers: Sequence[Answer]) -> Numbers:
 
 def line(one: Answer) -> str:
     """Return a case and its outcome in one line."""
-    hidden = "+".join(f"{n}@{s:.2f}" for n, s in zip(one.truth, one.wanted, strict=True))
+    hidden = "+".join(f"{n}@{s:.2f}" for n, s in zip(one.truth, one.sizes, strict=True))
     said = " ".join([one.verdict, "+".join(one.names)]).strip()
     rivals = "".join(f" or {'+'.join(sorted(names))}" for names in one.others)
     numbers = [f"trace {t['error']:.2f}" for t in one.traces.values()]

@@ -196,18 +196,7 @@ def diagnose(
     rule: Rule | None = None,
     seed: int = 0,
 ) -> Outcome:
-    """Compare Eq. 1 with the laboratory's knee torque and search for missing terms.
-
-    Parameters
-    ----------
-    recording : GaitRecording
-    causes : sequence of Cause
-        Rival terms.
-    rule : Rule, optional
-        Thresholds of the decision.
-    seed : int
-        Seed of the bootstrap.
-    """
+    """Compare Eq. 1 with the laboratory's knee torque and search for missing terms."""
     family, measured = GaitEstimate(recording), recording.torque[None]
     blocks = blocks_of(recording)
     plain = family.simulate(family.column[None])[0, :, 0]

@@ -28,29 +28,18 @@ LAB_NOISE = 1.0
 PLATE_NOISE = 2.0
 """Of the plate's horizontal force [N]."""
 LOADED = 50.0
-"""Vertical force [N] from which on a foot stands on the plate."""
+"""Least vertical force [N] of a loaded foot."""
 
 
 @dataclass(frozen=True)
 class GaitRecording:
     """Strides one after the other, arrays of shape (T,) in SI.
 
-    Attributes
-    ----------
-    stride : ndarray of int
-        Number of the stride of each sample.
-    torque : ndarray
-        Knee torque by inverse dynamics [N m]; NaN while the foot is in the air.
-    vertical, cop, lean : ndarray
-        Readings of the orthosis: ground force [N], centre of pressure [m ahead of the ankle], lean
-        of
-        the shank [rad].
-    horizontal : ndarray
-        Ground force on the plate [N], ahead positive.
-    knee, knee_rate, ankle : ndarray
-        Flexion [rad], [rad/s], dorsiflexion [rad].
-    inertial : ndarray
-        Knee torque [N m] that accelerates shank and foot, from the markers.
+    ``torque`` is the knee torque by inverse dynamics [N m], NaN while the foot is in the air;
+    ``inertial`` that which accelerates shank and foot, from the markers; ``horizontal`` the ground
+    force on the plate [N], ahead positive. The orthosis reads ``vertical`` force [N], centre of
+    pressure ``cop`` [m ahead of the ankle] and ``lean`` of the shank [rad]. Knee and ankle angles
+    [rad] are flexion and dorsiflexion.
     """
 
     stride: NDArray[np.int64]

@@ -50,14 +50,8 @@ def figures(
 ) -> Numbers:
     """Return all statistics of the page from the records of :func:`benchmarks.diagnosis.run.run`.
 
-    Parameters
-    ----------
-    records : sequence of mappings
-    tables : mapping, optional
-        Report of :func:`pam_envs.diagnosis.static.diagnosis.diagnose_readings` on the measured
-        tables.
-    whole_report_s : sequence of float
-        Durations of whole reports on 10 minutes at 50 Hz, on 2 cores [s].
+    ``tables`` is the report of :func:`pam_envs.diagnosis.static.diagnosis.diagnose_readings` on the
+    measured tables; ``whole_report_s`` are durations [s] of whole reports on 10 minutes at 50 Hz.
     """
     answers = [Answer.of(record) for record in records]
     kinds = defaultdict[str, list[Answer]](list)

@@ -37,11 +37,7 @@ Advance = Callable[[], None]
 
 @cache
 def engine_digest() -> str:
-    """Return the digest of what decides a diagnosis: rule, causes, default plant.
-
-    The numbers of the rule and of the causes, with recorded decisions, belong to a version of the
-    rule (``tests/diagnosis/decide/test_rule_version.py``), so that sources need not be compared.
-    """
+    """Return the digest of what decides a diagnosis: numbers of rule, causes, default plant."""
     causes = [
         (c.name, [[astuple(term) for term in form.terms] for form in c.forms]) for c in catalogue()
     ]
@@ -112,9 +108,8 @@ class Report:
     """Outcome of a run: one record a case, with the sections of its further stages.
 
     ``computed`` and ``found`` count the stages that were made now and those that were there
-    already;
-    ``failed`` are cases with the reason, which count as wrong, ``quarantined`` corrupt records that
-    were set aside and made again.
+    already; ``failed`` are cases with the reason, which count as wrong, ``quarantined`` corrupt
+    records that were set aside and made again.
     """
 
     records: list[dict[str, Any]] = field(default_factory=list)
@@ -134,16 +129,16 @@ def select(options: Options) -> list[Case]:
     drawn = cases(options.chosen, options.offset)
     _known("kind", options.kinds, {case.kind for case in drawn})
     _known("effect", options.names, {name for case in drawn for name in case.names})
-    wanted = [
+    matching = [
         case
         for case in drawn
         if (not options.kinds or case.kind in options.kinds)
         and (not options.names or set(options.names) & set(case.names))
     ]
     rng = np.random.default_rng(SHUFFLE)
-    totals, seen = Counter(map(_group, wanted)), Counter[tuple[str, ...]]()
+    totals, seen = Counter(map(_group, matching)), Counter[tuple[str, ...]]()
     kept = []
-    for case in wanted:
+    for case in matching:
         group = _group(case)
         number = math.ceil(options.fraction * totals[group] - 1e-9)
         if seen[group] < number:  # each group is spread evenly, at random within its share
@@ -171,8 +166,7 @@ def run(
     """Make what is missing of the records and return them all.
 
     ``start`` is called with the number of cases to make of each stage and returns what to call
-    after
-    each; ``act`` makes a record of a case and some stages.
+    after each; ``act`` makes a record of a case and some stages.
     """
     store = Store(options.folder)
     store.sweep()
@@ -196,7 +190,7 @@ def run(
     return report
 
 
-def retold(options: Options) -> list[dict[str, Any]]:
+def rejudged(options: Options) -> list[dict[str, Any]]:
     """Return records that are there, of whatever sources, judged anew by the present rule.
 
     Of several records of a case the newest; what no longer fits the names is left out.

@@ -28,8 +28,7 @@ def study(case: Case, stages: Collection[str] = ("verdict",)) -> dict[str, Any]:
     """Generate a case, diagnose it, and return the result with the truth in plain types.
 
     ``stages`` are some of :data:`STAGES`, ``verdict`` always included; the text of an error is kept
-    as
-    ``failure``.
+    as ``failure``.
     """
     unknown = sorted(set(stages) - set(STAGES))
     if unknown:
@@ -78,12 +77,12 @@ def truths_of(case: Case, made: Made) -> list[dict[str, Any]]:
     return [
         {
             "name": truth.name,
-            "wanted": wanted,
+            "target": target,
             "size": truth.size,
             "raw": truth.raw,
             "amplitude": truth.amplitude,
         }
-        for truth, wanted in zip(made.truths, case.sizes, strict=True)
+        for truth, target in zip(made.truths, case.sizes, strict=True)
     ]
 
 

@@ -28,8 +28,8 @@ tools use the same recordings.
   is that of `pam_envs.diagnosis`, with the rule and thresholds of the muscle diagnosis.
 - **mujoco.sysid**: `optimize` fits mass, stiffness and damping, from the same start within the same
   bounds. *Issues* are the warnings of its own report (`AutomatedInsights`).
-- **mujoco.sysid, told**: the same with MuJoCo's `frictionloss` as a further parameter, as a user
-  would do who suspects friction; on fewer rigs, since it takes longest.
+- **mujoco.sysid with friction**: the same with MuJoCo's `frictionloss` as a further parameter, as
+  a user would do who suspects friction; on fewer rigs, since it takes longest.
 
 `mujoco.sysid` estimates the parameters of a given model. It does not test for missing effects; this
 page measures what its report shows if a model lacks one.
@@ -117,7 +117,8 @@ def noticed(rows: Sequence[Row], against: bool) -> str:
     head = ["friction N", "ours: flagged", "ours: correct name only", "verdicts"]
     head += ["ours: residual before", "after"]
     if against:
-        head += ["sysid: issues", "sysid: residual", "told: issues", "told: residual"]
+        head += ["sysid: issues", "sysid: residual"]
+        head += ["with friction: issues", "with friction: residual"]
     made = []
     for friction, some in by_friction(rows).items():
         counts = Counter(r["ours"]["verdict"] for r in some)
@@ -131,7 +132,7 @@ def noticed(rows: Sequence[Row], against: bool) -> str:
     return table(head, made) + (
         "\nCounts with exact 95 % intervals. At 0 N the correct answer is *adequate*, no cause. "
         "Residuals are RMS over the noise, median and range: ours on held-out blocks, sysid's on "
-        "its training data. The issue of a told sysid at 0 N is that its friction is at the lower "
+        "its training data. The issue of sysid with friction at 0 N is that this is at the lower "
         "bound, which is correct. A residual of ours well above 1 is due to a candidate that "
         "breaks away slightly early or late and rests elsewhere until the next motion: with the "
         "rig's own constants it was 0.2 to 2.3 mm off on six rigs at 2 N.\n"
@@ -140,7 +141,7 @@ def noticed(rows: Sequence[Row], against: bool) -> str:
 
 def parameters(rows: Sequence[Row], against: bool) -> str:
     """Return the errors of the fitted parameters by friction."""
-    tools = {"sysid": ("sysid", "values"), "sysid, told": ("sysid_told", "values")}
+    tools = {"sysid": ("sysid", "values"), "sysid with friction": ("sysid_told", "values")}
     tools = tools if against else {}
     tools |= {"ours, refitted": ("ours", "base_values"), "ours, extended": ("ours", "values")}
     head = ["friction N", "tool", "mass %", "stiffness %", "damping %", "friction found N"]
@@ -172,7 +173,7 @@ def _inside(row: Row, tool: str) -> bool:
 def transfer(rows: Sequence[Row], against: bool) -> str:
     """Return the errors on another experiment by friction."""
     head = ["friction N", "ours, refitted", "ours, extended"]
-    head += ["sysid", "sysid, told"] if against else []
+    head += ["sysid", "sysid with friction"] if against else []
     made = []
     for friction, some in by_friction(rows).items():
         line = [f"{friction:g}", *(middle([r["ours"]["another"][k] for r in some]) for k in (0, 1))]

@@ -36,10 +36,8 @@ class Oscillator:
     """Constants of a rig in SI.
 
     ``friction`` is the dry friction while sliding [N], ``breakaway`` that at rest over it;
-    ``delay`` is
-    that of the force [samples], ``bias`` that of the sensor [m], ``drift`` its drift over an
-    experiment
-    [m].
+    ``delay`` is that of the force [samples], ``bias`` that of the sensor [m], ``drift`` its drift
+    over an experiment [m].
     """
 
     mass: float = NOMINAL["mass"]

@@ -110,10 +110,10 @@ def diagnose(force: Array, reading: Array, rule: Rule | None = None, seed: int =
     return Outcome(family, problem, blocks, base, decision)
 
 
-def run(case: Case, against: bool, told: bool = False) -> dict[str, Any]:
+def run(case: Case, against: bool, friction: bool = False) -> dict[str, Any]:
     """Return the results of both tools on a case, in plain types.
 
-    MuJoCo runs if ``against``, with friction as a further parameter if ``told``.
+    MuJoCo runs if ``against``, then also with ``friction`` as a parameter.
     """
     rig, force, fresh = case.rig, campaign(case.seed), another(case.seed)
     reading, truth = rig.readings(force, case.seed), rig.positions(fresh)
@@ -135,7 +135,7 @@ def run(case: Case, against: bool, told: bool = False) -> dict[str, Any]:
         ],
         "another": [_rms(found.predict(c, fresh) - truth) for c in (found.base, model)],
     }
-    runs = {"sysid": against, "sysid_told": against and told and "friction" in case.hidden}
+    runs = {"sysid": against, "sysid_told": against and friction and "friction" in case.hidden}
     for key in (key for key, runs_it in runs.items() if runs_it):
         fit = theirs.identify(force, reading, PERIOD, START, friction=key == "sysid_told")
         row[key] = {
@@ -168,7 +168,7 @@ def kept(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def main(
-    rigs: int = 20, others: int = 10, told: int = 5, write: bool = False, keep: bool = False
+    rigs: int = 20, others: int = 10, friction: int = 5, write: bool = False, keep: bool = False
 ) -> dict[str, Any]:
     """Run both tools on the same recordings and print the tables.
 
@@ -178,7 +178,7 @@ def main(
         Drawn rigs for every friction.
     others : int
         Drawn rigs for every other hidden effect.
-    told : int
+    friction : int
         Rigs on which MuJoCo also fits friction, which takes most of its time.
     write : bool
         Also write ``results/head_to_head.json`` and ``docs/head_to_head.md``.
@@ -193,7 +193,7 @@ def main(
     rows = []
     for case in track(list(cases(rigs, others)), "head to head"):
         against = version is not None and not keep
-        row = plain(run(case, against, case.seed < FIRST + told))
+        row = plain(run(case, against, case.seed < FIRST + friction))
         rows.append(kept(row) if keep else row)
     result = {
         "schema": 1,

@@ -45,8 +45,7 @@ class Identified:
     """Result of an identification; parameters by our names [SI].
 
     ``intervals`` are half-widths of 95 % intervals, ``issues`` the warnings of its report;
-    ``position``
-    is that of the fitted model [m], shape (T,), NaN where it is not compared.
+    ``position`` is that of the fitted model [m], shape (T,), NaN where it is not compared.
     """
 
     values: dict[str, float]

@@ -78,18 +78,12 @@ GRID = 0.6006743720854 / 99
 
 
 def near(
-    name: str,
-    ours: float,
-    unit: str,
-    expected: float,
-    share: float | None = NEAR,
-    note: str = BEFORE,
-    source: str = CONTROL,
-    why: str = "",
+    name: str, ours: float, unit: str, expected: float, share: float | None = NEAR, **more: Any
 ) -> Figure:
     """Return a figure judged within a share of the expected value; reported if that is None."""
     band = None if share is None else share * abs(expected)
-    return Figure(name, ours, unit, source, tolerance=band, note=note, expected=expected, why=why)
+    words = {"source": CONTROL, "note": BEFORE, **more}
+    return Figure(name, ours, unit, tolerance=band, expected=expected, **words)
 
 
 def nominal_step() -> tuple[Array, Array]:
@@ -119,7 +113,7 @@ def pi_figures() -> Iterator[Figure]:
     yield near("PI: overshoot", exact.overshoot, "%", 4.32, EXACT)
     yield near("PI: rise", exact.rise, "s", 0.1274, EXACT, why=why)
     text = f"on {coarse}: no figure of its own"
-    yield near("PI: rise on the coarse samples", rise, "s", 0.1274, None, text)
+    yield near("PI: rise on the coarse samples", rise, "s", 0.1274, None, note=text)
     yield near("PI: settling to 2 %", exact.settling, "s", 0.370, EXACT)
     yield near("PI: phase margin", float(margin), "deg", 65.5, EXACT)
 
@@ -213,7 +207,8 @@ def hysteresis_lines() -> Iterator[Figure]:
     text = "largest error over the range, 60 random histories"
     yield Figure("inverse by recursion", exact, "1", where, 0.0, 1e-12, text)
     text = f"{text}; {BEFORE}, for another mildly inhomogeneous hysteresis"
-    yield near("inverse (3.5) as printed", 100.0 * series, "%", 1.0, None, text, where)
+    more = {"note": text, "source": where}
+    yield near("inverse (3.5) as printed", 100.0 * series, "%", 1.0, **more)
 
 
 def disturbance_lines() -> Iterator[Figure]:
@@ -247,8 +242,8 @@ def rise_lines() -> Iterator[Figure]:
         )
         title = f"10 deg, rise, {name}"
         if name in EXPECTED:
-            text = f"{text}; {BEFORE}"
-            yield near(title, found.rise, "s", EXPECTED[name], NEAR, text, WHERE, UNKNOWN_LOOPS)
+            more = {"note": f"{text}; {BEFORE}", "source": WHERE, "why": UNKNOWN_LOOPS}
+            yield near(title, found.rise, "s", EXPECTED[name], **more)
         else:
             text += f"; {BEFORE}, tuned otherwise" if name in OTHERWISE else ""
             known = OTHERWISE.get(name)

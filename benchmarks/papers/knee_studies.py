@@ -52,16 +52,10 @@ class TensionErrors:
 class Switch:
     """Transient after switches from swing to stance, the mean over strides.
 
-    Attributes
-    ----------
-    tension : float
-        Largest error [N] in the first 0.5 s.
-    at_switch : float
-        Error [N] in the first period of stance: what the swing's controller left behind.
-    excess : float
-        By how much [N] the largest error is above that: the transient of the one taking over.
-    command : float
-        Largest change of the set-point [Pa] from one period to the next at the switch.
+    ``tension`` is the largest error [N] in the first 0.5 s; ``at_switch`` that of the first period
+    of stance, left behind by the swing's controller; ``excess`` is by how much [N] the largest
+    error is above it, the transient of the one taking over; ``command`` the change of the set-point
+    [Pa] from one period to the next at the switch.
     """
 
     tension: float
@@ -78,16 +72,10 @@ def tension_errors(
 ) -> TensionErrors:
     """Return the errors of tracking a tension of 0.1 Hz in ``PAM/KneeTension-v0``.
 
-    Parameters
-    ----------
-    width : float
-        Pressure [Pa] that all elements of the hysteresis hold together; the preset's is 0.5 bar.
-    feedback : {"printed", "designed"}
-        Controller (11), or our design on the identified plant.
-    mounting : {"rig", "no_load"}
-        The isometric preset, 80 to 330 N, or the wearable one, 80 to 205 N.
-    dynamics : {"measured", "lag"}
-        The published frequency response, or the regulator's lag.
+    ``width`` is the pressure [Pa] that all elements of the hysteresis hold together. The feedback
+    is controller (11), or our design on the identified plant; the mounting the isometric preset, 80
+    to 330 N, or the wearable one, 80 to 205 N; the dynamics the published frequency response, or
+    the regulator's lag.
     """
     preset = {"rig": KneeOrthosis.rig, "no_load": KneeOrthosis.no_load}[mounting]
     plant = preset(dynamics=dynamics, hysteresis__width=width / PRESET_FRICTION).without_noise()
@@ -130,22 +118,10 @@ def stride(
 ) -> Mapping[str, NDArray[np.float64]]:
     """Return the signals (SI) of three strides with the paper's control system, at rest at contact.
 
-    Parameters
-    ----------
-    activity : {"walk", "stairs_up", "stairs_down"}
-    mismatch : float
-        By how much [N] the tension's reference is off while it is off-line.
-    bumpless : bool
-        Whether the compensators of bumpless transfer are on.
-    preview : bool
-        Whether the feed-forward looks one lag of the regulator ahead, as the paper's does not.
-    pace : float
-        Duration of a stride [s].
-
-    Returns
-    -------
-    mapping
-        ``info`` of the environment by its keys, and ``set_point`` [Pa].
+    While the tension is off-line its reference is off by ``mismatch`` [N]. ``bumpless`` turns on
+    the compensators of bumpless transfer; with ``preview`` the feed-forward looks one lag of the
+    regulator ahead, as the paper's does not; ``pace`` is the duration of a stride [s]. The keys are
+    those of the environment's ``info``, and ``set_point`` [Pa].
     """
     plant = KneeOrthosis.on_leg(activity, stride=pace).without_noise()
     env: Any = gym.make(

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from benchmarks.speed import probes
 from benchmarks.speed.diagnosis import diagnosing
 from benchmarks.speed.learning import learning, shares
-from benchmarks.speed.planning import planning
 from benchmarks.speed.rates import Measurement, Missing
 
 Probe = Callable[[int], list[Measurement]]
@@ -18,7 +17,7 @@ Start = Callable[[int], Callable[[], None]]
 GROUPS: dict[str, tuple[Probe, ...]] = {
     "single": (probes.single, probes.single_joints),
     "batch": (probes.batch, probes.variants, probes.growth, probes.cores, probes.processes),
-    "planning": (planning,),
+    "planning": (probes.planning,),
     "plain": (probes.uncompiled, probes.jacobian),
     "start": (probes.start_up,),
     "learning": (learning, shares),
@@ -29,13 +28,7 @@ GROUPS: dict[str, tuple[Probe, ...]] = {
 def measure(
     only: Sequence[str] = (), rounds: int = 7, start: Start = lambda total: lambda: None
 ) -> list[Measurement]:
-    """Measure the named groups, or all.
-
-    Raises
-    ------
-    ValueError
-        If a group is unknown.
-    """
+    """Measure the named groups, or all; a ValueError names an unknown one."""
     unknown = sorted(set(only) - set(GROUPS))
     if unknown:
         raise ValueError(f"no group named {unknown[0]!r}; there are: {', '.join(GROUPS)}")

@@ -15,12 +15,17 @@ from typing import Any
 import numpy as np
 
 from benchmarks.speed.rates import Chunk, Measurement, Missing, interleaved, median, ratio
+from pam_envs.mechanics.redundancy.resolution import resolve
+from pam_envs.mechanics.serial_chain.chain import SerialChain
+from pam_envs.references.path import PATHS
 
 ENV = "PAM/MusclePositioning-v0"
 KNEE = "PAM/KneeWalk-v0"
 ELBOW = "PAM/ElbowOrthosis-v0"
 ROOT = Path(__file__).resolve().parents[2]
 JOINT, ARM = "PAM/AntagonisticJoint-v0", "PAM/RedundantManipulator-v0"
+REPEATS = 5
+"""Repetitions of each planned path, there and back."""
 PENDULUM, CARTPOLE, HOPPER = "InvertedPendulum-v5", "CartPole-v1", "Hopper-v5"
 
 
@@ -250,6 +255,22 @@ def processes(rounds: int) -> list[Measurement]:
     ]
 
 
+def planning(rounds: int) -> list[Measurement]:
+    """Joint angles for the poses of the arm's three paths, there and back."""
+    arm = SerialChain.uniform()
+    lines = [np.vstack([path.angles(), path.angles()[::-1]] * REPEATS) for path in PATHS]
+    paths = [(arm.pose(line), line[0]) for line in lines]
+
+    def chunk() -> int:
+        for poses, start in paths:
+            resolve(arm, poses, start=start)
+        return sum(len(poses) for poses, _ in paths)
+
+    rate = median(interleaved({"poses": chunk}, rounds)["poses"])
+    title = "weighted joint angles of an arm of six, poses per CPU second"
+    return [Measurement("planning", title, rate, "1/s", 2000.0, 20000.0)]
+
+
 # --- uncompiled, and fitting --------------------------------------------------------------------
 
 _UNCOMPILED = """
@@ -326,8 +347,7 @@ def start_up(rounds: int) -> list[Measurement]:
     """Import and first step in a fresh interpreter, and the way to machine code.
 
     An environment begins in plain Python and changes to machine code after some steps; what that
-    takes
-    is measured beside the first step, and has no target.
+    takes is measured beside the first step, and has no target.
     """
     from pam_envs.envs.core.plant_env import INTERPRETED_CALLS
 

@@ -55,8 +55,8 @@ WORDS = ("right_first", "exact", "both", "wrong", "extra", "listed", "alarm")
 def test_words_for_a_single_effect(
     verdict: str, names: list[str], others: list[str], holds: set[str]
 ) -> None:
-    told = Answer.of(record(verdict=verdict, names=names, others=others))
-    assert {word for word in WORDS if getattr(told, word)} == holds
+    found = Answer.of(record(verdict=verdict, names=names, others=others))
+    assert {word for word in WORDS if getattr(found, word)} == holds
 
 
 def test_words_for_two_effects() -> None:

@@ -19,7 +19,7 @@ from benchmarks.diagnosis import study as diagnosis_study
 from benchmarks.diagnosis.cases import NOISE, Case, cases, make
 from benchmarks.diagnosis.next import DrivenRig, OracleRig
 from benchmarks.diagnosis.report import figures
-from benchmarks.diagnosis.run import Options, retold, run, select
+from benchmarks.diagnosis.run import Options, rejudged, run, select
 from benchmarks.diagnosis.study import study, trace_errors
 from pam_envs.diagnosis.causes import catalogue
 from pam_envs.diagnosis.closed_loop.gain import COMPENSABLE
@@ -87,7 +87,7 @@ def answer(case: Case, stages: Collection[str]) -> dict[str, Any]:
 
 
 class Counting:
-    """Answers, and remembers what was asked."""
+    """Answers as a study does, with a record of the requests."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[Case, str]] = []
@@ -226,10 +226,10 @@ def test_records_are_rejudged_by_the_present_rule(tmp_path: Path) -> None:
 
     options = Options(kinds=("single",), names=("creep", "leak"), folder=tmp_path)
     run(options, act=judged)
-    made = retold(options)
+    made = rejudged(options)
     assert [one["verdict"] for one in made] == ["named", "named"]
     assert [one["names"] for one in made] == [["leak"], ["leak"]]
-    assert retold(Options(kinds=("clean",), folder=tmp_path)) == []
+    assert rejudged(Options(kinds=("clean",), folder=tmp_path)) == []
 
 
 # --- a study -------------------------------------------------------------------------------------

@@ -60,8 +60,8 @@ def test_runs_are_copied_under_the_presets_name(place: Path, tmp_path: Path) -> 
     assert names(place) == both(*(f"{NAME}.s{seed}" for seed in range(3)))
     for folder, seed in zip(given, (2, 0, 1), strict=True):
         for end in ("onnx", "json"):
-            wanted = (Path(folder) / f"policy.{end}").read_bytes()
-            assert (place / f"{NAME}.s{seed}.{end}").read_bytes() == wanted
+            expected = (Path(folder) / f"policy.{end}").read_bytes()
+            assert (place / f"{NAME}.s{seed}.{end}").read_bytes() == expected
     entry = catalogue.OFFERED["ppo_knee_walk"]
     assert list(entry.files()) == [0, 1, 2]
     assert entry.author == ""
@@ -79,11 +79,11 @@ def test_older_files_of_a_preset_are_replaced_and_listed(
     assert main(["enter", *runs(tmp_path / "new", [0, 1]), "--author", "Doe, J."]) == 0
     kept = ("KneeWalk-v0.ppo-residual.s0", "KneeStairsUp-v0.ppo.s2")
     assert names(place) == both(f"{NAME}.s0", f"{NAME}.s1", *kept)
-    told = capsys.readouterr().out.splitlines()
+    lines = capsys.readouterr().out.splitlines()
     gone = both(*(f"{NAME}.s{seed}" for seed in range(3)))
-    replaced = [line for line in told if line.startswith("replaced ")]
+    replaced = [line for line in lines if line.startswith("replaced ")]
     assert sorted(replaced) == sorted(f"replaced {place / name}" for name in gone)
-    assert told[-1] == "ppo_knee_walk: training seeds 0, 1"
+    assert lines[-1] == "ppo_knee_walk: training seeds 0, 1"
     assert catalogue.OFFERED["ppo_knee_walk"].author == "Doe, J."
     card = json.loads((place / f"{NAME}.s1.json").read_text())
     assert card.pop("author") == "Doe, J."

@@ -53,11 +53,11 @@ def test_file_and_torch_agree(name: str, request: pytest.FixtureRequest) -> None
     seen = observations(500)
     normaliser = model.get_vec_normalize_env()
     given = normaliser.normalize_obs(seen) if normaliser else seen
-    wanted, _ = model.predict(given, deterministic=True)
+    expected, _ = model.predict(given, deterministic=True)
     action, _ = policy.predict(seen)
     assert action.dtype == np.float32
-    assert np.abs(action - wanted).max() <= 1e-6
-    assert np.ptp(wanted) > 1e-3
+    assert np.abs(action - expected).max() <= 1e-6
+    assert np.ptp(expected) > 1e-3
 
 
 def test_normaliser_is_part_of_the_file(normalized_ppo: tuple[Any, Path]) -> None:
@@ -225,7 +225,7 @@ def test_a_doctored_pickle_runs_nothing(protocol: int, tmp_path: Path) -> None:
 class Gift:
     """A folder of files of sound formats that name an environment in a module of their own.
 
-    Gymnasium imports what stands before the colon, and the module makes a file.
+    Gymnasium imports the part before the colon, and the module makes a file.
     """
 
     def __init__(self, folder: Path, policy: Path) -> None:

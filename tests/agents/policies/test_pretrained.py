@@ -85,8 +85,8 @@ def test_file_is_small_with_a_training_record(path: Path) -> None:
 def test_settings_on_the_card_are_the_presets(path: Path) -> None:
     card = OnnxPolicy.load(path).card
     read = configs.from_mapping(card["config"]).as_dict()
-    told, known = (config.pop("search", {}) for config in (dict(card["config"]), read))
-    assert told.items() <= known.items()
+    stored, known = (config.pop("search", {}) for config in (dict(card["config"]), read))
+    assert stored.items() <= known.items()
     assert read == {name: value for name, value in card["config"].items() if name != "search"}
     preset = configs.read(configs.FOLDER / f"{path.stem.rpartition('.')[0]}.yaml")
     assert preset.decisive() == configs.from_mapping(card["config"]).decisive()

@@ -84,8 +84,8 @@ def test_controller_with_other_answers_is_refused(
     plant, make = plant_with(law), make_controller
     assert isinstance(with_controller(file, plant), ResidualPolicy)
 
-    def later(*told: Any) -> Any:
-        made = make(*told)
+    def later(*parts: Any) -> Any:
+        made = make(*parts)
         return dataclasses.replace(made, inverse=_with_horizon(made.inverse))
 
     monkeypatch.setattr(MAKE, later)
@@ -108,8 +108,8 @@ def _with_horizon(inverse: Any) -> Any:
 
 def test_controller_of_another_plant_may_answer_differently(file: OnnxPolicy) -> None:
     plant = plant_with("preisach")
-    told = plant.replace({"mass.damping": 1.2 * plant.mass.damping})
-    assert isinstance(with_controller(file, told), ResidualPolicy)
+    changed = plant.replace({"mass.damping": 1.2 * plant.mass.damping})
+    assert isinstance(with_controller(file, changed), ResidualPolicy)
 
 
 @pytest.mark.parametrize(
@@ -205,8 +205,8 @@ def _recorded(env: ResidualVecEnv) -> list[dict[str, Any]]:
         def get_env(self) -> ResidualVecEnv:
             return env
 
-    told: list[dict[str, Any]] = facts(Model())["baseline"]["recorded"]  # type: ignore[arg-type]
-    return told
+    recorded: list[dict[str, Any]] = facts(Model())["baseline"]["recorded"]  # type: ignore[arg-type]
+    return recorded
 
 
 def test_residual_has_the_controllers_model_output() -> None:

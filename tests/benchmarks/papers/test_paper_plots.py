@@ -13,15 +13,15 @@ TIME = 0.01 * np.arange(1, 1601)
 def record() -> dict[str, np.ndarray]:
     """Return a made-up walk: contacts at 5, 10 and 15 s, 2 s of stance, off by 30 N at a switch."""
     stance = ((TIME % 5.0) < 2.0).astype(float)
-    wanted = 100.0 + 20.0 * np.sin(TIME)
+    desired = 100.0 + 20.0 * np.sin(TIME)
     off = 30.0 * np.exp(-(TIME % 5.0) / 0.2) * stance
     ones = np.ones_like(TIME)
     return {
         "time": TIME,
         "state/stance": stance,
         "sensor/stance": stance,
-        "reference": wanted,
-        "output": wanted - off,
+        "reference": desired,
+        "output": desired - off,
         "state/angle": 1.8 + 0.3 * np.sin(TIME),
         "state/deviation": 0.01 * ones,
         "state/pressure": 2e5 * ones,

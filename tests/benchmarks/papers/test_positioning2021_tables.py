@@ -10,11 +10,12 @@ import pytest
 
 from baselines.positioning import contraction_errors as errors
 from baselines.positioning import contraction_tables as curves
+from benchmarks.papers import positioning as published
 from pam_envs.data.tables import BAR, MM, load_contraction_table
 
 TABLE = load_contraction_table()
 MILLI = 0.5e-3 + 1e-9
-"""Half a unit of the third decimal, with room for a figure that lies on the half."""
+"""Half a unit of the third decimal, with room for a figure on the half."""
 
 PRINTED_MEANS = {
     0.0: "0 .41 1 1.6 2.7 3.7 5.2 7.1 8.6 10.18 11.92 12.8 15.1 14.5 13.9 12.7 11.6 10.39 8.22 6.2 "
@@ -185,17 +186,9 @@ def test_two_more_entries_of_table_6_are_suspect(contraction, printed, read):
     assert curves.TABLE_6_PRESSURE[0, 1, row] == printed
 
 
-POSITIONING = {
-    "published": (1.730, 8.751),
-    "table 6 refit": (0.236, 1.114),  # with Table 6's 1.43 bar, as the paper fitted it
-    "table 6 refit, corrected": (0.196, 0.743),  # with 2.05 bar
-    "cubic": (0.262, 0.849),
-    "inverse of forward cubic": (0.202, 0.698),
-    "quintic": (0.174, 0.578),
-    "pchip": (0.162, 0.623),
-    "one cubic for both branches": (1.171, 2.191),
-}
-"""RMS and largest positioning error [mm] on the tables' own repeats."""
+POSITIONING = published.POSITIONING | {"table 6 refit, corrected": (0.196, 0.743)}
+"""RMS and largest positioning error [mm] on the tables' own repeats; with 2.05 bar in Table 6 in
+place of 1.43 bar, as the paper fitted it."""
 
 
 @pytest.fixture(scope="module")
@@ -211,8 +204,8 @@ def test_positioning_errors(positioning, inverse):
 
 def test_positioning_errors_by_published_equation(positioning):
     found = np.array(positioning["published"].per_equation) / MM
-    wanted = [0.243, 0.313, 1.130, 0.316, 3.964, 0.840]
-    np.testing.assert_allclose(found, wanted, rtol=0, atol=MILLI)
+    expected = [0.243, 0.313, 1.130, 0.316, 3.964, 0.840]
+    np.testing.assert_allclose(found, expected, rtol=0, atol=MILLI)
 
 
 def test_printed_equation_11_is_worse_than_ignoring_the_hysteresis(positioning):
@@ -229,10 +222,10 @@ def test_pchip_reaches_what_the_repeats_allow(positioning):
 
 @pytest.mark.parametrize("make", [curves.pchip_inverse, curves.forward_cubic_inverse])
 def test_inverses_of_curves_rise_with_the_contraction(make):
-    wanted = np.linspace(0.0, 16e-3, 801)
+    desired = np.linspace(0.0, 16e-3, 801)
     for load in (0.0, 1.0, 2.55, 3.3, 4.55, 6.0):
         for inflating in curves.BRANCHES:
-            pressure = make(TABLE).pressure(wanted, inflating, load)
+            pressure = make(TABLE).pressure(desired, inflating, load)
             assert np.all(np.diff(pressure) >= 0.0)
             assert -1e-6 <= pressure.min() < pressure.max() <= 6e5 + 1e-6
 
@@ -247,13 +240,15 @@ def test_pchip_gives_back_the_readings_it_was_made_from():
 
 
 def test_less_pressure_holds_a_contraction_when_deflating():
-    wanted = np.linspace(1e-3, 13e-3, 121)
+    desired = np.linspace(1e-3, 13e-3, 121)
     inverse = curves.pchip_inverse(TABLE)
     for load in (0.0, 1.2, 2.55, 3.5, 4.55):
-        assert np.all(inverse.pressure(wanted, True, load) > inverse.pressure(wanted, False, load))
+        assert np.all(
+            inverse.pressure(desired, True, load) > inverse.pressure(desired, False, load)
+        )
 
 
-def test_loads_between_two_measured_ones_lie_on_the_line_and_beyond_count_as_the_nearest():
+def test_loads_between_two_measured_ones_are_interpolated_and_others_clipped():
     inverse = curves.published_inverse()
     at = {load: inverse.pressure(8e-3, True, load) for load in (0.0, 2.55, 4.55)}
     assert inverse.pressure(8e-3, True, 3.55) == pytest.approx((at[2.55] + at[4.55]) / 2)
@@ -263,7 +258,7 @@ def test_loads_between_two_measured_ones_lie_on_the_line_and_beyond_count_as_the
 
 def test_arguments_broadcast():
     inverse = curves.pchip_inverse(TABLE)
-    wanted, inflating, load = np.array([4e-3, 8e-3]), np.array([[True], [False]]), [0.0, 4.55]
-    found = inverse.pressure(wanted, inflating, load)
+    desired, inflating, load = np.array([4e-3, 8e-3]), np.array([[True], [False]]), [0.0, 4.55]
+    found = inverse.pressure(desired, inflating, load)
     assert found.shape == (2, 2)
     assert found[1, 1] == inverse.pressure(8e-3, False, 4.55)

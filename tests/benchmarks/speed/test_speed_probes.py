@@ -1,4 +1,4 @@
-"""Probe of training: time within the plants, below all wrappers."""
+"""Probes of training (time within the plants, below all wrappers) and of planning."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import pytest
 from gymnasium.vector import VectorEnv
 
 from benchmarks.speed import learning as speed_learning
+from benchmarks.speed import probes, rates
+from benchmarks.speed.groups import measure
 
 
 @pytest.mark.parametrize(
@@ -45,10 +47,22 @@ def test_all_batches_of_a_preset_are_found(variant: str) -> None:
     )
     from agents.settings.presets import preset
 
-    wanted = preset("PAM/KneeTension-v0", "ppo", variant)
-    env = building.make_env(wanted)
+    config = preset("PAM/KneeTension-v0", "ppo", variant)
+    env = building.make_env(config)
     found = list(speed_learning.batches_of(env))
     env.close()
-    assert len(found) == len(wanted.kinds()) > 1
+    assert len(found) == len(config.kinds()) > 1
     assert all(isinstance(batch, VectorEnv) for batch in found)
-    assert sum(batch.num_envs for batch in found) == wanted.num_envs
+    assert sum(batch.num_envs for batch in found) == config.num_envs
+
+
+@pytest.mark.parametrize(("rate", "verdict"), [(1999.0, "MISSED"), (2001.0, "pass"), (3e4, "aim")])
+def test_planning_has_a_floor(monkeypatch, rate: float, verdict: str) -> None:
+    def timed(subjects, rounds):
+        assert subjects["poses"]() == 3 * 2 * 41 * probes.REPEATS
+        return {"poses": [rate] * rounds}
+
+    monkeypatch.setattr(probes, "interleaved", timed)
+    (found,) = measure(["planning"], rounds=3)
+    assert (found.value, found.verdict) == (rate, verdict)
+    assert "MISSED" not in rates.table([found]) or rate < 2000.0
