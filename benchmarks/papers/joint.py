@@ -208,7 +208,7 @@ def hysteresis_lines() -> Iterator[Figure]:
     yield Figure("inverse by recursion", exact, "1", where, 0.0, 1e-12, text)
     text = f"{text}; {BEFORE}, for another mildly inhomogeneous hysteresis"
     more = {"note": text, "source": where}
-    yield near("inverse (3.5) as printed", 100.0 * series, "%", 1.0, **more)
+    yield near("inverse (3.5) as printed", 100.0 * series, "%", 1.0, None, **more)
 
 
 def disturbance_lines() -> Iterator[Figure]:
@@ -243,7 +243,7 @@ def rise_lines() -> Iterator[Figure]:
         title = f"10 deg, rise, {name}"
         if name in EXPECTED:
             more = {"note": f"{text}; {BEFORE}", "source": WHERE, "why": UNKNOWN_LOOPS}
-            yield near(title, found.rise, "s", EXPECTED[name], **more)
+            yield near(title, found.rise, "s", EXPECTED[name], NEAR, **more)
         else:
             text += f"; {BEFORE}, tuned otherwise" if name in OTHERWISE else ""
             known = OTHERWISE.get(name)
