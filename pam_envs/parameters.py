@@ -1,8 +1,8 @@
 """Declared physical parameters and named signals.
 
-A component is a frozen dataclass whose fields are made by :func:`parameter`, so that every number
-carries unit, bounds, provenance and source. :func:`check` refuses a value out of bounds with a
-sentence that names value, bound and remedy.
+A component is a frozen dataclass whose fields are made by :func:`assumed`, :func:`published`,
+:func:`derived`, :func:`identified` or :func:`effect`, so that every number carries unit, bounds,
+provenance and source. :func:`check` refuses a value out of bounds.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections import namedtuple
-from collections.abc import Callable, Iterable, Iterator
-from functools import lru_cache
+from collections.abc import Iterable, Iterator
+from functools import lru_cache, partial
 from itertools import accumulate
 from typing import Any, Literal
 
@@ -32,10 +32,8 @@ class Declaration:
         SI unit, ``"1"`` for a pure number.
     low, high : float
         Bounds within which the parameter is physical, in ``unit``.
-    provenance : {"published", "derived", "assumed", "identified"}
-        Origin of the default.
-    source : str
-        The paper and place, or the reason for an assumption.
+    provenance, source : str
+        Origin of the default; the paper and place, or the reason for an assumption.
     neutral : float or None
         The value that switches the effect off, where there is one.
     spread : tuple of float or None
@@ -56,8 +54,8 @@ def parameter(
     unit: str,
     low: float,
     high: float,
-    provenance: Provenance,
     source: str,
+    provenance: Provenance = "assumed",
     **options: Any,
 ) -> Any:
     """Return a dataclass field for a physical parameter (see :class:`Declaration`)."""
@@ -65,22 +63,10 @@ def parameter(
     return dataclasses.field(default=default, metadata={"declaration": declaration})
 
 
-def _of(provenance: Provenance) -> Callable[..., Any]:
-    def declare(
-        default: float, unit: str, low: float, high: float, source: str, **options: Any
-    ) -> Any:
-        """Return :func:`parameter` of this provenance."""
-        return parameter(default, unit, low, high, provenance, source, **options)
-
-    return declare
-
-
-published, derived, assumed, identified = (
-    _of("published"),
-    _of("derived"),
-    _of("assumed"),
-    _of("identified"),
-)
+assumed = parameter
+published = partial(parameter, provenance="published")
+derived = partial(parameter, provenance="derived")
+identified = partial(parameter, provenance="identified")
 
 
 def effect(unit: str, low: float, high: float, source: str) -> Any:

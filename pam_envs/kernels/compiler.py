@@ -67,18 +67,30 @@ class _Cache(caching.Cache):
     _impl_class = _CacheImpl
 
 
-def _constant_view(context: Any, builder: Any, view: Any, data: Any, shape: tuple[int, int]) -> Any:
-    """Return an array value of constant shape over an address that it does not own."""
-    width = context.get_abi_sizeof(context.get_data_type(view.dtype))
+def _sizes(*given: Any) -> tuple[int, ...] | None:
+    """Return literal integers as numbers, or None if one is not literal."""
+    literal = all(isinstance(size, types.IntegerLiteral) for size in given)
+    return tuple(size.literal_value for size in given) if literal else None
+
+
+def _view(context: Any, builder: Any, view: Any, data: Any, shape: list[Any]) -> Any:
+    """Return an array value of a shape over an address that it does not own."""
+    itemsize = context.get_constant(
+        types.intp, context.get_abi_sizeof(context.get_data_type(view.dtype))
+    )
+    strides = [itemsize]
+    for size in shape[:0:-1]:
+        strides.insert(0, builder.mul(strides[0], size))
     made = make_array(view)(context, builder)
+    parent = cgutils.get_null_value(made.parent.type)
     populate_array(
         made,
         data=data,
-        shape=[context.get_constant(types.intp, n) for n in shape],
-        strides=[context.get_constant(types.intp, n) for n in (shape[1] * width, width)],
-        itemsize=context.get_constant(types.intp, width),
+        shape=shape,
+        strides=strides,
+        itemsize=itemsize,
         meminfo=None,
-        parent=cgutils.get_null_value(made.parent.type),
+        parent=parent,
     )
     return made._getvalue()
 
@@ -86,16 +98,17 @@ def _constant_view(context: Any, builder: Any, view: Any, data: Any, shape: tupl
 @intrinsic(prefer_literal=True)
 def _tile_view(typing: Any, tiles: Any, tile: Any, rows: Any, lanes: Any) -> Any:
     """Return a view of one tile whose shape and strides are constants of the code."""
-    if not isinstance(rows, types.IntegerLiteral) or not isinstance(lanes, types.IntegerLiteral):
+    sizes = _sizes(rows, lanes)
+    if sizes is None:
         return None
     view = types.Array(tiles.dtype, 2, "C")
-    shape = (rows.literal_value, lanes.literal_value)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         source = make_array(signature.args[0])(context, builder, arguments[0])
-        size = context.get_constant(types.intp, shape[0] * shape[1])
-        data = builder.gep(source.data, [builder.mul(arguments[1], size)])
-        return _constant_view(context, builder, view, data, shape)
+        shape = [context.get_constant(types.intp, size) for size in sizes]
+        offset = context.get_constant(types.intp, sizes[0] * sizes[1])
+        data = builder.gep(source.data, [builder.mul(arguments[1], offset)])
+        return _view(context, builder, view, data, shape)
 
     return view(tiles, types.intp, rows, lanes), generate
 
@@ -103,16 +116,16 @@ def _tile_view(typing: Any, tiles: Any, tile: Any, rows: Any, lanes: Any) -> Any
 @intrinsic(prefer_literal=True)
 def _scratch(typing: Any, rows: Any, lanes: Any) -> Any:
     """Return rows of scratch on the stack, of constant shape."""
-    if not isinstance(rows, types.IntegerLiteral) or not isinstance(lanes, types.IntegerLiteral):
+    sizes = _sizes(rows, lanes)
+    if sizes is None:
         return None
     view = types.Array(types.float64, 2, "C")
-    shape = (rows.literal_value, lanes.literal_value)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        block = cgutils.alloca_once(
-            builder, context.get_data_type(types.float64), size=shape[0] * shape[1]
-        )
-        return _constant_view(context, builder, view, block, shape)
+        kind = context.get_data_type(types.float64)
+        block = cgutils.alloca_once(builder, kind, size=sizes[0] * sizes[1])
+        shape = [context.get_constant(types.intp, size) for size in sizes]
+        return _view(context, builder, view, block, shape)
 
     return view(rows, lanes), generate
 
@@ -123,49 +136,27 @@ _DTYPES = (types.float64, types.int64, types.float32, types.int8)
 @intrinsic(prefer_literal=True)
 def _array_at(typing: Any, book: Any, index: Any, dimensions: Any, kind: Any) -> Any:
     """Return the array with an address and a shape of ``book`` (see ``build.address_book``)."""
-    if not isinstance(dimensions, types.IntegerLiteral) or not isinstance(
-        kind, types.IntegerLiteral
-    ):
+    sizes = _sizes(dimensions, kind)
+    if sizes is None:
         return None
-    ndim, dtype = dimensions.literal_value, _DTYPES[kind.literal_value]
+    ndim, dtype = sizes[0], _DTYPES[sizes[1]]
     view = types.Array(dtype, ndim, "C")
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         words = make_array(signature.args[0])(context, builder, arguments[0]).data
-        step = context.get_constant(types.intp, 4)
-        first = builder.mul(arguments[1], step)
+        first = builder.mul(arguments[1], context.get_constant(types.intp, 4))
 
         def word(k: int) -> Any:
             place = builder.add(first, context.get_constant(types.intp, k))
             return builder.load(builder.gep(words, [place]))
 
         data = builder.inttoptr(word(0), context.get_data_type(dtype).as_pointer())
-        width = context.get_abi_sizeof(context.get_data_type(dtype))
-        itemsize = context.get_constant(types.intp, width)
-        shape = [word(k + 1) for k in range(ndim)]
-        strides = [itemsize]
-        for size in shape[:0:-1]:
-            strides.insert(0, builder.mul(strides[0], size))
-        made = make_array(view)(context, builder)
-        populate_array(
-            made,
-            data=data,
-            shape=shape,
-            strides=strides,
-            itemsize=itemsize,
-            meminfo=None,
-            parent=cgutils.get_null_value(made.parent.type),
-        )
-        return made._getvalue()
+        return _view(context, builder, view, data, [word(k + 1) for k in range(ndim)])
 
     return view(book, types.intp, dimensions, kind), generate
 
 
-_REPLACED: dict[str, Any] = {
-    "tile_view": _tile_view,
-    "scratch": _scratch,
-    "array_at": _array_at,
-}
+_REPLACED: dict[str, Any] = {"tile_view": _tile_view, "scratch": _scratch, "array_at": _array_at}
 __all__ = ["compiled", "get_num_threads"]
 _DONE: dict[Any, Any] = {}
 FOLDER = rebind.cache_folder()

@@ -22,10 +22,10 @@ from pam_envs.kernels.build import kernel
 from pam_envs.muscle.effects import (
     LengthCreepEffects,
     LoadEffects,
+    StrandEffects,
     TemperatureEffects,
     ViscosityEffects,
 )
-from pam_envs.muscle.strands import StrandEffects
 from pam_envs.parameters import assumed, effect, identified, published
 
 _FIT = "least squares on positioning2021, Tables 3-5"

@@ -22,10 +22,16 @@ from pam_envs.kernels.arithmetic import count_on, decay
 from pam_envs.kernels.build import LANES, kernel, routine, scratch
 from pam_envs.kernels.motion import damped_motion
 from pam_envs.mechanics.guide import stick_slip_step
-from pam_envs.mechanics.support import MOUNT_STATE, load_fraction, mount_step
+from pam_envs.mechanics.hanging_mass import MOUNT_STATE, load_fraction, mount_step
 from pam_envs.muscle.effective_area import fine_slope, fine_tension, tension, tension_slope
-from pam_envs.muscle.effects import stiffening, temperature_factor, viscous_damping
-from pam_envs.muscle.strands import slip_strands, strand_forces, strands_on
+from pam_envs.muscle.effects import (
+    slip_strands,
+    stiffening,
+    strand_forces,
+    strands_on,
+    temperature_factor,
+    viscous_damping,
+)
 from pam_envs.plants.core.sensors import effect_kernels, read_with_effects
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.plants.single_muscle.hysteresis_kernels import hysteresis_kernels

@@ -14,14 +14,14 @@ from pam_envs.hysteresis.friction_effects import FirstCycles, FrictionEffects, T
 from pam_envs.hysteresis.protocol import NUMBERS
 from pam_envs.kernels.history import N_HISTORY
 from pam_envs.mechanics.guide import GuideEffects
-from pam_envs.mechanics.support import MOUNT_STATE, MountEffects, SupportEffects
+from pam_envs.mechanics.hanging_mass import MOUNT_STATE, MountEffects, SupportEffects
 from pam_envs.muscle.effects import (
     LengthCreepEffects,
     LoadEffects,
+    StrandEffects,
     TemperatureEffects,
     ViscosityEffects,
 )
-from pam_envs.muscle.strands import StrandEffects
 from pam_envs.parameters import declarations
 from pam_envs.plants.core.rows import dotted, each, layout
 from pam_envs.plants.core.sensors import sensor_rows

@@ -26,7 +26,7 @@ from pam_envs.envs.core.layout import Report, computed, indices
 from pam_envs.envs.core.setup import Setup, compose
 from pam_envs.envs.core.step import CHOICE, FIRST_CONFIG, KEY_A, KEY_B, PERIOD
 from pam_envs.kernels.build import LANES, kernel, routine
-from pam_envs.parameters import parameter
+from pam_envs.parameters import assumed
 from pam_envs.references.trajectory import FAMILIES, ROWS, SAMPLES, draw_reference, sines_needed
 from pam_envs.tasks.rewards import weight
 
@@ -53,7 +53,7 @@ class Holding:
     """Weight and scale of the reward."""
 
     tracking_weight: float = weight(1.0, "reward per control period at an error of error_scale")
-    error_scale: float = parameter(1e-3, "m", 1e-6, 1.0, "assumed", "an error of 1 mm costs 1")
+    error_scale: float = assumed(1e-3, "m", 1e-6, 1.0, "an error of 1 mm costs 1")
 
 
 CONFIG = indices(("tracking_weight", "error_scale"), FIRST_CONFIG)
@@ -63,8 +63,8 @@ CONFIG = indices(("tracking_weight", "error_scale"), FIRST_CONFIG)
 class Muscle:
     """First-order pressure, and a contraction proportional to it."""
 
-    lag: float = parameter(0.1, "s", 0.01, 1.0, "assumed", "of the regulator", spread=(0.05, 0.2))
-    gain: float = parameter(4e-8, "m/Pa", 1e-9, 1e-6, "assumed", "of muscle and spring")
+    lag: float = assumed(0.1, "s", 0.01, 1.0, "of the regulator", spread=(0.05, 0.2))
+    gain: float = assumed(4e-8, "m/Pa", 1e-9, 1e-6, "of muscle and spring")
     family, control_period, substeps = "spring_muscle", 0.01, 1
 
     @property
