@@ -146,10 +146,8 @@ class Signal:
 
     Attributes
     ----------
-    name : str
-        For example ``"pressure"``.
-    unit : str
-        SI unit.
+    name, unit : str
+        For example ``"pressure"``; SI unit.
     low, high : float
         Range in ``unit``; the normalised signal runs over [-1, 1] between them.
     index : int

@@ -79,7 +79,7 @@ def assumed_hysteresis(width: float = 1.0) -> Preisach:
     """
     weights = ((TOTAL - AFTER_TURN) / len(THRESHOLDS),) * len(THRESHOLDS)
     plays = PlayOperator(tuple(DEGREE * r for r in THRESHOLDS), weights, AFTER_TURN)
-    model = Preisach.from_play(plays, -RANGE, RANGE, levels=61, start="virgin")
+    model = Preisach.resembling(plays, -RANGE, RANGE, levels=61, start="virgin")
     return model.scaled(width, 1.0)
 
 

@@ -176,19 +176,8 @@ class ParallelElements:
     def step(self, x: ArrayLike, state: ArrayLike) -> tuple[Array, Array]:
         """Return the output and the new state for one sample of every row.
 
-        Parameters
-        ----------
-        x : array_like, shape (...)
-            Inputs.
-        state : array_like, shape (..., n)
-            Positions before; they are not changed.
-
-        Returns
-        -------
-        y : ndarray, shape (...)
-            Outputs, the same bits as :meth:`simulate` gives.
-        state : ndarray, shape (..., n)
-            Positions after.
+        ``x`` has shape (...), ``state`` and the new state (..., n); the outputs have the bits of
+        :meth:`simulate`. The state given is not changed.
         """
         thresholds, gains, line = self.parts
         x = np.asarray(x, dtype=float)

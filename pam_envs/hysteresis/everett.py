@@ -1,13 +1,11 @@
-"""The Everett map: change of a Preisach operator's output between two inputs.
+"""Everett map: change of a Preisach operator's output between two inputs.
 
-``E(alpha, beta)`` is the change of the output when the input rises from ``beta`` to ``alpha``
-(and has been below ``beta`` before): the weight of all relays that switch up at or below
-``alpha`` and down at or above ``beta``. A falling input changes it by ``E(beta, alpha) =
--E(alpha, beta)``, so the table is antisymmetric. It is given on a uniform grid and interpolated
-bilinearly, which spreads the relays of a cell evenly over the cell; relays of a cell on the
-diagonal are free of hysteresis (their loops are narrower than the grid resolves).
-
-There is no factor one half here: a relay goes from 0 to its weight.
+``E(alpha, beta)`` is the change of the output when the input rises from ``beta`` to ``alpha`` (and
+has been below ``beta`` before): the weight of all relays that switch up at or below ``alpha`` and
+down at or above ``beta``; a relay goes from 0 to its weight. ``E(beta, alpha) = -E(alpha, beta)``
+for a falling input, so the table is antisymmetric. Bilinear interpolation on a uniform grid spreads
+the relays of a cell evenly over the cell; relays of a cell on the diagonal are free of hysteresis
+(their loops are narrower than the grid resolves).
 
 References
 ----------
@@ -53,8 +51,8 @@ def grid(low: float, high: float, levels: int) -> Array:
 def table_from_weights(weights: ArrayLike) -> Array:
     """Return the table, shape (n, n), of relay weights per cell, shape (n - 1, n - 1).
 
-    ``weights[k][l]`` belongs to the relays that switch up in cell ``k`` and down in cell ``l``;
-    entries above the diagonal (up below down) are not looked at.
+    ``weights[k][l]``, ``l <= k``, belongs to the relays that switch up in cell ``k`` and down in
+    cell ``l``; entries above the diagonal are ignored.
     """
     w = np.tril(np.asarray(weights, dtype=float))
     n = len(w) + 1
@@ -70,16 +68,11 @@ def weights_from_table(table: ArrayLike) -> Array:
     return np.tril(rising[1:, :-1] - rising[:-1, :-1] - rising[1:, 1:] + rising[:-1, 1:])
 
 
-def line_table(slope: float, levels: Array) -> Array:
-    """Return the table of a line without hysteresis: ``slope * (alpha - beta)``."""
-    return slope * (levels[:, None] - levels[None, :])
-
-
 def play_table(operator: PlayOperator, levels: Array) -> Array:
     """Return the table of a play operator, exact at the grid's inputs.
 
-    A play of threshold ``r`` moves by ``max(0, alpha - beta - 2 r)``. Between the grid's inputs
-    each play is wrong by at most a quarter of its weight times the cell for every stored extremum.
+    A play of threshold ``r`` moves by ``max(0, alpha - beta - 2 r)``. Between the grid's inputs the
+    error of each play is at most a quarter of its weight times the cell for every stored extremum.
     """
     gap = levels[:, None] - levels[None, :]
     table = operator.linear * gap

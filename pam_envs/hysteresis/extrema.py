@@ -1,4 +1,4 @@
-"""The stack of dominant extrema, the state of a Preisach operator, and the recursive inverse.
+"""Stack of dominant extrema, the state of a Preisach operator, and the recursive inverse.
 
 Of an input's history, the operator keeps the alternating extrema that no later, larger excursion
 has wiped out, each with the output reached there. In the rows of a lane
@@ -8,8 +8,8 @@ has wiped out, each with the output reached there. In the rows of a lane
 - ``stack[count - 2]`` is the last turn and ``stack[count - 1]`` the present input;
 - ``sums[k]`` is the output at ``stack[k]``, so that one term of the Everett map gives the next.
 
-An output is always computed from a stored turn and never added up along the way: stopping in
-between, or coming back to a turn, changes no bit.
+An output is always computed from a stored turn, never accumulated: intermediate stops and returns
+to a turn change no bit.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def _origin(
 def _find_turn(
     x: float, stack: Any, sums: Any, count: Any, lane: int, low: float
 ) -> tuple[int, float, float, float]:
-    """Return the points that an input leaves, and the turn, output and factor to count from."""
+    """Return the points that an input keeps, and the turn, output and factor to count from."""
     n = count[lane]
     last, start = stack[n - 1][lane], stack[0][lane]
     goes_up = last > stack[max(n - 2, 0)][lane]
@@ -124,10 +124,8 @@ def preisach_step(
         Number of points in use of each ``lane``; changed in place.
     table : rows of float, shape (n, n)
         Antisymmetric Everett map.
-    low : float
-        Input of the table's first row.
-    inverse_cell : float
-        Cells per unit of input, ``(n - 1) / (high - low)``.
+    low, inverse_cell : float
+        Input of the table's first row, and cells per unit of input, ``(n - 1) / (high - low)``.
 
     Notes
     -----
@@ -204,10 +202,10 @@ def preisach_inverse(
 ) -> float:  # fmt: skip
     """Return the input that takes the output of one lane to ``y``; the state is not changed.
 
-    The recursion ``E(u_next, u_turn) = y - y_turn`` from the last turn that ``y`` leaves:
-    exact, other than a series over an inverted Everett map, which holds only for relay densities
-    of ``alpha - beta`` alone. An output out of reach gives the end of the range. Parameters are
-    those of :func:`preisach_step`.
+    The recursion ``E(u_next, u_turn) = y - y_turn`` from the last turn that ``y`` leaves: exact,
+    unlike a series over an inverted Everett map, which holds only for relay densities of ``alpha -
+    beta`` alone. An output out of reach gives the end of the range. Parameters are those of
+    :func:`preisach_step`.
     """
     n = count[lane]
     last, start = sums[n - 1][lane], stack[0][lane]

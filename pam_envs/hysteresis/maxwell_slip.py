@@ -24,16 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pam_envs.hysteresis.checks import check_not_negative, check_thresholds, floats, width_of
-from pam_envs.hysteresis.elements import (
-    ParallelElements,
-    play,
-    play_step,
-    plays_lag,
-    plays_peek,
-    plays_step,
-    slip_step,
-    stop,
-)
+from pam_envs.hysteresis.elements import ParallelElements, plays_lag, plays_peek, plays_step
 from pam_envs.hysteresis.everett import grid, play_table
 from pam_envs.hysteresis.protocol import (
     ELEMENTS,
@@ -45,8 +36,6 @@ from pam_envs.hysteresis.protocol import (
     Usage,
     register,
 )
-
-__all__ = ["MaxwellSlip", "PlayOperator", "play", "play_step", "slip_step", "stop"]
 
 Array = NDArray[np.float64]
 
@@ -126,11 +115,6 @@ class PlayOperator(ParallelElements, HysteresisModel):
     def rows(self) -> PlayRows:
         """Return the operator and its inverse over rows of environments."""
         return PlayRows(self)
-
-    @classmethod
-    def keys(cls) -> tuple[str, ...]:
-        """Return the keys of a record, in the order of a plant file."""
-        return ("linear", "thresholds", "weights")
 
     def everett_map(
         self, low: float, high: float, levels: int, start: Start

@@ -1,4 +1,4 @@
-"""The modified Maxwell-slip model: a nonlinear spring and elasto-slip elements in parallel.
+"""Modified Maxwell-slip model: a nonlinear spring and elasto-slip elements in parallel.
 
 Displacement in, force out, it is the sum of a spring ``g`` and stops (see
 :mod:`~pam_envs.hysteresis.maxwell_slip`); force in, displacement out, it is a hysteresis whose
@@ -7,16 +7,12 @@ stiffness ``s = tension / (length - shortest length)``:
 
     P = g(s) + sum_i k_i (s - w_i),    w_i = play(s, r_i)
 
-with ``g`` piecewise linear on evenly spaced knots. The pressure of a desired stiffness is a plain
-sum. The stiffness under a pressure is found by marching along the branch from kink to kink, where
-an element begins to slip or the spring has a knot: exact, with no tolerance.
+with ``g`` piecewise linear on evenly spaced knots. The pressure of a desired stiffness is this sum.
+The stiffness under a pressure is found by marching along the branch from kink to kink, where an
+element begins to slip or the spring has a knot: exact, with no tolerance.
 
-References
-----------
-T.-J. Yeh, M.-J. Wu, T.-J. Lu, F.-K. Wu, C.-R. Huang, "Control of McKibben pneumatic muscles for a
-power-assist, lower-limb orthosis", Mechatronics 20 (2010), section 3. T.-J. Yeh, S.-W. Lu,
-T.-Y. Wu, "Modeling and identification of hysteresis in piezoelectric actuators", J. Dyn. Sys.,
-Meas., Control 128 (2006).
+References: yeh2010, section 3; T.-J. Yeh, S.-W. Lu, T.-Y. Wu, "Modeling and identification of
+hysteresis in piezoelectric actuators", J. Dyn. Sys., Meas., Control 128 (2006).
 """
 
 from __future__ import annotations

@@ -30,13 +30,10 @@ from pam_envs.hysteresis.extrema import (
     STATE_ROWS,
     advance_rows,
     invert_rows,
-    preisach_inverse,
-    preisach_step,
     relays_begin,
     relays_peek,
     relays_step,
 )
-from pam_envs.hysteresis.maxwell_slip import PlayOperator
 from pam_envs.hysteresis.protocol import (
     HysteresisModel,
     Kernels,
@@ -47,8 +44,6 @@ from pam_envs.hysteresis.protocol import (
     padded,
     register,
 )
-
-__all__ = ["Preisach", "PreisachState", "preisach_inverse", "preisach_step"]
 
 Array = NDArray[np.float64]
 
@@ -168,22 +163,15 @@ class Preisach(HysteresisModel):
         return cls.from_weights(np.tril(values * area), low, high, depth, start)
 
     @classmethod
-    def from_play(
-        cls, operator: PlayOperator, low: float, high: float, levels: int = 33, depth: int = 24,
-        start: Start = "low",
-    ) -> Preisach:  # fmt: skip
-        """Return the Preisach operator that is ``operator``, exactly at the grid's inputs.
-
-        It starts in the play's own virgin state, or where the play is after the input has come up
-        to ``low`` from far below.
-        """
-        return cls.resembling(operator, low, high, levels, start, depth)
-
-    @classmethod
     def resembling(
-        cls, reference: Any, low: float, high: float, levels: int, start: Start, depth: int = DEPTH
-    ) -> Preisach:
-        """Return the operator with the Everett map of a reference model."""
+        cls, reference: Any, low: float, high: float, levels: int = 33, start: Start = "low",
+        depth: int = DEPTH,
+    ) -> Preisach:  # fmt: skip
+        """Return the operator with the Everett map of a reference model.
+
+        Of plays it is exact at the grid's inputs, and starts in their virgin state, or where they
+        are after the input has come up to ``low`` from far below.
+        """
         table, output = reference.everett_map(low, high, levels, start)
         return cls(low, high, table, depth, start, output)
 
@@ -202,7 +190,7 @@ class Preisach(HysteresisModel):
         return self._mixed(width, (1.0 - width) * s)
 
     def _mixed(self, width: float, slope: float) -> Preisach:
-        table = width * self.everett + maps.line_table(slope, self.levels)
+        table = width * self.everett + slope * (self.levels[:, None] - self.levels)
         start = self.low if self.start == "low" else 0.0
         output = width * self.start_output + slope * start
         return replace(self, table=table, start_output=output)  # type: ignore[arg-type]

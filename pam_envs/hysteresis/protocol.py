@@ -1,4 +1,4 @@
-"""The hysteresis protocol, between models and plants, files and controllers, and its registry.
+"""Hysteresis protocol, between models and plants, files and controllers, and its registry.
 
 A model is one class in one file of this folder, marked :func:`register`. It offers
 
@@ -7,8 +7,6 @@ A model is one class in one file of this folder, marked :func:`register`. It off
 - the rows that these kernels read: ``numbers`` (a column of the plant's parameters, so that each
   member of an ensemble, drawn per lane, has its own) and ``table_rows``;
 - a record for plant files, and a preset that resembles a reference model.
-
-Everything else (plants, environments, plant files, the command line) reads the registry.
 """
 
 from __future__ import annotations
@@ -381,10 +379,8 @@ def record(operator: HysteresisModel | None) -> dict[str, Any]:
 def read(record: Any, where: str) -> HysteresisModel | None:
     """Return the operator of a record; ``where`` names the file in messages.
 
-    Raises
-    ------
-    ValueError
-        If the kind is unknown, a key is missing or unknown, or a value is out of bounds.
+    Raises ValueError if the kind is unknown, a key is missing or unknown, or a value is out of
+    bounds.
     """
     if not isinstance(record, Mapping) or record.get("kind") not in MODELS:
         raise ValueError(

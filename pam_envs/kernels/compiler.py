@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -159,7 +160,9 @@ def _array_at(typing: Any, book: Any, index: Any, dimensions: Any, kind: Any) ->
 _REPLACED: dict[str, Any] = {"tile_view": _tile_view, "scratch": _scratch, "array_at": _array_at}
 __all__ = ["compiled", "get_num_threads"]
 _DONE: dict[Any, Any] = {}
-FOLDER = rebind.cache_folder()
+_BASE = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+FOLDER = Path(os.environ.get("PAM_ENVS_CACHE") or Path(_BASE) / "pam_envs")
+"""Folder of compiled code."""
 _COMPILER = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:16]
 """Options and intrinsics of this file are part of what it compiles."""
 

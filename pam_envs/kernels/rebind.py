@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import types
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -110,12 +108,3 @@ def _value_text(value: Any, names: Mapping[str, Any], known: dict[Any, str]) -> 
     if isinstance(value, int | float | str | tuple | frozenset | None):
         return repr(value)
     return f"{type(value).__name__} {getattr(value, '__qualname__', '')}"
-
-
-def cache_folder() -> Path:
-    """Return the folder for compiled code (``PAM_ENVS_CACHE``, else the user's cache folder)."""
-    given = os.environ.get("PAM_ENVS_CACHE")
-    if given:
-        return Path(given)
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "pam_envs"

@@ -1,15 +1,14 @@
-"""The static force of a Festo DMSP-10, a law fitted on a measured map.
+"""Static force of a Festo DMSP-10: a law fitted on a measured map.
 
     F(p, e) = p A (1 - taper e) - [threshold + braid (1 - exp(-e / strain)) + stiffness e]
 
 with ``e`` the contraction over the stretch of its axis. It is linear in the pressure, so that its
-inverse ``p(F, e)`` is exact, and smooth. It meets the measured map of a DMSP-10-250 (0.5 to
-6.5 bar, 0 to 20.8 % contraction, up to 542 N) within 1.4 N RMS, 8 N at the point of the lowest
-pressure. The sine law of fluidic_muscles (Boblan: a line and a sine over contraction, both linear
-in the pressure) has eight parameters in the place of six and meets it within 1.3 N; it waves
-between the measured contractions.
+inverse ``p(F, e)`` is exact, and smooth. It meets the measured map of a DMSP-10-250 (0.5 to 6.5
+bar, 0 to 20.8 % contraction, up to 542 N) within 1.4 N RMS, 8 N at the point of the lowest
+pressure. The sine law of fluidic_muscles has eight parameters instead of six and meets it within
+1.3 N, but oscillates between the measured contractions.
 
-A negative value means a slack muscle: its force is 0. The force is taken not to depend on the
+A negative value means a slack muscle: its force is 0. The force is assumed not to depend on the
 rest length at equal contraction, which the map of one length cannot show.
 
 References

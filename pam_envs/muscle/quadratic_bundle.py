@@ -1,11 +1,11 @@
-"""A bundle of pneumatic muscles as a spring that is quadratic in contraction: chakarov2018.
+"""Bundle of pneumatic muscles as a spring that is quadratic in contraction: chakarov2018.
 
     P = X (L_n - C) (C_max - C),    X = k0 + k1 p
     k = dP/dC = X (2 C - L_n - C_max)
 
 (Eqs. 5 to 7), with ``k0`` and ``k1`` linear in the number of muscles. The law is linear in the
-pressure, so that its inverse is exact. It is negative beyond ``C_max``, where a muscle that is
-filled pulls less than before, as the paper's Fig. 2 shows; a plant has a slack bundle there.
+pressure, so that its inverse is exact. It is negative beyond ``C_max``, where filling lowers the
+force, as the paper's Fig. 2 shows; a plant's bundle is slack there.
 
 The volume is the one whose virtual work is the pressure's share of the force,
 

@@ -145,27 +145,21 @@ def delayed_fraction(end: float, per_width: float, switch: float) -> float:
 
 @kernel
 def regulator_step(
-    pressure: float,
-    target: float,
-    lag: float,
-    per_lag: float,
-    slew: float,
-    per_slew: float,
-    h: float,
+    pressure: float, goal: float, lag: float, per_lag: float, slew: float, per_slew: float, h: float
 ) -> float:
-    """Return the pressure [Pa] after ``h`` seconds at a constant target: exact.
+    """Return the pressure [Pa] after ``h`` seconds at a constant goal: exact.
 
-    While the gap to the target exceeds ``slew * lag`` the pressure ramps; the rest of the interval
+    While the gap to the goal exceeds ``slew * lag`` the pressure ramps; the rest of the interval
     it decays exponentially. ``per_lag`` and ``per_slew`` are the reciprocals of the time constant
     [s] and the largest rate [Pa/s].
     """
-    gap = target - pressure
+    gap = goal - pressure
     size = abs(gap)
     ramp = max(0.0, min(h, size * per_slew - lag))
     left = (size - slew * ramp) * decay((h - ramp) * per_lag)
     if gap < 0.0:
-        return target + left
-    return target - left
+        return goal + left
+    return goal - left
 
 
 @kernel

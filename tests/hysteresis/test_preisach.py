@@ -366,19 +366,13 @@ def of_difference(a: Array, b: Array) -> Array:
     return 1.0 + 0.4 * (a - b)
 
 
-@pytest.mark.parametrize("reversals", [0, 1])
-def test_inverted_map_is_exact_up_to_one_reversal(reversals):
-    operator = Preisach.from_density(inhomogeneous, LOW, HIGH, 33).plus_linear(0.5)
-    assert max(worst_inverses(operator, reversals)) < 1e-9
-
-
-@pytest.mark.parametrize("reversals", [2, 3])
-def test_recursion_is_exact_and_inverted_map_is_not_from_two_reversals_on(reversals):
+@pytest.mark.parametrize("reversals", range(4))
+def test_recursion_is_exact_and_inverted_map_only_up_to_one_reversal(reversals):
     operator = Preisach.from_density(inhomogeneous, LOW, HIGH, 33).plus_linear(0.5)
     assert symmetry_error(operator.table) < 1e-12
     series, recursion = worst_inverses(operator, reversals)
-    assert series > 3e-3
     assert recursion < 1e-9
+    assert series < 1e-9 if reversals < 2 else series > 3e-3
 
 
 def test_inverted_map_holds_for_a_density_of_the_difference():
@@ -417,7 +411,7 @@ def come_from_below(operator: PlayOperator) -> Array:
 @given(plays_on_grid, st.lists(st.integers(0, CELLS), min_size=1, max_size=14), st.booleans())
 def test_plays_on_the_grid_are_a_preisach_operator(play, history, virgin):
     start, state = ("virgin", None) if virgin else ("low", come_from_below(play))
-    operator = Preisach.from_play(play, LOW, HIGH, CELLS + 1, 40, start)
+    operator = Preisach.resembling(play, LOW, HIGH, CELLS + 1, start, 40)
     y, _ = operator.simulate(LEVELS[history])
     np.testing.assert_allclose(y, play.simulate(LEVELS[history], state)[0], atol=1e-12)
 
@@ -428,7 +422,7 @@ def test_plays_between_the_grid_agree_to_the_cell(play, history, virgin):
     start, state = ("virgin", None) if virgin else ("low", come_from_below(play))
     expected = play.simulate(history, state)[0]
     for cells in (32, 256):
-        operator = Preisach.from_play(play, LOW, HIGH, cells + 1, 40, start)
+        operator = Preisach.resembling(play, LOW, HIGH, cells + 1, start, 40)
         y, _ = operator.simulate(history)
         cell = (HIGH - LOW) / cells
         bound = (len(history) + 1) * 0.25 * sum(play.weights) * cell
@@ -440,8 +434,8 @@ def test_plays_between_the_grid_agree_to_the_cell(play, history, virgin):
 def test_width_has_the_same_effect_on_plays_and_their_preisach_operator(play, width, virgin):
     start = "virgin" if virgin else "low"
     cells = 64
-    operator = Preisach.from_play(play, LOW, HIGH, cells + 1, start=start)
-    other = Preisach.from_play(play.scaled(width), LOW, HIGH, cells + 1, start=start)
+    operator = Preisach.resembling(play, LOW, HIGH, cells + 1, start=start)
+    other = Preisach.resembling(play.scaled(width), LOW, HIGH, cells + 1, start=start)
     if 2.0 * play.thresholds[-1] < HIGH - LOW - (HIGH - LOW) / cells:
         assert operator.total_slope == pytest.approx(play.total_slope, rel=1e-9)
     scaled = operator.scaled(width, slope=play.total_slope)

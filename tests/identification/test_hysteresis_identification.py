@@ -143,7 +143,7 @@ def test_map_is_recovered_from_first_order_curves(seed, points, output):
 
 
 def test_noisy_curves_are_clipped_to_weights_that_are_not_negative():
-    truth = Preisach.from_play(PlayOperator((0.25,), (1.0,), 0.2), -1.0, 1.0, LEVELS)
+    truth = Preisach.resembling(PlayOperator((0.25,), (1.0,), 0.2), -1.0, 1.0, LEVELS)
     x = curve_inputs(-1.0, 1.0, LEVELS, 2)
     sigma = 1e-3
     y = truth.simulate(x)[0] + sigma * np.random.default_rng(0).standard_normal(len(x))
@@ -196,7 +196,7 @@ def test_noise_on_a_random_record_averages_out():
 
 def test_one_loop_leaves_the_rest_to_the_prior():
     play = PlayOperator((0.25, 0.5), (0.5, 0.3), 0.4)
-    truth = Preisach.from_play(play, -1.0, 1.0, LEVELS)
+    truth = Preisach.resembling(play, -1.0, 1.0, LEVELS)
     grid = np.linspace(-1.0, 1.0, 65)
     x = np.concatenate([grid, grid[-2::-1]])
     fit = fit_preisach(x, truth.simulate(x)[0], -1.0, 1.0, LEVELS)
@@ -236,7 +236,7 @@ def test_congruency_error_has_the_expected_size():
 
 
 def test_congruency_error_allows_for_other_samples():
-    operator = Preisach.from_play(PlayOperator((0.1,), (1.0,), 0.5), -1.0, 1.0, 21)
+    operator = Preisach.resembling(PlayOperator((0.1,), (1.0,), 0.5), -1.0, 1.0, 21)
     coarse = np.array([-0.3, -0.1, 0.3, 0.1, -0.3])
     fine = np.interp(np.linspace(0, 4, 241), np.arange(5), coarse)
     records = []

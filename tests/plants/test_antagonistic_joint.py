@@ -246,7 +246,7 @@ def test_hysteresis_models_that_cannot_be_simulated_are_refused() -> None:
     plant = AntagonisticJoint.paper()
     steep = PlayOperator((0.01,), (0.5,), 0.7)
     many = PlayOperator(tuple(np.linspace(0.001, 0.03, 13)), (0.05,) * 13, 0.35)
-    low = Preisach.from_play(contraction_plays(), 0.0, 0.3)
+    low = Preisach.resembling(contraction_plays(), 0.0, 0.3)
     for operator, words in ((steep, "slope"), (many, "13 elements"), (low, "virgin")):
         hysteresis = dataclasses.replace(plant.hysteresis, operator=operator)
         with pytest.raises(ValueError, match=words):

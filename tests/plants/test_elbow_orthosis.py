@@ -200,7 +200,7 @@ def test_relays_follow_the_travel_in_one_direction() -> None:
 
 
 def test_of_plays_as_relays_the_largest_lag_is_the_same() -> None:
-    wide = Preisach.from_play(travel_plays(), -0.06, 0.06, 121, start="virgin")
+    wide = Preisach.resembling(travel_plays(), -0.06, 0.06, 121, start="virgin")
     lag = elbow_hysteresis("maxwell_slip").largest_lag
     assert ElbowHysteresis(wide).largest_lag == pytest.approx(lag, rel=1e-9)
 

@@ -110,16 +110,9 @@ class SerialChain:
     ) -> Self:
         """Return a chain of equal links, each with the inertia of a solid cylinder.
 
-        Parameters
-        ----------
-        axes : str or tuple of str
-            One letter a joint.
-        length, mass, radius : float
-            Of one link [m], [kg], [m]; by default those of :class:`LinkForm`.
-        centre : float
-            Centre of mass, as a share of the length.
-        gravity : tuple of float
-            In the base's frame [m/s2].
+        One letter of ``axes`` a joint; length [m], mass [kg], radius [m] and centre of mass (as a
+        share of the length) of one link, by default those of :class:`LinkForm`; ``gravity`` [m/s2]
+        in the base's frame.
         """
         n, square = len(axes), radius * radius
         return cls(
@@ -158,15 +151,8 @@ class SerialChain:
     def frames(self, angles: ArrayLike) -> tuple[Array, Array, Array]:
         """Return joint axes, joint positions and link directions in the base's frame.
 
-        Parameters
-        ----------
-        angles : array_like, shape (..., n)
-            [rad].
-
-        Returns
-        -------
-        axes, points, directions : ndarray, shapes (..., n, 3), (..., n + 1, 3), (..., n, 3)
-            The last point is the tip [m].
+        For angles [rad] of shape (..., n) the shapes are (..., n, 3), (..., n + 1, 3) and (..., n,
+        3); the last point is the tip [m].
         """
         given = self._angles(angles)
         turn = np.broadcast_to(np.eye(3), (*given.shape[:-1], 3, 3))
