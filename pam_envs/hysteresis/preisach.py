@@ -1,12 +1,11 @@
-"""The classical Preisach operator, with its exact recursive inverse.
+"""Classical Preisach operator, with its exact recursive inverse.
 
-Relays of all switching thresholds in parallel, weighted by a density: the general
-rate-independent hysteresis in which larger excursions wipe out smaller ones and all minor loops
-between the same two inputs are congruent. The operator is carried by its Everett map
+Relays of all switching thresholds in parallel, weighted by a density: the general rate-independent
+hysteresis in which larger excursions wipe out smaller ones and all minor loops between the same two
+inputs are congruent. The operator is represented by its Everett map
 (:mod:`~pam_envs.hysteresis.everett`) and by a stack of dominant extrema
-(:mod:`~pam_envs.hysteresis.extrema`), a handful of operations a step whatever the grid.
-
-Play operators are the special case whose density depends on ``alpha - beta`` alone.
+(:mod:`~pam_envs.hysteresis.extrema`): a few operations a step whatever the grid. Play operators are
+the special case whose density depends on ``alpha - beta`` alone.
 
 References
 ----------
@@ -139,8 +138,8 @@ class Preisach(HysteresisModel):
     ) -> Preisach:  # fmt: skip
         """Return the operator with relay weights per cell, shape (n - 1, n - 1).
 
-        ``weights[k][l]``, ``l <= k``, is what the relays that switch up in cell ``k`` and down in
-        cell ``l`` add to the output, in units of the output.
+        ``weights[k][l]``, ``l <= k``, is the change of the output, in its unit, by the relays that
+        switch up in cell ``k`` and down in cell ``l``.
         """
         table = maps.table_from_weights(weights)
         return cls(low, high, table, depth, start, start_output)  # type: ignore[arg-type]

@@ -272,7 +272,7 @@ class Rows:
     operator: Any
 
     def initial(self, rows: int) -> RowsState:
-        """Return the states of so many rows at the beginning."""
+        """Return the initial states of a number of rows."""
         return (self.operator.initial_state((rows,)),)
 
     def forward(self, x: Array, state: RowsState) -> tuple[Array, RowsState]:

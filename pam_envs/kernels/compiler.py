@@ -19,7 +19,7 @@ from pam_envs.kernels import rebind
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "fastmath": False}
 _CALLEE: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""Nobody but kernels calls a callee: what Python would need for it is not made."""
+"""Only kernels call a callee: wrappers for Python are left out."""
 
 
 class _Locator(caching._CacheLocator):
@@ -30,14 +30,14 @@ class _Locator(caching._CacheLocator):
     """
 
     def __init__(self, py_file: str) -> None:
-        self._py_file = py_file  # numba names it where it cannot keep what it compiled
+        self._py_file = py_file  # for numba's message where it cannot write
 
     def get_cache_path(self) -> str:
         """Return the folder."""
         return str(FOLDER)
 
     def get_source_stamp(self) -> str:
-        """Return what the code is valid for, beside its name."""
+        """Return the key of the code beside its name."""
         return _COMPILER
 
     def get_disambiguator(self) -> str:
@@ -164,7 +164,7 @@ _BASE = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
 FOLDER = Path(os.environ.get("PAM_ENVS_CACHE") or Path(_BASE) / "pam_envs")
 """Folder of compiled code."""
 _COMPILER = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:16]
-"""Options and intrinsics of this file are part of what it compiles."""
+"""Digest of this file: its options and intrinsics are part of the code."""
 
 
 def compiled(
@@ -176,7 +176,7 @@ def compiled(
     entry_name = f"{name}_parallel" if parallel else name
 
     def finish(made: Callable[..., Any], original: Any, bound: rebind.Bound) -> Callable[..., Any]:
-        # Code from the disk links by name: the name says what the code is.
+        # code from the disk links by name: the name contains the digest
         entry = original is function
         digest = rebind.graph_digest(original, names, digests)
         made.__name__ = f"{entry_name if entry else original.__name__}_{digest}"

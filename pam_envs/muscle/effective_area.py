@@ -149,7 +149,7 @@ def volume(strain: float, rest_length: float, tall: float, cosine: float) -> flo
 def fine_tension(
     drive: float, strain: float, area: float, curve: float, k2: float, k4: float
 ) -> float:
-    """Return what the finer terms of the static map add to the force [N]."""
+    """Return the force [N] of the finer terms of the static map."""
     e2 = strain * strain
     return -(area * curve * drive + k2 + k4 * e2) * e2
 

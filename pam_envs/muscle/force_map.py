@@ -89,7 +89,7 @@ class ForceMap(TemperatureEffects):
         return np.asarray(self.area * (1.0 - self.taper * self._measured(contraction)))
 
     def passive(self, contraction: ArrayLike) -> NDArray[np.float64]:
-        """Return what the pressure has to overcome [N] at a contraction [1]."""
+        """Return the force [N] that opposes the pressure at a contraction [1]."""
         e = self._measured(contraction)
         braid = self.braid_force * -np.expm1(-e / self.braid_strain)
         return np.asarray(self.threshold + braid + self.stiffness * e)

@@ -185,7 +185,7 @@ def regulate_with_effects(
         1.0 - fixed[effects + AIR.exhaust_taper][j] * pressure / full
     )
     lag = lag * (1.0 + slower if goal < pressure else 1.0)
-    # a spool opens beyond its overlap, by what the error exceeds it; within it leaks
+    # a spool opens by the error beyond its overlap; within the overlap it leaks
     over, within = fixed[effects + AIR.overlap][j], fixed[effects + AIR.overlap_leak][j]
     shift = over * (1.0 - within) if abs(goal - pressure) > over else 0.0
     lag = lag / within if abs(goal - pressure) < over else lag

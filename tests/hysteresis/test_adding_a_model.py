@@ -1,4 +1,4 @@
-"""A hysteresis model added by one file: plants, environments, files and batches take it."""
+"""Hysteresis model added by one file, for plants, environments, files and batches."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ IDS = {
 
 @pytest.fixture(scope="module", autouse=True)
 def toy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """Import the model from one file in a temporary folder; forget it afterwards."""
+    """Import the model from one file in a temporary folder; remove it afterwards."""
     file = tmp_path_factory.mktemp("models") / "backlash.py"
     file.write_text(textwrap.dedent(TOY))
     spec = importlib.util.spec_from_file_location("toy_backlash", file)

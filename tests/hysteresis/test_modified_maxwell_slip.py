@@ -1,4 +1,4 @@
-"""The modified Maxwell-slip model: forward and inverse, hysteresis, energy, one spring for all."""
+"""Modified Maxwell-slip model: forward and inverse, hysteresis, energy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The leg's balance against momentum and angular momentum differentiated numerically."""
+"""Leg: balance against numerically differentiated momentum and angular momentum."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pulley of the elbow."""
+"""Pulley of the elbow: stroke, virtual work, stops."""
 
 from __future__ import annotations
 

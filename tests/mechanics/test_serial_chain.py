@@ -1,4 +1,4 @@
-"""A serial chain: kernels against numpy, numpy against differences, and energy."""
+"""Serial chain: kernels against numpy, numpy against differences, and energy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The static law of the joint's muscles: the measured map, its inverse, its work."""
+"""Static law of the joint's muscles: measured map, inverse, virtual work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The quadratic law of a bundle: published points, signs, virtual work, volume."""
+"""Quadratic law of a bundle: published points, signs, virtual work, volume."""
 
 from __future__ import annotations
 

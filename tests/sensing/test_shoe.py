@@ -1,4 +1,4 @@
-"""The shoe: load on the heel and Eq. (1)."""
+"""Pressure shoe: load on the heel and Eq. (1)."""
 
 from __future__ import annotations
 

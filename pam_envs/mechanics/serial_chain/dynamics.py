@@ -41,7 +41,7 @@ from pam_envs.mechanics.serial_chain.rows import (
 __all__ = ["chain_solve", "chain_terms", "place_chain"]
 
 CARRIED = INERTIA + 6 - FORCE
-"""Rows, from ``FORCE``, of what a joint carries: wrench and inertia."""
+"""Rows, from ``FORCE``, of the wrench and inertia at a joint."""
 
 
 @kernel
