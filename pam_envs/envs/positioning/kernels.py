@@ -67,7 +67,7 @@ OWN = indices(("loads",), FIRST_CHOICE)
 
 NOISE_X, NOISE_P, START = 1, 2, 3
 """Random streams."""
-remember: Any = None  # a placeholder, replaced for each hysteresis
+write_drive: Any = None  # a placeholder, replaced for each hysteresis
 
 
 @kernel
@@ -139,7 +139,7 @@ def begin_muscle(
     elements = choices[CHOICE.elements]
     for pressure in (0.0, peak, begin):
         rows[R.PRESSURE][j] = pressure
-        remember(rows, fixed, counts, tables, HYSTERESIS, j, j + 1, elements, work)
+        write_drive(rows, fixed, counts, tables, HYSTERESIS, j, j + 1, elements, work)
     for k in range(N_HISTORY):
         rows[R.HISTORY + k][j] = begin
     rows[R.SET_POINT][j] = rows[R.OLD_SET_POINT][j] = rows[R.OLD_PRESSURE][j] = begin

@@ -36,12 +36,12 @@ def check_borne(
     ``payload`` is the heaviest [kg], ``where`` the subject of the error's sentence.
     """
     low, high = plant.torque_range(angles, by_pressure)
-    wanted = plant.weight_torque(angles, payload)
-    short = np.maximum(wanted - high, low - wanted)
+    needed_torque = plant.weight_torque(angles, payload)
+    short = np.maximum(needed_torque - high, low - needed_torque)
     pose, joint = np.unravel_index(int(np.argmax(short)), short.shape)
     if short[pose, joint] <= 0.0:
         return
-    needed = float(wanted[pose, joint])
+    needed = float(needed_torque[pose, joint])
     there = float((high if needed > high[pose, joint] else low)[pose, joint])
     most = bearable_payload(plant, angles, by_pressure)
     remedy = (

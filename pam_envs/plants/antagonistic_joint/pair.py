@@ -329,14 +329,14 @@ def feed_forward(fixed: Any, j: int, angle: float, prestress: float) -> tuple[fl
 
 @kernel
 def command(
-    rows: Any, fixed: Any, j: int, angle: float, prestress: float, asked: int, stress: int,
+    rows: Any, fixed: Any, j: int, angle: float, prestress: float, angles: int, stresses: int,
     set_point: int,
 ) -> float:  # fmt: skip
     """Set the pressures of a pair for an angle [rad] and a prestress [N]; 1 if out of reach.
 
-    ``asked``, ``stress`` and ``set_point`` are the rows of both, and the first of the pressures'.
+    ``angles``, ``stresses`` and ``set_point`` are the rows of both and the first of the pressures.
     """
     a, b, short = feed_forward(fixed, j, angle, prestress)
-    rows[asked][j], rows[stress][j] = angle, prestress
+    rows[angles][j], rows[stresses][j] = angle, prestress
     rows[set_point][j], rows[set_point + 1][j] = a, b
     return short

@@ -43,7 +43,7 @@ Array = NDArray[np.float64]
 
 @kernel
 def drive(rows: Any, fixed: Any, drives: Any, t: int, column: int, j: int) -> None:
-    """Write what drives one lane in one control period."""
+    """Write the inputs of one lane in one control period."""
     rows[K.COMMAND][j] = drives[COMMANDED][t][column]
     rows[K.PRESTRESS][j] = drives[STRESSED][t][column]
     rows[K.DISTURBANCE][j] = drives[DISTURBED][t][column]
@@ -77,7 +77,7 @@ def come_to_rest(
 
 
 def channels_of(plant: AntagonisticJoint) -> dict[str, float]:
-    """Return what drives the joint, with defaults; ``direct`` above 0: pressures are given."""
+    """Return the inputs of the joint, with defaults; ``direct`` above 0: pressures are given."""
     names = ("command", "prestress", "disturbance", "payload", "pressure_a", "pressure_b", "direct")
     return dict.fromkeys(names, 0.0) | {"prestress": plant.prestress}
 
@@ -115,7 +115,7 @@ def simulate_joint(
     quasi_static: bool = False,
     compiled: bool = COMPILED,
 ) -> dict[str, Array]:
-    """Simulate one joint, or several of one make, from rest under the first command.
+    """Simulate one joint, or several of one make, from rest under the first command, free of noise.
 
     Parameters
     ----------
@@ -132,13 +132,12 @@ def simulate_joint(
         Whether each command is held until rest (from which the next one starts) instead of for a
         control period; commands only.
     compiled : bool
-        Whether kernels run as machine code; plain Python gives the same bits.
+        Whether kernels run as machine code.
 
     Returns
     -------
     dict
-        Each signal of ``OUTPUTS`` at the end of each control period, free of noise, shape (T,) for
-        one plant and (T, n) for several.
+        Each signal of ``OUTPUTS``, shape (T,) for one plant and (T, n) for several.
     """
     first = first_of(plants_of(plants))
     stress = first.prestress if prestress is None else prestress

@@ -79,20 +79,13 @@ def inertia_of(rows: Any, fixed: Any, j: int) -> float:
 
 @kernel
 def swing(
-    rows: Any,
-    fixed: Any,
-    counts: Any,
-    table: Any,
-    hysteresis: int,
-    elements: int,
-    h: float,
-    work: Any,
+    rows: Any, fixed: Any, counts: Any, table: Any, state: int, elements: int, h: float, work: Any
 ) -> None:
     """Move the joint by one sub-step."""
     angle, velocity = rows[K.ANGLE], rows[K.VELOCITY]
     for j in range(LANES):
         predict(rows, fixed, j, 0, angle[j] + 0.5 * h * velocity[j], work)
-    peek_at(rows, fixed, counts, table, hysteresis, elements, 0, 2, 0, LANES)
+    peek_at(rows, fixed, counts, table, state, elements, 0, 2, 0, LANES)
     for j in range(LANES):
         ahead = 0.5 * h * velocity[j]
         load, slope = load_torque(rows, fixed, j, angle[j] + ahead)
@@ -108,25 +101,18 @@ def swing(
         )  # fmt: skip
         angle[j] = angle[j] + du
         contract(rows, fixed, j, 0, angle[j])
-    lag_of(rows, fixed, counts, table, hysteresis, elements, 2, 0, LANES)
+    lag_of(rows, fixed, counts, table, state, elements, 2, 0, LANES)
 
 
 @kernel
 def follow(
-    rows: Any,
-    fixed: Any,
-    counts: Any,
-    table: Any,
-    hysteresis: int,
-    elements: int,
-    h: float,
-    work: Any,
+    rows: Any, fixed: Any, counts: Any, table: Any, state: int, elements: int, h: float, work: Any
 ) -> None:
     """Move the reduced plant by one sub-step."""
     angle, velocity = rows[K.ANGLE], rows[K.VELOCITY]
     for j in range(LANES):
         rows[K.AT_A][j] = rows[K.COMMAND][j]
-    lag_of(rows, fixed, counts, table, hysteresis, elements, 1, 0, LANES)
+    lag_of(rows, fixed, counts, table, state, elements, 1, 0, LANES)
     for j in range(LANES):
         ahead = 0.5 * h * velocity[j]
         pole, per_stiffness = fixed[K.NOMINAL_POLE][j], 1.0 / fixed[K.NOMINAL_STIFFNESS][j]
@@ -148,7 +134,7 @@ def follow(
 
 @kernel
 def report_reduced(rows: Any, fixed: Any, j: int) -> None:
-    """Write what can be seen of the reduced plant; forces are those of the law alone."""
+    """Write the signals of the reduced plant; forces are those of the law alone."""
     lag = rows[K.LAG_A][j]
     rows[K.LAG_A][j] = 0.0
     report_muscles(rows, fixed, j)

@@ -1,8 +1,8 @@
 """The air of the elbow's bundles as kernels: proportional regulators, or on/off valves.
 
-``breathe`` lets the air of a sub-step in and out and writes, for the middle of its motion, the
-pressures before and after, and by how much they fall as a bundle contracts; ``settle`` writes
-pressures and air at its end. ``begin_period`` hands the valves their pulses.
+``exchange_air`` advances the air of a sub-step and writes, for the middle of its motion, the
+pressures before and after, and their fall as a bundle contracts; ``settle`` writes pressures and
+air at its end. ``begin_period`` latches the pulses of the valves.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def begin_regulated(rows: Any, fixed: Any, j: int, period: float) -> None:
 
 
 @kernel
-def breathe_regulated(
+def exchange_regulated(
     rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float, work: Any
 ) -> None:
     """Advance both pressures of a tile towards their set-points."""
@@ -87,7 +87,7 @@ def begin_pulsed(rows: Any, fixed: Any, j: int, period: float) -> None:
 
 
 @kernel
-def breathe_pulsed(
+def exchange_pulsed(
     rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float, work: Any
 ) -> None:
     """Let air through the valves of a tile, at the volumes of the middle of the sub-step."""
@@ -159,12 +159,12 @@ def settle_pulsed(rows: Any, fixed: Any, work: Any) -> None:
 AIR: dict[str, dict[str, Any]] = {
     "proportional": {
         "begin_period": begin_regulated,
-        "breathe": breathe_regulated,
+        "exchange_air": exchange_regulated,
         "settle": settle_regulated,
     },
     "on_off": {
         "begin_period": begin_pulsed,
-        "breathe": breathe_pulsed,
+        "exchange_air": exchange_pulsed,
         "settle": settle_pulsed,
     },
 }

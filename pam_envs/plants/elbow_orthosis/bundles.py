@@ -56,7 +56,7 @@ def shape_of(fixed: Any, j: int, side: int, contraction: float) -> tuple[float, 
 
 @kernel
 def friction_of(fixed: Any, j: int, side: int, lag: float) -> float:
-    """Return what friction takes [m2] of the shape of a bundle at a lag [m] of the travel."""
+    """Return the share of friction [m2] in the shape of a bundle at a lag [m] of the travel."""
     row = side * len(K.BUNDLE)
     length = fixed[row + K.BUNDLE.nominal_length][j]
     full = length * length * fixed[row + K.BUNDLE.largest_contraction][j]

@@ -17,7 +17,7 @@ from pam_envs.plants.elbow_orthosis.air import AIR, GIVES_A, NOW_A, WAS_A, count
 EFFECTS_AT = 0  # placeholder: the row after the hysteresis state
 FULL_SCALES = (2.1, 6e5, 6e5)
 """Full scales of the sensors: rad, Pa, Pa."""
-plain_breathe: Any = None  # placeholders: air of the plain plant
+plain_exchange: Any = None  # placeholders: air of the plain plant
 plain_settle: Any = None
 
 
@@ -54,7 +54,7 @@ def effective_pressures(rows: Any, fixed: Any, side: int, h: float, work: Any) -
 
 
 @kernel
-def breathe_regulated(
+def exchange_regulated(
     rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float, work: Any
 ) -> None:
     """Advance both pressures of a tile towards their set-points, with all effects."""
@@ -72,11 +72,11 @@ def breathe_regulated(
 
 
 @kernel
-def breathe_pulsed(
+def exchange_pulsed(
     rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float, work: Any
 ) -> None:
     """Let air through the valves of a tile; the bundles have their effects."""
-    plain_breathe(rows, fixed, counts, i, substeps, period, work)
+    plain_exchange(rows, fixed, counts, i, substeps, period, work)
     for side in range(2):
         travel = rows[path_of(side) + PATH_STATE.travel]
         for j in range(LANES):
@@ -124,9 +124,9 @@ def bundle_kernels(valves: str, first: int) -> dict[str, Any]:
     measured = (K.ANGLE, K.PRESSURE_A, K.PRESSURE_A + 1)
     effects = (K.EFFECT.angle, K.EFFECT.pressure, K.EFFECT.pressure)
     return effect_kernels(first, K, measured, effects, FULL_SCALES) | {
-        "plain_breathe": AIR[valves]["breathe"],
+        "plain_exchange": AIR[valves]["exchange_air"],
         "plain_settle": AIR[valves]["settle"],
-        "breathe": breathe_regulated if regulated else breathe_pulsed,
+        "exchange_air": exchange_regulated if regulated else exchange_pulsed,
         "settle": settle_regulated if regulated else settle_pulsed,
         "begin_muscles": begin_muscles,
     }

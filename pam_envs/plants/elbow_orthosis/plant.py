@@ -243,7 +243,7 @@ class ElbowOrthosis(Plant, rows=K):
         return np.asarray(moment * np.sin(angle))
 
     def friction(self, lag: ArrayLike) -> tuple[Array, Array]:
-        """Return what friction takes [m2] of the shapes of bundles a and b.
+        """Return the share of friction [m2] in the shapes of bundles a and b.
 
         ``lag`` [m] is the travel (``pulley.travel(angle)``) less the output of
         ``hysteresis.operator``: with hysteresis a force is ``X (shape - friction)``.

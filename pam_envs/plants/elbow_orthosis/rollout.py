@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 
 @kernel
 def drive(rows: Any, fixed: Any, drives: Any, t: int, column: int, j: int) -> None:
-    """Write what drives one lane."""
+    """Write the inputs of one lane."""
     for k in range(len(DRIVEN)):
         rows[DRIVEN[k]][j] = drives[k][t][column]
 
@@ -63,7 +63,7 @@ def begin(
 
 
 def channels_of(plant: ElbowOrthosis) -> dict[str, float]:
-    """Return what drives the orthosis, with defaults; ``start`` are the pressures at rest."""
+    """Return the inputs of the orthosis, with defaults; ``start`` are the pressures at rest."""
     motion = ("intent", "intent_rate", "intent_acceleration")
     names = ("command_a", "command_b", *motion, "disturbance", "start_a", "start_b")
     return dict.fromkeys(names, 0.0) | {"intent": 1.0}
@@ -117,7 +117,7 @@ def simulate_elbow(
     pressures: tuple[ArrayLike, ArrayLike] | None = None,
     compiled: bool = COMPILED,
 ) -> dict[str, Array]:
-    """Simulate one orthosis, or several of one make, from rest.
+    """Simulate one orthosis, or several of one make, from rest, free of noise.
 
     Parameters
     ----------
@@ -136,13 +136,12 @@ def simulate_elbow(
         Pressures [Pa] of bundles a and b at the start; default: the first set-points, or 0 with
         on/off valves.
     compiled : bool
-        Whether kernels run as machine code; plain Python gives the same bits.
+        Whether kernels run as machine code.
 
     Returns
     -------
     dict
-        Each signal of ``OUTPUTS`` at the end of each control period, free of noise, shape (T,) for
-        one plant and (T, n) for several.
+        Each signal of ``OUTPUTS``, shape (T,) for one plant and (T, n) for several.
 
     Raises
     ------

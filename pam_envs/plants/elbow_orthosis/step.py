@@ -54,7 +54,7 @@ SOFTEST = 0.1
 # placeholders, filled in for each hysteresis and each make of valves
 hysteresis_lag: Any = None
 begin_period: Any = None
-breathe: Any = None
+exchange_air: Any = None
 settle: Any = None
 start_air: Any = None
 MODEL_STATE = 0
@@ -171,7 +171,7 @@ def advance(
             rows, fixed, counts, table, hysteresis, elements, K.AT, K.LAG, 1, K.MODEL,
             K.STACK_COUNT, K.MEMBER, 0, LANES,
         )  # fmt: skip
-        breathe(rows, fixed, counts, i, substeps, period, work)
+        exchange_air(rows, fixed, counts, i, substeps, period, work)
         swing(rows, fixed, i, substeps, h, work)
         settle(rows, fixed, work)
     for j in range(LANES):
@@ -187,7 +187,7 @@ def advance(
 
 @kernel
 def report(rows: Any, fixed: Any, j: int) -> None:
-    """Write what can be seen of one lane."""
+    """Write the signals of one lane."""
     angle, velocity, radius = rows[K.ANGLE][j], rows[K.VELOCITY][j], fixed[K.PULLEY_RADIUS][j]
     torque, stiffness, slack = 0.0, 0.0, 0.0
     for side in range(2):
@@ -207,7 +207,7 @@ def report(rows: Any, fixed: Any, j: int) -> None:
 
 @kernel
 def felt_torque(rows: Any, fixed: Any, j: int, torque: float) -> float:
-    """Return what reaches the wearer [N m] of the bundles' torque.
+    """Return the part of the bundles' torque [N m] that reaches the wearer.
 
     The rest bears the orthosis itself and moves it, against its inertia and friction.
     """

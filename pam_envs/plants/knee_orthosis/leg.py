@@ -76,7 +76,7 @@ def balance(
     rows: Any, fixed: Any, j: int, sine: float, cosine: float, ahead: float, up: float,
     angular: float,
 ) -> None:  # fmt: skip
-    """Write what the knee has to bear, what Eq. (1) makes of it, and the load on the heel."""
+    """Write the load torque of the knee, its estimate by Eq. (1), and the load on the heel."""
     vertical, cop = rows[K.GROUND_Z][j], rows[K.COP][j]
     shank = fixed[K.LEG_SHANK][j]
     ground = ground_torque(
@@ -97,7 +97,7 @@ def balance(
 
 @kernel
 def hold(rows: Any, fixed: Any, j: int, loaded: float, restoring: float) -> None:
-    """Write how stiffly [N m/rad] and with what damping [N m s/rad] the wearer holds his path."""
+    """Write stiffness [N m/rad] and damping [N m s/rad] with which the wearer holds his path."""
     passive, free = fixed[K.LEG_STIFFNESS][j], fixed[K.LEG_HOLD_STIFFNESS][j]
     rows[K.HOLD][j] = passive + free + restoring + fixed[K.LEG_STANCE_STIFFNESS][j] * loaded
     passive, free = fixed[K.LEG_DAMPING][j], fixed[K.LEG_HOLD_DAMPING][j]
@@ -105,17 +105,17 @@ def hold(rows: Any, fixed: Any, j: int, loaded: float, restoring: float) -> None
 
 
 @kernel
-def wanted(fixed: Any, j: int, torque: float) -> float:
+def excite(fixed: Any, j: int, torque: float) -> float:
     """Return the excitation of muscles that bear a torque [N m]."""
     return excitation(torque, fixed[K.ACTIVATION_LARGEST_TORQUE][j], fixed[K.ACTIVATION_FLOOR][j])
 
 
 @kernel
 def start_muscles(rows: Any, fixed: Any, j: int) -> None:
-    """Put the wearer's muscles where they are without the orthosis."""
+    """Set the activity of the wearer's muscles to that without the orthosis."""
     demand = rows[K.DEMAND][j]
-    rows[K.QUADS][j] = rows[K.QUADS_FREE][j] = wanted(fixed, j, demand)
-    rows[K.FLEXORS][j] = rows[K.FLEXORS_FREE][j] = wanted(fixed, j, -demand)
+    rows[K.QUADS][j] = rows[K.QUADS_FREE][j] = excite(fixed, j, demand)
+    rows[K.FLEXORS][j] = rows[K.FLEXORS_FREE][j] = excite(fixed, j, -demand)
 
 
 @kernel
@@ -125,9 +125,9 @@ def share_muscles(rows: Any, fixed: Any, j: int, period: float) -> None:
     fallen = left_of_gap(period, fixed[K.ACTIVATION_FALL_TIME][j])
     demand = rows[K.DEMAND][j]
     rest = demand - rows[K.TORQUE][j]
-    rows[K.QUADS][j] = activation(rows[K.QUADS][j], wanted(fixed, j, rest), risen, fallen)
-    rows[K.FLEXORS][j] = activation(rows[K.FLEXORS][j], wanted(fixed, j, -rest), risen, fallen)
-    free = wanted(fixed, j, demand)
+    rows[K.QUADS][j] = activation(rows[K.QUADS][j], excite(fixed, j, rest), risen, fallen)
+    rows[K.FLEXORS][j] = activation(rows[K.FLEXORS][j], excite(fixed, j, -rest), risen, fallen)
+    free = excite(fixed, j, demand)
     rows[K.QUADS_FREE][j] = activation(rows[K.QUADS_FREE][j], free, risen, fallen)
-    free = wanted(fixed, j, -demand)
+    free = excite(fixed, j, -demand)
     rows[K.FLEXORS_FREE][j] = activation(rows[K.FLEXORS_FREE][j], free, risen, fallen)

@@ -47,7 +47,7 @@ def torque_and_slope(fixed: Any, j: int, angle: float, stiffness: float) -> tupl
 def begin_period_alone(
     rows: Any, fixed: Any, counts: Any, gait: Any, period: float, work: Any
 ) -> None:
-    """Nothing to look up without a leg."""
+    """Do nothing: without a leg there is no gait."""
 
 
 @kernel
@@ -87,7 +87,7 @@ def phase_of(rows: Any, fixed: Any, j: int, time: float) -> float:
 def begin_period_leg(
     rows: Any, fixed: Any, counts: Any, gait: Any, period: float, work: Any
 ) -> None:
-    """Look up the wearer's path at the end of the period and how firmly he holds it till then."""
+    """Read the wearer's path at the end of the period and the stiffness with which he holds it."""
     for j in range(LANES):
         stiffness, damping = rows[K.HOLD][j], rows[K.HOLD_RATE][j]
         work[KNEE_WAS][j], work[RATE_WAS][j] = rows[K.KNEE][j], rows[K.KNEE_RATE][j]
@@ -123,8 +123,8 @@ def follow_leg(
         old, slope_old = torque_and_slope(fixed, j, middle + work[KNEE_WAS][j], was[j])
         new, slope_new = torque_and_slope(fixed, j, middle + knee, stiffness[j])
         old = old + along_path(fixed, j, work[RATE_WAS][j], work[FORCE_WAS][j])
-        old = old - learnt(fixed, j, work[KNEE_WAS][j])
-        new = new + along_path(fixed, j, turn, bend) - learnt(fixed, j, knee)
+        old = old - habituated(fixed, j, work[KNEE_WAS][j])
+        new = new + along_path(fixed, j, turn, bend) - habituated(fixed, j, knee)
         slope = 0.5 * (slope_old + slope_new)
         du, rate[j] = damped_motion(
             rate[j],
@@ -146,7 +146,7 @@ def along_path(fixed: Any, j: int, rate: float, acceleration: float) -> float:
 
 
 @kernel
-def learnt(fixed: Any, j: int, knee: float) -> float:
+def habituated(fixed: Any, j: int, knee: float) -> float:
     """Return the extending torque [N m] of the wire that the wearer bears beforehand."""
     past = fixed[K.LEVER_MOUNT_ANGLE][j] + knee - fixed[K.LEVER_RELAXED_ANGLE][j]
     return fixed[K.LEG_HABITUATION][j] * fixed[K.LEVER_STIFFNESS][j] * max(0.0, past)
@@ -169,7 +169,7 @@ def report_muscle(rows: Any, fixed: Any, j: int, length: float) -> None:
 
 @kernel
 def report_alone(rows: Any, fixed: Any, j: int, period: float) -> None:
-    """Write what can be seen of a brace without a leg."""
+    """Write the signals of a brace without a leg."""
     sine, _ = sine_and_cosine(0.5 * rows[K.ANGLE][j])
     report_muscle(
         rows, fixed, j, muscle_length(sine, fixed[K.LEVER_ARM][j], fixed[K.LEVER_FITTINGS][j])
@@ -179,14 +179,14 @@ def report_alone(rows: Any, fixed: Any, j: int, period: float) -> None:
 
 @kernel
 def report_rig(rows: Any, fixed: Any, j: int, period: float) -> None:
-    """Write what can be seen of a muscle held at its length."""
+    """Write the signals of a muscle held at its length."""
     report_muscle(rows, fixed, j, fixed[K.FIXTURE_LENGTH][j])
     rows[K.TORQUE][j], _ = torque_and_slope(fixed, j, rows[K.ANGLE][j], rows[K.STIFFNESS][j])
 
 
 @kernel
 def report_leg(rows: Any, fixed: Any, j: int, period: float) -> None:
-    """Write what can be seen of the brace on the leg, and what the wearer's muscles do."""
+    """Write the signals of the brace on the leg, and the wearer's muscle activity."""
     rate = rows[K.KNEE_RATE][j] + rows[K.DEVIATION_RATE][j]
     angle = fixed[K.LEVER_MOUNT_ANGLE][j] + rows[K.KNEE][j] + rows[K.DEVIATION][j]
     rows[K.ANGLE][j], rows[K.VELOCITY][j] = angle, rate
@@ -197,14 +197,14 @@ def report_leg(rows: Any, fixed: Any, j: int, period: float) -> None:
 
 @kernel
 def delivered(rows: Any, fixed: Any, j: int, torque: float) -> float:
-    """Return what reaches the leg [N m] of the torque of spring and muscle.
+    """Return the part of the torque of spring and muscle [N m] that reaches the leg.
 
     The rest moves the brace itself, against its inertia and friction.
     """
     path = along_path(fixed, j, rows[K.KNEE_RATE][j], rows[K.KNEE_ACCELERATION][j])
     off, rate = rows[K.DEVIATION][j], rows[K.DEVIATION_RATE][j]
     drag = (rows[K.HOLD_RATE][j] + fixed[K.LEVER_DAMPING][j]) * rate
-    pull = torque + path - learnt(fixed, j, rows[K.KNEE][j]) + rows[K.HOLD][j] * off + drag
+    pull = torque + path - habituated(fixed, j, rows[K.KNEE][j]) + rows[K.HOLD][j] * off + drag
     sway = -pull / (fixed[K.LEG_INERTIA][j] + fixed[K.LEVER_INERTIA][j])
     return torque + path + fixed[K.LEVER_DAMPING][j] * rate + fixed[K.LEVER_INERTIA][j] * sway
 
@@ -245,7 +245,7 @@ def rest_leg(rows: Any, fixed: Any, gait: Any, j: int) -> None:
     """Put the knee where the wearer's hold balances the brace, moving along the path."""
     gait_at(rows, fixed, gait, j, fraction_of_turn(rows[K.START_PHASE][j]))
     load = along_path(fixed, j, rows[K.KNEE_RATE][j], rows[K.KNEE_ACCELERATION][j])
-    load = load - learnt(fixed, j, rows[K.KNEE][j])
+    load = load - habituated(fixed, j, rows[K.KNEE][j])
     angle = fixed[K.LEVER_MOUNT_ANGLE][j] + rows[K.KNEE][j]
     low, high = -1.0, 1.0
     for _ in range(60):

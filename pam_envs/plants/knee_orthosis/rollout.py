@@ -64,7 +64,7 @@ def advance_knee(
 
 
 def channels_of(plant: KneeOrthosis) -> dict[str, float]:
-    """Return what drives the orthosis, with defaults: set-point, and phase and pressure at rest."""
+    """Return the inputs of the orthosis, with defaults: set-point; phase and pressure at rest."""
     return {"set_point": 0.0, "phase": 0.0, "pressure": 0.0}
 
 
@@ -93,7 +93,7 @@ def simulate_knee(
     pressure: float = 0.0,
     compiled: bool = COMPILED,
 ) -> dict[str, NDArray[np.float64]]:
-    """Simulate one plant, or several of one make, from rest.
+    """Simulate one plant, or several of one make, from rest, free of noise.
 
     Parameters
     ----------
@@ -107,13 +107,12 @@ def simulate_knee(
     pressure : float
         Pressure [Pa] of the rest, reached by inflation from none.
     compiled : bool
-        Whether kernels run as machine code; plain Python gives the same bits.
+        Whether kernels run as machine code.
 
     Returns
     -------
     dict
-        Each signal of ``OUTPUTS`` at the end of each control period, free of noise, shape (T,) for
-        one plant and (T, n) for several.
+        Each signal of ``OUTPUTS``, shape (T,) for one plant and (T, n) for several.
     """
     commands = np.asarray(set_points, np.float64)
     single = isinstance(plants, KneeOrthosis) and commands.ndim == 1

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from pam_envs.hysteresis import protocol
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
 from pam_envs.plants.core.sensors import read_sensors
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.effects import muscle_kernels
-from pam_envs.plants.knee_orthosis.hysteresis_kernels import hysteresis_kernels
 from pam_envs.plants.knee_orthosis.motion import MOTIONS, N_WORK, WAS
 from pam_envs.pneumatics.measured_dynamics import MODES, REAL_MODES, pair_factor, turned
 from pam_envs.pneumatics.regulator import regulator_step
@@ -26,7 +26,7 @@ PAIR = K.MODE_TABLE + 2 * REAL_MODES
 """First row of what the slow pair is made of: decay, frequency, two gains."""
 
 # placeholders, filled in for each hysteresis, mounting and regulator
-remember: Any = None
+write_stiffness: Any = None
 hysteresis_begin: Any = None
 regulate: Any = None
 settle: Any = None
@@ -36,6 +36,43 @@ rest: Any = None
 report: Any = None
 SENSED = (K.TENSION, K.ANGLE, K.PRESSURE, K.HEEL, K.GROUND_Z, K.COP, K.ANKLE)
 """Rows of undisturbed readings, in the order of ``SENSORS``; effects replace them."""
+EFFECTIVE = K.PRESSURE
+"""Row of the effective pressure; that of the extended plant replaces it."""
+hysteresis_scaled: Any = None
+
+
+@kernel
+def stiffness_of_line(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, first: int, last: int,
+    elements: int,
+) -> None:  # fmt: skip
+    """Write the stiffness without hysteresis, proportional to the pressure."""
+    pressure, stiffness = rows[EFFECTIVE], rows[K.STIFFNESS]
+    for j in range(first, last):
+        stiffness[j] = fixed[K.MUSCLE_GAIN][j] * fixed[K.MUSCLE_STIFFNESS_RATIO][j] * pressure[j]
+
+
+@kernel
+def stiffness_of_model(
+    rows: Any, fixed: Any, counts: Any, table: Any, hysteresis: int, first: int, last: int,
+    elements: int,
+) -> None:  # fmt: skip
+    """Write the stiffness by a hysteresis model of the pressure."""
+    stiffness = rows[K.STIFFNESS]
+    hysteresis_scaled(
+        rows[EFFECTIVE], stiffness, fixed[K.HYSTERESIS_WIDTH], rows, fixed, counts, table, elements,
+        hysteresis, K.MODEL, K.STACK_COUNT, K.MEMBER, first, last,
+    )  # fmt: skip
+    for j in range(first, last):
+        stiffness[j] = fixed[K.MUSCLE_GAIN][j] * stiffness[j]
+
+
+def hysteresis_kernels(kind: str) -> dict[str, Any]:
+    """Return the kernels of a kind by the plant's placeholders."""
+    identity = protocol.model_of(kind).identity
+    return protocol.kernels(kind) | {
+        "write_stiffness": stiffness_of_line if identity else stiffness_of_model
+    }
 
 
 @kernel
@@ -103,7 +140,7 @@ def advance(
         regulate(rows, fixed, counts, i, substeps, period)
         for j in range(LANES):
             work[WAS][j] = rows[K.STIFFNESS][j]
-        remember(rows, fixed, counts, table, hysteresis, 0, LANES, elements)
+        write_stiffness(rows, fixed, counts, table, hysteresis, 0, LANES, elements)
         move(rows, fixed, counts, gait, i, substeps, h, work)
     for j in range(LANES):
         report(rows, fixed, j, period)
@@ -132,10 +169,10 @@ def begin_lane(
     )
     rows[K.PRESSURE][j] = 0.0
     begin_muscle(rows, fixed, j)
-    remember(rows, fixed, counts, table, hysteresis, j, j + 1, elements)
+    write_stiffness(rows, fixed, counts, table, hysteresis, j, j + 1, elements)
     rows[K.PRESSURE][j] = pressure
     begin_muscle(rows, fixed, j)
-    remember(rows, fixed, counts, table, hysteresis, j, j + 1, elements)
+    write_stiffness(rows, fixed, counts, table, hysteresis, j, j + 1, elements)
     settle(rows, fixed, j)
     rows[K.SET_POINT][j] = rows[K.OLD_SET_POINT][j] = rows[K.OLD_PRESSURE][j] = pressure
     rows[K.START_PHASE][j] = start_phase

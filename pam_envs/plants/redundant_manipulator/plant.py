@@ -181,15 +181,15 @@ class RedundantManipulator(PairPlant, rows=M):
         return dataclasses.replace(plant, joint_damping=plant.even_damping())
 
     def even_damping(self) -> tuple[float, ...]:
-        """Return what each joint lacks to a damping ratio of a half, the straight arm rigid."""
+        """Return the damping that gives each joint a ratio of one half, the straight arm rigid."""
         pressures = self.pressures_for(0.0)[:2]
         rate = self.lever.rate(0.0)
         viscous = self.muscle.viscosity * float(np.sum(np.array(pressures) * rate**2))
         own = viscous / self.muscle.rest_length + self.link.damping
         inertia = np.diag(self.chain.mass_matrix(np.zeros(self.stages), 0.0))
         stiffness = float(self.stiffness_at(0.0)) + np.maximum(0.0, self.weight_stiffness())
-        wanted = 2.0 * DAMPING_RATIO * np.sqrt(stiffness * inertia)
-        return tuple(float(round(d, 3)) for d in np.maximum(0.0, wanted - own))
+        total = 2.0 * DAMPING_RATIO * np.sqrt(stiffness * inertia)
+        return tuple(float(round(d, 3)) for d in np.maximum(0.0, total - own))
 
     # --- chain and ranges -----------------------------------------------------------------------
 
@@ -265,7 +265,7 @@ class RedundantManipulator(PairPlant, rows=M):
         return AntagonisticJoint(**same)
 
     def rest_angles(self, commands: ArrayLike, prestress: float | None = None) -> Array:
-        """Return where one stage rests [rad] after each of a series of set-points [rad], (T,).
+        """Return the angles at rest [rad] of one stage after each of some set-points [rad], (T,).
 
         Quasi-static, hysteresis included, from the straight virgin state, without gravity and load.
         """

@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 
 @kernel
 def drive(rows: Any, fixed: Any, drives: Any, t: int, column: int, j: int) -> None:
-    """Write what drives one lane: payload, prestress, commands, then disturbances."""
+    """Write the inputs of one lane: payload, prestress, commands, then disturbances."""
     rows[M.PAYLOAD][j] = drives[0][t][column]
     for k in range(N_STAGES):
         rows[M.DISTURBANCE + k][j] = drives[2 + N_STAGES + k][t][column]
@@ -57,7 +57,7 @@ def begin(
 
 
 def channels_of(plant: RedundantManipulator) -> dict[str, float]:
-    """Return what drives the arm, with defaults."""
+    """Return the inputs of the arm, with defaults."""
     joints = range(plant.stages)
     commands = [*(f"command_{k}" for k in joints), *(f"disturbance_{k}" for k in joints)]
     return {"payload": 0.0, "prestress": plant.prestress} | dict.fromkeys(commands, 0.0)

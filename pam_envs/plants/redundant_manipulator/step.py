@@ -77,7 +77,7 @@ SENSED_ANGLE, SENSED_PRESSURE = M.ANGLE, M.PRESSURE
 
 
 @kernel
-def foresee(rows: Any, fixed: Any, h: float, work: Any) -> None:
+def predict_middles(rows: Any, fixed: Any, h: float, work: Any) -> None:
     """Write the predicted middle of a sub-step, and the payload of the nominal links."""
     for j in range(LANES):
         rows[M.SHARE][j] = rows[M.PAYLOAD][j] / fixed[M.ARM_MASS_FACTOR][j]
@@ -111,18 +111,11 @@ def balance(rows: Any, fixed: Any, k: int, h: float, work: Any) -> None:
 
 @kernel
 def swing(
-    rows: Any,
-    fixed: Any,
-    counts: Any,
-    table: Any,
-    hysteresis: int,
-    elements: int,
-    h: float,
-    work: Any,
+    rows: Any, fixed: Any, counts: Any, table: Any, state: int, elements: int, h: float, work: Any
 ) -> None:
     """Move the arm by one sub-step."""
-    foresee(rows, fixed, h, work)
-    peek_at(rows, fixed, counts, table, hysteresis, elements, 0, 2 * N_STAGES, 0, LANES)
+    predict_middles(rows, fixed, h, work)
+    peek_at(rows, fixed, counts, table, state, elements, 0, 2 * N_STAGES, 0, LANES)
     chain_terms(rows, fixed, work, M.MIDDLE, M.MIDDLE_RATE, M.SHARE, M.CHAIN, CHAIN_WORK)
     for k in range(N_STAGES):
         balance(rows, fixed, k, h, work)
@@ -137,19 +130,12 @@ def swing(
     for k in range(N_STAGES):
         for j in range(LANES):
             contract(rows, fixed, j, k, rows[M.ANGLE + k][j])
-    lag_of(rows, fixed, counts, table, hysteresis, elements, 2 * N_STAGES, 0, LANES)
+    lag_of(rows, fixed, counts, table, state, elements, 2 * N_STAGES, 0, LANES)
 
 
 @routine
 def begin_lane(
-    rows: Any,
-    fixed: Any,
-    counts: Any,
-    table: Any,
-    hysteresis: int,
-    elements: int,
-    j: int,
-    work: Any,
+    rows: Any, fixed: Any, counts: Any, table: Any, state: int, elements: int, j: int, work: Any
 ) -> None:
     """Bring one lane to rest at its commanded angles [rad] and co-contractions [N].
 
@@ -177,11 +163,11 @@ def begin_lane(
         chain_terms(rows, fixed, work, M.MIDDLE, M.MIDDLE_RATE, M.SHARE, M.CHAIN, CHAIN_WORK)
         for k in range(N_STAGES):
             weight = factor * work[CHAIN_WORK + k][j]
-            settle(rows, fixed, counts, table, hysteresis, elements, j, k, weight)
+            settle(rows, fixed, counts, table, state, elements, j, k, weight)
     for k in range(N_STAGES):
         rows[M.CHANGE + k][j] = 0.0
         contract(rows, fixed, j, k, rows[M.ANGLE + k][j])
-    lag_of(rows, fixed, counts, table, hysteresis, elements, 2 * N_STAGES, j, j + 1)
+    lag_of(rows, fixed, counts, table, state, elements, 2 * N_STAGES, j, j + 1)
     report_state(rows, fixed, j)
     read_sensors(rows, fixed, j, 0, 0.0)
 

@@ -137,26 +137,23 @@ def carried(fixed: Any, j: int, load: float) -> tuple[float, float, float, float
 
 
 @kernel
-def law_force(fixed: Any, j: int, drive: float, e: float, bend: float, stiffer: float) -> float:
-    """Return the force [N] of the static law with its finer terms."""
+def law_of(
+    fixed: Any, j: int, drive: float, middle: float, e: float, stiffer: float
+) -> tuple[float, float]:
+    """Return the force [N] of the static law with its finer terms, at an effective pressure [Pa].
+
+    Then minus its derivative by the contraction [N], at another one.
+    """
     area, taper = fixed[R.MUSCLE_AREA][j], fixed[R.MUSCLE_AREA_TAPER][j]
     force, k1 = fixed[R.MUSCLE_BRAID_FORCE][j] * stiffer, fixed[R.MUSCLE_STIFFNESS][j] * stiffer
     k3, curve = fixed[R.MUSCLE_HARDENING][j] * stiffer, fixed[R.MUSCLE_AREA_CURVE][j]
     k2, k4 = fixed[R.MUSCLE_SOFTENING][j] * stiffer, fixed[R.MUSCLE_STIFFENING][j] * stiffer
+    strain = fixed[R.MUSCLE_BRAID_STRAIN][j]
+    bend = decay(e / strain)
     pull = tension(drive, e, bend, area, taper, force, k1, k3)
-    return pull + fine_tension(drive, e, area, curve, k2, k4)
-
-
-@kernel
-def law_slope(fixed: Any, j: int, drive: float, e: float, bend: float, stiffer: float) -> float:
-    """Return minus the derivative of :func:`law_force` by the contraction [N]."""
-    area, taper = fixed[R.MUSCLE_AREA][j], fixed[R.MUSCLE_AREA_TAPER][j]
-    force, k1 = fixed[R.MUSCLE_BRAID_FORCE][j] * stiffer, fixed[R.MUSCLE_STIFFNESS][j] * stiffer
-    k3, curve = fixed[R.MUSCLE_HARDENING][j] * stiffer, fixed[R.MUSCLE_AREA_CURVE][j]
-    k2, k4 = fixed[R.MUSCLE_SOFTENING][j] * stiffer, fixed[R.MUSCLE_STIFFENING][j] * stiffer
-    per_strain = force / fixed[R.MUSCLE_BRAID_STRAIN][j]
-    slope = tension_slope(drive, e, bend, area, taper, per_strain, k1, k3)
-    return slope + fine_slope(drive, e, area, curve, k2, k4)
+    slope = tension_slope(middle, e, bend, area, taper, force / strain, k1, k3)
+    pull = pull + fine_tension(drive, e, area, curve, k2, k4)
+    return pull, slope + fine_slope(middle, e, area, curve, k2, k4)
 
 
 @routine
@@ -167,8 +164,7 @@ def balance(fixed: Any, lane: int, drive: float, load: float, hangs: float) -> f
     low, high = -0.3, 0.6
     for _ in range(56):
         e = 0.5 * (low + high)
-        bend = decay(e / fixed[R.MUSCLE_BRAID_STRAIN][lane])
-        pull = law_force(fixed, lane, drive - shift, e, bend, stiffer)
+        pull, _ = law_of(fixed, lane, drive - shift, drive - shift, e, stiffer)
         if pull > weight * load_fraction(e * length, hangs, fixed[R.MASS_SLACK][lane]):
             low = e
         else:
@@ -259,10 +255,9 @@ def forces(rows: Any, fixed: Any, was: Any, h: float, own: Any, strands: int) ->
         mass, weight, stiffer, shift = carried(fixed, j, load[j])
         ahead = 0.5 * h * v[j]
         e = (x[j] + ahead) * per_length
-        bend = decay(e / fixed[R.MUSCLE_BRAID_STRAIN][j])
-        pull = law_force(fixed, j, was[j] - shift, e, bend, stiffer) - friction[j]
         middle = 0.5 * (was[j] + drive[j]) - shift
-        slope = law_slope(fixed, j, middle, e, bend, stiffer) + sticking[j]
+        pull, slope = law_of(fixed, j, was[j] - shift, middle, e, stiffer)
+        pull, slope = pull - friction[j], slope + sticking[j]
         slack = fixed[R.MASS_SLACK][j]
         hangs = load_fraction(x[j] + ahead, rows[EFFECTS_AT + S.hangs][j], slack)
         eased = weight * fixed[R.MUSCLE_REST_LENGTH][j] / max(slack, 1e-6)
@@ -411,7 +406,7 @@ def replacements(kind: str, first: int) -> dict[str, Any]:
         **effect_kernels(first, R, measured, effects, ()),
         "full_scale": full_scale,
         **hysteresis_kernels(kind, "plain_hysteresis"),
-        "remember": settled,
+        "write_drive": settled,
         "advance": advance_extended,
         "rest_contraction": rest_extended,
         "begin_effects": begin_effects,

@@ -73,7 +73,7 @@ def effective_pressure(
         drive[j] = unstretched(value, stretch[j], per_full[j])
 
 
-def hysteresis_kernels(kind: str, name: str = "remember") -> dict[str, Any]:
+def hysteresis_kernels(kind: str, name: str = "write_drive") -> dict[str, Any]:
     """Return the kernels of a kind; ``name`` is the plant's placeholder for the whole."""
     identity = protocol.model_of(kind).identity
     return protocol.kernels(kind) | {name: pressure_itself if identity else effective_pressure}

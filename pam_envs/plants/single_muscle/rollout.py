@@ -107,7 +107,7 @@ OUTPUT_ROWS: tuple[int, ...] = ()  # a placeholder
 
 
 def channels_of(plant: SingleMuscle) -> dict[str, float]:
-    """Return what drives the muscle, with defaults (``COMMAND`` to ``HELD``)."""
+    """Return the inputs of the muscle, with defaults (``COMMAND`` to ``HELD``)."""
     names = ("set_point", "load", "temperature", "start_pressure", "held")
     usual = {"load": plant.mass.load, "temperature": plant.muscle.temperature}
     return dict.fromkeys(names, 0.0) | usual

@@ -20,7 +20,7 @@ from pam_envs.muscle.effective_area import tension, tension_slope
 from pam_envs.plants.single_muscle import rows as R
 from pam_envs.pneumatics.regulator import DELAY_PERIODS, delayed_fraction, regulator_step
 
-remember: Any = None  # a placeholder, see hysteresis_kernels
+write_drive: Any = None  # a placeholder, see hysteresis_kernels
 
 
 @kernel
@@ -94,7 +94,7 @@ def advance(
                     pressure[j], target, lag[j], per_lag[j], slew[j], per_slew[j], width[j]
                 )
                 pressure[j] = reached if width[j] > 0.0 else pressure[j]
-            remember(rows, fixed, counts, table, hysteresis, 0, LANES, elements, work)
+            write_drive(rows, fixed, counts, table, hysteresis, 0, LANES, elements, work)
         for j in range(LANES):
             ahead = 0.5 * h * v[j]
             e = (x[j] + ahead) * per_length[j]
@@ -119,25 +119,25 @@ def advance(
 
 @kernel
 def true_position(rows: Any, j: int) -> float:
-    """Return where the load of lane ``j`` is [m], from its rest position."""
+    """Return the position [m] of the load of lane ``j``, from its rest position."""
     return rows[R.CONTRACTION][j] - rows[R.REST][j]  # type: ignore[no-any-return]
 
 
 @kernel
 def seen_position(rows: Any, j: int) -> float:
-    """Return what the position sensor measures [m], before its bias, noise and steps."""
+    """Return the undisturbed reading of the position sensor [m]."""
     return rows[R.CONTRACTION][j] - rows[R.REST][j]  # type: ignore[no-any-return]
 
 
 @kernel
 def seen_pressure(rows: Any, j: int) -> float:
-    """Return what the pressure sensor measures [Pa], before its bias, noise and steps."""
+    """Return the undisturbed reading of the pressure sensor [Pa]."""
     return rows[R.PRESSURE][j]  # type: ignore[no-any-return]
 
 
 @kernel
 def begin_effects(rows: Any, fixed: Any, j: int) -> None:
-    """Begin what a plain plant has not."""
+    """Begin the effects: a plain plant has none."""
 
 
 N_WORK = 17
