@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from pam_envs.plants.antagonistic_joint.plant import AntagonisticJoint
+from pam_envs.plants.antagonistic_joint.statics import PairPlant
 from pam_envs.plants.core.linearise import Array, Branch, Equilibrium, local_branch
 
 Inputs = Literal["pressure", "angle"]
@@ -39,36 +40,61 @@ def at_rest(
         Mass at the link's end [kg].
     """
     link = plant.link
-    inertia = link.inertia + payload * link.length**2
     if plant.dynamics == "reduced":
         return _reduced(plant, angle, payload, branch)
-    stress = plant.prestress if prestress is None else prestress
-    weight = float(plant.weight_torque(angle, payload))
-    a, b, short = plant.pressures_for(angle, stress, weight)
-    if short:
-        raise ValueError(f"angle = {angle:g} rad is out of reach at {stress:g} N: choose a smaller")
-    pull = muscle_torque(plant, angle, branch)
+    inertia = link.inertia + payload * link.length**2
+    dynamics = np.array([[1.0 / inertia]]), np.array([link.damping])
+    return pair_equilibrium(plant, np.array([angle]), prestress, payload, inputs, branch, *dynamics)
+
+
+def pair_equilibrium(
+    plant: PairPlant, pose: Array, prestress: float | None, payload: float, inputs: Inputs,
+    branch: Branch, inverse_mass: Array, damping: Array,
+) -> Equilibrium:  # fmt: skip
+    """Return the equations of n joints with pairs of muscles about the rest at a pose, (n,) [rad].
+
+    ``inverse_mass`` (n, n) [1/(kg m2)] and ``damping`` (n,) [N m s/rad] are those of the links; the
+    names of an arm's joints are numbered.
+    """
+    n = len(pose)
+    stress = np.full(n, plant.prestress if prestress is None else prestress)
+    weight = plant.weight_torque(pose, payload)
+    a, b, short = plant.pressures_for(pose, stress, weight)
+    if np.any(short):
+        raise ValueError(
+            f"angles = {pose.tolist()} rad are out of reach at {stress[0]:g} N: choose smaller ones"
+        )
+    pulls = [muscle_torque(plant, float(phi), branch) for phi in pose]
 
     def derivative(state: Array, command: Array) -> Array:
-        set_points, (phi, speed) = command, state[2:]
+        pressures, phi, speed = state[: 2 * n].reshape(n, 2), state[2 * n : 3 * n], state[3 * n :]
+        torque = [
+            pull(*args) for pull, *args in zip(pulls, phi, speed, pressures, strict=True)
+        ] - plant.weight_torque(phi, payload)
+        set_points = command.reshape(n, 2)
         if inputs == "angle":
-            set_points = np.array(plant.pressures_for(command[0], command[1], weight)[:2])
-        torque = pull(phi, speed, state[:2]) - float(plant.weight_torque(phi, payload))
-        bend = (torque - link.damping * speed) / inertia
-        lag = (set_points - state[:2]) / plant.regulator.time_constant
-        return np.array([*lag, speed, bend])
+            set_points = np.stack(plant.pressures_for(command[:n], command[n:], weight)[:2], -1)
+        lag = (set_points - pressures) / plant.regulator.time_constant
+        return np.concatenate([lag.ravel(), speed, inverse_mass @ (torque - damping * speed)])
 
-    by_angle = inputs == "angle"
+    def named(name: str, ends: tuple[str, ...] = ("",)) -> list[str]:
+        alone = isinstance(plant, AntagonisticJoint)
+        joints = ["_" if ends[0] else ""] if alone else [f"_{k + 1}" for k in range(n)]
+        return [f"{name}{joint}{end}" for joint in joints for end in ends]
+
+    held, by_angle = np.stack([a, b], -1).ravel(), inputs == "angle"
+    steps = [1e-6] * n + [1e-3] * n if by_angle else [10.0] * 2 * n
+    given = named("command") + named("co_contraction")
     return Equilibrium(
         derivative,
-        lambda state: state[2:3],
-        np.array([a, b, angle, 0.0]),
-        np.array([angle, stress] if by_angle else [a, b]),
-        np.array([10.0, 10.0, 1e-6, 1e-6, *([1e-6, 1e-3] if by_angle else [10.0, 10.0])]),
+        lambda state: state[2 * n : 3 * n],
+        np.concatenate([held, pose, np.zeros(n)]),
+        np.concatenate([pose, stress]) if by_angle else held,
+        np.array([10.0] * 2 * n + [1e-6] * 2 * n + steps),
         (
-            ("pressure_a", "pressure_b", "angle", "velocity"),
-            ("command", "co_contraction") if by_angle else ("set_point_a", "set_point_b"),
-            ("angle",),
+            tuple(named("pressure", ("a", "b")) + named("angle") + named("velocity")),
+            tuple(given if by_angle else named("set_point", ("a", "b"))),
+            tuple(named("angle")),
         ),
     )
 
