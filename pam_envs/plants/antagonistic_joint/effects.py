@@ -58,6 +58,7 @@ def pair_kernels(kind: str, layout: Any, pairs: int, effects: int | None) -> dic
     ``effects`` is the first row of the state of the effects; None for a plain plant.
     """
     found = protocol.kernels(kind) | {"PAIR": pair_rows(layout, effects), "N_PAIRS": pairs}
+    found["N_OPERATORS"] = 2 * pairs
     if effects is None:
         return found
     block, muscles = layout.EFFECT, 2 * pairs

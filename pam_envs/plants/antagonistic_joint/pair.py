@@ -12,8 +12,8 @@ from pam_envs.kernels.build import LANES, kernel
 from pam_envs.mechanics.antagonistic_lever import span, squares
 from pam_envs.muscle.force_map import force_terms, inner_volume
 from pam_envs.plants.antagonistic_joint import rows as K
+from pam_envs.plants.core.muscle_path import regulated
 from pam_envs.plants.core.sensors import read_sensors
-from pam_envs.pneumatics.regulator import regulator_step
 
 PAIR: Any = None
 """Placeholder: rows of the plant whose joints have the pairs (:func:`pair_rows`)."""
@@ -53,10 +53,8 @@ def regulate(
     pressure, set_point, was = rows[PAIR.pressure + m], rows[PAIR.set_point + m], work[m]
     h = period / substeps
     for j in range(LANES):
-        time, slew = fixed[K.REGULATOR_TIME_CONSTANT][j], fixed[K.REGULATOR_SLEW_RATE][j]
-        target = max(0.0, min(fixed[K.REGULATOR_MAX_PRESSURE][j], set_point[j]))
         was[j] = pressure[j]
-        pressure[j] = regulator_step(pressure[j], target, time, 1.0 / time, slew, 1.0 / slew, h)
+        pressure[j] = regulated(fixed, K.REGULATOR_MAX_PRESSURE, j, pressure[j], set_point[j], h)
 
 
 @kernel
@@ -126,15 +124,6 @@ def peek_at(
         rows, fixed, counts, table, hysteresis, elements, PAIR.at + m, PAIR.lag + m,
         PAIR.stick + m, operators, PAIR.model, K.STACK_COUNT + m, K.MEMBER, first, last,
     )  # fmt: skip
-
-
-@kernel
-def start_hysteresis(rows: Any, counts: Any, hysteresis: int, j: int) -> None:
-    """Put the hysteresis models of one lane into their virgin state."""
-    for k in range(len(rows) - hysteresis):
-        rows[hysteresis + k][j] = 0.0
-    for m in range(2 * N_PAIRS):
-        counts[K.STACK_COUNT + m][j] = 1
 
 
 @kernel

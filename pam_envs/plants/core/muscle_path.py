@@ -23,6 +23,7 @@ from pam_envs.pneumatics.regulator import (
     begin_air,
     delayed_fraction,
     line_effects_on,
+    regulator_step,
     valve_effects_on,
 )
 
@@ -37,6 +38,17 @@ PATH_NAMES = (
     *(f"hysteresis.{name}" for name in (*declarations(CreepEffects), *declarations(FirstCycles))),
 )
 """Parameters of the path in the order of ``PATH``."""
+
+
+@kernel
+def regulated(fixed: Any, plain: int, j: int, pressure: float, set_point: float, h: float) -> float:
+    """Return the pressure [Pa] of one lane after ``h`` seconds, without effects.
+
+    ``plain`` is the first row of full pressure, time constant and slew rate.
+    """
+    time, slew = fixed[plain + 1][j], fixed[plain + 2][j]
+    target = max(0.0, min(fixed[plain][j], set_point))
+    return regulator_step(pressure, target, time, 1.0 / time, slew, 1.0 / slew, h)
 
 
 @kernel

@@ -29,8 +29,11 @@ from pam_envs.plants.core.tiles import first_of, in_tiles
 
 BEGIN, REST, REZERO = 1, 2, 4
 """Flags of a control period: begin anew; come to rest instead of advancing; zero the sensor."""
-STEP = 3
-"""Row of the control period among the whole numbers of every plant."""
+STEP, STACK_COUNT = 3, 5
+"""Rows of every plant's whole numbers: control period, first count of its hysteresis operators."""
+
+N_OPERATORS = 1
+"""Placeholder: hysteresis operators of the plant."""
 
 # placeholders, filled in for each plant
 N_ROWS = N_PARAMETERS = N_COUNTS = N_WORK = END = 0
@@ -41,6 +44,15 @@ plant_begin: Any = None
 advance: Any = None
 
 Array = NDArray[np.float64]
+
+
+@kernel
+def start_hysteresis(rows: Any, counts: Any, hysteresis: int, j: int) -> None:
+    """Clear the hysteresis of one lane, and all state after it."""
+    for k in range(len(rows) - hysteresis):
+        rows[hysteresis + k][j] = 0.0
+    for m in range(N_OPERATORS):
+        counts[STACK_COUNT + m][j] = 1
 
 
 @kernel

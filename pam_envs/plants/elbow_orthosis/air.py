@@ -12,10 +12,10 @@ from typing import Any
 from pam_envs.constants import ATMOSPHERE, PRESSURE_PER_DENSITY
 from pam_envs.kernels.arithmetic import clip
 from pam_envs.kernels.build import LANES, kernel
+from pam_envs.plants.core.muscle_path import regulated
 from pam_envs.plants.elbow_orthosis import rows as K
 from pam_envs.plants.elbow_orthosis.bundles import contraction_at, factors_of, shape_of, volume_of
 from pam_envs.pneumatics.on_off_pair import coil_window, emptied, filled
-from pam_envs.pneumatics.regulator import regulator_step
 
 MIDDLE, WAS_A, WAS_B, NOW_A, NOW_B, GIVES_A, GIVES_B, DRIVE_WAS = range(8)
 """Rows of scratch: angle at the middle; pressures before and after; their fall with contraction;
@@ -40,10 +40,8 @@ def exchange_regulated(
         pressure, command = rows[K.PRESSURE_A + side], rows[K.COMMAND_A + side]
         was, now, gives = work[WAS_A + side], work[NOW_A + side], work[GIVES_A + side]
         for j in range(LANES):
-            time, slew = fixed[K.REGULATOR_TIME_CONSTANT][j], fixed[K.REGULATOR_SLEW_RATE][j]
-            target = max(0.0, min(fixed[K.REGULATOR_MAX_PRESSURE][j], command[j]))
             was[j] = pressure[j]
-            now[j] = regulator_step(pressure[j], target, time, 1.0 / time, slew, 1.0 / slew, h)
+            now[j] = regulated(fixed, K.REGULATOR_MAX_PRESSURE, j, pressure[j], command[j], h)
             gives[j] = 0.0
 
 

@@ -13,12 +13,13 @@ from typing import Any
 from pam_envs.hysteresis import protocol
 from pam_envs.kernels.arithmetic import decay
 from pam_envs.kernels.build import LANES, kernel, routine
+from pam_envs.plants.core.muscle_path import regulated
+from pam_envs.plants.core.rollout import start_hysteresis
 from pam_envs.plants.core.sensors import read_sensors
 from pam_envs.plants.knee_orthosis import rows as K
 from pam_envs.plants.knee_orthosis.effects import muscle_kernels
 from pam_envs.plants.knee_orthosis.motion import MOTIONS, N_WORK, WAS
 from pam_envs.pneumatics.measured_dynamics import MODES, REAL_MODES, pair_factor, turned
-from pam_envs.pneumatics.regulator import regulator_step
 
 __all__ = ["N_WORK", "advance", "begin_lane", "replacements", "start_hysteresis"]
 
@@ -86,9 +87,7 @@ def lag(rows: Any, fixed: Any, counts: Any, i: int, substeps: int, period: float
     h = period / substeps
     pressure, set_point = rows[K.PRESSURE], rows[K.SET_POINT]
     for j in range(LANES):
-        time, slew = fixed[K.REGULATOR_TIME_CONSTANT][j], fixed[K.REGULATOR_SLEW_RATE][j]
-        target = max(0.0, min(fixed[K.REGULATOR_MAX_PRESSURE][j], set_point[j]))
-        pressure[j] = regulator_step(pressure[j], target, time, 1.0 / time, slew, 1.0 / slew, h)
+        pressure[j] = regulated(fixed, K.REGULATOR_MAX_PRESSURE, j, pressure[j], set_point[j], h)
 
 
 @kernel
@@ -145,14 +144,6 @@ def advance(
     for j in range(LANES):
         report(rows, fixed, j, period)
         read_sensors(rows, fixed, j, counts[K.STEP][j] + 1, period)
-
-
-@kernel
-def start_hysteresis(rows: Any, counts: Any, hysteresis: int, j: int) -> None:
-    """Clear the hysteresis of one lane; :func:`begin_lane` then begins it."""
-    for k in range(len(rows) - hysteresis):
-        rows[hysteresis + k][j] = 0.0
-    counts[K.STACK_COUNT][j] = 1
 
 
 @routine

@@ -47,10 +47,10 @@ from pam_envs.plants.antagonistic_joint.pair import (
     pull_of,
     report_muscles,
     report_state,
-    start_hysteresis,
     stop_torque,
     turning,
 )
+from pam_envs.plants.core.rollout import start_hysteresis
 from pam_envs.plants.core.sensors import read_sensors
 from pam_envs.plants.redundant_manipulator import rows as M
 
