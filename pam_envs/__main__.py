@@ -61,7 +61,7 @@ class Render:
 
 @dataclass
 class Identify:
-    """Identify the shipped muscle anew from the shipped readings (some minutes)."""
+    """Identify the shipped muscle again from the shipped readings (some minutes)."""
 
     out: Path = Path("identified")
     """Folder for the plant files and the report."""
@@ -199,7 +199,7 @@ def _pictures(env: Any, options: Render) -> Iterator[NDArray[np.uint8]]:
 
 
 def identify(options: Identify) -> None:
-    """Identify the shipped plants anew and write files and report."""
+    """Identify the shipped plants again and write files and report."""
     from pam_envs.identification.mas10 import identify_all
 
     options.out.mkdir(parents=True, exist_ok=True)

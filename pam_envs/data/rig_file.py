@@ -81,7 +81,7 @@ class Rig:
     cycles_since_rest : int
         Cycles that the muscle had made before the first row, since it last rested.
     rezeroed : bool
-        Whether the position sensor was zeroed anew at the start of each segment.
+        Whether the position sensor was zeroed again at the start of each segment.
     repeats : tuple of tuple of str
         Groups of segments in which the same was done.
     valve_closed : tuple of str

@@ -67,7 +67,7 @@ def identify_all(
     table = load_contraction_table()
     floor = 1e3 * cycles.repeatability_floor(table)
     lines = [
-        "# What the tables say of the MAS-10-N-100, and what they do not",
+        "# Identification of the MAS-10-N-100 from the tables",
         "",
         "Made by `pam-envs identify`. Errors in mm over the readings that are not zero by "
         f"definition; the repeatability floor (a repeat against the mean of the others) is "
@@ -102,18 +102,18 @@ def identify_all(
                 "single muscle a Preisach map from pressure straight to contraction is an "
                 "approximation; here the static law comes between."
             )
-    lines += ["", congruency, "", "## What the readings fix", ""]
+    lines += ["", congruency, "", "## Identifiability of the parameters", ""]
     found = cycles.identifiability(fits[PlayOperator.kind])
     lines += [
-        "Share of each parameter that lies in the combinations that the means fix to better than "
-        "a fifth. What is near 0 is assumed (its range is in the plant file) or comes from the "
-        "prior: equal weight on every threshold, which is what fills the minor loops.",
+        "Share of each parameter in the combinations that the means determine to better than a "
+        "fifth. A parameter near 0 is assumed (its range is in the plant file) or comes from the "
+        "prior, equal weight on every threshold, which determines the minor loops.",
         "",
         "| parameter | fixed |",
         "|---|---|",
         *(f"| {n} | {v:.2f} |" for n, v in zip(found.names, found.fixed, strict=True)),
         "",
-        "## What the model misses",
+        "## Unmodelled structure",
         "",
         *(f"- {line}" for line in MISSED),
         "",

@@ -1,4 +1,4 @@
-"""Transfer functions from frequency responses: known ones come back, fits stay stable."""
+"""Transfer functions from frequency responses: known ones are recovered, fits are stable."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def test_joints_pass_with_either_hysteresis_and_unequal_muscles_do_not() -> None
 
 
 def test_muscle_at_rest_carries_its_load() -> None:
-    """Force of the law less friction, worked out anew with plays of its own."""
+    """Force of the law less friction, computed with separate plays."""
     joint = AntagonisticJoint.paper()
     operator, hysteresis = joint.hysteresis.operator, joint.hysteresis
     assert isinstance(operator, PlayOperator)

@@ -1,4 +1,4 @@
-"""The linear programme of the modified Maxwell-slip model: exact, honest about its rank."""
+"""Linear programme of the modified Maxwell-slip model: exact fits, rank, open unknowns."""
 
 from __future__ import annotations
 

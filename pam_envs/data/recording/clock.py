@@ -32,7 +32,7 @@ ON_GRID = 0.1
 class Clock:
     """Mean period [s] of the samples.
 
-    ``restart`` marks rows, shape (n,), at which the muscle starts anew from rest, ``gap`` those
+    ``restart`` marks rows, shape (n,), at which the muscle restarts from rest, ``gap`` those
     after which nothing was recorded for a while, with the command held.
     """
 

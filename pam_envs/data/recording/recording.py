@@ -85,7 +85,7 @@ class Recording:
     Attributes
     ----------
     time : ndarray
-        [s]; it starts anew where ``restart`` is set.
+        [s]; it starts again at a ``restart``.
     segment : ndarray of int
         Index into ``segments``.
     segments : tuple of str
@@ -99,8 +99,8 @@ class Recording:
     temperature, supply, force : ndarray or None
         [deg C], [Pa], [N].
     restart : ndarray of bool
-        Where the muscle starts anew from rest: the first sample, and each new segment whose time
-        starts anew.
+        Restarts of the muscle from rest: the first sample, and each new segment whose time
+        starts again.
     valve_closed : ndarray of bool
         Where the valve is shut, so that the command has no effect.
     period : float

@@ -1,1 +1,1 @@
-"""report."""
+"""Report of a diagnosis: its content, page and files."""

@@ -1,1 +1,1 @@
-"""static."""
+"""Diagnosis of tables of settled readings."""

@@ -196,7 +196,7 @@ CREEP = {
     "size": 4.1,
 }
 TEXTS = {
-    "named": "The muscle creeps: after every step it goes on for tens of seconds, 0.31 mm RMS. "
+    "named": "The muscle creeps: every step continues for tens of seconds, 0.31 mm RMS. "
     "With creep in the plant the held-out error falls from 0.214 mm to 0.054 mm.",
     "ambiguous": "Creep and first-cycle softening explain the error equally well.",
     "adequate": "The simulation is as good as the noise allows: 1.03 times the noise floor.",

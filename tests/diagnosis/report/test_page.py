@@ -61,9 +61,9 @@ def test_page_is_self_contained(html):
 def test_ids_are_unique_and_every_reference_has_its_target(html):
     read = Page(html)
     assert len(read.ids) == len(set(read.ids))
-    wanted = {a[1:] for a in read.addresses} | set(re.findall(r"url\(#([^)]+)\)", html))
-    assert wanted <= set(read.ids)
-    assert len(wanted) > 20
+    targets = {a[1:] for a in read.addresses} | set(re.findall(r"url\(#([^)]+)\)", html))
+    assert targets <= set(read.ids)
+    assert len(targets) > 20
 
 
 def test_figures_use_colours_of_the_page(html):

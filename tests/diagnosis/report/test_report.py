@@ -87,21 +87,23 @@ def test_schema_refuses_wrong_values(path, value):
         jsonschema.validate(found, SCHEMA)
 
 
-def told(verdict: str, **changes: Any) -> str:
+def sentence_of(verdict: str, **changes: Any) -> str:
     return sentence(json.loads(report_json(fakes.report(verdict) | changes)), Rule())
 
 
 def test_sentence_names_held_out_data_and_open_rivals():
-    text = told("ambiguous")
+    text = sentence_of("ambiguous")
     assert "held-out experiments of the kinds steps_held and sine_held" in text
     assert "Not excluded: first_cycle_softening." in text
     assert "sensor_drift" not in text  # left out because it imitates the best
-    assert "blocks of 4 s" in told("adequate", held_out={"by": "blocks", "kinds": [], "share": 0.3})
+    assert "blocks of 4 s" in sentence_of(
+        "adequate", held_out={"by": "blocks", "kinds": [], "share": 0.3}
+    )
 
 
 def test_insignificant_gain_of_a_cause_is_stated():
     weak = {"name": "leak", "title": "a leak", "gain": {"value": 0.03, "interval": [-0.01, 0.1]}}
-    text = told("named", causes=[fakes.CREEP, fakes.CREEP | weak])
+    text = sentence_of("named", causes=[fakes.CREEP, fakes.CREEP | weak])
     assert "lacks creep of the muscle and a leak" in text
     assert "The gain of a leak is not significant" in text
     assert "gain of creep" not in text
@@ -110,7 +112,7 @@ def test_insignificant_gain_of_a_cause_is_stated():
 def test_insufficient_extension_is_stated():
     report = fakes.report("unexplained")
     after = {"contraction": fakes.error(0.18, "mm", 0.05, 0.1)}
-    text = told("unexplained", causes=[fakes.CREEP], error_after=after)
+    text = sentence_of("unexplained", causes=[fakes.CREEP], error_after=after)
     assert "Adding creep of the muscle reduces it to 0.18 mm" in text
     assert "not sufficient" in text
     assert "time since reversal" in text

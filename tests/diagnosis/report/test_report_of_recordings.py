@@ -48,11 +48,11 @@ def made(name: str, size: float, folder: Path) -> Made:
 
 
 @pytest.fixture(scope="module")
-def told(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Diagnosis]:
+def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Diagnosis]:
     """Return diagnoses by the effect that was hidden, each made once."""
     known: dict[str, Diagnosis] = {}
 
-    def tell(name: str) -> Diagnosis:
+    def make(name: str) -> Diagnosis:
         if name not in known:
             case = made(name, 0.0 if name == "none" else 4.0, tmp_path_factory.mktemp(name))
             known[name] = diagnose(
@@ -60,14 +60,14 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Diagnosis]
             )
         return known[name]
 
-    return tell
+    return make
 
 
 @pytest.mark.parametrize("name", ["temperature", "slip_step", "none"])
 def test_real_report_is_valid_and_equals_written_file(
-    told: Callable[[str], Diagnosis], name: str, tmp_path: Path
+    diagnosed: Callable[[str], Diagnosis], name: str, tmp_path: Path
 ) -> None:
-    found = told(name)
+    found = diagnosed(name)
     assert found.causes == (() if name == "none" else (name,))
     jsonschema.validate(found.report, SCHEMA)
     found.write(tmp_path)
@@ -77,8 +77,8 @@ def test_real_report_is_valid_and_equals_written_file(
     assert SingleMuscle.from_yaml(tmp_path / "plant.yaml").digest() == found.plant.digest()
 
 
-def test_report_says_what_was_held_out(told: Callable[[str], Diagnosis]) -> None:
-    kinds, once = told("temperature"), told("slip_step")
+def test_report_says_what_was_held_out(diagnosed: Callable[[str], Diagnosis]) -> None:
+    kinds, once = diagnosed("temperature"), diagnosed("slip_step")
     assert kinds.report["held_out"]["by"] == "kinds"
     assert all(kind in kinds.text for kind in kinds.report["held_out"]["kinds"])
     assert set(kinds.report["error_before"]["contraction"]["kinds"]) == set(
@@ -92,9 +92,9 @@ def test_report_says_what_was_held_out(told: Callable[[str], Diagnosis]) -> None
 
 
 def test_gains_equal_held_out_error_ratios(
-    told: Callable[[str], Diagnosis],
+    diagnosed: Callable[[str], Diagnosis],
 ) -> None:
-    report = told("temperature").report
+    report = diagnosed("temperature").report
     before, after = report["error_before"], report["error_after"]
     gain = sum(2.0 * np.log(before[c]["value"] / after[c]["value"]) for c in before)
     assert report["causes"][0]["gain"]["value"] == pytest.approx(gain, rel=1e-3)
@@ -104,8 +104,8 @@ def test_gains_equal_held_out_error_ratios(
     assert {name for name, by in on.items() if by == "blocks"} <= {"slip_step"}
 
 
-def test_parameters_have_provenance(told: Callable[[str], Diagnosis]) -> None:
-    found = told("temperature")
+def test_parameters_have_provenance(diagnosed: Callable[[str], Diagnosis]) -> None:
+    found = diagnosed("temperature")
     marks, report = found.plant.provenance, found.report
     source = report["provenance"]["recording"]["digest"][:12]
     for name in ("muscle.area", "regulator.gain", "muscle.temperature_gain"):
@@ -115,8 +115,8 @@ def test_parameters_have_provenance(told: Callable[[str], Diagnosis]) -> None:
     assert "published" not in {kind for kind, _ in marks.values()}
 
 
-def test_rig_can_be_traced(told: Callable[[str], Diagnosis]) -> None:
-    report = told("temperature").report
+def test_rig_can_be_traced(diagnosed: Callable[[str], Diagnosis]) -> None:
+    report = diagnosed("temperature").report
     assert report["provenance"]["rig"]["source"].endswith("rig.yaml")
     rig = Rig(repeats=(("a", "b"),), tolerance={"mass.load": 0.02})
     assert rig.digest == Rig(repeats=(("a", "b"),), tolerance={"mass.load": 0.02}).digest
@@ -124,9 +124,9 @@ def test_rig_can_be_traced(told: Callable[[str], Diagnosis]) -> None:
 
 
 def test_without_a_comparison_in_closed_loop_there_is_a_reason(
-    told: Callable[[str], Diagnosis], tmp_path: Path
+    diagnosed: Callable[[str], Diagnosis], tmp_path: Path
 ) -> None:
-    assert told("temperature").report["closed_loop_reason"] == "it was not requested"
+    assert diagnosed("temperature").report["closed_loop_reason"] == "it was not requested"
     case = made("slip_step", 4.0, tmp_path)
     found = diagnose(case.recording, rig=case.rig, causes=CAUSES, progress=False)
     assert found.report["closed_loop"] is None

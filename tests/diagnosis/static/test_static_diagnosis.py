@@ -30,12 +30,12 @@ def measured():
     return diagnose_readings(TABLE)
 
 
-def _rung(report, *forms):
+def _stage(report, *forms):
     return next(r for r in report["readings"]["ladder"] if tuple(r["model"]) == forms)
 
 
-def _tried(rung, form):
-    return next(t for t in rung["tried"] if t["form"] == form)
+def _tried(stage, form):
+    return next(t for t in stage["tried"] if t["form"] == form)
 
 
 def _cause(report, name):
@@ -55,7 +55,7 @@ def test_floor_is_that_of_the_repeats(measured):
 
 
 def test_load_blind_model_is_three_floors_off(measured):
-    base = _rung(measured)
+    base = _stage(measured)
     assert base["cells_mm"] == pytest.approx(0.475, abs=0.005)
     assert base["load_left_out_mm"] == pytest.approx(0.634, abs=0.01)
     assert measured["error_before"]["contraction"]["times_floor"] == pytest.approx(2.95, abs=0.1)
@@ -73,7 +73,7 @@ def test_linear_load_effects_reduce_held_out_load_error_by_30_percent(measured):
     cut = measured["readings"]["loads_left_out"]["cut_percent"]
     assert cut["value"] == pytest.approx(39.7, abs=2.0)
     assert cut["interval"][0] > 10.0
-    both = _rung(measured, "pressure shift", "width linear in load")
+    both = _stage(measured, "pressure shift", "width linear in load")
     assert both["load_left_out_mm"] <= 0.7 * before
 
 
@@ -95,8 +95,8 @@ def test_shift_and_width_come_with_intervals(measured):
 
 
 def test_width_is_significant_only_beside_the_shift(measured):
-    alone = _tried(_rung(measured), "width linear in load")
-    beside = _tried(_rung(measured, "pressure shift"), "width linear in load")
+    alone = _tried(_stage(measured), "width linear in load")
+    beside = _tried(_stage(measured, "pressure shift"), "width linear in load")
     assert alone["p"] > 0.3
     assert not alone["accepted"]
     assert beside["p"] < 0.005
