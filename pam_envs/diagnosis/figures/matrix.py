@@ -86,15 +86,10 @@ def shares(ax: Any, absorbed: Report, names: Sequence[str]) -> None:
 
 
 def alike(cosine: Array) -> list[int]:
-    """Return the order that puts similar causes side by side.
+    """Return the order that puts similar causes side by side, of a similarity (n, n) from 0 to 1.
 
     Order along the second eigenvector of the graph Laplacian (Fiedler vector), which keeps
     strongly connected nodes close together.
-
-    Parameters
-    ----------
-    cosine : (n, n) array
-        Similarity from 0 to 1.
     """
     weight = np.nan_to_num((cosine + cosine.T) / 2.0) ** 2
     np.fill_diagonal(weight, 0.0)

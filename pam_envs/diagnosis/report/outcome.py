@@ -35,24 +35,11 @@ def steps(progress: bool) -> Iterator[Callable[[str], None]]:
 
 @dataclass(frozen=True)
 class Traces:
-    """Time series of a report; arrays of shape (T,) in SI.
+    """Time series of a report in SI, shape (T,): [s], [Pa], [N], [deg C].
 
-    Attributes
-    ----------
-    time, command, load : ndarray
-        Time [s], command [Pa] and load [N].
-    segment : ndarray of int
-        Index into ``segments``.
-    segments : tuple of str
-        Labels of the segments.
-    held_out : ndarray of bool
-        Held-out samples, of which the errors are reported.
-    temperature : ndarray or None
-        Temperature [deg C].
-    measured, base, extended : dict of str to ndarray
-        Readings and simulations, by output.
-    effects : dict of str to dict of str to ndarray
-        Contribution of each named cause, by output.
+    ``segment`` is an index into the labels ``segments``; ``held_out`` are the samples of the
+    reported errors. ``measured``, ``base`` and ``extended`` are readings and simulations by output,
+    ``effects`` the contributions of the named causes.
     """
 
     time: Array

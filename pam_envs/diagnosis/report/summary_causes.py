@@ -133,14 +133,10 @@ def reasons(decision: Decision, rule: Rule) -> list[str]:
 
 
 def _reason(
-    rival: Candidate,
-    row: Mapping[str, Any],
-    best: Candidate,
-    rule: Rule,
-    stays: bool,
+    rival: Candidate, row: Mapping[str, Any], best: Candidate, rule: Rule, stays: bool
 ) -> str:
     number = len(rival.names) - len(best.names)
-    for applies, word in (
+    words = (
         (rival is best, BEST),
         (stays, OPEN),
         (number < 0, FEWER),
@@ -148,10 +144,8 @@ def _reason(
         (set(rival.names) == set(best.names), SAME),
         (row["imitates"], IMITATES),
         (row["better"] <= rule.doubt, WORSE),
-    ):
-        if applies:
-            return word
-    return LESS
+    )
+    return next((word for applies, word in words if applies), LESS)
 
 
 def rivals(study: Any, rule: Rule) -> list[Json]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import jsonschema
@@ -27,15 +26,7 @@ SCHEMA = json.loads(
 CAUSES = ("leak", "temperature", "creep", "slip_step", "sensor_bias", "dead_time")
 
 
-@dataclass(frozen=True)
-class Made:
-    """A recording of a rig that hides effects, and its rig file."""
-
-    recording: Recording
-    rig: Rig
-
-
-def made(name: str, size: float, folder: Path) -> Made:
+def made(name: str, size: float, folder: Path) -> tuple[Recording, Rig]:
     random = np.random.default_rng(8)
     base, campaign = hidden.draw_base(random), hidden.campaign_short(2)
     effects = [(hidden.draw_effect(name, random), size)] if size else []
@@ -44,7 +35,7 @@ def made(name: str, size: float, folder: Path) -> Made:
     )
     (folder / "rig.yaml").write_text(yaml.safe_dump(hidden.rig_yaml(base, campaign)))
     rig = Rig.from_yaml(folder / "rig.yaml")
-    return Made(load_recording(folder / "recording.csv", rig), rig)
+    return load_recording(folder / "recording.csv", rig), rig
 
 
 @pytest.fixture(scope="module")
@@ -54,9 +45,10 @@ def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Diagn
 
     def make(name: str) -> Diagnosis:
         if name not in known:
-            case = made(name, 0.0 if name == "none" else 4.0, tmp_path_factory.mktemp(name))
+            size, folder = 0.0 if name == "none" else 4.0, tmp_path_factory.mktemp(name)
+            recording, rig = made(name, size, folder)
             known[name] = diagnose(
-                case.recording, rig=case.rig, causes=CAUSES, progress=False, closed_loop=False
+                recording, rig=rig, causes=CAUSES, progress=False, closed_loop=False
             )
         return known[name]
 
@@ -127,7 +119,7 @@ def test_without_a_comparison_in_closed_loop_there_is_a_reason(
     diagnosed: Callable[[str], Diagnosis], tmp_path: Path
 ) -> None:
     assert diagnosed("temperature").report["closed_loop_reason"] == "it was not requested"
-    case = made("slip_step", 4.0, tmp_path)
-    found = diagnose(case.recording, rig=case.rig, causes=CAUSES, progress=False)
+    recording, rig = made("slip_step", 4.0, tmp_path)
+    found = diagnose(recording, rig=rig, causes=CAUSES, progress=False)
     assert found.report["closed_loop"] is None
     assert "cannot compensate slip_step" in found.report["closed_loop_reason"]
