@@ -25,22 +25,10 @@ BETTER, DEARER, NOT_SHOWN = "better", "better error, higher cost", "not shown to
 class Claim:
     """A controller beside the best paper controller of its track.
 
-    Attributes
-    ----------
-    split : str
-        Split of the episodes: the audit's if both are in the round.
-    probability : Interval
-        Of improvement of the headline over training seeds and paired episodes.
-    ratios : mapping from the name of a cost to its ratio
-        Infinite where the paper controller has none of it.
-    verdict : str
-        ``BETTER``, ``DEARER`` or ``NOT_SHOWN``.
-    reasons : tuple of str
-        Violated conditions of ``BETTER``.
-    gain : Interval
-        Relative reduction of the mean against the paper controller, paired by episode.
-    remarks : tuple of str
-        Beside the verdict: the numbers of settings that were tried for each side.
+    ``probability`` is that of improvement of the headline over training seeds and paired episodes,
+    ``gain`` the relative reduction of the mean, paired by episode. ``ratios`` are those of costs,
+    infinite where the paper controller has none. ``reasons`` are the violated conditions of
+    ``BETTER``, ``remarks`` the numbers of settings that were tried for each side.
     """
 
     row: Row

@@ -46,15 +46,9 @@ INTRODUCTION = (
 
 
 def page_text(name: str, tracks: Mapping[str, Track], figures: Mapping[str, str]) -> str:
-    """Return the page of an environment.
+    """Return the page of an environment; ``figures`` are paths relative to it, by track.
 
-    Parameters
-    ----------
-    name : str
-    tracks : mapping from track to rows
-        Of the environment, the nominal one first; rows best first.
-    figures : mapping from track to path
-        Pictures to show, relative to the page.
+    The nominal track comes first, rows best first.
     """
     entries = {views.name_of(row): row for ordered in tracks.values() for row in ordered}
     lines = [f"# {name}", "", INTRODUCTION, ""]

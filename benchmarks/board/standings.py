@@ -32,15 +32,9 @@ class Place:
 class Listing:
     """The rows of a track, the lowest error first.
 
-    Attributes
-    ----------
-    ranked, few : list of rows
-        In the audit round of the track; those with too few training seeds for a rank apart. All
-        rows where there has been no round yet.
-    outside : list of rows
-        Not in the round of a track that has one.
-    missing : tuple of str
-        Controllers that are in the round and have no row.
+    ``ranked`` are in the audit round of the track, or all rows where there is no round yet; ``few``
+    have too few training seeds for a rank. ``outside`` are rows that are not in the round, and
+    ``missing`` the controllers that are in the round and have no row.
     """
 
     ranked: Track
@@ -86,10 +80,7 @@ def by_env(by_track: Mapping[str, Track]) -> dict[str, dict[str, Track]]:
 
 
 def ordered(rows: Sequence[Row]) -> Track:
-    """Return the rows of a track by the mean of their headline, the lowest first.
-
-    Rows of the audit round by its episodes; after them the others, by the public ones.
-    """
+    """Return the rows of a track by the mean of their headline, the audit round first."""
 
     def order(row: Row) -> tuple[bool, float, str]:
         mean = views.mean_of(row)

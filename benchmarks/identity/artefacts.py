@@ -20,13 +20,9 @@ from benchmarks.scenarios.scenario import ScenarioSet
 class Artefact:
     """Behaviour of a controller in a track.
 
-    Attributes
-    ----------
-    files : tuple of mapping
-        Name, sha256, bytes and training_seed of each policy file.
-    answers : tuple of ndarray, shape (n, n_actions)
-        Of the controller in each setting of the task, in action ranges; of a residual policy those
-        of the controller that it corrects, and none of a policy alone.
+    ``files`` has name, sha256, bytes and training_seed of each policy file. ``answers``, each of
+    shape (n, n_actions), are those of the controller in each setting of the task, in action ranges;
+    of a residual policy those of the controller that it corrects, and none of a policy alone.
     """
 
     files: tuple[Mapping[str, Any], ...]

@@ -1,8 +1,7 @@
 """Audit rounds: seeds drawn once for all controllers of a track, after they were frozen.
 
-Public seeds can be tried as often as the maker of a controller likes. Controllers are therefore
-compared on episodes whose seeds nobody could know: the first eight bytes, less their last eleven
-bits so that every reader of JSON holds the number exactly, of
+Controllers are compared on episodes whose seeds nobody could know: the first eight bytes, less
+their last eleven bits so that every reader of JSON holds the number exactly, of
 
     sha256(frozen | salt | scenario | number)
 

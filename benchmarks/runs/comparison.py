@@ -30,7 +30,10 @@ def beyond_rounding(before: Row, after: Row) -> list[str]:
     Every episode is compared, not their mean: free episodes would allow any interval.
     """
     found = differences(_exact(before), _exact(after))
-    found += differences(_frames(before), _frames(after), "episodes")
+    old, new = (
+        [_without(episode, *ROUNDED) for episode in row["episodes"]] for row in (before, after)
+    )
+    found += differences(old, new, "episodes")
     worst = after["scenarios"]["content"]["worst_case"]
     episodes = zip(before["episodes"], after["episodes"], strict=False)
     for k, (old, new) in enumerate(episodes):
@@ -48,10 +51,6 @@ def _exact(row: Row) -> dict[str, Any]:
     kept, about = _without(row, "episodes", "traces", "controller"), row["controller"]
     artefact = about["artefact"] if row["audit"] else _without(about["artefact"], "digest")
     return {**kept, "controller": {**about, "artefact": artefact}}
-
-
-def _frames(row: Row) -> list[dict[str, Any]]:
-    return [_without(episode, *ROUNDED) for episode in row["episodes"]]
 
 
 def _without(record: Row, *keys: str) -> dict[str, Any]:

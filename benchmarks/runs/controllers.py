@@ -27,28 +27,13 @@ BY_RULE = "by rule or as published"
 class Entrant:
     """A controller as the board names it.
 
-    Attributes
-    ----------
-    knowledge : str
-        "nothing", "tables", "nominal model" or "true model".
-    envs : tuple of str
-        Ids that it runs in; empty means any.
-    kind : {"classical", "learned", "residual"}
-        Residual ones are learned on top of a classical one.
-    source : str
-        Module whose ``make_controller`` builds it.
-    files : tuple of (int, Path)
-        Training seed and policy file (relative to the checkout), ascending.
-    trials : int or None
-        Number of settings tried to choose its numbers; None if unknown.
-    author : str
-        Author in the form of BibTeX; empty for the authors of this package.
-    tuned : str
-        Name in ``baselines/core/tuned.yaml``; of a residual controller that of the one it corrects.
-    knobs : tuple of (str, float)
-        Its numbers there, none for a controller that is not tuned.
-    trained_with : (tuple of str, tuple of str) or None
-        Names of the signals and actions of a policy's training.
+    ``knowledge`` is "nothing", "tables", "nominal model" or "true model"; ``kind`` "classical",
+    "learned" or "residual", which is learned on top of a classical one. ``source`` is the module
+    whose ``make_controller`` builds it. Without ``envs`` it runs in any. ``files`` are training
+    seed and policy file, relative to the checkout, ascending. ``trials`` is the number of settings
+    tried to choose its numbers, None if unknown; ``knobs`` are the numbers that a search found, and
+    ``tuned`` their name in ``baselines/core/tuned.yaml``. ``trained_with`` names the signals and
+    actions of a policy's training. An empty ``author`` means those of this package.
     """
 
     name: str

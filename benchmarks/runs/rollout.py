@@ -29,19 +29,10 @@ Watch = Callable[[Any], None]
 class Episode:
     """Record of one episode of n steps.
 
-    Attributes
-    ----------
-    signals : mapping of (n,) array
-        Every entry of ``info``, SI; and the outputs of the model that the controller follows, if
-        it has one: ``model/0``, ``model/1``, ...
-    observations, actions : (n, n_obs), (n, n_act) array
-    seconds : (m,) array
-        Times that answers to one observation took [s], not of all steps where episodes ran as
-        rows of a batch.
-    period : float [s]
-        Control period.
-    failure : str
-        Reason of an early end, the message of the error if a controller raised one; else empty.
+    ``signals`` are every entry of ``info``, SI, and the outputs of the model that the controller
+    follows, if it has one: ``model/0``, ``model/1``, ... ``seconds`` are times that answers to one
+    observation took, not of all steps where episodes ran as rows of a batch. ``failure`` is the
+    reason of an early end, or the message of the controller's error; empty otherwise.
     """
 
     signals: Mapping[str, Array]
@@ -119,9 +110,6 @@ def _named(keys: Sequence[str], table: Array, models: Array) -> dict[str, Array]
     }
 
 
-# --- several at once ---------------------------------------------------------------------------
-
-
 def run_all(
     make: Callable[[int], Any], env: Any, controller: Controller, seeds: Sequence[int]
 ) -> list[Episode]:
@@ -131,13 +119,7 @@ def run_all(
     This is checked: the first answers in the first and the last row are computed again, alone.
     If one differs, each episode is a batch of its own. If the controller takes no batch, or raises
     an error, the episodes are run one by one. A cancelled run raises RuntimeError.
-
-    Parameters
-    ----------
-    make : callable
-        From a number of rows to the batched environment.
-    env : gymnasium.Env
-        The same environment alone.
+    ``make`` makes the batched environment of a number of rows; ``env`` is the same one alone.
     """
     for groups in ([list(seeds)], [[seed] for seed in seeds]):
         made: list[Episode] = []

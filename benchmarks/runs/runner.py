@@ -46,20 +46,10 @@ def plans(pairs: Iterable[Pair]) -> list[Plan]:
 
 @dataclass
 class Report:
-    """Report of a run.
+    """Report of a run: cells that were computed now, and that were there already.
 
-    Attributes
-    ----------
-    computed, found : int
-        Cells that were computed now, and that were there already.
-    swept : int
-        Half-written files of killed processes that were removed.
-    quarantined : list of str
-        Corrupt cells that were set aside and computed again.
-    rows : list of Path
-        Rows that were written.
-    missing : list of str
-        Cells that could not be computed, and rows that could not be made, with the reason.
+    ``swept`` counts half-written files of killed processes that were removed; ``quarantined`` names
+    corrupt cells that were computed again, ``missing`` cells and rows that could not be made.
     """
 
     computed: int = 0

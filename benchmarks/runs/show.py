@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.runs import controllers, rollout
 from benchmarks.scenarios.scenario_env import make_env
@@ -17,11 +16,7 @@ from benchmarks.scoring import metrics
 
 
 def play(
-    env_id: str,
-    controller: str,
-    kwargs: Mapping[str, Any],
-    seed: int,
-    video: Path | None = None,
+    env_id: str, controller: str, kwargs: Mapping[str, Any], seed: int, video: Path | None = None
 ) -> tuple[rollout.Episode, Any]:
     """Return a recorded episode and its setpoints by name, SI; film it if a path is given."""
     entrant = controllers.find(controller)
@@ -36,16 +31,10 @@ def play(
     made = controllers.make(entrant, env.unwrapped.plant, env)
     with _film(video, env) as watch:
         episode = rollout.run(env, made, seed, watch)
-    set_points = _set_points(env, episode.actions)
-    env.close()
-    return episode, set_points
-
-
-def _set_points(env: Any, actions: NDArray[Any]) -> dict[str, NDArray[np.float64]]:
-    """Return each commanded setpoint, within its range, SI."""
     space, signals = env.action_space, env.unwrapped.action_signals
-    inside = np.clip(actions.reshape(-1, len(signals)), space.low, space.high)
-    return {name: signals.decode(inside, name) for name in signals.names()}
+    inside = np.clip(episode.actions.reshape(-1, len(signals)), space.low, space.high)
+    env.close()
+    return episode, {name: signals.decode(inside, name) for name in signals.names()}
 
 
 @contextmanager

@@ -194,7 +194,7 @@ class Store:
         return sorted(file.name for file in aside.iterdir()) if aside.is_dir() else []
 
     def sweep(self) -> int:
-        """Remove temporary files of processes that are gone, and return how many."""
+        """Remove temporary files of processes that are gone; see :func:`sweep`."""
         return sweep(self.folder)
 
 

@@ -121,9 +121,6 @@ def nominal_track(env: str) -> ScenarioSet:
     return found[0]
 
 
-# --- objective ------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Measured:
     """Result of a controller in the tuning episodes.
@@ -201,14 +198,8 @@ def worth(found: Measured, untuned: Measured) -> float:
     return max(found.error, untuned.error) * (1.0 + excess) if excess else found.error
 
 
-# --- search -------------------------------------------------------------------------------
-
-
 def search(job: Job, measure: Callable[[Knobs], Measured], start: Start | None = None) -> Tuned:
-    """Try settings until ``job.trials`` are done; return the best.
-
-    ``measure`` is :meth:`Course.measure`.
-    """
+    """Try settings until ``job.trials`` are done by :meth:`Course.measure`; return the best."""
     study = open_study(job)
     if UNTUNED not in study.user_attrs:  # the published controller, measured once in a search
         study.set_user_attr(UNTUNED, dataclasses.asdict(measure({})))
@@ -233,25 +224,21 @@ def open_study(job: Job) -> optuna.Study:
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     job.storage.parent.mkdir(parents=True, exist_ok=True)
     url, patience = f"sqlite:///{job.storage}", {"connect_args": {"timeout": 60}}
-    name = f"{tuned_name(job.controller, job.env)}, {job.episodes} episodes, seed {job.seed}"
-    study = optuna.create_study(
-        storage=RDBStorage(url, engine_kwargs=patience),
-        study_name=f"{name}, {_task(job)[:12]}",
-        load_if_exists=True,
-    )
-    for lost in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
-        study.tell(lost.number, state=TrialState.FAIL)  # the sampler would count it
-    return study
-
-
-def _task(job: Job) -> str:
-    """Return the digest of track, bounds and code, without the results of searches."""
     code = [
         sources_digest([controllers.ROOT / "baselines"], SOURCES - {tuned.FILE.suffix}),
         sources_digest([controllers.ROOT / "pam_envs"], SOURCES),
     ]
     bounds = {name: list(ends) for name, ends in job.bounds.items()}
-    return digest([nominal_track(job.env).content, bounds, code])
+    task = digest([nominal_track(job.env).content, bounds, code])  # without results of searches
+    name = f"{tuned_name(job.controller, job.env)}, {job.episodes} episodes, seed {job.seed}"
+    study = optuna.create_study(
+        storage=RDBStorage(url, engine_kwargs=patience),
+        study_name=f"{name}, {task[:12]}",
+        load_if_exists=True,
+    )
+    for lost in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
+        study.tell(lost.number, state=TrialState.FAIL)  # the sampler would count it
+    return study
 
 
 def _finished(study: optuna.Study) -> list[optuna.trial.FrozenTrial]:

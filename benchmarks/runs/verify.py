@@ -36,16 +36,9 @@ DESCRIPTION = ("summary", "citation", "author")
 class Verdict:
     """Result of computing a row again.
 
-    Attributes
-    ----------
-    mode : {"bits", "elsewhere"}
-        Compared to the last bit, or within the rounding of another machine.
-    drifted : list of str
-        Every field that differs, with both values; empty if the row is reproduced.
-    notes : list of str
-        Differences that are no drift by themselves (versions, commit, description).
-    checksum : str
-        Of the row that was read.
+    It was compared to the last bit, or within the rounding of another machine (``mode``).
+    ``drifted`` are the fields that differ, with both values; ``notes`` are differences that are no
+    drift by themselves: versions, commit, description. ``checksum`` is that of the row's file.
     """
 
     row: str

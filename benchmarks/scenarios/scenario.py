@@ -43,17 +43,9 @@ _UNITS = {"load": "kg", "mismatch": "N", "pace": "s", "payload": "kg"}
 class Scenario:
     """One setting of an environment, run once per seed.
 
-    Attributes
-    ----------
-    name : str
-        Unique in its file.
-    kwargs : mapping
-        Keyword arguments of ``gymnasium.make``.
-    model : mapping
-        Keyword arguments that differ for the environment whose plant is the controller's nominal
-        model; empty where the model is of the plant's own kind.
-    rests : bool
-        Whether the reference rests, so that a steady-state error is scored.
+    ``model`` has the keyword arguments that differ for the environment whose plant is the
+    controller's nominal model; it is empty where the model is of the plant's own kind. Where the
+    reference rests a steady-state error is scored.
     """
 
     name: str

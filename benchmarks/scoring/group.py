@@ -27,13 +27,8 @@ OUT_OF_REACH: Column = ("saturated_time", "out of reach [%]", 100.0)
 class Record:
     """Recorded signals of one episode, (n,) arrays in SI, and the samples that are scored.
 
-    Attributes
-    ----------
-    window, tracked : (n,) array of bool
-        After settling; and where the output is tracked as well.
-    period : float [s]
-    content : mapping
-        Of the scenario file.
+    ``window`` is after settling, ``tracked`` where the output is tracked as well; the period is in
+    seconds, the content that of the scenario file.
     """
 
     signals: Mapping[str, Array]

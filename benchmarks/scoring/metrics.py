@@ -129,10 +129,8 @@ def score(
     period : float [s]
         Control period.
     content : mapping
-        Of the scenario file: ``sensed`` signal, ``settle_seconds`` before the scored window (the
-        constraint cost is of the whole episode), ``hold_seconds`` of rest before a steady-state
-        error, ``cost_scales``, ``gate`` (signals that are all 1 where the output is tracked), and
-        the entries that its groups of ``metrics`` need.
+        Of the scenario file. The constraint cost is of the whole episode, everything else of the
+        time after ``settle_seconds``, where all signals of its ``gate`` are 1.
 
     Raises
     ------
@@ -188,15 +186,8 @@ def scores_of(
 ) -> dict[str, float]:
     """Return the scores of an episode; one that did not reach its end gets the worst case.
 
-    Parameters
-    ----------
-    episode : benchmarks.runs.rollout.Episode
-    content : mapping
-        Of the scenario file.
-    rests : bool
-        Whether the reference rests; otherwise the steady-state error is NaN.
-    failed : bool, optional
-        Whether it counts as failed; by default whether it did.
+    A reference that does not rest has no steady-state error (NaN). ``failed`` overrides whether the
+    episode counts as failed.
     """
     scores: dict[str, float] = {}
     try:

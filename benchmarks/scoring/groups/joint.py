@@ -20,7 +20,6 @@ from benchmarks.scoring.group import (
     Array,
     Column,
     Group,
-    Mask,
     Record,
     rms,
 )
@@ -78,15 +77,6 @@ def of_joint(record: Record) -> dict[str, float]:
     }
 
 
-def tool_error(signals: Mapping[str, Array], window: Mask, length: float) -> float:
-    """Return the RMS distance [m] of two points of the tool, ``length`` [m] apart, from theirs."""
-    tip, turn = (
-        np.array([signals[f"state/{k}"] - signals[f"state/reference_{k}"] for k in names])
-        for names in (POSITION, DIRECTION)
-    )
-    return rms(np.linalg.norm([tip[:, window], (tip - length * turn)[:, window]], axis=1))
-
-
 def path_length(signals: Mapping[str, Array]) -> Array:
     """Return the path length of the desired pose, shape (n,), constant while the pose rests."""
     desired = np.array([signals[f"state/reference_{k}"] for k in (*POSITION, *DIRECTION)])
@@ -100,8 +90,13 @@ def of_chain(record: Record) -> dict[str, float]:
     stages = sum(key.startswith("state/joint_reference_") for key in signals)
     angles = [f"state/angle_{k}" for k in range(stages)]
     turned = np.array([signals[key] for key in angles])[:, window]
+    tip, turn = (
+        np.array([(signals[f"state/{k}"] - signals[f"state/reference_{k}"])[window] for k in names])
+        for names in (POSITION, DIRECTION)
+    )
+    length = record.content["tool_length"]
     return {
-        "tool_rms_error": tool_error(signals, window, record.content["tool_length"]),
+        "tool_rms_error": rms(np.linalg.norm([tip, tip - length * turn], axis=1)),
         "pointing_rms": rms(signals["state/pointing_error"][window]),
         "joint_rms": rms(signals["state/joint_error"][window]),
         "largest_angle": float(np.max(np.abs(turned))),

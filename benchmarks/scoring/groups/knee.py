@@ -6,7 +6,7 @@ phase differs from the true one, by noise, count for neither.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,17 +88,18 @@ def landings(stance: Array, period: float) -> NDArray[np.int64]:
     return np.array([k for k in rises if k >= before and not stance[k - before : k].any()], int)
 
 
-def _mean_after(
-    size: Callable[[int], float], starts: NDArray[np.int64], samples: int, signal: Array
-) -> float:
-    """Return the mean of a size over the starts that ``samples`` follow, NaN of none."""
-    sizes = [size(k) for k in starts if k + samples <= len(signal)]
+def _windows(signal: Array, starts: NDArray[np.int64], samples: int) -> Iterator[tuple[int, Array]]:
+    """Yield each start that ``samples`` follow, with these samples."""
+    return ((k, signal[k : k + samples]) for k in starts if k + samples <= len(signal))
+
+
+def _mean(sizes: list[float]) -> float:
     return float(np.mean(sizes)) if sizes else float("nan")
 
 
 def largest_after(signal: Array, starts: NDArray[np.int64], samples: int) -> float:
     """Return the mean over starts of the largest size of a signal from there on, NaN of none."""
-    return _mean_after(lambda k: np.abs(signal[k : k + samples]).max(), starts, samples, signal)
+    return _mean([np.abs(part).max() for _, part in _windows(signal, starts, samples)])
 
 
 def excess_after(signal: Array, starts: NDArray[np.int64], samples: int) -> float:
@@ -107,19 +108,14 @@ def excess_after(signal: Array, starts: NDArray[np.int64], samples: int) -> floa
     The error at the start is that of the other phase's controller; the excess is the transient of
     the one that takes over. NaN of no starts.
     """
-    return _mean_after(
-        lambda k: np.abs(signal[k : k + samples]).max() - abs(signal[k]), starts, samples, signal
-    )
+    parts = _windows(signal, starts, samples)
+    return _mean([np.abs(part).max() - abs(part[0]) for _, part in parts])
 
 
 def pressure_jump(pressure: Array, starts: NDArray[np.int64], samples: int) -> float:
     """Return the mean over starts of the largest change of pressure [Pa] from there on."""
-    return _mean_after(
-        lambda k: np.abs(pressure[k : k + samples] - pressure[k - 1]).max(),
-        starts,
-        samples,
-        pressure,
-    )
+    parts = _windows(pressure, starts, samples)
+    return _mean([np.abs(part - pressure[k - 1]).max() for k, part in parts])
 
 
 def of_range(record: Record) -> dict[str, float]:
