@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.runs import rows
 from benchmarks.runs.cells import AUDIT, PUBLIC
 from benchmarks.runs.rows import Row, episodes_of, scores_of
 from benchmarks.scenarios.scenario import ScenarioSet
@@ -168,9 +167,16 @@ def smooth(row: Mapping[str, Any]) -> Interval | None:
 
 def by_setting(row: Mapping[str, Any]) -> dict[tuple[str, str], float]:
     """Return the headline's mean for each value of each axis of the grid."""
-    episodes = episodes_of(row, published_split(row))
-    found = rows.breakdown(ScenarioSet(content_of(row)), episodes)
-    return {(axis, point): value for axis, of in found.items() for point, value in of.items()}
+    track, episodes = ScenarioSet(content_of(row)), episodes_of(row, published_split(row))
+    values = scores_of(episodes, headline_of(track.content))
+    settings = {scenario.name: scenario.kwargs for scenario in track.scenarios()}
+    return {
+        (axis, str(point)): float(
+            np.mean(values[[settings[e["scenario"]][axis] == point for e in episodes]])
+        )
+        for axis, points in (track.content.get("grid") or {}).items()
+        for point in points
+    }
 
 
 def pairs_of(row: Mapping[str, Any], split: str) -> frozenset[tuple[str, int]]:

@@ -48,16 +48,14 @@ def entry(key: str, fields: Fields) -> str:
     lines = [f"@{fields['type']}{{{key},"]
     for name, value in fields.items():
         if name != "type":
-            shown = f"{{{_text(value)}}}" if name == "title" else _text(value)
-            lines.append(f"  {name} = {{{shown}}},")
+            text = str(value).translate(_SPECIAL)
+            lines.append(f"  {name} = {{{f'{{{text}}}' if name == 'title' else text}}},")
     return "\n".join([*lines, "}"]) + "\n"
 
 
-_SPECIAL = {"&": r"\&", "%": r"\%", "#": r"\#", "_": r"\_", "$": r"\$"}
-
-
-def _text(value: Any) -> str:
-    return "".join(_SPECIAL.get(letter, letter) for letter in str(value))
+_SPECIAL = str.maketrans({letter: f"\\{letter}" for letter in "&%#_$"})
+_UNBRACED = str.maketrans("", "", "{}\\")
+"""Without the characters that BibTeX interprets."""
 
 
 def package() -> str:
@@ -83,12 +81,12 @@ AUTHORS = "The pam-envs authors"
 
 
 def _row_entry(row: Mapping[str, Any]) -> str:
-    """Return the entry of the row: what it scored, on what, and what runs it again."""
+    """Return the entry of the row: its score, identity and the command that reproduces it."""
     env, about, found = row["env"], row["controller"], row["audit"]
     unit, factor = views.unit_of(row)
     score = bounded(views.interval(row), factor)
     split = views.published_split(row)
-    said = [
+    note = [
         f"RMS {score} {unit} (mean and 95 % interval over {split} episodes)",
         f"audit round {found['round']}, salt {found['salt']}" if found else "not audited",
         f"environment {env['id']}",
@@ -101,15 +99,10 @@ def _row_entry(row: Mapping[str, Any]) -> str:
     title = f"{about['name']} in {row['scenarios']['content']['title']}"
     fields = {
         "type": "misc",
-        "author": f"{{{_unbraced(about.get('author') or AUTHORS)}}}",
+        "author": f"{{{(about.get('author') or AUTHORS).translate(_UNBRACED)}}}",
         "title": f"Leaderboard row {row['row']}: {title}",
         "year": (found["drawn"] if found else str(row["volatile"]["date"]))[:4],
-        "note": ", ".join(map(_unbraced, said)),
+        "note": ", ".join(note).translate(_UNBRACED),
         "howpublished": f"python -m benchmarks verify {row['row']}",
     }
     return entry(f"{row['row']}-{row['controller']['artefact']['digest'][:8]}", fields)
-
-
-def _unbraced(text: str) -> str:
-    """Return a text without the characters that BibTeX interprets."""
-    return "".join(letter for letter in text if letter not in "{}\\")

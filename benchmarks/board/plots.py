@@ -73,10 +73,9 @@ def _draw_effort(axes: Any, drawn: Sequence[Row]) -> None:
         head = views.interval(row)
         x, y = 1e-5 * views.mean_of(row, "pressure_travel"), factor * head.value
         bounds = factor * np.array([[head.value - head.low], [head.high - head.value]])
-        mark = MARKS.get(row["controller"]["kind"], "s")
-        color = _style(number, row)["color"]
-        style = {"fmt": mark, "markersize": 5, "linewidth": 1, "color": color}
-        axes.errorbar(x, y, np.maximum(bounds, 0.0), **style)
+        mark, color = MARKS.get(row["controller"]["kind"], "s"), _style(number, row)["color"]
+        given = np.maximum(bounds, 0.0)
+        axes.errorbar(x, y, given, fmt=mark, markersize=5, linewidth=1, color=color)
     _plain_log(axes.yaxis)
     axes.set_xlabel("pressure travel [bar/s]")
     axes.set_ylabel(f"RMS [{unit}], mean and 95 % interval")

@@ -1,6 +1,6 @@
 """Audit rounds: seeds drawn once for all controllers of a track, after they were frozen.
 
-Controllers are compared on episodes whose seeds nobody could know: the first eight bytes, less
+Controllers are compared on episodes whose seeds were unknown before: the first eight bytes, less
 their last eleven bits so that every reader of JSON holds the number exactly, of
 
     sha256(frozen | salt | scenario | number)

@@ -17,7 +17,6 @@ from benchmarks.runs.controllers import Entrant
 from benchmarks.runs.store import read_record, write_record
 from benchmarks.scenarios import scenario as scenarios
 from benchmarks.scenarios.scenario import ScenarioSet
-from benchmarks.scoring.metrics import headline_of
 
 SCHEMA = 4
 RESULTS = Path(__file__).parents[1] / "results"
@@ -137,18 +136,6 @@ def scores_of(episodes: Sequence[Mapping[str, Any]], metric: str) -> np.ndarray[
     """Return one metric of all episodes; NaN if it does not apply."""
     values = [episode["scores"][metric] for episode in episodes]
     return np.array([np.nan if value is None else value for value in values], float)
-
-
-def breakdown(track: ScenarioSet, episodes: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the headline's mean for each value of each axis of the grid."""
-    settings = {scenario.name: scenario.kwargs for scenario in track.scenarios()}
-    values = scores_of(episodes, headline_of(track.content))
-    table: dict[str, Any] = {}
-    for axis, points in (track.content.get("grid") or {}).items():
-        for point in points:
-            chosen = [settings[episode["scenario"]][axis] == point for episode in episodes]
-            table.setdefault(axis, {})[str(point)] = float(np.mean(values[chosen]))
-    return table
 
 
 def save(row: Row, folder: Path = RESULTS) -> Path:

@@ -82,7 +82,7 @@ class Options(Computing):
     """Options of a run."""
 
     force: bool = False
-    """Compute again what is there already."""
+    """Compute cells again that are there already."""
     out: Path = rows.RESULTS
     """Folder of the rows."""
     cells: Path = CELLS

@@ -27,7 +27,7 @@ _SUFFIX = ".tmp"
 
 
 def comparable(record: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a record without times, host, date and checksum: what is hashed and compared."""
+    """Return a record without times, host, date and checksum, for hashes and comparisons."""
     return {key: value for key, value in record.items() if key not in (VOLATILE, CHECKSUM)}
 
 

@@ -103,7 +103,7 @@ def _check(stored: Record, cluster: engine.Cluster, verdict: Verdict) -> None:
     entrant, track = find(stored["controller"]["name"]), _track(stored)
     content = (stored["scenarios"]["content"], track.content)
     theirs, ours = (plain(scenarios.identifying(each)) for each in content)
-    if theirs != ours:  # a stranger's scenarios are not run
+    if theirs != ours:  # other scenarios are not run
         verdict.drifted.append(
             f"scenarios: the content is not that of {track.name}.yaml, version "
             f"{track.content['version']}; run the row again"

@@ -1,7 +1,7 @@
 """Environments and nominal models of a scenario.
 
-A scenario may be from a stranger: it names a registered environment and plants of this checkout,
-and nothing else. ``gymnasium.make`` would import the module before a colon.
+A scenario names a registered environment and plants of this checkout and nothing else, since it may
+come from elsewhere; ``gymnasium.make`` would import the module before a colon.
 """
 
 from __future__ import annotations

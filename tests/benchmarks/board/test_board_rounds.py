@@ -14,7 +14,7 @@ from tests.benchmarks.row_helpers import draw, place, run_row
 PAGE = "leaderboard/MusclePositioning.md"
 
 
-def test_a_round_its_entrants_and_who_is_outside_of_it(tmp_path: Path) -> None:
+def test_board_shows_round_missing_entrants_and_outsiders(tmp_path: Path) -> None:
     with place(tmp_path):
         run_row(tmp_path, "middle")
         draw(tmp_path, "trained", "low", "integral")

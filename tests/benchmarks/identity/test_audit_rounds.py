@@ -1,4 +1,4 @@
-"""Audit rounds: one salt a track, drawn after all artefacts, of no use to who tries many."""
+"""Audit rounds: one salt a track, drawn after all artefacts; trying many variants gains nothing."""
 
 from __future__ import annotations
 
@@ -76,22 +76,17 @@ def test_round_is_drawn_once_and_all_of_it_run_the_same_episodes(board: Path) ->
     assert drawn.number == 1
     assert drawn.task["digest"] == tasks.of(tiny(board)).identity.digest
     seeds = drawn.seeds([scenario.name for scenario in tiny(board).scenarios()])
-    wanted = [(name, seed) for name, own in seeds.items() for seed in own]
+    expected = [(name, seed) for name, own in seeds.items() for seed in own]
     for name, runs in (("trained", (0, 1)), ("integral", (None,))):
         row = rows.load(run_row(board, name))
         assert audit.in_last_round(row)
-        assert {k: row["audit"][k] for k in ("round", "salt", "drawn", "commit", "entry")} == {
-            "round": 1,
-            "salt": drawn.salt,
-            "drawn": drawn.drawn,
-            "commit": drawn.commit,
-            "entry": 1,
-        }
+        same = {"salt": drawn.salt, "drawn": drawn.drawn, "commit": drawn.commit}
+        assert row["audit"].items() >= {"round": 1, "entry": 1, **same}.items()
         assert {k: tuple(own) for k, own in row["audit"]["seeds"].items()} == seeds
         episodes = rows.episodes_of(row, "audit")
         for run in runs:
             mine = [(e["scenario"], e["seed"]) for e in episodes if e["training_seed"] == run]
-            assert mine == wanted
+            assert mine == expected
 
 
 def test_frozen_identity_is_of_task_and_all_artefacts(board: Path) -> None:
@@ -165,9 +160,7 @@ def test_rows_of_an_altered_round_drift(board: Path) -> None:
     assert any(line.startswith("audit.salt: ") for line in verify(path).drifted)
 
 
-def test_two_that_draw_at_once_draw_one_after_the_other(
-    board: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_simultaneous_draws_are_serialised(board: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     lock = audit.FILE.with_name(f".{audit.FILE.name}.lock")
     monkeypatch.setattr(audit, "FileLock", lambda path: FileLock(path, timeout=0.1))
     with FileLock(lock), pytest.raises(Timeout):
@@ -197,68 +190,36 @@ def test_damaged_file_of_rounds_is_refused(board: Path) -> None:
 # A task of one number: a table of answers, given blindly, to what a seed draws. None can do better
 # than by its size, but on known seeds one of a thousand does.
 VARIANTS, STEPS, SIZE = 1000, 12, 0.5
-PUBLIC = range(101, 106)
-TASK = digest("a tiny task")
 SCENARIOS = ("calm", "windy")
 DRAWN = np.random.default_rng(3).normal(size=(9973, STEPS))
 
 
-def disturbances(scenario: str, seeds: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return what the seeds of a scenario draw, shape (seeds, steps)."""
-    return DRAWN[[(seed + len(scenario)) % len(DRAWN) for seed in seeds]]
-
-
 def score(table: NDArray[np.float64], seeds: dict[str, tuple[int, ...]]) -> float:
     """Return the mean RMS over scenarios and seeds of what a table of answers leaves."""
-    left = [disturbances(name, found) + table for name, found in seeds.items()]
-    return float(np.mean([np.sqrt(np.mean(part**2, axis=-1)).mean() for part in left]))
-
-
-def variants() -> NDArray[np.float64]:
-    """Return a thousand artefacts that are equally good, shape (variants, steps)."""
-    drawn = np.random.default_rng(7).normal(size=(VARIANTS, STEPS))
-    return SIZE * drawn / np.sqrt(np.mean(drawn**2, axis=-1, keepdims=True))
-
-
-def ground(tables: NDArray[np.float64], known: list[dict[str, tuple[int, ...]]]) -> int:
-    """Return the variant with the lowest score on the seeds that its maker can know."""
-    return int(np.argmin([score(table, seeds) for table, seeds in zip(tables, known, strict=True)]))
+    places = [[(seed + len(name)) % len(DRAWN) for seed in own] for name, own in seeds.items()]
+    return float(np.mean([np.sqrt(np.mean((DRAWN[k] + table) ** 2, axis=-1)) for k in places]))
 
 
 def audit_seeds(table: NDArray[np.float64], salt: str) -> dict[str, tuple[int, ...]]:
-    frozen = f"{TASK}|{digest({'ground': digest(table), 'rival': 'r' * 64})}"
-    return a_round(frozen=frozen, salt=salt).seeds(SCENARIOS)
+    return a_round(frozen=digest({"ground": digest(table)}), salt=salt).seeds(SCENARIOS)
 
 
-def test_grinding_a_thousand_variants_gains_nothing() -> None:
-    tables = variants()
-    public = dict.fromkeys(SCENARIOS, tuple(PUBLIC))
-    best = ground(tables, [public] * VARIANTS)
-    claimed = score(tables[best], public)
-    level = np.mean([score(table, public) for table in tables])
-    assert claimed < 0.93 * level  # on the public seeds it pays
+def test_selecting_among_a_thousand_variants_gains_nothing() -> None:
+    drawn = np.random.default_rng(7).normal(size=(VARIANTS, STEPS))
+    tables = SIZE * drawn / np.sqrt(np.mean(drawn**2, axis=-1, keepdims=True))  # equally good
+    public = dict.fromkeys(SCENARIOS, tuple(range(101, 106)))
+    claims = [score(table, public) for table in tables]
+    best, claimed = tables[np.argmin(claims)], min(claims)
+    assert claimed < 0.93 * np.mean(claims)  # on the public seeds it pays
 
     # each salt gives every variant audit seeds of its own
     salts = [f"{k:032x}" for k in range(40)]
-    audited = [score(tables[best], audit_seeds(tables[best], salt)) for salt in salts]
+    audited = [score(best, audit_seeds(best, salt)) for salt in salts]
     others = [score(table, audit_seeds(table, salts[0])) for table in tables]
     scatter = np.std(audited) / np.sqrt(len(salts)) + np.std(others) / np.sqrt(VARIANTS)
     assert abs(np.mean(audited) - np.mean(others)) < 3.0 * scatter
     assert np.mean(audited) - claimed > 0.8 * (np.mean(others) - claimed) > 0.0
     assert min(audited) > claimed
-
-
-def test_without_a_salt_to_come_grinding_would_pay() -> None:
-    tables, guess, drawn = variants(), "", "5" * 32
-    best = ground(tables, [audit_seeds(table, guess) for table in tables])
-    known = score(tables[best], audit_seeds(tables[best], guess))
-    blind = score(tables[best], audit_seeds(tables[best], drawn))
-    level = np.mean([score(table, audit_seeds(table, drawn)) for table in tables])
-    assert known < 0.9 * level
-    assert abs(blind - level) < 3.0 * np.std(
-        [score(table, audit_seeds(table, drawn)) for table in tables]
-    )
-    assert blind > known
 
 
 def test_tracks_have_names_that_a_seed_can_be_derived_from() -> None:

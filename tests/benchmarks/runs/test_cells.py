@@ -90,4 +90,4 @@ def test_cancelled_cell_ends(track: ScenarioSet, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(rollout, "is_needed", lambda: next(asked))
     with pytest.raises(RuntimeError, match="cancelled"):
         cells.compute(cells.Group((cell,)))
-    assert worker.is_needed()  # outside of a cluster somebody always does
+    assert worker.is_needed()  # always true outside of a cluster

@@ -1,4 +1,4 @@
-"""One episode of any environment, with what was given on the command line alone."""
+"""Command that shows one episode of any environment."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ def test_every_environment_is_shown(
 ) -> None:
     options = ["--controller", controller, "--episode-seconds", "2"]
     assert main(["show", env.removeprefix("PAM/"), *options]) == 0
-    told = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
-    assert {"rms_error", "sensed_rms_error", "pressure_travel"} <= set(told)
-    assert told["pressure_travel"].endswith(" Pa/s")
-    assert "nan" not in told.values()
-    value, _, unit = told["rms_error"].partition(" ")
+    shown_scores = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
+    assert {"rms_error", "sensed_rms_error", "pressure_travel"} <= set(shown_scores)
+    assert shown_scores["pressure_travel"].endswith(" Pa/s")
+    assert "nan" not in shown_scores.values()
+    value, _, unit = shown_scores["rms_error"].partition(" ")
     assert 0.0 < float(value) < float("inf")
     assert unit == TRACKS[env].content.get("unit", "m")
 
@@ -34,14 +34,14 @@ def test_every_environment_is_shown(
 @pytest.mark.parametrize(
     "env", ["MusclePositioning-v0", "ElbowOrthosis-v0", "RedundantManipulator-v0"]
 )
-def test_an_episode_is_drawn(env: str, tmp_path: Path) -> None:
+def test_episode_is_drawn(env: str, tmp_path: Path) -> None:
     plot = tmp_path / "episode.svg"
     options = ["--controller", FIRST[f"PAM/{env}"], "--episode-seconds", "0.5"]
     assert main(["show", env, *options, "--plot", str(plot)]) == 0
     assert plot.read_text().rstrip().endswith("</svg>")
 
 
-def test_what_is_given_reaches_the_environment(capsys: pytest.CaptureFixture[str]) -> None:
+def test_arguments_reach_the_environment(capsys: pytest.CaptureFixture[str]) -> None:
     short = ["show", "MusclePositioning-v0", "--controller", "zero", "--episode-seconds", "0.5"]
     found = []
     for load in ("0.0", "4.5"):
@@ -60,7 +60,7 @@ def test_what_is_given_reaches_the_environment(capsys: pytest.CaptureFixture[str
         (["KneeWalk-v0", "--controller", "pid"], "pid is for PAM/MusclePositioning-v0, not for"),
     ],
 )
-def test_mistakes_are_one_sentence(
+def test_wrong_argument_is_one_sentence(
     arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["show", *arguments]) == 2
@@ -70,7 +70,7 @@ def test_mistakes_are_one_sentence(
     assert len(error.splitlines()) == 1
 
 
-def test_the_tracks_of_an_environment_agree_on_what_is_shown() -> None:
+def test_tracks_of_an_environment_share_sensor_gate_and_unit() -> None:
     for track in scenarios.available().values():
         other = TRACKS[track.env].content
         for name in ("sensed", "gate", "settle_seconds", "hold_seconds"):

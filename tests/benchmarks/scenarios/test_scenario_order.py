@@ -10,7 +10,7 @@ from benchmarks.scenarios.scenario import ScenarioSet, available
 
 
 @pytest.mark.parametrize("name", sorted(available()))
-def test_a_record_gives_the_scenarios_of_its_file(name: str) -> None:
+def test_record_gives_the_scenarios_of_its_file(name: str) -> None:
     made = available()[name]
     content = json.loads(json.dumps(made.content, sort_keys=True))
     again = ScenarioSet(content)

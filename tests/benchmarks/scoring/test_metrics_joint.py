@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import pam_envs  # noqa: F401 (registers)
+from benchmarks.board import accessors as views
 from benchmarks.board import standings
-from benchmarks.runs import rollout, rows
+from benchmarks.runs import rollout
 from benchmarks.scenarios.scenario import ScenarioSet, available
 from benchmarks.scenarios.scenario_env import make_env
 from benchmarks.scoring import metrics
@@ -71,9 +72,9 @@ def test_sensed_and_model_errors_are_scored_beside_the_headline() -> None:
     assert scores["rms_error"] == 0.0
     assert scores["sensed_rms_error"] == pytest.approx(0.01)
     assert np.isnan(scores["model_rms_error"])
-    told = score(joint(**{"model/0": angle - 0.03}), "joint")
-    assert told["rms_error"] == 0.0
-    assert told["model_rms_error"] == pytest.approx(0.03)
+    modelled = score(joint(**{"model/0": angle - 0.03}), "joint")
+    assert modelled["rms_error"] == 0.0
+    assert modelled["model_rms_error"] == pytest.approx(0.03)
 
 
 def test_shares_of_time_are_of_the_window_after_settling() -> None:
@@ -145,26 +146,28 @@ def test_chain_is_ranked_by_its_whole_tool() -> None:
     assert names == ["tool", "tip"]
 
 
-def _row(content: Any, name: str, tip: float, tool: float) -> dict[str, Any]:
-    scores = {"rms_error": tip, "tool_rms_error": tool}
-    where = {"scenario": "path", "seed": 1, "training_seed": None, "split": "public"}
+def _row(content: Any, name: str, tip: float, *tool: float) -> dict[str, Any]:
+    """Return a row with an episode for each tool error, one a scenario."""
+    where = {"seed": 1, "training_seed": None, "split": "public", "failed": False}
+    episodes = [
+        {**where, "scenario": s.name, "scores": {"rms_error": tip, "tool_rms_error": error}}
+        for s, error in zip(ScenarioSet(content).scenarios(), tool, strict=False)
+    ]
     return {
         "controller": {"name": name, "kind": "classical"},
         "env": {"id": CHAIN},
         "scenarios": {"name": content["name"], "content": content},
-        "episodes": [{**where, "failed": False, "scores": scores}],
+        "episodes": episodes,
         "audit": None,
     }
 
 
-def test_breakdown_uses_the_headline() -> None:
+def test_scores_by_setting_are_of_the_headline() -> None:
     track = TRACKS["manipulator_nominal"]
-    episodes = [
-        {"scenario": s.name, "scores": {"rms_error": 9.0, "tool_rms_error": 1.0 + i}}
-        for i, s in enumerate(track.scenarios())
-    ]
-    found = rows.breakdown(track, episodes)["reference"]
-    assert np.mean(list(found.values())) == pytest.approx(3.5)
+    errors = np.arange(1.0, 1.0 + len(track.scenarios()))
+    found = views.by_setting(_row(track.content, "any", 9.0, *errors))
+    references = [value for (axis, _), value in found.items() if axis == "reference"]
+    assert np.mean(references) == pytest.approx(3.5)
 
 
 @dataclass(frozen=True)
@@ -202,10 +205,10 @@ def test_tracks_name_signals_that_there_are(name: str) -> None:
     keys = gym.make(track.env).unwrapped.setup.info_keys
     assert track.content["sensed"] in keys
     assert set(track.content["cost_scales"]) <= set(keys)
-    wanted = metrics.of_track(track.content)
-    assert {metric for metric, _, _ in metrics.columns_of(track.content)} <= set(wanted)
-    assert wanted["rms_error"] == wanted[metrics.headline_of(track.content)]
-    assert wanted["rms_error"] == track.content["unit"]
+    expected = metrics.of_track(track.content)
+    assert {metric for metric, _, _ in metrics.columns_of(track.content)} <= set(expected)
+    assert expected["rms_error"] == expected[metrics.headline_of(track.content)]
+    assert expected["rms_error"] == track.content["unit"]
     assert {f"state/{k}" for k in metrics_joint.POSITION} <= set(keys) or track.env == JOINT
 
 
