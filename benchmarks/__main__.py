@@ -128,7 +128,7 @@ def show_row(row: Positional[tuple[str, ...]], json: bool = False) -> int:
     """
     from json import dumps
 
-    from benchmarks.board.row_text import row_text
+    from benchmarks.board.words import row_text
 
     for held in map(rows.load, _row_paths(row)):
         print(dumps(held, indent=1, sort_keys=True) if json else row_text(held))
@@ -156,9 +156,9 @@ def site(results: Path = rows.RESULTS, out: Path | None = None) -> int:
         results: Folder of the rows.
         out: Folder of the page, benchmarks/site by default.
     """
-    from benchmarks.board import site_build
+    from benchmarks.board import site as pages
 
-    written = site_build.build(results, site_build.OUT if out is None else out)
+    written = pages.build(results, pages.OUT if out is None else out)
     print(f"{len(written)} files; open {written[0]}")
     return 0
 

@@ -30,6 +30,7 @@ from benchmarks.board.words import (
     by_controller,
     change_cells,
     full_verdict,
+    kind_of,
     round_words,
     short_name,
 )
@@ -181,14 +182,6 @@ def _origins(rows: Sequence[Row]) -> Table:
         "state": views.verified_words,
     }
     return by_controller(rows, columns)
-
-
-def kind_of(row: Row) -> str:
-    """Return the kind of a controller, with its number of training seeds."""
-    seeds = views.training_seeds(row)
-    if not seeds:
-        return "classical"
-    return f"{row['controller']['kind']}, {seeds} seed{'s' * (seeds != 1)}"
 
 
 def _means(columns: Sequence[Column]) -> Cells:

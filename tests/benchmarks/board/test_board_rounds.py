@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from benchmarks.board import accessors as views
-from benchmarks.board import leaderboard, site_build, standings
+from benchmarks.board import leaderboard, site, standings
 from benchmarks.runs import verified
 from benchmarks.runs.store import CHECKSUM, read_json
 from tests.benchmarks.row_helpers import draw, place, run_row
@@ -37,7 +37,7 @@ def test_board_shows_round_missing_entrants_and_outsiders(tmp_path: Path) -> Non
         day = verified.read(tmp_path / "out")["tiny--trained"]["date"]
         assert f"| verified {day} |" in text
 
-        site_build.build(tmp_path / "out", tmp_path / "site")
+        site.build(tmp_path / "out", tmp_path / "site")
         assert json.loads((tmp_path / "site/rows/tiny--trained.json").read_text()) == read_json(
             path
         )

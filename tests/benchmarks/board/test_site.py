@@ -14,7 +14,7 @@ import board_fakes as fakes
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.board import leaderboard, site_build, site_data
+from benchmarks.board import leaderboard, site
 from benchmarks.runs import rows, traces
 from benchmarks.runs.controllers import find
 from benchmarks.runs.runner import Options, run
@@ -45,7 +45,7 @@ def page_rows() -> list[dict[str, Any]]:
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder with the page of the fakes."""
     out = tmp_path_factory.mktemp("page")
-    for name, text in site_build.page(page_rows()).items():
+    for name, text in site.page(page_rows()).items():
         (out / name).parent.mkdir(parents=True, exist_ok=True)
         (out / name).write_text(text)
     return out
@@ -101,7 +101,7 @@ def test_verdicts_and_rank_changes_are_shown(seen: dict[str, Any]) -> None:
 @needs_browser
 def test_rows_are_in_their_groups_with_intervals(seen: dict[str, Any]) -> None:
     assert seen["first"] == ORDER
-    assert seen["groups"] == [title for title in site_data.GROUPS.values() if title]
+    assert seen["groups"] == [title for title in site.GROUPS.values() if title]
     assert seen["intervals"] == len(ORDER) - 1
     assert seen["round"].startswith("Audit round 2, drawn 2026-01-02: 6 episodes")
 
@@ -177,7 +177,7 @@ def test_address_opens_a_row(built: Path) -> None:
 
 @needs_browser
 def test_page_without_rows_has_a_message(tmp_path: Path) -> None:
-    site_build.build(tmp_path, tmp_path / "out")
+    site.build(tmp_path, tmp_path / "out")
     shown = browse((tmp_path / "out" / "index.html").as_uri(), tmp_path)
     assert "There are no rows yet" in shown
 
@@ -187,27 +187,27 @@ def test_equal_rows_give_an_equal_page(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(leaderboard, "load", lambda folder: made["rows"])
     for row in made["rows"]:
         write_json(rows.path_of(row["row"], tmp_path), {"the row": row["row"]})
-    written = site_build.build(tmp_path, tmp_path / "out")
+    written = site.build(tmp_path, tmp_path / "out")
     assert written[0].name == "index.html"
     raw = tmp_path / "out" / "rows" / "short_nominal--pid.json"
     assert json.loads(raw.read_text()) == {"the row": "short_nominal--pid"}
     before = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*.*")}
     made["rows"] = page_rows()[::-1]
-    site_build.build(tmp_path, tmp_path / "out")
+    site.build(tmp_path, tmp_path / "out")
     after = {path: path.read_bytes() for path in (tmp_path / "out").rglob("*.*")}
     assert after == before
     made["rows"] = page_rows()[:4]
-    site_build.build(tmp_path, tmp_path / "out")
+    site.build(tmp_path, tmp_path / "out")
     for folder, end in (("data/traces", "js"), ("rows", "json")):
         left = {path.name for path in (tmp_path / "out" / folder).iterdir()}
         assert left == {f"short_nominal--{n}.{end}" for n in ("inverse", "pid", "zero", "outside")}
 
 
 def test_page_loads_nothing_from_the_network() -> None:
-    for path in site_build.ASSETS.iterdir():
+    for path in site.ASSETS.iterdir():
         links = re.findall(r"https?://[^\s\"']+", path.read_text())
         assert set(links) <= {"http://www.w3.org/2000/svg"}, path.name  # a name, not an address
-    index = (site_build.ASSETS / "index.html").read_text()
+    index = (site.ASSETS / "index.html").read_text()
     assert "default-src 'none'" in index
 
 

@@ -1,25 +1,32 @@
-"""Content of the site as plain data: a pure function of the rows."""
+"""Static site, a pure function of the rows: one folder, without server and network."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.board import accessors as views
-from benchmarks.board import cite, claims, standings, words
+from benchmarks.board import cite, claims, leaderboard, plots, standings, words
 from benchmarks.board import summary as board_summary
 from benchmarks.board.claims import Claim
 from benchmarks.board.format import percent
 from benchmarks.board.standings import Changes, Listing, Track
+from benchmarks.identity.hashing import plain
+from benchmarks.runs import rows
 from benchmarks.runs.cells import PUBLIC
 from benchmarks.runs.rows import Row
-from benchmarks.runs.store import CHECKSUM
+from benchmarks.runs.store import CHECKSUM, read_json, write_all
 from benchmarks.scoring.group import Column
 from benchmarks.scoring.metrics import COSTS, columns_of
 from benchmarks.scoring.statistics import Interval
 
+ASSETS = Path(__file__).parent / "site_assets"
+OUT = Path(__file__).parents[1] / "site"
+_OWNED = ("data/*.js", "data/traces/*.js", "figures/*.svg", "rows/*.json")
 GROUPS = {
     "ranked": "",
     "few": f"Not ranked: fewer than {views.LISTED_SEEDS} training seeds",
@@ -28,11 +35,43 @@ GROUPS = {
 """Parts of a track's table with their titles; the first has the track's round as its title."""
 
 
-def board(rows: Sequence[Row]) -> dict[str, Any]:
+def build(results: Path = rows.RESULTS, out: Path = OUT) -> list[Path]:
+    """Write the site from the rows of a folder, in place of an earlier build; return its files.
+
+    ``index.html`` comes first; equal rows give equal bytes.
+    """
+    all_rows = leaderboard.load(results)
+    texts = page(all_rows)
+    for row in all_rows:
+        stored = read_json(rows.path_of(str(row["row"]), results))
+        texts[f"rows/{row['row']}.json"] = _json(stored) + "\n"
+    return write_all(out, texts, _OWNED)
+
+
+def page(all_rows: Sequence[Row]) -> dict[str, str]:
+    """Return the site's files by their names, ``index.html`` first."""
+    names = ("index.html", "page.css", "draw.js", "detail.js", "page.js")
+    texts = {name: (ASSETS / name).read_text() for name in names}
+    texts["data/board.js"] = f"const BOARD = {_json(board(all_rows))};\n"
+    for name, ordered in standings.tracks(all_rows).items():
+        texts[f"figures/{name}.svg"] = plots.track_figure(ordered)
+    for row in sorted(all_rows, key=lambda row: str(row["row"])):
+        if row.get("traces"):
+            call = f"loadTraces({_json(row['row'])}, {_json(row['traces'])});\n"
+            texts[f"data/traces/{row['row']}.js"] = call
+    return texts
+
+
+def _json(value: Any) -> str:
+    """Return JSON that is valid in a script: ordered keys, ASCII letters."""
+    return json.dumps(plain(value), separators=(",", ":"), allow_nan=False)
+
+
+def board(all_rows: Sequence[Row]) -> dict[str, Any]:
     """Return the content of the site without the trajectories, from rows in any order."""
-    tracks = standings.tracks(rows)
+    tracks = standings.tracks(all_rows)
     changes = standings.changes(standings.ranked(tracks))
-    kinds = {views.name_of(row): row["controller"]["kind"] for row in rows}
+    kinds = {views.name_of(row): row["controller"]["kind"] for row in all_rows}
     return {
         "groups": [{"name": name, "title": title} for name, title in GROUPS.items()],
         "tracks": [_track(name, ordered) for name, ordered in tracks.items()],
@@ -85,8 +124,8 @@ def _rows(
         zip((r["row"] for r in listing.ranked), standings.ranks(listing.ranked), strict=True)
     )
     shown = []
-    for group, rows in zip(GROUPS, (listing.ranked, listing.few, listing.outside), strict=True):
-        for row in rows:
+    for group, own in zip(GROUPS, (listing.ranked, listing.few, listing.outside), strict=True):
+        for row in own:
             place = ranks.get(row["row"])
             placed = {"group": group, "rank": str(place or "-"), "place": place and place.first}
             shown.append({**placed, **_row(row, columns, found.get(views.name_of(row)))})
