@@ -101,7 +101,7 @@ def test_docstrings_formatting_module_paths_renderer_and_diagnosis_void_nothing(
         reformat(tmp_path / folder)
     move("baselines.positioning.inverse_pid", "baselines.positioning.elsewhere", tmp_path)
     move("pam_envs.references.trajectory", "pam_envs.references.moved", tmp_path)
-    renderer = tmp_path / "pam_envs/envs/rendering/film.py"
+    renderer = tmp_path / "pam_envs/envs/rendering/renderer.py"
     renderer.write_text(renderer.read_text() + "\nFRAME_SECONDS = 0.5\n")
     shutil.rmtree(tmp_path / "pam_envs/diagnosis")
     script = "import json, test_identity; print(json.dumps(test_identity.identities()))"
