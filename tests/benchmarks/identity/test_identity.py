@@ -84,9 +84,13 @@ def move(module: str, new: str, root: Path) -> None:
     """Move a module and its importers' imports."""
     old_file, new_file = (root / f"{name.replace('.', '/')}.py" for name in (module, new))
     old_file.rename(new_file)
+    imports = ("from {0}.{1} import", "from {0} import {1} as", "from {0} import {1}\n")
     for path in root.rglob("*.py"):
         text = path.read_text(encoding="utf-8")
-        path.write_text(text.replace(f"{module} import", f"{new} import"), encoding="utf-8")
+        for line in imports:
+            old, other = (line.format(*name.rsplit(".", 1)) for name in (module, new))
+            text = text.replace(old, other)
+        path.write_text(text, encoding="utf-8")
 
 
 def test_docstrings_formatting_module_paths_renderer_and_diagnosis_void_nothing(
