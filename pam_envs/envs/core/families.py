@@ -28,7 +28,7 @@ class Kernels:
     report: Report
     """Entries of ``info`` and signals of the observation."""
     evaluate: Kernel
-    """Writes what is computed of both."""
+    """Writes the computed ones of both."""
     begin: Kernel
     """Starts an episode."""
     rows: int

@@ -109,7 +109,7 @@ def read_elbow(rows: Any, fixed: Any, counts: Any, step: int, j: int) -> None:
 
 @kernel
 def observe(rows: Any, counts: Any, settings: Any, choices: Any, work: Any, j: int) -> None:
-    """Write what the readings of lane ``j`` give: rate, estimates, references at the angle."""
+    """Write rate, estimates, and references at the sensed angle of lane ``j``."""
     model, step = settings[choices[CHOICE.at_own]], counts[K.STEP][j]
     angle, before = rows[L.READ_ANGLE][j], rows[L.OLD_READ][j]
     torque, stiffness = estimate(model, angle, rows[L.READ_A][j], rows[L.READ_B][j])

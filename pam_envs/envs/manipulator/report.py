@@ -58,7 +58,7 @@ def evaluate(rows: Any, fixed: Any, counts: Any, settings: Any, choices: Any, wo
 
 @kernel
 def judge_pressures(rows: Any, fixed: Any, config: Any, info: Any, j: int) -> None:
-    """Write what the pressures of lane ``j`` and changes of them cost."""
+    """Write costs, margins and efforts of the pressures of lane ``j``."""
     higher, moved, travel = 0.0, 0.0, 0.0
     for k in range(2 * N_STAGES):
         higher = max(higher, rows[M.PRESSURE + k][j])

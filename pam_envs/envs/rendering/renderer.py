@@ -42,10 +42,7 @@ WINDOW_FPS = 50
 
 
 def _pygame() -> Any:
-    """Import the drawing library, or raise saying how to install it.
-
-    Its import sets environment variables of the process; they are removed again.
-    """
+    """Import the drawing library, and remove the environment variables that its import sets."""
     before = dict(os.environ)
     try:
         import pygame
@@ -171,13 +168,13 @@ class Renderer:
     def _draw_numbers(self) -> None:
         info, text, first = self.info, self.canvas.text, self.view.strips[0]
         error = first.scale * (info["output"] - info["reference"])
-        what, unit, number = self.view.number
-        for x, name, value, color in (
+        name, unit, number = self.view.number
+        for x, title, value, color in (
             (360, "time", f"{info['time']:.2f} s", INK),
             (475, "error", f"{error:+.2f} {first.unit}", INK),
-            (600, what, f"{number(info):.2f} {unit}", PRESSURE),
+            (600, name, f"{number(info):.2f} {unit}", PRESSURE),
         ):
-            text(name, (x, 14), MUTED, 11)
+            text(title, (x, 14), MUTED, 11)
             text(value, (x, 29), color, 16)
         if info["saturated"]:
             text("action", (770, 14), REFERENCE, 11, "right")

@@ -19,7 +19,7 @@ EVERY = pytest.mark.parametrize("name", IDS)
 
 
 def bad_actions(n: int) -> list[Any]:
-    """Return what is no action of ``n`` numbers."""
+    """Return invalid actions for ``n`` numbers."""
     return [
         *([value] * n for value in (np.nan, np.inf, -np.inf, 10**400, 1j)),
         [0.1] * (n - 1) + [np.nan],

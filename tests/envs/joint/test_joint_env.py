@@ -21,7 +21,7 @@ STILL: dict[str, Any] = {
     "episode_seconds": 60.0,
 }
 IDEAL = AntagonisticJoint.paper(hysteresis__width=0.0, link__gravity=0.0)
-"""Without hysteresis and weight: what the inverse of the static laws is exact for."""
+"""Without hysteresis and weight: the inverse of the static laws is exact."""
 
 
 def make(**arguments: Any) -> Any:

@@ -30,7 +30,7 @@ def make(**arguments: Any) -> Any:
 
 
 def vector(info: dict[str, float], key: str) -> np.ndarray:
-    """Return what ``info`` has of every joint."""
+    """Return a quantity of every joint."""
     return np.array([info[f"{key}_{k}"] for k in range(6)])
 
 
